@@ -26,9 +26,9 @@ from lightpaint.screen import Shown, some_names, some_of
 
 @dataclass(frozen=True)
 class IndirectLight:
-    """The part of the images that more than one surface has scattered.
+    """The part of the images that was scattered by more than one surface.
 
-    planes, noise: as those of a `Basis`, of that part alone.
+    planes, noise: as in `Basis`, for that part alone.
     """
 
     planes: Planes
@@ -41,35 +41,35 @@ class Basis(Shown):
     """The images of a scene lit by one light at a time.
 
     Attributes:
-        lights: The table of n lights, which may be given as a sequence of them; their order is the
-            order of everything else.
-        planes: Linear Rec.709 radiance of each light at unit emission; an array (n, h, w, 3)
-            float32 may be given. `images` is that array.
-        noise: Half the difference of two independent halves of the samples: the noise of `planes`;
-            given as these are. Where an interrupt left the halves unequal, it overstates the noise
-            a little. Zeros where nothing is known of it (see `knows_noise`). `half_differences` is
-            the array.
-        emitters_seen: (h, w) bool, pixels in which the camera sees an emitter, directly or
-            through clear glass.
-        origin: Where it comes from: scene, sensor, seed, samples.
-        guide_table: (2, cells, emitters) float32, what the renderer has learned about which emitter
-            matters where, or None. Only rendering more samples needs it.
-        features: Albedo, normals and positions of what is seen, to denoise pictures by, or None.
-        objects: Whose surfaces are seen, or None.
-        indirect: The indirect part of `planes` and `noise`, to denoise pictures by; None where it
-            was not kept apart.
-        extra: (h, w), samples of each half beyond those of the origin, where a painting needed
-            them; None if no pixel has any. Their number never depends on the light of their pixel,
-            so that the images are as unbiased as without them. Going on needs it, nobody else.
-        source: Path of the file that it was read from, or of the scene that it was rendered of, for
-            people; of memory only.
-        sums: The undivided sums of both halves of the samples, (n or 2n, h, w, 3) float32 each, of
-            which `planes`, `noise` and `indirect` are made; only where more samples are to be
-            added, which so come to the bits of one render; of memory only.
-        former: The look of the scene before its lights were moved, with its noise: what a painting
-            was painted over; None where none were. Of memory only.
-        render_s: Seconds that all of it took to render in this process; None where that is not
-            known, as of what was kept; of memory only.
+        lights: The table of n lights, or a sequence of lights. All other attributes follow their
+            order.
+        planes: Linear Rec.709 radiance of each light at unit emission; may be given as an array (n,
+            h, w, 3) float32, which `images` returns.
+        noise: Half the difference of two independent halves of the samples, which estimates the
+            noise of `planes`; given in the same form. If an interrupted render left the halves
+            unequal, it overstates the noise a little. Zeros if the noise is unknown (see
+            `knows_noise`). `half_differences` is the array.
+        emitters_seen: (h, w) bool, pixels in which the camera sees an emitter, directly or through
+            clear glass.
+        origin: Scene, sensor, seed and samples that it was made from.
+        guide_table: (2, cells, emitters) float32, the importance of each emitter in each cell of
+            space as learned by the renderer, or None. Only needed to render more samples.
+        features: Albedo, normals and positions of the visible surfaces, for denoising, or None.
+        objects: The map of visible objects, or None.
+        indirect: The indirect part of `planes` and `noise`, for denoising; None if it was not
+            stored separately.
+        extra: (h, w), number of samples of each half beyond those of the origin, where a painting
+            needed them; None if there are none. The number in a pixel never depends on the light of
+            that pixel, so the images stay unbiased. Only needed to continue rendering.
+        source: Path of the file that it was read from or of the scene that it was rendered from,
+            for display; not stored.
+        sums: The undivided sums of both halves of the samples, (n or 2n, h, w, 3) float32 each,
+            from which `planes`, `noise` and `indirect` are computed. Present only if more samples
+            are to be added, so that the result has the bits of a single render; not stored.
+        former: The look of the scene before its lights were moved, with its noise: the picture that
+            was painted over. None if no light was moved; not stored.
+        render_s: Seconds that this process spent rendering it; None if unknown, for example if a
+            part comes from the cache; not stored.
 
     Examples:
         >>> basis.names
@@ -130,10 +130,10 @@ class Basis(Shown):
         return f"Basis({summary}: {some_of(self.names, room=400)})"
 
     def to_dataframe(self) -> Any:
-        """Return a pandas.DataFrame with a row for each light, by its name.
+        """Return a pandas.DataFrame with one row for each light, indexed by name.
 
         red, green, blue: its present emission, linear Rec.709 in `unit`. mean: luminance of its
-        image at that emission, over all pixels. Raises LightpaintError without pandas.
+        image at that emission, averaged over all pixels. Raises LightpaintError without pandas.
         """
         pixels = self.size[0] * self.size[1]
         means = self.totals / pixels * self.present_weights
@@ -156,7 +156,7 @@ class Basis(Shown):
     def to_xarray(self) -> Any:
         """Return an xarray.Dataset of the images and their noise, with lights by name.
 
-        images, half_differences: (light, y, x, channel), as of the attributes, and not copied.
+        images, half_differences: (light, y, x, channel), the arrays of the properties, not copied.
         present: (light, channel), weights of the present look. emitters_seen: (y, x). Raises
         LightpaintError without xarray.
         """
@@ -183,8 +183,8 @@ class Basis(Shown):
         return self.lights.names
 
     def image(self, name: str) -> Floats:
-        """Return the image of the light called `name`, (h, w, 3). Raises BasisError if there is
-        none.
+        """Return the image of the light called `name`, (h, w, 3). Raises BasisError if there is no
+        such light.
         """
         if name not in self.names:
             raise BasisError(f"no light {name!r} in the basis: it has {some_names(self.names)}")
@@ -192,7 +192,7 @@ class Basis(Shown):
 
     @property
     def images(self) -> Floats:
-        """All planes as one array, (n, h, w, 3) float32: for people, and for small pictures."""
+        """All planes as one array, (n, h, w, 3) float32: for interactive use and small images."""
         return self.planes.array()
 
     @property
@@ -207,9 +207,10 @@ class Basis(Shown):
         emitters_seen: Bools,
         former: Estimate | None = None,
     ) -> "Basis":
-        """Return a basis of the same lights on other pixels: some, or those of several views.
+        """Return a basis of the same lights on other pixels: a selection, or those of several
+        views.
 
-        It has no part that describes the pixels as one picture. Parameters are the attributes.
+        Parts that describe the pixels as one image are dropped. Parameters are the attributes.
         """
         return replace(
             self,
@@ -227,7 +228,7 @@ class Basis(Shown):
         )
 
     def without_cached_values(self) -> "Basis":
-        """Return this basis without values computed from its planes, which have changed since."""
+        """Return this basis without the values cached from its planes, which have changed since."""
         return replace(self)
 
     def with_requests(self, requests: SceneRequests) -> "Basis":
@@ -240,7 +241,7 @@ class Basis(Shown):
 
     @property
     def requests(self) -> SceneRequests:
-        """The wishes of its scene's lights file, by light."""
+        """The requests in the scene's lights file, by light."""
         return self.lights.requests
 
     @property
@@ -250,7 +251,9 @@ class Basis(Shown):
 
     @property
     def knows_noise(self) -> bool:
-        """True if `half_differences` estimate the noise: not if the samples are unknown."""
+        """True if `half_differences` estimate the noise; False if the number of samples is
+        unknown.
+        """
         return min(self.origin.halves) > 0 or bool(self.origin.each_light)
 
     @property
@@ -260,7 +263,7 @@ class Basis(Shown):
 
     @cached_property
     def present_look(self) -> npt.NDArray[np.float32]:
-        """The present scene, (h, w, 3), or the scene before its lights were moved."""
+        """The scene as it is now, (h, w, 3), or as it was before its lights were moved."""
         if self.former is not None:
             return read_only(self.former.image)
         return read_only(self.mix(self.present_weights))
@@ -274,37 +277,42 @@ class Basis(Shown):
 
     @cached_property
     def surface_filter(self) -> SurfaceFilter | None:
-        """The filter of light along the surfaces that are seen; None where these are not known."""
+        """The filter that averages light along visible surfaces; None if the surfaces are
+        unknown.
+        """
         if self.features is None or self.features.position is None:
             return None
         return SurfaceFilter(self.features)
 
     @property
     def is_fixed(self) -> Bools:
-        """Which lights are fixed, with weight 1, (n,)."""
+        """(n,), True for lights that stay as they are, with weight 1."""
         return self.lights.is_fixed
 
     @cached_property
     def power(self) -> Doubles:
-        """‖Φᵢ‖² over the picture, (n, 3) float64; where an emitter is seen, nothing counts."""
+        """‖Φᵢ‖² over the picture, (n, 3) float64; pixels in which an emitter is seen do not
+        count.
+        """
         return read_only(self._power_and_totals[0])
 
     @cached_property
     def totals(self) -> Doubles:
-        """Σ_pixels Φᵢ, (n, 3) float64, over all of the picture."""
+        """Σ_pixels Φᵢ, (n, 3) float64, over the whole picture."""
         return read_only(self._power_and_totals[1])
 
     @cached_property
     def _power_and_totals(self) -> tuple[Doubles, Doubles]:
-        """Power and totals of one walk, (n, 3) each."""
+        """Power and totals, (n, 3) each, computed in one walk over the planes."""
         return power_and_totals(self.planes, ~self.emitters_seen)
 
     def set_power_and_totals(self, power: Doubles, totals: Doubles) -> None:
-        """Keep `power` and `totals` that are known already, so that no walk computes them.
+        """Set `power` and `totals` to known values, so that no walk over the planes computes them.
 
-        power, totals: (n, 3) float64, of just these planes. Call it before either is read.
+        power, totals: (n, 3) float64, for exactly these planes. Must be called before either is
+        read.
         """
-        vars(self)["_power_and_totals"] = power, totals  # the place of the cached property's value
+        vars(self)["_power_and_totals"] = power, totals  # where cached_property stores its value
 
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
         """Return the image Σ w_i Φ_i, (h, w, 3) float32. weights: (n, 3) in the order of the
@@ -315,7 +323,7 @@ class Basis(Shown):
     def predict(self, weights: Doubles) -> Estimate:
         """Return the image Σ w_i Φ_i with its noise, read-only. weights: (n, 3).
 
-        The last one is kept: an analysis and a report of the same weights ask for it many times.
+        The last result is kept, since an analysis and a report ask for the same weights many times.
         """
         key = np.asarray(weights, np.float64).tobytes()
         estimate = self._predicted.get(key)
@@ -331,10 +339,10 @@ class Basis(Shown):
 
 
 def meter_exposure(image: Floats, *bases: Basis) -> float:
-    """Return the exposure in stops at which to show a picture that bases make.
+    """Return the exposure in stops at which to show a picture mixed from `bases`.
 
-    image: (h, w, 3) linear; of several bases, their pictures as rows of pixels, (1, p, 3). Light
-    groups do not say where an emitter is seen.
+    image: (h, w, 3) linear; for several bases, their pixels in one row, (1, p, 3). Visible emitters
+    are ignored, except in light groups, which do not say where they are.
     """
     if not all(basis.knows_noise for basis in bases):
         return choose_exposure(image)

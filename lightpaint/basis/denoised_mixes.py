@@ -1,8 +1,8 @@
 """Denoised mixes of lights.
 
-Direct light is nearly clean after few samples, and has the edges of shadows and highlights that a
-denoiser blurs; indirect light is noisy and smooth. So indirect light is denoised, and direct light
-only as far as its own noise asks for it. Where Open Image Denoise is not installed, both are
+Direct light is nearly clean after few samples, and has edges of shadows and highlights that a
+denoiser would blur; indirect light is noisy and smooth. So indirect light is denoised fully, and
+direct light only as far as its own noise demands. If Open Image Denoise is not installed, both are
 averaged along surfaces instead.
 """
 
@@ -17,9 +17,9 @@ from lightpaint.images.estimate import box_mean
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.images.stray_pixels import stray_pixels
 
-#: Pixels on either side over which noise and the denoiser's changes are averaged.
+#: Radius in pixels over which noise and the change made by the denoiser are averaged.
 RADIUS = 3
-#: The same if noise is estimated from the picture alone, which takes more pixels.
+#: The same if the noise is estimated from the picture alone, which takes more pixels.
 GRAIN_RADIUS = 5
 
 
@@ -31,10 +31,10 @@ def denoise_mix(
     factor: int = 1,
     quality: Quality = "fast",
 ) -> Floats:
-    """Return Σ w_i Φ_i without its grain, (h, w, 3) float32.
+    """Return Σ w_i Φ_i denoised, (h, w, 3) float32.
 
-    weights: (n, 3). mixed: the sum, where somebody has it already. factor: side of the blocks of
-    pixels that become one.
+    weights: (n, 3). mixed: the sum, if it is already computed. factor: side of the blocks of pixels
+    that are averaged to one.
     """
     total = basis.mix(weights) if mixed is None else mixed
     pictures = [total]
@@ -44,7 +44,7 @@ def denoise_mix(
 
 
 def denoise_present_look(basis: Basis, *, quality: Quality = "fast") -> Floats:
-    """Return the present scene, denoised, (h, w, 3) float32."""
+    """Return the scene in its present state, denoised, (h, w, 3) float32."""
     mixed = basis.present_look
     if basis.former is not None:
         return denoised(mixed, basis.features, quality=quality)
@@ -52,9 +52,9 @@ def denoise_present_look(basis: Basis, *, quality: Quality = "fast") -> Floats:
 
 
 def denoise_plane(basis: Basis, k: int, *, factor: int = 1, quality: Quality = "fast") -> Floats:
-    """Return the image of light k at unit emission without its grain, (h, w, 3) float32.
+    """Return the image of light k at unit emission, denoised, (h, w, 3) float32.
 
-    factor: as of `denoise_mix`.
+    factor: as in `denoise_mix`.
     """
     pictures = [basis.planes.plane(k)]
     if (parts := basis.indirect) is not None:
@@ -65,9 +65,10 @@ def denoise_plane(basis: Basis, k: int, *, factor: int = 1, quality: Quality = "
 def _denoise_pictures(
     basis: Basis, pictures: Sequence[Floats], factor: int, quality: Quality
 ) -> Floats:
-    """Return all light without its grain: direct and indirect light apart, where both are known.
+    """Return all light denoised: direct and indirect light separately, if both are known.
 
-    pictures: (h, w, 3), of all light; then perhaps its noise, indirect light, the noise of that.
+    pictures: (h, w, 3) each: all light; then, if known, its noise, indirect light, and the noise of
+    that.
     """
     features = basis.features
     if factor > 1:
@@ -92,18 +93,20 @@ def _denoise_pictures(
 def blend_by_noise(raw: Floats, half_difference: Floats, clean: Floats) -> Floats:
     """Return the mean of a picture and its denoised form that has the least expected error.
 
-    All are (h, w, 3), as of `share_of_clean`.
+    All are (h, w, 3), as in `share_of_clean`.
     """
     return np.asarray(raw + share_of_clean(raw, half_difference, clean) * (clean - raw), np.float32)
 
 
 def share_of_clean(raw: Floats, half_difference: Floats, clean: Floats) -> Floats:
-    """Return the share of the denoised form in the mean of least expected error, (h, w, 1) float32.
+    """Return the share of the denoised form in the mean with the least expected error, (h, w, 1)
+    float32.
 
-    raw: (h, w, 3), whose `half_difference` tells its variance V. clean: the same, denoised, which
-    has lost E[(clean − raw)²] − V =: B of it. All are averaged over a window of pixels and the
-    channels. With (1 − t) raw + t clean the error is (1 − t)² V + t² B, so t = V / (V + B). Stray
-    pixels, whose halves agree by chance, do not count for B, and are taken from the denoised form.
+    raw: (h, w, 3), whose variance V is estimated from `half_difference`. clean: its denoised form,
+    whose squared bias is B = E[(clean − raw)²] − V. Both are averaged over a window of pixels and
+    over channels. The error of (1 − t) raw + t clean is (1 − t)² V + t² B, hence t = V / (V + B).
+    Stray pixels, whose halves agree by chance, do not count for B, and are taken from the denoised
+    form.
     """
 
     def mean_square(values: Floats) -> Doubles:
@@ -121,11 +124,11 @@ def share_of_clean(raw: Floats, half_difference: Floats, clean: Floats) -> Float
 def blend_by_grain(raw: Floats, clean: Floats) -> Floats:
     """Return the mean of a picture of unknown noise and its denoised form, (h, w, 3) float32.
 
-    Noise differs from pixel to pixel, while along an edge neighbours lose alike. So the part of r =
-    clean − raw that correlates with the pixels two away, in the direction of the largest
-    correlation, counts as detail that the denoised form has lost, and the rest as noise: t = V /
-    ⟨r²⟩ as in `share_of_clean`. The distance is two pixels, since filtering renderers correlate the
-    noise of neighbours.
+    Noise differs from pixel to pixel, while neighbours along an edge lose alike. So take r = clean
+    − raw in a window of pixels, and its correlation with the pixels two away in the direction in
+    which that is largest. The correlated part counts as detail lost by denoising, the remainder V
+    as noise: t = V / ⟨r²⟩, as in `share_of_clean`. The distance is two pixels because renderers
+    that filter correlate the noise of neighbours.
     """
     changed = (clean - raw).astype(np.float64)
 

@@ -1,7 +1,7 @@
-"""Planes derived from others: sums of several, means over blocks, pictures joined in a row.
+"""Planes computed from other planes: selections, means over blocks, several pictures in one row.
 
-Planes that fit into memory are computed at once. The rest is computed from rows of the others on
-each request, and takes no more memory than these rows.
+If the result fits in memory, it is computed at once. Otherwise it is computed from the source's
+rows on each request, and takes no more memory than these rows.
 """
 
 from collections.abc import Sequence
@@ -16,13 +16,13 @@ from lightpaint.basis.file.file_planes import RowPlanes
 from lightpaint.basis.planes import BLOCK_PIXELS, MemoryPlanes, Planes
 from lightpaint.images.pixel_blocks import block_sums
 
-#: Rows of pixels that are averaged at a time: those of a chunk of a file that is compressed.
+#: Number of rows of pixels averaged at a time: one chunk of a compressed file.
 READ_ROWS = 16
 
-#: If less than one in so many blocks is requested, only the pixels of those are read.
+#: If fewer than one in this many blocks is requested, only their own pixels are read.
 SPARSE = 8
 
-#: A plane by its number among others; None for a black one.
+#: A plane by its number among others; None for a black plane.
 PlaneReference = tuple[Planes, int] | None
 
 
@@ -31,21 +31,21 @@ def compose_planes(
 ) -> Planes:
     """Return planes of (height, width) pixels, one for each of `picks`.
 
-    in_memory: whether they are copied there, or else stay where they are.
+    in_memory: whether they are copied into memory, or read from their sources on request.
     """
     composed = ComposedPlanes(picks, size)
     return MemoryPlanes(np.stack(list(composed))) if in_memory else composed
 
 
 class ComposedPlanes(RowPlanes):
-    """Planes that stay with the others that they come from. picks: one for each light."""
+    """Planes picked from other planes, which are read on request. picks: one for each light."""
 
     def __init__(self, picks: Sequence[PlaneReference], size: tuple[int, int]) -> None:
         self._picks, self._size = tuple(picks), size
 
     @property
     def count(self) -> int:
-        """n."""
+        """Number of lights."""
         return len(self._picks)
 
     @property
@@ -59,7 +59,7 @@ class ComposedPlanes(RowPlanes):
         return np.zeros((*self._size, 3), np.float32) if pick is None else pick[0].plane(pick[1])
 
     def rows(self, top: int, bottom: int) -> Floats:
-        """Return some rows of all planes, (n, bottom - top, w, 3)."""
+        """Return rows `top` to `bottom` of all planes, (n, bottom - top, w, 3)."""
         top, bottom = max(top, 0), min(bottom, self._size[0])
         composed = np.zeros((self.count, max(bottom - top, 0), self._size[1], 3), np.float32)
         sources = {id(pick[0]): pick[0] for pick in self._picks if pick is not None}
@@ -72,10 +72,10 @@ class ComposedPlanes(RowPlanes):
 
 
 def block_means(planes: Planes, weight: Doubles, side: int) -> Planes:
-    """Return means over blocks of side × side pixels, weighted, as planes of a pixel for each.
+    """Return weighted means over blocks of side × side pixels, as planes with one pixel per block.
 
-    weight: (h, w), >= 0, of pixels from the top left corner on; others belong to no block. Where a
-    block has no weight its mean is 0. Remainders at the right and at the bottom form smaller ones.
+    weight: (h, w), >= 0, for pixels from the top left corner on; pixels outside it belong to no
+    block. A block without weight has mean 0. Blocks at the right and bottom edges may be smaller.
     """
     means = BlockPlanes(planes, weight, side)
     if not isinstance(planes, RowPlanes):
@@ -86,7 +86,7 @@ def block_means(planes: Planes, weight: Doubles, side: int) -> Planes:
 
 
 class BlockPlanes(RowPlanes):
-    """Means over blocks of pixels of other planes. For the arguments see `block_means`."""
+    """Means over blocks of pixels of other planes. See `block_means` for the arguments."""
 
     def __init__(self, whole: Planes, weight: Doubles, side: int) -> None:
         self._whole, self._weight, self._side = whole, weight, side
@@ -95,7 +95,7 @@ class BlockPlanes(RowPlanes):
 
     @property
     def count(self) -> int:
-        """n."""
+        """Number of lights."""
         return self._whole.count
 
     @property
@@ -108,7 +108,7 @@ class BlockPlanes(RowPlanes):
         return self._means(self._whole.plane(i), 0, self.size[0])
 
     def rows(self, top: int, bottom: int) -> Floats:
-        """Return some rows of all planes, (n, bottom - top, w, 3)."""
+        """Return rows `top` to `bottom` of all planes, (n, bottom - top, w, 3)."""
         top, bottom = max(top, 0), min(bottom, self.size[0])
         blocks = np.empty((self.count, max(bottom - top, 0), self.size[1], 3), np.float32)
         step = max(1, READ_ROWS // self._side)
@@ -120,7 +120,9 @@ class BlockPlanes(RowPlanes):
         return blocks
 
     def pixels(self, where: slice | Indices) -> Floats:
-        """Return some blocks of all planes, (n, p, 3): of a few, from their own pixels alone."""
+        """Return some blocks of all planes, (n, p, 3). If they are few, only their own pixels are
+        read.
+        """
         if isinstance(where, slice) or SPARSE * len(where) > np.ptp(where) + 1:
             return super().pixels(where)
         means = np.empty((self.count, len(where), 3), np.float32)
@@ -134,7 +136,7 @@ class BlockPlanes(RowPlanes):
         """Return the means of some blocks, (n, p, 3)."""
         side, (height, width) = self._side, self._weight.shape
         rows, columns = np.divmod(blocks, self.size[1])
-        # One block beside the other: (side, p * side) places in the picture.
+        # Indices of the blocks' pixels, with blocks side by side: (side, p * side).
         along = np.arange(side)
         y, x = np.broadcast_arrays(
             side * rows[:, None] + along[:, None, None], side * columns[:, None] + along
@@ -150,7 +152,9 @@ class BlockPlanes(RowPlanes):
         return np.array([values / total for values in sums], np.float32)
 
     def _means(self, lit: Floats, top: int, bottom: int) -> npt.NDArray[np.float32]:
-        """Return some rows of means of a plane's pixels, which begin with the first of them."""
+        """Return block rows `top` to `bottom` of one plane. lit: its pixels, starting with those of
+        `top`.
+        """
         first = top * self._side
         weight = self._weight[first : bottom * self._side]
         counted = lit[: len(weight), : weight.shape[1]] * weight[..., None]
@@ -158,7 +162,7 @@ class BlockPlanes(RowPlanes):
 
 
 def in_one_row(parts: Sequence[Planes]) -> Planes:
-    """Return the planes of several pictures of the same lights as those of one, a single row."""
+    """Return the planes of several pictures of the same lights as one picture with a single row."""
     if any(isinstance(part, RowPlanes) for part in parts):
         return JoinedRow(parts)
     flat = [part.pixels(slice(None)) for part in parts]
@@ -166,7 +170,7 @@ def in_one_row(parts: Sequence[Planes]) -> Planes:
 
 
 class JoinedRow(RowPlanes):
-    """The pixels of several pictures of the same lights behind each other, read on request."""
+    """The pixels of several pictures of the same lights in one row, read on request."""
 
     def __init__(self, parts: Sequence[Planes]) -> None:
         self._parts = tuple(parts)
@@ -175,7 +179,7 @@ class JoinedRow(RowPlanes):
 
     @property
     def count(self) -> int:
-        """n."""
+        """Number of lights."""
         return self._parts[0].count
 
     @property
@@ -188,11 +192,13 @@ class JoinedRow(RowPlanes):
         return np.concatenate([part.plane(i).reshape(-1, 3) for part in self._parts])[None]
 
     def rows(self, top: int, bottom: int) -> Floats:
-        """Return the single row of all planes, (n, 1, p, 3), if it is asked for."""
+        """Return the single row of all planes, (n, 1, p, 3), or no row if it is outside the
+        range.
+        """
         return self.pixels(slice(None))[:, None][:, top:bottom]
 
     def pixels(self, where: slice | Indices) -> Floats:
-        """Return some of the pixels, (n, p, 3)."""
+        """Return some pixels of all planes, (n, p, 3)."""
         if isinstance(where, slice):
             start, stop, step = where.indices(self.size[1])
             if step == 1 and start < stop:

@@ -1,4 +1,4 @@
-"""The lights of a basis without pixels: their kinds, emission and constraints."""
+"""The lights of a basis, without pixels: kinds, emission, and requests of their lights file."""
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -16,16 +16,17 @@ from lightpaint.validation import BRIGHTEST, MAX_NAME, is_amount
 
 @dataclass(frozen=True)
 class BasisLight:
-    """A light of a basis.
+    """A light in a basis.
 
-    parameter, unit: meaning of one unit of weight (`radiance`, `W/(m² sr)`). emission: its present
-    RGB emission in the scene, in that unit. form: its place and size, as text. is_scalar: whether
-    it can only be scaled as a whole, with one weight for all channels. is_fixed: whether it is not
-    adjusted: its weight is 1.
-    members: names of the emitters it consists of; itself if none are given.
-    unit_flux: watts it radiates per channel at an emission of 1; None where that is not known.
-    identity: of its plane; lights of the same identity have the same plane, up to noise (see
-    `Light.identity`); "" if unknown.
+    parameter, unit: parameter and unit that weights refer to (`radiance`, `W/(m² sr)`).
+    emission: its present RGB emission in the scene, in that unit.
+    form: its position and size as text.
+    is_scalar: whether it can only be scaled as a whole, with one weight for all channels.
+    is_fixed: whether its weight stays 1, whatever is painted.
+    members: names of the emitters that it consists of; by default its own name.
+    unit_flux: watts radiated per channel at an emission of 1; None if unknown.
+    identity: identity of its plane; planes with equal identities are equal up to noise (see
+    `Light.identity`). "" if unknown.
     """
 
     name: str
@@ -67,10 +68,10 @@ class BasisLight:
 
 @dataclass(frozen=True)
 class Lights(Sequence[BasisLight]):
-    """The ordered table of lights: their order is the order of weights, planes and sums.
+    """The ordered table of lights, whose order is that of weights, planes and sums.
 
-    records: the record of each light. requests: the constraints that the lights file of their scene
-    asks for; of memory only, since that file may change.
+    records: one record for each light. requests: constraints from the scene's lights file, which
+    are not stored with the basis, since that file may change.
     """
 
     records: tuple[BasisLight, ...]
@@ -83,7 +84,7 @@ class Lights(Sequence[BasisLight]):
 
     @classmethod
     def of(cls, lights: Sequence[BasisLight]) -> "Lights":
-        """Return `lights` as such a table."""
+        """Return `lights` as a table."""
         return lights if isinstance(lights, Lights) else cls(tuple(lights))
 
     def __repr__(self) -> str:
@@ -103,16 +104,16 @@ class Lights(Sequence[BasisLight]):
         return self.records[k]
 
     def with_requests(self, requests: SceneRequests) -> "Lights":
-        """Return these lights with these requests."""
+        """Return these lights with other requests."""
         return self if self.requests == requests else replace(self, requests=requests)
 
     def identity(self, i: int) -> str:
-        """Return the identity of plane i; "" where that is not known."""
+        """Return the identity of plane i; "" if unknown."""
         return self.records[i].identity
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Their names."""
+        """Names of the lights."""
         return tuple(light.name for light in self.records)
 
     @cached_property
@@ -123,17 +124,17 @@ class Lights(Sequence[BasisLight]):
 
     @cached_property
     def is_fixed(self) -> Bools:
-        """Which lights are fixed, with weight 1, (n,)."""
+        """(n,), True for lights that stay as they are, with weight 1."""
         return read_only(np.array([light.is_fixed for light in self.records], dtype=bool))
 
     @cached_property
     def is_scalar(self) -> Bools:
-        """(n,), which lights have one weight for all channels."""
+        """(n,), True for lights that have one weight for all channels."""
         return read_only(np.array([light.is_scalar for light in self.records], dtype=bool))
 
 
 def free_name(name: str, used: Collection[str]) -> str:
-    """Return `name`, with underscores added while another light has it."""
+    """Return `name` with underscores appended until no other light has it."""
     while name in used:
         name += "_"
     return name

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from lightpaint.errors import BasisError
 from lightpaint.version import __version__
 
-#: Most samples of a pixel, which is beyond any render.
+#: Maximum number of samples per pixel, beyond that of any render.
 MAX_SAMPLES = 2**40
 
-#: Prefix of the method of light groups; the renderer follows.
+#: Prefix of the method of light groups, before the name of the renderer.
 LIGHT_GROUPS = "light groups of "
 
 
@@ -16,14 +16,14 @@ LIGHT_GROUPS = "light groups of "
 class Origin:
     """The origin of a basis, which decides whether bases are comparable and samples can be added.
 
-    halves: samples per pixel of each of the two halves; passes: the number of passes of each.
-    each_light: where lights have unequal numbers of samples, because an interrupt ended separate
-    renders or because they come from several runs, samples of half A and B and passes of A and B of
-    each; `halves` and `passes` are then what all have at least.
-    integrator: replacement of the scene's own; "" if there was none.
-    is_composed: whether planes come from several renders, some of them of another state of the
-    scene, so that no single render reproduces it.
-    extra_spp: further samples per pixel, on average, taken where a painting needed them (see
+    halves: samples per pixel of each of the two halves. passes: number of passes of each half.
+    each_light: samples of halves A and B and passes of A and B for each light, if these numbers
+    differ because separate renders were interrupted or come from several runs; `halves` and
+    `passes` are then the minimum over all lights.
+    integrator: the integrator that replaced the scene's; "" if that was used.
+    is_composed: whether planes come from several renders, some of them of other states of the
+    scene, so that no single render reproduces the basis exactly.
+    extra_spp: mean number of additional samples per pixel where a painting needed them (see
     `Basis.extra`).
     """
 
@@ -51,17 +51,17 @@ class Origin:
 
     @property
     def spp(self) -> int:
-        """Samples per pixel in all."""
+        """Samples per pixel in both halves together."""
         return sum(self.halves)
 
     @property
     def mean_spp(self) -> float:
-        """Samples per pixel in the mean, extra ones included."""
+        """Mean samples per pixel, including extra ones."""
         return self.spp + self.extra_spp
 
     @property
     def samples_text(self) -> str:
-        """Return how many samples pixels have, as `16 samples per pixel`."""
+        """The number of samples in words, such as `16 samples per pixel`."""
         text = f"{self.spp} samples per pixel"
         if not self.extra_spp:
             return text
@@ -69,5 +69,5 @@ class Origin:
 
     @property
     def is_light_groups(self) -> bool:
-        """True if another renderer made it, so that its picture has no template."""
+        """True if another renderer made the picture, which then has no template."""
         return self.method.startswith(LIGHT_GROUPS)

@@ -1,7 +1,7 @@
-"""Planes: one picture per light, in memory or in a file.
+"""Planes: one picture for each light, accessed by pixels, independent of their storage.
 
-A basis has two sets of them, the images and half the differences of two halves of the samples.
-Code outside this room does not index arrays of planes; it calls the methods here.
+A basis has two sets of planes: the images, and half the differences of the two halves of samples.
+Code outside this package uses the protocol below and never indexes an array of planes.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,22 +15,22 @@ import numpy.typing as npt
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.threads import one_thread
 
-#: Pixels multiplied at a time, whose float64 copies fit into the processor's cache.
+#: Number of pixels multiplied at a time, whose float64 copies stay in the processor's cache.
 BLOCK_PIXELS = 2**13
 
-#: Lights up to which the product of a block is too small for BLAS to share it out to threads.
+#: Number of lights up to which the product of a block is too small for BLAS to use threads.
 FEW_LIGHTS = 256
 
 
 class Planes(Protocol):
-    """The planes of n lights, (h, w, 3) each, float32 however they are stored.
+    """The planes of n lights, (h, w, 3) each, float32 whatever the stored type.
 
-    Returned arrays are read-only: they may be views of the stored planes.
+    Returned arrays are read-only by convention: they may share the memory of the planes.
     """
 
     @property
     def count(self) -> int:
-        """n."""
+        """Number of lights."""
 
     @property
     def size(self) -> tuple[int, int]:
@@ -43,40 +43,40 @@ class Planes(Protocol):
         """Return the plane of light i, (h, w, 3)."""
 
     def rows(self, top: int, bottom: int) -> Floats:
-        """Return some rows of all planes, (n, bottom - top, w, 3)."""
+        """Return rows `top` to `bottom` of all planes, (n, bottom - top, w, 3)."""
 
     def pixels(self, where: slice | Indices) -> Floats:
-        """Return some pixels of all planes, (n, p, 3), counted along the rows."""
+        """Return some pixels of all planes, (n, p, 3), indexed in row-major order."""
 
     def picked(self, where: slice | Indices) -> "Planes":
-        """Return the same pixels as planes of a single row, (1, p, 3) each."""
+        """Return these pixels as planes with a single row, (1, p, 3) each."""
 
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
         """Return Σ w_i Φ_i, (h, w, 3). weights: (n, 3), one per light and channel."""
 
     def sums(self, weight: Floats, image: Floats) -> tuple[Doubles, Doubles, Doubles]:
-        """Return M (3, n, n), b (3, n) and ‖Ψ‖² (3,) of all pixels, in one walk.
+        """Return M (3, n, n), b (3, n) and ‖Ψ‖² (3,) over all pixels, in one walk.
 
-        weight: (h, w), (h, w, 1) or, where it differs between channels, (h, w, 3), >= 0. image: Ψ,
-        (h, w, 3).
+        weight: (h, w), (h, w, 1) or, if it differs between channels, (h, w, 3), >= 0. image: Ψ, (h,
+        w, 3).
         """
 
     def squares(self) -> Doubles:
-        """Return Σ Φ² of all pixels and channels, (n,)."""
+        """Return Σ Φ² over all pixels and channels, (n,)."""
 
     def replaced(self, planes: Mapping[int, Floats]) -> "Planes":
-        """Return these planes with others, (h, w, 3), for some of the lights."""
+        """Return planes in which some lights have other planes, (h, w, 3) each."""
 
     def array(self) -> Floats:
-        """Return all planes, (n, h, w, 3): for Python users, and for small bases."""
+        """Return all planes, (n, h, w, 3): for interactive use and small images."""
 
 
 class PlanesBase:
-    """Shared code of all planes: mixes and sums by rows, wherever these are kept."""
+    """Implementation shared by all planes: sums and squares, computed block by block."""
 
     @property
     def count(self) -> int:
-        """n."""
+        """Number of lights."""
         raise NotImplementedError
 
     @property
@@ -100,7 +100,7 @@ class PlanesBase:
         return (self.plane(k) for k in range(self.count))
 
     def squares(self) -> Doubles:
-        """Return Σ Φ² of all pixels and channels, (n,)."""
+        """Return Σ Φ² over all pixels and channels, (n,)."""
         totals, pixels = np.zeros(self.count), self.size[0] * self.size[1]
         for start in range(0, pixels, BLOCK_PIXELS):
             block = self.pixels(slice(start, start + BLOCK_PIXELS)).astype(np.float64)
@@ -108,7 +108,7 @@ class PlanesBase:
         return totals
 
     def sums(self, weight: Floats, image: Floats) -> tuple[Doubles, Doubles, Doubles]:
-        """Return M (3, n, n), b (3, n) and ‖Ψ‖² (3,), in one walk over the pixels that count."""
+        """Return M (3, n, n), b (3, n) and ‖Ψ‖² (3,), in one walk over the pixels with weight."""
         n, (height, width) = self.count, self.size
         # Pixels without weight contribute nothing and need not be read.
         apart = weight.shape[2:] == (3,)
@@ -122,7 +122,7 @@ class PlanesBase:
                 where = as_slice(counted[start : start + BLOCK_PIXELS])
                 lit, painted = self.pixels(where), colours[where]
                 root = np.sqrt(weights[where].astype(np.float64))
-                # (n + 1, block): the target goes along as one more row.
+                # (n + 1, block): the target is the last row.
                 block = room[:, : len(painted)]
                 for c in range(3):
                     channel_root = root[:, c * apart]
@@ -133,14 +133,14 @@ class PlanesBase:
 
 
 class MemoryPlanes(PlanesBase):
-    """Planes that are kept in memory. images: (n, h, w, 3) float32."""
+    """Planes in memory. images: (n, h, w, 3) float32."""
 
     def __init__(self, images: Floats) -> None:
         self._images = images
 
     @property
     def count(self) -> int:
-        """n."""
+        """Number of lights."""
         return len(self._images)
 
     @property
@@ -153,7 +153,7 @@ class MemoryPlanes(PlanesBase):
         return np.asarray(self._images[i])
 
     def rows(self, top: int, bottom: int) -> Floats:
-        """Return some rows of all planes, (n, bottom - top, w, 3)."""
+        """Return rows `top` to `bottom` of all planes, (n, bottom - top, w, 3)."""
         return self._images[:, top:bottom]
 
     def pixels(self, where: slice | Indices) -> Floats:
@@ -161,7 +161,7 @@ class MemoryPlanes(PlanesBase):
         return self._images.reshape(len(self._images), -1, 3)[:, where]
 
     def picked(self, where: slice | Indices) -> "MemoryPlanes":
-        """Return the same pixels as planes of a single row."""
+        """Return these pixels as planes with a single row."""
         return MemoryPlanes(self.pixels(where)[:, None])
 
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
@@ -169,29 +169,29 @@ class MemoryPlanes(PlanesBase):
         return mix(self._images, weights)
 
     def replaced(self, planes: Mapping[int, Floats]) -> "MemoryPlanes":
-        """Return these planes with others for some of the lights."""
+        """Return planes in which some lights have other planes, (h, w, 3) each."""
         images = self._images.copy()
         for k, plane in planes.items():
             images[k] = plane
         return MemoryPlanes(images)
 
     def array(self) -> Floats:
-        """Return all planes, (n, h, w, 3), which are not copied."""
+        """Return all planes, (n, h, w, 3), without copying."""
         return self._images
 
 
 def as_planes(planes: Planes | Floats) -> Planes:
-    """Return planes as they are, and an array (n, h, w, 3) as planes in memory."""
+    """Return an array (n, h, w, 3) as planes in memory, and planes unchanged."""
     return MemoryPlanes(planes) if isinstance(planes, np.ndarray) else planes
 
 
 def joined_planes(
     parts: Sequence[Planes], width: int
 ) -> tuple[MemoryPlanes, tuple[MemoryPlanes, ...]]:
-    """Return the planes of several pictures as those of one, (n, rows, width, 3), and the parts.
+    """Return the planes of several pictures as one, (n, rows, width, 3), and views of its parts.
 
-    Pixels lie behind each other along the rows, and the last row is filled with zeros. The parts
-    that are returned look at the memory of the joint planes.
+    The pixels of the pictures follow each other along the rows, and the last row is padded with
+    zeros. The returned parts share the memory of the joint planes.
     """
     ends = np.cumsum([0, *(part.size[0] * part.size[1] for part in parts)])
     n, rows = parts[0].count, -(-int(ends[-1]) // width)
@@ -205,14 +205,15 @@ def joined_planes(
 
 
 def power_and_totals(planes: Planes, counted: Bools) -> tuple[Doubles, Doubles]:
-    """Return ‖Φᵢ‖² over the counted pixels, and Σ Φᵢ over all of them, (n, 3) float64 each.
+    """Return ‖Φᵢ‖² over the counted pixels and Σ Φᵢ over all pixels, (n, 3) float64 each, in one
+    walk.
 
-    counted: (h, w). Both of one walk.
+    counted: (h, w).
     """
     power, totals = np.zeros((2, planes.count, 3))
     counted_f64 = counted.ravel().astype(np.float64)
-    # A sum over axes this short is slow in NumPy, a product is not; in float64 and by blocks it
-    # is as exact as the sum, and needs no copy of the basis.
+    # NumPy sums over such short axes slowly, but multiplies matrices fast; in float64 and by blocks
+    # a product is as exact as a sum, and needs no copy of the basis.
     for start in range(0, counted_f64.size, BLOCK_PIXELS):
         weights = counted_f64[start : start + BLOCK_PIXELS]
         block = planes.pixels(slice(start, start + BLOCK_PIXELS)).astype(np.float64)
@@ -223,7 +224,7 @@ def power_and_totals(planes: Planes, counted: Bools) -> tuple[Doubles, Doubles]:
 
 
 def as_slice(pixels: Indices) -> slice | Indices:
-    """Return a slice for pixels in one run, which are looked at where they are."""
+    """Return contiguous pixels as a slice, which avoids a copy, and others unchanged."""
     first, last = int(pixels[0]), int(pixels[-1])
     return slice(first, last + 1) if last - first + 1 == pixels.size else pixels
 
@@ -235,11 +236,11 @@ def mix(images: Floats, weights: Doubles) -> npt.NDArray[np.float32]:
     """
     n, height, width, _ = images.shape
     weights = np.asarray(weights, np.float32)
-    if images.strides[-1] != images.itemsize:  # channel by channel
+    if images.strides[-1] != images.itemsize:  # stored with channels first
         apart = [np.einsum("nhw,n->hw", images[..., c], weights[:, c]) for c in range(3)]
         return np.stack(apart, axis=-1)
-    # With a weight for every value of a row the innermost sums run along whole rows, not
-    # over three channels at a time.
+    # One weight for each value of a row lets the innermost loop run along the whole row, rather
+    # than over three channels at a time.
     along_row = np.tile(weights, (1, width))
     rows = images.reshape(n, height, width * 3)
     mixed = np.einsum("nhk,nk->hk", rows, along_row)

@@ -1,1 +1,1 @@
-"""The cache of earlier runs: bases, denoised planes, facts about scenes."""
+"""The cache: bases, denoised planes and facts about scenes from earlier runs."""

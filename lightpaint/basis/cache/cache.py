@@ -1,8 +1,8 @@
-"""Bases kept from earlier runs, so that a second painting of a scene is answered at once.
+"""The cache of bases, so that a second painting of a scene starts at once.
 
-One file per scene content, sensor, size and seed; more samples are added to it when asked for.
-Files with its name and another ending hold data derived from it, and facts about its scene. The
-folder (`cache_folder.py`) may be deleted at any time.
+There is one file per scene content, sensor, size and seed; further samples are added to it. Data
+derived from a basis lie beside it under the same name with another suffix. The folder
+(`cache_folder.py`) may be deleted at any time.
 """
 
 import hashlib
@@ -36,13 +36,13 @@ from lightpaint.basis.origin import Origin
 from lightpaint.errors import BasisError, LightpaintError, OutputError
 from lightpaint.files import replacing
 
-#: Bytes above which the bases that were not used for longest are deleted.
+#: Size of the cache in bytes above which the least recently used bases are deleted.
 MAX_BYTES = 8 * 2**30
-#: Errors of reading a damaged file of arrays.
+#: Exceptions raised by damaged array files.
 _DAMAGES = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile)
-#: Seconds after which an unfinished file belongs to nobody.
+#: Age in seconds after which an unfinished file counts as abandoned.
 LEFTOVER_S = 3600.0
-#: And after which what was made of a basis that is not kept here is made again if need be.
+#: Age in seconds after which data derived from a basis that is not in the cache are deleted.
 UNUSED_S = 30 * 86400.0
 
 
@@ -50,8 +50,9 @@ UNUSED_S = 30 * 86400.0
 class Entry:
     """A cached basis.
 
-    size: in bytes, with what is kept beside it. image_size: (height, width), lights: how many.
-    origin and these are None if the file cannot be read. identities: of its planes, where known.
+    size: bytes, including the files beside it. image_size: (height, width). lights: number of
+    lights. identities: the known identities of its planes. origin, image_size and lights are None
+    if the file cannot be read.
     """
 
     path: Path
@@ -63,13 +64,13 @@ class Entry:
 
 
 def find(scene_identity: str, sensor: str, seed: int, size: tuple[int, int]) -> Basis | None:
-    """Return the cached basis for these arguments; None if missing or damaged."""
+    """Return the cached basis for these arguments; None if it is missing or damaged."""
     path = _path(scene_identity, sensor, seed, size)
     return _read(path) if is_own(path) else None
 
 
 def read(entry: Entry) -> Basis | None:
-    """Return the basis of an entry, or None if it is damaged, or deleted since it was listed."""
+    """Return the basis of an entry; None if it is damaged or was deleted after it was listed."""
     return _read(entry.path)
 
 
@@ -80,7 +81,7 @@ def _read(path: Path) -> Basis | None:
             raise BasisError(f"{path} is the basis of something else")
     except LightpaintError:
         return None
-    with suppress(OSError):  # a cache that can only be read
+    with suppress(OSError):  # the cache may be read-only
         path.touch()
     return basis
 
@@ -95,9 +96,9 @@ def cached_spp(scene_identity: str, sensor: str, seed: int, size: tuple[int, int
 def find_most_sampled(
     scene_identity: str, sensor: str, *, samples: int, largest: int
 ) -> Basis | None:
-    """Return the cached basis of any size and seed with the most samples; None if there is none.
+    """Return the cached basis with the most samples, at any size and seed; None if there is none.
 
-    samples: of all pixels together, that it has at least. largest: bytes of its file, at most.
+    samples: minimum number of samples, summed over all pixels. largest: maximum file size in bytes.
     """
     candidates: list[tuple[int, Origin, tuple[int, int]]] = []
     for entry in entries():
@@ -115,9 +116,9 @@ def find_most_sampled(
 
 
 def keep(basis: Basis) -> bool:
-    """Keep `basis`, replacing the entry of its scene, sensor, size and seed.
+    """Store `basis` in the cache, replacing the one for its scene, sensor, size and seed.
 
-    Returns whether that worked: a full disk is no reason to lose a render.
+    Returns whether that worked: a full disk must not lose a render.
     """
     try:
         path = _path_of(basis)
@@ -135,7 +136,7 @@ def keep(basis: Basis) -> bool:
 
 
 def sums_of(basis: Basis) -> tuple[Floats, Floats] | None:
-    """Return the exact sums of a cached basis (`Basis.sums`); None if they are not kept."""
+    """Return the exact sums of a cached basis (`Basis.sums`); None if they are not in the cache."""
     path = _sums_path(basis)
     try:
         if not is_own(path):
@@ -150,39 +151,41 @@ def sums_of(basis: Basis) -> tuple[Floats, Floats] | None:
 
 
 def _write_sums(basis: Basis) -> None:
-    """Write the exact sums of `basis`, if it has them, before it is written itself.
+    """Write the exact sums of `basis`, if it has any, before the basis itself is written.
 
-    Under a name of their own: until then, those of the basis that is replaced stay.
+    The file name depends on the samples, so the sums of the old basis stay until it is replaced.
     """
     if basis.sums is None:
         return
     with suppress(OutputError, OSError), replacing(_sums_path(basis)) as path:
-        # Uncompressed: noise does not shrink, and they are soon needed again.
+        # Uncompressed, because noise does not shrink and the sums are soon needed again.
         np.savez(path, sums_a=basis.sums[0], sums_b=basis.sums[1])
 
 
 def _sums_path(basis: Basis) -> Path:
-    """Return the place for the exact sums of `basis`, which no other samples have."""
+    """Return the path for the exact sums of `basis`, which is unique to its samples."""
     samples = hashlib.sha256(repr(basis.origin).encode()).hexdigest()[:32]
     return companion_path(basis, f".{samples}{SUMS_SUFFIX}")
 
 
 def file_of(basis: Basis) -> Path | None:
-    """Return the file that holds just `basis`; None if it is not, or has more samples there."""
+    """Return the cache file that holds exactly `basis`; None if there is none or it has other
+    samples.
+    """
     path = _path_of(basis)
     return path if is_own(path) and _entry(path).origin == basis.origin else None
 
 
 def companion_path(basis: Basis, ending: str) -> Path:
-    """Return the place for data derived from `basis`, whether that is cached or not.
+    """Return the path for data derived from `basis`, whether or not the basis is cached.
 
-    ending: DENOISED_SUFFIX, FACTS_SUFFIX or SUMS_SUFFIX, what stands before it included.
+    ending: DENOISED_SUFFIX, FACTS_SUFFIX or SUMS_SUFFIX, including what precedes it.
     """
     return folder() / f"{_path_of(basis).name.removesuffix(SUFFIX)}{ending}"
 
 
 def is_cached(basis: Basis) -> bool:
-    """Return True if `basis`, or the same with more samples, is in the cache."""
+    """Return True if `basis`, or the same basis with more samples, is in the cache."""
     path = _path_of(basis)
     origin = _entry(path).origin if is_own(path) else None
     return origin is not None and (
@@ -191,9 +194,9 @@ def is_cached(basis: Basis) -> bool:
 
 
 def _prune(path: Path) -> None:
-    """Bring the folder back under MAX_BYTES, and keep `path`."""
+    """Bring the folder back under MAX_BYTES, without deleting `path`."""
     for leftover in folder().glob(".*"):
-        # Delete what a killed process was writing.
+        # Leftovers of a killed process.
         if _is_leftover(leftover) and time.time() - leftover.stat().st_mtime > LEFTOVER_S:
             shutil.rmtree(leftover, ignore_errors=True)
     delete_orphans(UNUSED_S)
@@ -208,7 +211,7 @@ def _prune(path: Path) -> None:
 
 
 def _is_leftover(path: Path) -> bool:
-    """Return True for a folder in which a single file of the cache was being written."""
+    """Return True for a temporary folder in which one file of the cache was being written."""
     name = LEFTOVER_NAME.fullmatch(path.name)
     if name is None or not path.is_dir() or path.is_symlink():
         return False
@@ -216,22 +219,22 @@ def _is_leftover(path: Path) -> bool:
 
 
 def entries() -> list[Entry]:
-    """Return all entries of the cache, the longest unused first."""
+    """Return all entries of the cache, least recently used first."""
     basis_files = [path for path in folder().glob(f"*{SUFFIX}") if BASIS_NAME.fullmatch(path.name)]
     files = sorted(filter(is_own, basis_files), key=lambda path: path.stat().st_mtime)
     return [_entry(path) for path in files]
 
 
 def entries_named(pattern: str) -> list[Entry]:
-    """Return the entries of a scene, or of a file, of that name; `*` matches anything.
+    """Return the entries whose scene or file name matches `pattern`, in which `*` matches anything.
 
-    A scene goes by the name of its file, with or without its ending.
+    A scene matches by its file name, with or without the suffix.
     """
     return [entry for entry in entries() if any(fnmatchcase(x, pattern) for x in _names(entry))]
 
 
 def delete_entries(dropped: Iterable[Entry]) -> int:
-    """Delete these. Returns how many bytes that freed."""
+    """Delete entries and return the number of bytes freed. Raises OutputError."""
     freed = 0
     for entry in dropped:
         try:

@@ -1,7 +1,8 @@
-"""The folder that bases are kept in, and which of its files are this program's own.
+"""The cache folder, and the check that a file in it was written by this program.
 
-The cache lists, reads and deletes only files with our own kind of name, the signature of our own
-formats, and a trusted owner. So a user who names a work folder as the cache loses nothing.
+A file there is listed, read or deleted only if its name follows our patterns, it contains the mark
+of our formats, and its owner is trusted. So nobody loses files by naming a work folder as the
+cache.
 """
 
 import os
@@ -17,32 +18,31 @@ from lightpaint.errors import OutputError
 from lightpaint.files import write_text
 from lightpaint.screen import some_names
 
-#: Names the folder, where it is not that of the user's cache.
+#: Environment variable that overrides the default folder in the user's cache.
 VARIABLE = "LIGHTPAINT_CACHE"
 
-#: Suffix of a basis, and of the files beside it: its denoised planes, facts about its scene, and
-#: the exact sums of one to which samples are still to be added.
+#: Suffixes of a basis and of the files beside it: its denoised planes, facts about its scene, and
+#: the exact sums of a basis to which samples are still to be added.
 SUFFIX, DENOISED_SUFFIX, FACTS_SUFFIX = ".basis.exr", ".clean.npz", ".known.json"
 SUMS_SUFFIX = ".sums.npz"
-#: Folder of the parts of bases that are being rendered.
+#: Folder for parts of bases that are being rendered.
 PARTS = "parts"
 
 BASIS_NAME = re.compile(r"[0-9a-f]{32}\.basis\.exr")
 COMPANION_NAME = re.compile(
     r"([0-9a-f]{32})(?:\.clean\.npz|\.[0-9a-f]{32}\.known\.json|\.[0-9a-f]{32}\.sums\.npz)"
 )
-#: Folder of a file that is being written, as `files.replacing` names it.
+#: Pattern of the temporary folders that `files.replacing` creates.
 LEFTOVER_NAME = re.compile(r"\.([0-9a-f]{32}\.(?:[0-9a-f.]+\.)?[a-z]+\.[a-z]+)\.[a-z0-9_]{8}")
 
-#: The file that marks a folder as a cache, by a convention that backup programs know:
-#: https://bford.info/cachedir
+#: Marks a cache folder, by a convention that backup programs know: https://bford.info/cachedir
 TAG = "CACHEDIR.TAG"
 TAG_TEXT = """Signature: 8a477f597d28d172789f06886806bc55
 # This file is a cache directory tag created by lightpaint, which keeps rendered bases here.
 # All of this folder may be deleted at any time.
 """
 
-#: Signature at or near the beginning of each kind of file, and its largest offset in bytes.
+#: Mark at or near the beginning of each kind of file, and the bytes within which it must appear.
 MARKS = {
     SUFFIX: b"lightpaint-basis",
     DENOISED_SUFFIX: b"made_of.npy",
@@ -51,15 +51,15 @@ MARKS = {
 }
 MARK_WITHIN = {SUFFIX: 2**20, DENOISED_SUFFIX: 2**8, FACTS_SUFFIX: 2**8, SUMS_SUFFIX: 2**8}
 
-#: Other files that are named of a folder that is none of ours, and looked at before it is one.
+#: Number of foreign files that an error message names, and number of files that are inspected.
 NAMES_SHOWN, NAMES_READ = 3, 100_000
 
 
 def folder() -> Path:
-    """Return where bases are kept.
+    """Return the folder in which bases are cached.
 
-    Raises OutputError for a folder that LIGHTPAINT_CACHE names and that has other files in it, not
-    having been made, or begun, for this.
+    Raises OutputError if LIGHTPAINT_CACHE names a folder that contains other files and was not
+    created by this program.
     """
     named_folder = os.environ.get(VARIABLE)
     if not named_folder:
@@ -74,19 +74,19 @@ def folder() -> Path:
 
 
 def mark_folder() -> None:
-    """Mark the folder as one of ours, where it is not yet. Raises OutputError."""
+    """Mark the folder as ours, unless it is marked already. Raises OutputError."""
     tag = folder() / TAG
     if not tag.exists():
         write_text(tag, TAG_TEXT)
 
 
 def is_own(path: Path) -> bool:
-    """Return whether the file at `path` was written by this program, and by somebody to believe."""
+    """Return whether the file at `path` was written by this program and has a trusted owner."""
     ending = next((end for end in MARKS if path.name.endswith(end)), None)
     if ending is None:
         return False
     try:
-        # A file of another user may be a link, or a pipe that never ends.
+        # Another user's file may be a link, or a pipe that never ends.
         with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as f:
             status = os.fstat(f.fileno())
             return is_trusted_owner(status) and MARKS[ending] in f.read(MARK_WITHIN[ending])
@@ -95,18 +95,20 @@ def is_own(path: Path) -> bool:
 
 
 def is_trusted_owner(status: os.stat_result) -> bool:
-    """Return whether this process's user or the administrator owns a file or folder."""
+    """Return whether a file or folder belongs to the current user or to root."""
     return not hasattr(os, "geteuid") or status.st_uid in (os.geteuid(), 0)
 
 
 def companions_of(path: Path) -> list[Path]:
-    """Return the data derived from the basis at `path`."""
+    """Return the files derived from the basis at `path`."""
     name = path.name.removesuffix(SUFFIX)
     return [companion for companion, stem in _companions() if stem == name]
 
 
 def delete_orphans(unused_s: float = 0.0) -> int:
-    """Delete long-unused files without a kept basis, and return their bytes."""
+    """Delete derived files whose basis is gone and which were not used for `unused_s` seconds.
+    Returns the number of bytes freed.
+    """
     freed = 0
     for path, name in _companions():
         with suppress(OSError):
@@ -119,13 +121,15 @@ def delete_orphans(unused_s: float = 0.0) -> int:
 
 
 def _companions() -> list[tuple[Path, str]]:
-    """Return data derived from bases, with the stem of each basis."""
+    """Return the files derived from bases, each with the stem of its basis."""
     matches = ((path, COMPANION_NAME.fullmatch(path.name)) for path in folder().glob("*"))
     return [(path, match[1]) for path, match in matches if match is not None and is_own(path)]
 
 
 def _foreign_names(path: Path) -> list[str]:
-    """Return some foreign names in the folder; none if it is ours, new or hidden."""
+    """Return some foreign names in the folder; none if it is ours or new, or contains only hidden
+    files.
+    """
     with suppress(OSError):
         if "created by lightpaint" in (path / TAG).read_text("utf-8", "replace")[:1000]:
             return []

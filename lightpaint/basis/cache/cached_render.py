@@ -1,4 +1,4 @@
-"""The basis to solve with: a cached one if it fits, completed by rendering."""
+"""Obtains a basis: reuses planes from the cache and renders only what is missing."""
 
 import time
 from collections.abc import Callable
@@ -32,12 +32,12 @@ from lightpaint.progress import Progress, silent
 from lightpaint.scene.scene import Scene
 from lightpaint.screen import some_names
 
-#: Seconds that a render is asked for at least: in less it renders one step, too.
+#: Smallest time budget of a render in seconds, which still renders one step.
 SHORTEST_S = 1e-3
 
-#: `render_basis`, or another that takes and gives the same.
+#: `render_basis`, or a function with the same signature.
 Render = Callable[..., Basis]
-#: Hears how many of how many lights are taken from earlier runs.
+#: Called with the number of lights taken from earlier runs, and the number of all lights.
 ReuseReport = Callable[[int, int], None]
 
 
@@ -55,27 +55,27 @@ def obtain_basis(
     report_reuse: ReuseReport = lambda count, of: None,
     before: Basis | None = None,
 ) -> Basis:
-    """Return the basis of `scene`: cached planes, and missing samples rendered.
+    """Return the basis of `scene`, from cached planes and newly rendered samples.
 
-    A plane serves every scene that has its identity (`Scene.light_identities`): after a lamp was
-    moved, only that lamp is rendered. Its samples follow the same camera paths as in a render of
-    all lights, but choose among fewer emitters, so the planes have the same means as a full render,
-    and other noise.
+    A plane serves every scene that has its identity (`Scene.light_identities`): if one lamp of a
+    scene was moved, only that lamp is rendered. Its samples follow the same camera paths as in a
+    render of all lights, but choose among fewer emitters. So the planes have the same means as
+    those of a complete render, but different noise.
 
-    time_s: instead of spp, seconds of rendering to add to what was kept. Lights with fewer samples
-    than others get the time until they have as many.
-    use_cache: False neither looks for one nor keeps it.
-    exact_spp: whether the basis has exactly the requested samples, whatever is cached. Then no
-    planes come from another state of the scene. A cached basis with more samples stays in the
-    cache.
-    is_final: False for a basis to be gone on from: its exact sums are kept beside it, so that a
-    basis with more samples has the bits of one render, as it has after an interrupt.
-    render: who renders what is missing.
-    report_reuse: told how many of the lights are taken, and of how many, where others are rendered.
-    before: a basis of the scene in another state, of the same seed and film, whose planes are taken
-    as well.
-
-    Raises SceneError for exact_spp with a time, which asks for no number.
+    time_s: seconds of rendering to add to the cached samples, instead of spp. If some lights have
+    fewer samples than others, they get the time until they have caught up.
+    use_cache: whether the cache is read and written.
+    exact_spp: whether the basis must have exactly the requested samples, whatever is cached. Then
+    no plane of another state of the scene is used, and a cached basis with more samples stays in
+    the cache.
+    is_final: False for a basis that gets more samples later: its exact sums are cached with it, so
+    that the continued basis has the bits of a single render, as after an interrupt.
+    render: function that renders what is missing.
+    report_reuse: called with the number of reused lights and of all lights, if some are reused and
+    others are rendered.
+    before: a basis of the scene in another state, with the same seed and film, whose planes are
+    reused as well.
+    Raises SceneError for exact_spp together with time_s, which gives no number of samples.
     """
     if exact_spp and time_s is not None:
         raise SceneError("exact_spp=True goes with a number of samples, not with time_s=...")
@@ -101,7 +101,7 @@ def obtain_basis(
         )
 
     if start is not None:
-        # One kept by an earlier version may know less of the same lights.
+        # A basis cached by an earlier version may know less about the same lights.
         start = replace(start, lights=basis_lights(scene), source=str(scene.path))
         enough = [
             sum(counts[:2]) >= (1 if goal_spp is None else goal_spp) for counts in counts_of(start)
@@ -127,10 +127,10 @@ def _starting_planes(
     exact_spp: bool,
     before: Basis | None,
 ) -> Basis | None:
-    """Return the planes to which a render adds samples; None to begin without any.
+    """Return the planes to which a render adds samples; None to start from scratch.
 
-    cached: the basis of the present scene. goal_spp: None for a time, whose samples add to any. The
-    other arguments are those of `obtain_basis`.
+    cached: the basis of the scene in its present state. goal_spp: None for a time budget, whose
+    samples are added to any. The other arguments are those of `obtain_basis`.
     """
     lacks_samples = goal_spp is None or cached is None or cached.origin.spp < goal_spp
     start = cached
@@ -147,9 +147,9 @@ def _starting_planes(
 
 
 def _as_from_cache(scene: Scene, basis: Basis, keep: Callable[[Basis], bool]) -> Basis:
-    """Keep a basis in the cache, and return it as it is read from there."""
+    """Store a basis in the cache, and return it as it would be read back."""
     if not is_large(len(basis.lights), basis.size):
-        # Rounded as in its file, so that the next run gets the same.
+        # The next run, which reads the file, must find the same planes.
         basis = replace(as_stored(basis, keep), sums=None)
         file = cache.file_of(basis)
         return basis if file is None else leave_indirect(basis, file)
@@ -164,10 +164,11 @@ def _as_from_cache(scene: Scene, basis: Basis, keep: Callable[[Basis], bool]) ->
 def _completed(
     scene: Scene, start: Basis | None, *, spp: int | None, render: Render, options: dict[str, Any]
 ) -> Basis:
-    """Return `start` with the samples that are missing, of lights that have fewest first.
+    """Return `start` with the missing samples added, beginning with the lights that have the
+    fewest.
 
-    spp: None for the time in `options`, which are other arguments of `render`. That adds as many
-    samples to all lights in one pass.
+    spp: None for the time in `options`, which holds the other arguments of `render`. Once all
+    lights have equal numbers of samples, one pass adds to all of them.
     """
     end_s = None if options["time_s"] is None else time.monotonic() + options["time_s"]
 
@@ -195,7 +196,7 @@ def _completed(
 
 
 def _marked(basis: Basis, *, is_composed: bool) -> Basis:
-    """Return `basis`, which says whether it went on from planes of other states of its scene."""
+    """Return `basis`, marked if it continues planes of other states of its scene."""
     if basis.origin.is_composed or not is_composed:
         return basis
     return replace(basis, origin=replace(basis.origin, is_composed=True))
@@ -211,7 +212,9 @@ def top_up_basis(
     is_enough: Callable[[], bool] = lambda: False,
     tracers: KeptTracer | None = None,
 ) -> Basis:
-    """Return `basis` with further samples of some pixels, kept in its place. See `top_up`."""
+    """Return `basis` with additional samples in some pixels, and replace it in the cache. See
+    `top_up`.
+    """
     keep = cache.keep if use_cache else None
     refined = top_up(
         scene,
@@ -226,7 +229,9 @@ def top_up_basis(
 
 
 def check_same_view(scene: Scene, basis: Basis) -> None:
-    """Raise BasisError unless `basis` was rendered from the present `scene`, through its sensor."""
+    """Raise BasisError unless `basis` was made from `scene` in its present state, through its
+    sensor.
+    """
     origin, sensor = basis.origin, scene.sensor_names[scene.sensor]
     scene_members = {light.name: light.member_names for light in scene.lights}
     basis_members = {light.name: light.members for light in basis.lights}

@@ -1,9 +1,10 @@
-"""Denoised planes of a basis, cached between runs.
+"""Denoised planes of a basis, cached from earlier runs.
 
-Light is additive, so a sum of denoised planes is a denoised picture of any lighting. It is slightly
-closer to a render with many samples than the denoised sum is. These planes are for display only:
-solves use the basis as rendered. They are cached with the bases, keyed by the content that they
-were made from, and may be deleted at any time.
+Since light adds, a weighted sum of denoised planes is a denoised picture of any lighting, at the
+cost of a sum; compared with a render of many samples, it is slightly closer than the denoised sum.
+Denoised planes are for display only: the solver uses the basis as it was rendered. They lie beside
+the cached basis, are keyed by the content that they were computed from, and may be deleted at any
+time.
 """
 
 import hashlib
@@ -31,23 +32,22 @@ from lightpaint.threads import parallel_map
 
 FORMAT, ARRAY_NAMES = "lightpaint-clean 3", ("halves", "scales", "present")
 
-#: Pixels of all planes below which a sum is denoised as soon as planes are read.
+#: Number of pixels of all planes below which denoising the sum is as fast as reading planes.
 MIN_PIXELS = 2**18
 
-#: The brightest value of a plane as half floats, which leaves 24 stops below it to their full
-#: precision.
+#: Brightest value of a plane in half floats, which leaves 24 stops below it at full precision.
 BRIGHTEST_HALF = 1024.0
 
-#: Pixels on a side over which the share of a light is taken where surfaces are not known.
+#: Side in pixels of the blocks over which the share of a light is computed if surfaces are unknown.
 ROUGH_BLOCK = 8
 
-#: Largest factor of the light of rough planes in a denoised block.
+#: Maximum gain applied to rough planes to match the denoised planes in a block.
 MAX_BLOCK_GAIN = 4.0
 
-#: Rows of planes that are brought to single precision at a time.
+#: Number of rows that are converted to single precision at a time.
 STRIP_ROWS = 64
 
-#: Errors of reading a truncated file, or one of another kind.
+#: Exceptions raised by reading a truncated or foreign file.
 _READ_ERRORS = (
     *(OSError, EOFError, LookupError, MemoryError, NotImplementedError, RuntimeError, ValueError),
     zipfile.BadZipFile,
@@ -60,10 +60,10 @@ Halves = npt.NDArray[np.float16]
 class DenoisedPlanes:
     """Denoised planes, for display.
 
-    halves: (n, h, w, 3) float16, linear, at unit emission over `scales`, or as many means over
-    blocks of pixels. scales: (n,), powers of 2. present: (h, w, 3) float32, the present scene: the
-    sum of the planes, or the denoised sum if that came first, so that painting continues from the
-    picture that was shown.
+    halves: (n, h, w, 3) float16, linear, at unit emission divided by `scales`; h and w are smaller
+    if they are means over blocks of pixels. scales: (n,), powers of 2. present: (h, w, 3) float32,
+    the scene in its present state: the sum of the planes, or the denoised sum if that was shown
+    first, so that a painter continues from the picture on screen.
     """
 
     halves: Halves
@@ -72,12 +72,12 @@ class DenoisedPlanes:
 
     @classmethod
     def of(cls, basis: Basis, halves: Halves, scales: Doubles) -> "DenoisedPlanes":
-        """Return the planes with their sum for the present scene."""
+        """Return the planes together with their sum for the present scene."""
         return cls(halves, scales, _mixed(halves, scales, basis.present_weights))
 
     @property
     def is_whole(self) -> bool:
-        """True for planes of all pixels, of which none are means over blocks."""
+        """True if the planes have all pixels; False if they are means over blocks."""
         return self.halves.shape[1:] == self.present.shape
 
     def mix(self, weights: Doubles) -> Floats:
@@ -85,7 +85,7 @@ class DenoisedPlanes:
         return _mixed(self.halves, self.scales, weights)
 
     def scaled_as(self, basis: Basis) -> "DenoisedPlanes":
-        """Return the same light, in the scales of another basis of the same lights."""
+        """Return the same light in the scales of another basis of the same lights."""
         scales = np.array([scale_of(plane) for plane in basis.planes])
         halves = np.stack([as_halves(self.plane(k), x) for k, x in enumerate(scales)])
         return DenoisedPlanes(halves, scales, self.present)
@@ -98,13 +98,15 @@ class DenoisedPlanes:
 class RoughPlanes:
     """Planes without most of the noise, available at once, while denoising takes seconds.
 
-    Each is the denoised picture of the present scene times the light's share in it, so that they
-    add up to that picture. The shares come from light averaged along surfaces; direct light is
-    averaged only as far as its noise requires. If surfaces are unknown, or pictures too large, the
-    shares come from means over squares of pixels, and shadows are soft.
+    A rough plane is the denoised picture of the present scene times the share of the light in it,
+    so the planes add up to that picture. The shares are computed from light that is averaged along
+    surfaces; direct light is averaged only as far as its noise in that picture demands. If surfaces
+    are unknown, or the picture is too large for that to be quick, shares are computed over square
+    blocks of pixels, and shadows become soft.
 
-    present: (h, w, 3) float32, that picture. small: denoised planes of pixel blocks, as cached by a
-    page of results; the rough planes then match them in each block.
+    present: (h, w, 3) float32, the denoised picture of the present scene. small: denoised planes of
+    blocks of pixels, as a report page stores them; rough planes then match their light in each
+    block.
     """
 
     def __init__(self, basis: Basis, present: Floats, small: DenoisedPlanes | None = None) -> None:
@@ -122,7 +124,7 @@ class RoughPlanes:
             resampled(x, self.basis.size)
             for x in (small, block_mean(rough, -(-self.basis.size[0] // len(small))))
         )
-        # In a block with little light, the pixels say little about the missing light.
+        # Where a block has hardly any light, its ratio is unreliable.
         least = np.float32(1e-4) * there.mean()
         gain = np.clip((wanted + least) / (there + least), 0, MAX_BLOCK_GAIN)
         return np.asarray(rough * gain, np.float32)
@@ -141,7 +143,9 @@ class RoughPlanes:
         return self._averaged(self.basis.present_look, indirect)
 
     def _averaged(self, picture: Floats, indirect: Floats | None) -> Floats:
-        """Return a picture that is smooth; a sum of pictures becomes the sum of smooth ones."""
+        """Return a smoothed picture. This is linear: a sum of pictures becomes the sum of their
+        smoothed forms.
+        """
         along_surfaces = self.basis.surface_filter
         if indirect is None or along_surfaces is None or not along_surfaces.is_quick:
             height, width = self.basis.size
@@ -152,7 +156,7 @@ class RoughPlanes:
 
     @cached_property
     def _share_of_smooth(self) -> Floats:
-        """Share of the average in direct light, (h, w, 1)."""
+        """Share of the smoothed picture in direct light, (h, w, 1)."""
         basis, weights = self.basis, self.basis.present_weights
         assert basis.indirect is not None
         assert basis.surface_filter is not None
@@ -162,7 +166,7 @@ class RoughPlanes:
 
 
 def scale_of(plane: Floats) -> float:
-    """Return the power of two that a plane is divided by to become half floats."""
+    """Return the power of two by which a plane is divided before conversion to half floats."""
     brightest = float(plane.max(initial=0))
     return float(2.0 ** np.ceil(np.log2(brightest / BRIGHTEST_HALF))) if brightest > 0 else 1.0
 
@@ -175,9 +179,9 @@ def as_halves(plane: Floats, scale: float = 1.0) -> Halves:
 def obtain_denoised_planes(basis: Basis, *, factor: int = 1) -> DenoisedPlanes | None:
     """Return the denoised planes, from the cache or computed and cached now.
 
-    factor: side of the blocks whose means are denoised, which costs less; cached whole planes are
-    returned instead. None without Open Image Denoise, and for so few pixels that denoising their
-    sums is quicker.
+    factor: side of the blocks of pixels whose means are denoised, which costs accordingly less; if
+    whole planes are cached, these are returned. None if Open Image Denoise is not installed, or if
+    there are so few pixels that denoising their sum is faster.
     """
     pixels = len(basis.lights) * basis.size[0] * basis.size[1]
     if pixels < MIN_PIXELS or not oidn_is_installed():
@@ -196,15 +200,17 @@ def obtain_denoised_planes(basis: Basis, *, factor: int = 1) -> DenoisedPlanes |
 
 
 def denoise_to_halves(basis: Basis, k: int, factor: int = 1) -> tuple[Halves, float]:
-    """Return the denoised plane of light k as `DenoisedPlanes` holds it, and its scale."""
+    """Return the denoised plane of light k in the form of `DenoisedPlanes.halves`, and its
+    scale.
+    """
     scale = scale_of(basis.planes.plane(k))
     return as_halves(denoise_plane(basis, k, factor=factor), scale), scale
 
 
 def read_denoised_planes(basis: Basis, *, factor: int = 1) -> DenoisedPlanes | None:
-    """Return the cached denoised planes of just these pixels; None if missing or damaged.
+    """Return the cached denoised planes of exactly this basis; None if missing or damaged.
 
-    factor: side of blocks, of which planes serve as well as whole ones.
+    factor: side of blocks; planes of such blocks are accepted as well as whole planes.
     """
     with suppress(*_READ_ERRORS, LightpaintError):
         path = cache.companion_path(basis, DENOISED_SUFFIX)
@@ -227,7 +233,7 @@ def read_denoised_planes(basis: Basis, *, factor: int = 1) -> DenoisedPlanes | N
 
 
 def cache_denoised_planes(basis: Basis, planes: DenoisedPlanes) -> bool:
-    """Cache the denoised planes of `basis`. Returns whether that worked; nothing is lost if not."""
+    """Store denoised planes of `basis`. Returns whether that worked: if not, nothing is lost."""
     try:
         path = cache.companion_path(basis, DENOISED_SUFFIX)
         with replacing(path) as place, place.open("wb") as file:
@@ -253,7 +259,7 @@ def _shape(basis: Basis) -> tuple[int, int, int, int]:
 
 
 def _content_key(basis: Basis) -> str:
-    """Return everything that the denoised planes depend on."""
+    """Return a hash of everything that the denoised planes depend on."""
     other_inputs: list[Floats] = [basis.present_weights]
     if basis.features is not None:
         other_inputs += [basis.features.albedo, basis.features.normal]
@@ -263,7 +269,7 @@ def _content_key(basis: Basis) -> str:
             return hashlib.blake2b(np.ascontiguousarray(which).data).digest()
         plane = basis.planes.plane(which)
         if basis.indirect is not None:
-            # Both parts, so that it counts whether they are known.
+            # Both parts, so that the key also depends on whether they are known.
             plane = np.stack([plane, basis.indirect.planes.plane(which)])
         return hashlib.blake2b(np.ascontiguousarray(plane).data).digest()
 

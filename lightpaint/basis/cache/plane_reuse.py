@@ -1,8 +1,8 @@
-"""Bases assembled from earlier planes, by the planes' identities.
+"""Bases composed of planes that were rendered before, found by their identities.
 
-A moved light has a plane of another identity. The planes of all other lights still equal a new
-render, up to noise. So only missing planes are rendered, together, and lights may have unequal
-numbers of samples (`Origin.each_light`).
+A light that moved has a plane with a new identity; the planes of all other lights still equal a new
+render of them, up to noise. So only the missing planes are rendered, all together, and lights may
+have unequal numbers of samples, which `Origin.each_light` records.
 """
 
 from collections.abc import Sequence
@@ -24,13 +24,13 @@ from lightpaint.scene.properties.emission import ENVIRONMENTS
 from lightpaint.scene.scene import Scene
 from lightpaint.version import __version__
 
-#: Samples of half A and B, and passes of both.
+#: Number of samples of halves A and B, and number of passes of both.
 Counts = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True)
 class KeptPlane:
-    """A plane of a basis by its number."""
+    """A plane of a basis. index: its number there."""
 
     basis: Basis
     index: int
@@ -42,12 +42,12 @@ class KeptPlane:
 
     @property
     def noise(self) -> PlaneReference:
-        """Half the difference of its halves."""
+        """Half the difference of the two halves of its samples."""
         return self.basis.noise, self.index
 
     @property
     def indirect(self) -> tuple[PlaneReference, PlaneReference] | None:
-        """Image and half difference of its indirect part; None where that is not known."""
+        """Image and half difference of its indirect part; None if that part is unknown."""
         parts = self.basis.indirect
         if parts is None:
             return None
@@ -60,7 +60,7 @@ class KeptPlane:
 
 
 def counts_of(basis: Basis) -> Sequence[Counts]:
-    """Return the samples and passes of each light."""
+    """Return the number of samples and passes for each light."""
     origin = basis.origin
     return origin.each_light or [(*origin.halves, *origin.passes)] * len(basis.lights)
 
@@ -74,14 +74,15 @@ def gather_planes(
     before: Basis | None = None,
     use_cache: bool = True,
 ) -> Basis | None:
-    """Return a basis of `scene` from cached planes, whatever scene they were rendered from.
+    """Return a basis of `scene` composed of all matching planes in the cache, whichever scene they
+    were rendered for.
 
-    Lights without a cached plane are black and have no samples. None if no plane is cached.
+    Lights without a cached plane are black and have no samples. Returns None if no plane is found.
 
-    cached: the basis of the present scene, returned itself if no other adds to it. spp: samples per
-    pixel that suffice; None for as many as possible. before: a basis of the same seed and film, of
-    the scene in another state, whose planes are taken as well. use_cache: False to take of no
-    other.
+    cached: the basis of the scene in its present state, returned itself if no other basis adds to
+    it. spp: samples per pixel beyond which a plane is good enough; None to take as many as
+    possible. before: a basis of the scene in another state, with the same seed and film, whose
+    planes are used as well. use_cache: False to use no other planes.
     """
     identities = scene.light_identities
     planes: list[KeptPlane | None] = [None] * len(identities)
@@ -124,10 +125,11 @@ def gather_planes(
 
 
 def least_sampled_lights(basis: Basis, spp: int | None) -> tuple[list[str], int | None]:
-    """Return which lights are to be rendered next, and how many samples per pixel they come to.
+    """Return the names of the lights to render next, and their goal in samples per pixel.
 
-    Those with fewest, up to those that come next, until all have `spp`; None for a time, which is
-    for all of them then. No names: all have enough, or as many as each other.
+    These are the lights with the fewest samples; the goal is the next larger number, or `spp`. No
+    names are returned if all lights have `spp` or equal numbers. spp: None for a time budget, which
+    then goes to all lights.
     """
     counts = counts_of(basis)
     totals = [sum(light_counts[:2]) for light_counts in counts]
@@ -147,9 +149,10 @@ def least_sampled_lights(basis: Basis, spp: int | None) -> tuple[list[str], int 
 
 
 def restrict(basis: Basis, scene: Scene) -> Basis | None:
-    """Return what `basis` has of the lights of `scene`, which is its own with some `only`.
+    """Return the part of `basis` for the lights of `scene`, which is its scene restricted by
+    `only`.
 
-    None where it has no samples of them. They have equal numbers.
+    These lights must have equal numbers of samples. Returns None if they have none.
     """
     sources = [KeptPlane(basis, basis.names.index(light.name)) for light in scene.lights]
     if not sum(sources[0].counts[:2]):
@@ -158,7 +161,7 @@ def restrict(basis: Basis, scene: Scene) -> Basis | None:
 
 
 def merge(scene: Scene, whole: Basis, part: Basis) -> Basis:
-    """Return `whole`, a basis of `scene`, with the planes of `part`, of some of its lights."""
+    """Return `whole`, a basis of `scene`, with the planes of `part` for some of its lights."""
     names = part.names
     sources = [
         KeptPlane(part, names.index(name)) if name in names else KeptPlane(whole, i)
@@ -170,7 +173,7 @@ def merge(scene: Scene, whole: Basis, part: Basis) -> Basis:
 
 
 def _is_like(entry: cache.Entry, scene: Scene, seed: int) -> bool:
-    """Return whether planes of a basis in the cache may be those of `scene`, by its origin."""
+    """Return whether a cached basis may have planes of `scene`, judging by its origin."""
     origin = entry.origin
     return (
         origin is not None
@@ -182,12 +185,12 @@ def _is_like(entry: cache.Entry, scene: Scene, seed: int) -> bool:
 
 
 def _better_sampled(plane: KeptPlane | None, other: Basis, identity: str) -> KeptPlane | None:
-    """Return the plane of that identity in `other`, if it has more samples than `plane`."""
+    """Return the plane with that identity in `other` if it has more samples, else `plane`."""
     has = 0 if plane is None else sum(plane.counts[:2])
     for i, light in enumerate(other.lights):
         if light.identity == identity != "":
             candidate = KeptPlane(other, i)
-            # The noise of a single half is unknown.
+            # With only one half, the noise is unknown.
             if min(candidate.counts[:2]) and sum(candidate.counts[:2]) > has:
                 return candidate
     return plane
@@ -196,7 +199,7 @@ def _better_sampled(plane: KeptPlane | None, other: Basis, identity: str) -> Kep
 def _compose_basis(
     scene: Scene, seed: int, sources: Sequence[KeptPlane | None], seen: Bools
 ) -> Basis:
-    """Return a basis of `scene` of these planes; None stands for a black one."""
+    """Return a basis of `scene` composed of these planes; None stands for a black plane."""
     lights, size = basis_lights(scene), scene.size
     methods = [source.basis.origin.method for source in sources if source is not None]
     is_one_pass = method_of(scene) == ONE_PASS
@@ -210,7 +213,7 @@ def _compose_basis(
     def compose(picks: Sequence[PlaneReference]) -> Planes:
         return compose_planes(picks, size, in_memory=in_memory)
 
-    # Known of all lights or of none.
+    # Indirect light is known for all lights or for none.
     parts = [None if source is None else source.indirect for source in sources]
     is_split = all(
         (source is None) == (part is None) for source, part in zip(sources, parts, strict=True)
@@ -229,9 +232,9 @@ def _compose_basis(
 
 
 def _count_fields(each_light: Sequence[Counts], *, is_one_pass: bool) -> dict[str, Any]:
-    """Return the fields of an Origin that say how many samples there are.
+    """Return the fields of an Origin that record the number of samples.
 
-    In one pass numbers follow from the samples alone, and passes are only counted.
+    In one pass, random numbers follow from the samples alone, so passes are merely counted.
     """
     if is_one_pass:
         passes = max(counts[2] for counts in each_light), max(counts[3] for counts in each_light)
@@ -248,9 +251,9 @@ def _count_fields(each_light: Sequence[Counts], *, is_one_pass: bool) -> dict[st
 
 
 def _emitters_seen_in(scene: Scene, sources: Sequence[Basis]) -> Bools:
-    """Return where an emitter is visible in `scene`, from bases of it with other lights.
+    """Return the pixels in which an emitter is seen in `scene`, from bases with other lights.
 
-    They share the emitting shapes, but maybe not the environment.
+    All of them have the same emitting shapes, but an environment may be missing in some.
     """
     is_surrounded = any(emitter.plugin in ENVIRONMENTS for emitter in scene.emitters)
     alike = [

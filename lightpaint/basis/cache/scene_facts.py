@@ -1,12 +1,12 @@
-"""Facts about a scene from an earlier run, valid while everything they depend on is unchanged.
+"""Facts about a scene from an earlier run, valid as long as nothing that they depend on changes.
 
-Loading a scene takes seconds, but finding its cached basis needs only the scene's identity. So that
-is kept beside the basis, with all else that a painter has to know.
+Loading a scene takes seconds, but a cached basis only needs the scene's identity to be found. So
+the identity is stored beside the basis, with the other facts that the painter needs. The key covers
+everything that they may depend on: the arguments of loading, the code that reads scenes, every file
+of the scene, and every file that does not exist but would be read if it did.
 
-Its key covers everything that it depends on: the arguments of loading, the code that read the
-scene, and every file of the scene, including missing files that would be read if they existed. In
-doubt the facts do not count and the scene is loaded: if a file was written while it was read, or if
-only Mitsuba's parser knows of it.
+In doubt, the facts are discarded and the scene is loaded: for example if a file was written while
+it was read, or if only Mitsuba's parser knows which files are read.
 """
 
 import hashlib
@@ -35,14 +35,14 @@ from lightpaint.version import __version__
 
 FORMAT = "lightpaint-known 2"
 
-#: Seconds before a scene was read in which none of its files may have been written: clocks of
-#: disks are as coarse as that.
+#: Seconds before the start of reading in which no file of the scene may have been written, since
+#: file times may be that coarse.
 COARSE_S = 2.0
 
-#: Environment variables that change how Mitsuba reads a scene.
+#: Prefixes of environment variables that change how Mitsuba reads a scene.
 ENVIRONMENT_PREFIXES = ("MI_", "MITSUBA")
 
-#: Code that reads scenes and makes identities of them: our rooms, and libraries of others.
+#: Code that reads scenes and computes their identities: our packages, and libraries.
 OWN_ROOMS = ("scene", "basis")
 LIBRARIES = ("mitsuba", "drjit")
 
@@ -51,9 +51,8 @@ LIBRARIES = ("mitsuba", "drjit")
 class SceneFacts:
     """Facts about a scene that are known without loading it.
 
-    identity, sensor, size: the key of its basis. spp: samples that the scene asks for. path: as
-    `Scene.path`. lights: those of its basis. remarks: messages for the user from when it was
-    loaded.
+    identity, sensor, size: the key of its cached basis. spp: the scene's number of samples. path:
+    as `Scene.path`. lights: the lights of its basis. remarks: messages from loading it.
     """
 
     identity: str
@@ -66,9 +65,9 @@ class SceneFacts:
 
 
 def facts_key(asking: Mapping[str, Any]) -> str:
-    """Return a key for everything that is neither in a scene nor in its files.
+    """Return a key for everything that is neither in the scene nor in its files.
 
-    asking: all arguments of loading and of the film, as plain values.
+    asking: all arguments that decide how the scene is loaded and on which film, as plain values.
     """
     environment = {x: y for x, y in os.environ.items() if x.startswith(ENVIRONMENT_PREFIXES)}
     key = [FORMAT, dict(asking), os.getcwd(), environment, _code_version()]
@@ -76,8 +75,8 @@ def facts_key(asking: Mapping[str, Any]) -> str:
 
 
 def recall_facts(key: str) -> SceneFacts | None:
-    """Return the known facts of a scene, or None. key: as in `facts_key`."""
-    if "mitsuba" in sys.modules:  # where somebody else may have told it to look for files
+    """Return the stored facts of a scene, or None. key: from `facts_key`."""
+    if "mitsuba" in sys.modules:  # other code may have changed its file resolver
         return None
     with suppress(OSError, LightpaintError, LookupError, TypeError, ValueError):
         for file in folder().glob(f"*.{key}{FACTS_SUFFIX}"):
@@ -133,7 +132,7 @@ def remember_facts(
         }
         text = json.dumps(record, allow_nan=False)
         if strict_json(text)["known"]["lights"]["requests"] != asdict(scene.requests):
-            return False  # TOML knows values that JSON does not
+            return False  # TOML has values that JSON lacks
         write_text(bases.companion_path(basis, f".{key}{FACTS_SUFFIX}"), text)
     except (OSError, LightpaintError, TypeError, ValueError):
         return False
@@ -147,7 +146,7 @@ def _is_unchanged(places: Mapping[str, Any], texts: Mapping[str, str]) -> bool:
 
 
 def _stamp(path: Path) -> list[int] | None:
-    """Return a value that changes when the file does; None if it does not exist."""
+    """Return a value that changes whenever the file does; None if it does not exist."""
     try:
         status = path.stat()
     except (FileNotFoundError, NotADirectoryError):
@@ -163,7 +162,7 @@ def _stamp(path: Path) -> list[int] | None:
 
 
 def _is_new(stamp: list[int] | None, began_s: float) -> bool:
-    """Return True if a file may have been written since it was read, without a visible change."""
+    """Return True if a file may have changed after it was read without a new time stamp."""
     return stamp is not None and max(stamp[1], stamp[2]) > 1e9 * (began_s - COARSE_S)
 
 
@@ -172,9 +171,9 @@ def _digest(path: Path) -> str:
 
 
 def _reads_more(path: Path) -> bool:
-    """Return True if the XML at `path` makes its parser read more files or folders.
+    """Return True if the XML at `path` makes Mitsuba read further files or folders.
 
-    Raises ValueError for XML that is not read here, such as UTF-16.
+    Raises ValueError if the XML cannot be read here, for example in UTF-16.
     """
     for element in markup(path.read_bytes()):
         tag = element["tag"]
@@ -185,14 +184,14 @@ def _reads_more(path: Path) -> bool:
 
 @cache
 def _code_version() -> str:
-    """Return the version of the code that reads scenes, from its files."""
+    """Return a version of the code that reads scenes, derived from its files."""
     versions = [__version__, sys.version, *(list(_files_of_package(name)) for name in LIBRARIES)]
     versions += [list(_files_in_folder(folder)) for folder in _code_folders()]
     return hashlib.sha256(repr(versions).encode()).hexdigest()
 
 
 def _code_folders() -> Iterator[Path]:
-    """Yield the folders of our own code that reads scenes, those inside others too."""
+    """Yield the folders of our own code that reads scenes, including subfolders."""
     package = Path(__file__).parents[2]
     for room in OWN_ROOMS:
         for place, _, _ in sorted(os.walk(package / room)):
@@ -207,7 +206,7 @@ def _files_of_package(package: str) -> Iterator[tuple[str, int, int]]:
 
 
 def _files_in_folder(folder: Path) -> Iterator[tuple[str, int, int]]:
-    """Return the files of a folder, by name, size and time."""
+    """Yield path, size and modification time of each file in a folder."""
     for entry in sorted(os.scandir(folder), key=lambda entry: entry.path):
         if entry.is_file():
             status = entry.stat()

@@ -1,1 +1,1 @@
-"""The file of a basis: its parts, its checksums, and planes whose rows are read on demand."""
+"""Basis files: parts, checksums, and planes whose rows are read on demand."""

@@ -1,4 +1,4 @@
-"""Writing a basis as a multi-part OpenEXR, which other programs can open.
+"""Writes a basis as a multi-part OpenEXR file that other programs can open.
 
 Part k is named after light k and holds its image as R, G, B; docs/formats.md has the details.
 """
@@ -30,22 +30,22 @@ from lightpaint.images.formats.exr_streams import PartHead, room_for, write_stre
 from lightpaint.keywords import keywords
 from lightpaint.storage.json_records import fields_of
 
-#: Format that is written, and an older one that is read, too: all its planes are float32.
+#: The written format, and an older one that is still read, in which all planes are float32.
 FORMAT, OLD_FORMAT = "lightpaint-basis 2", "lightpaint-basis 1"
 FORMAT_KEY = "lightpaint.format"
 ORIGIN_KEY = "lightpaint.origin"
 
-#: Largest size of all images in float32, in bytes, at which memory holds them as float32. Smaller
-#: bases save the time to decode half floats; larger ones save memory.
+#: Size of all images in float32, in bytes, above which memory holds half floats: below it decoding
+#: time matters more, above it memory.
 SINGLES_MAX_BYTES = 2**27
 
-#: Largest size of planes in float32, in bytes, that are read into memory.
+#: Size of all planes in float32, in bytes, above which they stay in their file.
 IN_MEMORY_MAX_BYTES = 2**31
 
 
 @keywords()
 def write_basis(path: str | Path, basis: Basis) -> None:
-    """Write `basis` as a multi-part EXR, whole or not at all.
+    """Write `basis` as a multi-part EXR file, atomically.
 
     Args:
         path: The file to write, by convention `*.basis.exr`.
@@ -56,7 +56,7 @@ def write_basis(path: str | Path, basis: Basis) -> None:
         >>> lp.read_basis("again.basis.exr").names
         ('panel', 'bulb')
     """
-    # Fields with default values are left out, as in files from before these fields existed.
+    # Newer fields are left out at their defaults, as in files that are older than these fields.
     later = ("each_light", "integrator", "is_composed", "extra_spp")
     of_origin = json.dumps(fields_of(basis.origin, *later), ensure_ascii=False)
     others, sums = list(other_parts(basis)), dict[str, str]()
@@ -82,7 +82,7 @@ def write_basis(path: str | Path, basis: Basis) -> None:
 
 
 def _room(basis: Basis, others: Sequence[ExrPart], of_origin: str) -> int:
-    """Return the largest number of bytes before the pixels of a basis."""
+    """Return an upper bound for the number of bytes before the first pixel of a basis file."""
     scaled = [PlaneEncoding(scale=LARGEST_SCALE)] * len(PLANE_CHANNELS)
     lights = [(light.name, light_texts(light, scaled), basis.size[0]) for light in basis.lights]
     parts = [(part.name, part.attributes, part.size[0]) for part in others]
@@ -92,12 +92,13 @@ def _room(basis: Basis, others: Sequence[ExrPart], of_origin: str) -> int:
 
 
 def as_stored(basis: Basis, keep: Callable[[Basis], object] = lambda basis: None) -> Basis:
-    """Return `basis` with its planes rounded as `write_basis` rounds them.
+    """Return `basis` with its planes rounded as `write_basis` stores them.
 
-    So a solve gives the same answer with a fresh basis as with its file. A large basis is copied in
-    half floats. A small one is rounded in place; its planes must be in memory.
+    Solving a basis that was just rendered then gives the same result as solving the one read back
+    from its file. A large basis is returned with new planes in half floats. The planes of a small
+    one, which must be in memory, are rounded in place.
 
-    keep: called with all planes encoded, which can be written without rounding again.
+    keep: called with the basis in stored encoding, which can be written without further rounding.
     """
     stored = _encoded(basis)
     keep(stored)
@@ -111,12 +112,14 @@ def as_stored(basis: Basis, keep: Callable[[Basis], object] = lambda basis: None
 
 
 def is_encoded(lights: int, size: tuple[int, int]) -> bool:
-    """Return whether planes of so many lights stay encoded in memory, as in their file."""
+    """Return whether planes of this number of lights are held in memory in their file's
+    encoding.
+    """
     return 12 * lights * size[0] * size[1] > SINGLES_MAX_BYTES
 
 
 def _encoded(basis: Basis) -> Basis:
-    """Return `basis` with planes encoded in memory as in their file."""
+    """Return `basis` with planes in the encoding of its file."""
     of_lights = [encoded_planes_of(basis, k) for k in range(len(basis.lights))]
     images, noise, *indirect = map(EncodedPlanes, zip(*of_lights, strict=True))
     parts = IndirectLight(*indirect) if indirect else None
@@ -124,10 +127,10 @@ def _encoded(basis: Basis) -> Basis:
 
 
 def is_large(lights: int, size: tuple[int, int]) -> bool:
-    """Return whether planes of so many lights stay in their file when it is read."""
+    """Return whether planes of this number of lights stay in their file when it is read."""
     return 4 * len(LIGHT_CHANNELS) * lights * size[0] * size[1] > IN_MEMORY_MAX_BYTES
 
 
 def is_basis_file(path: Path) -> bool:
-    """Return whether a path names a basis, which is an EXR, rather than a scene, which is XML."""
+    """Return True if `path` has the suffix of a basis file (EXR) rather than of a scene (XML)."""
     return path.suffix.lower() == ".exr"

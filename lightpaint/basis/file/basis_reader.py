@@ -1,4 +1,4 @@
-"""Reading a basis file: whole into memory or, of a large one, its rows when they are asked for."""
+"""Reads basis files: completely into memory or, if large, row by row on request."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -46,10 +46,10 @@ from lightpaint.images.formats.exr_rows import PartLayout, RowFile, RowsUnsuppor
 from lightpaint.keywords import keywords
 from lightpaint.storage.json_records import read_record, strict_json
 
-#: Longest basis file that is read, in bytes.
+#: Maximum size in bytes of a basis file that is read.
 MAX_BYTES = 2**36
 
-#: Errors of a header with invalid content.
+#: Exceptions raised by a header with unexpected content.
 _HEADER_ERRORS = (AttributeError, LookupError, OverflowError, TypeError, ValueError)
 
 
@@ -58,11 +58,11 @@ def read_basis(path: str | Path) -> Basis:
     """Read a basis file, even if another program has reordered its parts.
 
     Args:
-        path: What `write_basis` or the command line wrote.
+        path: A file written by `write_basis` or the command line.
 
     Raises:
         ImageError: If the file is damaged.
-        BasisError: If it is not a basis or not as it was written.
+        BasisError: If it is not a basis, or was changed after it was written.
 
     Examples:
         >>> lp.read_basis("room.basis.exr")
@@ -85,10 +85,11 @@ def read_basis(path: str | Path) -> Basis:
 
 
 def leave_indirect(basis: Basis, path: Path) -> Basis:
-    """Return `basis` with indirect planes whose rows are read on demand, if it has many lights.
+    """Return `basis` with indirect planes that are read on demand from `path`, if it has many
+    lights.
 
-    Only pictures need them, so they then take no memory. path: a file of exactly this basis; with
-    any other file nothing changes.
+    Only denoised pictures need them, so they take no memory otherwise. path: the file that holds
+    exactly this basis; if it does not, or has another layout, `basis` is returned unchanged.
     """
     if basis.indirect is None or not is_encoded(len(basis.lights), basis.size):
         return basis
@@ -112,9 +113,9 @@ def leave_indirect(basis: Basis, path: Path) -> Basis:
 
 
 def _read_large(path: Path) -> Basis | None:
-    """Return a basis whose rows are read when they are asked for.
+    """Return a basis whose rows are read on demand.
 
-    None of one that memory has room for, and where the file is not read so.
+    Returns None if the basis fits in memory or the file does not support reading rows.
     """
     try:
         file = RowFile(path)
@@ -139,7 +140,7 @@ def _head(texts: Iterable[Mapping[str, str]]) -> Mapping[str, str]:
 
 
 def _basis_of_parts(parts: Sequence[ExrPart], head: Mapping[str, str]) -> Basis:
-    """Return the basis of EXR parts. Raises BasisError or one of _DAMAGES."""
+    """Return the basis of EXR parts. Raises BasisError or one of _HEADER_ERRORS."""
     lit = [p.in_display_window() for p in parts if LIGHT_KEY in p.attributes]
     others = [p for p in parts if LIGHT_KEY not in p.attributes]
     scales = [scales_of(p.attributes) for p in lit]
@@ -160,9 +161,9 @@ def _basis_of_parts(parts: Sequence[ExrPart], head: Mapping[str, str]) -> Basis:
 
 
 def _basis_of_rows(file: RowFile, head: Mapping[str, str]) -> Basis | None:
-    """Return the basis whose planes stay in the file; None where its parts are not alike.
+    """Return a basis whose planes stay in the file; None if its parts differ in layout.
 
-    Raises as `_basis_of_parts` does.
+    Raises the errors of `_basis_of_parts`.
     """
     lit = [p for p in file.parts if LIGHT_KEY in p.texts]
     if any(
@@ -195,11 +196,11 @@ def _checked_basis(
     *,
     has_indirect: bool,
 ) -> Basis:
-    """Return the basis of a file, checked.
+    """Return the basis of a file after checking it.
 
-    texts, stored: for the part of each light, its attributes and the reader of its channels.
-    planes: makes planes of the parts in an order, for an index into `PLANE_CHANNELS`. has_indirect:
-    whether the parts have planes of indirect light.
+    texts: attributes of each light's part. stored: functions that read the channels of each light's
+    part. planes: function of an order of the parts and an index into `PLANE_CHANNELS` that returns
+    those planes. has_indirect: whether the parts have planes of indirect light.
     """
     seen = [p.in_display_window().channels["Y"] for p in others if "Y" in p.channels]
     if not texts or not seen:
@@ -232,7 +233,7 @@ def _checked_basis(
     except (BasisError, ImageError) as error:
         raise BasisError(f"is damaged as a basis: {one_line(str(error))}") from error
     for light, attributes, read in zip(lights, texts, stored, strict=True):
-        channels = read()  # one light at a time: they may be larger than memory
+        channels = read()  # one light at a time, since together they may exceed memory
         names = LIGHT_CHANNELS | INDIRECT_CHANNELS if has_indirect else LIGHT_CHANNELS
         if not all(np.isfinite(channels[name]).all() for name in names):
             raise BasisError("holds values that are not finite: make it again")
@@ -249,7 +250,9 @@ def _checked_basis(
 
 
 def read_origin(path: Path) -> tuple[Origin, tuple[int, int], tuple[str, ...]]:
-    """Return origin, (height, width) and light identities of the basis at `path`, no pixels."""
+    """Return origin, (height, width) and light identities of the basis at `path`, without reading
+    pixels.
+    """
     file_length(path, "basis", BasisError, limit=MAX_BYTES)
     try:
         headers, size = read_headers(path)

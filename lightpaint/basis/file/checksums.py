@@ -1,9 +1,9 @@
-"""Checksums in a basis file, which reveal changes by other programs.
+"""Checksums in a basis file, which detect that another program has changed it.
 
 OpenEXR's own compression detects damage, but not a part that was painted over, converted to half,
-cropped or replaced and written again. The header of the first part has, as the text attribute
-`lightpaint.checksums`, CRC-32s of every light (what its header says and its pixels, together), of
-the origin and of the mask of seen emitters. A file without the attribute is read unchecked.
+cropped or replaced, and written again. The header of the first part has, as the text attribute
+`lightpaint.checksums`, the CRC-32s of every light (header text and pixels together), of the origin
+and of the mask of seen emitters. A file without this attribute is read unchecked.
 """
 
 import json
@@ -26,7 +26,9 @@ Channels = Mapping[str, npt.NDArray[Any]]
 
 @dataclass(frozen=True)
 class Checksums:
-    """The checksums of a basis file. lights: by name, in order. learned: of the guide table."""
+    """The checksums of a basis. lights: by name, in the order of the lights. learned: that of the
+    guide table.
+    """
 
     lights: Mapping[str, str]
     origin: str
@@ -45,7 +47,7 @@ class Checksums:
     def in_order(self, names: Sequence[str]) -> list[int]:
         """Return the indices of `names` in the order in which the lights were written.
 
-        Raises BasisError if a light is gone, or one is there that was not written with them.
+        Raises BasisError if a light is missing, duplicated, or was not written with the others.
         """
         if missing := [name for name in self.lights if name not in names]:
             raise BasisError(f"has lost the light {one_line(missing[0])!r}: make it again")
@@ -61,7 +63,9 @@ class Checksums:
 
 
 def checksum(text: str, channels: Channels) -> str:
-    """Return eight hexadecimal digits for a text and pixels, with their sizes, types and names."""
+    """Return the CRC-32 of a text and of pixels with their sizes, types and names, as eight
+    hexadecimal digits.
+    """
     crc = zlib.crc32(text.encode())
     for name in sorted(channels):
         pixels = np.ascontiguousarray(channels[name])
@@ -71,7 +75,7 @@ def checksum(text: str, channels: Channels) -> str:
 
 
 def check(expected: str, part: str, text: str, channels: Channels) -> None:
-    """Raise BasisError unless text and pixels have the expected checksum."""
+    """Raise BasisError unless text and pixels match the checksum that was stored for them."""
     if checksum(text, channels) == expected:
         return
     raise BasisError(

@@ -1,4 +1,4 @@
-"""Parts of a basis file: its lights, visible emitters, the table of the guide, surfaces."""
+"""Parts of a basis file: lights, visible emitters, the guide table and the surface features."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -35,22 +35,22 @@ EXTRA_PART, EXTRA_KEY = "extra samples", "lightpaint.extra"
 
 LIGHT_KEY, SCALE_KEY = "lightpaint.light", "lightpaint.scale"
 
-#: Channels that each light has: of its image, and of its noise.
+#: Channels of each light: its image and its noise.
 IMAGE_CHANNELS, NOISE_CHANNELS = (*"RGB",), (*(f"{HALF_DIFFERENCE}.{c}" for c in "RGB"),)
 LIGHT_CHANNELS = {*IMAGE_CHANNELS, *NOISE_CHANNELS}
 
-#: Channels of the indirect part of both, where it was kept apart.
+#: Channels of the indirect part of image and noise, if it is stored separately.
 INDIRECT_IMAGE_CHANNELS = (*(f"indirect.{c}" for c in "RGB"),)
 INDIRECT_NOISE_CHANNELS = (*(f"indirect_{HALF_DIFFERENCE}.{c}" for c in "RGB"),)
 INDIRECT_CHANNELS = {*INDIRECT_IMAGE_CHANNELS, *INDIRECT_NOISE_CHANNELS}
 
-#: All planes that a light may have, by their channels.
+#: Channels of all planes that a light may have.
 PLANE_CHANNELS = (IMAGE_CHANNELS, NOISE_CHANNELS, INDIRECT_IMAGE_CHANNELS, INDIRECT_NOISE_CHANNELS)
 
-#: Most extra samples of a pixel, which float32 tells apart.
+#: Maximum number of extra samples of a pixel, up to which float32 holds integers exactly.
 MAX_EXTRA = 2**24
 
-#: Smallest and largest scale of a plane.
+#: Range of the scale of a stored plane.
 LEAST_SCALE, LARGEST_SCALE = 2.0**-126, 2.0**126
 
 
@@ -63,7 +63,7 @@ def plane_sets(basis: Basis) -> list[Planes]:
 
 
 def encoded_planes_of(basis: Basis, k: int) -> list[EncodedPlane]:
-    """Return the planes of light k, encoded for storage, in the order of `PLANE_CHANNELS`."""
+    """Return the planes of light k in their best encoding, in the order of `PLANE_CHANNELS`."""
     sets = plane_sets(basis)
     if all(isinstance(planes, EncodedPlanes) for planes in sets):
         return [planes.encoded(k) for planes in sets if isinstance(planes, EncodedPlanes)]
@@ -73,10 +73,10 @@ def encoded_planes_of(basis: Basis, k: int) -> list[EncodedPlane]:
 
 
 def light_texts(light: BasisLight, encodings: Sequence[PlaneEncoding]) -> dict[str, str]:
-    """Return the attributes of the part of a light."""
+    """Return the text attributes for the part of a light."""
     data = fields_of(light, "is_fixed", "unit_flux", "identity")
     if light.members == (light.name,):
-        del data["members"]  # which goes without saying for one emitter
+        del data["members"]  # the default for a single emitter
     texts = {LIGHT_KEY: json.dumps(data, ensure_ascii=False)}
     if any(encoding.scale != 1 for encoding in encodings):
         texts[SCALE_KEY] = json.dumps([encoding.scale for encoding in encodings])
@@ -93,14 +93,14 @@ def light_channels(planes: Sequence[EncodedPlane]) -> Channels:
 
 
 def checked_text(texts: Mapping[str, str]) -> str:
-    """Return the text that the checksum of a light covers besides its pixels."""
+    """Return the text that enters the checksum of a light, besides its pixels."""
     return texts[LIGHT_KEY] + texts.get(SCALE_KEY, "")
 
 
 def scales_of(texts: Mapping[str, str]) -> tuple[float, ...]:
-    """Return the factors of the stored planes of a light, in the order of `PLANE_CHANNELS`.
+    """Return the scales of the stored planes of a light, in the order of `PLANE_CHANNELS`.
 
-    Raises BasisError for anything else than two or four numbers above 0.
+    Raises BasisError for anything but two or four numbers above 0.
     """
     scales = strict_json(texts.get(SCALE_KEY, "[1, 1, 1, 1]"))
     if isinstance(scales, list) and len(scales) in (2, 4) and all(map(_is_scale, scales)):
@@ -113,7 +113,7 @@ def _is_scale(scale: object) -> bool:
 
 
 def stack_channels(parts: Sequence[tuple[ExrPart, float]], names: Sequence[str]) -> Floats:
-    """Return some channels of parts times a scale each, (n, h, w, 3)."""
+    """Return the named channels of parts, each part multiplied by its scale, (n, h, w, 3)."""
     stored = stored_channels(parts, names)
     stacked = np.empty((len(parts), *parts[0][0].size, 3), np.float32)
     for image, channels, (_, scale) in zip(stacked, stored, parts, strict=True):
@@ -127,9 +127,9 @@ def stack_channels(parts: Sequence[tuple[ExrPart, float]], names: Sequence[str])
 def stored_channels(
     parts: Sequence[tuple[ExrPart, float]], names: Sequence[str]
 ) -> list[list[npt.NDArray[Any]]]:
-    """Return some channels of parts as they are stored, (h, w) each.
+    """Return the named channels of parts as they are stored, (h, w) each.
 
-    Raises BasisError if parts differ in size, or lack one of these channels.
+    Raises BasisError if parts differ in size or lack one of the channels.
     """
     first = parts[0][0]
     for part, _ in parts:
@@ -142,13 +142,13 @@ def stored_channels(
 
 
 def other_parts(basis: Basis) -> Iterator[ExrPart]:
-    """Yield all parts but those of the lights, the emitters that are seen first."""
+    """Yield all parts except those of the lights, beginning with the visible emitters."""
     seen = {"Y": basis.emitters_seen.astype(np.float16)}
-    # The format's rule: a part name never repeats, so a light may not take this one.
+    # OpenEXR requires unique part names, and a light may already have this one.
     yield ExrPart(free_name(VISIBLE_EMITTERS_PART, basis.names), seen)
     if basis.guide_table is not None:
         guide_table = dict(zip(("received", "asked"), basis.guide_table, strict=True))
-        # A table and no picture; the format wants one display window for all parts.
+        # A table rather than a picture, but OpenEXR requires one display window for all parts.
         yield ExrPart(free_name(GUIDE_PART, basis.names), guide_table, display=basis.size)
     if basis.features is not None:
         channels = _feature_channels(basis.features)
@@ -156,7 +156,7 @@ def other_parts(basis: Basis) -> Iterator[ExrPart]:
         yield ExrPart(free_name(FEATURES_PART, basis.names), channels, about_them)
     if basis.objects is not None:
         named = json.dumps(basis.objects.names, ensure_ascii=False)
-        # Whole numbers that float32 holds.
+        # Integers small enough for float32.
         index = {"index": basis.objects.index.astype(np.float32)}
         about_it = {NAMES_KEY: named, OBJECTS_KEY: checksum(named, index)}
         yield ExrPart(free_name(OBJECTS_PART, basis.names), index, about_it)
@@ -169,9 +169,10 @@ def other_parts(basis: Basis) -> Iterator[ExrPart]:
 def fields_of_others(
     others: Sequence[ExrPart], checksums: Checksums | None, size: tuple[int, int]
 ) -> dict[str, Any]:
-    """Return the fields of a `Basis` that stand in parts of their own, by name.
+    """Return the fields of a `Basis` that have a part each in the file, by name.
 
-    size: (height, width) of its planes. Raises BasisError for damaged ones that are needed.
+    size: (height, width) of its planes. Raises BasisError if a part that cannot be left out is
+    damaged.
     """
     return {
         "guide_table": guide_table_of(others, checksums),
@@ -182,7 +183,9 @@ def fields_of_others(
 
 
 def guide_table_of(others: Sequence[ExrPart], checksums: Checksums | None) -> Floats | None:
-    """Return the table of the emitter guide; None if missing or damaged: nothing needs it."""
+    """Return the table of the emitter guide; None if it is missing or damaged, since it is
+    optional.
+    """
     for channels in (p.channels for p in others if {"received", "asked"} <= p.channels.keys()):
         if checksums is not None and checksum("", channels) != checksums.learned:
             return None
@@ -191,7 +194,7 @@ def guide_table_of(others: Sequence[ExrPart], checksums: Checksums | None) -> Fl
 
 
 def _feature_channels(features: Features) -> Channels:
-    """Return the features, rounded to half floats but for positions."""
+    """Return the channels of the features: positions in float32, all others in half floats."""
     albedo = rgb_channels(features.albedo, "albedo")
     channels = {
         x: y.astype(np.float16) for x, y in (albedo | _xyz(features.normal, "normal")).items()
@@ -204,9 +207,9 @@ def _xyz(vectors: Floats, name: str) -> dict[str, Floats]:
 
 
 def features_of(others: Sequence[ExrPart], size: tuple[int, int]) -> Features | None:
-    """Return albedo, normals and, unless an earlier version wrote them, positions.
+    """Return albedo, normals and, except from files of an earlier version, positions.
 
-    None if missing or damaged, since nothing needs them.
+    None if they are missing or damaged, since they are optional.
     """
     for part in (p.in_display_window() for p in others if FEATURES_KEY in p.attributes):
         channels = part.channels
@@ -223,7 +226,7 @@ def features_of(others: Sequence[ExrPart], size: tuple[int, int]) -> Features | 
 
 
 def objects_of(others: Sequence[ExrPart], size: tuple[int, int]) -> Objects | None:
-    """Return the map of objects; None if missing or damaged, since nothing needs it."""
+    """Return the map of objects; None if it is missing or damaged, since it is optional."""
     for part in (p.in_display_window() for p in others if OBJECTS_KEY in p.attributes):
         named = part.attributes.get(NAMES_KEY, "")
         if checksum(named, part.channels) != part.attributes[OBJECTS_KEY] or part.size != size:
@@ -236,9 +239,9 @@ def objects_of(others: Sequence[ExrPart], size: tuple[int, int]) -> Objects | No
 
 
 def extra_of(others: Sequence[ExrPart], size: tuple[int, int]) -> Indices | None:
-    """Return the numbers of extra samples; None without a part of them.
+    """Return the numbers of extra samples; None if the file has none.
 
-    Raises BasisError for a damaged one: means of samples are weighed by it.
+    Raises BasisError if they are damaged, because they weight the means of samples.
     """
     for part in (p.in_display_window() for p in others if EXTRA_KEY in p.attributes):
         counts = part.channels.get("samples", np.full(1, np.nan))

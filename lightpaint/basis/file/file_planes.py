@@ -1,4 +1,4 @@
-"""Planes in a basis file, whose rows are read when they are asked for: larger than memory."""
+"""Planes of a basis file whose rows are read on demand, so that they may exceed memory."""
 
 import os
 from collections import OrderedDict
@@ -15,34 +15,34 @@ from lightpaint.basis.planes import MemoryPlanes, Planes, PlanesBase, mix
 from lightpaint.images.formats.exr_rows import PartLayout, RowFile
 from lightpaint.threads import parallel_map
 
-#: Bytes of strips of rows that are kept, of all planes together; and how many strips these are, so
-#: that each thread may walk along one of its own.
+#: Bytes of recently read strips of rows that are kept, for all planes together; and the number of
+#: these strips, so that each thread can walk along one of them.
 STRIP_CACHE_BYTES, STRIP_CACHE_COUNT = 2**27, (os.cpu_count() or 1) + 2
 
-#: Bytes of picked pixels that are kept in memory.
+#: Maximum size in bytes of picked pixels that are copied into memory.
 PICKED_MAX_BYTES = 2**27
 
 
 class RowPlanes(PlanesBase):
-    """Planes that a function (`rows`) reads by rows on demand.
+    """Planes that are read by rows; subclasses implement `rows`.
 
-    Passes over the pixels request the same rows repeatedly, so a few strips of rows are cached.
+    Walks over pixels visit the same rows repeatedly, so a few strips of rows are kept.
     """
 
     def rows(self, top: int, bottom: int) -> Floats:
-        """Return some rows of all planes, (n, bottom - top, w, 3)."""
+        """Return rows `top` to `bottom` of all planes, (n, bottom - top, w, 3)."""
         raise NotImplementedError
 
     @property
     def chunk_rows(self) -> int:
-        """Rows that are read together, whichever of them is asked for."""
+        """Number of rows that the file stores as one chunk, which can only be read together."""
         return 1
 
     @cached_property
     def strip_rows(self) -> int:
-        """Rows of a strip, of which some are kept."""
+        """Number of rows in a strip."""
         step = max(1, STRIP_CACHE_BYTES // (STRIP_CACHE_COUNT * 12 * self.count * self.size[1]))
-        # Whole chunks of the file, which would else be unpacked for two strips each.
+        # Whole chunks of the file; otherwise a chunk on a boundary would be unpacked twice.
         return max(step // self.chunk_rows, 1) * self.chunk_rows
 
     @cached_property
@@ -75,7 +75,7 @@ class RowPlanes(PlanesBase):
         return self._strips[k].reshape(self.count, -1, 3)
 
     def picked(self, where: slice | Indices) -> Planes:
-        """Return the same pixels as planes of a single row; kept in memory where they are few."""
+        """Return these pixels as planes with a single row, copied into memory if they are few."""
         height, width = self.size
         if isinstance(where, slice):
             where = np.arange(height * width)[where]
@@ -95,16 +95,18 @@ class RowPlanes(PlanesBase):
         return mixed
 
     def replaced(self, planes: Mapping[int, Floats]) -> Planes:
-        """Return these planes with others, (h, w, 3), for some of the lights."""
+        """Return planes in which some lights have other planes, (h, w, 3) each."""
         return ReplacedPlanes(self, planes)
 
     def array(self) -> Floats:
-        """Return all planes, (n, h, w, 3): as much memory as that takes."""
+        """Return all planes, (n, h, w, 3). The whole array must fit in memory."""
         return np.ascontiguousarray(self.rows(0, self.size[0]))
 
 
 class _Strips:
-    """Strips of rows that were read last. step: rows of one. read: makes the k-th."""
+    """The strips of rows that were read last. step: rows in a strip. read: function that reads
+    strip k.
+    """
 
     def __init__(self, step: int, read: Callable[[int], Floats]) -> None:
         self.step, self._read = step, read
@@ -112,7 +114,7 @@ class _Strips:
         self._lock = Lock()
 
     def __getitem__(self, k: int) -> Floats:
-        """Return the k-th strip; wait if another thread is reading it."""
+        """Return strip k. If another thread is reading it, wait for the result."""
         with self._lock:
             strip = self._strips.get(k)
             is_mine = strip is None
@@ -134,8 +136,8 @@ class _Strips:
 class FilePlanes(RowPlanes):
     """Planes in parts of an OpenEXR file.
 
-    parts: one for each light, all of one size. names: the channels of red, green and blue. scales:
-    factors of the numbers of each part.
+    parts: one for each light, all of the same size. names: the channels of red, green and blue.
+    scales: factor for the stored numbers of each part.
     """
 
     def __init__(
@@ -150,7 +152,7 @@ class FilePlanes(RowPlanes):
 
     @property
     def count(self) -> int:
-        """n."""
+        """Number of lights."""
         return len(self._parts)
 
     @property
@@ -160,7 +162,7 @@ class FilePlanes(RowPlanes):
 
     @property
     def chunk_rows(self) -> int:
-        """Rows that are read together, whichever of them is asked for."""
+        """Number of rows that the file stores as one chunk, which can only be read together."""
         return max(part.lines for part in self._parts)
 
     def plane(self, i: int) -> Floats:
@@ -171,9 +173,9 @@ class FilePlanes(RowPlanes):
         return image
 
     def rows(self, top: int, bottom: int) -> Floats:
-        """Return some rows of all planes, (n, bottom - top, w, 3)."""
+        """Return rows `top` to `bottom` of all planes, (n, bottom - top, w, 3)."""
         top, bottom = max(top, 0), min(bottom, self.size[0])
-        # Channel by channel, as they are stored and as sums go over them.
+        # Channels first, which is how they are stored and summed.
         block = np.empty((self.count, 3, max(bottom - top, 0), self.size[1]), np.float32)
         for i, rows in enumerate(block):
             self._read(i, top, bottom, rows)
@@ -187,14 +189,14 @@ class FilePlanes(RowPlanes):
 
 
 class PickedPlanes(RowPlanes):
-    """Planes of selected pixels of other planes, as a single row, read on request."""
+    """Selected pixels of other planes as a single row, read on demand."""
 
     def __init__(self, whole: RowPlanes, where: Indices) -> None:
         self._whole, self._where = whole, where
 
     @property
     def count(self) -> int:
-        """n."""
+        """Number of lights."""
         return self._whole.count
 
     @property
@@ -207,11 +209,13 @@ class PickedPlanes(RowPlanes):
         return self._whole.plane(i).reshape(-1, 3)[self._where][None]
 
     def rows(self, top: int, bottom: int) -> Floats:
-        """Return the single row of all planes, (n, 1, p, 3), if it is asked for."""
+        """Return the single row of all planes, (n, 1, p, 3), or no row if it is outside the
+        range.
+        """
         return self.pixels(slice(0, len(self._where)))[:, None][:, top:bottom]
 
     def pixels(self, where: slice | Indices) -> Floats:
-        """Return some of the pixels, (n, p, 3)."""
+        """Return some pixels of all planes, (n, p, 3)."""
         return self._whole.pixels(self._where[where])
 
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
@@ -220,14 +224,14 @@ class PickedPlanes(RowPlanes):
 
 
 class ReplacedPlanes(RowPlanes):
-    """Other planes, but for some of the lights."""
+    """Planes of which some lights have been replaced."""
 
     def __init__(self, whole: RowPlanes, planes: Mapping[int, Floats]) -> None:
         self._whole, self._planes = whole, dict(planes)
 
     @property
     def count(self) -> int:
-        """n."""
+        """Number of lights."""
         return self._whole.count
 
     @property
@@ -237,7 +241,7 @@ class ReplacedPlanes(RowPlanes):
 
     @property
     def chunk_rows(self) -> int:
-        """Rows that are read together, whichever of them is asked for."""
+        """Number of rows that the file stores as one chunk, which can only be read together."""
         return self._whole.chunk_rows
 
     def plane(self, i: int) -> Floats:
@@ -245,7 +249,7 @@ class ReplacedPlanes(RowPlanes):
         return self._planes[i] if i in self._planes else self._whole.plane(i)
 
     def rows(self, top: int, bottom: int) -> Floats:
-        """Return some rows of all planes, (n, bottom - top, w, 3)."""
+        """Return rows `top` to `bottom` of all planes, (n, bottom - top, w, 3)."""
         block = self._whole.rows(top, bottom)
         for k, plane in self._planes.items():
             block[k] = plane[top:bottom]

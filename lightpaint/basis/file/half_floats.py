@@ -1,8 +1,9 @@
-"""Half floats for planes whose rounding stays invisible.
+"""Half floats for planes, used where their rounding stays invisible.
 
-Rounding to half changes a value by 2⁻¹¹ at most. An image is stored in half floats if that is far
-below its own noise in every tile, and in float32 if it is cleaner. Images too bright for half
-floats, or so dim that they would lose digits, are multiplied by a power of two first.
+Rounding to half changes a value by at most 2⁻¹¹ of it. An image is stored in half floats if that is
+far below its own noise in every tile, and in float32 if it is so clean that rounding would show.
+Values that are too bright for half floats, or so dim that they lose digits, are first multiplied by
+a power of two.
 """
 
 from collections.abc import Sequence
@@ -17,29 +18,31 @@ from lightpaint.basis.file.file_planes import RowPlanes
 
 HALF, FLOAT = np.dtype(np.float16), np.dtype(np.float32)
 
-#: Part of the noise of a tile that rounding may have at most, root mean square: it adds 1/512 to
-#: the standard deviation. Pixels along the side of a tile.
+#: Maximum ratio of rounding error to noise in a tile, root mean square, which adds 1/512 to the
+#: standard deviation; and the side of a tile in pixels.
 HIDDEN_SHARE, TILE = 1 / 16, 32
 
-#: Power of two to which the brightest value is scaled, of 15 that half floats reach.
+#: Exponent to which the brightest value is scaled; half floats reach 15.
 BRIGHTEST = 14
 
 
 @dataclass(frozen=True)
 class PlaneEncoding:
-    """The storage of a plane. kind: type of its numbers. scale: factor for them, a power of two."""
+    """The encoding of a plane. kind: stored number type. scale: a power of two that multiplies
+    stored numbers.
+    """
 
     kind: np.dtype[Any] = FLOAT
     scale: float = 1.0
 
     def encoded(self, plane: Floats) -> npt.NDArray[Any]:
-        """Return the numbers that are stored of a plane, or of a part of one."""
+        """Return the numbers to store for a plane or part of one."""
         with np.errstate(over="ignore"):
             scaled = plane if self.scale == 1 else plane * np.float32(1 / self.scale)
         return round_to_halves(scaled) if self.kind == HALF else scaled
 
     def decoded(self, stored: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
-        """Return light, float32, of numbers that were stored."""
+        """Return the light, float32, that stored numbers represent."""
         plane = np.empty(stored.shape, np.float32)
         copy_as_singles(stored, plane)
         if self.scale != 1:
@@ -49,7 +52,7 @@ class PlaneEncoding:
 
 @dataclass(frozen=True)
 class EncodedPlane:
-    """A plane as it is stored. numbers: its three channels, (h, w) each."""
+    """A plane in its stored encoding. numbers: its three channels, (h, w) each."""
 
     encoding: PlaneEncoding
     numbers: Sequence[npt.NDArray[Any]] | npt.NDArray[Any]
@@ -62,9 +65,10 @@ class EncodedPlane:
 
 
 class EncodedPlanes(RowPlanes):
-    """Planes that memory holds as files do: in half floats where nobody sees the rounding.
+    """Planes held in memory in their stored encoding: in half floats where rounding stays
+    invisible.
 
-    planes: of each light.
+    planes: one for each light.
     """
 
     def __init__(self, planes: Sequence[EncodedPlane]) -> None:
@@ -72,7 +76,7 @@ class EncodedPlanes(RowPlanes):
 
     @property
     def count(self) -> int:
-        """n."""
+        """Number of lights."""
         return len(self._encoded)
 
     @property
@@ -86,7 +90,7 @@ class EncodedPlanes(RowPlanes):
         return sum(channel.nbytes for plane in self._encoded for channel in plane.numbers)
 
     def encoded(self, i: int) -> EncodedPlane:
-        """Return the plane of light i as it is stored."""
+        """Return the plane of light i in its stored encoding."""
         return self._encoded[i]
 
     def plane(self, i: int) -> Floats:
@@ -96,7 +100,7 @@ class EncodedPlanes(RowPlanes):
         return image
 
     def rows(self, top: int, bottom: int) -> Floats:
-        """Return some rows of all planes, (n, bottom - top, w, 3)."""
+        """Return rows `top` to `bottom` of all planes, (n, bottom - top, w, 3)."""
         height, width = self.size
         top, bottom = max(top, 0), min(bottom, height)
         block = self.pixels(slice(top * width, max(bottom, top) * width))
@@ -105,14 +109,14 @@ class EncodedPlanes(RowPlanes):
     def pixels(self, where: slice | Indices) -> Floats:
         """Return some pixels of all planes, (n, p, 3)."""
         length = self._encoded[0].numbers[0].reshape(-1)[where].size
-        # Channel by channel, as they are stored and as sums go over them.
+        # Channels first, which is how they are stored and summed.
         block = np.empty((self.count, 3, length), np.float32)
         for i, channels in enumerate(block):
             self._decode(i, where, channels)
         return block.transpose(0, 2, 1)
 
     def _decode(self, i: int, where: slice | Indices, into: Floats) -> None:
-        """Write some pixels of light i into (3, p)."""
+        """Decode some pixels of light i into an array (3, p)."""
         encoded = self._encoded[i]
         for stored, channel in zip(encoded.numbers, into, strict=True):
             copy_as_singles(stored.reshape(-1)[where], channel)
@@ -121,20 +125,20 @@ class EncodedPlanes(RowPlanes):
 
 
 def encoded_plane(channels: Sequence[npt.NDArray[Any]], scale: float) -> EncodedPlane:
-    """Return a plane of channels as they are stored, (h, w) each."""
+    """Return a plane whose stored channels, (h, w) each, are given."""
     numbers = [np.ascontiguousarray(channel) for channel in channels]
     return EncodedPlane(PlaneEncoding(numbers[0].dtype, scale), numbers)
 
 
 def encode_pair(image: Floats, noise: Floats) -> tuple[EncodedPlane, EncodedPlane]:
-    """Return the image of a light and its half difference, (h, w, 3), as they are best stored."""
+    """Return the image of a light and its half difference, (h, w, 3), in their best encodings."""
     hidden = HIDDEN_SHARE**2 * _power(noise)
     return _encode(image, hidden), _encode(noise, hidden)
 
 
 def _encode(plane: Floats, hidden: Doubles) -> EncodedPlane:
-    """Return a plane in half floats if rounding has no more power than `hidden`, tile by tile and
-    channel by channel; else in float32.
+    """Return a plane in half floats if the power of the rounding error is at most `hidden` in every
+    tile and channel; else in float32.
     """
     height, width, _ = plane.shape
     for scale in dict.fromkeys((1.0, _scale_of(plane))):
@@ -152,11 +156,13 @@ def _encode(plane: Floats, hidden: Doubles) -> EncodedPlane:
 
 
 def _scale_of(plane: Floats) -> float:
-    """Return the power of two that brings the brightest value to just below 2^BRIGHTEST."""
+    """Return the power of two by which stored numbers are multiplied, so that the brightest is
+    stored just below 2^BRIGHTEST.
+    """
     brightest = float(max(plane.max(initial=0), -plane.min(initial=0)))
     if not 0 < brightest < np.inf:
         return 1.0
-    # Within what float32 has, so that scaling to and fro changes no bit.
+    # Within the exponents of float32, so that scaling back and forth changes no bit.
     return float(2.0 ** np.clip(np.frexp(brightest)[1] - BRIGHTEST, -100, 100))
 
 
@@ -167,7 +173,7 @@ def _power(plane: Floats) -> Doubles:
 
 
 def _row_power(rows: Floats) -> Doubles:
-    """Return Σ x² of a row of tiles, (3, columns). rows: (3, up to TILE, w)."""
-    # Each row of pixels is summed first, which stays in the processor's cache.
+    """Return Σ x² of each tile in one row of tiles, (3, columns). rows: (3, up to TILE, w)."""
+    # Sum over the rows of pixels first, which stay in the processor's cache.
     squares = np.square(rows, dtype=np.float64).sum(axis=1)
     return np.add.reduceat(squares, np.arange(0, rows.shape[2], TILE), axis=1)

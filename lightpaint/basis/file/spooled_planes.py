@@ -1,4 +1,4 @@
-"""Planes that are costly to make and asked for again and again, in a temporary file."""
+"""Copies in a temporary file of planes that are costly to compute and requested repeatedly."""
 
 from contextlib import suppress
 
@@ -11,9 +11,10 @@ from lightpaint.basis.planes import Planes
 
 
 def spooled(planes: Planes) -> Planes:
-    """Return planes in memory unchanged, and copy planes computed on request to a temporary file.
+    """Return planes in memory unchanged, and others copied to a temporary file.
 
-    Without room for that file, they are computed again on each request.
+    If the file does not fit on the disk, planes are returned unchanged and computed on each
+    request.
     """
     if isinstance(planes, RowPlanes):
         with suppress(OSError):
@@ -22,11 +23,11 @@ def spooled(planes: Planes) -> Planes:
 
 
 class SpooledPlanes(RowPlanes):
-    """A copy of planes in a temporary file. Raises OSError if there is no room for it."""
+    """A copy of planes in a temporary file. Raises OSError if the disk is full."""
 
     def __init__(self, planes: RowPlanes) -> None:
         height, width = planes.size
-        # Channel by channel, as sums go over them.
+        # Channels first, which is how they are summed.
         self._file = TemporaryArray((planes.count, 3, height, width))
         step = planes.strip_rows
         for top in range(0, height, step):
@@ -36,7 +37,7 @@ class SpooledPlanes(RowPlanes):
 
     @property
     def count(self) -> int:
-        """n."""
+        """Number of lights."""
         return int(self._file.array.shape[0])
 
     @property
@@ -52,7 +53,7 @@ class SpooledPlanes(RowPlanes):
         return image
 
     def rows(self, top: int, bottom: int) -> Floats:
-        """Return some rows of all planes, (n, bottom - top, w, 3)."""
+        """Return rows `top` to `bottom` of all planes, (n, bottom - top, w, 3)."""
         block = np.array(self._file.array[:, :, max(top, 0) : max(bottom, 0)])
         self._file.release()
         return block.transpose(0, 2, 3, 1)

@@ -1,1 +1,1 @@
-"""A basis from another renderer's light groups: its layers, their names, their sum."""
+"""A basis from another renderer's light groups: its layers, their names and their sum."""

@@ -1,4 +1,4 @@
-"""Comparison of the sum of light groups with the beauty: do they make up the whole picture?"""
+"""Checks whether the sum of the light groups equals the beauty, the whole picture."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -9,20 +9,20 @@ from lightpaint.arrays import Floats
 from lightpaint.basis.lightgroups.render_layers import RenderLayer
 from lightpaint.colour.color import LUMINANCE
 
-#: Share of the beauty that the groups may lack beyond rounding before it counts as missing.
+#: Share of the beauty that may be missing beyond rounding without being reported.
 NEGLIGIBLE_SHARE = 1e-5
 
-#: Share of the beauty by which they may exceed it before that is a warning.
+#: Share of the beauty by which the groups may exceed it without a warning.
 WARNING_EXCESS = 1e-3
 
-#: Largest relative error of one rounding to float16, absolute error below its normal range, and
-#: of a sum in float32 over the samples of a renderer, whose order differs from layer to layer.
+#: Largest relative error of rounding to float16; its absolute error below the normal range;
+#: relative error of a renderer's float32 sum over samples, whose order differs between layers.
 HALF, SUBNORMAL, SUMMED = 2.0**-11, 2.0**-25, 2.0**-20
 
-#: Most pictures of which the sum of all but two is sought: each is tried with each.
+#: Maximum number of layers for which every pair is tried as the sum and the one left out.
 MAX_CANDIDATES = 40
 
-#: Every how many rows and columns a pixel is looked at first, where most pictures are others.
+#: Step between pixels of the first, coarse comparison, which rules out most pictures.
 COARSE_STEP = 8
 
 
@@ -36,8 +36,9 @@ def describe_sum(
 ) -> tuple[str, bool]:
     """Return a sentence on the sum of the groups, and whether more than rounding is missing.
 
-    name: of the light that represents the missing part. All numbers are in the primaries of the
-    file, since light of a wide gamut is negative in others.
+    rest, whole: the beauty minus the groups, and the beauty, (h, w, 3), both in the primaries of
+    the file: in others, light of a wide gamut would be negative. missing, exceeding: as in
+    `missing_and_exceeding`. name: name of the light that holds `rest`.
     """
     beyond = np.sign(rest) * np.maximum(np.abs(rest) - rounding(layers), 0)
     truly_missing, truly_exceeding = missing_and_exceeding(beyond, whole)
@@ -63,7 +64,7 @@ def describe_sum(
 
 
 def missing_and_exceeding(rest: Floats, whole: Floats) -> tuple[float, float]:
-    """Return the luminance that is missing, and that is too much, relative to the beauty."""
+    """Return the missing and the excess luminance of the groups, as shares of the beauty."""
     total = float((np.abs(whole) @ LUMINANCE).sum())
     if total == 0:
         return 0.0, float(bool(rest.any()))
@@ -72,7 +73,7 @@ def missing_and_exceeding(rest: Floats, whole: Floats) -> tuple[float, float]:
 
 
 def rounding(layers: Sequence[RenderLayer]) -> Floats:
-    """Return the largest rounding error of the sum of the layers, (h, w, 3)."""
+    """Return an upper bound of the rounding error of the sum of the layers, (h, w, 3)."""
     bound: Floats = np.zeros(layers[0].image.shape)
     for layer in layers:
         bound += _rounded(layer.image, is_half=layer.is_half)
@@ -86,10 +87,10 @@ def _rounded(image: Floats, *, is_half: bool) -> Floats:
 
 @dataclass(frozen=True)
 class LayerSum:
-    """The sum of layers, to compare with several pictures.
+    """A sum of layers, computed once to be compared with many pictures.
 
-    total: (h, w, 3) float64, not finite where one of them is not. bound: largest effect of rounding
-    on it.
+    total: (h, w, 3) float64, not finite where a layer is not finite. bound: upper bound of its
+    rounding error.
     """
 
     total: Floats
@@ -97,7 +98,7 @@ class LayerSum:
 
     @staticmethod
     def of(layers: Sequence[RenderLayer]) -> "LayerSum":
-        """Return the sum of at least one layer."""
+        """Return the sum of one or more layers."""
         total: Floats = np.zeros(layers[0].image.shape)
         with np.errstate(invalid="ignore"):
             for layer in layers:
@@ -105,28 +106,29 @@ class LayerSum:
         return LayerSum(total, rounding(layers))
 
     def and_also(self, layer: RenderLayer) -> "LayerSum":
-        """Return the sum with one more layer."""
+        """Return the sum with one layer added."""
         with np.errstate(invalid="ignore"):
             total = self.total + layer.image
         return LayerSum(total, self.bound + rounding([layer]))
 
     def without(self, layer: RenderLayer) -> "LayerSum":
-        """Return the sum without one of its layers."""
+        """Return the sum with one of its layers removed."""
         with np.errstate(invalid="ignore"):
             return LayerSum(self.total - layer.image, self.bound)
 
     def lacks(self, beauty: RenderLayer) -> float:
-        """Return Σ |beauty − total|, where both are finite."""
+        """Return Σ |beauty − total| over the pixels where both are finite."""
         return float(_deviation(beauty.image, self.total).sum())
 
     def is_of(self, beauty: RenderLayer, *, less_itself: bool = False) -> bool:
-        """Return whether the sum equals a picture that is not black.
+        """Return True if the sum equals that picture, and the picture is not black.
 
-        less_itself: whether the picture is one of the summed layers and has to be subtracted.
+        less_itself: whether the picture is one of the layers in the sum, and is to be removed from
+        it.
         """
         size = np.nan_to_num(np.abs(beauty.image), posinf=0, neginf=0).sum(dtype=np.float64)
         most = NEGLIGIBLE_SHARE * size
-        # Excesses only add up, so that a few pixels are enough to tell that it is another picture.
+        # The excess only grows with more pixels, so a few of them can rule a picture out.
         coarse = (slice(None, None, COARSE_STEP), slice(None, None, COARSE_STEP))
         return bool(
             size > 0
@@ -137,10 +139,10 @@ class LayerSum:
     def _excess(
         self, beauty: RenderLayer, pixels: tuple[slice, ...], *, less_itself: bool
     ) -> float:
-        """Return their difference beyond rounding, summed over these pixels."""
+        """Return the difference beyond rounding, summed over these pixels."""
         image, bound = beauty.image[pixels], self.bound[pixels]
         if less_itself:
-            # x − (total − x); the bound is that of the same layers.
+            # x − (total − x); the layers and hence the bound are the same.
             deviation = _deviation(2 * image.astype(np.float64), self.total[pixels])
         else:
             deviation = _deviation(image, self.total[pixels])
@@ -157,7 +159,7 @@ def _deviation(picture: Floats, total: Floats) -> Floats:
 def find_beauty_of_lights(
     others: Sequence[RenderLayer], lights: Sequence[RenderLayer]
 ) -> RenderLayer | None:
-    """Return the layer of unknown name that is the sum of the lights."""
+    """Return the layer among `others` that is the sum of the lights; None if there is none."""
     if not others or not lights:
         return None
     added = LayerSum.of(lights)
@@ -165,7 +167,7 @@ def find_beauty_of_lights(
 
 
 def find_beauty(layers: Sequence[RenderLayer]) -> RenderLayer | None:
-    """Return the layer that is the sum of the others."""
+    """Return the layer that is the sum of the others; None if there is none."""
     added = LayerSum.of(layers)
     return next((layer for layer in layers if added.is_of(layer, less_itself=True)), None)
 
@@ -175,14 +177,14 @@ def unrelated_layer(
 ) -> tuple[RenderLayer, RenderLayer] | None:
     """Return the layer without which the others add up to the picture, and that picture.
 
-    beauty: the picture; without one it is sought among the layers. None where all of them are
-    needed, where no single one is in the way, and where they are too many to try.
+    beauty: the picture; None to search for it among the layers. Returns None if all layers are
+    needed, if leaving out one of them does not help, or if there are too many to try.
     """
     if len(layers) < (2 if beauty else 4) or (beauty is None and len(layers) > MAX_CANDIDATES):
         return None
     if beauty is not None and LayerSum.of(layers).is_of(beauty):
         return None
-    # A few pixels tell that most pairs are none.
+    # A coarse selection of pixels rules out most pairs.
     coarse_layers, whole = list(map(_coarsened, layers)), beauty and _coarsened(beauty)
     for k in _unrelated_candidates(coarse_layers, whole):
         others = [*layers[:k], *layers[k + 1 :]]
@@ -194,7 +196,7 @@ def unrelated_layer(
 
 
 def _unrelated_candidates(layers: Sequence[RenderLayer], beauty: RenderLayer | None) -> list[int]:
-    """Return indices of layers without which the others may add up to the picture."""
+    """Return the indices of layers without which the others may add up to the picture."""
     added = LayerSum.of(layers)
     candidates = []
     for k, layer in enumerate(layers):
@@ -213,5 +215,5 @@ def _coarsened(layer: RenderLayer) -> RenderLayer:
 
 
 def share_text(share: float) -> str:
-    """Return a share in words: `0.4 %`, `25 %`."""
+    """Return a share as a percentage: `0.4 %`, `25 %`."""
     return f"{100 * share:.2g} %" if share < 0.0995 else f"{100 * share:.0f} %"

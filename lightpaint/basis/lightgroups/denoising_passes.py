@@ -1,7 +1,7 @@
-"""Passes beside light groups that pictures are denoised by: surfaces, and parts of a light.
+"""Passes in the file of light groups that help to denoise: surfaces, and parts of lights.
 
-Names propose which layers these are. That a layer is the direct or indirect part of a light is
-believed if it is nowhere brighter than the light.
+Layers are proposed by name. A layer named as the direct or indirect part of a light is accepted if
+it is nowhere brighter than the light.
 """
 
 import re
@@ -16,7 +16,7 @@ from lightpaint.basis.lightgroups.naming_conventions import SEPARATORS, is_known
 from lightpaint.basis.lightgroups.render_layers import RenderLayer
 from lightpaint.images.denoiser import Features
 
-#: Names in lower case, without the view layer, and with spaces for underscores; best first.
+#: Names in lower case, without the view layer and with spaces for underscores; best first.
 ALBEDO_NAMES = (
     "denoising albedo",
     "denoise albedo",
@@ -31,30 +31,30 @@ NORMAL_NAMES = (
 )
 POSITION_NAMES = ("position", "p", "pworld")
 
-#: How the parts of a light are named: after the light's layer, or before its name.
+#: Names of the parts of a light: a suffix of its layer's name or a prefix of its own name.
 PART = re.compile(
     r"(?P<owner>.+)[ ._-](?P<after>direct|indirect)"
     r"|(?:.+\.)?(?P<before>direct|indirect)[ ._-](?P<name>.+)",
     re.I,
 )
 
-#: Share of pixels in which a part may exceed its light: filters have negative lobes.
+#: Share of pixels in which a part may exceed its light, since filters have negative lobes.
 MAX_EXCEEDING_SHARE = 1e-3
 
 
 @dataclass(frozen=True)
 class DenoisingPasses:
-    """The passes of a file that are no lights.
+    """The passes of a file that are not lights.
 
-    surfaces: layers of albedo, normals and positions. indirect: the indirect part of a light, by
-    the name of the light's layer, (h, w, 3) as stored.
+    surfaces: layers of albedo, normals and positions. indirect: the indirect part of each light for
+    which it is known, by the name of the light's layer, (h, w, 3) as stored.
     """
 
     surfaces: tuple[RenderLayer, ...]
     indirect: Mapping[str, Floats]
 
     def features(self, view: str) -> Features | None:
-        """Return the denoising features of a view layer; None without albedo or normals."""
+        """Return the surface features of a view layer; None without albedo or normals."""
         albedo, normal, position = (
             self._surface(names, view) for names in (ALBEDO_NAMES, NORMAL_NAMES, POSITION_NAMES)
         )
@@ -65,7 +65,9 @@ class DenoisingPasses:
         return Features(np.clip(albedo, 0, 1), unit, position)
 
     def _surface(self, names: Sequence[str], view: str) -> Floats | None:
-        """Return the pixels of the best layer of these names, (h, w, 3) float32, all finite."""
+        """Return the pixels of the first of these names that exists, (h, w, 3) float32, all
+        finite.
+        """
         of_view = [x for x in self.surfaces if not view or x.name.startswith(f"{view}.")]
         for name in names:
             for layer in of_view or self.surfaces:
@@ -76,9 +78,9 @@ class DenoisingPasses:
 
 
 def split_passes(layers: Sequence[RenderLayer]) -> tuple[list[RenderLayer], DenoisingPasses]:
-    """Return the layers that may be lights or the whole picture, and the passes among the others.
+    """Split layers into those that may be lights or the whole picture, and the passes.
 
-    Normals in R, G, B are known by an albedo that comes with them: a light may have that name.
+    Normals in R, G, B are recognised only next to an albedo, since a light may have their name.
     """
     has_albedo = any(_plain_name(x) in ALBEDO_NAMES for x in layers)
     of_surfaces = {*ALBEDO_NAMES, *(NORMAL_NAMES + POSITION_NAMES if has_albedo else ())}
@@ -111,7 +113,9 @@ def _plain_name(layer: RenderLayer) -> str:
 
 
 def _owner(match: re.Match[str], layers: Mapping[str, RenderLayer]) -> RenderLayer | None:
-    """Return the light's layer that a part is named after; None if none or several match."""
+    """Return the layer of the light that a part is named after; None if it is missing or
+    ambiguous.
+    """
     if match["owner"]:
         return layers.get(match["owner"])
     name = match["name"]
@@ -123,7 +127,9 @@ def _owner(match: re.Match[str], layers: Mapping[str, RenderLayer]) -> RenderLay
 
 
 def _is_part(part: RenderLayer, owner: RenderLayer) -> bool:
-    """Return True if a layer has light, and nowhere more than the light that it may be part of."""
+    """Return True if a layer is not black, and nowhere brighter than the light that it may be part
+    of.
+    """
     beyond = part.image.astype(np.float64) - owner.image - 2 * rounding([part, owner])
     exceeds = (np.nan_to_num(beyond, nan=0, posinf=0, neginf=0) > 0).any(axis=-1)
     return bool(part.image.any()) and float(exceeds.mean()) <= MAX_EXCEEDING_SHARE

@@ -1,8 +1,8 @@
-"""The files of a folder that may hold light groups: not hidden ones, paintings or results.
+"""Files of a folder that may hold light groups, excluding hidden files, paintings and results.
 
-Paintings and results of lightpaint often lie beside a render. Each would count as one more light,
-and match the painting best. A file is left out only if it certainly is no light, and a remark
-always names it.
+Paintings and lightpaint's own output often lie beside a render. Taken for a light, they would be
+the ones that match the painting best. A file is left out only if this is certain, and is always
+reported.
 """
 
 from collections.abc import Iterable, Sequence
@@ -16,7 +16,7 @@ from lightpaint.images.formats.exr_layers import KRITA_LAYERS
 from lightpaint.images.formats.file_kinds import head_of, kind_of
 from lightpaint.screen import some_names
 
-#: Files that a folder of light groups may have: more are the frames of a film.
+#: Maximum number of files in a folder of light groups: more are probably frames of a film.
 MAX_FILES = 1000
 
 
@@ -32,7 +32,10 @@ def is_light_groups(path: Path) -> bool:
 
 
 def is_exr(path: Path) -> bool:
-    """Return whether `path` is a file that begins like OpenEXR. May raise ImageError."""
+    """Return True if `path` is a file with the signature of OpenEXR, whatever its name.
+
+    May raise ImageError.
+    """
     return path.is_file() and kind_of(head_of(path, 16)) == "exr"
 
 
@@ -44,10 +47,11 @@ def is_own_basis(path: Path) -> bool:
 def candidate_files(
     folder: Path, leave_out: Iterable[str | Path] = ()
 ) -> tuple[list[Path], list[str]]:
-    """Return files of a folder that may hold light groups, by name, and a sentence on the others.
+    """Return the files of a folder that may hold light groups, by name, and a sentence on those
+    left out.
 
-    leave_out: files that are none, like the painting. Raises BasisError if none is left, if there
-    are too many, and if the folder cannot be looked into.
+    leave_out: files that are not lights, such as the painting. Raises BasisError if no file
+    remains, if there are too many, or if the folder cannot be read.
     """
     visible = _visible(folder)
     files = _named_exr(visible)
@@ -70,7 +74,7 @@ def candidate_files(
 
 
 def _visible(folder: Path) -> list[Path]:
-    """Return files that are not hidden: systems keep notes of their own in hidden ones."""
+    """Return the files that are not hidden; operating systems keep metadata in hidden ones."""
     try:
         return sorted(f for f in folder.iterdir() if not f.name.startswith(".") and f.is_file())
     except OSError as error:
@@ -82,7 +86,7 @@ def _named_exr(files: Iterable[Path]) -> list[Path]:
 
 
 def _is_readable(file: Path) -> bool:
-    """Return True if a file of another suffix is an EXR."""
+    """Return True if a file without the suffix `.exr` is an EXR."""
     try:
         return is_exr(file)
     except ImageError:
@@ -90,14 +94,14 @@ def _is_readable(file: Path) -> bool:
 
 
 def _reason_against(file: Path, others: Sequence[Path]) -> str:
-    """Return why a file is not the render of a light, in few words; "" if it may be one."""
+    """Return briefly why a file is not the render of a light; "" if it may be one."""
     if any(_is_same(file, other) for other in others):
         return "painting or mask"
     try:
         headers, _ = read_headers(file)
         channels = read_channels(file)
     except ImageError:
-        return ""  # Reading it will report what is wrong.
+        return ""  # Reading it reports the error.
     if any(key.startswith(OWN) for header in headers for key in header):
         return "made by lightpaint"
     if any(name.startswith(f"{HALF_DIFFERENCE}.") for name in channels):
@@ -115,7 +119,9 @@ def _is_same(file: Path, other: Path) -> bool:
 
 
 def _list_with_reasons(reasons: dict[Path, str]) -> str:
-    """Return files with reasons: `a.exr, b.exr (made by lightpaint); c.exr (painting or mask)`."""
+    """Return files grouped by reason: `a.exr, b.exr (made by lightpaint); c.exr (painting or
+    mask)`.
+    """
     texts = []
     for reason in dict.fromkeys(reasons.values()):
         names = [file.name for file, reason_of_file in reasons.items() if reason_of_file == reason]

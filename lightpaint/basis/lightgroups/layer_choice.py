@@ -1,7 +1,7 @@
-"""The choice of a file's layers that are light groups, and of the whole picture.
+"""Chooses by name which layers of a file are light groups, and which is the whole picture.
 
-Works on names alone. A layer is known by its own name, `ViewLayer.Combined_key`. A pattern also
-finds it by the name of its part or file.
+A layer is identified by its own name, such as `ViewLayer.Combined_key`. A pattern may also match
+the name of its part or file.
 """
 
 import re
@@ -19,7 +19,7 @@ from lightpaint.basis.lightgroups.naming_conventions import (
 from lightpaint.errors import BasisError
 from lightpaint.screen import some_names
 
-#: Name of the renderer of files that follow no known convention.
+#: Name for files that no convention matches, in place of a renderer.
 ONE_FILE_PER_LIGHT = "one file per light"
 
 
@@ -27,10 +27,9 @@ ONE_FILE_PER_LIGHT = "one file per light"
 class LayerChoice:
     """The roles of layers.
 
-    lights: name of the light → name of its layer. optional: the same, for layers that may or may
-    not be part of the sum. whole: the same, for a group whose name suggests that it is the sum of
-    all, which the sum will confirm or not. beauty: name of its layer; None if none is known by its
-    name.
+    lights: light name → layer name. optional: the same for layers that may or may not be part of
+    the sum. whole: the same for a group whose name says that it contains all others, which the sum
+    then confirms or not. beauty: name of its layer; None if no layer has a known name for it.
     """
 
     renderer: str
@@ -45,11 +44,11 @@ class LayerChoice:
 def choose_layers(
     layers: Mapping[str, Sequence[str]], *, pattern: str | None = None, file_name: str
 ) -> LayerChoice:
-    """Tell lights, beauty and everything else apart.
+    """Identify the lights and the beauty among the layers.
 
-    layers: name of each layer → other names that a pattern may meet it by.
-    pattern: `Light_{name}`, instead of the known conventions. file_name: for messages.
-    Raises BasisError, listing the layers, where no convention fits or several do.
+    layers: layer name → other names that a pattern may match.
+    pattern: for example `Light_{name}`, replaces the known conventions. file_name: for messages.
+    Raises BasisError, listing the layers, if no convention or more than one fits.
     """
     if pattern is not None:
         return _by_pattern(layers, pattern, file_name)
@@ -73,14 +72,16 @@ def choose_layers(
 
 
 def choose_files(layers: Iterable[str]) -> LayerChoice:
-    """Choose among files with a single layer each: all but the beauty are lights."""
+    """Choose among files with a single layer each: all except the beauty are lights."""
     names = list(layers)
     beauty = beauty_name(names)
     return LayerChoice(ONE_FILE_PER_LIGHT, {n: n for n in names if n != beauty}, beauty=beauty)
 
 
 def short_names(stems: Sequence[str]) -> dict[str, str]:
-    """Return names without their common start and end, up to a joint: `shot_key_v1` → `key`."""
+    """Return names without their common start and end, cut at a separator: `shot_key_v1` →
+    `key`.
+    """
     if len(stems) < 2:
         return {stem: stem for stem in stems}
     head = _shared_head(stems)
@@ -121,7 +122,7 @@ def _by_convention(
     matches = [m for m in matches if (m.groupdict().get("view") or "") == view]
     _check_not_stereo([m[0] for m in matches], file_name)
     lights = _unique_lights(_light_names(convention, matches), file_name)
-    # By its name alone, since a single group leaves nothing to compare with.
+    # Decided by name alone, since a single group cannot be compared with others.
     whole = {n: x for n, x in lights.items() if n == convention.whole and len(lights) > 1}
     lights = {name: layer for name, layer in lights.items() if name not in whole}
     rest = [name for name in layers if name not in [*lights.values(), *whole.values()]]
@@ -139,7 +140,7 @@ def _by_convention(
 
 
 def _light_names(convention: Convention, matches: list[re.Match[str]]) -> list[tuple[str, str]]:
-    """Return the names of lights and of their layers, with their prefix if prefixes differ."""
+    """Return pairs of light and layer names, with prefixes if these differ."""
     prefixes = [m.groupdict().get("prefix") or "" for m in matches]
     several = len(set(prefixes)) > 1
     return [
@@ -167,7 +168,7 @@ def _by_pattern(layers: Mapping[str, Sequence[str]], pattern: str, file_name: st
             matches.append((match[1], layer))
     if not matches:
         raise BasisError(f"pattern={pattern!r} fits no layer of {file_name}: {_layer_list(layers)}")
-    # A pattern as wide as {name} also meets the beauty.
+    # A pattern as broad as {name} also matches the beauty.
     names = [layer for layer in layers if layer not in [matched for _, matched in matches]]
     first = {
         (
@@ -183,7 +184,9 @@ def _by_pattern(layers: Mapping[str, Sequence[str]], pattern: str, file_name: st
 
 
 def _check_not_stereo(names: Sequence[str], file_name: str) -> None:
-    """Raise BasisError for stereo: the same names once with `.left` and once with `.right`."""
+    """Raise BasisError for stereo files, with the same names once as `.left` and once as
+    `.right`.
+    """
     left, right = (
         {name.removesuffix(eye) for name in names if name.endswith(eye)}
         for eye in (".left", ".right")
@@ -209,7 +212,9 @@ def _unique_lights(pairs: Sequence[tuple[str, str]], file_name: str) -> dict[str
 
 
 def _example_pattern(layers: Iterable[str]) -> str:
-    """Return a pattern that fits several of the layers, if there is one."""
+    """Return a pattern that matches several of the layers if there is one, else a generic
+    example.
+    """
     names = [name for name in layers if beauty_name([name]) is None]
     heads: dict[str, int] = {}
     for name in names:

@@ -24,7 +24,7 @@ from lightpaint.basis.lightgroups.render_layers import RenderLayer
 class Roles:
     """The lights by name, and the picture that they add up to; None if there is none.
 
-    renderer: whose names these are. view: the view layer, if there are such.
+    renderer: the one whose naming convention fits. view: the view layer, or "".
     """
 
     renderer: str
@@ -35,9 +35,9 @@ class Roles:
 
 
 def roles_of(path: Path, read: Sequence[RenderLayer], pattern: str | None) -> Roles:
-    """Tell the layers of the file or folder at `path` apart. Raises BasisError where names do not.
+    """Identify the role of each layer in the file or folder at `path`.
 
-    pattern: as in `choose_layers`.
+    pattern: as in `choose_layers`. Raises BasisError if the names are ambiguous.
     """
     layers = {layer.name: layer for layer in read}
     choice = _choose_roles(path, layers, pattern)
@@ -60,7 +60,7 @@ def roles_of(path: Path, read: Sequence[RenderLayer], pattern: str | None) -> Ro
             remarks.append(f"{layer}: taken for the sum of all lights, and left out")
     in_order = {n: x for layer in read for n, x in lights.items() if x is layer}
     for name, layer in choice.optional.items():
-        # Whether a renderer counts these among its groups depends on version and settings.
+        # Renderers include these in the sum or not, depending on version and settings.
         if beauty is None or _improves_sum(layers[layer], list(in_order.values()), beauty):
             in_order[name] = layers[layer]
     return Roles(choice.renderer, choice.view, in_order, beauty, tuple(remarks))
@@ -69,10 +69,11 @@ def roles_of(path: Path, read: Sequence[RenderLayer], pattern: str | None) -> Ro
 def _remove_non_lights(
     lights: dict[str, RenderLayer], beauty: RenderLayer | None
 ) -> tuple[RenderLayer | None, list[str]]:
-    """Remove layers from `lights` that are none; return the beauty, and sentences on this.
+    """Remove layers that are not lights; return the whole picture, and sentences on what was
+    removed.
 
-    One may be the beauty under another name; and a layer is no light if the others add up to the
-    beauty without it.
+    One layer may be the picture itself under an unusual name. A layer that the others do not need
+    to add up to the picture is not a light, whatever it shows.
     """
     if beauty is None and len(lights) > 2:
         beauty = find_beauty(list(lights.values()))
@@ -93,13 +94,15 @@ def _drop(lights: dict[str, RenderLayer], layer: RenderLayer | None) -> None:
 
 
 def _is_light(layer: RenderLayer, lights: Sequence[RenderLayer], beauty: RenderLayer) -> bool:
-    """Return True if a layer that is named like the whole picture is a light after all."""
+    """Return True if a layer named like the whole picture is in fact one of the lights."""
     alone = LayerSum.of([layer])
     return LayerSum.of(lights).and_also(layer).lacks(beauty) < alone.lacks(beauty)
 
 
 def _improves_sum(layer: RenderLayer, lights: Sequence[RenderLayer], beauty: RenderLayer) -> bool:
-    """Return True if the lights, if there are any, come closer to the beauty with that layer."""
+    """Return True if adding the layer brings the lights closer to the beauty, or if there are no
+    lights.
+    """
     if not lights:
         return True
     added = LayerSum.of(lights)

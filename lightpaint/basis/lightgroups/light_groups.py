@@ -1,7 +1,7 @@
 """A basis from another renderer's light groups: layers of an EXR file that add up to the picture.
 
-A weight multiplies the rendered light, so 1, 1, 1 is the light as rendered. The part of the beauty
-that is in no group becomes one more light, `rest`, which is fixed.
+Weights multiply the rendered light, so 1, 1, 1 is the light as rendered. The part of the beauty
+that no group contains becomes one more light, `rest`, which is not adjusted.
 """
 
 import hashlib
@@ -32,14 +32,13 @@ from lightpaint.errors import BasisError
 from lightpaint.keywords import keywords
 from lightpaint.screen import short_repr, some_names
 
-#: Meaning of one unit of weight.
+#: The unit of weights.
 AS_RENDERED = "× as rendered"
 
-#: Share of its light that a group may take away in places: filters with negative lobes do.
+#: Maximum negative light of a group, as a share of its positive light: filters have negative lobes.
 MAX_NEGATIVE_SHARE = 0.25
 
-#: Name of the part of the beauty that is in no group, with underscores added if a light has that
-#: name.
+#: Name of the light that holds the missing part; underscores are added if a light has that name.
 REST_NAME = "rest"
 
 
@@ -49,17 +48,17 @@ class LightGroups:
     """The light groups that `read_light_groups` returns.
 
     Attributes:
-        basis: A light for each group, and `rest` last if something is missing.
+        basis: A light for each group, and `rest` last if the groups lack part of the beauty.
         path: The file or folder.
-        renderer: The renderer whose naming the layers follow.
-        layers: Layers of the groups, in the order of the lights, without `rest` and without pixels,
-            which the basis has.
-        beauty: None if the file has none.
-        missing: Luminance that the groups lack compared with the beauty, as a share of it, summed
-            over pixels; None without a beauty.
-        exceeding: Luminance by which they exceed it, likewise.
+        renderer: The renderer whose naming convention the layers follow.
+        layers: The layers of the groups, in the order of the lights and without `rest`. Their
+            pixels are dropped, since the basis has them.
+        beauty: The layer of the whole picture; None if the file has none.
+        missing: Luminance of the beauty that the groups lack, summed over pixels, as a share of its
+            total; None without a beauty.
+        exceeding: Luminance by which the groups exceed the beauty, likewise.
         holes: (h, w) bool, pixels where a layer is not finite. They are 0 in all images of the
-            basis, so they do not affect any sum.
+            basis, so that they do not contribute to any sum.
         remarks: Messages for the user, one sentence each.
 
     Examples:
@@ -82,18 +81,18 @@ class LightGroups:
 
     @property
     def has_rest(self) -> bool:
-        """True if the last light of the basis is the part of the beauty in no group."""
+        """True if the last light of the basis is the part of the beauty that the groups lack."""
         return len(self.basis.lights) > len(self.layers)
 
     @property
     def files(self) -> list[Path]:
-        """Files that they were read from."""
+        """The files that were read."""
         read = self.layers if self.beauty is None else (*self.layers, self.beauty)
         return list(dict.fromkeys(layer.file for layer in read))
 
     @property
     def is_half(self) -> bool:
-        """True if the file holds no more than float16."""
+        """True if all layers are stored as float16."""
         return all(layer.is_half for layer in self.layers)
 
 
@@ -101,18 +100,18 @@ class LightGroups:
 def read_light_groups(
     path: str | Path, *, pattern: str | None = None, leave_out: Iterable[str | Path] = ()
 ) -> LightGroups:
-    """Read the light groups of an EXR file, or of a folder with a file for each.
+    """Read the light groups of an EXR file, or of a folder with one file for each group.
 
     Args:
-        path: EXR file, or a folder. Hidden files, results of lightpaint and recognisable paintings
-            in it are skipped; `remarks` names them.
-        pattern: `Light_{name}`, which layers, parts or files are lights; by default the names that
-            known renderers give them (naming_conventions.py).
-        leave_out: Files of the folder that are no lights, like the painting.
+        path: EXR file or folder. In a folder, hidden files, lightpaint's own output and recognised
+            paintings are skipped; `remarks` lists them.
+        pattern: Pattern of the layers, parts or files that are lights, such as `Light_{name}`; by
+            default the names that known renderers use (naming_conventions.py).
+        leave_out: Files of the folder that are not lights, such as the painting.
 
     Raises:
-        ImageError: For a file that cannot be read or is not linear Rec.709.
-        BasisError: If the lights cannot be told from other layers, or differ in size.
+        ImageError: If a file cannot be read or is not linear Rec.709.
+        BasisError: If the lights cannot be identified, or differ in size.
 
     Examples:
         >>> groups = lp.read_light_groups("groups.exr")
@@ -128,7 +127,9 @@ def read_light_groups(
 def _check_light(
     path: Path, lights: Mapping[str, RenderLayer], holes: npt.NDArray[np.bool_]
 ) -> None:
-    """Raise BasisError for a group that takes light away: all that follows would be of no use."""
+    """Raise BasisError if a group has mostly negative light, which would make every result
+    useless.
+    """
     for name, layer in lights.items():
         light = np.where(holes, 0, layer.image.astype(np.float32) @ LUMINANCE)
         light_given, light_taken = float(light[light > 0].sum()), -float(light[light < 0].sum())
@@ -147,9 +148,9 @@ def _check_light(
 def _light_groups(
     path: Path, roles: Roles, passes: DenoisingPasses, first_remarks: Sequence[str]
 ) -> LightGroups:
-    """Return the light groups in these layers.
+    """Return the light groups in layers with known roles.
 
-    first_remarks: sentences that come before those of the roles.
+    first_remarks: sentences to put before those of the roles.
     """
     names, lights, beauty = list(roles.lights), list(roles.lights.values()), roles.beauty
     if not lights:
@@ -193,8 +194,8 @@ def _light_groups(
 class _Missing:
     """The difference between the groups and the beauty.
 
-    rest: (h, w, 3), None if only rounding. share, exceeding: of the beauty, None without one.
-    remark: a sentence on these.
+    rest: (h, w, 3), None if it is within rounding. share, exceeding: shares of the beauty, None
+    without one. remark: the difference in words.
     """
 
     rest: Floats | None
@@ -219,7 +220,7 @@ def _missing_light(roles: Roles, holes: npt.NDArray[np.bool_]) -> _Missing:
 
 
 def _remarks_on_black(lights: Mapping[str, RenderLayer], missing: float | None) -> list[str]:
-    """Return a sentence for a light that is black in the file, with its likely layer."""
+    """Return a sentence on lights that are black in the file, with the likely reason."""
     black = [name for name, layer in lights.items() if not layer.image.any()]
     if not black:
         return []
@@ -233,7 +234,7 @@ def _remarks_on_black(lights: Mapping[str, RenderLayer], missing: float | None) 
 
 
 def _remarks_on_passes(basis: Basis) -> list[str]:
-    """Return a sentence on the passes that guide denoising, if the file has any."""
+    """Return a sentence on the passes used for denoising, if the file has any."""
     known = ["albedo and normals"] if basis.features is not None else []
     known += ["direct and indirect light"] if basis.indirect is not None else []
     return [f"pictures are denoised by {' and by '.join(known)} of the file"] if known else []
@@ -246,7 +247,7 @@ def _basis(
     rest: Floats | None,
     holes: npt.NDArray[np.bool_],
 ) -> Basis:
-    """Return the basis in linear Rec.709; `rest`, if there is one, is a light that is kept."""
+    """Return the basis in linear Rec.709, with `rest`, if given, as a fixed light."""
     lights = roles.lights
     basis_lights = [_light(name, layer.name, "light group") for name, layer in lights.items()]
     height, width = holes.shape
@@ -275,8 +276,8 @@ def _basis(
 def _indirect_planes(
     roles: Roles, passes: DenoisingPasses, images: Floats, holes: npt.NDArray[np.bool_]
 ) -> Floats | None:
-    """Return indirect light, (n, h, w, 3), all of an image whose parts are not known; None if none
-    is.
+    """Return indirect light, (n, h, w, 3), equal to the whole image where the parts are unknown;
+    None if they are unknown for all lights.
     """
     parts = [passes.indirect.get(layer.name) for layer in roles.lights.values()]
     if all(part is None for part in parts):
@@ -294,7 +295,7 @@ def _light(name: str, layer: str, plugin: str, *, is_fixed: bool = False) -> Bas
 
 
 def _origin(path: Path, roles: Roles, images: Floats, names: Sequence[str]) -> Origin:
-    """Return an origin without samples: their number is unknown, and so are error bars."""
+    """Return an origin without samples: their number, and hence the noise, is unknown."""
     digest = hashlib.sha256(repr((names, images.shape)).encode())
     for image in images:
         digest.update(np.ascontiguousarray(image).data)

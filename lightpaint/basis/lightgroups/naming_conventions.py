@@ -1,22 +1,22 @@
-"""Naming conventions of renderers, for light groups and for the picture that they add up to."""
+"""Naming conventions of renderers for light groups and the beauty that they add up to."""
 
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-#: Placeholder of the light's name in a pattern.
+#: Placeholder for the name of the light in a pattern.
 NAME_FIELD = "{name}"
 
-#: The whole picture, in the words of most renderers; names compare without regard to case.
+#: Names of the whole picture in most renderers, compared without regard to case.
 BEAUTY_NAMES = ("", "rgba", "rgb", "beauty", "combined", "main", "color", "rgb_color", "ci", "c")
 
-#: Prefix of an unmistakable marker: files are often named after a shot.
+#: An optional prefix, such as a shot name, before a marker that is distinctive enough.
 PREFIX_PATTERN = r"(?:(?P<prefix>.+?)[ ._-])??"
 
-#: Versions of a layer beside it, which would count a light twice. A pattern may still name them.
+#: Other versions of a layer, which would count a light twice. A pattern may still match them.
 OTHER_VERSION = re.compile(r".*[ _.](denoised?|denoising|variance|mse|noisy|albedo|normal)", re.I)
 
-#: Characters that join a name to its surroundings.
+#: Characters that separate parts of a name.
 SEPARATORS = " ._-"
 
 
@@ -24,11 +24,12 @@ SEPARATORS = " ._-"
 class Convention:
     """The naming convention of a family of renderers.
 
-    layer: fits the whole name of a layer; its group `name` is the light, `view` the view layer,
-    `prefix` what tells apart lights of one name.
-    beauty: name of the picture that they add up to, before BEAUTIES are tried.
-    whole: name of the group of all lights, if the renderer has one. optional: layers that are part
-    of the sum in some versions and settings (in lower case). light: name of the light.
+    layer: matches the whole name of a layer; its group `name` is the light, `view` the view layer,
+    and `prefix` distinguishes lights with the same name.
+    beauty: name of the picture that the lights add up to, tried before BEAUTY_NAMES.
+    whole: name of a group that contains all lights, if the renderer has one.
+    optional: layers, in lower case, that belong to the sum in some versions and settings.
+    light: template for the name of a light.
     """
 
     renderer: str
@@ -76,12 +77,14 @@ CONVENTIONS = (
 
 
 def is_known(name: str) -> bool:
-    """Return True if a known renderer gives a light group this name."""
+    """Return True if a known renderer gives this name to a light group."""
     return any(convention.layer.fullmatch(name) for convention in CONVENTIONS)
 
 
 def beauty_name(names: Iterable[str], *, first: str = "") -> str | None:
-    """Return the name of the whole picture: `first`, else one of BEAUTIES; None if none is."""
+    """Return the name of the whole picture: `first`, or else one of BEAUTY_NAMES; None if
+    absent.
+    """
     by_folded: dict[str, str] = {}
     for name in names:
         by_folded.setdefault(name.casefold(), name)

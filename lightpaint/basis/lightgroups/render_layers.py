@@ -1,7 +1,8 @@
-"""The RGB layers of an EXR file, or of a folder of them, from any renderer.
+"""The RGB layers of an EXR file or of a folder of them, from any renderer.
 
-A layer is three channels that share all but the last part of their names, `key.R`, `key.G` and
-`key.B`; in a part of its own it may have plain `R`, `G`, `B` and the part its name.
+A layer is three channels whose names differ only in their last component, such as `key.R`, `key.G`
+and `key.B`. A separate part of the file may have plain `R`, `G`, `B`, and the layer is then named
+after the part.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -29,14 +30,15 @@ from lightpaint.screen import some_names
 
 @dataclass(frozen=True)
 class RenderLayer:
-    """Three channels of a file, as a renderer has written them.
+    """Three channels of a file, as stored by a renderer.
 
-    name: the name to choose it by. part, channels: its place; part is "" in a file with one part.
-    others: other names that a pattern may match.
+    name: the name for choosing it. part, channels: its location; part is "" if the file has only
+    one.
+    others: alternative names that a pattern may match.
     image: (h, w, 3) in the display window, as stored: linear light, float16 or float32.
     alpha: (h, w), or None.
-    is_vector: whether its channels are X, Y and Z: it is no light then.
-    primaries: of the image, CIE xy of red, green, blue and white; None for Rec.709's.
+    is_vector: whether its channels are X, Y and Z, so that it is not a light.
+    primaries: CIE xy of red, green, blue and white; None for Rec.709.
     """
 
     name: str
@@ -51,11 +53,11 @@ class RenderLayer:
 
     @property
     def is_half(self) -> bool:
-        """True if the file has it in float16."""
+        """True if the file stores it as float16."""
         return bool(self.image.dtype == np.float16)
 
     def in_rec709(self, image: Floats) -> Floats:
-        """Return an image of these primaries, (h, w, 3), as float32 in linear Rec.709."""
+        """Return an image in these primaries, (h, w, 3), converted to linear Rec.709 float32."""
         if self.primaries is None:
             return image.astype(np.float32)
         return converted(image, to_rec709(self.primaries))
@@ -69,13 +71,13 @@ class RenderLayer:
 def read_layers(
     path: Path, *, leave_out: Iterable[str | Path] = ()
 ) -> tuple[list[RenderLayer], list[str]]:
-    """Return the layers of the file, or of the folder's files, at `path`, in their order.
+    """Return the layers of the file, or of the files in the folder, at `path`, in file order.
 
-    They hold red, green and blue, or vectors, all of one size. In a folder a file of plain R, G, B
-    is a layer named after the file, without the text that all these names share. `leave_out` and
-    other files that cannot be lights (folder_files.py) are skipped; the returned sentences name
-    them. Raises ImageError for files that cannot be read, BasisError if there are none, if they
-    differ in size or if names repeat.
+    They are RGB layers, followed by vector layers of the same size. In a folder, a file with plain
+    R, G, B becomes a layer named after the file, without the common parts of these names. Files in
+    `leave_out` and others that cannot be lights (folder_files.py) are skipped, which the returned
+    sentences report. Raises ImageError if a file cannot be read, and BasisError if there are no RGB
+    layers, if they differ in size or if names repeat.
     """
     path = Path(path)
     remarks: list[str] = []
@@ -120,7 +122,7 @@ def _of_files(files: Sequence[Path]) -> list[RenderLayer]:
     for file, layers in read.items():
         for x in layers:
             name = x.name or file.stem
-            # The renderer's name for a file is better than the remainder of its file name.
+            # A renderer's own name for a light is better than the shortened one.
             if not x.name and not is_known(name):
                 name = short.get(name, name)
             layers_of_folder.append(replace(x, name=name, others=(file.stem, file.name, *x.others)))
@@ -142,7 +144,7 @@ def _of_file(path: Path) -> list[RenderLayer]:
                 other_names += [
                     path.stem,
                     path.name,
-                ]  # of a file of one layer, it is that one's name
+                ]  # a file with one layer names that layer
             layers.append(
                 RenderLayer(
                     name=part.name if prefix == "" and len(parts) > 1 else prefix,
@@ -160,7 +162,7 @@ def _of_file(path: Path) -> list[RenderLayer]:
 
 
 def _primaries(path: Path, part: ExrPart) -> tuple[float, ...] | None:
-    """Return the declared primaries, None for Rec.709's. Raises ImageError if unknown."""
+    """Return the declared primaries, None for Rec.709. Raises ImageError if they are invalid."""
     try:
         return primaries_of(part)
     except ImageError as error:

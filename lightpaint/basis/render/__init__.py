@@ -1,1 +1,1 @@
-"""Rendering a basis, with Mitsuba: one pass for all lights, or one after the other."""
+"""Rendering a basis with Mitsuba: all lights in one pass, or one after the other."""

@@ -1,8 +1,8 @@
-"""The sums of a one-pass render: of the whole film on the device or, of a large one, band by band.
+"""The sums of a one-pass render: of the whole film on the device or, if it is large, band by band.
 
-The samples of a pixel are added in their order, whichever rows are traced at a time. So a film in
-bands has the bits of one that is traced whole. Its sums lie in a file without a name, of which
-memory holds a band, and its planes are made of them when they are asked for.
+The samples of a pixel are added in the same order whichever rows are traced together, so a film
+traced in bands has the same bits as one traced whole. In bands, the sums lie in a temporary file,
+memory holds one band at a time, and planes are computed from the sums on request.
 """
 
 import tempfile
@@ -23,20 +23,20 @@ from lightpaint.scene.scene import Scene
 if TYPE_CHECKING:
     from lightpaint.basis.render.tracer.one_pass import Tracer
 
-#: Bytes of the sums of both halves up to which a film is traced whole, and bytes of a band of them.
+#: Size of the sums of both halves, in bytes, up to which a film is traced whole; size of a band.
 WHOLE_MAX_BYTES, BAND_BYTES = 2**30, 2**27
 
 
 def is_banded(scene: Scene) -> bool:
-    """Return whether the sums of `scene` lie in a file while it is rendered in one pass."""
+    """Return whether a one-pass render of `scene` keeps its sums in a file."""
     height, width = scene.size
     return 2 * 12 * plane_count(scene) * height * width > WHOLE_MAX_BYTES
 
 
 class FilmSums(ABC):
-    """The sums of both halves of the samples of a film, whose rows are traced in bands.
+    """The sums of both halves of the samples of a film, traced in bands of rows.
 
-    tracer: traces them. begun: samples per pixel of each half that come before.
+    tracer: traces the samples. begun: samples per pixel of each half that were taken earlier.
     """
 
     def __init__(self, tracer: "Tracer", begun: int, band_rows: int) -> None:
@@ -44,23 +44,23 @@ class FilmSums(ABC):
         height, self._width = tracer.scene.size
         tops = range(0, height, band_rows)
         self._bands = [range(top, min(top + band_rows, height)) for top in tops]
-        #: Samples per pixel that are added, of each half and band.
+        #: Number of samples per pixel added so far, for each half and band.
         self._added = np.zeros((2, len(self._bands)), np.int64)
 
     @property
     def band_pixels(self) -> int:
-        """Pixels that are traced at a time."""
+        """Number of pixels that are traced at a time."""
         return len(self._bands[0]) * self._width
 
     @property
     def ahead(self) -> int:
-        """Samples per pixel of a half that an interrupt has left some pixels ahead of others."""
+        """Number of samples per pixel by which an interrupt left some pixels ahead of others."""
         return int(self._added.max() - self._added.min())
 
     def add(self, first: int, spp: int, pause: Callable[[], None]) -> None:
-        """Add samples of all pixels to both halves, except to pixels that have them already.
+        """Add samples to both halves, skipping pixels that already have them.
 
-        first: samples of a half that come before. pause: called before each kernel.
+        first: number of earlier samples of each half. pause: called before each kernel.
         """
         goal = first + spp - self._begun
         for half, added in enumerate(self._added):
@@ -72,17 +72,17 @@ class FilmSums(ABC):
 
     @abstractmethod
     def _trace(self, half: int, rows: range, first: int, spp: int) -> None:
-        """Add samples of a band to a half."""
+        """Trace samples of a band and add them to a half."""
 
     @abstractmethod
     def seen(self) -> Bools:
-        """Return where an emitter was seen, (h, w)."""
+        """Return the pixels in which an emitter was seen, (h, w)."""
 
 
 class WholeFilm(FilmSums):
-    """Sums that the device holds, in a single band.
+    """Sums on the device, in a single band.
 
-    start: those of both halves that they begin with, (planes, h, w, 3); None for zeros.
+    start: initial sums of both halves, (planes, h, w, 3); None for zeros.
     """
 
     def __init__(
@@ -99,19 +99,19 @@ class WholeFilm(FilmSums):
         return np.asarray(np.add(*(planes.seen() for planes in self._halves)) > 0)
 
     def sums(self, *, is_last: bool) -> list[Floats]:
-        """Return the sums of both halves, (planes, h, w, 3). is_last: whether they are released."""
+        """Return the sums of both halves, (planes, h, w, 3). is_last: whether to release them."""
         sums = []
         for half, planes in enumerate(self._halves):
             sums.append(planes.sums())
-            if is_last:  # saves as much memory again
+            if is_last:  # halves the peak memory
                 self._halves[half] = self._tracer.planes(range(0))
         return sums
 
 
 class BandedFilm(FilmSums):
-    """Sums in a file, of which the device holds a band. start: as of `WholeFilm`.
+    """Sums in a file, of which the device holds one band. start: as in `WholeFilm`.
 
-    Raises SceneError if the disk has no room for them.
+    Raises SceneError if the disk is full.
     """
 
     def __init__(
@@ -135,18 +135,20 @@ class BandedFilm(FilmSums):
         return self._seen.copy()
 
     def planes(self, spp: int) -> list[tuple["SumPlanes", "SumPlanes"]]:
-        """Return images and half differences of all light and, where it is apart, indirect light.
+        """Return pairs of images and half differences: of all light and, if it is split, of
+        indirect light.
 
-        They are made of the sums as these are when they are asked for. spp: samples of a half.
+        They are computed from the sums on request. spp: samples per pixel of each half.
         """
         sets = SumSets(self.sums, len(self._tracer.scene.lights), spp)
         return [(SumPlanes(sets, k), SumPlanes(sets, k + 1)) for k in range(0, sets.count, 2)]
 
 
 class FileSums:
-    """An array of zeros, (2, planes, h, w, 3) float32, in a temporary file.
+    """A float32 array, (2, planes, h, w, 3), initially zero, in a temporary file that is deleted
+    with it.
 
-    Memory releases the parts read and written at once. Raises SceneError if the disk has no room.
+    Memory is released after each read and write. Raises SceneError if the disk is full.
     """
 
     def __init__(self, shape: tuple[int, ...]) -> None:
@@ -162,34 +164,33 @@ class FileSums:
 
     @property
     def array(self) -> Floats:
-        """All sums, in their file."""
+        """All sums, mapped from the file."""
         return self._file.array
 
     def read(self, half: int, rows: range) -> Floats:
-        """Return a copy of some rows of a half, (planes, rows, w, 3)."""
+        """Return a copy of some rows of one half, (planes, rows, w, 3)."""
         block = np.array(self.array[half, :, rows.start : rows.stop])
         self._file.release()
         return block
 
     def write(self, half: int, rows: range, sums: Floats) -> None:
-        """Write some rows of a half."""
+        """Write some rows of one half."""
         self.array[half, :, rows.start : rows.stop] = sums
         self._file.release()
 
     def halves(self, planes: slice, rows: slice) -> list[Floats]:
-        """Return a copy of the sums of both halves of some planes and rows."""
+        """Return a copy of the sums of both halves for some planes and rows."""
         halves = [np.array(half[planes, rows]) for half in self.array]
         self._file.release()
         return halves
 
 
 class SumSets:
-    """The sets of planes computed from sums in a file.
+    """The sets of planes computed from sums in a file: images and half differences of all light
+    and, if it is split, of indirect light.
 
-    They are images and half differences of all light and, if separate, of indirect light.
-
-    Callers request the planes of a light from one set after the other, so those of the last light
-    are cached. lights: their number. spp: samples per pixel of each half.
+    The planes of the last light are kept, since callers request the same light from all sets in
+    turn. lights: number of lights. spp: samples per pixel of each half.
     """
 
     def __init__(self, sums: FileSums, lights: int, spp: int) -> None:
@@ -205,13 +206,13 @@ class SumSets:
         last, planes = self._last
         if last != i:
             del planes
-            self._last = (-1, [])  # whose memory is free for the next
+            self._last = (-1, [])  # releases memory for the next ones
             planes = [rows[0] for rows in self.rows(slice(i, i + 1), slice(None))]
             self._last = (i, planes)
         return planes
 
     def rows(self, lights: slice, rows: slice) -> list[Floats]:
-        """Return some rows of some lights in all sets, (lights, rows, w, 3) each."""
+        """Return some rows of some lights from all sets, (lights, rows, w, 3) each."""
         total = self._sums.halves(lights, rows)
         if self.count == 2:
             return [*mean_and_half_difference(total, (self._spp, self._spp))]
@@ -226,14 +227,14 @@ class SumSets:
 
 
 class SumPlanes(RowPlanes):
-    """Planes made of the sums in a file when they are asked for. number: which of the sets."""
+    """Planes computed on request from sums in a file. number: index of the set."""
 
     def __init__(self, sets: SumSets, number: int) -> None:
         self._sets, self._number = sets, number
 
     @property
     def count(self) -> int:
-        """n."""
+        """Number of lights."""
         return self._sets.lights
 
     @property
@@ -246,6 +247,6 @@ class SumPlanes(RowPlanes):
         return self._sets.of_light(i)[self._number]
 
     def rows(self, top: int, bottom: int) -> Floats:
-        """Return some rows of all planes, (n, bottom - top, w, 3)."""
+        """Return rows `top` to `bottom` of all planes, (n, bottom - top, w, 3)."""
         rows = slice(max(top, 0), max(bottom, 0))
         return self._sets.rows(slice(0, self.count), rows)[self._number]

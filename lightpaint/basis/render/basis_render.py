@@ -1,4 +1,4 @@
-"""Rendering the basis: all lights in one pass where that is possible, else one by one."""
+"""Renders a basis: all lights in one pass if possible, else one by one."""
 
 import gc
 from collections.abc import Callable
@@ -51,23 +51,24 @@ def render_basis(
     """Render the image of each light of `scene` alone, at unit emission.
 
     Args:
-        scene: As `load_scene` returns it.
-        spp: Samples per pixel (the scene's own number by default).
-        time_s: Instead, seconds to render for, besides what `start` took; whole steps.
-        until_spp: With a time and in one pass, samples per pixel at which it ends though there is
-            time left.
-        seed: Any number >= 0; other seeds give independent bases.
-        start: An earlier basis of the same scene, sensor and seed: its samples count, and only what
-            is missing to `spp` is rendered, or as many more as `time_s` allows. With its `sums` the
-            result has the bits of one render, else it differs by round-off.
-        keep: Called with what there is, now and then and when Ctrl-C ends the work early, its
-            `sums` included; returns whether it could be kept.
-        is_final: False for a basis that more samples are to be added to: it has its `sums`.
-        progress: Hears how far the work has come.
+        scene: From `load_scene`.
+        spp: Samples per pixel (by default the scene's own number).
+        time_s: Seconds to render for, instead of spp and in addition to the time spent on `start`;
+            a step that has begun is finished.
+        until_spp: Samples per pixel at which rendering stops before `time_s` is over; one-pass
+            renders only.
+        seed: Any number >= 0; different seeds give independent bases.
+        start: An earlier basis of the same scene, sensor and seed. Its samples count, so only those
+            missing to `spp` are rendered, or as many more as `time_s` allows. If it has `sums`, the
+            result has the bits of a single render, else it differs by round-off.
+        keep: Called with the basis so far, including its `sums`, from time to time and when Ctrl-C
+            ends the work early. Returns whether it was stored.
+        is_final: False for a basis to which more samples will be added: it keeps its `sums`.
+        progress: Called with the progress of the work.
 
     Raises:
-        SceneError: For more lights and pixels than fit.
-        Interrupted: For Ctrl-C.
+        SceneError: If there are more lights and pixels than fit.
+        Interrupted: On Ctrl-C.
 
     Examples:
         >>> lp.render_basis(lp.load_scene("room.xml"), spp=4)
@@ -89,7 +90,7 @@ def render_basis(
         return with_first_hits(start.with_requests(scene.requests), scene, seed)
     method = method_of(scene)
     if start is not None and start.origin.method != method:
-        # Nothing to go on from, but nothing to be replaced by less either.
+        # It cannot be continued, but must not be replaced by a basis with fewer samples either.
         start, keep = None, None
     if start is not None and method == ONE_PASS and start.origin.each_light:
         raise BasisError(
@@ -111,7 +112,7 @@ def render_basis(
 
 
 def render_planes_only(scene: Scene, *, spp: int, seed: int) -> Basis:
-    """Render a basis without features and objects, for work that never looks at them."""
+    """Render a basis without features and objects, for callers that do not need them."""
     check_memory(scene)
     render_all = _render_together if method_of(scene) == ONE_PASS else _render_one_by_one
     with render_errors(scene.path):
@@ -119,9 +120,9 @@ def render_planes_only(scene: Scene, *, spp: int, seed: int) -> Basis:
 
 
 def with_first_hits(basis: Basis, scene: Scene, seed: int, *, loaded: Any = None) -> Basis:
-    """Return `basis` with its features: one from an earlier version may lack them.
+    """Return `basis` with features and objects, which a basis from an earlier version may lack.
 
-    loaded: `scene`, where it is loaded.
+    loaded: the loaded `scene`, if available.
     """
     if basis.features is not None and basis.objects is not None:
         return basis
@@ -141,9 +142,9 @@ def _render_together(
     is_final: bool = True,
     needs_first_hits: bool = False,
 ) -> Basis:
-    """Render all lights by one path tracer (see one_pass.py), step by step.
+    """Render all lights step by step with one path tracer (see one_pass.py).
 
-    needs_first_hits: whether features and objects are rendered, while the scene is loaded.
+    needs_first_hits: whether to render features and objects while the scene is loaded.
     """
     from lightpaint.basis.render.tracer.one_pass import Tracer
 
@@ -151,7 +152,7 @@ def _render_together(
     guide_table = None if start is None else start.guide_table
     tracer = Tracer(scene, view_seed(seed, scene.sensor), guide_table)
     before = None if start is None else start.sums
-    rest = start if before is None else None  # samples that the sums do not include yet
+    rest = start if before is None else None  # the samples that are not in the initial sums
     film: WholeFilm | BandedFilm
     film = (BandedFilm if renders_in_bands(scene, start) else WholeFilm)(tracer, done, before)
 
@@ -215,7 +216,9 @@ def _render_one_by_one(
     *,
     is_final: bool = True,
 ) -> Basis:
-    """Render one light after the other, by the scene's own integrator (see separate_renders.py)."""
+    """Render one light after the other with the scene's own integrator (see
+    separate_renders.py).
+    """
     sums = LightSums(len(scene.lights), scene.size) if start is None else LightSums.of(start)
     seen = emitters_seen(scene) if start is None else start.emitters_seen
     nothing = origin_of(scene, seed, SEPARATE, (0, 0), (0, 0))

@@ -1,7 +1,7 @@
-"""Training of the emitter guide, which learns which emitter matters where, before a render.
+"""Trains the emitter guide before a basis is rendered: which emitters matter where.
 
-It depends on the scene and the seed alone, not on the number of samples, the budget or the machine.
-So all machines choose emitters alike, and none waits for another.
+Training depends on the scene and the seed alone, not on the number of samples, the budget or the
+machine. So all machines choose emitters in the same way, and none has to wait for another.
 """
 
 import gc
@@ -16,13 +16,13 @@ from lightpaint.scene.scene_render import view_seed
 if TYPE_CHECKING:
     from lightpaint.basis.render.tracer.one_pass import Tracer
 
-#: Camera samples of the training passes. Each pass uses what the earlier ones have learned.
+#: Numbers of camera samples in the training passes. Each pass uses what earlier ones learned.
 TRAINING_SAMPLES = (2**16, 2**17, 2**17)
 
 
 @MITSUBA.acquired()
 def train_guide(scene: Scene, seed: int) -> Floats:
-    """Learn which emitters to choose where in `scene`, and return the `Basis.guide_table`."""
+    """Train an emitter guide for `scene`, and return its `Basis.guide_table`."""
     from lightpaint.basis.render.tracer.one_pass import Tracer
 
     tracer = Tracer(scene, view_seed(seed, scene.sensor))
@@ -37,12 +37,12 @@ def train_guide(scene: Scene, seed: int) -> Floats:
 def train(tracer: "Tracer", let_others_through: Callable[[], None]) -> Floats:
     """Train the guide of `tracer`, and return its table.
 
-    let_others_through: called between passes.
+    let_others_through: called before each pass.
     """
     (height, width), done = tracer.scene.size, 0
     for k, samples in enumerate(TRAINING_SAMPLES):
         let_others_through()
-        # In a large picture some rows are enough, other ones in each pass.
+        # In a large picture a subset of the rows suffices, a different one in each pass.
         step = min(-(-height * width // samples), height)
         rows = range(k * step // len(TRAINING_SAMPLES), height, step)
         spp = max(1, samples // (len(rows) * width))

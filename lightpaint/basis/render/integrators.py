@@ -1,7 +1,7 @@
-"""The integrators of Mitsuba that the one-pass renderer replaces, and their parameters.
+"""Mitsuba integrators that the one-pass renderer replaces, and their parameters.
 
-It traces the paths of `path`. Others estimate the same picture from other samples: then they have
-the same basis, but for noise.
+It traces the paths of `path`. Some other integrators estimate the same picture from other samples;
+their basis is then the same up to noise.
 """
 
 from lightpaint.scene.properties.emission import ENVIRONMENTS
@@ -9,18 +9,18 @@ from lightpaint.scene.properties.integrator import Integrator
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
 
-#: They end after one bounce.
+#: Integrators that end after one bounce.
 DIRECT = ("direct", "direct_projective")
-#: They see surfaces alone, and whatever is inside of them as nothing.
+#: Integrators that ignore participating media.
 ON_SURFACES = ("path", "prb", "prb_projective", *DIRECT)
-#: Bytes of the planes of all lights in float32 up to which indirect light is kept apart.
+#: Size of the planes of all lights in float32, in bytes, up to which indirect light is split off.
 SPLIT_MAX_BYTES = 2**29
-#: They hide emitters from the camera otherwise than `path` does.
+#: Integrators that hide emitters from the camera in another way than `path`.
 HIDING_OTHERWISE = ("volpath", "prb_projective", "direct_projective")
 
 
 def why_not_one_pass(scene: Scene) -> str | None:
-    """Return why `scene` cannot use the one-pass renderer, in few words; None if it can."""
+    """Return briefly why `scene` cannot use the one-pass renderer; None if it can."""
     variant = use_variant()
     if not variant.is_jit:
         return f"the variant is {variant.variant}"
@@ -35,13 +35,13 @@ def why_not_one_pass(scene: Scene) -> str | None:
     if integrator.hide_emitters and plugin in HIDING_OTHERWISE:
         return f"the integrator {plugin} hides emitters in a way of its own (hide_emitters)"
     if integrator.samples != (1, 1):
-        # It counts lights without a size once for each of them.
+        # It would count lights without a size once per sample.
         return "the integrator direct takes other than one sample (emitter_samples, bsdf_samples)"
     return None
 
 
 def remark_on_separate_renders(scene: Scene) -> str | None:
-    """Return a remark on the cost of separate renders; None if there is none."""
+    """Return a remark on the cost of separate renders; None if it is not needed."""
     count = len(scene.lights)
     if (reason := why_not_one_pass(scene)) is None or count == 1:
         return None
@@ -56,14 +56,14 @@ def remark_on_separate_renders(scene: Scene) -> str | None:
 
 
 def depth_limit(integrator: Integrator) -> int:
-    """Return the longest path in vertices after the camera. Mitsuba's −1 means no limit."""
+    """Return the maximum number of vertices after the camera. Mitsuba's −1 means no limit."""
     return 2 if integrator.plugin in DIRECT else integrator.max_depth % 2**32
 
 
 def has_indirect_planes(scene: Scene) -> bool:
-    """Return whether the one pass stores indirect light separately.
+    """Return whether the one pass stores indirect light separately from direct light.
 
-    That doubles the memory, which is affordable for small pictures, the ones that people look at.
+    That doubles the memory, which is affordable for small pictures, the ones shown to people.
     """
     height, width = scene.size
     is_small = 12 * len(scene.lights) * height * width <= SPLIT_MAX_BYTES
@@ -71,15 +71,15 @@ def has_indirect_planes(scene: Scene) -> bool:
 
 
 def plane_count(scene: Scene) -> int:
-    """Return how many planes the one pass fills: one for each light, or two."""
+    """Return the number of planes that the one pass fills: one or two for each light."""
     return len(scene.lights) * (2 if has_indirect_planes(scene) else 1)
 
 
 def needs_a_bounce(scene: Scene) -> bool:
-    """Return whether a path is black if all surfaces let it pass.
+    """Return True if paths that meet only null surfaces must be black.
 
-    `path` treats it as one that met nothing and discards the light gathered on masks, unless an
-    environment is visible behind.
+    `path` treats such a path as one that hit nothing, and discards the light that it gathered on
+    masks, unless an environment is visible behind them.
     """
     sees_backdrop = any(x.plugin in ENVIRONMENTS for x in scene.emitters)
     is_hidden = scene.integrator.hide_emitters or not sees_backdrop

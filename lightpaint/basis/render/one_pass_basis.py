@@ -1,4 +1,4 @@
-"""The basis that the sums of a one-pass render make."""
+"""The basis computed from the sums of a one-pass render."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -30,12 +30,12 @@ def basis_of_sums(
     start: Basis | None,
     is_finished: bool = True,
 ) -> Basis:
-    """Return the one-pass basis of the rendered sums and of `start`.
+    """Return the one-pass basis of the rendered samples and those of `start`.
 
-    halves: undivided sums of two halves of the samples, (n or 2n, h, w, 3), as `LightPlanes.sums`
-    returns them; they are overwritten. seen: (h, w). half_spp: samples per pixel of each half in
-    all. start: earlier basis that these sums do not include. is_finished: whether all requested
-    samples are there; if not, the basis has a copy of its sums.
+    halves: undivided sums of the two halves of the samples, (n or 2n, h, w, 3), as returned by
+    `LightPlanes.sums`; overwritten. seen: (h, w). half_spp: total samples per pixel of each half.
+    start: samples that are not in these sums. is_finished: whether all requested samples were
+    taken; if not, the basis gets a copy of its sums.
     """
     n, spp = len(scene.lights), half_counts(half_spp, start)
     keeps_sums = not is_finished and start is None
@@ -78,8 +78,8 @@ def basis_of_planes(
     is_finished: bool,
     sums: tuple[Floats, Floats] | None,
 ) -> Basis:
-    """Return the one-pass basis of images and half differences: of all light, and of indirect
-    light where it is apart. For the others see `basis_of_sums`.
+    """Return the one-pass basis of pairs of images and half differences: for all light and, if it
+    is split, for indirect light. See `basis_of_sums` for the other arguments.
     """
     (images, noise), *indirect = pairs
     origin = origin_of(
@@ -100,7 +100,7 @@ def basis_of_planes(
 
 
 def half_counts(spp: int, basis: Basis | None) -> HalfCounts:
-    """Return the samples of both halves: `spp` of each, and the extra ones of a basis."""
+    """Return the samples of both halves: `spp` each, plus the extra samples of a basis."""
     if basis is None or basis.extra is None:
         return spp, spp
     counts = (spp + basis.extra[..., None]).astype(np.float32)

@@ -1,4 +1,4 @@
-"""The budget of a basis, a number of samples or a time, and saving it meanwhile."""
+"""The budget of a basis, a number of samples or a time, and saving the basis during rendering."""
 
 import math
 import time
@@ -10,24 +10,22 @@ from lightpaint.errors import SceneError
 from lightpaint.progress import Progress
 from lightpaint.scene.scene_render import largest_pass, plan_passes
 
-#: Seconds of work that a crash may cost: on the clock and of the processor, so that a machine that
-#: is busy with other work does not write more often.
+#: Seconds of work that a crash may lose, both in wall time and in processor time, so that a busy
+#: machine does not save more often.
 KEEP_EVERY_S = 30.0
 
-#: Passes of a basis are shorter by this factor than those of a picture: they are the steps in which
-#: time is spent, and what Ctrl-C has to wait for.
+#: Factor by which passes of a basis are shorter than those of a picture. A time budget is spent in
+#: whole passes, and Ctrl-C has to wait for the end of one.
 PASS_DIVISOR = 4
 
 
 @dataclass(frozen=True)
 class Budget:
-    """The budget of a basis: samples per pixel or seconds.
+    """The budget of a basis: `spp` samples per pixel in all, or `time_s` seconds from now, in which
+    a one-pass render stops at `until_spp`.
 
-    It is `spp` samples per pixel in all, or `time_s` seconds from now, in which one pass renders at
-    most `until_spp`.
-
-    A time is wall time from the first pass on. It includes compiling kernels, saving intermediate
-    results, and loading the scene if that happens for every light.
+    Time is wall time from the first pass on. It includes compiling kernels, saving the basis and,
+    in separate renders, loading the scene for every light.
     """
 
     spp: int
@@ -39,12 +37,12 @@ class Budget:
             raise SceneError(f"{self.time_s} seconds are no time to render: ask for more than 0")
 
     def met_by(self, spp: int) -> bool:
-        """Return True if that many samples per pixel are enough; a time always asks for more."""
+        """Return True if this many samples per pixel are enough; never for a time budget."""
         return self.time_s is None and spp >= self.spp
 
 
 class Clock:
-    """Tells how much of a time is spent, and reports it in whole seconds."""
+    """Measures how much of a time budget is spent, and reports it in whole seconds."""
 
     def __init__(self, time_s: float, progress: Progress) -> None:
         self.time_s, self.progress = time_s, progress
@@ -65,7 +63,7 @@ class Clock:
 
 
 def steps(pixels: int, budget: Budget, done: int, progress: Progress) -> Iterator[int]:
-    """Yield the samples per pixel of one step after another until `budget` is spent, in each half.
+    """Yield the samples per pixel of each half for one step after another until `budget` is spent.
 
     done: samples per pixel of each half so far.
     """
@@ -88,7 +86,7 @@ def steps(pixels: int, budget: Budget, done: int, progress: Progress) -> Iterato
 
 
 def half_of(spp: int) -> int:
-    """Return the samples per pixel of each half of `spp`. Raises SceneError if there is none."""
+    """Return half of `spp`, rounded up. Raises SceneError if `spp` is less than 2."""
     if spp < 2:
         raise SceneError(f"{spp} samples per pixel are too few for two halves: ask for 2 or more")
     return -(-spp // 2)
@@ -97,34 +95,34 @@ def half_of(spp: int) -> int:
 def next_pair(
     pixels: int, done: tuple[int, int], pairs: int = 1, *, step: int = 1
 ) -> list[tuple[int, int]]:
-    """Return the passes that bring both halves `pairs` short passes beyond the fuller one.
+    """Return the passes that bring both halves `pairs` short passes beyond the larger half.
 
-    step: samples of a pixel come in multiples of this.
+    step: the number of samples per pixel is a multiple of this.
     """
     spp = max(done) + pairs * largest_pass(pixels, shorter=PASS_DIVISOR)
     return plan_passes(pixels, 2 * spp, done=done, shorter=PASS_DIVISOR, step=step)
 
 
 class Keeper:
-    """Hands a basis on to be kept, now and then and when Ctrl-C ends the work."""
+    """Saves a basis from time to time, and when Ctrl-C ends the work."""
 
     def __init__(self, keep: Callable[[Basis], bool] | None) -> None:
         self.keep = keep
         self.kept_s, self.every_s = _now_s(), KEEP_EVERY_S
 
     def now_and_then(self, make: Callable[[], Basis]) -> None:
-        """Keep what `make` makes, if the last time is long enough ago."""
+        """Save the result of `make` if the last save was long enough ago."""
         now_s = _now_s()
         if self.keep is None or min(_passed(self.kept_s, now_s)) <= self.every_s:
             return
         self.keep(make())
         self.kept_s = _now_s()
-        # Slow writing must not take up most of the time.
+        # Slow writing must not take most of the time.
         self.every_s = max(KEEP_EVERY_S, 10 * _passed(now_s, self.kept_s)[0])
 
 
 def _now_s() -> tuple[float, float]:
-    """Return seconds on the clock and of the processor, of this process."""
+    """Return wall time and processor time of this process, in seconds."""
     return time.monotonic(), time.process_time()
 
 

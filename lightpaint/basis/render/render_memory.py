@@ -1,4 +1,4 @@
-"""The memory that a render of a basis needs, and whether it is there."""
+"""Estimates the memory needed to render a basis, and checks that it is available."""
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.banded_film import BAND_BYTES, is_banded
@@ -10,9 +10,9 @@ from lightpaint.scene.scene_render import SAMPLES_PER_PASS
 
 
 def renders_in_bands(scene: Scene, start: Basis | None = None) -> bool:
-    """Return whether `render_basis` keeps the sums of a film in a file, with one band in memory.
+    """Return whether `render_basis` keeps the sums of the film in a file and only a band in memory.
 
-    start: basis to continue from. Without its exact sums that takes whole planes.
+    start: the basis to continue. Without its exact sums, whole planes are needed.
     """
     can_be_read = start is None or start.sums is not None
     return can_be_read and method_of(scene) == ONE_PASS and is_banded(scene)
@@ -21,21 +21,22 @@ def renders_in_bands(scene: Scene, start: Basis | None = None) -> bool:
 def memory_needed(scene: Scene, *, in_bands: bool = False) -> int:
     """Return the peak memory of rendering a basis, in bytes, for any number of samples.
 
-    in_bands: as `renders_in_bands` says.
+    in_bands: from `renders_in_bands`.
     """
     height, width = scene.size
     images = len(scene.lights) * height * width * 3 * 4
     if in_bands:
-        # Half floats of images and half differences, and of indirect light; the rest is of a band.
+        # Half floats of images and half differences, and of indirect light; the remainder is for a
+        # band.
         return images * plane_count(scene) // len(scene.lights) + 6 * BAND_BYTES
-    # Sums of two halves, the images and half differences made of them, and a copy of both
-    # where they are written to a file; passes are small beside that.
+    # Sums of two halves, the images and half differences computed from them, and a copy of both
+    # when they are written to a file; passes are small in comparison.
     sets = 12 if has_indirect_planes(scene) else 6
     return sets * images + 512 * SAMPLES_PER_PASS
 
 
 def check_memory(scene: Scene, *, in_bands: bool = False) -> None:
-    """Raise SceneError if a basis of `scene` would not fit, instead of being killed for it."""
+    """Raise SceneError if a basis of `scene` does not fit, before the system kills the process."""
     needed, free = memory_needed(scene, in_bands=in_bands), _free_memory()
     if free is not None and needed > free:
         height, width = scene.size
@@ -46,7 +47,7 @@ def check_memory(scene: Scene, *, in_bands: bool = False) -> None:
 
 
 def _free_memory() -> int | None:
-    """Return the bytes available without swapping, if the system tells (Linux)."""
+    """Return the bytes available without swapping; None where unknown (outside Linux)."""
     try:
         with open("/proc/meminfo", encoding="ascii") as lines:
             available = [line.split()[1] for line in lines if line.startswith("MemAvailable:")]

@@ -1,4 +1,4 @@
-"""The origin of a rendered basis: how its scene is rendered, and with how many samples."""
+"""The origin of a rendered basis: its method and its number of samples."""
 
 from dataclasses import replace
 
@@ -16,13 +16,15 @@ ONE_PASS = "one pass, several questions"
 
 SEPARATE = "separate renders"
 
-#: Passes of a one-pass basis, whose samples do not depend on them: whether it has all that were
-#: asked for, or an interrupt ended it.
+#: Values of `passes` for a one-pass basis, whose samples do not depend on passes: whether it has
+#: all requested samples or was interrupted.
 FINISHED, UNFINISHED = (1, 1), (0, 0)
 
 
 def is_of(scene: Scene, basis: Basis, seed: int) -> bool:
-    """Return whether `basis` was rendered from this `scene`, with its sensor, film and `seed`."""
+    """Return True if `basis` was made from `scene` in its present state, with its sensor, film and
+    `seed`.
+    """
     of = basis.origin
     current = replace(
         origin_of(scene, seed, of.method, of.halves, of.passes),
@@ -34,10 +36,11 @@ def is_of(scene: Scene, basis: Basis, seed: int) -> bool:
 
 
 def is_on_the_way(scene: Scene, basis: Basis, spp: int | None) -> bool:
-    """Return True if a render from nothing to `spp` samples comes by just those of `basis`.
+    """Return True if a new render to `spp` samples would pass through exactly the samples of
+    `basis`.
 
-    With fewer samples it needs its exact sums: without, it was rounded. And those of separate
-    renders must not end elsewhere than passes do. spp: the scene's own number if None.
+    If it has fewer samples, its exact sums are needed, since planes are rounded. Separate renders
+    must end at the boundary of a pass. spp: None for the scene's own number.
     """
     origin = basis.origin
     if origin.is_composed or origin.extra_spp or origin.method != method_of(scene):
@@ -57,10 +60,10 @@ def is_on_the_way(scene: Scene, basis: Basis, spp: int | None) -> bool:
 
 
 def samples_for(scene: Scene, spp: int | None) -> int:
-    """Return the samples per pixel that a basis gets if `spp` are requested.
+    """Return the samples per pixel of a basis for which `spp` were requested.
 
-    One more where that makes the halves equal, and some where a pixel is a block of pixels that
-    ordinary renders take one sample of each in.
+    The number is rounded up to make the halves equal. Separate renders of pixels that are blocks of
+    film pixels round it up further, to one sample in each of these.
     """
     spp = scene.spp if spp is None else spp
     if method_of(scene) == ONE_PASS:
@@ -69,7 +72,7 @@ def samples_for(scene: Scene, spp: int | None) -> int:
 
 
 def method_of(scene: Scene) -> str:
-    """Return how a basis of `scene` is rendered: `ONE_PASS` or `SEPARATE`."""
+    """Return the method for rendering a basis of `scene`: `ONE_PASS` or `SEPARATE`."""
     return ONE_PASS if why_not_one_pass(scene) is None else SEPARATE
 
 
@@ -90,7 +93,7 @@ def origin_of(
 
 
 def basis_lights(scene: Scene) -> Lights:
-    """Return the lights of `scene` for a basis, with the constraints of its lights file."""
+    """Return the lights of `scene` as basis lights, with the requests of its lights file."""
     lights = tuple(
         BasisLight(
             x.name,

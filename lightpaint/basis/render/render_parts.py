@@ -1,9 +1,9 @@
-"""A basis in independent parts, so that many processes can render it.
+"""A basis rendered in independent parts, which can be distributed over many processes.
 
 A part is some rows of the picture or, if each light is rendered separately, a pass of one light.
-The parts follow from scene and samples alone, and the samples of a pixel are added in their order.
-So the basis equals that of `render_basis` to the last bit, in whatever order and by whichever
-process parts are rendered, failures included.
+The parts follow from scene and samples alone, and the samples of a pixel are added in a fixed
+order. So the basis equals that of `render_basis` bit by bit, whichever process renders which part,
+in any order, and however often one fails.
 """
 
 import gc
@@ -33,10 +33,10 @@ from lightpaint.scene.runtime.render_lock import MITSUBA, tracing
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import SAMPLES_PER_PASS, largest_pass, view_seed
 
-#: Camera samples of a part: some seconds of one processor, the loss if a process dies.
+#: Number of camera samples in a part: some seconds on one processor, the work lost by a failure.
 PART_SAMPLES = SAMPLES_PER_PASS // 2
 
-#: Bytes of a part's images, at most.
+#: Maximum size in bytes of the images of a part.
 PART_MAX_BYTES = 2**27
 
 
@@ -44,11 +44,10 @@ PART_MAX_BYTES = 2**27
 class Part:
     """A part of the samples of a basis.
 
-    top, bottom: its rows, the last one not among them. first: samples of a pixel of a half that
-    come before. spp: its own, of each half.
-
-    One light's alone has its index as light, and is of one half, 0 or 1. number: of the pass among
-    those of that light and half.
+    top, bottom: its rows, `bottom` excluded. first: number of earlier samples per pixel of each
+    half. spp: number of its samples per pixel of each half.
+    light, half: index of the light and half (0 or 1) that a pass of separate renders belongs to.
+    number: index of that pass for its light and half.
     """
 
     top: int
@@ -61,7 +60,7 @@ class Part:
 
     @property
     def place(self) -> tuple[int, int]:
-        """Light and half of a pass; passes with the same place are summed."""
+        """Light and half of a pass; passes with the same values are added up."""
         assert self.light is not None
         assert self.half is not None
         return self.light, self.half
@@ -70,7 +69,7 @@ class Part:
 def plan_parts(scene: Scene, spp: int, *, start: Basis | None = None) -> list[Part]:
     """Return the parts that bring a basis of `scene` to `spp` samples per pixel, in order.
 
-    start: earlier basis, whose samples count.
+    start: an existing basis whose samples count.
     """
     height, width = scene.size
     if method_of(scene) != ONE_PASS:
@@ -79,7 +78,7 @@ def plan_parts(scene: Scene, spp: int, *, start: Basis | None = None) -> list[Pa
     left = half_of(spp) - done
     if left <= 0:
         return []
-    # Few enough rows for some seconds of work with all samples.
+    # The number of rows is chosen so that all their samples take some seconds.
     by_work = PART_SAMPLES // (2 * width * left)
     by_memory = PART_MAX_BYTES // (2 * plane_count(scene) * width * 12)
     count = -(-height // max(1, min(by_work, by_memory)))
@@ -88,7 +87,7 @@ def plan_parts(scene: Scene, spp: int, *, start: Basis | None = None) -> list[Pa
 
 
 def _separate_parts(scene: Scene, spp: int, start: Basis | None) -> list[Part]:
-    """Return the passes of each light, numbered from its first one on."""
+    """Return the passes of each light, numbered from the first pass of `start`."""
     height, _ = scene.size
     sums = LightSums(len(scene.lights), (0, 0)) if start is None else LightSums.counted(start)
     parts = []
@@ -102,9 +101,10 @@ def _separate_parts(scene: Scene, spp: int, start: Basis | None) -> list[Part]:
 
 
 class PartRenderer:
-    """Renders parts of one scene, which stays loaded between them: close it before another is.
+    """Renders parts of one scene, which stays loaded in between. Close it before loading another
+    scene.
 
-    guide_table: from `train_guide`, or that of the basis to which samples are added.
+    guide_table: from `train_guide`, or from the basis to which samples are added.
     """
 
     def __init__(self, scene: Scene, seed: int, guide_table: Floats | None) -> None:
@@ -119,10 +119,11 @@ class PartRenderer:
 
     @MITSUBA.acquired()
     def render(self, part: Part) -> tuple[Floats, Floats]:
-        """Return the sums of its samples and how many rays saw an emitter, of each half it is of.
+        """Return the sums of a part's samples and the number of rays that saw an emitter, for each
+        half.
 
-        (halves, lights, rows, w, 3) and (halves, rows, w) float32. The lights are all of them, or
-        its own alone.
+        (halves, lights, rows, w, 3) and (halves, rows, w) float32. A part of separate renders has a
+        single half and light.
         """
         if part.light is not None:
             return self._of_light(part, part.light)
@@ -131,7 +132,7 @@ class PartRenderer:
 
             self._tracer = Tracer(self._scene, self._seed, self._guide_table)
         rows, size = range(part.top, part.bottom), (part.bottom - part.top, self._scene.size[1])
-        # A kernel that runs cannot be interrupted.
+        # A running kernel cannot be interrupted.
         step = largest_pass(size[0] * size[1], shorter=PASS_DIVISOR)
         halves = [self._tracer.planes(rows) for _ in range(2)]
         with tracing() as let_others_through:
@@ -168,7 +169,7 @@ class PartRenderer:
 class PartSums:
     """The sums of parts, which may arrive in any order.
 
-    start: basis that they are added to.
+    start: the basis to which they are added.
     """
 
     def __init__(
@@ -182,7 +183,9 @@ class PartSums:
             return
         self._half = 0 if start is None else start.origin.halves[0]
         self._half += parts[0].spp if parts else 0
-        self._halves: Floats | None = None  # of as many planes and channels as parts have
+        self._halves: Floats | None = (
+            None  # allocated when the first part tells the number of planes and channels
+        )
         self._seen = np.zeros(scene.size, np.float32)
 
     def add(self, part: Part, planes: Floats, seen: Floats) -> None:
@@ -198,15 +201,15 @@ class PartSums:
         self._seen[part.top : part.bottom] = seen.sum(axis=0)
 
     def basis(self, guide_table: Floats | None) -> Basis:
-        """Return the basis, once all parts are added; the sums are released.
+        """Return the basis after all parts were added; the sums are released.
 
-        guide_table: by which the parts chose emitters.
+        guide_table: the table by which emitters were chosen.
         """
         assert not self._left
         scene, start = self._scene, self._start
         if self._lights is not None:
             made = self._lights.basis(self._seed)
-        elif self._halves is None:  # a start with all samples, to which no part was added
+        elif self._halves is None:  # `start` had all samples, so there were no parts
             assert start is not None
             made = start
         else:
@@ -220,7 +223,7 @@ class PartSums:
 
 
 class LightPasses:
-    """The passes of separate renders, added in the order of the plan."""
+    """The passes of separate renders, added in planned order."""
 
     def __init__(self, scene: Scene, parts: Sequence[Part], start: Basis | None) -> None:
         self._scene, self._start = scene, start
@@ -232,7 +235,7 @@ class LightPasses:
         self._waiting: dict[Part, Floats] = {}
 
     def add(self, part: Part, image: Floats) -> None:
-        """Add a pass, (h, w, 3), as soon as those before are there."""
+        """Add a pass, (h, w, 3), once all earlier passes have arrived."""
         self._waiting[part] = image
         line = self._next[part.place]
         while line and line[0] in self._waiting:
@@ -243,7 +246,7 @@ class LightPasses:
             line.pop(0)
 
     def basis(self, seed: int) -> Basis:
-        """Return the basis, once all passes are added."""
+        """Return the basis after all passes were added."""
         scene, start = self._scene, self._start
         images, half_differences = self._sums.mean_and_half_difference()
         seen = emitters_seen(scene) if start is None else start.emitters_seen

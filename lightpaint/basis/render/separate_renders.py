@@ -1,7 +1,8 @@
-"""A basis by one ordinary render per light: correct for any integrator, n times the work.
+"""A basis from one ordinary render per light: works with any integrator, but takes n times the
+work.
 
-The seed of a pass follows from the light, the half and its number alone. So it does not matter
-in which order passes are rendered, nor in how many runs.
+The seed of a pass follows from its light, half and number alone. So passes may be rendered in any
+order, and in several runs.
 """
 
 import gc
@@ -24,17 +25,17 @@ from lightpaint.scene.scene_render import Stream, as_float32, pass_seed, plan_pa
 WHITE: RGB = (1.0, 1.0, 1.0)
 BLACK: RGB = (0.0, 0.0, 0.0)
 
-#: Samples per pixel in the search for visible emitters.
+#: Number of camera samples per pixel in the search for visible emitters.
 SEEN_SAMPLES = 16
 
-#: Half (0 or 1) and samples per pixel of consecutive passes.
+#: Consecutive passes as pairs of half (0 or 1) and samples per pixel.
 Plan = list[tuple[int, int]]
 
 
 class LightSums:
     """The sums, not divided by their counts, of the two halves of each light's samples.
 
-    planes: (2, n, h, w, 3) float32. spp, passes: (n, 2), per light and half, so far.
+    planes: (2, n, h, w, 3) float32. spp, passes: (n, 2), numbers so far, by light and half.
     """
 
     def __init__(self, lights: int, size: tuple[int, int]) -> None:
@@ -44,7 +45,9 @@ class LightSums:
 
     @classmethod
     def of(cls, basis: Basis) -> "LightSums":
-        """Return the sums that made `basis`, up to round-off where it does not have them."""
+        """Return the sums from which `basis` was computed, exact if it has them, else up to
+        round-off.
+        """
         sums = cls.counted(basis)
         if basis.sums is not None:
             sums.planes = np.stack(basis.sums)
@@ -52,21 +55,21 @@ class LightSums:
         sums.planes = np.zeros((2, *basis.images.shape), np.float32)
         for k, (a, b) in enumerate(sums.spp.tolist()):
             image, half_difference = basis.images[k], basis.half_differences[k]
-            # The mean is (a A + b B) / (a + b), half the difference (A − B) / 2.
+            # The mean is (a A + b B) / (a + b), the half difference (A − B) / 2.
             sums.planes[0, k] = a * (image + half_difference * (2 * b / max(a + b, 1)))
             sums.planes[1, k] = b * (image - half_difference * (2 * a / max(a + b, 1)))
         return sums
 
     @classmethod
     def counted(cls, basis: Basis) -> "LightSums":
-        """Return the samples and passes that made `basis`, without their sums."""
+        """Return the numbers of samples and passes of `basis`, without their sums."""
         origin, sums = basis.origin, cls(len(basis.lights), (0, 0))
         each_light = origin.each_light or ((*origin.halves, *origin.passes),) * len(basis.lights)
         sums.spp[:], sums.passes[:] = np.array(each_light)[:, :2], np.array(each_light)[:, 2:]
         return sums
 
     def done(self, light: int) -> tuple[int, int]:
-        """Return the samples per pixel of the two halves of that light."""
+        """Return the samples per pixel of the two halves of a light."""
         a, b = self.spp[light].tolist()
         return a, b
 
@@ -81,8 +84,8 @@ class LightSums:
         return means, half_differences
 
     def counts(self) -> dict[str, Any]:
-        """Return the fields of an Origin that count samples."""
-        # The noise of a single half is unknown, so only samples that both halves have count.
+        """Return the fields of an Origin that record numbers of samples and passes."""
+        # With only one half the noise is unknown, so the minimum over both halves counts.
         spp, passes = int(self.spp.min()), int(self.passes.min())
         each_light: tuple[tuple[int, ...], ...] = ()
         if (self.spp != spp).any() or (self.passes != passes).any():
@@ -100,9 +103,9 @@ def render_separately(
     keeper: Keeper,
     progress: Progress,
 ) -> None:
-    """Add the samples that `budget` allows to `sums`.
+    """Render passes until `budget` is spent, and add them to `sums`.
 
-    basis: makes a basis from the sums so far, to save it. Raises Interrupted for Ctrl-C.
+    basis: returns the basis of the sums so far, for saving. Raises Interrupted on Ctrl-C.
     """
     try:
         with tracing() as let_others_through:
@@ -129,7 +132,8 @@ def render_separately(
 def plan_of_light(scene: Scene, spp: int, *, done: tuple[int, int] = (0, 0)) -> Plan:
     """Return the passes that bring one light from `done` samples per half to `spp` in all.
 
-    On a film of blocks there are a few more: each pixel of a block takes at least one sample.
+    If a pixel is a block of film pixels, the number is rounded up so that each of these gets a
+    sample.
     """
     height, width = scene.size
     step = scene.film.block_pixels
@@ -139,11 +143,13 @@ def plan_of_light(scene: Scene, spp: int, *, done: tuple[int, int] = (0, 0)) -> 
 def _turns(
     scene: Scene, budget: Budget, sums: LightSums, progress: Progress
 ) -> Iterator[tuple[int, Plan, Callable[[], None]]]:
-    """Yield (light, its passes, function to call after each) in turn, until `budget` is spent."""
+    """Yield (light, its passes, function to call after each pass) in turn, until `budget` is
+    spent.
+    """
     height, width = scene.size
     pixels, lights = height * width, len(scene.lights)
     if budget.time_s is None:
-        # One light after the other: a large scene takes long to load.
+        # One light at a time, since a large scene takes long to load.
         for light in range(lights):
             plan = plan_of_light(scene, budget.spp, done=sums.done(light))
             if plan:
@@ -154,8 +160,8 @@ def _turns(
                 )
         return
 
-    # Each round brings all lights to the same number of samples. The first takes one pair of passes
-    # to measure the time; the next use the time that is left. More than two more are rare.
+    # In each round every light reaches the same number of samples. The first round is one pair of
+    # passes and measures their time; the second spends the remaining time, and a third is rare.
     clock, pairs = Clock(budget.time_s, progress), 1
     while pairs > 0:
         fullest = int(sums.spp.max())
@@ -199,8 +205,10 @@ def _add_pass(
 def light_pass(
     loaded: Any, scene: Scene, light: int, half: int, number: int, spp: int, seed: int
 ) -> Floats:
-    """Return the undivided sum of a pass, (h, w, 3). number: its index for that light and half."""
-    # Each light uses its own random samples.
+    """Render a pass and return its undivided sum, (h, w, 3). number: its index for this light and
+    half.
+    """
+    # Lights have independent samples.
     of_light = pass_seed(seed, Stream.BASIS, light)
     seed_of_pass = pass_seed(of_light, Stream.BASIS, 2 * number + half)
     return spp * as_float32(render_pass(loaded, scene, seed=seed_of_pass, spp=spp))
@@ -208,7 +216,9 @@ def light_pass(
 
 @MITSUBA.acquired()
 def emitters_seen(scene: Scene) -> Bools:
-    """Return the pixels, (h, w), that show an emitter, directly or through clear glass."""
+    """Return the pixels in which the camera sees an emitter, directly or through clear glass, (h,
+    w).
+    """
     import mitsuba as mi
 
     if scene.integrator.hide_emitters:
@@ -228,7 +238,7 @@ def emitters_seen(scene: Scene) -> Bools:
 
 
 def _seen_through_glass(scene: Scene, loaded: Any) -> Bools:
-    """Return the pixels, (h, w), in which some ray meets an emitter through clear surfaces only."""
+    """Return the pixels in which a ray reaches an emitter through clear surfaces only, (h, w)."""
     from lightpaint.basis.render.tracer.one_pass import view_of
     from lightpaint.basis.render.tracer.seen_emitters import (
         emitters_seen_through,

@@ -1,9 +1,9 @@
-"""A top-up: further samples of those pixels of a basis in which they matter.
+"""Adds samples to selected pixels of a basis, where they matter most.
 
-A plane holds means of samples, so a pixel with more of them has less noise, and nothing else
-changes. Both halves get as many in each pixel, so that half their difference stays the noise of
-their mean. The samples of a pixel are terms of a sequence of its own, far from that of the uniform
-samples: either can go on where it stopped, whatever was added of the other.
+A plane holds means of samples, so more samples in a pixel only reduce its noise. Both halves get
+equal numbers of samples in each pixel, so half their difference still estimates the noise of the
+mean. Extra samples are terms of a separate sequence, far from that of the uniform samples, so
+either sequence can be continued independently of the other.
 """
 
 import gc
@@ -35,17 +35,17 @@ if TYPE_CHECKING:
 
 
 class KeptTracer:
-    """The tracers of the last top-ups: their scene stays loaded until another one is asked for.
+    """Tracers of the last top-ups, whose scene stays loaded until another one is needed.
 
     views: one scene through several sensors, which is loaded once for all of them.
     """
 
     def __init__(self, views: Sequence[Scene] = ()) -> None:
         self._views = tuple(views)
-        self._tracers: dict[int, tuple[Tracer, int]] = {}  # by view, with the seed
+        self._tracers: dict[int, tuple[Tracer, int]] = {}  # by index of the view, with the seed
 
     def of(self, scene: Scene, basis: Basis) -> "Tracer":
-        """Return a tracer that goes on with `basis`, which was rendered of `scene`."""
+        """Return a tracer that continues `basis`, which was rendered from `scene`."""
         from lightpaint.basis.render.tracer.one_pass import Tracer
 
         seed, table = basis.origin.seed, basis.guide_table
@@ -63,7 +63,7 @@ class KeptTracer:
         return tracer
 
     def close(self) -> None:
-        """Release the scene."""
+        """Release the loaded scene."""
         if self._tracers:
             for tracer, _ in self._tracers.values():
                 tracer.close()
@@ -77,9 +77,9 @@ def _is_equal(a: Floats | None, b: Floats | None) -> bool:
 
 @contextmanager
 def kept_loaded(views: Sequence[Scene] = ()) -> Iterator[KeptTracer]:
-    """Hold Mitsuba, and keep the scene of a top-up loaded for the next one within the block.
+    """Acquire Mitsuba, and keep the scene loaded between top-ups within the block.
 
-    views: as of `KeptTracer`.
+    views: as in `KeptTracer`.
     """
     with MITSUBA.acquired():
         tracers = KeptTracer(views)
@@ -99,14 +99,13 @@ def top_up(
     is_enough: Callable[[], bool] = lambda: False,
     tracers: KeptTracer | None = None,
 ) -> Basis:
-    """Return `basis` with further samples of its pixels.
+    """Return `basis` with additional samples in some pixels.
 
-    scene: the one that `basis` was rendered from, in one pass. counts: (h, w), samples to add to
-    each half; they must not depend on the light of their own pixel. is_enough: called between
-    passes; True stops early. keep: called with the basis so far when Ctrl-C ends the work early;
-    returns whether it was saved. tracers: of a block in which the scene stays loaded.
-
-    Raises BasisError for a basis of something else, and Interrupted for Ctrl-C.
+    scene: the scene from which `basis` was rendered in one pass. counts: (h, w), number of samples
+    to add to each half, which must not depend on the light of the same pixel. is_enough: checked
+    between passes; True stops early. keep: called with the basis so far when Ctrl-C ends the work
+    early; returns whether it was stored. tracers: from `kept_loaded`, to keep the scene loaded.
+    Raises BasisError if the basis does not belong to the scene, and Interrupted on Ctrl-C.
     """
     if basis.origin.method != ONE_PASS or not is_of(scene, basis, basis.origin.seed):
         raise BasisError("the basis to top up is not a one-pass basis of this scene and film")
@@ -146,10 +145,11 @@ def top_up(
 
 
 def pixel_batches(counts: Indices, planes: int) -> Iterator[Indices]:
-    """Yield the pixels with samples to take, (p,) at a time, fewest samples first.
+    """Yield batches of pixels that need samples, (p,) each, fewest samples first.
 
-    Pixels of a batch have similar counts, since they are traced together. Each batch is a short
-    pass whose planes take little memory.
+    The pixels of a batch are traced in parallel, so they should need similar numbers of samples. A
+    batch is a short pass, and is small enough that its planes take little memory. planes: number of
+    planes per pixel.
     """
     flat = counts.ravel()
     pixels = np.flatnonzero(flat)
@@ -166,7 +166,7 @@ def pixel_batches(counts: Indices, planes: int) -> Iterator[Indices]:
 
 
 class _PlaneSums:
-    """Images and half differences of a basis, to which samples of some pixels are added."""
+    """Images and half differences of a basis, to which samples of selected pixels are added."""
 
     def __init__(self, scene: Scene, basis: Basis) -> None:
         self._basis, self._lights = basis, len(scene.lights)
@@ -178,7 +178,9 @@ class _PlaneSums:
             ]
 
     def add(self, pixels: Indices, halves: list[Floats], first: Indices, spp: Indices) -> None:
-        """Add undivided sums of both halves, (n or 2n, 1, p, 3). first, spp: as `Tracer.top_up`."""
+        """Add undivided sums of both halves, (n or 2n, 1, p, 3). first, spp: as in
+        `Tracer.top_up`.
+        """
         n = self._lights
         indirect = [half[n:] for half in halves]
         totals = [half[:n] for half in halves]
@@ -202,14 +204,14 @@ class _PlaneSums:
                     flat(plane)[k, pixels] = updated[0, 0]
 
     def _half_spp(self) -> list[tuple[int, int]]:
-        """Return the uniform samples of each light in both halves."""
+        """Return the number of uniform samples in both halves for each light."""
         origin = self._basis.origin
         if origin.each_light:
             return [counts[:2] for counts in origin.each_light]
         return [origin.halves] * self._lights
 
     def basis(self, extra: Indices, guide_table: Floats | None) -> Basis:
-        """Return the basis with all that was added."""
+        """Return the basis with all added samples."""
         planes: list[Planes] = [as_planes(x) for x in self._all]
         mean = 2 * float(extra.mean(dtype=np.float64))
         return replace(
@@ -225,5 +227,5 @@ class _PlaneSums:
 
 
 def flat(planes: Floats) -> Floats:
-    """Return planes (n, h, w, 3) as (n, h w, 3), in the same memory."""
+    """Return planes (n, h, w, 3) as (n, h w, 3), sharing memory."""
     return planes.reshape(len(planes), -1, 3)

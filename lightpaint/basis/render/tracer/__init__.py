@@ -1,1 +1,1 @@
-"""Modules that run in Dr.Jit: they import Mitsuba, whose variant has to be chosen before."""
+"""Modules with Dr.Jit code. They import Mitsuba, so its variant must be set before."""

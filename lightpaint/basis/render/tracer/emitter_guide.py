@@ -1,16 +1,16 @@
-"""The choice of the emitter to sample from a place, learned in training.
+"""The emitter guide: learns which emitters to sample from each region of space.
 
-A path tracer that chooses emitters at random samples most of them in vain: a spot whose cone is
-elsewhere, a window behind a wall. Space is divided into cells, and each cell remembers what
-its surface points received from every emitter, shadows included. A path then draws an
-emitter with a probability that follows that light, relative to what the light of that emitter does
-in the whole picture, so that a faint light gets its rays where it matters as well as a
-bright one. A remainder is drawn evenly: no emitter is left out anywhere, so that the mean of
-every image does not depend on what has been learned.
+A path tracer that chooses emitters uniformly wastes most samples: on a spot whose cone points
+elsewhere, or a window behind a wall. Space is divided into cells, and each cell records how much
+light its surface points received from every emitter, shadows included. A path then chooses an
+emitter with a probability proportional to that light, relative to the light that the emitter
+contributes to the whole picture, so that a faint light gets rays where it matters just like a
+bright one. A fixed share of the choices is uniform. So every emitter may be chosen everywhere, and
+the mean of every image is independent of what was learned.
 
-Light is counted in integers, whose sums are the same in whatever order threads add.
+Light is counted in integers, whose sums do not depend on the order in which threads add.
 
-Import this module only after a JIT variant is set: its array types do not exist before.
+Import this module after setting a Dr.Jit variant, since its array types do not exist before.
 """
 
 # mypy: disable-error-code="no-untyped-def, no-untyped-call"
@@ -25,31 +25,31 @@ import numpy.typing as npt
 from lightpaint.arrays import Floats
 from lightpaint.basis.render.tracer.sobol import hashed
 
-#: Share of the samples that is spread evenly over the emitters of a cell.
+#: Share of the samples that is distributed uniformly over the emitters.
 EVEN_SHARE = 0.1
-#: Integer units of an emitter's light: the number in its average contribution, and the largest
-#: number from one sample.
+#: Units in which the light of an emitter is counted: units of its mean contribution, and the
+#: maximum number of units for one sample.
 MEAN_UNITS, MAX_UNITS = 2.0**12, 2.0**31
-#: Units of radiance 1, before anything is known of an emitter.
+#: Units of radiance 1, until something is known about an emitter.
 FIRST_UNITS = 2.0**20
-#: Weight of the mean over all cells, in samples of the cell itself.
+#: Weight of the mean over all cells, as a number of samples in the cell.
 PRIOR_SAMPLES = 0.5
-#: Largest ratio of a cell's distance from the camera to its width; the least is half of that.
+#: Largest ratio of a cell's distance from the camera to its width; the smallest is half of that.
 CELLS_PER_DISTANCE = 24.0
 #: The largest number in [0, 1).
 BELOW_1 = 1 - 2**-24
-#: Largest size of the table: entries in all, and cells.
+#: Maximum size of the table: number of entries, and number of cells.
 MAX_ENTRIES, MAX_CELLS = 2**22, 2**16
 
 
 class EmitterGuide:
-    """Probabilities of emitters by cell, and the records they are computed from.
+    """Probabilities of emitters by cell, and the records from which they are computed.
 
-    scene: an `mi.Scene`, whose emitters it chooses from.
-    light_of: UInt32 array, the light that an emitter belongs to, by its Dr.Jit instance id.
-    eye: position of the camera; cells are smaller near it.
-    table: what `table()` of an earlier guide returned, which this one then uses as it is; None, or
-        an implausible one, to learn from the passes that sample by this guide.
+    scene: an `mi.Scene`, whose emitters are chosen.
+    light_of: UInt32 array from the Dr.Jit instance id of an emitter to its light.
+    eye: position of the camera; cells near it are smaller.
+    table: a table from `table()` of an earlier guide, to be used unchanged. None, or an implausible
+    table, starts a guide that learns from the passes that use it.
     """
 
     def __init__(self, scene: Any, light_of: Any, eye: Any, table: Floats | None = None) -> None:
@@ -62,7 +62,8 @@ class EmitterGuide:
         index_of = np.zeros(instances.max() + 1, np.uint32)
         index_of[instances] = np.arange(self.count)
         self._index_of = mi.UInt32(index_of)
-        # Emitters that the scene never samples are not chosen; point lights among them are dark.
+        # Emitters that the scene never samples are never chosen; any point lights among them are
+        # black.
         self._can_sample = np.array([emitter.sampling_weight() > 0 for emitter in scene.emitters()])
         shape = (2, self.cells, self.count)
         if table is not None and (table.shape != shape or not _is_sane(table)):
@@ -78,7 +79,7 @@ class EmitterGuide:
         self._set_probabilities()
 
     def table(self) -> Floats:
-        """Return (2, cells, emitters) float32: received light, and number of samples."""
+        """Return (2, cells, emitters) float32: received light, and numbers of samples."""
         return np.stack([self._received_light, self._sample_counts]).astype(np.float32)
 
     def update(self) -> None:
@@ -89,7 +90,7 @@ class EmitterGuide:
         self._received_light += new_light / self._units
         self._sample_counts += new_counts
         mean = new_light.sum(axis=0) / np.maximum(new_counts.sum(axis=0), 1)
-        # Powers of two, which leave all digits of the counts unchanged.
+        # Powers of two, so that scaling is exact.
         units = self._units * 2.0 ** np.round(
             np.log2(MEAN_UNITS / np.maximum(mean, 1 / MEAN_UNITS))
         )
@@ -108,9 +109,9 @@ class EmitterGuide:
         self._units_of = mi.Float(self._units.astype(np.float32))
 
     def _set_probabilities(self) -> None:
-        # Rounded as in a file, so that it makes no difference where the training ran.
+        # Rounded as in a file, so that the result does not depend on where the training ran.
         received_light, sample_counts = self.table()
-        # Most cells of the table hold no surface: there the choice is even.
+        # Most cells of the table contain no surface; there the choice is uniform.
         visited = sample_counts.any(axis=1)
         even = np.cumsum(self._can_sample, dtype=np.float32) / self._can_sample.sum()
         cumulative = np.tile(even, (self.cells, 1))
@@ -126,8 +127,10 @@ class EmitterGuide:
         dr.eval(self._cumulative)
 
     def cell(self, si):
-        """Return the index of a surface point's cell, by its place and the side it is seen from."""
-        # The exponent of a float is its logarithm: cells are powers of two wide.
+        """Return the index of a surface point's cell, which depends on its position and visible
+        side.
+        """
+        # The exponent of a float is its binary logarithm, so the widths of cells are powers of two.
         distance = dr.norm(si.p - self.eye) * (1 / CELLS_PER_DISTANCE)
         exponent = dr.clip(dr.reinterpret_array(mi.UInt32, distance) >> 23, 1, 252)
         per_unit = dr.reinterpret_array(mi.Float, (253 - exponent) << 23)
@@ -144,7 +147,9 @@ class EmitterGuide:
         return hashed(key) & (self.cells - 1)
 
     def choose(self, cell, number, active):
-        """Return per path an emitter, its probability, and `number` made uniform again in it."""
+        """Choose an emitter for each path. Returns its index, its probability, and `number`
+        rescaled to be uniform again.
+        """
         first = cell * self.count
         emitter = dr.binary_search(
             0,
@@ -155,13 +160,13 @@ class EmitterGuide:
         return emitter, probability, dr.minimum((number - below) / probability, BELOW_1)
 
     def probability(self, cell, emitter, active):
-        """Return the probability with which `choose` draws `emitter`, a pointer, in `cell`."""
+        """Return the probability with which `choose` selects `emitter`, a pointer, in `cell`."""
         instance = dr.reinterpret_array(mi.UInt32, emitter)
         index = dr.gather(mi.UInt32, self._index_of, instance, active)
         return self._share(cell * self.count, index, active)[1]
 
     def _share(self, first, emitter, active):
-        """Return (lower end, length) of an emitter's share of the unit interval."""
+        """Return the start and length of an emitter's interval within [0, 1)."""
         above = dr.gather(mi.Float, self._cumulative, first + emitter, active)
         below = dr.gather(mi.Float, self._cumulative, first + emitter - 1, active & (emitter > 0))
         return below, above - below
@@ -170,12 +175,12 @@ class EmitterGuide:
         """Record the light that `emitter` contributed to the picture from `cell`.
 
         contribution: RGB, not divided by the probability of the emitter. is_sampled: whether the
-        emitter was sampled at all; lit: whether its light arrived.
+        emitter was sampled at all. lit: whether its light arrived.
         """
         entry = cell * self.count + emitter
         is_sampled, lit = is_sampled & self._learns, lit & self._learns
         _count(self._new_counts, mi.UInt32(1), entry, is_sampled)
-        # Not dr.mean, which makes a constant of the kernel of how many paths it follows.
+        # dr.mean would compile the number of paths into the kernel as a constant.
         red, green, blue = contribution
         gray = (red + green + blue) * (1 / 3)
         units = gray * dr.gather(mi.Float, self._units_of, emitter, lit)
@@ -183,13 +188,15 @@ class EmitterGuide:
         _count(self._new_light, units, entry, lit & dr.isfinite(gray))
 
     def evaluate(self) -> None:
-        """Run the traced kernel, and wait for it."""
+        """Run the recorded kernels, and wait for them."""
         dr.eval(self._new_light, self._new_counts)
         dr.sync_thread()
 
 
 def _count(array, value, entry, active):
-    """Add to entries of an array, of whatever length: by itself Dr.Jit has other code for each."""
+    """Add to entries of an array with code that is independent of its length, unlike Dr.Jit's
+    default.
+    """
     dr.scatter_reduce(dr.ReduceOp.Add, array, value, entry, active, mode=dr.ReduceMode.Direct)
 
 
@@ -198,7 +205,7 @@ def _is_sane(table: Floats) -> bool:
 
 
 def table_cells(emitters: int) -> int:
-    """Return the number of cells, a power of two, for that many emitters."""
+    """Return the number of cells for this number of emitters, a power of two."""
     return int(2 ** np.floor(np.log2(np.clip(MAX_ENTRIES / emitters, 1, MAX_CELLS))))
 
 
@@ -208,9 +215,9 @@ def _probabilities(
     lights: npt.NDArray[np.int_],
     can_sample: npt.NDArray[np.bool_],
 ) -> npt.NDArray[np.float64]:
-    """Return (cells, emitters) probabilities, from the received light and the number of samples.
+    """Return (cells, emitters) probabilities from the received light and the numbers of samples.
 
-    lights: the light of each emitter; can_sample: whether it may be chosen at all.
+    lights: the light of each emitter. can_sample: whether it may be chosen at all.
     """
     even = can_sample / can_sample.sum()
     mean_of_all = received_light.sum(axis=0) / np.maximum(sample_counts.sum(axis=0), 1)

@@ -1,6 +1,6 @@
-"""Planes that paths add their light to, one for each light, on the device that renders.
+"""Planes on the device to which paths add their light, one for each light.
 
-Import this module only after a JIT variant is set: its array types do not exist before.
+Import this module after setting a Dr.Jit variant, since its array types do not exist before.
 """
 
 # mypy: disable-error-code="no-untyped-def, no-untyped-call"
@@ -16,16 +16,16 @@ from lightpaint.arrays import Floats
 
 
 class LightPlanes:
-    """Sums of the samples of some pixels, undivided, light by light.
+    """Undivided sums of the samples of some pixels, light by light.
 
-    light_of: as `lights_by_instance` returns it. lights: their number. size: rows and columns of
-    the pixels, which `add` counts row by row. is_shared: whether several paths may add to one pixel
-    at a time, in an order that decides the last bits; else each pixel has one path, which adds in
-    order. is_split: whether direct and indirect light have separate planes. start: initial sums, as
-    `sums` returns them; zeros if None.
+    light_of: from `lights_by_instance`. lights: number of lights. size: rows and columns of pixels,
+    which `add` indexes in row-major order. is_shared: whether several paths may add to a pixel at
+    the same time, in an order that then affects the last bits; otherwise each pixel has a single
+    path, which adds in order. is_split: whether direct and indirect light have separate planes.
+    start: initial sums, in the form returned by `sums`; None for zeros.
 
-    This is an object rather than arrays of the tracing loop, since Dr.Jit refuses an array that is
-    never modified, such as `seen` when all lights are points.
+    The sums are attributes of this object rather than variables of the tracing loop, because Dr.Jit
+    rejects a loop variable that never changes, such as `seen` where all lights are points.
     """
 
     def __init__(
@@ -53,9 +53,9 @@ class LightPlanes:
 
     @classmethod
     def nowhere(cls, light_of: Any, lights: int, *, is_split: bool) -> "LightPlanes":
-        """Return planes that store nothing, for training paths.
+        """Return planes that discard light, for paths from which the guide only learns.
 
-        lights, is_split: as for the planes of other paths, so that both share a kernel.
+        lights, is_split: as in the planes of other paths, which then share the same kernel.
         """
         nothing = cls(light_of, lights, (1, 1), is_split=is_split)
         nothing._keeps = dr.opaque(mi.Bool, False)
@@ -64,9 +64,9 @@ class LightPlanes:
     def add(self, pixel, emitter, value, bounces, active):
         """Add RGB values to the plane of the light that `emitter` belongs to.
 
-        bounces: the number of surfaces that have scattered them; beyond one the light is indirect.
-        NaNs, which one path in a hundred million carries, are dropped: one such pixel would make
-        all sums over the picture NaN.
+        bounces: number of surfaces that scattered the light; with more than one it is indirect.
+        Values that are not finite are skipped: one path in a hundred million has them, and a single
+        one would spoil all sums over the picture.
         """
         active = active & dr.all(dr.isfinite(value))
         instance = dr.reinterpret_array(mi.UInt32, emitter)
@@ -86,27 +86,28 @@ class LightPlanes:
         dr.scatter_reduce(add, array, value, place, active, mode=self._mode)
 
     def evaluate(self) -> None:
-        """Run the traced kernel, and wait for it: a running kernel cannot be interrupted."""
+        """Run the recorded kernels, and wait for them: a running kernel cannot be interrupted."""
         dr.eval(self._sums, self._seen)
         dr.sync_thread()
 
     def sums(self) -> Floats:
         """Return a copy of the sums, (lights, rows, columns, 3).
 
-        Split, (2 lights, rows, columns, 3): direct light of each, then indirect light of each.
+        If split: (2 lights, rows, columns, 3), first the direct light of all lights, then the
+        indirect.
         """
         return np.array(self._sums).reshape(self.count, *self.size, 3)
 
     def seen(self) -> Floats:
-        """Return how many camera rays of each pixel saw an emitter, (rows, columns)."""
+        """Return the number of camera rays in each pixel that saw an emitter, (rows, columns)."""
         return np.array(self._seen).reshape(self.size)
 
 
 def lights_by_instance(scene: Any, plane_of: Mapping[str, int]) -> Any:
-    """Return a UInt32 array from the Dr.Jit instance id of an emitter to its light's plane.
+    """Return a UInt32 array from the Dr.Jit instance id of an emitter to the plane of its light.
 
-    plane_of: index of the plane by the emitter's name. Emitters of no light are black and do no
-    harm in the first plane.
+    plane_of: index of the plane by the emitter's name. Emitters that belong to no light are black,
+    so they may be assigned to the first plane.
     """
     instances = np.array(dr.reinterpret_array(mi.UInt32, scene.emitters_dr())).tolist()
     table = np.zeros(max(instances) + 1, dtype=np.uint32)

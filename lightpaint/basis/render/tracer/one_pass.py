@@ -1,16 +1,16 @@
-"""The one-pass basis: a path tracer that separates the contributions of lights.
+"""The one-pass basis: a path tracer that separates the contributions of the lights.
 
-Radiance is a sum over the emitters that a path reaches, by chance (a ray that hits one) or
-by choice (next-event estimation). This integrator traces the same paths as Mitsuba's own `path`,
-and adds each contribution to the image of its emitter instead of to one image. It draws random
-numbers in the same order too, so that with equal seeds the sum over the lights equals `mi.render`
-up to round-off, and one pass serves all lights.
+Radiance is a sum over the emitters that a path reaches, either by hitting one or by sampling one
+(next-event estimation). This integrator traces exactly the paths of Mitsuba's own `path`, and adds
+each contribution to the image of its emitter instead of to a single image. It draws random numbers
+in the same order, so with equal seeds the sum over the lights equals `mi.render` up to round-off,
+and one pass serves all lights.
 
-That is its plain mode, `trace_plainly`, which tests compare with Mitsuba's. For a basis it improves
-two things at the same cost: it takes numbers from a low-discrepancy sequence instead of a random
-one (see sobol.py), and chooses emitters by a trained guide (guide_training.py).
+That is its plain mode, `trace_plainly`, which tests compare with Mitsuba. For a basis it does two
+things better, at the same cost: it uses a low-discrepancy sequence instead of random numbers (see
+sobol.py), and a trained guide chooses the emitters (guide_training.py).
 
-Import this module only after a JIT variant is set: its array types do not exist before.
+Import this module after setting a Dr.Jit variant, since its array types do not exist before.
 """
 
 # mypy: disable-error-code="no-untyped-call"
@@ -36,25 +36,26 @@ from lightpaint.scene.runtime.kernel_threads import kernels
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, pass_seed
 
-#: Number of emitters sampled at the first vertex, and at later ones if there are fewer emitters
-#: than that.
+#: Number of emitter samples at the first vertex, and at later ones: keys are exclusive upper bounds
+#: of the number of emitters.
 FIRST_EMITTER_SAMPLES = 8
 LATER_EMITTER_SAMPLES = {32: 2, 128: 4, 2**32: 8}
 
-#: Streams of numbers; those below are of the halves of all pixels.
+#: Indices of number streams; lower ones are the halves of the uniform samples.
 TRAINING_STREAM, FIRST_TOP_UP_STREAM = 2, 3
 
 
 class Tracer:
-    """A tracer of a loaded scene, with all lights at unit emission, into `LightPlanes`.
+    """A loaded scene with all lights at unit emission, whose samples are traced into `LightPlanes`.
 
-    Close it before another scene is loaded. seed: of all random numbers. guide_table: of a trained
-    guide; without one, the guide has to be trained first. emitter_samples: at the first vertex and
-    at later ones, if not the default. loaded: scene loaded by the tracer of another view. views:
-    the scene through other sensors, whose tracers will share the scene loaded here.
+    Close it before loading another scene. seed: seed of all random numbers. guide_table: the table
+    of a trained guide; without one, the guide must be trained first. emitter_samples: numbers of
+    emitter samples at the first vertex and at later ones, to override the defaults. loaded: the
+    scene as loaded by the tracer of another view. views: the scene through other sensors, whose
+    tracers will share the loaded scene.
 
     The samples of a pixel are terms of one sequence for each half, however they are divided into
-    calls. So their sum depends neither on that nor on the number of threads.
+    passes. So their sum depends neither on the passes nor on the number of threads.
     """
 
     def __init__(
@@ -76,14 +77,14 @@ class Tracer:
         if emitter_samples is None:
             emitter_samples = FIRST_EMITTER_SAMPLES, later_emitter_samples(self.guide.count)
         self._emitter_samples = emitter_samples
-        # One stream of numbers for each half, for the training, and for each half of a top-up, far
-        # from all others.
+        # One stream of numbers for each half, one for training, and one for each half of a top-up,
+        # all independent.
         self._streams = [pass_seed(seed, Stream.NUMBERS, k) for k in range(5)]
 
     def learn(self, rows: range, first: int, spp: int) -> None:
-        """Learn from some samples of some rows, whose light is not kept.
+        """Train the guide with some samples of some rows, and discard their light.
 
-        first: number of samples of a pixel that earlier passes took.
+        first: number of samples per pixel in earlier passes.
         """
         lights, is_split = len(self.scene.lights), has_indirect_planes(self.scene)
         nowhere = LightPlanes.nowhere(self.light_of, lights, is_split=is_split)
@@ -93,7 +94,7 @@ class Tracer:
         self.guide.update()
 
     def end_training(self) -> Floats:
-        """Stop training, and return the table of the guide, (2, cells, emitters)."""
+        """Finish training, and return the table of the guide, (2, cells, emitters)."""
         self.guide_table = self.guide.table()
         self.guide.freeze()
         return self.guide_table
@@ -104,9 +105,9 @@ class Tracer:
         return self.guide_table is not None
 
     def planes(self, rows: range, start: Floats | None = None) -> LightPlanes:
-        """Return planes of some rows, to which nothing is added yet.
+        """Return planes for some rows, without added samples.
 
-        start: sums of samples that come before, (planes, rows, columns, 3), which they begin with.
+        start: initial sums of earlier samples, (planes, rows, columns, 3).
         """
         size = len(rows), self.scene.size[1]
         is_split = has_indirect_planes(self.scene)
@@ -114,14 +115,15 @@ class Tracer:
         return LightPlanes(self.light_of, lights, size, is_split=is_split, start=start)
 
     def pixel_planes(self, pixels: int) -> LightPlanes:
-        """Return empty planes of a number of single pixels."""
+        """Return planes for a number of single pixels, without added samples."""
         is_split = has_indirect_planes(self.scene)
         return LightPlanes(self.light_of, len(self.scene.lights), (1, pixels), is_split=is_split)
 
     def add(self, planes: LightPlanes, half: int, rows: range, first: int, spp: int) -> None:
-        """Add the light of some samples of some rows, of one half, to `planes` of these rows.
+        """Trace some samples of some rows for one half, and add their light to the `planes` of
+        these rows.
 
-        first: samples of a pixel of that half that come before.
+        first: number of earlier samples per pixel of that half.
         """
         with kernels():
             self._trace(half, planes, *self._of_rows(rows, first, spp))
@@ -130,21 +132,22 @@ class Tracer:
     def top_up(
         self, planes: LightPlanes, half: int, pixels: Indices, first: Indices, spp: Indices
     ) -> None:
-        """Add the light of further samples of single pixels, of one half, to `planes` of these.
+        """Trace additional samples of single pixels for one half, and add their light to their
+        `planes`.
 
-        pixels: (p,), of the picture, counted along its rows, each once; `planes` are (1, p). first:
-        (p,), samples that such calls have taken before. spp: (p,), how many to take.
+        pixels: (p,), row-major indices into the picture, without repetitions; `planes` are (1, p).
+        first: (p,), number of samples in earlier calls. spp: (p,), number of samples to take.
         """
         with kernels():
             self._trace(FIRST_TOP_UP_STREAM + half, planes, pixels, first, spp)
             planes.evaluate()
 
     def close(self) -> None:
-        """Release the scene and all that refers to it."""
+        """Release the scene and everything that refers to it."""
         del self.loaded, self.light_of, self.guide
 
     def _of_rows(self, rows: range, first: int, spp: int) -> tuple[Indices, Indices, Indices]:
-        """Return the pixels of some rows, and for each of them the same samples."""
+        """Return the pixels of some rows, with first sample and number of samples for each."""
         width = self.scene.size[1]
         pixels = (np.array(rows)[:, None] * width + np.arange(width)).ravel()
         return pixels, np.full(pixels.size, first), np.full(pixels.size, spp)
@@ -154,7 +157,8 @@ class Tracer:
     ) -> None:
         view = view_of(self.scene, self.loaded)
         place = dr.arange(mi.UInt32, pixels.size)
-        # Values that differ between calls are no constants of the kernel, which is compiled once.
+        # Values that differ between calls must not become constants of the kernel, which would be
+        # recompiled.
         pixel, begin, end = (mi.UInt32(aligned(x, np.uint32)) for x in (pixels, first, first + spp))
         numbers = SobolPairs(pixel, dr.opaque(mi.UInt32, self._streams[stream]))
         first_emitters, later = self._emitter_samples
@@ -166,19 +170,19 @@ class Tracer:
 
 
 def later_emitter_samples(emitters: int) -> int:
-    """Return how many of a number of emitters are sampled at vertices after the first."""
+    """Return the number of emitter samples at each vertex after the first."""
     return next(samples for fewer, samples in LATER_EMITTER_SAMPLES.items() if emitters < fewer)
 
 
 def view_of(scene: Scene, loaded: Any) -> View:
-    """Return the view of the loaded `scene` through its camera."""
+    """Return the view of the camera of `scene`. loaded: the loaded scene."""
     camera = scene.camera(loaded)
     width, height = (int(v) // scene.film.block for v in camera.film().crop_size())
     return View(loaded, camera, width, height)
 
 
 def rules_of(scene: Scene) -> Rules:
-    """Return the rules by which the integrator of `scene` follows paths."""
+    """Return the limits of the paths that the integrator of `scene` follows."""
     integrator = scene.integrator
     return Rules(
         hide_emitters=integrator.hide_emitters,
@@ -189,9 +193,9 @@ def rules_of(scene: Scene) -> Rules:
 
 
 def trace_plainly(scene: Scene, loaded: Any, *, seed: int, spp: int) -> Floats:
-    """Render all planes with Mitsuba's own numbers and choices, (n, h, w, 3).
+    """Render all planes with Mitsuba's own random numbers and choices, (n, h, w, 3).
 
-    loaded: `scene`, by its `load`. spp: samples per pixel, which some samplers round up.
+    loaded: `scene` as returned by its `load`. spp: samples per pixel, which some samplers round up.
     """
     view = view_of(scene, loaded)
     sampler = view.camera.sampler().clone()

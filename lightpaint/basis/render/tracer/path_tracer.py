@@ -1,15 +1,16 @@
-"""The paths of the one-pass basis: a path tracer that adds each emitter's light to its own plane.
+"""The path tracer of the one-pass basis, which adds each emitter's light to a plane of its own.
 
-It follows Mitsuba's path.cpp step for step. Two things can replace random choices: `numbers`, a
-low-discrepancy sequence instead of the sampler's, and `guide`, which chooses emitters by its
-training. Either both are given or none. With them one thread of the loop follows all paths of a
-pixel, one after the other, so that their light is added in the order of the samples.
+It follows Mitsuba's path.cpp step by step, with two optional replacements: `numbers`, a
+low-discrepancy sequence instead of the sampler's random numbers, and `guide`, which chooses
+emitters by what training has learned. Either both are given or neither. With them, one thread
+follows all paths of a pixel one after the other, so that light is added in the order of the
+samples.
 
-Import this module only after a JIT variant is set: its array types do not exist before.
+Import this module after setting a Dr.Jit variant, since its array types do not exist before.
 """
 
-# Dr.Jit rewrites `trace` from its source and traces it with arrays of any width, which a static
-# checker cannot follow.
+# Dr.Jit transforms functions decorated with `dr.syntax` and traces them with arrays of any width,
+# which a static checker cannot follow.
 # mypy: disable-error-code="no-untyped-def, no-untyped-call"
 
 from typing import Any, NamedTuple
@@ -20,15 +21,16 @@ import mitsuba as mi
 from lightpaint.basis.render.tracer.emitter_guide import BELOW_1
 from lightpaint.basis.render.tracer.sobol import APERTURE, FILM, TIME
 
-#: Steps of this, taken modulo 1, are spread evenly in whatever number.
+#: Multiples of this, modulo 1, are evenly spread for any number of them.
 GOLDEN_RATIO = 0.6180339887
 
 
 class Rules(NamedTuple):
-    """Limits of the paths that are followed.
+    """Limits of the traced paths.
 
-    max_depth, rr_depth: vertices behind the camera of the longest path, and after how many
-    Russian roulette begins. must_bounce: whether paths that only pass surfaces carry nothing.
+    max_depth: maximum number of vertices after the camera. rr_depth: number of vertices after which
+    Russian roulette begins. must_bounce: whether paths that only pass through null surfaces are
+    black.
     """
 
     hide_emitters: bool
@@ -40,9 +42,10 @@ class Rules(NamedTuple):
     later_emitter_samples: Any = 1
 
     def emitter_samples_at(self, depth):
-        """Return the number of emitters sampled at a vertex.
+        """Return the number of emitter samples at a vertex.
 
-        depth: UInt32, number of surfaces before it; the camera (−1) counts like the first surface.
+        depth: UInt32, number of vertices before it. A depth of −1, the camera, counts as the first
+        vertex.
         """
         return dr.select(
             mi.Int32(depth) <= 0,
@@ -52,9 +55,10 @@ class Rules(NamedTuple):
 
 
 class View(NamedTuple):
-    """Pixels that a camera of the scene sees.
+    """The pixels that a camera of the scene sees.
 
-    width, height: pixels into which the film's crop window is divided, its own or larger ones.
+    width, height: number of pixels into which the film's crop window is divided, its own or larger
+    ones.
     """
 
     scene: Any
@@ -64,7 +68,9 @@ class View(NamedTuple):
 
 
 def camera_rays(view, sampler, numbers, pixel, term):
-    """Return one ray per sample, drawing random numbers as Mitsuba's SamplingIntegrator does."""
+    """Return one ray per sample, with random numbers drawn in the order of Mitsuba's
+    SamplingIntegrator.
+    """
     _, sensor, width, height = view
     film = sensor.film()
     corner = mi.Vector2f(pixel % width, pixel // width) + mi.Vector2f(film.crop_offset())
@@ -83,7 +89,9 @@ def camera_rays(view, sampler, numbers, pixel, term):
 
 
 def _first_hit(scene, ray, rules):
-    """Return the first intersection of a camera ray, which passes through hidden area lights."""
+    """Return the first hit along a camera ray, which passes through area lights if these are
+    hidden.
+    """
     pi = scene.ray_intersect_preliminary(ray, True)
     if not rules.hide_emitters:
         return pi
@@ -96,10 +104,10 @@ def _first_hit(scene, ray, rules):
 
 @dr.syntax
 def trace_samples(view, numbers, guide, planes, rules, pixel, place, term, end):
-    """Follow the paths of some samples of each pixel, one after the other.
+    """Trace the given samples of each pixel one after the other.
 
-    pixel: of the picture. place: its index in `planes`. term, end: samples, the last one not among
-    them.
+    pixel: index in the picture. place: index in `planes`. term, end: range of samples, `end`
+    excluded.
     """
     term = mi.UInt32(term)
     while term < end:
@@ -109,24 +117,24 @@ def trace_samples(view, numbers, guide, planes, rules, pixel, place, term, end):
 
 @dr.syntax
 def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term):
-    """Follow one path per pixel from the camera, and add its light to `planes`.
+    """Trace one path from the camera for each pixel, and add its light to `planes`.
 
-    term: number of its sample. Other parameters are those of `trace_samples`.
+    term: number of the sample. The other parameters are those of `trace_samples`.
     """
     scene = view.scene
     ray, weight = camera_rays(view, sampler, numbers, pixel, term)
     # fmt: off
-    throughput = mi.Spectrum(1)                 # Share of the light at its end that comes back
-    eta = mi.Float(1)                           # Product of the indices of refraction passed
-    depth = mi.UInt32(0)                        # Vertices behind the camera so far
-    active = rules.max_depth > 0                # Paths that go on
-    pi = _first_hit(scene, ray, rules)          # What the ray meets
-    previous = dr.zeros(mi.Interaction3f)       # Vertex that the ray comes from
-    previous_pdf = mi.Float(1)                  # Density with which its surface chose the ray
-    previous_delta = mi.Bool(True)              # Whether nothing but the surface could choose it
-    previous_cell = mi.UInt32(0)                # Cell of the guide that the vertex lies in
-    cell = mi.UInt32(0)                         # Cell of the guide that the path is in
-    looks_through = mi.Bool(True)               # Whether nothing but clear surfaces was passed
+    throughput = mi.Spectrum(1)                 # Fraction of radiance that reaches the camera
+    eta = mi.Float(1)                           # Product of relative indices of refraction
+    depth = mi.UInt32(0)                        # Number of vertices after the camera
+    active = rules.max_depth > 0                # Paths that continue
+    pi = _first_hit(scene, ray, rules)          # Intersection of the ray
+    previous = dr.zeros(mi.Interaction3f)       # Vertex at which the ray starts
+    previous_pdf = mi.Float(1)                  # Density with which its BSDF sampled the ray
+    previous_delta = mi.Bool(True)              # Whether that density is a delta function
+    previous_cell = mi.UInt32(0)                # Guide cell of the previous vertex
+    cell = mi.UInt32(0)                         # Guide cell of the current vertex
+    looks_through = mi.Bool(True)               # Whether all surfaces so far were clear
     # fmt: on
 
     if dr.hint(rules.must_bounce, mode="scalar"):
@@ -135,7 +143,7 @@ def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term
     while active:
         si = pi.compute_surface_interaction(ray, mi.RayFlags.All, active)
 
-        # The ray hit an emitter: its light, found by chance.
+        # The ray hit an emitter: add its emission.
         emitter = si.emitter(scene)
         hit = active & (emitter != None)  # noqa: E711 (compares arrays)
         if dr.hint(rules.hide_emitters, mode="scalar"):
@@ -154,7 +162,7 @@ def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term
         planes.add(place, emitter, emitted, depth, hit)
         planes.note_seen(place, hit & looks_through)
 
-        # Next-event estimation: emitters are sampled.
+        # Next-event estimation: sample emitters.
         active_next = active & (depth + 1 < rules.max_depth) & si.is_valid()
         bsdf = si.bsdf(ray)
         smooth = active_next & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
@@ -173,7 +181,7 @@ def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term
                 scene, guide, planes, place, si, bsdf, carried, cell, number, count, depth, smooth
             )
 
-        # The path goes on in a direction that the surface chooses.
+        # Sample the BSDF for the next direction.
         lobe, direction, fate = _numbers_of_surface(sampler, numbers, term, depth)
         sample, bsdf_weight = bsdf.sample(mi.BSDFContext(), si, lobe, direction, active_next)
         ray = si.spawn_ray(si.to_world(sample.wo))
@@ -190,7 +198,7 @@ def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term
 
 
 def passes_clearly(sample):
-    """Return whether a surface, by its sample, lets the ray through as clear glass or a hole."""
+    """Return whether a BSDF sample passes straight through, as in clear glass or a hole."""
     flags = mi.BSDFFlags
     return mi.has_flag(sample.sampled_type, flags.DeltaTransmission) | mi.has_flag(
         sample.sampled_type, flags.Null
@@ -199,27 +207,27 @@ def passes_clearly(sample):
 
 @dr.syntax
 def _will_bounce(scene, sampler, numbers, term, ray, pi, active, rules):
-    """Return which paths will meet a surface that does not let them pass.
+    """Return which of the paths will meet a surface other than a null surface.
 
-    A path gathers light, from any number of lights, before it is known to count. So this follows it
-    ahead with the same numbers, up to the first surface that does not let it pass.
+    Whether a path counts is only known after it has gathered light, possibly from several lights.
+    So each path is traced ahead with the same numbers, up to the first surface that is not null.
     """
     # fmt: off
     sampler = None if sampler is None else sampler.clone()
-    pi = mi.PreliminaryIntersection3f(pi)  # What the ray meets
-    ray = mi.Ray3f(ray)                    # Ray that is followed
-    throughput = mi.Spectrum(1)            # Share of the light at its end that comes back
-    eta = mi.Float(1)                      # Product of the indices of refraction passed
-    depth = mi.UInt32(0)                   # Vertices behind the camera so far
-    active = mi.Bool(active)               # Paths that have only passed surfaces so far
-    bounces = mi.Bool(False)               # Paths that have met another
+    pi = mi.PreliminaryIntersection3f(pi)  # Intersection of the ray
+    ray = mi.Ray3f(ray)                    # Ray being traced
+    throughput = mi.Spectrum(1)            # Fraction of radiance that reaches the camera
+    eta = mi.Float(1)                      # Product of relative indices of refraction
+    depth = mi.UInt32(0)                   # Number of vertices after the camera
+    active = mi.Bool(active)               # Paths with only null surfaces so far
+    bounces = mi.Bool(False)               # Paths that met another surface
     # fmt: on
 
     while active:
         si = pi.compute_surface_interaction(ray, mi.RayFlags.All, active)
         bsdf = si.bsdf(ray)
         if dr.hint(sampler is not None, mode="scalar"):
-            sampler.next_2d()  # chooses an emitter
+            sampler.next_2d()  # the number that chooses an emitter
         lobe, direction, fate = _numbers_of_surface(sampler, numbers, term, depth)
         sample, weight = bsdf.sample(mi.BSDFContext(), si, lobe, direction, active)
         passes = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Null)
@@ -241,13 +249,13 @@ def _sample_emitters(
 ):
     """Sample `count` emitters, and add the light that is not in shadow to `planes`.
 
-    One number, split systematically, chooses all of them: each share of the guide gets as many
-    samples as it is worth, but for one. number: for choice and place of the first. carried: what
-    the camera sees of the light that the surface scatters.
+    One number, split systematically, chooses all of them, so each emitter gets its share of the
+    samples, rounded up or down. number: pair that chooses the first emitter and a point on it.
+    carried: fraction of the scattered light that reaches the camera.
     """
     context = mi.BSDFContext()
-    k = mi.UInt32(0)  # Emitters sampled so far
-    active = mi.Bool(active)  # Paths that have not sampled all
+    k = mi.UInt32(0)  # Number of emitters sampled so far
+    active = mi.Bool(active)  # Paths that need more samples
     while active:
         x = dr.minimum((number.x + mi.Float(k)) / mi.Float(count), BELOW_1)
         y = number.y + mi.Float(k) * GOLDEN_RATIO
@@ -259,7 +267,7 @@ def _sample_emitters(
         bsdf_value, bsdf_pdf = bsdf.eval_pdf(context, si, si.to_local(ds.d), lit)
         mis = dr.select(ds.delta, 1, _mis(ds.pdf * expected, bsdf_pdf))
         contribution = carried * bsdf_value * radiance * mis
-        # No shadow ray is needed outside a spot's cone or below the surface.
+        # No shadow ray is needed outside the cone of a spot, or below the surface.
         lit &= dr.any(contribution != 0)
         lit &= ~scene.ray_test(si.spawn_ray_to(ds.p), lit)
         guide.learn(cell, chosen, contribution, is_sampled=active, lit=lit)
@@ -269,7 +277,9 @@ def _sample_emitters(
 
 
 def _numbers_of_surface(sampler, numbers, term, depth):
-    """Return the numbers that choose a lobe, a direction and the survival of the path."""
+    """Return the numbers that choose a lobe of the BSDF, a direction, and whether the path
+    survives.
+    """
     if numbers is None:
         return sampler.next_1d(), sampler.next_2d(), sampler.next_1d()
     lobe_and_fate = numbers.at_vertex(term, depth, 1)
@@ -277,10 +287,11 @@ def _numbers_of_surface(sampler, numbers, term, depth):
 
 
 def _roulette(throughput, eta, roulette, fate, active):
-    """Return the paths that go on; survivors of Russian roulette gain `throughput`.
+    """Return the paths that continue after Russian roulette; `throughput` of survivors is
+    increased.
 
-    It looks at the surfaces alone, never at emission: the paths, and with them every plane, stay
-    the same whatever the lights do.
+    The probability depends on surfaces alone, never on emission. So the paths, and hence all
+    planes, do not depend on what the lights emit.
     """
     strongest = dr.max(throughput)
     survival = dr.minimum(strongest * dr.square(eta), 0.95)

@@ -1,6 +1,6 @@
-"""Pixels in which the camera sees an emitter through clear surfaces.
+"""Finds the pixels in which the camera sees an emitter through clear surfaces, without lighting.
 
-Import this module only after a JIT variant is set: its array types do not exist before.
+Import this module after setting a Dr.Jit variant, since its array types do not exist before.
 """
 
 # mypy: disable-error-code="no-untyped-def, no-untyped-call"
@@ -16,7 +16,9 @@ from lightpaint.basis.render.tracer.path_tracer import View, camera_rays, passes
 
 
 def has_clear_surfaces(loaded: Any) -> bool:
-    """Return whether a loaded scene has glass or other surfaces that a ray can pass unscattered."""
+    """Return whether a loaded scene has clear glass or other surfaces that let rays pass straight
+    through.
+    """
     surfaces = [shape.bsdf().flags() for shape in loaded.shapes() if shape.bsdf() is not None]
     clear = mi.BSDFFlags.DeltaTransmission, mi.BSDFFlags.Null
     return any(mi.has_flag(flags, kind) for flags in surfaces for kind in clear)
@@ -36,13 +38,15 @@ def emitters_seen_through(view: View, max_depth: int, *, samples: int, seed: int
 
 @dr.syntax
 def _sees_emitter(view, sampler, pixel, max_depth):
-    """Follow a ray of each pixel through clear surfaces, and return whether it meets an emitter."""
+    """Trace a ray of each pixel through clear surfaces, and return whether it reaches an
+    emitter.
+    """
     scene = view.scene
     ray, _ = camera_rays(view, sampler, None, pixel, None)
     # fmt: off
-    depth = mi.UInt32(0)      # Surfaces passed so far
-    seen = mi.Bool(False)     # Rays that have met an emitter
-    active = max_depth > 0    # Rays that go on
+    depth = mi.UInt32(0)      # Number of surfaces passed
+    seen = mi.Bool(False)     # Rays that reached an emitter
+    active = max_depth > 0    # Rays that continue
     # fmt: on
     while active:
         si = scene.ray_intersect(ray, active)
