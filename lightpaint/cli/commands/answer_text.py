@@ -98,7 +98,7 @@ def _sentences(look: Look, table: Table) -> list[str]:
 
 
 def _what_holds(look: Look) -> list[str]:
-    """Return the reasons that keep the lights from the painting, main reason first, with options."""
+    """Return the reasons that keep the lights from the painting, the main first, with options."""
     if not look.analysis.appearance.reasons:
         return bound_sentences(look.diagnosis)
     sentences = [_spoken_cause(look, reason) for reason in look.analysis.appearance.reasons]
