@@ -1,4 +1,4 @@
-"""Linear problems: squares, and all that their solve needs without pixels."""
+"""Linear problems: squares, and all else that their solve needs, without pixels."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property

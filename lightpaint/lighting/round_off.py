@@ -1,4 +1,4 @@
-"""Weights of lights that are off, which are round-off.
+"""Removal of weights that are mere round-off of lights that are off.
 
 For a painting that is a mix of the layers without a light, the solve finds 10⁻⁹ of that light
 instead of 0, because numbers in a file are rounded. A reader of −28 stops would take that for an
@@ -16,7 +16,7 @@ HALF_ROUND_OFF, SINGLE_ROUND_OFF = 2.0**-11, 2.0**-24
 #: Roundings that may add up: those of the painting, the layers and the sum.
 ROUNDINGS = 4
 
-#: A light above this share of its present emission is on, however little it shows.
+#: A light above this share of its present emission counts as on, however little it shows.
 MAX_TRACE = 2.0**-11
 
 

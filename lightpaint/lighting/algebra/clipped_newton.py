@@ -1,5 +1,5 @@
-"""Newton's step on the free unknowns, clipped to the bounds: the optimum in a few steps, or not at
-all.
+"""Newton's step on the free unknowns, clipped to the bounds: finds the optimum in a few steps, or
+fails.
 
 Unlike `active_set.polish` it lets the objective rise on its way, and holds and releases as many
 unknowns at a time as the gradient suggests. So it is fast, also from an answer to another target,
@@ -20,7 +20,7 @@ from lightpaint.progress import cancellation_check
 #: to an optimum without the ridge.
 RIDGE = 8 * EPSILON
 
-#: Ridge in its place where that one is lost in rounding.
+#: Ridge to use instead where that one is lost in rounding.
 FIRM_RIDGE = 1e-12
 
 #: Steps after which methods take over that cannot cycle.

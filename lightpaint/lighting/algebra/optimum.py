@@ -17,7 +17,7 @@ from lightpaint.lighting.algebra.quadratic import UNREACHED_POWER, Cap, Quadrati
 from lightpaint.progress import cancellation_check
 from lightpaint.threads import one_thread, parallel_map
 
-#: The paper's iteration alone, or Newton's on the active set, with the paper's to fall back on.
+#: Newton's method on the active set, which falls back on the paper's iteration; or that one alone.
 Method = Literal["polished", "gauss-seidel"]
 
 #: The multipliers of a problem without caps.
@@ -26,7 +26,7 @@ NO_CAPS = np.zeros(0)
 #: Unknowns up to which numpy solves several problems in one call; larger ones get a thread each.
 MAX_BATCHED_UNKNOWNS = 64
 
-#: Sweeps before a polish is tried again, if one did not do.
+#: Sweeps before a polish is tried again, if one was not enough.
 SWEEPS_BETWEEN = 50
 
 
@@ -86,7 +86,7 @@ def minimise(
     begin = np.zeros(q.n) if start is None else np.asarray(start, np.float64)
     x = q.feasible(begin / q.scale)
     if not (q.b > 0).any():
-        # The target needs no light. Where bounds allow it, all lights off is exactly optimal.
+        # The target needs no light: where bounds allow it, all lights off is exactly optimal.
         dark = q.feasible(np.where(np.diag(q.M) > 0, 0.0, x))
         x = dark if q.violations(dark)[2] == 0 else x
     by_method = _solve_by_sweeps if method == "gauss-seidel" else _solve_polished
@@ -155,7 +155,7 @@ def minimise_each(
 def _solve_together(
     M: Doubles, b: Doubles, lower: Doubles, upper: Doubles, start: Doubles, tolerance: float
 ) -> dict[int, Optimum]:
-    """Solve those of the problems that clipped steps solve, by their index. For the arguments see
+    """Solve the problems that clipped steps can solve; return them by index. For the arguments see
     `minimise_each`.
     """
     power = np.einsum("cii->ci", M)

@@ -1,4 +1,4 @@
-"""The diagnosis of the residual: its parts, by what causes them.
+"""The diagnosis of the residual: its parts, by their causes.
 
 With the closest weights u of any sign, Ψ − ΣuΦ is orthogonal to every light, so
 
@@ -116,7 +116,7 @@ class Diagnosis:
 
 
 def error_shares(diagnosis: Diagnosis) -> dict[str, float]:
-    """Return the parts of the error that are worth telling, with their shares, the largest first.
+    """Return the notable parts of the error with their shares, the largest first.
 
     No parts if the lights meet the painting.
     """
@@ -187,7 +187,7 @@ def _relative_error(solution: Solution, total: float, norm2: float) -> float:
 
 
 def _compromise(solution: Solution) -> float:
-    """Return by how much the energy of this view exceeds that of the best lighting for it alone.
+    """Return the excess of this view's energy over that of the best lighting for it alone.
 
     After reweighting, both are of the same squares: the loss itself has another scale.
     """

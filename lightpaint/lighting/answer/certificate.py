@@ -37,7 +37,7 @@ class Certificate:
         noise_removed: Share of the noise that was removed from the equations.
         delta_e: Mean CIEDE2000 between the prediction and the painting, over the paint.
         delta_e_noise: The part of it that noise explains.
-        delta_e_asked: That of the present scene: the change that the painting asks for.
+        delta_e_asked: `delta_e` of the present scene: the change that the painting asks for.
         software: The software that computed it, if known.
         basis_spp: Samples per pixel of the basis, of the first of several views; None if unknown.
 

@@ -181,7 +181,7 @@ class Constraints:
             )
         lights = []
         for name, table in (light or {}).items():
-            # Checked now, so that a mistake shows even if no such light is there.
+            # Checked now, so that a mistake is reported even if the scene has no such light.
             LightConstraint.of(table, where=f"{lead}light.{name}")
             lights.append((name, dict(table), f"{lead}light.{name}"))
         lights.sort(key=lambda entry: not is_pattern(entry[0]))

@@ -1,4 +1,4 @@
-"""Whites for all lamps whose colour is open."""
+"""The restriction to whites, for all lamps whose colour is open."""
 
 from collections.abc import Sequence
 

@@ -45,7 +45,7 @@ from lightpaint.lighting.unknowns.white_neighbours import (
     snap_to_whites,
 )
 
-#: Most steps between whites for one answer; the next answer goes on.
+#: Most steps between whites for one answer; the next answer continues.
 WHITE_STEPS = 2
 
 #: Width, in pieces of a range of white, of the window in which a light first finds its white.
@@ -78,13 +78,14 @@ class LiveSolver:
         self._pulls: _Pulls | None = None
         self._untouched: Doubles | None = None
         self._within, self._gamuts_of = reduction, tuple[LiveView, ...]()
-        self._is_kept_to = False  # by the answer before
+        self._is_kept_to = False  # whether the last answer kept to the constraints
         for view in self._views:
             view.set_transform(fit.transform)
 
     def follow_planes(self) -> Basis:
-        """Note that planes of some lights are others, of which the views know; return the first
-        view's basis.
+        """Follow the views, in which planes of some lights were replaced.
+
+        Returns the first view's basis.
         """
         self._basis = self._views[0].basis
         self._pulls, self._untouched, self._gamuts_of = None, None, ()
@@ -136,7 +137,7 @@ class LiveSolver:
             weights = best(equations, start)
             if self._fit.colors != "gentle":
                 return weights
-            # Once more, as `solve` does, with a stronger pull to the colours of lights that came
+            # Solve again, as `solve` does, with a stronger pull to the colours of lights that came
             # out dim.
             pull = self._pull(views, weights)
             return best(equations, weights)

@@ -124,7 +124,7 @@ class SmallFilm:
         return np.asarray(total / block_sums(self._shown, self._side)[..., None], np.float32)
 
     def replace_planes(self, basis: Basis, lights: Iterable[int]) -> None:
-        """Average anew the planes of some lights, by number, which are others now."""
+        """Average the replaced planes of some lights, by number."""
         for k in lights:
             self.rows[:, k] = _planes(self._average(basis.planes.plane(k)))
 
@@ -182,7 +182,7 @@ class Films:
         self.join()
 
     def join(self) -> None:
-        """Join the planes of the films again, of which some are others now."""
+        """Join the planes of the films again, after some were replaced."""
         rows = [film.rows for film in self._films]
         self._rows = rows[0] if len(rows) == 1 else np.concatenate(rows, axis=2)
 

@@ -54,7 +54,7 @@ class LiveView:
 
     def update(self, region: Slices, *, with_importance: bool = True) -> None:
         """Update the sums of a painted rectangle. with_importance: whether its importance changed,
-        too. with_importance: also what counts there.
+        too.
         """
         region, is_other = self._read(region)
         with_importance = with_importance or is_other

@@ -1,11 +1,10 @@
-"""The meaning of paint over an emitter in view: its glow or what it lights, seldom less light.
+"""The meaning of paint over an emitter in view: seldom that it should give less light.
 
-A flame outshines every display. Somebody who paints a table and the lantern on it warm wants no
-less light of the lantern, though the paint on each pixel of the flame is darker than the flame.
+A flame outshines every display. Painting a table and the lantern on it in a warm colour does not
+ask for less light from the lantern, although the paint is darker than each pixel of the flame.
 Only paint that darkens the surroundings of the emitter, or its displayed value where nothing around
-it is painted, asks for less. A stroke over both that is warmer does not, though it may be darker
-than a bright room was before: on the flame it is darker still than beside it, since it covers the
-flame.
+it is painted, asks for less. A warmer stroke over both does not, even if it is darker than a bright
+room was before.
 """
 
 import numpy as np

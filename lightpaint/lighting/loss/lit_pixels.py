@@ -1,4 +1,4 @@
-"""Pixels that count, with the light of each lamp on them: the data of a descent."""
+"""The pixels that count, with each light's part of them: the data of a descent."""
 
 from dataclasses import dataclass
 

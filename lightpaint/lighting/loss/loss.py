@@ -23,7 +23,7 @@ from lightpaint.threads import parallel_map
 #: more, the painting is encoded anew each time.
 STRIP_PIXELS, MAX_KEPT_PIXELS = 2**13, 2**21
 
-#: From arrays of all views to the part of one of them.
+#: Cuts one view's part out of an array of all views.
 Cut = Callable[[npt.NDArray[Any]], npt.NDArray[Any]]
 
 Result = TypeVar("Result")
@@ -172,7 +172,7 @@ class Loss(ABC):
 
 @dataclass(frozen=True)
 class Squares(Loss):
-    """The loss Σ weight (image − x)², also in the place of another loss where it was made.
+    """The loss Σ weight (image − x)², by itself or as an approximation of another loss.
 
     image: (h, w, 3). weight: (h, w, 1), or (h, w, 3) where channels differ, >= 0. share: of
     the same shape, the share of the image that follows the current look.

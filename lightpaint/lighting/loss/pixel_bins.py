@@ -2,9 +2,9 @@
 
 The mean display value of a noisy pixel differs from the display value of its mean light, since the
 curve of the display is bent, and steepest in the dark. A fit of noisy pixels makes up for that with
-light that nobody painted, and a lamp with little but stray pixels may get any weight. The remedy is
-the average of a block: many more samples of nearly the same light. The noise of the present look,
-as the display shows it, determines the size of blocks.
+light that nobody painted, and a lamp that shows only in stray pixels may get any weight. The remedy
+is the average of a block: many more samples of nearly the same light. The noise of the present
+look, as the display shows it, determines the size of blocks.
 """
 
 from collections.abc import Sequence
@@ -147,7 +147,7 @@ def bin_pixels(views: Views, loss: Loss, side: int) -> BinnedPixels | None:
         glows = basis.emitters_seen & view_loss.exceeds(np.inf).all(axis=-1)
         weights = enlarged(block_sums(np.where(glows, 0, counts), side), side)
         counts[glows & (weights[: counts.shape[0], : counts.shape[1]] > 0)] = 0
-        # Each step of the solve asks for images again, but only some sums for their noise.
+        # Each step of the solve needs the images again, but only some sums need their noise.
         images.append(spooled(block_means(basis.planes, counts, side)))
         halves.append(block_means(basis.noise, counts, side))
         if basis.former is not None:

@@ -2,8 +2,8 @@
 last answer.
 
 The squares have the loss's own gradient, so the way to their optimum is downhill; the loss itself
-decides the length of each step, and therefore never rises. Where it falls no more, the answer is
-stationary under the constraints: for a convex loss the optimum.
+decides the length of each step, and therefore never rises. Once it stops falling, the answer is
+stationary under the constraints, and for a convex loss it is the optimum.
 """
 
 from collections.abc import Callable

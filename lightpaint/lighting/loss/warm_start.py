@@ -35,10 +35,10 @@ EVEN_SHARE = 0.5
 #: later a share of the change that the last correction made.
 FIRST_STEP, STEP_RATIO = 1e-4, 1e-3
 
-#: Share of the loss by which it fell last below which exact rounds are as good.
+#: Relative fall of the loss in the last correction below which exact rounds are as good.
 MIN_GAIN = 1e-9
 
-#: The most corrections, and the largest ratio to the last one at which another is worth its time.
+#: Most corrections, and the largest ratio of one to the last at which another is worth its time.
 MAX_CORRECTIONS, MAX_STEP_RATIO = 8, 0.7
 
 

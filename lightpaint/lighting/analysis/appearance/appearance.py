@@ -1,8 +1,8 @@
 """The visible difference between an answer and its painting, over the paint.
 
-The objective of a solve also holds the rest, pulls at colours, and is a sum of squares; painters
-look at the paint. So people are told the mean CIEDE2000 there, at the exposure and through the view
-of the painting, weighted by importance.
+The objective of a solve is a sum of squares which also holds unpainted pixels and pulls at colours,
+whereas painters look at the paint. So reports give the mean CIEDE2000 there, weighted by
+importance, at the exposure and through the view transform of the painting.
 """
 
 from collections.abc import Mapping
@@ -159,7 +159,7 @@ class Appearance:
 
     @property
     def is_worse(self) -> bool:
-        """True if the present scene is closer to the paint, in the numbers that people are told."""
+        """True if the present scene is closer to the paint, by the numbers that reports give."""
         return round(self.delta_e, 1) > round(self.requested_change, 1)
 
     @property
@@ -172,7 +172,7 @@ class Appearance:
 
     @property
     def is_in_vain(self) -> bool:
-        """True if hardly any of the requested change has come about."""
+        """True if hardly any of the requested change was achieved."""
         return self.error > max(INVISIBLE, (1 - MIN_CHANGE) * self.requested_change)
 
     @property

@@ -1,4 +1,4 @@
-"""The answers of all choices of `colors`, for comparison with the one that was made.
+"""The answers with each choice of `colors`, for comparison with the present one.
 
 In linear light they have the answer's own equations. For a loss that is not linear all choices,
 also the answer's, are solved over a sample of its pixels, so that errors of the sample cancel.
@@ -192,7 +192,7 @@ def _view_choices(view: Solution, delta_e: float, answers: Mapping[Colors, Doubl
     chosen, choices = answers[view.problem.fit.colors or "free"], []
     own = missed(chosen)
     for colors, weights in answers.items():
-        # Both are of the same sample, so that they differ by the effect of colours.
+        # Both use the same sample, so that they differ only by the effect of colours.
         distance = delta_e if weights is chosen else max(delta_e + missed(weights) - own, 0.0)
         turned = _largest_hue_change(view, chosen, weights)
         choices.append(ColorChoice(colors, weights is chosen, distance, *turned, weights))

@@ -44,7 +44,7 @@ class ConstraintsByLight:
         return ConstraintsByLight(lights, tables, constraints)
 
     def kinds(self) -> dict[ConstraintKind, tuple[int, ...]]:
-        """Return the kinds of constraints that there are, and places of the lights under each."""
+        """Return the kinds of constraints in use, and the indices of the lights under each."""
         tied = tied_lights(self.constraints, self.lights)
         by_kind: dict[ConstraintKind, tuple[int, ...]] = {
             kind: tuple(

@@ -6,9 +6,8 @@ difference along both axes,
     a = N r,  N = [1 −2 1]ᵀ [1 −2 1],
 
 ignores smooth parts, and straight edges along an axis. Noise that is independent between pixels
-gives
-it the variance 36 σ², and no correlation with itself farther away: E[a(x) a(x + d)] = 0. An edge or
-a stroke continues there, so that these products are subtracted.
+gives it the variance 36 σ² and no correlation at a distance: E[a(x) a(x + d)] = 0. An edge or a
+stroke continues there, so these products are subtracted.
 """
 
 from collections.abc import Iterator

@@ -40,9 +40,9 @@ class Noise:
     part of b that is noise of the current look, where this is a goal.
     gradient: (3, n, 3, n), covariance of the gradient. objective_error, objective_noise: as in
     `Uncertainty`.
-    hidden: (3, n), variance of a light that few pixels may have and do not show (peaks.py).
-    freedom: (3, n), degrees of freedom of the variance of a light's gradient: how many pixels of
-    equal noise would tell it as well.
+    hidden: (3, n), variance of a light that a few pixels may hide (peaks.py).
+    freedom: (3, n), degrees of freedom of the variance of a light's gradient: the number of pixels
+    of equal noise that would determine it as well.
     """
 
     power: Doubles
@@ -57,13 +57,13 @@ class Noise:
     def widening(self) -> Doubles:
         """(n, 3), ratios of an interval to that of a variance which is known.
 
-        1 where `hidden` has it already.
+        1 where `hidden` includes that already.
         """
         return np.where(self.hidden > 0, 1, t_ratios(self.freedom)).T
 
     @property
     def is_hidden(self) -> Bools:
-        """(n, 3), whether most of the noise on a light may be hidden in few pixels."""
+        """(n, 3), whether a few pixels may hide most of the noise on a light."""
         return np.asarray(self.hidden > np.einsum("cici->ci", self.gradient)).T
 
     @property
@@ -154,7 +154,7 @@ class NoisyPixels:
 
     @classmethod
     def of(cls, solution: Solution) -> "NoisyPixels":
-        """Return those of a solution."""
+        """Return the noisy pixels of a solution."""
         basis, problem, weights = solution.basis, solution.problem, solution.weights
         # (pixels, 1), or (pixels, 3) where channels differ.
         squares = problem.squares

@@ -34,9 +34,8 @@ SHARE_STEPS = 8
 def correct_noise(solution: Solution, *, share: float | None = None) -> Solution:
     """Solve the equations without a share of the noise power in M and b.
 
-    Those of many lights are of light that is averaged along surfaces (smooth_light.py).
-    A fit of blocks of pixels has averaged most of the noise already, and its solution stays as it
-    is.
+    With many lights, the equations are of light averaged along surfaces (smooth_light.py).
+    A fit of blocks of pixels has already averaged most of the noise; its solution stays as it is.
     If squares stand for another loss, the share is lowered until this loss falls, too: far from the
     answer the squares do not represent it.
 

@@ -1,7 +1,7 @@
-"""Lights whose pictures are little but stray bright pixels, and how weak these pictures may be.
+"""Lights whose pictures are mostly stray bright pixels, and lower limits on their power.
 
-In a picture that is all fireflies no part is known to be light: its power is that of its noise, and
-the light comes out too dim by as much. At most half of M is removed as noise, since the rest would
+In a picture that is all fireflies, power cannot be told from noise, and the light comes out too
+dim. At most half of M is removed as noise, since the rest would
 be noise itself. So this module estimates the least power of a light in a render without noise; the
 answer with that power tells how far the true one may be (docs/method.md, "How sure").
 """

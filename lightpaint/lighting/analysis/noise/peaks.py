@@ -1,4 +1,4 @@
-"""Single pixels that decide a light, whose noise a half difference cannot tell.
+"""Single pixels that decide a light, and whose half difference does not show their noise.
 
 A pixel that one rare path has hit in each half of its samples looks as if it had no noise. So where
 a few pixels dominate a light, their noise is estimated with the uncertainty of so few
@@ -27,7 +27,7 @@ NORMAL_95 = 1.96
 #: freedom.
 T_RATIOS = (6.483, 2.195, 1.624, 1.416, 1.312)
 
-#: Times the variance of the others that a pixel among few may have.
+#: Largest variance of a pixel among few, relative to that of the others.
 MAX_UNLIKE = 4.0
 
 

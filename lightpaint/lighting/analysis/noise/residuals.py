@@ -1,4 +1,4 @@
-"""The residual of an answer and the noise of its prediction, of those pixels that are asked for."""
+"""The residual of an answer and the noise of its prediction, for any pixels."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from lightpaint.lighting.solution import Solution
 
 @dataclass(frozen=True)
 class Residuals:
-    """The residual of an answer, and the noise of its prediction, of any pixels.
+    """The residual of an answer, and the noise of its prediction, for any pixels.
 
     The noise is Σ w_i h_i less what Ψ shares where it is the current look.
 
@@ -27,7 +27,7 @@ class Residuals:
 
     @classmethod
     def of(cls, solution: Solution) -> "Residuals":
-        """Return those of a solution."""
+        """Return the residuals of a solution."""
         basis, weights, problem = solution.basis, solution.weights, solution.problem
         predicted, r, share = basis.predict(weights), problem.refinement, problem.squares.share
         half, present = predicted.half_difference, None

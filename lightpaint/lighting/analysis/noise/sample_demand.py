@@ -1,4 +1,4 @@
-"""Density of samples: where further ones make an answer surer.
+"""Density of samples: where more of them reduce the error of an answer most.
 
 The variance of a weight is a sum over pixels, and a pixel with n samples has 1/n of the variance of
 one. For a given number of samples in all, Σ q/n is least with n in proportion to √q (Neyman
@@ -19,7 +19,7 @@ from lightpaint.lighting.analysis.noise.weight_spread import gradient_response
 from lightpaint.lighting.solution import Solution
 from lightpaint.threads import parallel_map
 
-#: Pixels on either side whose mean tells the variance of a pixel.
+#: Pixels on either side whose mean estimates the variance of a pixel.
 AROUND = 2
 
 #: Least density of a pixel that counts, in parts of the mean (docs/benchmarks.md).
@@ -39,7 +39,7 @@ class SampleDemand:
 
 
 def pixel_variances(solution: Solution, aims: Doubles) -> Doubles:
-    """Return what each pixel adds to Σ_k Var(aims_k · w), (h, w) float64, as its noise shows it.
+    """Return each pixel's part of Σ_k Var(aims_k · w), (h, w) float64, as its noise shows it.
 
     aims: (k, 3 n), directions of the weights, channel by channel.
     """
@@ -64,7 +64,7 @@ def sample_demand(variances: Doubles, counted: Bools, have: Doubles) -> SampleDe
     variances: (h, w), its part of `pixel_variances`. counted: (h, w), pixels that count. have: (h,
     w), samples that pixels have.
     """
-    # Of a single sample, since neighbours may have other numbers of samples.
+    # The variance of a single sample, since neighbours may have other numbers of samples.
     of_one = np.where(counted, variances * have, 0)
     count = np.maximum(_sum_around(counted.astype(np.float64)), 1)
     mean, density = (
@@ -88,7 +88,7 @@ def _sum_around(image: Doubles) -> Doubles:
 def top_up_counts(density: Doubles, have: Doubles, budget: float) -> Indices:
     """Return whole numbers of samples to add to each pixel, (h, w), `budget` of them in all.
 
-    So that afterwards their numbers are as near to proportions of `density` as can be.
+    Afterwards the numbers are as nearly in proportion to `density` as possible.
     """
     return np.rint(np.maximum(_level(density, have, budget) * density - have, 0)).astype(np.intp)
 

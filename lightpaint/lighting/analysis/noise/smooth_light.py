@@ -1,4 +1,4 @@
-"""Equations of many lights from indirect light that is averaged along surfaces.
+"""Equations of many lights, from indirect light averaged along surfaces.
 
 The more lights share the samples of emitters, the noisier is each plane, and the more of M is
 noise: its bias and its own noise then decide the answer. An average over 5 x 5 pixels
@@ -25,7 +25,7 @@ from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.views import joint_basis
 
-#: Lights from which on sums are of averaged light: with a dozen the basis is as good.
+#: Fewest lights for which sums use averaged light: with a dozen, the basis itself is as good.
 MIN_LIGHTS = 64
 
 #: Pixels on either side that light is averaged over.
@@ -46,10 +46,10 @@ def can_smooth(views: Sequence[Basis]) -> bool:
 
 
 def on_smooth_light(solution: Solution) -> Solution:
-    """Return a solution with the same weights, whose equations and noise are of averaged planes."""
+    """Return the solution with equations and noise of averaged planes, and the same weights."""
     basis, problem = solution.basis, solution.problem
     smooth, _ = joint_basis([_smooth(view) for view in problem.views.bases])
-    # Where the goal is the current look, it is that of the same planes.
+    # A goal that is the current look is averaged alike.
     moved = problem.squares.share * (smooth.present_look - basis.present_look)
     squares = replace(problem.squares, image=problem.squares.image + moved)
     equations = NormalEquations.of(smooth, squares.image, squares.weight)
@@ -75,7 +75,7 @@ def _average(basis: Basis) -> tuple[Planes, Planes]:
     assert basis.features is not None
     assert basis.indirect is not None
     along = SurfaceFilter(basis.features, FILTER_RADIUS)
-    # What the average changes comes first, in place of the planes.
+    # The arrays hold the change by the average first, and the averaged planes later.
     changed = [
         np.stack([along(x) - x for x in planes])
         for planes in (basis.indirect.planes, basis.indirect.noise)

@@ -61,7 +61,7 @@ def weight_spread(
 
 
 def gradient_response(solution: Solution) -> Doubles:
-    """Return how noise of the gradient moves the weights, (3 n, 3 n): channel by channel.
+    """Return the response of the weights to noise of the gradient, (3 n, 3 n), channel by channel.
 
     It is the matrix whose product with the covariance of the gradient on both sides makes the
     scatter of `error_bars`, but for bounds that hold.
