@@ -1,4 +1,6 @@
-"""Parsed scenes with other emitters: moved, black or added, without reading their files again."""
+"""Copies of parsed scenes with changed emitters: moved, black or added, without reading files
+again.
+"""
 
 from collections.abc import Mapping
 from copy import copy
@@ -11,7 +13,7 @@ from lightpaint.scene.scene_tree import ParsedScene
 
 
 def with_motions(parsed: ParsedScene, motions: Mapping[int, Motion]) -> ParsedScene:
-    """Return a scene with emitters moved. motions: by the nodes of emitters."""
+    """Return a copy of a scene with moved emitters. motions: by emitter node."""
     import mitsuba as mi
 
     other = copy(parsed)
@@ -28,7 +30,9 @@ def with_motions(parsed: ParsedScene, motions: Mapping[int, Motion]) -> ParsedSc
 
 
 def darkened(parsed: ParsedScene, dark: Mapping[int, EmitterSetting]) -> ParsedScene:
-    """Return a scene with the settings `dark` made, by the nodes of emitters."""
+    """Return a copy of a scene in which emitters have other settings. dark: settings by emitter
+    node.
+    """
     import mitsuba as mi
 
     other = copy(parsed)
@@ -39,9 +43,9 @@ def darkened(parsed: ParsedScene, dark: Mapping[int, EmitterSetting]) -> ParsedS
 
 
 def with_elements(parsed: ParsedScene, elements: Mapping[str, str]) -> ParsedScene:
-    """Return a scene with emitters added, or others in the place of added ones.
+    """Return a copy of a scene with emitters added, or earlier added ones replaced.
 
-    elements: XML by the name that its emitter gets, a name that no emitter of the files has.
+    elements: XML by the name of its emitter, which must not occur in the files.
     """
     import mitsuba as mi
 
@@ -72,10 +76,11 @@ def with_elements(parsed: ParsedScene, elements: Mapping[str, str]) -> ParsedSce
 def with_points(
     parsed: ParsedScene, dark: Mapping[int, EmitterSetting], positions: Mapping[str, Position]
 ) -> ParsedScene:
-    """Return a scene with point lights of intensity 1 added, and the settings `dark` made.
+    """Return a copy of a scene with the settings `dark`, and with point lights of intensity 1
+    added.
 
-    positions: by the names of the new lights, which no other has. The nodes of these come
-    last, in that order.
+    positions: by name of the new light, which must not exist yet. The nodes of the new lights come
+    last, in this order.
     """
     import mitsuba as mi
 
@@ -96,7 +101,7 @@ def with_points(
 
 
 def _put_nodes(state: Any, first: int, fragment: Any) -> None:
-    """Put the nodes of a parsed fragment, but for its root, to `first` and on in `state`."""
+    """Store the nodes of a parsed fragment, except its root, in `state` from index `first` on."""
     import mitsuba as mi
 
     reference = mi.Properties.Type.ResolvedReference

@@ -1,27 +1,27 @@
-"""Normals of smooth meshes that are reproducible to the last bit.
+"""Makes the normals of smooth meshes reproducible to the last bit.
 
-Mitsuba computes missing normals of a mesh when it loads it, from the faces around a vertex. Several
-threads add them up, in a different order each time, so that renders differ in their last bits from
-process to process.
+When Mitsuba loads a mesh without normals, it computes them from the faces around each vertex.
+Several threads add these up in varying order, so renders differ in their last bits between
+processes.
 """
 
 from typing import Any
 
 from lightpaint.scene.runtime.kernel_threads import kernels
 
-#: Largest difference at which the normals of a file count as computed from its faces. Round-off is
-#: a hundredth of it.
+#: Maximum difference at which normals count as computed from the faces rather than read from the
+#: file. Round-off is a hundredth of it.
 NORMAL_TOLERANCE = 1e-5
 
 
 def make_normals_reproducible(scene: Any) -> None:
-    """Compute the normals again on one thread, which adds in the same order each time.
+    """Recompute normals on one thread, which always adds in the same order.
 
-    Normals from a file stay, unless they equal the computed ones. scene: a `mi.Scene`.
+    Normals from a file are kept, unless they equal the computed ones. scene: an `mi.Scene`.
     """
     import mitsuba as mi
 
-    # Scalar variants have one thread anyway.
+    # Scalar variants use one thread anyway.
     if mi.variant().startswith("scalar") or not isinstance(scene, mi.Scene):
         return
     import drjit as dr

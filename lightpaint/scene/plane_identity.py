@@ -1,9 +1,10 @@
-"""Identities of planes: hashes of all that the image of one light at unit emission depends on.
+"""Identities of planes: hashes of everything that the image of one light at unit emission depends
+on.
 
-That is the scene without what its emitters say of themselves (`unlit_content`), and the light's own
-emitters: kind, place, shape, cone, texture (`EmitterDigest`). Names of things do not count, nor do
-colour and brightness where the unit of a light is white. An area light's shape blocks and reflects
-the light of all others, so it belongs to the scene, with its place in it.
+That is the scene without the parameters of its emitters (`unlit_content`), and the light's own
+emitters: kind, position, shape, cone, texture (`EmitterDigest`). Names do not count, nor do colour
+and brightness if the unit of a light is white. The shape of an area light blocks and reflects the
+light of all others, so it belongs to the scene, including its position.
 """
 
 import hashlib
@@ -18,19 +19,19 @@ from lightpaint.scene.properties.emission import EmissionKind, Scaling
 from lightpaint.scene.properties.film import Film
 from lightpaint.scene.scene_tree import ParsedScene
 
-#: Names that Mitsuba's parser makes up for what stands in another element.
+#: Names that Mitsuba's parser generates for nested elements.
 _MADE_UP = re.compile(r"_(arg|unnamed)_\d+")
 
-#: Bytes of a file that are hashed at a time.
+#: Number of bytes of a file that are hashed at a time.
 CHUNK = 2**24
 
 
 @dataclass(frozen=True)
 class EmitterDigest:
-    """Hashes of an emitter and the shape that it belongs to.
+    """Hashes of an emitter together with its shape.
 
-    unit: of what its light at unit emission depends on; as_is: with its emission, and how often it
-    is sampled.
+    unit: hash of what its light at unit emission depends on. as_is: also includes its emission and
+    sampling weight.
     """
 
     unit: str
@@ -40,8 +41,8 @@ class EmitterDigest:
 class SceneHasher:
     """Hashes of a parsed scene, seen through one of its sensors.
 
-    A node's hash is that of its plugin, its values and the hashes of its children; where a value
-    names a file, that file's content counts and not its name.
+    The hash of a node covers its plugin, its values and the hashes of its children; if a value
+    names a file, the content of the file counts instead of its name.
     """
 
     def __init__(self, parsed: ParsedScene) -> None:
@@ -52,9 +53,9 @@ class SceneHasher:
     def unlit_content(self, film: Film, *, has_environment: bool, has_null: bool) -> str:
         """Return the hash of the scene without its lights, seen through the sensor of `film`.
 
-        has_environment: whether a light surrounds the scene. It decides what integrators make of
-        paths that met nothing but surfaces which let them pass, and so counts where there are any.
-        has_null: whether there are such surfaces.
+        has_environment: whether a light surrounds the scene, which decides how integrators treat
+        paths that meet only null surfaces, and therefore counts if there are any. has_null: whether
+        there are null surfaces.
         """
         import mitsuba as mi
 
@@ -66,12 +67,12 @@ class SceneHasher:
             if self._nodes[k].type != kinds.Emitter and k not in others
         ]
         passes = has_null or parsed.has_media()
-        # Views share no random numbers, and go by their index.
+        # The index of the sensor counts, since views have independent random numbers.
         facts = (mi.__version__, film.sensor, has_environment and passes, children)
         return _digest(facts)
 
     def emitter(self, node: int, kind: EmissionKind | None) -> EmitterDigest:
-        """Return the hashes of the emitter at `node`, which is scaled by `kind`."""
+        """Return the hashes of the emitter at `node`. kind: how it is scaled."""
         shape = self._parsed.shape_of.get(node)
         where = "" if shape is None else self._hash(shape)
         left_out = {"sampling_weight"}
@@ -83,7 +84,7 @@ class SceneHasher:
         )
 
     def _hash(self, node: int) -> str:
-        """Return the hash of a node, in which emitters are nothing but there."""
+        """Return the hash of a node, which is the same for all emitters."""
         import mitsuba as mi
 
         if node not in self._hashes:
@@ -96,7 +97,7 @@ class SceneHasher:
 
         tree_node, props = self._nodes[node], self._nodes[node].props
         kinds, parts = mi.Properties.Type, []
-        # A basis has a box filter, and samples of its own.
+        # A basis replaces the filter by a box, and the sampler by its own.
         replaced = (mi.ObjectType.Sampler, mi.ObjectType.ReconstructionFilter)
         for key in props:
             if key in left_out:
@@ -112,12 +113,12 @@ class SceneHasher:
             else:
                 value = self._value(kind, props[key])
             parts.append((_MADE_UP.sub("", key), str(kind), value))
-        # Parameters may stand in any order, but for children without a name.
+        # The order of parameters does not matter, except for unnamed children.
         parts.sort(key=lambda entry: entry[0])
         return _digest((str(tree_node.type), props.plugin_name(), parts))
 
     def _value(self, kind: Any, value: Any) -> Any:
-        """Return what a property holds, as plain values in full precision."""
+        """Return the value of a property as plain values in full precision."""
         import mitsuba as mi
 
         kinds = mi.Properties.Type
@@ -129,7 +130,7 @@ class SceneHasher:
             return np.array(value.matrix, dtype=float).ravel().tolist()
         if kind == kinds.Spectrum:
             return [np.array(x, dtype=float).tolist() for x in (value.wavelengths, value.values)]
-        # What cannot be looked into may be anything: then all of the scene counts.
+        # A value of unknown type may be anything, so the whole scene counts.
         return self._everything
 
     @property
@@ -137,7 +138,7 @@ class SceneHasher:
         return self._parsed.content(0)
 
     def _file(self, name: str) -> str:
-        """Return the hash of a file's content, with the ending that says how it is read."""
+        """Return the hash of a file's content, with the suffix, which decides how it is read."""
         if name not in self._files:
             path, digest = Path(str(self._parsed.resolver.resolve(name))), hashlib.sha256()
             if path.is_file():
@@ -151,7 +152,7 @@ class SceneHasher:
 
 
 def combined_identity(unlit_content: str, *own: object) -> str:
-    """Return the identity of a plane: of the scene without its lights, and of a light's own."""
+    """Return the identity of a plane from the hash of the unlit scene and those of the light."""
     return _digest((unlit_content, *own))
 
 

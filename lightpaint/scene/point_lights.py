@@ -1,4 +1,4 @@
-"""Scenes under point lights alone, which show what a light would do at each of many places."""
+"""A copy of a scene lit only by point lights, to probe many candidate positions."""
 
 import hashlib
 from collections.abc import Sequence
@@ -15,10 +15,10 @@ from lightpaint.scene.scene import Scene
 
 
 def lit_by_points(scene: Scene, positions: Sequence[Position]) -> Scene:
-    """Return a scene under point lights alone, one at each of `positions`, in their order.
+    """Return a scene lit only by point lights, one at each of `positions`, in their order.
 
-    Its own emitters stay where they are, black: what blocks or reflects light still does.
-    They are the last light, which is fixed.
+    The scene's own emitters become black but stay in place, so that they still block and reflect
+    light. Together they are the last light, which is fixed.
     """
     names = free_names("candidate", len(positions), [x.name for x in scene.emitters])
     dark = {x.node: EmitterSetting(x.kind, (0.0, 0.0, 0.0), 0.0) for x in scene.emitters}

@@ -1,8 +1,8 @@
 """Presets of samples and resolution.
 
-docs/benchmarks.md has a table of their measured quality. Noise in the basis makes lights too dim,
-depending on the samples per pixel but hardly on the number of pixels, so a preview saves pixels
-rather than samples.
+docs/benchmarks.md has a table of their measured quality. Noise in the basis biases lights towards
+dark by an amount that depends on samples per pixel but hardly on the number of pixels, so a preview
+saves pixels rather than samples.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,9 @@ Quality = Literal["preview", "final"]
 
 @dataclass(frozen=True)
 class Preset:
-    """A preset. spp: samples per pixel. pixels: most pixels of the reduced film, if possible."""
+    """A preset. spp: samples per pixel. pixels: upper bound for the reduced film, if it can be
+    met.
+    """
 
     spp: int
     pixels: int | None = None
@@ -30,9 +32,9 @@ PRESETS: dict[Quality, Preset] = {"preview": Preset(32, 2**15), "final": Preset(
 
 
 def on_film(scene: Scene, quality: Quality | None, resolution: str | None) -> Scene:
-    """Return `scene` on the film for its basis: of `resolution`, else of the preset.
+    """Return `scene` on the film for its basis: at `resolution`, or else that of the preset.
 
-    Raises SceneError for a resolution that the film cannot be reduced to.
+    Raises SceneError if the film cannot be reduced to that resolution.
     """
     if resolution is None and quality is not None:
         resolution = f"1/{PRESETS[quality].reduction(scene.film)}"
@@ -40,5 +42,7 @@ def on_film(scene: Scene, quality: Quality | None, resolution: str | None) -> Sc
 
 
 def samples(quality: Quality | None, *, spp: int | None, time_s: float | None) -> int | None:
-    """Return the samples per pixel of a basis: the preset's if neither spp nor a time is given."""
+    """Return the samples per pixel of a basis: `spp`, or the preset's if neither it nor a time is
+    given.
+    """
     return PRESETS[quality].spp if quality is not None and spp is None and time_s is None else spp

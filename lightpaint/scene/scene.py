@@ -1,7 +1,7 @@
-"""A Mitsuba scene with named lights, loaded as often as needed with other emissions.
+"""A Mitsuba scene with named lights, which can be loaded repeatedly with different emissions.
 
-The parsed XML is kept, not the loaded scene: only one loaded scene should be alive at a
-time, and no reference to one of its emitters may outlive it.
+The parsed XML is kept rather than the loaded scene: only one loaded scene should exist at a time,
+and no reference to one of its emitters may outlive it.
 """
 
 import gc
@@ -42,28 +42,28 @@ class Scene(Shown):
     """A parsed scene, seen through one of its sensors.
 
     Attributes:
-        path: Of its XML.
+        path: The XML file.
         parameters: Values of the `$name` parameters.
-        film: Of the sensor it is seen through.
+        film: The film of its sensor.
         sensor_names: Ids of all sensors.
-        spp: Samples per pixel the scene itself asks for.
-        integrator: Its plugin and options.
-        instead: What was put in the place of the scene's own integrator, if anything was.
-        has_media: Whether there is fog or the like.
-        has_null: Whether rays may pass a surface as if it were not there.
-        emitters: All of them.
-        lights: What is adjusted, and last what is kept, if anything is.
+        spp: The scene's own number of samples per pixel.
+        integrator: The parameters of its integrator.
+        instead: The integrator that replaces the scene's own, or None.
+        has_media: Whether it has participating media, such as fog.
+        has_null: Whether it has null surfaces, which let rays pass unchanged.
+        emitters: All emitters.
+        lights: The lights to adjust, followed by the fixed light if there is one.
         files: All XML files.
-        content: Hash of all XML files and assets, the parameters and the sensor; the same on a
+        content: Hash of all XML files and assets, the parameters and the sensor; independent of a
             reduced film.
-        unlit_content: Hash of all that the image of each light depends on, except that light: the
-            scene without its lights, but with the shapes of area lights.
-        lights_file: The lights file that went into `lights`, if one did.
-        requests: The constraints that it asks for.
-        parsed: Its nodes, by Mitsuba's parser; for this folder's modules alone.
-        chosen: Names of the lights that `only` left; none where all are there.
-        added: Emitters of `with_new_emitters`, which are in no file.
-        old_sites: Where emitters that `moved` has moved are in the file, by name.
+        unlit_content: Hash of everything that the image of each light depends on besides that
+            light: the scene without its lights, but with the shapes of area lights.
+        lights_file: The lights file that was used for `lights`, or None.
+        requests: The constraints in the lights file.
+        parsed: The nodes from Mitsuba's parser; internal to this package.
+        chosen: Names of the lights selected by `only`; empty if all are present.
+        added: Emitters added by `with_new_emitters`, which are in no file.
+        old_sites: Sites in the file of the emitters that `moved` has moved, by name.
 
     Examples:
         >>> scene = lp.load_scene("room.xml")
@@ -105,8 +105,8 @@ class Scene(Shown):
 
     @property
     def identity(self) -> str:
-        """Identity of the basis of this scene: `content`, and how emitters are tied."""
-        # Of a scene whose emitters are all adjusted one by one it is the content alone.
+        """Identity of the basis of this scene: `content`, and how emitters are grouped."""
+        # If all emitters are adjusted one by one, it is the content alone.
         if all(x.member_names == (x.name,) and not x.is_fixed for x in self.lights):
             return self.content
         tied = [(x.name, x.member_names, x.is_fixed) for x in self.lights]
@@ -114,21 +114,21 @@ class Scene(Shown):
 
     @property
     def light_identities(self) -> tuple[str, ...]:
-        """Identity of the image of each light, see `Light.identity`."""
+        """Identity of the image of each light; see `Light.identity`."""
         return tuple(light.identity(self.unlit_content) for light in self.lights)
 
     @property
     def plane_of(self) -> Mapping[str, int]:
-        """Index among the lights of the one that an emitter belongs to, by the emitter's name."""
+        """Index of each emitter's light, by the emitter's name."""
         return {m.name: k for k, light in enumerate(self.lights) for m in light.members}
 
     def with_lights(
         self, members: Mapping[str, Sequence[str]], fixed: Collection[str] = ()
     ) -> "Scene":
-        """Return this scene with its emitters tied to other lights.
+        """Return this scene with its emitters grouped into other lights.
 
-        members: name of a light → names of its emitters; fixed: lights that stay as they are.
-        Raises SceneError unless every emitter of the scene, and no other, is named once.
+        members: light name → names of its emitters. fixed: lights that stay as they are.
+        Raises SceneError unless every emitter of the scene, and nothing else, is named once.
         """
         grouped = [name for names in members.values() for name in names]
         existing = {emitter.name for emitter in self.emitters}
@@ -146,46 +146,47 @@ class Scene(Shown):
 
     @property
     def sensor(self) -> int:
-        """Index of the sensor it is seen through."""
+        """Index of its sensor."""
         return self.film.sensor
 
     @property
     def size(self) -> tuple[int, int]:
-        """(height, width) in pixels of the picture: of the sensor's film, or its crop window."""
+        """(height, width) of the picture in pixels: that of the film or its crop window."""
         width, height = self.film.pixels
         return height, width
 
     def light(self, name: str) -> Light:
-        """Return the light called `name`. Raises SceneError if there is none."""
+        """Return the light called `name`. Raises SceneError if it does not exist."""
         return light_named(name, self.lights, scene=str(self.path))
 
     def reduced(self, resolution: str) -> "Scene":
-        """Return this scene on a smaller film: each pixel is the mean of a square block of pixels.
+        """Return this scene on a smaller film, on which each pixel is the mean of a square block.
 
-        resolution: `1/4`, or `320x180`. What makes no whole block at the right and at the bottom
-        is left out. Raises SceneError, with sizes that would do, for sizes that no blocks have.
+        resolution: `1/4`, or `320x180`. Pixels at the right and bottom that do not fill a block are
+        left out. Raises SceneError, listing possible sizes, if no square blocks result in that
+        size.
         """
         return replace(self, film=reduced(self.film, reduction(self.film, resolution)))
 
     def camera(self, loaded: Any) -> Any:
-        """Return the sensor of this scene, in what `load` returned."""
+        """Return the sensor of this scene in a scene that `load` returned."""
         return camera_named(loaded, self.sensor_names[self.sensor])
 
     def eye(self, loaded: Any) -> Any:
-        """Return the position of that sensor, as an `mi.Point3f`."""
+        """Return the position of the sensor, as an `mi.Point3f`."""
         return self.camera(loaded).world_transform().translation()
 
     def only(self, names: Collection[str]) -> "Scene":
-        """Return this scene with the lights `names` alone.
+        """Return this scene with only the lights `names`.
 
-        The other emitters stay where they are, black and in no light, and are asked for no light:
-        what blocks or reflects light still does. Raises SceneError for a light that is not there.
+        The other emitters become black, belong to no light and are not sampled, but stay in place,
+        so that they still block and reflect light. Raises SceneError if a light does not exist.
         """
         chosen = {self.light(name).name for name in names}
         lights = tuple(light for light in self.lights if light.name in chosen)
         members = {member.name for light in lights for member in light.members}
         others = [x for x in self.emitters if x.name not in members]
-        # Where nothing else may be asked for light, black ones are: some emitter has to be.
+        # If nothing else may be sampled, black emitters are, since Mitsuba needs at least one.
         is_asked = any(not m.hit_by_chance for light in lights for m in light.members)
         black = (0.0, 0.0, 0.0)
         dark = {
@@ -211,15 +212,15 @@ class Scene(Shown):
 
     @MITSUBA.acquired()
     def moved(self, poses: Mapping[str, Pose]) -> "Scene":
-        """Return this scene with lights at other places, directions or cones.
+        """Return this scene with lights at other positions, directions or cones.
 
-        Nothing is written: `relight` writes the new places with the new emissions. A basis of it
-        needs the planes of the moved lights alone, unless one has a shape, which blocks and
-        reflects the light of the others. poses: by the names of lights of one emitter, or of
-        emitters.
+        Nothing is written; `relight` writes the new poses together with the new emissions. A basis
+        of the result only needs new planes for the moved lights, unless one of them has a shape,
+        which blocks and reflects the light of the others. poses: by name of an emitter, or of a
+        light with one emitter.
 
         Raises:
-            SceneError: For lights that are not there, or cannot be moved so.
+            SceneError: If a light does not exist or cannot be moved in this way.
 
         Examples:
             >>> scene = lp.load_scene("room.xml")
@@ -244,7 +245,7 @@ class Scene(Shown):
 
     @property
     def emitter_places(self) -> tuple[EmitterPlace, ...]:
-        """Places of the emitters that have a place or a direction."""
+        """Places of the emitters that have a position or a direction."""
         added = {x.name: x for x in self.added}
         places = []
         for emitter in self.emitters:
@@ -258,14 +259,14 @@ class Scene(Shown):
 
     @MITSUBA.acquired()
     def with_new_emitters(self, emitters: Sequence[NewEmitter]) -> "Scene":
-        """Return this scene with emitters added, each a light of its own.
+        """Return this scene with emitters added, each as a separate light.
 
-        Nothing is written: `relight` writes their elements behind all others, with the new
-        emissions. A panel is a rectangle, which also blocks light; planes of points and spots are
-        all that a basis of it needs to add.
+        Nothing is written; `relight` writes their elements after all others, with the new
+        emissions. A basis of the result only needs new planes for added points and spots. A panel
+        is a rectangle, which also blocks the light of the others.
 
         Raises:
-            SceneError: For names that are taken.
+            SceneError: If a name is taken.
 
         Examples:
             >>> key = lp.NewEmitter("key", "point", lp.Pose(position=(0, 1, 1)))
@@ -285,7 +286,9 @@ class Scene(Shown):
         return replace(extended, added=(*self.added, *emitters))
 
     def _inspected(self, parsed: ParsedScene, more: Sequence[str]) -> "Scene":
-        """Return the scene of another parsed form. more: names of its emitters without a light."""
+        """Return this scene with another parsed form. more: names of emitters that belong to no
+        light yet.
+        """
         with mitsuba_errors(self.path):
             facts = inspect_scene(parsed, self.sensor)
         members: dict[str, Sequence[str]] = {x.name: x.member_names for x in self.lights}
@@ -301,7 +304,7 @@ class Scene(Shown):
         )
 
     def _emitter(self, name: str) -> Emitter:
-        """Return the emitter, or the only one of the light, of that name."""
+        """Return the emitter called `name`, or the only emitter of the light called `name`."""
         if emitter := next((x for x in self.emitters if x.name == name), None):
             return emitter
         light = self.light(name)
@@ -314,16 +317,17 @@ class Scene(Shown):
 
     @property
     def up(self) -> Position:
-        """The axis that is up in the scene, as far as its camera and its lights tell."""
+        """The up axis of the scene, estimated from its camera and its lights."""
         node = self.parsed.state.nodes[self.parsed.sensor_nodes[self.sensor]]
         shining = [x.site.direction for x in self.emitters if x.site.direction is not None]
         return upward_axis(node.props, shining)
 
     @property
     def moved_elements(self) -> tuple[tuple[Path, int, Mapping[str, str]], ...]:
-        """Elements of the files that `moved` changed.
+        """Elements in the files that `moved` changed.
 
-        Each with its file, the byte offset of its `<`, and the children to set: XML by name.
+        For each: its file, the byte offset of its `<`, and the child elements to set, as XML by
+        name.
         """
         nodes = self.parsed.state.nodes
         return tuple(
@@ -333,22 +337,22 @@ class Scene(Shown):
 
     @property
     def originals(self) -> tuple[Path, ...]:
-        """All files the scene consists of: XML, meshes, textures, tables."""
+        """All files of the scene: XML, meshes, textures, tables."""
         return (*self.files, *self.parsed.assets())
 
     @property
     def read_files(self) -> tuple[Path, ...]:
-        """`originals`, and the lights file."""
+        """`originals`, and the lights file if there is one."""
         return (*self.originals, *([] if self.lights_file is None else [self.lights_file]))
 
     @property
     def places(self) -> frozenset[Path]:
-        """Places of its files, and of files that would change the scene if they existed."""
+        """Paths of its files, and of files that would change the scene if they existed."""
         beside = self.lights_file or lights_file_beside(self.path)
         return frozenset({*self.parsed.places(), beside})
 
     def relocated(self, old: Path, new: Path) -> "Scene":
-        """Return this scene after the folder `old`, which contains its XML, has moved to `new`."""
+        """Return this scene after its folder `old` was moved to `new`."""
         parsed = self.parsed.relocated(old, new)
         return replace(self, path=parsed.path, files=parsed.files, parsed=parsed)
 
@@ -356,13 +360,13 @@ class Scene(Shown):
     def load(
         self, emission: Mapping[str, RGB] | None = None, *, views: Sequence["Scene"] = ()
     ) -> Any:
-        """Load the `mi.Scene`, its lights set to `emission` (those not named stay as they are).
+        """Load the `mi.Scene` with lights set to `emission`; other lights stay as they are.
 
-        The film is replaced by a box-filtered RGB float32 one of the same size, for basis
-        and verification alike. A light set to black is never sampled. Drop the scene, and
-        all that came from it, before loading another. Lights that are images, and what is
-        kept, can only be black or as authored here: other multiples take files (see relight).
-        views: this scene through other sensors, whose films are replaced, too.
+        The film is replaced by a box-filtered RGB float32 film of the same size, for basis and
+        verification alike. A light set to black is never sampled. The scene, and everything that
+        refers to it, must be released before another is loaded. Image lights and the fixed light
+        can only be black or as authored here: other multiples need files (see relight). views: this
+        scene through other sensors, whose films are replaced as well.
         """
         settings = settings_for(self.lights, self.emitters, emission or {}, scene=str(self.path))
         return self.parsed.instantiate(settings, self.film, *(view.film for view in views))
@@ -386,12 +390,12 @@ class Scene(Shown):
 
     @cached_property
     def shape_names(self) -> tuple[str, ...]:
-        """Names of the shapes, in the order of a loaded scene's."""
+        """Names of the shapes, in the order of a loaded scene."""
         return shape_names(self.parsed)
 
     @property
     def replaced_integrators(self) -> tuple[tuple[Path, int], ...]:
-        """Integrators that `instead` replaces: file, and byte offset of the element."""
+        """The integrators that `instead` replaces: file, and byte offset of the element."""
         return tuple((self.files[file], offset) for file, offset in self.parsed.replaced)
 
     def emitted_image(self, emitter: Emitter) -> Floats:

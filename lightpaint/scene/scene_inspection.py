@@ -1,4 +1,4 @@
-"""Facts about a scene that only Mitsuba's objects tell: its film, emitters, surfaces, shapes."""
+"""Facts about a scene that require loading it in Mitsuba: film, emitters, surfaces, shapes."""
 
 import gc
 from collections.abc import Iterator
@@ -11,12 +11,12 @@ from lightpaint.scene.properties.emission import ENVIRONMENTS
 from lightpaint.scene.properties.film import Film, camera_named
 from lightpaint.scene.scene_tree import ParsedScene
 
-#: A shape that is visible only where instances refer to it.
+#: A shape that is only visible through instances.
 GROUP = "shapegroup"
 
 
 def inspect_scene(parsed: ParsedScene, sensor: int) -> dict[str, Any]:
-    """Return the facts that only the loaded and the parsed scene tell, as fields of a `Scene`."""
+    """Return the fields of a `Scene` that require loading it."""
     loaded, hasher = parsed.instantiate({}), SceneHasher(parsed)
     camera = camera_named(loaded, parsed.sensor_names[sensor])
     emitters, film = find_emitters(parsed, loaded, hasher), Film.of(camera, sensor)
@@ -51,7 +51,9 @@ def _has_null_surfaces(loaded: Any) -> bool:
 
 
 def shape_names(parsed: ParsedScene) -> tuple[str, ...]:
-    """Return names of a loaded scene's shapes, in order: id, else mesh file, material or kind."""
+    """Return names of a loaded scene's shapes, in order: id, or else mesh file, material or
+    kind.
+    """
     import mitsuba as mi
 
     shapes = parsed.children_of(0, mi.ObjectType.Shape)
@@ -64,7 +66,7 @@ def shape_names(parsed: ParsedScene) -> tuple[str, ...]:
 
 
 def _names_of(parsed: ParsedScene, node: int) -> Iterator[str]:
-    """Yield possible names of a shape, the best first."""
+    """Yield possible names of a shape, best first."""
     import mitsuba as mi
 
     def ids(kind: Any) -> Iterator[str]:
@@ -74,7 +76,7 @@ def _names_of(parsed: ParsedScene, node: int) -> Iterator[str]:
     yield str(props.id())
     if "filename" in props:
         yield PurePath(str(props["filename"])).stem
-    # An instance has the name of its group.
+    # An instance is named after its shape group.
     yield from ids(mi.ObjectType.Shape)
     yield from ids(mi.ObjectType.BSDF)
     yield str(props.plugin_name())

@@ -1,4 +1,4 @@
-"""Reading a Mitsuba scene, and choosing the lights to adjust."""
+"""Reads a Mitsuba scene and chooses the lights to adjust."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -39,23 +39,24 @@ def load_scene(
     """Read a Mitsuba scene XML and find its lights.
 
     Args:
-        path: Mitsuba XML.
-        sensor: Index or id of the sensor to look through (the first by default).
+        path: The XML file.
+        sensor: Index or id of the sensor to look through (by default the first).
         parameters: Values for the `$name` parameters of the XML (Mitsuba's `-D`).
-        variant: Mitsuba variant to run, where the process has none yet.
-        lights: Names or patterns (`window_*`) of those to adjust, all by default; others are kept.
+        variant: Mitsuba variant to use, if the process has none yet.
+        lights: Names or patterns (`window_*`) of the lights to adjust, by default all. Other lights
+            are kept as they are.
         groups: Name → names or patterns of emitters that are adjusted as one light.
-        lights_file: TOML with such lights and groups, instead of the one beside the scene. `lights`
-            replaces what it lists, `groups` are added to its own or replace namesakes; without
-            `lights` they are adjusted beside what it lists.
-        use_lights_file: False leaves the one beside the scene alone.
-        group_alike: Whether more than 24 emitters that are alike and have no names are one light,
-            unless they are asked for by the names that they get here. The lights file may say no.
-        integrator: To render with instead of the scene's own, like `path`, `direct` or
-            `path:max_depth=8`. What its own says of max_depth, rr_depth and hide_emitters stays.
+        lights_file: TOML file with lights and groups, used instead of the one beside the scene.
+            `lights` replaces its list; `groups` are added to its groups, or replace those with the
+            same names, and without `lights` are adjusted as well.
+        use_lights_file: False to ignore the lights file beside the scene.
+        group_alike: Whether more than 24 similar emitters without names become one light, unless
+            they are selected by their generated names. The lights file can disable this.
+        integrator: Integrator to render with instead of the scene's own, such as `path`, `direct`
+            or `path:max_depth=8`. It inherits max_depth, rr_depth and hide_emitters.
 
     Raises:
-        SceneError: With Mitsuba's own message where it refuses the scene.
+        SceneError: If the scene is invalid, with Mitsuba's own message if Mitsuba rejects it.
         BackendError: If Mitsuba cannot run.
 
     Examples:

@@ -16,16 +16,16 @@ from lightpaint.scene.runtime.kernel_threads import kernels
 from lightpaint.scene.runtime.render_lock import tracing
 from lightpaint.scene.scene import Scene
 
-#: Camera samples in one pass: a running kernel cannot be interrupted and needs memory for its whole
-#: pass, so passes are short.
+#: Number of camera samples in one pass. Passes are short, since a running kernel cannot be
+#: interrupted and needs memory for its whole pass.
 SAMPLES_PER_PASS = 2**21
 
-#: Camera samples of a range of passes, which is summed separately.
+#: Number of camera samples in a range of passes that is summed separately.
 SAMPLES_PER_RANGE = 2**22
 
 
 class Stream(IntEnum):
-    """Purposes of random numbers; equal seeds in two streams share no numbers."""
+    """Purposes of random numbers; equal seeds give independent numbers in different streams."""
 
     BASIS = 0
     VERIFICATION = 1
@@ -40,12 +40,16 @@ class Stream(IntEnum):
 
 
 def pass_seed(seed: int, stream: Stream, index: int) -> int:
-    """Return the 32-bit seed of pass `index`: unrelated for any other seed, stream or index."""
+    """Return the 32-bit seed of pass `index`, unrelated to that for any other seed, stream or
+    index.
+    """
     return int(np.random.SeedSequence([seed, int(stream), index]).generate_state(1)[0])
 
 
 def view_seed(seed: int, sensor: int) -> int:
-    """Return the seed of a view: no two share random numbers, so their noise is independent."""
+    """Return the seed of a view. Different views have independent random numbers and hence
+    noise.
+    """
     return seed if sensor == 0 else pass_seed(seed, Stream.VIEW, sensor)
 
 
@@ -57,16 +61,16 @@ def largest_pass(pixels: int, *, shorter: int = 1) -> int:
 def plan_passes(
     pixels: int, spp: int, *, done: tuple[int, int] = (0, 0), shorter: int = 1, step: int = 1
 ) -> list[tuple[int, int]]:
-    """Return (half 0 or 1, samples per pixel) of each remaining pass, the halves alternating.
+    """Return (half 0 or 1, samples per pixel) for each remaining pass, with alternating halves.
 
-    spp: total of both halves, or a little more to make them equal. done: samples per pixel that
-    each half has already. step: samples come in multiples of this.
+    spp: total of both halves, rounded up to make them equal. done: samples per pixel that each half
+    already has. step: the number of samples in a pass is a multiple of this.
     """
     if spp < 2:
         raise SceneError(f"{spp} samples per pixel are too few for two halves: expected 2 or more")
     largest = max(1, largest_pass(pixels, shorter=shorter) // step)
     lists = []
-    # After an interrupt the second half may be behind: it comes first then.
+    # After an interrupt the second half may have fewer samples; then it comes first.
     for half in (0, 1) if done[0] <= done[1] else (1, 0):
         left = -(-max(0, -(-spp // 2) - done[half]) // step)
         sizes = [largest] * (left // largest) + [left % largest] * (left % largest > 0)
@@ -110,7 +114,7 @@ def render_loaded(
     label: str = "render",
     progress: Progress = silent,
 ) -> Estimate:
-    """Render a scene that is already loaded, as `render` does."""
+    """Render a loaded scene, as `render` does."""
     passes = passes_of(scene, spp)
     sums = np.zeros((2, *scene.size, 3), np.float64)
     progress(label, 0, len(passes))
@@ -136,10 +140,10 @@ def render_in_stages(
     label: str = "render",
     progress: Progress = silent,
 ) -> tuple[Estimate, int]:
-    """Render `scene` stage by stage until `is_enough`, as `render` does.
+    """Render `scene` in stages until `is_enough` returns True, as `render` does.
 
     stages: samples per pixel at the end of each stage, increasing. is_enough: called after each
-    stage but the last, with the picture so far and its samples per pixel. Returns both.
+    stage except the last, with the picture so far and its samples per pixel. Returns both.
     """
     height, width = scene.size
     done, plan = (0, 0), []
@@ -173,16 +177,16 @@ def render_in_stages(
 
 
 def passes_of(scene: Scene, spp: int | None) -> list[tuple[int, int]]:
-    """Return (half, samples per pixel) of all passes of an ordinary render, in the order of their
-    numbers.
-    """
+    """Return (half, samples per pixel) for all passes of an ordinary render, in order."""
     height, width = scene.size
     step = scene.film.block_pixels
     return plan_passes(height * width, scene.spp if spp is None else spp, step=step)
 
 
 def ranges_of(scene: Scene, passes: Sequence[tuple[int, int]]) -> list[range]:
-    """Return ranges of passes that are summed separately, so that others may render some."""
+    """Return ranges of passes that are summed separately, so that other machines can render
+    some.
+    """
     height, width = scene.size
     largest = max((spp for _, spp in passes), default=1)
     size = max(1, SAMPLES_PER_RANGE // (height * width * largest))
@@ -192,13 +196,15 @@ def ranges_of(scene: Scene, passes: Sequence[tuple[int, int]]) -> list[range]:
 def pass_sum(
     loaded: Any, scene: Scene, number: int, spp: int, *, seed: int, stream: Stream
 ) -> Doubles:
-    """Return the undivided sum of a pass, (h, w, 3) float64."""
+    """Render a pass and return its undivided sum, (h, w, 3) float64."""
     image = render_pass(loaded, scene, seed=pass_seed(seed, stream, number), spp=spp)
     return spp * image.astype(np.float64)
 
 
 def estimate_of(sums: Doubles, passes: Sequence[tuple[int, int]]) -> Estimate:
-    """Return the estimate of undivided sums of both halves, (2, h, w, 3), which it overwrites."""
+    """Return the estimate from undivided sums of both halves, (2, h, w, 3), which are
+    overwritten.
+    """
     sums /= sum(size for _, size in passes) / 2
     return Estimate.of_halves(as_float32(sums[0]), as_float32(sums[1]))
 
@@ -206,7 +212,7 @@ def estimate_of(sums: Doubles, passes: Sequence[tuple[int, int]]) -> Estimate:
 def render_pass(loaded: Any, scene: Scene, *, seed: int, spp: int) -> Floats:
     """Return the render of one pass by the scene's own integrator, (h, w, 3).
 
-    spp: a multiple of the film pixels in a block.
+    spp: a multiple of the number of film pixels in a block.
     """
     import mitsuba as mi
 
@@ -214,7 +220,7 @@ def render_pass(loaded: Any, scene: Scene, *, seed: int, spp: int) -> Floats:
     spp //= film.block_pixels
     with kernels():
         image = np.array(mi.render(loaded, sensor=scene.camera(loaded), seed=seed, spp=spp))
-    # Wrapping integrators append channels of their own after R, G and B.
+    # Wrapping integrators append further channels after R, G and B.
     return block_mean(image[..., :3], film.block)
 
 

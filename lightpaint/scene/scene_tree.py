@@ -1,7 +1,7 @@
-"""Mitsuba's parsed form of a scene XML, and how loaded scenes are made of it.
+"""Mitsuba's parsed form of a scene XML, from which loaded scenes are built.
 
-What Mitsuba parsed is kept and copied for every load: instantiating changes it, and only one
-loaded scene should be alive at a time.
+The parsed form is kept and copied for every load, because instantiating changes it, and only one
+loaded scene should exist at a time.
 """
 
 import hashlib
@@ -31,7 +31,7 @@ from lightpaint.scene.runtime.plugins import check_plugins
 
 
 class ParsedScene:
-    """The nodes of a scene XML, by Mitsuba's own parser."""
+    """The nodes of a scene XML, from Mitsuba's own parser."""
 
     def __init__(
         self,
@@ -40,26 +40,26 @@ class ParsedScene:
         variant: str,
         instead: IntegratorChoice | None = None,
     ) -> None:
-        """instead: an integrator in the place of the scene's own."""
+        """Parse the XML. instead: an integrator that replaces the scene's own."""
         import mitsuba as mi
 
         self.path = path
         self.parameters = parameters
         self.config = mi.parser.ParserConfig(variant)
-        # Merged meshes would lose the order and the names of their emitters.
+        # Merging meshes would lose the order and the names of their emitters.
         self.config.merge_meshes = False
         self.resolver = mi.FileResolver(mi.file_resolver())
         self.resolver.prepend(str(path.resolve().parent))
         with self._resolving(), mitsuba_errors(path):
             check_xml(path, parameters, mi.file_resolver())
             self.state = mi.parser.parse_file(self.config, str(path), **parameters)
-            # Mitsuba takes properties that were looked at for used, and reports the others.
+            # Reading a property marks it as used, and Mitsuba reports unused ones: so check copies.
             check_nodes(path, mi.parser.ParserState(self.state))
             mi.parser.transform_all(self.config, self.state)
             check_required(path, mi.parser.ParserState(self.state))
             has_exr = check_assets(path, mi.parser.ParserState(self.state), self.resolver)
-            # Thrown in one of several threads, what its OpenEXR reader makes of a damaged table of
-            # offsets now and then ends the process.
+            # An exception about a damaged offset table in Mitsuba's OpenEXR reader sometimes ends
+            # the process if it is thrown in one of several threads.
             self.config.parallel = self.config.parallel and not has_exr
         if self.state.nodes[0].props.plugin_name() != "scene":
             raise SceneError(f"{path} is not a scene: its root element must be <scene>")
@@ -84,19 +84,19 @@ class ParsedScene:
             for child in self.children_of(shape, kinds.Shape)
         }
         self.names = self._name_lights()
-        #: The parameters that `with_motions` changed, as XML: node → name → element.
+        #: Parameters changed by `with_motions`, as XML: node → name → element.
         self.moved: dict[int, dict[str, str]] = {}
 
     def _replace_integrator(
         self, instead: IntegratorChoice | None
     ) -> tuple[IntegratorChoice | None, tuple[tuple[int, int], ...]]:
-        """Replace the integrator; return it, and the places of the replaced: file index, byte
-        offset.
+        """Replace the integrator. Returns the choice, and the positions of the replaced elements:
+        file index, byte offset.
         """
         if instead is None:
             return None, ()
         nodes = [self.state.nodes[k] for k in integrator_nodes(self.state)]
-        # The parser's offset is just behind the `<`.
+        # The parser's offset is just after the `<`.
         places = tuple((int(node.file_index), int(node.offset) - 1) for node in nodes)
         return replace_integrator(self.state, instead), places
 
@@ -104,7 +104,9 @@ class ParsedScene:
         return [k for k, node in enumerate(self.state.nodes) if node.type == kind]
 
     def children_of(self, parent: int, kind: Any = None) -> list[int]:
-        """Return the nodes inside a node, or referred to by it. kind: only those of this kind."""
+        """Return the nodes inside a node, or referenced by it. kind: restricts them to this
+        kind.
+        """
         import mitsuba as mi
 
         props = self.state.nodes[parent].props
@@ -113,7 +115,7 @@ class ParsedScene:
         return [c for c in children if kind is None or self.state.nodes[c].type == kind]
 
     def _name_lights(self) -> dict[int, str]:
-        """Return names by node: emitter id, else the id of its shape, else `<plugin>_<k>`."""
+        """Return names by node: emitter id, or else the id of its shape, or else `<plugin>_<k>`."""
         names: dict[int, str] = {}
         taken: set[str] = set()
         count: dict[str, int] = {}
@@ -132,16 +134,16 @@ class ParsedScene:
         return names
 
     def instantiate(self, settings: Mapping[int, EmitterSetting], *films: Film) -> Any:
-        """Make a `mi.Scene`, its emitters set by node.
+        """Build an `mi.Scene` with emitter settings, by node.
 
-        films: put in the places of their sensors' own; the others stay as they are.
+        films: replace those of their sensors; other sensors keep their films.
         """
         import mitsuba as mi
 
         state = mi.parser.ParserState(self.state)
         for node, name in self.names.items():
             state.nodes[node].props.set_id(name)
-        # Sensors that belong to shapes stand among the others once loaded: ids tell them apart.
+        # Sensors that belong to shapes are listed with the others after loading; ids identify them.
         for node, name in zip(self.sensor_nodes, self.sensor_names, strict=True):
             state.nodes[node].props.set_id(name)
         for node, setting in settings.items():
@@ -162,12 +164,12 @@ class ParsedScene:
         return scene
 
     def shape_plugin(self, emitter: int) -> str:
-        """Return the plugin of the shape that an emitter belongs to; "" for one without a shape."""
+        """Return the plugin of the shape of an emitter; "" if it has no shape."""
         shape = self.shape_of.get(emitter)
         return "" if shape is None else str(self.state.nodes[shape].props.plugin_name())
 
     def relocated(self, old: Path, new: Path) -> "ParsedScene":
-        """Return this scene, whose files in the folder `old` are about to move to `new`."""
+        """Return this scene after its files in the folder `old` are moved to `new`."""
         import mitsuba as mi
 
         other = copy(self)
@@ -180,7 +182,7 @@ class ParsedScene:
         return other
 
     def image_file(self, node: int, parameter: str) -> tuple[Path, bool]:
-        """Return the file of an emitter's image, and whether its values are linear as stored."""
+        """Return the file of an emitter's image, and whether its stored values are linear."""
         texture = child_named(self.state, node, parameter)
         props = self.state.nodes[node if texture is None else texture].props
         if "filename" not in props:
@@ -200,7 +202,7 @@ class ParsedScene:
     def content(self, sensor: int) -> str:
         import mitsuba as mi
 
-        # The parsed form holds what stood in files that only the parser reads.
+        # The parsed form includes the content of files that only the parser reads.
         parsed = mi.parser.write_string(self.state)
         digest = hashlib.sha256(repr((mi.__version__, parsed)).encode())
         for path in (*self.files, *self.assets()):
@@ -214,14 +216,14 @@ class ParsedScene:
         return digest.hexdigest()[:32]
 
     def assets(self) -> Iterator[Path]:
-        """Return files that plugins read: meshes, textures, tables."""
+        """Yield the files that plugins read: meshes, textures, tables."""
         for name in self._asset_names():
             path = Path(str(self.resolver.resolve(name)))
             if path.is_file():
                 yield path
 
     def _asset_names(self) -> Iterator[str]:
-        """Return the names of assets as in the scene."""
+        """Yield the names of assets as given in the scene."""
         import mitsuba as mi
 
         for node in self.state.nodes:
@@ -230,9 +232,9 @@ class ParsedScene:
                     yield str(node.props[key])
 
     def places(self) -> set[Path]:
-        """Return the places of its files, and of files that would be found if they existed.
+        """Return the paths of its files, and of files that would be used if they existed.
 
-        More than Mitsuba looks at: wherever it looks for one file it may look for each of them.
+        These are more than Mitsuba tries: every file name in every search folder.
         """
         folders = {Path(str(self.resolver[k])) for k in range(len(self.resolver))}
         folders |= {file.parent for file in self.files}
@@ -255,11 +257,11 @@ class ParsedScene:
 
 
 def relocated_path(path: Path, old: Path, new: Path) -> Path:
-    """Return the path of `path` after the folder `old` has moved to `new`, by a lasting route."""
+    """Return `path` after the folder `old` was moved to `new`, without passing through `old`."""
     if ".." not in path.parts and path.is_relative_to(old):
         return new / path.relative_to(old)
     real, gone = Path(os.path.realpath(path)), Path(os.path.realpath(old))
     if real.is_relative_to(gone):
         return Path(os.path.realpath(new)) / real.relative_to(gone)
-    # The way there may lead through the old folder.
+    # The path may lead through the old folder.
     return real if gone.name in path.parts else path

@@ -17,10 +17,10 @@ from lightpaint.scene.runtime.render_lock import tracing
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, largest_pass, pass_seed
 
-#: Samples per pixel, one render each: the index of a shape must not be averaged.
+#: Number of samples per pixel, each a separate render, since shape indices must not be averaged.
 SAMPLES = 16
 
-#: Samples that decide the object of a pixel.
+#: Number of samples that decide the object of a pixel.
 VOTES = 4
 
 #: Depth of the background, as in compositing programs.
@@ -29,13 +29,13 @@ BACKGROUND = 1e10
 
 @dataclass(frozen=True)
 class Surfaces:
-    """The first surfaces behind each pixel, averaged over its area.
+    """The first surfaces in each pixel, averaged over its area.
 
     albedo: (h, w, 3) float32 in [0, 1], share of light that the materials reflect diffusely.
-    normal: (h, w, 3), shading normal in world space, of unit length; 0 for the background.
-    depth: (h, w), distance from the camera along its axis in scene units, of the nearest sample;
-    BACKGROUND where there is none. coverage: by name of shape, (h, w) in [0, 1], the part of the
-    pixel that it fills. Invisible shapes are left out.
+    normal: (h, w, 3), shading normal in world space, of unit length; 0 for the background. depth:
+    (h, w), distance from the camera along its axis in scene units, of the nearest sample;
+    BACKGROUND if there is none. coverage: by shape name, (h, w) in [0, 1], share of the pixel
+    covered by the shape. Invisible shapes are left out.
     """
 
     albedo: Floats
@@ -50,14 +50,14 @@ def render_surfaces(scene: Scene, *, seed: int = 0, progress: Progress = silent)
 
 
 def render_features(scene: Scene, *, seed: int = 0) -> Features:
-    """Return albedo, normals and positions of `scene`; the first two rounded to half floats."""
+    """Return albedo, normals and positions of `scene`; the first two are rounded to half floats."""
     return scene.while_loaded(lambda loaded: loaded_features(scene, loaded, seed))
 
 
 def render_first_hits(
     scene: Scene, *, seed: int = 0, loaded: Any = None
 ) -> tuple[Features, Objects]:
-    """Return features, and the objects that are seen. loaded: `scene`, where it is loaded."""
+    """Return features and the map of visible objects. loaded: the loaded `scene`, if available."""
 
     def both(loaded: Any) -> tuple[Features, Objects]:
         return loaded_features(scene, loaded, seed), _objects(scene, loaded, seed)
@@ -66,7 +66,7 @@ def render_first_hits(
 
 
 def loaded_features(scene: Scene, loaded: Any, seed: int) -> Features:
-    """Return the features of `scene`, which is loaded; see `render_features`."""
+    """Return the features of `scene`. loaded: the loaded scene. See `render_features`."""
     import mitsuba as mi
 
     film = scene.film
@@ -87,7 +87,7 @@ def loaded_features(scene: Scene, loaded: Any, seed: int) -> Features:
 
 
 def _objects(scene: Scene, loaded: Any, seed: int) -> Objects:
-    """Return the object that most of a few samples of each pixel see."""
+    """Return the object that most of a few samples see in each pixel."""
     import mitsuba as mi
 
     integrator = mi.load_dict({"type": "aov", "aovs": "i:shape_index"})
@@ -107,7 +107,7 @@ def _objects(scene: Scene, loaded: Any, seed: int) -> Objects:
 
 
 def _most_frequent(votes: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
-    """Return the most frequent value of (k, h, w), (h, w); of equally frequent ones the first."""
+    """Return the most frequent value in (k, h, w) as (h, w); in a tie, the first."""
     counts = [(votes == vote).sum(axis=0) for vote in votes[:VOTES]]
     winners = np.argmax(counts, axis=0)
     return np.asarray(np.take_along_axis(votes, winners[None], axis=0)[0])
@@ -148,7 +148,7 @@ def _averaged(
     """
     indices = samples[..., 9].astype(np.int64)
     is_hit = indices > 0
-    # Materials like metals state an albedo without upper bound.
+    # Some materials, such as metals, state an albedo above 1.
     albedo = np.clip(samples[..., :3], 0, 1) * is_hit[..., None]
     normal = (samples[..., 3:6] * is_hit[..., None]).sum(axis=0)
     length = np.linalg.norm(normal, axis=-1, keepdims=True)
@@ -170,7 +170,7 @@ def _averaged(
 def _names_by_index(loaded: Any, names: Sequence[str]) -> dict[int, str]:
     """Return the name of each shape, by the index that the integrator writes.
 
-    names: those of the shapes in their order, including unnamed ones.
+    names: names of all shapes in their order, including unnamed ones.
     """
     import drjit as dr
     import mitsuba as mi

@@ -1,1 +1,1 @@
-"""Checks of a scene's files before Mitsuba reads them, since Mitsuba trusts them."""
+"""Checks of a scene's files before Mitsuba reads them, since Mitsuba trusts its input."""

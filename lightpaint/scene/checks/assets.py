@@ -1,7 +1,7 @@
 """Checks of the files that a scene refers to, before Mitsuba reads them.
 
-Mitsuba's own readers never return from a pipe, crash on a damaged OpenEXR or mesh, and allocate as
-much memory as a header demands.
+Mitsuba's own readers wait forever for a pipe, crash on a damaged OpenEXR file or mesh, and allocate
+as much memory as a header declares.
 """
 
 import struct
@@ -14,11 +14,11 @@ from lightpaint.files import one_line
 from lightpaint.images.formats.exr import read_parts
 from lightpaint.scene.checks.mesh import MeshError, check_ply, check_serialized
 
-#: Longest file that is read, in bytes.
+#: Maximum size in bytes of a file that is read.
 MAX_ASSET = 2**32
 
-#: A picture that declares more bytes than this, four per pixel, and more than 1000 times the length
-#: of its file, is not decoded.
+#: A picture is not decoded if its declared size in bytes, at four per pixel, exceeds both MAX_BYTES
+#: and MAX_COMPRESSION times the size of its file.
 MAX_BYTES = 2**29
 MAX_COMPRESSION = 1000
 
@@ -48,9 +48,10 @@ def check_assets(scene: Path, state: Any, resolver: Any) -> bool:
 
 
 def check_asset(path: Path, plugin: str, index: int = 0) -> None:
-    """Raise SceneError unless `plugin` can read the file at `path` safely.
+    """Raise SceneError unless `plugin` can safely read the file at `path`.
 
-    index: that of the mesh in it. Faults that Mitsuba itself reports cleanly are left to it.
+    index: index of the mesh in the file. Faults that Mitsuba itself reports cleanly are not
+    checked.
     """
     length = file_length(path, "file to read", SceneError, limit=MAX_ASSET)
     try:
@@ -76,7 +77,7 @@ def _check_picture(path: Path, length: int) -> None:
     with path.open("rb") as file:
         head = file.read(32)
         if head.startswith(b"\x76\x2f\x31\x01"):
-            # Only a full read shows whether Mitsuba's reader survives.
+            # Only a complete read shows whether Mitsuba's reader will survive.
             read_parts(path)
             return
         width = height = 0
@@ -92,7 +93,7 @@ def _check_picture(path: Path, length: int) -> None:
 
 
 def _jpeg_size(data: bytes) -> tuple[int, int]:
-    """Return (width, height) from the header, 0 if missing. data: from after the first marker."""
+    """Return (width, height) from the header; 0 if missing. data: bytes after the first marker."""
     position = 0
     while position + 9 <= len(data) and data[position] == 0xFF:
         mark = data[position + 1]

@@ -1,7 +1,7 @@
 """Checks that a mesh file is as long as it declares, and that its faces use existing vertices.
 
-Mitsuba checks neither, and the process crashes. Faults that it reports itself (faces other than
-triangles, unknown types) are left to it.
+Mitsuba checks neither and would crash. Faults that it reports itself, such as non-triangular faces
+or unknown types, are not checked here.
 """
 
 import struct
@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-#: Longest header of a PLY, in bytes.
+#: Maximum size of a PLY header in bytes.
 MAX_HEAD = 2**16
-#: Longest mesh that is unpacked, in bytes.
+#: Maximum size in bytes to which a mesh is decompressed.
 MAX_UNPACKED = 2**31
 
 _TYPES = {
@@ -27,12 +27,12 @@ _TYPES = {
 _ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
 _INDICES = ("vertex_index", "vertex_indices")
 
-#: Name, number of rows and type of a row; `face` has a field `faces`.
+#: Name, number of rows, and row type, which has a field `faces` for the element `face`.
 Element = tuple[str, int, np.dtype[np.void]]
 
 
 class MeshError(Exception):
-    """A fault of a mesh, without the name of its file."""
+    """An error in a mesh, without the name of its file."""
 
 
 def check_ply(path: Path) -> None:
@@ -50,14 +50,14 @@ def check_ply(path: Path) -> None:
             raise MeshError(f"it is shorter than its {count} rows of {name!r}")
         if name == "face" and count and "faces" in (row.names or ()):
             table = np.memmap(path, row, "r", position, (count,))
-            # Mitsuba itself refuses lists of other lengths.
+            # Mitsuba itself rejects lists of other lengths.
             if (table["sides"] == 3).all():
                 _check_faces(table["faces"], vertices)
         position += count * row.itemsize
 
 
 def _ply_head(head: bytes) -> tuple[str, list[Element], int]:
-    """Return format, elements, and the position of the first row."""
+    """Return the format, the elements, and the position of the first row."""
     format_name, position, is_complete = "", 0, False
     counts: list[tuple[str, int]] = []
     fields: list[list[tuple[str, str, tuple[int, ...]]]] = []
@@ -74,7 +74,7 @@ def _ply_head(head: bytes) -> tuple[str, list[Element], int]:
                 counts.append((name, int(count[:20])))
                 fields.append([])
             case ["property", "list", sides, kind, name] if fields and {sides, kind} <= {*_TYPES}:
-                # As Mitsuba reads them, all lists have three entries.
+                # Mitsuba also reads every list as three entries.
                 names = (
                     ("sides", "faces") if name in _INDICES else (f"#{position}", f"list{position}")
                 )
@@ -116,7 +116,7 @@ def _check_ascii(path: Path, position: int, elements: list[Element], vertices: i
 
 
 def _check_faces(faces: npt.NDArray[np.generic], vertices: int) -> None:
-    # The comparison is written so that NaN fails it.
+    # Written so that NaN fails the comparison.
     if faces.size and not (faces.min() >= 0 and faces.max() < vertices):
         raise MeshError(
             f"its faces use vertices from {faces.min()} to {faces.max()}, of {vertices}"

@@ -1,7 +1,7 @@
-"""Better errors for scenes of Mitsuba 0.6, where Mitsuba 3 refuses them.
+"""Better errors for scenes of Mitsuba 0.6 that Mitsuba 3 rejects.
 
-Mitsuba 3 renames the parameters of a file with a version below 2 (maxDepth to max_depth), and
-handles no other change. There is no converter.
+If the version of a file is below 2, Mitsuba 3 converts the names of its parameters (maxDepth to
+max_depth), but nothing else. There is no converter.
 """
 
 import re
@@ -14,13 +14,13 @@ from lightpaint.file_reading import read_bytes
 from lightpaint.files import one_line
 from lightpaint.scene.checks.tokens import attributes, markup
 
-#: Elements that are a parameter; a `<default>` may have any name.
+#: Elements that are parameters; a `<default>` may have any name.
 _PARAMETERS = frozenset(
     b"boolean float integer string rgb spectrum transform point vector ref texture bsdf".split()
 )
 _CAMEL = re.compile(r"[a-z]+[A-Z][A-Za-z]*")
 
-#: Successors in Mitsuba 3 of elements and plugins that many scenes of 0.6 use.
+#: Replacements in Mitsuba 3 for common elements and plugins of 0.6.
 SUCCESSORS = {
     "lookAt": "lookat",
     **dict.fromkeys(("ldrfilm", "mfilm", "tiledhdrfilm"), "hdrfilm"),
@@ -36,11 +36,11 @@ _REFUSED = re.compile(r"unexpected <(\w+)> element|has no \w+ plugin '(\w+)'")
 
 @contextmanager
 def explain_old_scene(path: Path) -> Iterator[None]:
-    """Explain the error if Mitsuba refuses the scene at `path` because it is for 0.6."""
+    """Explain the error if Mitsuba rejects the scene at `path` because it was written for 0.6."""
     try:
         yield
     except SceneError as error:
-        # The cause is an exception of Mitsuba's if Mitsuba refused the scene.
+        # The cause is an exception from Mitsuba if Mitsuba rejected the scene.
         sign = _sign_of_old_version(path) if error.__cause__ is not None else ""
         raise (_old_scene_error(path, sign, str(error)) if sign else error) from error.__cause__
 
@@ -63,7 +63,7 @@ def _old_scene_error(path: Path, sign: str, message: str) -> SceneError:
 
 
 def _sign_of_old_version(path: Path) -> str:
-    """Return the evidence that a scene is for Mitsuba 0.6; "" if there is none."""
+    """Return the evidence that a scene was written for Mitsuba 0.6; "" if there is none."""
     try:
         text = read_bytes(path, "scene file", SceneError)
         tags = [tag for tag in markup(text) if tag["tag"] is not None]

@@ -1,6 +1,7 @@
-"""Checks for parameters that plugins of Mitsuba use without checking: without them it crashes.
+"""Checks for parameters without which a Mitsuba plugin crashes.
 
-They were found by loading and rendering each plugin without parameters; the others report that.
+The list was found by loading and rendering each plugin without parameters; other plugins report
+what they lack.
 """
 
 from pathlib import Path
@@ -10,7 +11,7 @@ from lightpaint.errors import SceneError
 from lightpaint.files import one_line
 from lightpaint.scene.checks.tokens import place_of_node
 
-#: By plugin: parameters of which it needs one, and the XML for it.
+#: Plugin → alternative parameters, one of which is required, and XML for the error message.
 REQUIRED = {
     "bitmap": (("filename", "bitmap", "data"), '<string name="filename" value="..."/>'),
     "blendbsdf": (("weight",), '<float name="weight" value="..."/>'),
@@ -19,7 +20,7 @@ REQUIRED = {
 
 
 def check_required(path: Path, state: Any) -> None:
-    """Raise SceneError for a plugin of a parsed scene that lacks a required parameter."""
+    """Raise SceneError if a plugin of a parsed scene lacks a required parameter."""
     for node in state.nodes:
         plugin = str(node.props.plugin_name())
         names, form = REQUIRED.get(plugin, ((), ""))

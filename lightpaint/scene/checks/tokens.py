@@ -1,8 +1,8 @@
-"""The tokens of an XML file: tags, comments, declarations and their content.
+"""A tokenizer for XML files: tags, comments, declarations and their content.
 
-It reads everything that Mitsuba's parser (pugixml) tolerates: a bare `&` or `<` in an attribute,
+It accepts everything that Mitsuba's parser (pugixml) tolerates: a bare `&` or `<` in an attribute,
 `--` in a comment, white space before the XML declaration. Positions are byte offsets into the UTF-8
-form of the text, byte-order mark included, as that parser counts them.
+text including a byte-order mark, as that parser counts them.
 """
 
 import codecs
@@ -21,7 +21,7 @@ _MARKS = {
     codecs.BOM_UTF32_BE: "utf-32-be",
     codecs.BOM_UTF16_LE: "utf-16-le",
     codecs.BOM_UTF16_BE: "utf-16-be",
-    # Without a byte-order mark, by the first character, which is `<`.
+    # Without a byte-order mark, detected by the first character, `<`.
     b"<\0\0\0": "utf-32-le",
     b"\0\0\0<": "utf-32-be",
     b"<\0": "utf-16-le",
@@ -29,11 +29,11 @@ _MARKS = {
 }
 _LATIN = re.compile(rb"<\?xml[^>]*?encoding\s*=\s*[\"'](?:iso-8859-1|latin1)[\"']", re.IGNORECASE)
 
-# Possessive (`*+`): broken text fails at once instead of backtracking forever.
+# Possessive quantifiers (`*+`), so that invalid text fails at once instead of backtracking forever.
 _NAME = rb"[A-Za-z_:\x80-\xff][\w:.\-\x80-\xff]*+"
 _QUOTED = rb"""(?:"[^"]*+"|'[^']*+')"""
 _SKIPPED = rb"<!--(?s:.*?)-->|<\?(?s:.*?)\?>"  # XML declarations look like processing instructions
-#: Declarations inside a document type, one level deep.
+#: Declarations inside a document type declaration, one level deep.
 _DECLARATION = rb"<!(?:%b|[^\"'>])*+>" % _QUOTED
 _MARKUP = re.compile(
     rb"%b|<!\[CDATA\[(?s:.*?)\]\]>"
@@ -48,7 +48,9 @@ _ENTITIES = {"lt": "<", "gt": ">", "amp": "&", "quot": '"', "apos": "'"}
 
 
 def encoding_of(raw: bytes) -> str:
-    """Return the encoding as Mitsuba's parser detects it; it heeds no declaration but Latin-1."""
+    """Return the encoding that Mitsuba's parser detects; it ignores all declarations except
+    Latin-1.
+    """
     for mark, name in _MARKS.items():
         if raw.startswith(mark):
             return name
@@ -56,10 +58,11 @@ def encoding_of(raw: bytes) -> str:
 
 
 def markup(text: bytes) -> Iterator[re.Match[bytes]]:
-    """Yield everything in angle brackets, in order; raise ValueError for a `<` that opens nothing.
+    """Yield all tokens in angle brackets, in order. Raises ValueError for a `<` that starts no
+    token.
 
-    text: in UTF-8, or nearly. Groups of a start tag are `tag`, `attributes` and `empty`, its `/`;
-    that of an end tag is `end`, its name.
+    text: UTF-8, possibly with invalid bytes. A start tag has the groups `tag`, `attributes` and
+    `empty` (its `/`), an end tag the group `end` (its name).
     """
     position = text.find(b"<")
     while position >= 0:
@@ -72,7 +75,7 @@ def markup(text: bytes) -> Iterator[re.Match[bytes]]:
 
 
 def attributes(tag: re.Match[bytes]) -> dict[str, str]:
-    """Return attributes by name, white space and references resolved; of repeats the first."""
+    """Return attributes by name, with references resolved; of repeated attributes the first."""
     values: dict[str, str] = {}
     for key, quoted in _ATTRIBUTE.findall(tag["attributes"]):
         value = re.sub(r"\r\n|[\r\n\t]", " ", decoded(quoted[1:-1]))
@@ -81,12 +84,12 @@ def attributes(tag: re.Match[bytes]) -> dict[str, str]:
 
 
 def line_of(text: bytes, offset: int) -> int:
-    """Return the number of the line at a byte offset, from 1."""
+    """Return the line number of a byte offset, counted from 1."""
     return text.count(b"\n", 0, offset) + 1
 
 
 def decoded(text: bytes) -> str:
-    """Return text as Unicode; invalid bytes are replaced."""
+    """Return text as Unicode, with invalid bytes replaced."""
     return text.decode("utf-8", "replace")
 
 
@@ -99,7 +102,7 @@ def _character(reference: re.Match[str]) -> str:
 
 
 def place_of_node(state: Any, node: Any) -> str:
-    """Return the place of a node of a parsed scene, in words; "" if it is in no file."""
+    """Return file and line of a node of a parsed scene as text; "" if it is not in a file."""
     try:
         file = Path(str(state.files[node.file_index]))
         line = line_of(file.read_bytes(), int(node.offset))
@@ -110,11 +113,11 @@ def place_of_node(state: Any, node: Any) -> str:
 
 
 def tag(element: str, /, **attributes: str) -> str:
-    """Return an empty element, with its attributes escaped.
+    """Return an empty element with escaped attributes.
 
-    Raises SceneError if one holds a `$`, which cannot be escaped.
+    Raises SceneError if an attribute contains `$`, which cannot be escaped.
     """
-    # It brings half of the network's protocols along.
+    # Imported late, since it imports many network modules.
     from xml.sax.saxutils import quoteattr
 
     for key, value in attributes.items():

@@ -1,8 +1,8 @@
-"""Checks of a scene's XML, before Mitsuba parses it and right after.
+"""Checks of a scene's XML, immediately before and after Mitsuba parses it.
 
-Mitsuba's parser accepts anything: elements or references nested until the stack overflows, includes
-and parameters that multiply without end, pipes that never answer. These functions walk through the
-same text within limits, and each of these faults is a SceneError of one line.
+Mitsuba's parser accepts everything: nesting until the stack overflows, includes and parameters that
+multiply without end, pipes that never answer. These functions read the same text within limits, and
+report each such fault as a SceneError.
 """
 
 import re
@@ -17,20 +17,20 @@ from lightpaint.file_reading import file_length, read_bytes
 from lightpaint.files import one_line
 from lightpaint.scene.checks.tokens import attributes, encoding_of, line_of, markup
 
-#: Most bytes of XML in all; a file that is included twice counts twice.
+#: Maximum size of all XML in bytes; a file that is included twice counts twice.
 MAX_XML = 2**26
-#: Most elements that create an object; each costs Mitsuba about 20 kB and 0.1 ms.
+#: Maximum number of elements that create an object; each costs Mitsuba about 20 kB and 0.1 ms.
 MAX_OBJECTS = 100_000
-#: Most included files, and deepest nesting of elements or references.
+#: Maximum number of included files, and maximum nesting of elements or references.
 MAX_INCLUDES = 10_000
 MAX_NESTING = 100
-#: Most elements of any kind, and most searches for a parameter in a value.
+#: Maximum number of elements of any kind, and of searches for a parameter in a value.
 MAX_ELEMENTS = 1_000_000
 MAX_LOOKUPS = 10_000_000
-#: Longest value of an attribute after its parameters are substituted.
+#: Maximum length of an attribute value after substitution of parameters.
 MAX_VALUE = 2**16
 
-#: Elements that change what is read, or from where.
+#: Elements that change which files are read.
 _FOLLOWED = (b"default", b"path", b"include", b"spectrum")
 _OBJECTS = frozenset(
     b"bsdf emitter field film integrator medium phase rfilter sampler scene sensor shape texture "
@@ -39,16 +39,17 @@ _OBJECTS = frozenset(
 
 
 def check_xml(path: Path, parameters: Mapping[str, str], resolver: Any) -> None:
-    """Raise SceneError unless Mitsuba can parse the XML at `path` and its includes within limits.
+    """Raise SceneError unless Mitsuba can parse the XML at `path` and its includes within the
+    limits.
 
-    parameters: values of its `$name`; resolver: a mi.FileResolver with the folder of `path`. Other
-    faults are left to Mitsuba.
+    parameters: values of `$name` parameters. resolver: an mi.FileResolver that includes the folder
+    of `path`. Other faults are left to Mitsuba.
     """
     _Walk(parameters).file(path, resolver, 0, ())
 
 
 def check_nodes(path: Path, state: Any) -> None:
-    """Raise SceneError unless a scene can be built of what Mitsuba has parsed.
+    """Raise SceneError unless a scene can be built from what Mitsuba has parsed.
 
     References between objects must be at most MAX_NESTING deep, and all numbers finite as float32.
     Cycles are left to Mitsuba.
@@ -85,7 +86,9 @@ def check_nodes(path: Path, state: Any) -> None:
 
 
 def _deepest(children: Sequence[Sequence[int]]) -> int:
-    """Return the length of the longest path from a node downwards, with cycles cut open."""
+    """Return the length of the longest downward path from any node; edges that close a cycle are
+    ignored.
+    """
     depth = [0] * len(children)  # of the subtree; -1 while it is being computed
     done = [False] * len(children)
     for root in range(len(children)):
@@ -105,18 +108,19 @@ def _deepest(children: Sequence[Sequence[int]]) -> int:
 
 
 class _Walk:
-    """A walk through a scene's files in the order in which Mitsuba parses them."""
+    """A traversal of a scene's files in the order in which Mitsuba parses them."""
 
     def __init__(self, parameters: Mapping[str, str]) -> None:
         self.parameters = {f"${name}": value for name, value in parameters.items()}
         self.bytes = self.elements = self.objects = self.includes = self.looked_up = 0
-        # A file may be included thousands of times, but it is read only once.
+        # A file may be included thousands of times, but is read only once.
         self.contents: dict[Path, bytes] = {}
 
     def file(self, path: Path, resolver: Any, depth: int, chain: tuple[Path, ...]) -> None:
-        """Walk through a file.
+        """Traverse a file.
 
-        depth: that of the element that includes it; chain: the files that include each other.
+        depth: nesting depth of the element that includes it. chain: the including files, outermost
+        first.
         """
         import mitsuba as mi
 
@@ -174,7 +178,7 @@ class _Walk:
     def _element(
         self, token: re.Match[bytes], resolver: Any, depth: int, chain: tuple[Path, ...]
     ) -> None:
-        """Follow an element. Raises ValueError for faults whose place the caller adds."""
+        """Process an element. Raises ValueError for faults; the caller adds their position."""
         tag = token["tag"]
         if b"$" not in token["attributes"] and tag not in _FOLLOWED:
             return
@@ -202,7 +206,7 @@ class _Walk:
         self.looked_up += len(self.parameters)
         if self.looked_up > MAX_LOOKUPS:
             raise ValueError("too many parameters are used too often: use fewer")
-        # The longest name first, since one name may begin with another.
+        # Longest name first, since one name may be a prefix of another.
         for key in sorted((k for k in self.parameters if k in text), key=len, reverse=True):
             value = self.parameters[key]
             if len(text) + text.count(key) * len(value) > MAX_VALUE:
@@ -228,5 +232,5 @@ def _as_utf8(raw: bytes) -> bytes:
 
 
 def _resolved(resolver: Any, name: str) -> str:
-    # Mitsuba's names contain neither invalid Unicode nor NUL.
+    # Mitsuba's file names contain neither invalid Unicode nor NUL.
     return str(resolver.resolve(name.encode("utf-8", "replace").decode().replace("\0", "?")))

@@ -1,4 +1,4 @@
-"""Lights as people adjust them: one emitter, or several tied together under one weight."""
+"""Lights as users adjust them: one emitter, or several sharing one weight."""
 
 import itertools
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -11,26 +11,26 @@ from lightpaint.scene.plane_identity import combined_identity
 from lightpaint.scene.properties.emission import AS_AUTHORED, MULTIPLE, EmitterSetting, Scaling
 from lightpaint.screen import some_names
 
-#: Parameter of a light whose emission is a multiple of the scene's own.
+#: Parameter of a light whose emission is a multiple of that in the scene.
 WHOLE_EMISSION = "emission"
 
 
 def free_names(stem: str, count: int, taken: Collection[str]) -> list[str]:
-    """Return `stem_1`, `stem_2` … without names that are taken."""
+    """Return the first `count` of `stem_1`, `stem_2` … that are not taken."""
     numbered = (f"{stem}_{k}" for k in itertools.count(1))
     return list(itertools.islice((name for name in numbered if name not in taken), count))
 
 
 @dataclass(frozen=True)
 class Light:
-    """A light that people adjust: one emitter, or several tied together under one weight.
+    """A light as users adjust it: one emitter, or several sharing one weight.
 
-    parameter, unit: meaning of one unit of weight. With the unit MULTIPLE the weight multiplies
-    each member's own emission; with any other it is the emission of each.
+    parameter, unit: what a weight means. With the unit MULTIPLE the weight multiplies each member's
+    own emission; with any other unit it is the emission of each member.
     emission: present RGB emission in `unit`.
-    is_scalar: True if it has one weight for all channels instead of three. is_fixed: True for the
-    light of all emitters that stay as they are, with weight 1. is_found: True if its members were
-    tied automatically, since they are many, similar and unnamed.
+    is_scalar: whether it has one weight for all channels instead of three. is_fixed: whether it is
+    the light of all emitters that stay as they are, with weight 1. is_found: whether its members
+    were grouped automatically because they are many, similar and unnamed.
     """
 
     name: str
@@ -56,19 +56,19 @@ class Light:
 
     @property
     def plugin(self) -> str:
-        """Mitsuba's name of the emitter plugin; `area + point` if members differ."""
+        """Mitsuba's name of the emitter plugin; `area + point` if its members differ."""
         return " + ".join(dict.fromkeys(member.plugin for member in self.members))
 
     @property
     def form(self) -> str:
-        """Place and size in words; for several emitters, their names."""
+        """Position and size as text; for several emitters, their names."""
         if len(self.members) == 1:
             return self.members[0].form
         return f"{len(self.members)} emitters: {some_names(self.member_names)}"
 
     @property
     def unit_flux(self) -> RGB | None:
-        """Watts per channel at an emission of 1, of all members together.
+        """Watts per channel of all members together at an emission of 1.
 
         None if the flux of any member is unknown.
         """
@@ -81,10 +81,10 @@ class Light:
         return total[0], total[1], total[2]
 
     def identity(self, unlit_content: str) -> str:
-        """Return the identity of its image at unit emission, in a scene of that `unlit_content`.
+        """Return the identity of its image at unit emission, in a scene with this `unlit_content`.
 
-        Equal for lights whose images are equal but for noise, whatever they are called and however
-        bright they are; "" where a member stands in no file.
+        Lights whose images are equal up to noise have equal identities, whatever their names and
+        brightness. "" if a member is not in a file.
         """
         if self.is_fixed:
             digests = [m.digest and m.digest.as_is for m in self.members]
@@ -97,7 +97,7 @@ class Light:
         return combined_identity(unlit_content, self.is_fixed, self.unit, sorted(map(str, digests)))
 
     def emission_of(self, member: Emitter, emission: RGB) -> RGB:
-        """Return the emission of `member`, in its own unit, if this light has `emission`."""
+        """Return the emission of `member` in its own unit when this light has `emission`."""
         if self.unit != MULTIPLE:
             return emission
         r, g, b = (w * factor for w, factor in zip(emission, member.emission, strict=True))
@@ -105,11 +105,11 @@ class Light:
 
 
 def tie(name: str, members: Sequence[Emitter]) -> Light:
-    """Return the light `name` of emitters that share one weight.
+    """Return a light called `name` whose emitters share one weight.
 
-    If all have the same colour in the same unit, or all are black, that colour is the unknown.
-    Otherwise the unknown is a factor, and they keep their proportions. Raises SceneError if all are
-    black and differ in kind, so that there are no proportions.
+    If all have the same colour in the same unit, or all are black, the weight is that colour.
+    Otherwise it is a factor, and the emitters keep their proportions. Raises SceneError if all are
+    black and of different kinds, so that their proportions are undefined.
     """
     kinds = {member.kind for member in members}
     first = members[0]
@@ -139,16 +139,17 @@ def _is_colour(emitter: Emitter) -> bool:
 
 
 def keep(name: str, emitters: Sequence[Emitter]) -> Light:
-    """Return the fixed light `name` of all `emitters` that stay as they are."""
+    """Return a fixed light called `name` with all `emitters` that stay as they are."""
     return Light(name, tuple(emitters), WHOLE_EMISSION, MULTIPLE, AS_AUTHORED, is_fixed=True)
 
 
 def lights_of(
     emitters: Sequence[Emitter], members: Mapping[str, Sequence[str]], fixed: Collection[str]
 ) -> tuple[Light, ...]:
-    """Return the lights `members` (name → names of its emitters); those in `fixed` are kept.
+    """Return the lights `members` (name → names of its emitters), of which those in `fixed` are
+    fixed.
 
-    Raises SceneError if an adjusted light has an emitter that cannot be scaled.
+    Raises SceneError if a light to adjust has an emitter that cannot be scaled.
     """
     by_name = {emitter.name: emitter for emitter in emitters}
     lights = []
@@ -161,7 +162,7 @@ def lights_of(
 
 
 def light_named(name: str, lights: Sequence[Light], *, scene: str) -> Light:
-    """Return the light called `name`. Raises SceneError if there is none."""
+    """Return the light called `name`. Raises SceneError if it does not exist."""
     for light in lights:
         if light.name == name:
             return light
@@ -175,7 +176,7 @@ def settings_for(
     *,
     scene: str,
 ) -> dict[int, EmitterSetting]:
-    """Return the settings of emitters, by their nodes. emission: that of lights, by name."""
+    """Return emitter settings by node. emission: emission by light name."""
     settings: dict[int, EmitterSetting] = {}
     for name, rgb in emission.items():
         light = light_named(name, lights, scene=scene)
@@ -191,8 +192,8 @@ def settings_for(
     if not any(
         (sampling_weights | {node: x.sampling_weight for node, x in settings.items()}).values()
     ):
-        # Mitsuba refuses a scene in which no emitter may be sampled: black ones may, or the one
-        # that is hit by chance, where there are no others.
+        # Mitsuba rejects a scene without any sampled emitter. So sample black emitters, or the one
+        # that is hit by chance if there are no others.
         by_chance = {emitter.node for emitter in emitters if emitter.hit_by_chance}
         for node in settings.keys() - by_chance or settings.keys():
             settings[node] = replace(settings[node], sampling_weight=sampling_weights[node] or 1.0)
@@ -200,13 +201,13 @@ def settings_for(
 
 
 def _setting(emitter: Emitter, rgb: RGB) -> EmitterSetting:
-    # An emitter that the scene never samples is sampled again once it shines.
+    # An emitter with sampling weight 0 in the scene is sampled again when it emits light.
     weight = (emitter.sampling_weight or 1.0) if any(rgb) and not emitter.hit_by_chance else 0.0
     return EmitterSetting(emitter.kind, rgb, weight)
 
 
 def check_adjustable(emitters: Iterable[Emitter]) -> None:
-    """Raise SceneError for the first emitter that cannot be scaled."""
+    """Raise SceneError if an emitter cannot be scaled."""
     for emitter in emitters:
         if emitter.obstacle:
             raise SceneError(

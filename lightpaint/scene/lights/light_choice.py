@@ -1,6 +1,6 @@
-"""The choice of lights: which emitters are tied and which are adjusted, by names and patterns.
+"""Chooses which emitters are grouped and which lights are adjusted, by names and patterns.
 
-Everything is in document order; the emitters that are not adjusted come last, as one fixed light.
+Lights are in document order; the emitters that are not adjusted come last, as one fixed light.
 """
 
 import difflib
@@ -15,7 +15,7 @@ from lightpaint.scene.lights.similar_emitters import alike_groups, remove_separa
 from lightpaint.screen import some_names
 from lightpaint.validation import MAX_LISTED, MAX_NAME
 
-#: Name of the fixed light; underscores are added if another light has it.
+#: Name of the fixed light; underscores are added if another light has that name.
 REST = "rest"
 
 
@@ -28,15 +28,14 @@ def choose_lights(
     group_alike: bool = True,
     named: Iterable[str] = (),
 ) -> tuple[Light, ...]:
-    """Return the lights of a scene: its emitters, tied by `groups`; `lights` are adjusted.
+    """Return the lights of a scene: emitters grouped by `groups`, of which `lights` are adjusted.
 
     lights: names or patterns (`window_*`) of lights and groups; None for all.
-    groups: name → names or patterns of its emitters. scene: its name in errors. group_alike: True
-    to tie many similar emitters without names to one light (`alike_groups`), except those that
-    `lights` or `named`, names or patterns too, select one by one.
-
+    groups: name → names or patterns of its emitters. scene: its name in errors. group_alike:
+    whether many similar unnamed emitters become one light (`alike_groups`), except those that
+    `lights` or `named`, also names or patterns, select individually.
     Emitters that are not chosen, or cannot be scaled, form one fixed light. Raises SceneError for
-    names that do not exist, clash or are used twice, and if nothing is left to adjust.
+    names that do not exist, clash or are used twice, and if there is nothing left to adjust.
     """
     group_of = _members_of_groups(emitters, groups or {}, scene)
     similar: dict[str, tuple[Emitter, ...]] = {}
@@ -66,7 +65,9 @@ def _similar_lights(
     groups: Collection[str],
     patterns: Iterable[str],
 ) -> dict[str, tuple[Emitter, ...]]:
-    """Return lights of many similar emitters, without those in groups or selected alone."""
+    """Return lights of many similar emitters, excluding those in groups or selected
+    individually.
+    """
     free = [emitter for emitter in emitters if emitter.name not in group_of]
     similar = alike_groups(free, {*groups, *(emitter.name for emitter in emitters)})
     inside = {member.name for members in similar.values() for member in members}
@@ -94,7 +95,7 @@ def _with_rest(lights: Sequence[Light], emitters: Sequence[Emitter]) -> tuple[Li
 def _members_of_groups(
     emitters: Sequence[Emitter], groups: Mapping[str, Iterable[str]], scene: str
 ) -> dict[str, str]:
-    """Return the group of each emitter that is in one."""
+    """Return the group of each emitter that belongs to one."""
     names = [emitter.name for emitter in emitters]
     group_of: dict[str, str] = {}
     for group, patterns in groups.items():
@@ -146,7 +147,9 @@ def _chosen(
 
 
 def _matching(pattern: str, names: Sequence[str], place: str, scene: str) -> set[str]:
-    """Return the name itself, else all names that match the pattern. Raises SceneError if none."""
+    """Return the name itself, or else all names that match the pattern. Raises SceneError if none
+    do.
+    """
     if pattern in names:
         return {pattern}
     matches = {name for name in names if fnmatchcase(name, pattern)}
@@ -160,8 +163,8 @@ def _matching(pattern: str, names: Sequence[str], place: str, scene: str) -> set
 
 
 def _as_list(names: Iterable[str], place: str) -> list[str]:
-    """Return names as a list, after checking that there is at least one."""
-    # A string would otherwise count as a list of its letters.
+    """Return names as a list, checked to be non-empty."""
+    # A string would otherwise become a list of its letters.
     listed = [names] if isinstance(names, str) else list(names)
     if len(listed) > MAX_LISTED:
         raise SceneError(f"{place} lists {len(listed)} names: expected at most {MAX_LISTED}")

@@ -1,8 +1,8 @@
-"""The lights file: which lights to adjust and which to tie, in a TOML beside the scene.
+"""The lights file: a TOML file beside the scene that says which lights to adjust and to group.
 
-For `hall.xml` that is `hall.lights.toml`; docs/formats.md has the details. Its constraints and what
-it lets move are kept as they are; lighting/constraints/constraints_file.py and placement/rigging/
-read them.
+For `hall.xml` it is `hall.lights.toml`; docs/formats.md has the details. Constraints and permitted
+moves are stored unparsed; lighting/constraints/constraints_file.py and placement/rigging/ read
+them.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -21,19 +21,19 @@ SUFFIX = ".lights.toml"
 CONSTRAINTS = ("light", "tie", "prefer_current", "sparse")
 #: Older key for `prefer_current`, as in `prefer = { current = 0.01 }`.
 OLDER = ("prefer",)
-#: Keys of what may move, and those of a light in `[light.NAME]`.
+#: Keys of permitted moves, and those of a light in `[light.NAME]`.
 RIGGING, MOVES = ("on", "new", "pair"), ("move", "aim", "cone")
 KNOWN_KEYS = ("lights", "groups", "group_alike", *CONSTRAINTS, *RIGGING)
 
-#: Longest lights file that is read, in bytes.
+#: Maximum size of a lights file in bytes.
 MAX_BYTES = 2**20
 
 
 @dataclass(frozen=True)
 class SceneRequests:
-    """The constraints of a lights file and what it lets move, as they stand there.
+    """Constraints and permitted moves of a lights file, unparsed.
 
-    source: the file, for errors; "" if there is none, and so no constraints.
+    source: the file, for errors; "" if there is none, and hence no constraints.
     """
 
     keys: Mapping[str, Any] = field(default_factory=dict)
@@ -41,7 +41,7 @@ class SceneRequests:
 
     @classmethod
     def of(cls, path: Path, data: Mapping[str, Any]) -> "SceneRequests":
-        """Return the requests among all keys of the lights file at `path`."""
+        """Return the requests among the keys of the lights file at `path`."""
         keys = (*CONSTRAINTS, *OLDER, *RIGGING)
         return cls({key: data[key] for key in keys if key in data}, str(path))
 
@@ -55,10 +55,10 @@ class SceneRequests:
 
 @dataclass(frozen=True)
 class LightsFile:
-    """The content of a lights file. path: None if there is none.
+    """The content of a lights file. path: None if there is no file.
 
-    lights, groups, group_alike: as in `choose_lights`. requests: the constraints on lights and what
-    may move.
+    lights, groups, group_alike: as in `choose_lights`. requests: constraints on lights, and
+    permitted moves.
     """
 
     path: Path | None = None
@@ -70,7 +70,9 @@ class LightsFile:
     def with_more(
         self, lights: Iterable[str] | None, groups: Mapping[str, Iterable[str]] | None
     ) -> "LightsFile":
-        """Return the content with arguments: `lights` replaces its own, `groups` are added."""
+        """Return the content combined with arguments: `lights` replaces its own, `groups` are
+        added.
+        """
         groups = groups or {}
         if lights is None and self.lights is not None:
             # A group given as an argument is meant to be adjusted.
@@ -86,7 +88,7 @@ def lights_file_beside(scene: Path) -> Path:
 def lights_file_for(
     scene: Path, path_given: str | Path | None, *, beside_scene: bool
 ) -> LightsFile:
-    """Return the content of the file `path_given`, else of the one beside `scene` if allowed."""
+    """Return the content of `path_given`, or else of the file beside `scene` if permitted."""
     if path_given is not None:
         return read_lights_file(Path(path_given))
     path = lights_file_beside(scene)
@@ -96,7 +98,7 @@ def lights_file_for(
 def read_lights_file(path: Path) -> LightsFile:
     """Read a lights file.
 
-    Raises SceneError with the line of the TOML's error, or with the wrong key.
+    Raises SceneError with the line of a TOML error, or with the wrong key.
     """
     data = read_keys(path)
     groups, group_alike = data.get("groups", {}), data.get("group_alike", True)
@@ -118,7 +120,7 @@ def read_lights_file(path: Path) -> LightsFile:
 
 
 def read_keys(path: Path) -> dict[str, Any]:
-    """Return all keys of a lights file, none of them unknown. Raises SceneError."""
+    """Return all keys of a lights file. Raises SceneError if one is unknown."""
     text = read_text(path, "lights file", SceneError, limit=MAX_BYTES, may_be_empty=True)
     try:
         data = strict_toml(text)
@@ -140,7 +142,7 @@ def read_keys(path: Path) -> dict[str, Any]:
 
 
 def _texts(value: Any) -> Iterator[str]:
-    """Yield all strings in lists, and in the `lights` of tables."""
+    """Yield all strings in lists, and in the `lights` of tables, at any depth."""
     if isinstance(value, str):
         yield value
     elif isinstance(value, dict):

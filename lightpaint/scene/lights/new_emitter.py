@@ -1,7 +1,6 @@
-"""An emitter to add to a scene: a point, a spot or a panel, and its element of the XML.
+"""An emitter to add to a scene: a point, a spot or a panel, and its XML element.
 
-The element is what is written to files and what Mitsuba's parser makes nodes of in memory, so both
-are the same scene.
+The same element is written to files and parsed by Mitsuba in memory, so both give the same scene.
 """
 
 from collections.abc import Sequence
@@ -35,19 +34,18 @@ PLUGIN_OF: dict[NewKind, str] = {"point": "point", "spot": "spot", "panel": "are
 @keywords()
 @dataclass(frozen=True)
 class NewEmitter:
-    """An emitter that no scene has yet; see `Scene.with_new_emitters`.
+    """An emitter to be added to a scene; see `Scene.with_new_emitters`.
 
     Attributes:
-        name: Its id, which nothing in the scene has.
-        kind: `point`, `spot`, or `panel`, a rectangle that shines to its front and reflects
+        name: Its id, which must be new to the scene.
+        kind: `point`, `spot`, or `panel`, a rectangle that emits from its front and reflects
             nothing.
-        pose: Where it hangs; also the target that a spot or a panel points at, and the cone of a
-            spot.
-        size: Width and height of a panel, in units of the scene.
-        emission: Its RGB intensity in W/sr; of a panel, its radiance in W/(m² sr).
+        pose: Its position; for a spot or a panel also its target, and for a spot its cone.
+        size: Width and height of a panel, in scene units.
+        emission: RGB intensity in W/sr; for a panel, radiance in W/(m² sr).
 
     Raises:
-        SceneError: For values that no light can have.
+        SceneError: If a value is invalid for such a light.
 
     Examples:
         >>> lp.NewEmitter("key", "spot", lp.Pose(position=(0, 3, 1), target=(0, 0, 0))).plugin
@@ -70,7 +68,7 @@ class NewEmitter:
         if self.pose.position is None:
             raise SceneError(f"new light {self.name!r} has no position: give its pose one")
         if self.kind == "point":
-            # A pose whose light points nowhere.
+            # A point light has no direction.
             object.__setattr__(self, "pose", Pose(position=self.pose.position))
         elif self.pose.target is None:
             raise SceneError(f"new light {self.name!r} points nowhere: give its pose a target")
@@ -82,12 +80,12 @@ class NewEmitter:
 
     @property
     def plugin(self) -> str:
-        """Mitsuba's name of its plugin."""
+        """Mitsuba's name of the plugin."""
         return PLUGIN_OF[self.kind]
 
     @property
     def site(self) -> Site:
-        """Its place, direction and cone."""
+        """Its position, direction and cone."""
         place, target = self.pose.position, self.pose.target
         if target is None:
             return Site(place)
@@ -102,9 +100,9 @@ class NewEmitter:
         return cutoff, min(beam, cutoff)
 
     def lines(self, emission: RGB | None = None, *, is_sampled: bool = True) -> list[str]:
-        """Return its element, line by line.
+        """Return its XML element, line by line.
 
-        emission: instead of its own. is_sampled: False for one that renders are not to sample.
+        emission: overrides its own. is_sampled: False if renders must not sample it.
         """
         rgb = self.emission if emission is None else emission
         colour = " ".join(f"{np.float32(v):.9g}" for v in rgb)
@@ -156,13 +154,13 @@ class NewEmitter:
 
 
 def new_emitter_at(place: EmitterPlace) -> NewEmitter:
-    """Return the new emitter of an answer, at unit emission. Raises SceneError for what is none."""
+    """Return the new emitter of an answer, at unit emission. Raises SceneError if it is invalid."""
     assert place.new
     return NewEmitter(place.name, place.new, pose_of(place.site), place.size)
 
 
 def moved_emitter(emitter: NewEmitter, site: Site, target: Position | None) -> NewEmitter:
-    """Return a new emitter at another site. target: the point it points at, if one was named."""
+    """Return a new emitter at another site. target: the point it aims at, if one was given."""
     assert site.position is not None
     if target is None and site.direction is not None:
         x, y, z = (float(a + b) for a, b in zip(site.position, site.direction, strict=True))

@@ -1,7 +1,7 @@
-"""Many similar emitters without names form one light, unless the user separates them.
+"""Combines many similar unnamed emitters into one light, unless the user separates them.
 
-A street of three hundred lamps without ids would be three hundred unknowns that nobody can tell
-apart by `area_217`, and take three hundred planes of the basis.
+A street of three hundred lamps without ids would otherwise be three hundred unknowns with
+meaningless names such as `area_217`, and take three hundred planes of the basis.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -10,20 +10,20 @@ from itertools import count, pairwise
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.properties.emission import Scaling
 
-#: Up to this number, similar emitters stay separate: they can be inspected one by one.
+#: Maximum number of similar emitters that stay separate, since they can be inspected one by one.
 MAX_SEPARATE = 24
 
-#: Largest ratio of two sizes that count as equal: rotation in float32 changes them slightly.
+#: Maximum ratio of two sizes that count as equal: float32 rotations change them slightly.
 SIZE_TOLERANCE = 1.001
 
 
 def alike_groups(
     emitters: Sequence[Emitter], taken: Collection[str]
 ) -> dict[str, tuple[Emitter, ...]]:
-    """Return name of a light → its emitters, of more than MAX_SEPARATE similar, unnamed ones.
+    """Return light name → its emitters, for more than MAX_SEPARATE similar, unnamed emitters.
 
-    Similar emitters have the same plugin and emission and belong to the same material, file or
-    parent or, if that has no name, have the same size. taken: names that no light may have.
+    Similar emitters have the same plugin and emission, and belong to the same material, file or
+    parent, or have the same size if that has no name. taken: names that lights must not have.
     """
     by_kind: dict[object, list[Emitter]] = {}
     for emitter in emitters:
@@ -42,7 +42,9 @@ def alike_groups(
 def remove_separated(
     groups: Mapping[str, Sequence[Emitter]], separated: Collection[str]
 ) -> dict[str, tuple[Emitter, ...]]:
-    """Return the groups without the emitters of these names; single ones are dropped."""
+    """Return the groups without the `separated` emitters; groups with a single emitter are
+    dropped.
+    """
     left = {
         name: tuple(emitter for emitter in emitters if emitter.name not in separated)
         for name, emitters in groups.items()
@@ -57,7 +59,7 @@ def _is_lamp(emitter: Emitter) -> bool:
 
 
 def _of_one_size(emitters: Sequence[Emitter]) -> Iterator[list[Emitter]]:
-    """Yield runs of emitters whose sizes follow each other without a gap."""
+    """Yield groups of emitters with equal sizes, up to SIZE_TOLERANCE between neighbours."""
     by_size = sorted(emitters, key=lambda emitter: (emitter.unit_flux or 0.0, emitter.node))
     run = by_size[:1]
     for smaller, larger in pairwise(by_size):

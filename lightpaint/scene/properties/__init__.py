@@ -1,1 +1,1 @@
-"""Emission, pose, film and integrator: how each is read from a scene, and how it is changed."""
+"""Emission, pose, film and integrator: reading them from a scene, and changing them."""

@@ -1,4 +1,4 @@
-"""The emission of each kind of emitter: its unit, and how it is read and set."""
+"""The emission of each kind of emitter: its unit, reading and setting."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -9,16 +9,16 @@ import numpy as np
 from lightpaint.arrays import RGB
 from lightpaint.errors import SceneError
 
-#: The emission of an unchanged light, if the unit is a multiple of the scene's own.
+#: The emission of an unchanged light if the unit is a multiple of that in the scene.
 AS_AUTHORED: RGB = (1.0, 1.0, 1.0)
 
 
 class Scaling(Enum):
-    """The part of the scene file that carries the emission of a light.
+    """The part of the scene file that defines the emission of a light.
 
-    COLOUR: one RGB colour; its unit is white, whatever the scene says.
-    IMAGE: a bitmap, scaled per channel; its unit is the image as authored.
-    FACTORS: numbers that scale the light as a whole, not per channel; unit as authored.
+    COLOUR: one RGB colour; the unit is white, whatever the colour in the scene.
+    IMAGE: a bitmap, scaled per channel; the unit is the image as authored.
+    FACTORS: numbers that scale the whole light, not per channel; the unit is the light as authored.
     """
 
     COLOUR = "colour"
@@ -28,7 +28,7 @@ class Scaling(Enum):
 
 @dataclass(frozen=True)
 class EmissionKind:
-    """The scaling of a light, the parameter of its plugin, and the unit of its emission.
+    """A way of scaling a light: its plugin parameter, and the unit of its emission.
 
     factors: names of the numbers that scale it, for FACTORS.
     """
@@ -44,10 +44,10 @@ class EmissionKind:
         return self.scaling is Scaling.FACTORS
 
 
-#: Unit of lights whose emission is a multiple of the scene's own.
+#: Unit of lights whose emission is a multiple of that in the scene.
 MULTIPLE = "× as authored"
 
-#: (parameter of the emission, unit) of the supported emitters.
+#: Emission parameter and its unit, for the supported emitters.
 PLUGINS = {
     "area": ("radiance", "W/(m² sr)"),
     "constant": ("radiance", "W/(m² sr)"),
@@ -59,7 +59,7 @@ PLUGINS = {
     "sunsky": ("radiance", "W/(m² sr)"),
 }
 
-#: The emitters that surround the scene.
+#: Emitters that surround the scene.
 ENVIRONMENTS = ("constant", "envmap", "sunsky")
 
 
@@ -83,7 +83,7 @@ def emission_kind(emitter: Any, plugin: str) -> EmissionKind | None:
 
 
 def read_emission(emitter: Any, kind: EmissionKind | None, name: str) -> RGB:
-    """Return the emission of a loaded Mitsuba emitter, as linear RGB in the unit of `kind`.
+    """Return the emission of a loaded Mitsuba emitter as linear RGB in the unit of `kind`.
 
     It is read from the loaded object, since the XML may contain a spectrum, a preset or nothing at
     all. Raises SceneError for values that are not an RGB colour.
@@ -104,7 +104,7 @@ def read_emission(emitter: Any, kind: EmissionKind | None, name: str) -> RGB:
 
 
 def why_not_adjusted(plugin: str, kind: EmissionKind | None, emission: RGB) -> str:
-    """Return why a light cannot be solved for, in words that follow its name; "" if it can."""
+    """Return why a light cannot be adjusted, phrased to follow its name; "" if it can."""
     if plugin not in PLUGINS:
         return f"is a {plugin} emitter, which lightpaint cannot scale"
     if kind is None:
@@ -117,9 +117,9 @@ def why_not_adjusted(plugin: str, kind: EmissionKind | None, emission: RGB) -> s
 
 @dataclass(frozen=True)
 class EmitterSetting:
-    """A setting of an emitter: emission in the unit of `kind`, and sampling weight.
+    """Settings of an emitter: emission in the unit of `kind`, and sampling weight.
 
-    kind: None for an emitter that cannot be scaled, only removed: its emission is black.
+    kind: None for an emitter that cannot be scaled but only be made black.
     """
 
     kind: EmissionKind | None
@@ -128,7 +128,7 @@ class EmitterSetting:
 
 
 def set_emission(state: Any, node: int, setting: EmitterSetting, *, on_shape: bool) -> None:
-    """Set the emitter `node` of a parser's state, before a scene is built of it."""
+    """Apply a setting to the emitter `node` of a parser state, before a scene is built from it."""
     import mitsuba as mi
 
     kind, rgb = setting.kind, setting.emission
@@ -141,13 +141,13 @@ def set_emission(state: Any, node: int, setting: EmitterSetting, *, on_shape: bo
     if kind.scaling is Scaling.COLOUR:
         props[kind.parameter] = mi.ScalarColor3f(*rgb)
     elif kind.scaling is Scaling.FACTORS:
-        # The factors are in the emitter itself or in its texture.
+        # The factors belong to the emitter or to its texture.
         texture = child_named(state, node, kind.parameter)
         owner = props if texture is None else state.nodes[texture].props
         for factor in kind.factors:
             owner[factor] = float(owner.get(factor, 1.0)) * rgb[0]
     elif not any(rgb):
-        # Emitters with a bitmap have a scale beside it, except area lights.
+        # Emitters with a bitmap also have a scale, except area lights.
         if props.plugin_name() == "area":
             props[kind.parameter] = mi.ScalarColor3f(0)
         else:
@@ -159,12 +159,12 @@ def set_emission(state: Any, node: int, setting: EmitterSetting, *, on_shape: bo
 
 
 def _darken(props: Any, *, on_shape: bool) -> None:
-    """Replace an emitter that has no numbers to change with a black one."""
+    """Turn an emitter that cannot be scaled into a black one."""
     import mitsuba as mi
 
     for key in list(props):
         del props[key]
-    # The shape keeps an emitter: without one it would get another surface.
+    # The shape must keep an emitter, or its surface would change.
     props.set_plugin_name("area" if on_shape else "point")
     props["radiance" if on_shape else "intensity"] = mi.ScalarColor3f(0)
 

@@ -1,8 +1,8 @@
-"""The film of a sensor, whole or reduced so that each pixel is a block of full-size pixels.
+"""The film of a sensor, in full size or reduced so that each pixel is a block of full-size pixels.
 
-Only then is a box-filtered render on the small film the block mean of one on the large film, so
-that a painting or a verification of full size can be compared with it exactly. If film, crop window
-and offset are whole multiples of the blocks, Mitsuba's own film is made smaller. Any other film
+Only then is a box-filtered render on the reduced film the block mean of a full-size one, so that a
+painting or a verification in full size can be compared with it exactly. If film size, crop window
+and offset are multiples of the block size, Mitsuba's own film is made smaller. Otherwise the film
 keeps its size, its crop window is cut to whole blocks, and a pixel is the mean of a block.
 """
 
@@ -17,19 +17,19 @@ from lightpaint.errors import SceneError
 from lightpaint.images.pixel_blocks import blocks_in, left_over, whole_factor
 from lightpaint.screen import some_names
 
-#: Most pixels of a film, and most samples per pixel: larger numbers are mistakes.
+#: Maximum number of pixels of a film, and maximum samples per pixel: larger numbers are mistakes.
 MAX_PIXELS = 2**28
 MAX_SPP = 2**20
 
-#: Sizes that an error lists.
+#: Maximum number of sizes that an error lists.
 LISTED_SIZES = 8
 
 
 @dataclass(frozen=True)
 class Film:
-    """The film of a sensor: sizes of the whole and of its crop window, in pixels.
+    """The film of a sensor: its size and its crop window, in pixels.
 
-    sensor: its index in the scene. block: side of the blocks of film pixels that form a pixel of
+    sensor: its index in the scene. block: side in film pixels of the block that forms a pixel of
     the picture. All pairs are (x, y).
     """
 
@@ -51,21 +51,23 @@ class Film:
 
     @property
     def pixels(self) -> tuple[int, int]:
-        """Size of the picture."""
+        """Size of the picture in pixels."""
         return blocks_in(self.crop_size, self.block)
 
     @property
     def left_out(self) -> tuple[int, int]:
-        """Columns at the right and rows at the bottom that form no whole block."""
+        """Columns at the right and rows at the bottom that do not fill a block."""
         return left_over(self.crop_size, self.block)
 
     @property
     def block_pixels(self) -> int:
-        """Pixels of Mitsuba's film in a pixel of the picture: also its least number of samples."""
+        """Number of film pixels in a pixel of the picture, which is also its minimum number of
+        samples.
+        """
         return self.block**2
 
     def load(self) -> Any:
-        """Load a box-filtered RGB float32 film of all blocks into Mitsuba."""
+        """Create a Mitsuba film with a box filter and RGB float32 pixels, covering all blocks."""
         import mitsuba as mi
 
         width, height = (side * self.block for side in self.pixels)
@@ -92,7 +94,9 @@ def even_reductions(film: Film) -> list[int]:
 
 
 def reduction_to(film: Film, pixels: int) -> int:
-    """Return the smallest factor that reduces `film` to `pixels`, or a near one without rest."""
+    """Return the smallest factor that reduces `film` to at most `pixels`, or a slightly larger one
+    if that divides the film evenly.
+    """
     width, height = film.pixels
     enough = math.isqrt(max(width * height - 1, 0) // pixels) + 1
     smallest = min(enough, width, height)
@@ -101,7 +105,7 @@ def reduction_to(film: Film, pixels: int) -> int:
 
 
 def check_resolution(resolution: str) -> re.Match[str]:
-    """Return the match of a part, `1/4`, or a size, `320x180`. Raises SceneError otherwise."""
+    """Return the match of a fraction, `1/4`, or a size, `320x180`. Raises SceneError otherwise."""
     match = re.fullmatch(r"1/(\d{1,9})|(\d{1,9})x(\d{1,9})", resolution)
     if match is None:
         raise SceneError(f"{resolution!r} is not a resolution: expected one like 1/4 or 320x180")
@@ -109,9 +113,9 @@ def check_resolution(resolution: str) -> re.Match[str]:
 
 
 def reduction(film: Film, resolution: str) -> int:
-    """Return the factor that `resolution`, `1/4` or `320x180`, means for `film`.
+    """Return the reduction factor for a `resolution` such as `1/4` or `320x180`.
 
-    A size is that of the picture. Raises SceneError if no square blocks give that size.
+    A size is that of the picture. Raises SceneError if no square blocks result in that size.
     """
     match = check_resolution(resolution)
     part, width, height = (int(number or 0) for number in match.groups())
@@ -128,7 +132,9 @@ def reduction(film: Film, resolution: str) -> int:
 
 
 def _possible(film: Film, width: int) -> str:
-    """Return sizes that `film` can be reduced to: near a `width` > 0, and without remainder."""
+    """Return sizes to which `film` can be reduced: near `width` if that is > 0, and without
+    remainder.
+    """
     nearest = film.pixels[0] // width if width else 2
     factors = [*range(max(nearest, 2), nearest + 3), *even_reductions(film)[1 : LISTED_SIZES + 1]]
     sizes = {
@@ -140,7 +146,9 @@ def _possible(film: Film, width: int) -> str:
 
 
 def reduced(film: Film, factor: int) -> Film:
-    """Return `film` in blocks of factor x factor pixels, or in the largest of the same number."""
+    """Return `film` in blocks of factor × factor pixels, or in larger blocks if their number is the
+    same.
+    """
     small = blocks_in(film.pixels, factor)
     factor = whole_factor(film.pixels, small) or factor
     if film.block > 1 or factor not in even_reductions(film):
@@ -154,7 +162,7 @@ def reduced(film: Film, factor: int) -> Film:
 
 
 def check_film(path: Path, film: Film, spp: int) -> None:
-    """Raise SceneError for an absurd film, or absurd samples per pixel."""
+    """Raise SceneError for an invalid film size, or too many samples per pixel."""
     width, height = film.crop_size
     if min(width, height) < 1:
         raise SceneError(
@@ -173,7 +181,7 @@ def check_film(path: Path, film: Film, spp: int) -> None:
 
 
 def camera_named(loaded: Any, name: str) -> Any:
-    """Return the sensor of that name in a loaded scene."""
+    """Return the sensor with that id in a loaded scene."""
     return next(sensor for sensor in loaded.sensors() if sensor.id() == name)
 
 

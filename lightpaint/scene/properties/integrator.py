@@ -1,4 +1,4 @@
-"""The integrator of a scene, which decides its light paths, and its replacement."""
+"""The integrator of a scene, which decides its light paths, and replacing it."""
 
 import re
 from collections.abc import Mapping
@@ -8,16 +8,16 @@ from typing import Any
 from lightpaint.errors import SceneError
 from lightpaint.files import one_line
 
-#: Parameters of the scene's own integrator that a replacement inherits, by the replacement.
+#: Parameters that a replacement inherits from the scene's own integrator, by its plugin.
 INHERITED = {
     **dict.fromkeys(("path", "volpath", "volpathmis"), ("max_depth", "rr_depth", "hide_emitters")),
     "direct": ("hide_emitters",),
 }
 
-#: Integrators that only pass on the render of another one inside them.
+#: Integrators that only wrap another one.
 WRAPPERS = ("aov", "moment")
 
-#: Default path lengths of integrators with a limit.
+#: Default max_depth of integrators that limit it.
 DEPTHS = {"prb": 6, "prb_basic": 6, "prb_projective": 6, "prbvolpath": 6}
 
 _CHOICE = re.compile(r"([a-z]\w*)(?::(.*))?", re.DOTALL)
@@ -28,8 +28,8 @@ _OPTION = re.compile(r"([a-z]\w*)=(\S+)")
 class Integrator:
     """The parameters of the scene's integrator that decide its light paths.
 
-    plugin: that of the integrator that renders light, inside wrappers (`aov`, `moment`). samples:
-    of `direct`, per surface point, of emitters and of the BSDF.
+    plugin: the integrator that computes light, inside any wrappers (`aov`, `moment`). samples: for
+    `direct`, numbers of emitter and BSDF samples per surface point.
     """
 
     plugin: str
@@ -48,7 +48,9 @@ class IntegratorChoice:
 
     @classmethod
     def of(cls, text: str) -> "IntegratorChoice":
-        """Read a choice like `path` or `path:max_depth=8,hide_emitters=true`. Raises SceneError."""
+        """Parse a choice such as `path` or `path:max_depth=8,hide_emitters=true`. Raises
+        SceneError.
+        """
         match = _CHOICE.fullmatch(text)
         parts = [] if match is None or match[2] is None else match[2].split(",")
         options = [_OPTION.fullmatch(part.strip()) for part in parts]
@@ -65,7 +67,7 @@ class IntegratorChoice:
 
     @property
     def xml(self) -> str:
-        """XML element for a scene file."""
+        """The XML element for a scene file."""
         # Imported late, since it imports many network modules.
         from xml.sax.saxutils import quoteattr
 
@@ -76,16 +78,16 @@ class IntegratorChoice:
         return f'<integrator type="{self.plugin}">{inner}</integrator>'
 
     def over(self, own: Mapping[str, Any]) -> "IntegratorChoice":
-        """Return the choice with parameters inherited from the scene's `own` integrator."""
+        """Return the choice with parameters inherited from the scene's `own` integrator added."""
         inherited = {key: own[key] for key in INHERITED.get(self.plugin, ()) if key in own}
         return IntegratorChoice(self.plugin, {**inherited, **self.options})
 
 
 def read_integrator(state: Any, path: Any) -> Integrator:
-    """Return the integrator of a parsed scene with resolved references. Raises SceneError."""
+    """Return the integrator of a parsed scene whose references are resolved. Raises SceneError."""
     nodes = integrator_nodes(state)
     if not nodes:
-        # Mitsuba's own default.
+        # Mitsuba's default.
         return Integrator("path", -1, 5, False)
     outermost = state.nodes[nodes[0]].props.plugin_name()
     while state.nodes[nodes[0]].props.plugin_name() in WRAPPERS:
@@ -110,8 +112,8 @@ def read_integrator(state: Any, path: Any) -> Integrator:
 def replace_integrator(state: Any, choice: IntegratorChoice) -> IntegratorChoice:
     """Replace all integrators of a parsed scene with another one.
 
-    Returns the choice with inherited parameters: each from the first integrator that sets it, from
-    outside inwards.
+    Returns the choice with inherited parameters, each taken from the outermost integrator that sets
+    it.
     """
     import mitsuba as mi
 
@@ -128,7 +130,7 @@ def replace_integrator(state: Any, choice: IntegratorChoice) -> IntegratorChoice
     for key, value in choice.options.items():
         node.props[key] = value
     replaced = [key for key, _ in _references(state, 0, mi.ObjectType.Integrator)]
-    state.nodes.append(node)  # this moves the others: keep no reference to a node
+    state.nodes.append(node)  # appending moves the nodes in memory: keep no references to them
     root = state.nodes[0].props
     for key in replaced:
         del root[key]

@@ -1,7 +1,7 @@
-"""Place, direction and cone of a light, and how to change them.
+"""Position, direction and cone of a light, and changing them.
 
-A move is rigid: the light goes to its new place, and turns by the smallest rotation that makes it
-point at its target, so that a texture in its beam keeps its roll.
+Moves are rigid: the light goes to its new position, and turns by the smallest rotation that aims it
+at its target, so a texture in its beam keeps its roll.
 """
 
 import math
@@ -19,32 +19,33 @@ from lightpaint.scene.properties.emission import ENVIRONMENTS
 from lightpaint.scene.properties.rotation import rotation_between, unit
 from lightpaint.scene.properties.site import Site as Site
 
-#: Mitsuba's default cutoff angle of a spot, in degrees, and the share of it that its beam is wide.
+#: Mitsuba's default cutoff angle of a spot in degrees, and default ratio of beam width to cutoff.
 DEFAULT_CUTOFF, DEFAULT_BEAM_SHARE = 20.0, 0.75
 
-#: Most extreme coordinate of a place, in units of the scene.
+#: Maximum absolute coordinate of a position, in scene units.
 FARTHEST = 1e7
 
 
-#: Least component of a direction that is not level; of one that is along an axis; and how much
-#: farther lights shine along a camera's view than down its picture if it looks down.
+#: Component below which a direction counts as level; component above which it counts as along an
+#: axis; and difference between the light along a camera's view and that down its picture above
+#: which the camera counts as looking down.
 LEVEL, STRAIGHT, FARTHER = 0.02, 0.999, 0.3
 
 
 @keywords()
 @dataclass(frozen=True)
 class Pose:
-    """A change of a light's place, direction and cone; None leaves one as it is.
+    """A change of a light's position, direction and cone; None keeps a value unchanged.
 
     Attributes:
-        position: Where it hangs, in units of the scene; of an area light the middle of its shape.
-        target: A point that it points at. A light at infinity shines along the way from the origin
-            to there.
-        cutoff: Degrees from the axis of a spot to where its cone ends.
+        position: Its position in scene units; for an area light the centre of its shape.
+        target: A point that it aims at. A light at infinity shines in the direction from the origin
+            to this point.
+        cutoff: Degrees from the axis of a spot to the edge of its cone.
         beam: Degrees from the axis to where its light begins to fall off, at most `cutoff`.
 
     Raises:
-        SceneError: For values that no light can have.
+        SceneError: If a value is invalid.
 
     Examples:
         >>> lp.Pose(position=(0, 2.5, 1), target=(0, 0, 0))
@@ -77,16 +78,16 @@ class Pose:
 
 
 def pose_of(site: Site) -> Pose:
-    """Return the pose that brings a light to `site`."""
+    """Return the pose that moves a light to `site`."""
     return Pose(position=site.position, target=site.target, cutoff=site.cutoff, beam=site.beam)
 
 
-#: Plugins that point somewhere by themselves, and shapes that do if they shine.
+#: Plugins that have a direction, and shapes that give one to an area light.
 _AIMED, _AIMED_SHAPES = ("spot", "directional", "projector"), ("rectangle", "disk")
 
 
 def site_of(emitter: Any, plugin: str, shape_plugin: str) -> Site:
-    """Return the site of a loaded emitter. shape_plugin: of the shape that it belongs to, or ""."""
+    """Return the site of a loaded emitter. shape_plugin: plugin of its shape, or ""."""
     import mitsuba as mi
 
     if plugin in ENVIRONMENTS:
@@ -96,7 +97,7 @@ def site_of(emitter: Any, plugin: str, shape_plugin: str) -> Site:
         middle = _three(shape.bbox().center())
         if shape_plugin not in _AIMED_SHAPES:
             return Site(middle)
-        # A normal is turned by the inverse transpose; what flips it is in the matrix.
+        # Normals transform by the inverse transpose; the matrix includes any flip.
         return Site(middle, unit(np.linalg.inv(_matrix(mi.traverse(shape)))[2, :3]))
     parameters = mi.traverse(emitter)
     if "position" in parameters:
@@ -115,16 +116,16 @@ def site_of(emitter: Any, plugin: str, shape_plugin: str) -> Site:
 
 
 def upward_axis(props: Any, light: Sequence[Position] = ()) -> Position:
-    """Return the axis that is up in the scene of a sensor with these properties.
+    """Return the up axis of the scene, as seen by a sensor with these properties.
 
-    That is what the sensor has upwards, or behind it where it looks straight down. light: the
-    directions that lights shine in, by which these two are told apart: most light comes from above.
+    This is the sensor's up axis, or the axis behind it if it looks straight down. light: directions
+    in which lights shine, which distinguish these two cases, since most light comes from above.
     """
     if "to_world" not in props:
         return (0.0, 1.0, 0.0)
     left, up, ahead = _matrix(props)[:3, :3].T
     axis = np.zeros(3)
-    # A horizon that is level is across what is up.
+    # With a level horizon, up is perpendicular to the sensor's left axis.
     level = np.where(np.abs(left) < LEVEL, up, -np.inf)
     k, behind = int(np.argmax(level)), int(np.argmax(-ahead))
     looks_down = -ahead[behind] > STRAIGHT
@@ -139,7 +140,7 @@ def upward_axis(props: Any, light: Sequence[Position] = ()) -> Position:
 
 
 def _shines(light: Sequence[Position], way: Doubles) -> float:
-    """Return how far lights shine along `way`, -1 to 1 on average."""
+    """Return the mean component of light directions along `way`, -1 to 1."""
     return float(np.mean(np.array(light) @ way)) if len(light) else 0.0
 
 
@@ -149,10 +150,10 @@ def _matrix(parameters: Any) -> Doubles:
 
 @dataclass(frozen=True)
 class Motion:
-    """A pose that fits its light: the rigid motion that leads there, and the new cone.
+    """The motion that gives a light a pose: a rigid transform, and the new cone.
 
-    matrix: (4, 4), maps points of the light as it is now to where they will be. site: the new one.
-    target: the point it points at, if one was asked for. changes_cone: whether the cone is another.
+    matrix: (4, 4), maps present points of the light to new ones. site: the new site. target: the
+    point it aims at, if one was given. changes_cone: whether the cone changes.
     """
 
     matrix: Doubles
@@ -164,7 +165,7 @@ class Motion:
 def motion_of(name: str, plugin: str, site: Site, pose: Pose) -> Motion:
     """Return the motion that gives the light `name` at `site` a pose.
 
-    Raises SceneError for what this light cannot do.
+    Raises SceneError for changes that are impossible for this light.
     """
     if site.position is None and site.direction is None:
         raise SceneError(f"light {name!r} ({plugin}) has no place: it cannot be moved")
@@ -196,7 +197,7 @@ def motion_of(name: str, plugin: str, site: Site, pose: Pose) -> Motion:
 
 
 def _cone(name: str, site: Site, pose: Pose) -> tuple[float | None, float | None]:
-    """Return cutoff and beam with this pose; a beam that is not given keeps its share."""
+    """Return cutoff and beam with this pose; without a given beam, the ratio of the two is kept."""
     if site.cutoff is None or (pose.cutoff is None and pose.beam is None):
         return site.cutoff, site.beam
     share = site.cutoff * DEFAULT_BEAM_SHARE if site.beam is None else site.beam
@@ -212,7 +213,7 @@ def _cone(name: str, site: Site, pose: Pose) -> tuple[float | None, float | None
 
 @dataclass(frozen=True)
 class MovedParameter:
-    """A parameter of an element that a motion changes: its value for Mitsuba, and its XML."""
+    """A parameter of an element that a motion changes: its value for Mitsuba and its XML."""
 
     name: str
     value: Any
@@ -220,9 +221,9 @@ class MovedParameter:
 
 
 def moved_parameters(props: Any, motion: Motion) -> list[MovedParameter]:
-    """Return what `motion` changes of an element, the same in memory and in a file.
+    """Return the parameters of an element that `motion` changes, equal in memory and in a file.
 
-    props: Mitsuba's properties of the emitter, or of the shape it belongs to.
+    props: Mitsuba's properties of the emitter, or of its shape if it has one.
     """
     moved, site = [], motion.site
     if "position" in props and "to_world" not in props:
@@ -250,7 +251,7 @@ def _vector(element: str, name: str, value: Position | None) -> MovedParameter:
 
 
 def _transform(matrix: Doubles, *, is_spot: bool, target: Position | None) -> MovedParameter:
-    """Return a transform as people write it, or its matrix if it does more than hang and turn."""
+    """Return a transform as `lookat` if it is rigid and for a spot, else as a matrix."""
     import mitsuba as mi
 
     left, up, ahead, origin = matrix[:3].T
@@ -272,7 +273,7 @@ def _transform(matrix: Doubles, *, is_spot: bool, target: Position | None) -> Mo
 
 
 def _texts(values: Doubles) -> list[str]:
-    """Return numbers as text, without what is only rounding."""
+    """Return numbers as text, with values that are only rounding errors set to 0."""
     least = 1e-9 * float(np.abs(values).max(initial=1e-300))
     return [f"{v if abs(v) > least else 0.0:.9g}" for v in values]
 

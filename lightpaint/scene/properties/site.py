@@ -1,4 +1,4 @@
-"""Places of emitters as plain values: where one hangs, where it points, how wide its cone is."""
+"""Positions, directions and cones of emitters as plain values."""
 
 import math
 from dataclasses import dataclass
@@ -12,10 +12,10 @@ NewKind = Literal["point", "spot", "panel"]
 
 @dataclass(frozen=True)
 class Site:
-    """The place of an emitter in a loaded scene.
+    """Position, direction and cone of an emitter in a loaded scene.
 
-    position: None for what is infinitely far away. direction: unit vector that it points along;
-    None for what has none. cutoff, beam: degrees from its axis; None for all but spots.
+    position: None for a light at infinity. direction: unit vector that it points along; None if it
+    has no direction. cutoff, beam: degrees from its axis; None except for spots.
     """
 
     position: Position | None = None
@@ -25,14 +25,14 @@ class Site:
 
     @property
     def target(self) -> Position | None:
-        """A point on its axis, one unit away; for a light at infinity, from the origin."""
+        """A point on its axis, one unit away; for a light at infinity, one unit from the origin."""
         if self.direction is None:
             return None
         (x, y, z), (i, j, k) = self.position or (0.0, 0.0, 0.0), self.direction
         return x + i, y + j, z + k
 
     def is_near(self, other: "Site") -> bool:
-        """Return whether the two differ only by the rounding of a file."""
+        """Return whether two sites differ only by the rounding in a file."""
         pairs = zip(self._numbers, other._numbers, strict=False)
         same = len(self._numbers) == len(other._numbers)
         return same and all(math.isclose(a, b, rel_tol=1e-5, abs_tol=1e-5) for a, b in pairs)
@@ -45,11 +45,11 @@ class Site:
 
 @dataclass(frozen=True)
 class EmitterPlace:
-    """The place of an emitter in an answer.
+    """Position, direction and cone of an emitter in an answer.
 
-    position, direction, cutoff, beam: as in `Site`. moved_from: where it is in the file of the
-    scene, if that is elsewhere. new: the kind of one that is in no file of the scene; "" for all
-    others. size: width and height of a new panel.
+    position, direction, cutoff, beam: as in `Site`. moved_from: its site in the file of the scene,
+    if that differs. new: its kind if it is not in any file of the scene, else "". size: width and
+    height of a new panel.
     """
 
     name: str
@@ -63,11 +63,11 @@ class EmitterPlace:
 
     @property
     def site(self) -> Site:
-        """Its place alone."""
+        """Its site, without the other fields."""
         return Site(self.position, self.direction, self.cutoff, self.beam)
 
     @classmethod
     def of(cls, name: str, site: Site, moved_from: Site | None = None) -> "EmitterPlace":
-        """Return the place of an emitter that is in the file, there or elsewhere."""
+        """Return the place of an emitter of the scene's file, moved or not."""
         numbers = (site.position, site.direction, site.cutoff, site.beam)
         return cls(name, *numbers, None if moved_from == site else moved_from)

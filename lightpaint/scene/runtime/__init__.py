@@ -1,1 +1,1 @@
-"""Mitsuba in this process: its variant, LLVM, plugins, threads, and one render at a time."""
+"""Mitsuba in this process: variant, LLVM, plugins, threads, and one render at a time."""

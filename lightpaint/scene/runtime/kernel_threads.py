@@ -1,7 +1,7 @@
-"""The number of threads of kernels: all, or fewer if workers share a machine.
+"""The number of threads that run kernels: all, or fewer if workers share a machine.
 
-On one thread a kernel adds up in the same order each time, reproducible to the last bit. The limit
-is set only while kernels run: with one thread Mitsuba's reader of EXR files would deadlock.
+On one thread a kernel always adds in the same order, so results are reproducible to the last bit.
+The limit is set only while kernels run, because Mitsuba's EXR reader deadlocks with one thread.
 """
 
 from collections.abc import Iterator
@@ -13,9 +13,9 @@ _limit: int | None = None
 
 
 def limit_threads(count: int | None) -> None:
-    """Limit kernels, and other parallel work, of this process to `count` threads; None for all.
+    """Limit kernels and other parallel work of this process to `count` threads; None for all.
 
-    The limit holds for `parallel_map` too.
+    The limit also applies to `parallel_map`.
     """
     global _limit
     _limit = count
@@ -24,9 +24,9 @@ def limit_threads(count: int | None) -> None:
 
 @contextmanager
 def kernels(threads: int | None = None) -> Iterator[None]:
-    """Run the kernels of this block on no more threads than the process may use.
+    """Limit the number of threads for kernels within the block.
 
-    threads: a lower limit.
+    threads: a limit in addition to that of the process.
     """
     limit = min((x for x in (_limit, threads) if x is not None), default=None)
     if limit is None:
@@ -41,7 +41,7 @@ def kernels(threads: int | None = None) -> Iterator[None]:
     dr.set_thread_count(limit)
     try:
         yield
-        # Kernels run asynchronously: wait for them.
+        # Kernels run asynchronously, so wait for them.
         dr.sync_thread()
     finally:
         dr.set_thread_count(before)

@@ -1,7 +1,7 @@
-"""Finding and testing the LLVM library for Dr.Jit.
+"""Finds and tests the LLVM library for Dr.Jit.
 
-Dr.Jit looks for LLVM when it is first imported and cannot try twice, and one that is too old
-crashes the process. So each library is first tested in a process of its own.
+Dr.Jit looks for LLVM once, when it is first imported, and crashes the process if the library is too
+old. So each library is first tested in a separate process.
 """
 
 import ctypes
@@ -43,7 +43,7 @@ def prepare_llvm() -> Llvm | None:
 
 @cache
 def llvm_candidates() -> tuple[Llvm, ...]:
-    """Return LLVM libraries in the order they are tried, up to the first usable one."""
+    """Return LLVM libraries in the order of preference, up to the first usable one."""
     candidates: list[Llvm] = []
     seen: set[Path] = set()
     for path, origin in _llvm_paths():
@@ -101,7 +101,7 @@ print(*(v.value for v in version))
 
 
 def _probe(path: Path, origin: str) -> Llvm:
-    """Load `path` in a process of its own and return its version."""
+    """Load `path` in a separate process and return its version."""
     if not path.exists():
         return Llvm(path, origin, None, "no such file")
     runtime = [str(p) for p in _cpp_runtime(path)]
@@ -112,7 +112,7 @@ def _probe(path: Path, origin: str) -> Llvm:
             text=True,
             timeout=60,
             check=False,
-            start_new_session=True,  # else Ctrl-C would make it seem unusable
+            start_new_session=True,  # or Ctrl-C would make it appear unusable
         )
     except (OSError, subprocess.TimeoutExpired) as error:
         return Llvm(path, origin, None, f"cannot be tested: {error}")
@@ -137,8 +137,8 @@ def _cpp_runtime(llvm: Path) -> list[Path]:
 
 
 def _preload_cpp_runtime(llvm: Path) -> None:
-    # The package's own link to its runtime appears only at the second start of Python. RTLD_LOCAL:
-    # a global runtime would take over Mitsuba's exceptions, and every one of them would crash the
-    # process.
+    # The package's own link to its runtime appears only when Python starts for the second time.
+    # RTLD_LOCAL, because a global runtime would take over Mitsuba's exceptions, and each of them
+    # would crash the process.
     for path in _cpp_runtime(llvm):
         ctypes.CDLL(str(path), ctypes.RTLD_LOCAL)

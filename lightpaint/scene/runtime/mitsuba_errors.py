@@ -1,4 +1,4 @@
-"""Errors of Mitsuba in one line: while it loads a scene, and while it renders one."""
+"""Reduces Mitsuba's errors to one line, while loading and while rendering a scene."""
 
 import re
 from collections.abc import Iterator
@@ -12,13 +12,13 @@ from lightpaint.scene.properties.integrator import (
 )
 from lightpaint.scene.runtime.plugins import UnknownPluginError
 
-#: Longest text of Mitsuba that is quoted: the cause may be at its end.
+#: Maximum length of quoted Mitsuba errors, whose cause may be at the end.
 MAX_QUOTED_ERROR = 2000
 
 
 @contextmanager
 def mitsuba_errors(path: Path, instead: IntegratorChoice | None = None) -> Iterator[None]:
-    """Turn exceptions of Mitsuba into one line: its own words, without positions in its source.
+    """Convert Mitsuba's exceptions to one line: its own words, without positions in its source.
 
     instead: the integrator that replaces the scene's own.
     """
@@ -43,14 +43,14 @@ def mitsuba_errors(path: Path, instead: IntegratorChoice | None = None) -> Itera
 
 @contextmanager
 def render_errors(path: Path) -> Iterator[None]:
-    """Turn exceptions of Mitsuba during a render into one line: the first cause.
+    """Convert Mitsuba's exceptions during a render to one line: the first cause.
 
-    Some scenes load but cannot be rendered: particles may never hit their sensor, for example.
+    Some scenes load but cannot be rendered, for example if particles never hit their sensor.
     """
     try:
         yield
     except RuntimeError as error:
-        # Python's own subclasses, such as RecursionError, are bugs and pass through.
+        # Subclasses such as RecursionError are bugs and pass through.
         if type(error) is not RuntimeError or not _is_native(error):
             raise
         first: BaseException = error
@@ -63,7 +63,7 @@ def render_errors(path: Path) -> Iterator[None]:
 
 
 def _is_native(error: BaseException) -> bool:
-    """Return True if Mitsuba raised it, and not a listener of the progress."""
+    """Return True if the error comes from Mitsuba rather than from a progress callback."""
     trace = error.__traceback__
     while trace is not None and trace.tb_next is not None:
         trace = trace.tb_next

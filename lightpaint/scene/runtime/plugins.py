@@ -1,8 +1,9 @@
-"""The plugins that a scene may use, and the native code that runs for them.
+"""The plugins that a scene may use, and a guard against foreign native code.
 
-Mitsuba looks for `plugins/NAME.so` in every folder of its file resolver, the working folder and the
-scene's before its own, and runs what it finds. Therefore all of its own plugins are loaded at
-start, from its own folder; Mitsuba never looks for a loaded name again. Scenes may use only these.
+Mitsuba looks for `plugins/NAME.so` in every folder of its file resolver, including the working
+folder and the scene's, before its own folder, and runs what it finds. Therefore all of its own
+plugins are loaded at start from its own folder; Mitsuba never looks for a loaded name again. Scenes
+may use only these plugins.
 """
 
 import difflib
@@ -18,10 +19,10 @@ from lightpaint.errors import BackendError
 from lightpaint.files import one_line
 from lightpaint.scene.checks.tokens import place_of_node
 
-#: Environment variable with a folder of plugins that the user adds.
+#: Environment variable that names a folder with the user's own plugins.
 VARIABLE = "LIGHTPAINT_PLUGINS"
 
-#: Integrators that Mitsuba implements in Python, for compiling variants: they have no plugin file.
+#: Integrators that Mitsuba implements in Python for JIT variants; they have no plugin file.
 IN_PYTHON = frozenset(
     ["direct_projective", "prb", "prb_basic", "prb_projective", "prbvolpath", "volprim_rf_basic"]
 )
@@ -32,15 +33,15 @@ ENDINGS = (".so", ".dylib", ".dll")
 
 
 class UnknownPluginError(RuntimeError):
-    """A plugin of a scene that neither Mitsuba nor the user has."""
+    """A plugin of a scene that is neither Mitsuba's nor the user's."""
 
 
 @cache
 def loaded_plugins() -> frozenset[str]:
     """Load all plugins of Mitsuba and of the user's folder, and return their names.
 
-    Raises BackendError if that folder does not exist, or has a file that is not a plugin of this
-    Mitsuba.
+    Raises BackendError if that folder does not exist, or contains a file that is not a plugin for
+    this Mitsuba.
     """
     import mitsuba as mi
 
@@ -71,7 +72,7 @@ def loaded_plugins() -> frozenset[str]:
 def check_plugins(state: Any, resolver: Any) -> None:
     """Raise UnknownPluginError if a parsed scene uses a plugin that is not loaded.
 
-    Call it before building the scene. resolver: the one in which Mitsuba will look for files.
+    Must be called before the scene is built. resolver: the resolver that Mitsuba will use.
     """
     plugins = loaded_plugins()
     for node in _in_use(state):
@@ -92,7 +93,9 @@ def check_plugins(state: Any, resolver: Any) -> None:
 
 
 def _in_use(state: Any) -> Iterator[Any]:
-    """Yield the nodes that objects are built from: not those of a replaced integrator."""
+    """Yield the nodes that objects will be built from, which excludes those of a replaced
+    integrator.
+    """
     import mitsuba as mi
 
     resolved = mi.Properties.Type.ResolvedReference
@@ -107,7 +110,7 @@ def _in_use(state: Any) -> Iterator[Any]:
 
 
 def _shadowing_file(name: str, resolver: Any) -> Path | None:
-    """Return a file that Mitsuba would load as the plugin `name`; None if there is none."""
+    """Return the file that Mitsuba would load as the plugin `name`; None if there is none."""
     folders = [Path(), *(Path(str(resolver[k])) for k in range(len(resolver)))]
     files = (folder / "plugins" / f"{name}{end}" for folder in folders for end in ENDINGS)
     return next(filter(Path.exists, files), None)
@@ -118,11 +121,11 @@ def _files(folder: Path) -> list[Path]:
 
 
 def _load_folder(folder: Path) -> frozenset[str]:
-    """Load the plugins in `folder`, even if other folders have such names. Returns their names."""
+    """Load the plugins in `folder`, whatever plugins other folders contain. Returns their names."""
     import mitsuba as mi
 
     manager = mi.PluginManager.instance()
-    # Plugins may read Mitsuba's data files while they load.
+    # Plugins may read Mitsuba's data files while loading.
     own = Path(mi.__file__).resolve().parent
     with (
         tempfile.TemporaryDirectory(prefix="lightpaint-") as above,
@@ -135,7 +138,7 @@ def _load_folder(folder: Path) -> frozenset[str]:
 
 @contextmanager
 def _resolving_only_in(*folders: Path) -> Iterator[None]:
-    """Make Mitsuba look for files in these folders alone within the block."""
+    """Restrict Mitsuba's file search to these folders within the block."""
     import mitsuba as mi
 
     before = mi.file_resolver()

@@ -1,9 +1,9 @@
 """A lock that gives Mitsuba to one thread at a time.
 
-Two threads at once would corrupt each other's results: what Dr.Jit records involves all materials
-and lights of the process, even of a scene that another thread is still loading. So threads take
-turns at loading and tracing, and work in pieces. Between pieces, low-priority threads let others go
-first.
+Threads that used it at the same time would corrupt each other's results: what Dr.Jit records
+involves all materials and lights of the process, even those of a scene that another thread is still
+loading. So threads take turns at loading and tracing, and work in pieces. Between pieces,
+low-priority threads let others go first.
 """
 
 from collections import deque
@@ -14,23 +14,26 @@ from time import monotonic
 
 from lightpaint.signals import interruptible_between_pieces
 
-#: Seconds after which even a low-priority thread gets a turn.
+#: Seconds of waiting after which even a low-priority thread gets a turn.
 MAX_WAIT_S = 2.0
 
 
 class Turns:
-    """A fair, reentrant lock with two priorities: threads take turns in the order of arrival.
+    """A fair, reentrant lock with two priorities.
 
-    Low-priority threads come last, but not never.
+    Threads take turns in the order of arrival. Low-priority threads wait for all others, but at
+    most for MAX_WAIT_S.
     """
 
     def __init__(self) -> None:
         self._changed = Condition()
         self._holder: int | None = None
         self._depth = 0
-        self._waiting = deque[object]()  # of normal priority
-        self._idle: dict[object, float] = {}  # waiting low-priority threads, and since when
-        self._away = 0  # number of threads that have lent their turn
+        self._waiting = deque[object]()  # threads of normal priority
+        self._idle: dict[
+            object, float
+        ] = {}  # low-priority threads, with the time since when they wait
+        self._away = 0  # number of threads that are lending their turn
         self._called: object | None = None  # the thread whose turn it is, until it takes it
         self._own = local()
 
@@ -44,14 +47,14 @@ class Turns:
         try:
             yield
         finally:
-            if self._holder == get_ident():  # else it was interrupted while its turn was lent
+            if self._holder == get_ident():  # false if it was interrupted while its turn was lent
                 self._depth -= 1
                 if not self._depth:
                     self._leave()
 
     @contextmanager
     def low_priority(self) -> Iterator[None]:
-        """Give other threads precedence over this one within the block."""
+        """Give this thread low priority within the block."""
         before, self._own.is_low_priority = self._is_low_priority, True
         try:
             yield
@@ -62,8 +65,8 @@ class Turns:
     def aside(self) -> Iterator[None]:
         """Lend this thread's turn, if it has one, to others within the block.
 
-        This avoids deadlock if they wait for one another. A low-priority thread does not get the
-        turn of one that is not.
+        This avoids a deadlock when they wait for one another. The turn of a normal thread is never
+        lent to a low-priority one.
         """
         if self._holder != get_ident():
             yield
@@ -81,7 +84,9 @@ class Turns:
                     self._call()
 
     def let_others(self) -> None:
-        """Make a low-priority thread wait, between two pieces, until no other wants a turn."""
+        """Between pieces of work, make a low-priority thread wait until no other thread wants a
+        turn.
+        """
         if self._is_low_priority and self._waiting:
             with self.aside():
                 pass
@@ -106,16 +111,18 @@ class Turns:
                     self._waiting.remove(ticket)
                 if self._called is ticket:
                     self._called = None
-                self._call()  # an interrupted thread keeps nobody waiting
+                self._call()  # an interrupted thread must not block others
 
     def _call(self) -> None:
-        """Choose the next thread if nobody has a turn; only once, since that depends on time."""
+        """Choose the next thread if nobody has a turn; only once, since the choice depends on
+        time.
+        """
         if self._holder is None and self._called is None:
             self._called = self._next()
             self._changed.notify_all()
 
     def _next(self) -> object | None:
-        """Return the ticket of the next thread; None if none waits."""
+        """Return the ticket of the next thread; None if no thread waits."""
         idle = next(iter(self._idle), None)
         if idle is not None and monotonic() - self._idle[idle] > MAX_WAIT_S:
             return idle
@@ -136,7 +143,9 @@ MITSUBA = Turns()
 
 @contextmanager
 def tracing() -> Iterator[Callable[[], None]]:
-    """Hold Mitsuba and hold Ctrl-C back; yield a function that lets both through between pieces."""
+    """Hold Mitsuba and defer Ctrl-C; yield a function that admits both, to be called between
+    pieces.
+    """
     with MITSUBA.acquired(), interruptible_between_pieces() as let_interrupts_through:
 
         def between() -> None:

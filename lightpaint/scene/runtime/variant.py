@@ -1,4 +1,4 @@
-"""The variant of Mitsuba: chosen once per process, before Mitsuba is imported.
+"""The variant of Mitsuba, which is chosen once per process, before Mitsuba is imported.
 
 This is the only module that calls `mi.set_variant`.
 """
@@ -23,7 +23,7 @@ class SlowBackendWarning(UserWarning):
 
 @dataclass(frozen=True)
 class Backend:
-    """The Mitsuba variant of this process and, if it compiles with LLVM, the library."""
+    """The Mitsuba variant of this process, and its LLVM library if it uses one."""
 
     variant: str
     llvm: Llvm | None = None
@@ -31,7 +31,7 @@ class Backend:
 
     @property
     def is_jit(self) -> bool:
-        """True if Python integrators run at full speed, unlike in scalar variants."""
+        """True if Python integrators run at full speed, which they do not in scalar variants."""
         return not self.variant.startswith("scalar")
 
 
@@ -40,12 +40,12 @@ _current: Backend | None = None
 
 @keywords()
 def use_variant(wanted: str | None = None) -> Backend:
-    """Set up Mitsuba once, with the variant `wanted` or the fastest RGB variant that works here.
+    """Start Mitsuba with the variant `wanted`, or with the fastest RGB variant that works here.
 
     Later calls return the same backend.
 
     Args:
-        wanted: Like `llvm_ad_rgb`; None for the fastest.
+        wanted: A variant such as `llvm_ad_rgb`; None for the fastest.
 
     Raises:
         BackendError: If Mitsuba is missing, if `wanted` is not an RGB variant of this installation,
@@ -79,7 +79,7 @@ def _start(wanted: str | None) -> Backend:
     except ImportError as error:
         raise BackendError(f"Mitsuba cannot be imported ({error}): pip install mitsuba") from error
 
-    # A notebook or a script may have set a variant already; its choice stays.
+    # A notebook or a script may have set a variant already, which is respected.
     present = mi.variant()
     if present is not None and wanted in (None, present):
         _check_is_rgb(present)
@@ -93,7 +93,7 @@ def _start(wanted: str | None) -> Backend:
     else:
         backend = _set(mi, wanted, llvm)
     mi.set_log_level(mi.LogLevel.Error)
-    loaded_plugins()  # before any scene adds folders to search
+    loaded_plugins()  # before any scene adds search folders
     return backend
 
 
@@ -132,7 +132,7 @@ def _set(mi: Any, variant: str, llvm: Llvm | None) -> Backend:
     try:
         mi.set_variant(variant)
         if not variant.startswith("scalar"):
-            # The first array starts the backend: it should fail here rather than in a render.
+            # The first array starts the backend, which should fail here rather than in a render.
             import drjit as dr
 
             _check_llvm_in_use(dr, variant)
