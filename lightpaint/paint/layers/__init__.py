@@ -1,1 +1,1 @@
-"""Layers of a painting: what each asks for, in which order, and the target that they come to."""
+"""Layers of a painting: the request of each, their order, and the target that they add up to."""

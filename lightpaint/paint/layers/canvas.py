@@ -27,7 +27,7 @@ MAX_IMPORTANCE, MAX_LIGHT = 1e4, 1e9
 
 
 class Canvas:
-    """The painting of one view: its layers, and the target that they come to. Updated in place.
+    """The painting of one view: its layers, and the target composed of them. Updated in place.
 
     Attributes:
         basis: The planes of its lights.
@@ -61,9 +61,9 @@ class Canvas:
         self.live = LiveView(basis, self.image, self.importance)
 
     def replace_planes(self, basis: Basis, lights: Collection[int]) -> None:
-        """Continue with a basis in which the planes of some lights, by number, are others.
+        """Continue with a basis in which the planes of some lights, by number, were replaced.
 
-        The present look stays that of before these lights moved.
+        The present look stays as it was before these lights moved.
         """
         self.basis = basis
         self.live.replace_planes(basis, lights)
@@ -152,7 +152,7 @@ class Canvas:
     def show(
         self, layers: LayerStack, steps: Sequence[Step] = (), *, at_rest: bool = True
     ) -> Region:
-        """Show other layers, or the same with other properties; return where that matters.
+        """Show other layers, or layers with other properties; return the region that changed.
 
         steps: the pixels of layers that come back are those after these. at_rest: whether accents
         follow what the layers cover by now; under the brush they stay.
@@ -219,7 +219,7 @@ class Canvas:
                 # A stroke may take pixels back while it lasts: unchanged ones keep their marks.
                 after = _with_marks(after, before)
                 self.put(number, region, after)
-            # A page sends a stroke again if its answer was lost; that changes nothing.
+            # A page that lost the answer to a stroke sends it again, which changes nothing.
             if not is_empty(region) and not before.equals(after):
                 patches.append(Patch(region, before, after, self.view, number))
         return patches

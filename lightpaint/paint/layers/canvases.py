@@ -26,7 +26,7 @@ class Canvases:
     look to all.
 
     Attributes:
-        layers: The layers as they are.
+        layers: The present layers.
         next_layer: The first id that no layer has had.
     """
 
@@ -63,7 +63,7 @@ class Canvases:
             view.replace_lights(basis)
 
     def replace_planes(self, bases: Sequence[Basis], lights: Collection[int]) -> None:
-        """Continue with bases in which the planes of some lights, by number, are others."""
+        """Continue with bases in which the planes of some lights, by number, were replaced."""
         for view, basis in zip(self, bases, strict=True):
             view.replace_planes(basis, lights)
 
@@ -97,7 +97,7 @@ class Canvases:
         """Paint pixels of a layer by hand: they belong to the open stroke on it."""
         canvas = self[view]
         canvas.paint(layer, region, pixels)
-        if layer not in self._layers_at_rest.ids:  # how much it covers decides how much it counts
+        if layer not in self._layers_at_rest.ids:  # its accent follows its coverage
             canvas.show(self.layers)
 
     def copy_layer(self, source: int, number: int) -> None:
@@ -130,7 +130,7 @@ class Canvases:
             view.show(self.layers)
 
     def drop(self) -> list[tuple[int, Region]]:
-        """Drop all that is open; return views and their regions that changed."""
+        """Drop open strokes and changes; return the views and regions that changed."""
         regions = [view.drop() for view in self]
         self.layers = self._layers_at_rest
         shown = [view.show(self.layers) for view in self]
@@ -147,7 +147,7 @@ class Canvases:
     ) -> list[tuple[int, Region]]:
         """Go to the layers and pixels after a step, or before it; return the regions that changed.
 
-        steps: those that are done then; of them layers that come back have their pixels.
+        steps: the steps done at that point, from which returning layers get their pixels.
         """
         for patch in patches:
             if patch.layer in self.layers.ids:
@@ -166,7 +166,7 @@ class Canvases:
     def replacement_patches(self, paintings: Mapping[int, Pixels]) -> tuple[Patch, ...]:
         """Return the patches that replace all layers by these paintings, by view.
 
-        A view without one keeps what its layers come to.
+        A view without one keeps the composition of its layers.
         """
         patches, whole = [], dict(paintings)
         if self.layers != LayerStack():

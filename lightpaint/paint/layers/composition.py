@@ -1,4 +1,4 @@
-"""The target that layers come to: light and importance of each pixel, from the lowest layer up.
+"""Composition of layers into a target: light and importance of each pixel, lowest layer first.
 
 Everything is float32 arithmetic on single pixels, in NumPy, so that any partition of the picture
 into regions gives the same bits. A layer's accent alone depends on more than its pixel: where all
@@ -40,7 +40,7 @@ class ShownLayer(NamedTuple):
 
 
 def accent(part: float) -> float:
-    """Return by how much a layer over that part of a fully painted picture counts more."""
+    """Return the factor by which a layer over that part of a fully painted picture counts more."""
     if part <= 0:
         return MAX_ACCENT
     return min(MAX_ACCENT, max(1.0, (1 - part) / (REST_SHARE * part)))
@@ -49,7 +49,7 @@ def accent(part: float) -> float:
 def accents(layers: Sequence[tuple[Layer, LayerPixels]]) -> list[float]:
     """Return the accent of each of the layers that show, in one view.
 
-    It follows from what they cover alone, and not from when they were made.
+    It depends on their coverage alone, and not on when they were made.
     """
     covering = [layer.id for layer, pixels in layers if pixels.covers_all]
     return [
@@ -72,7 +72,7 @@ def compose(layers: Sequence[ShownLayer], present: Floats, region: Region) -> Pi
 
 
 def _compose_layer(shown: ShownLayer, pixels: Pixels, below: Pixels) -> Pixels:
-    """Return what a layer makes of the pixels below it."""
+    """Return the pixels below a layer with the layer applied."""
     layer = shown.layer
     factor = np.float32(shown.accent * layer.importance)
     if layer.kind == "pixels":
@@ -129,7 +129,7 @@ def _luminance(light: Floats) -> _Array:
 
 
 def _weighed(importance: _Array, times: np.float32) -> _Array:
-    """Return so many times as much, within bounds; what is beyond them already stays there."""
+    """Return importance times a factor, within bounds; values already beyond them stay."""
     least = np.minimum(importance, np.float32(MIN_WEIGHED))
     most = np.maximum(importance, np.float32(MAX_WEIGHED))
     return np.asarray(np.minimum(most, np.maximum(least, importance * times)), np.float32)

@@ -1,4 +1,4 @@
-"""A layer of a painting: one wish, with its name, eye, strength and importance."""
+"""A layer of a painting: one request, with its name, visibility, strength and importance."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from lightpaint.arrays import RGB
 
-#: What a layer does to the pixels below it.
+#: The effect of a layer on the pixels below it.
 LayerKind = Literal["pixels", "paint", "adjust", "weigh", "group"]
 
 #: The layer of paint that names none; sessions from before there were layers consist of it.

@@ -1,4 +1,4 @@
-"""The pixels of one layer in one view, kept in tiles, and only where it covers something."""
+"""The pixels of one layer in one view, in tiles, which exist only where it covers something."""
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -30,7 +30,7 @@ class LayerPixels:
 
     They are exchanged as `Pixels`: `image` is the colour, `importance` the coverage (of a layer
     `pixels`, its importance). Where nothing is covered the colour is black, so that two layers
-    that came about in different ways are equal to the bit.
+    made in different ways are equal to the bit.
 
     Attributes:
         revision: A number that grows with every change.
@@ -55,7 +55,7 @@ class LayerPixels:
 
     @property
     def bounds(self) -> Region:
-        """The smallest region of whole tiles that holds all that is covered."""
+        """The smallest region of whole tiles that contains all covered pixels."""
         return enclosing([self._tile_region(key) for key in self._tiles])
 
     @property
@@ -183,7 +183,7 @@ def _relative(region: tuple[int, ...], origin: Region) -> Region:
 
 
 def _packed(array: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
-    """Return an array of the same values, without memory for them if all are one."""
+    """Return the same values, without memory for each if all are equal."""
     first = array.reshape(-1)[0]
     if array.reshape(-1)[-1] == first and (array == first).all() and not np.signbit(first):
         return np.broadcast_to(np.float32(first), array.shape)

@@ -1,4 +1,4 @@
-"""The layers of a session in their order, and how one state of them differs from another."""
+"""The layers of a session in their order, and the differences between two states of them."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -103,7 +103,7 @@ class LayerStack:
         return tuple(shown)
 
     def change_to(self, after: "LayerStack") -> StackChange:
-        """Return how another state differs from this one; empty if it does not."""
+        """Return the change from this state to another; empty if there is none."""
         change: dict[str, Any] = {}
         if self.ids != after.ids:
             change["order"] = [list(self.ids), list(after.ids)]

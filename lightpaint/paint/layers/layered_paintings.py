@@ -1,4 +1,4 @@
-"""Layers with their pixels in every view, apart from a session: as looks and files keep them."""
+"""Layers with their pixels in every view, independent of a session, for looks and files."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -25,7 +25,7 @@ class LayeredPaintings:
 
     @classmethod
     def of(cls, views: Canvases) -> "LayeredPaintings":
-        """Return those of a session as it is."""
+        """Return the layered paintings of a session."""
         pixels = {}
         for view in views:
             for number in views.layers.ids:

@@ -1,4 +1,4 @@
-"""The rays of a camera: what each pixel sees, as a page draws lamps with it, and first hits."""
+"""The rays of a camera, with which a page draws lamps, and their first hits."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -52,7 +52,7 @@ def camera_of(scene: Scene, loaded: Any) -> Camera | None:
     off = np.linalg.norm(np.cross(origin - eye, direction), axis=1)
     if (off > STRAIGHT * max(float(np.linalg.norm(origin - eye, axis=1).max()), STRAIGHT)).any():
         return None
-    # All rays end in one plane before the eye: that which the first ray meets after a length of 1.
+    # All rays end in one plane before the eye, which the first ray meets after a length of 1.
     middle = _rays(scene, loaded, np.array([(0.5, 0.5)]))[1][0]
     ends = direction / (direction @ middle)[:, None]
     across, down = ends[1] - ends[0], ends[2] - ends[0]
@@ -106,7 +106,7 @@ def up_axis(cameras: list[Camera | None]) -> int:
 
 
 def first_hit(scene: Scene, loaded: Any, at: tuple[float, float]) -> FirstHit | None:
-    """Return what the pixel (column, row) of `scene` sees first; None for nothing."""
+    """Return the first hit of the pixel (column, row) of `scene`; None if it sees nothing."""
     import mitsuba as mi
 
     height, width = scene.size

@@ -38,7 +38,7 @@ SLIDE, TURN = 0.15, 60.0
 #: The most lights that one search adds.
 MAX_NEW = 4
 
-#: Seconds between the places that pages are shown while a search goes on.
+#: Seconds between updates of the trial places that pages show during a search.
 WATCH_S = 0.15
 
 
@@ -77,7 +77,7 @@ class LightPlacer:
     def handle(self, request: PlaceLights) -> list[Message]:
         """Start the search, or stop it. Raises LightpaintError if there is nothing to search for.
 
-        A later search replaces an earlier one.
+        A new search replaces a running one.
         """
         if not request.run:
             self._request = None
@@ -185,7 +185,7 @@ class LightPlacer:
     def _searched(
         self, request: PlaceLights, check: Callable[[], None]
     ) -> tuple[SessionSnapshot, Placement]:
-        """Return the paintings that the search is for, and what it found."""
+        """Return the paintings of the search, and its result."""
 
         def report(label: str, done: int, total: int, unit: str = "passes") -> None:
             del label, unit

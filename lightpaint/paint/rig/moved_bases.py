@@ -1,4 +1,4 @@
-"""Bases in which some lights are elsewhere: their planes beside those of the others."""
+"""Bases in which some lights have moved: new planes for them, and the old ones for the others."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -65,7 +65,7 @@ def with_planes_of(basis: Basis, moved: Mapping[int, Basis], *, in_memory: bool)
         sums=None,
         origin=replace(basis.origin, is_composed=True),
     )
-    # A walk over all planes would come to the same as those of each.
+    # A walk over all planes would give the same as one over each.
     power, totals = np.zeros((2, count, 3))
     power[: len(basis.lights)], totals[: len(basis.lights)] = basis.power, basis.totals
     for k, one_light in moved.items():

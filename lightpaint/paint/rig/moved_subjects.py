@@ -1,4 +1,4 @@
-"""The subjects of a session whose lights hang elsewhere, for its exports and verification."""
+"""The subjects of a session with moved lights, for its exports and verification."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Closed forms of where a light is whose light, highlight or shadow falls on a place."""
+"""Closed forms for the place of a light whose beam, highlight or shadow shall fall on a point."""
 
 from collections.abc import Callable
 from typing import Any
@@ -17,7 +17,7 @@ BEFORE_WALL, LEAST_ROOM = 0.9, 0.05
 #: Least distance of a light beyond what casts its shadow, relative to its distance from the shadow.
 BEYOND_EDGE = 0.3
 
-#: How far a ray goes from a point in a direction before it meets a surface.
+#: Returns the distance from a point to the first surface in a direction.
 FreeLength = Callable[[Doubles, Doubles], float]
 
 Pose = dict[str, Any]

@@ -1,4 +1,4 @@
-"""The plane of a light at any place within a tenth of a second, while somebody drags it.
+"""Quick planes: an estimate of a light's plane at any place in a tenth of a second, for dragging.
 
 Direct light has edges: one frozen path for each pixel finds it. Indirect light is smooth: a small
 film has it, averaged along surfaces, and each pixel takes it from the four cells around it, by how

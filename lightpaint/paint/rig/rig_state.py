@@ -1,4 +1,4 @@
-"""The message that tells pages where all lights hang, and how the cameras see them."""
+"""The message with the places of all lights and the cameras of the views."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -14,7 +14,7 @@ from lightpaint.scene.properties.pose import Site
 
 
 def rig_state(rig: LampRig, placed: Placed) -> Rig:
-    """Return where all lights are, for pages. The rig is open."""
+    """Return the places of all lights, for pages. The rig is open."""
     views = rig.views
     assert views is not None
     with in_this_thread():

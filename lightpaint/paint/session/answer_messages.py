@@ -1,4 +1,4 @@
-"""Messages about an answer: short sentences, and the figures of each light that people go by."""
+"""Messages about an answer: short sentences, and the figures of each light."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -69,7 +69,7 @@ CONSTRAINED_MISS_TEXTS = {"forbidden": "would need colours or levels that the li
 
 
 def light_info(light: BasisLight, scale: float) -> LightInfo:
-    """Return what does not change of a light. scale: as in `LightInfo`."""
+    """Return the constant properties of a light. scale: as in `LightInfo`."""
     members = tuple(light.members)
     return LightInfo(
         name=light.name,
@@ -88,7 +88,7 @@ def light_info(light: BasisLight, scale: float) -> LightInfo:
 
 
 def answer_findings(bases: Sequence[Basis], weights: Doubles) -> Findings:
-    """Return what is known of each light at once: emission, change, colour, part of the picture.
+    """Return the immediate findings on each light: emission, change, colour, share of the picture.
 
     Of several views `shares` has its part of each, too.
     """
@@ -178,7 +178,7 @@ def judge(analyses: Sequence[Analysis], painted: Sequence[int]) -> Judgement:
 
 
 def unpainted_text(*, is_asked: bool, is_white: bool) -> str:
-    """Say what the answer is before anything is painted, and after all of it has been undone.
+    """Describe the answer while nothing is painted, or all paint is undone.
 
     is_asked: whether something is asked of the lights. is_white: whether all are to be white.
     """
@@ -192,7 +192,7 @@ def unpainted_text(*, is_asked: bool, is_white: bool) -> str:
 
 
 def sketch_headline(appearance: Appearance) -> str:
-    """Say how far a painting in progress has come, and what would bring it further: no judgement.
+    """Describe the progress of a painting, and the best next step, without judging it.
 
     A sketch begins with a stroke, of which little can come about before more is said. What it does
     to what is not painted is part of it.
@@ -230,7 +230,7 @@ def _progress_phrase(appearance: Appearance) -> str:
 
 
 def why_not_closer(analysis: Analysis) -> list[str]:
-    """Return at most four sentences on what keeps the lights from the paint.
+    """Return at most four sentences on the reasons that keep the lights from the paint.
 
     Where it is missed most stands in `sketch_headline`, below the pictures.
     """
@@ -289,7 +289,7 @@ def _closeness(analysis: Analysis) -> Closeness:
 def preview_text(
     closes: float, rest: UnpaintedChange | None, *, delta_e: tuple[float, float], is_at_cost: bool
 ) -> tuple[str, bool]:
-    """Say what a change would bring, before it is made, and whether it changes more than it gains.
+    """Describe the effect of a change before it is made, and whether it changes more than it gains.
 
     closes: share of the miss that it takes away. rest: its change where nobody painted. delta_e:
     over the paint, now and then. is_at_cost: whether it changes the rest by more than it gains.

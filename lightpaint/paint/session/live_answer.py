@@ -1,4 +1,4 @@
-"""The requests of a session, and the answer that follows them and the paint under the hand."""
+"""The requests of a session, and the answer that follows them and the brush."""
 
 from collections.abc import Callable, Sequence
 
@@ -90,7 +90,7 @@ class LiveAnswer:
         return self._basis
 
     def check(self, requests: SessionRequests) -> None:
-        """Raise LightpaintError for what cannot be asked, before anything is changed."""
+        """Raise LightpaintError for impossible requests, before anything is changed."""
         reduce_lights(self._constraints(requests), self._lights_of(requests), self._fit(requests))
 
     def set_requests(self, requests: SessionRequests) -> None:

@@ -1,4 +1,4 @@
-"""Lights that a session moves or adds: whoever has the renderer makes their planes."""
+"""Lights that a session moves or adds; their planes come from a source that has the renderer."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
@@ -78,7 +78,7 @@ class MovedLights:
         self._placed = dict(placed)
 
     def follow(self, placed: Placed, views: Canvases, live_answer: LiveAnswer) -> None:
-        """Give `views` the planes of `placed`, if they have others."""
+        """Give `views` the planes of `placed`, unless they have them."""
         if added_names(placed) != added_names(self._placed):
             views.replace_lights(self._source.bases(self.bases, placed))
             live_answer.set_views(views.live)
@@ -91,7 +91,7 @@ class MovedLights:
     def renew(
         self, names: Sequence[str], placed: Placed, views: Canvases, live_answer: LiveAnswer
     ) -> None:
-        """Give `views` the planes of `placed`, of which those of these lights are others."""
+        """Give `views` the planes of `placed`, in which those of the named lights were replaced."""
         if not names:
             return
         bases = self._source.bases(self.bases, placed)

@@ -1,4 +1,4 @@
-"""A session's paintings and requests at one time, for work that takes longer than a stroke."""
+"""A snapshot of a session's paintings and requests, for work that takes longer than a stroke."""
 
 from dataclasses import dataclass, replace
 from statistics import mean

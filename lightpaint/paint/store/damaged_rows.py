@@ -1,4 +1,4 @@
-"""Rows of a damaged database: those that can be read, and what is known of the others."""
+"""Rows of a damaged database: readable rows, and the names of the others."""
 
 import sqlite3
 from collections.abc import Iterator, Sequence

@@ -236,7 +236,7 @@ def free_name(path: Path) -> Path:
 
 
 def check_pages(database: sqlite3.Connection) -> None:
-    """Raise sqlite3.Error where pages of an open database are not as they were written."""
+    """Raise sqlite3.Error for damaged pages of an open database."""
     [(verdict,)] = database.execute("PRAGMA quick_check(1)")
     if verdict != "ok":
         raise sqlite3.DatabaseError(verdict)
@@ -250,7 +250,7 @@ def set_aside(path: Path) -> Path | None:
     if not path.exists():
         return None
     try:
-        open_database(path, None).close()  # what its last process left beside it goes into it
+        open_database(path, None).close()  # merges the log that its last process left beside it
     except PaintError as error:
         if IN_USE in str(error):
             raise

@@ -1,4 +1,4 @@
-"""Recovery of a damaged session file: what can still be read is brought into a new one.
+"""Recovery of a damaged session file: its readable contents are copied into a new one.
 
 A disk that returns other bytes than it was given damages single pages. Every row is therefore read
 by itself and checked as a whole, pixels included; what is lost is named. The damaged file stays
