@@ -1,5 +1,4 @@
-"""Contents of a session file that are read on first use: pixels of steps and of looks.
-"""
+"""Contents of a session file that are read on first use: pixels of steps and of looks."""
 
 import json
 from collections.abc import Callable, Iterator, Mapping
