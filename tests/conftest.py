@@ -52,6 +52,11 @@ def pytest_configure(config: pytest.Config) -> None:
         threadpool_limits(1, "blas")
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Run long tests first: no worker shall have one left when the others are done."""
+    items.sort(key=lambda item: item.get_closest_marker("long") is None)
+
+
 def pytest_unconfigure() -> None:
     """Have all collected at the end: libraries complain of what is left."""
     gc.unfreeze()

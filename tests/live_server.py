@@ -21,6 +21,8 @@ from lightpaint.paint.frames import from_frame, to_frame
 from lightpaint.paint.server.guard import PROTOCOL
 from lightpaint.paint.server.server import Server
 
+#: As long as anything takes on a busy machine.
+PATIENCE_S = 60.0
 #: More than the system takes for somebody who does not read.
 LARGE = np.zeros((2048, 2048, 4), np.float32)
 
@@ -60,14 +62,14 @@ class Serving:
         made = socket.socket()
         made.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         made.connect(("127.0.0.1", self.server.port))
-        made.settimeout(20)
+        made.settimeout(PATIENCE_S)
         self.connections.append(made)
         return made
 
     def end(self) -> None:
         """Stop, and fail if that is an error or never comes."""
         self.server.stop()
-        self.thread.join(20)
+        self.thread.join(PATIENCE_S)
         self.server.close()
         assert not self.thread.is_alive()
         assert self.ended_in is None
@@ -119,7 +121,7 @@ class Page:
 
 def until(is_so: Callable[[], object], what: str) -> None:
     """Wait for it, as long as anything takes on a busy machine."""
-    end = time.monotonic() + 20
+    end = time.monotonic() + PATIENCE_S
     while not is_so():
         assert time.monotonic() < end, what
         time.sleep(0.01)

@@ -89,6 +89,7 @@ def test_public_names_and_options_that_are_named_are_there(document: Path):
     assert sorted(options - _options()) == []
 
 
+@pytest.mark.long
 def test_snippets_of_python_run_one_after_the_other(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

@@ -33,6 +33,8 @@ from lightpaint.scene.runtime.kernel_threads import limit_threads
 
 distributed = pytest.importorskip("distributed", reason="Dask's distributed")
 
+pytestmark = pytest.mark.long
+
 LOOKS = """
 [defaults]
 scene = "room.xml"

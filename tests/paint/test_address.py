@@ -68,14 +68,14 @@ def test_who_can_reach_it_is_known_and_its_address_leads_there(
 ) -> None:
     made, its = listen(host, 0)
     with made:
-        made.settimeout(5)
+        made.settimeout(60)
         made.accept()[0].close()  # it has been tried
         assert its.reach is reach
         assert its.name == (name or its.name)
         assert its.name not in ("", "0.0.0.0", "[::]", "::")
         for url in (its.url, its.local_url):
             place = url.removeprefix("http://").rstrip("/").rpartition(":")[0].strip("[]")
-            with closing(socket.create_connection((place, its.port), 5)):
+            with closing(socket.create_connection((place, its.port), 60)):
                 made.accept()[0].close()
 
 
@@ -86,7 +86,7 @@ def test_an_address_of_ipv6_alone_leads_there_too(monkeypatch: pytest.MonkeyPatc
     with made:
         for url in (its.url, its.local_url):
             place = url.removeprefix("http://").rstrip("/").rpartition(":")[0].strip("[]")
-            socket.create_connection((place, its.port), 5).close()
+            socket.create_connection((place, its.port), 60).close()
 
 
 @pytest.mark.parametrize(
@@ -127,9 +127,9 @@ def test_the_page_is_there_where_the_address_says(monkeypatch: pytest.MonkeyPatc
     serving.start()
     try:
         for url in (made.url, made.one_time_url()):
-            with urllib.request.urlopen(url, timeout=10) as answer:
+            with urllib.request.urlopen(url, timeout=60) as answer:
                 assert answer.status == 200
     finally:
         made.stop()
-        serving.join(20)
+        serving.join(60)
         made.close()

@@ -141,17 +141,17 @@ def test_only_the_latest_is_worked_on():
     def work(which: int) -> None:
         seen.append(which)
         begun.set()
-        may_go_on.wait(10)
+        may_go_on.wait(60)
 
     loop = LatestWork(work, lambda _: None)
     thread = threading.Thread(target=loop.run)
     thread.start()
     loop.give(1)
-    begun.wait(10)
+    begun.wait(60)
     loop.give(2)
     loop.give(3)
     may_go_on.set()
     wait(lambda: len(seen) == 2)
     loop.stop()
-    thread.join(10)
+    thread.join(60)
     assert seen == [1, 3]

@@ -131,7 +131,7 @@ def _arrays(content: Any, buffers: Any) -> dict[str, Any]:
 
 def wait_for(what: Callable[[], Any]) -> Any:
     """What it gives, once it does."""
-    end_s = time.monotonic() + 30
+    end_s = time.monotonic() + 60
     while not (found := what()):
         assert time.monotonic() < end_s
         time.sleep(0.01)
@@ -505,7 +505,7 @@ def test_messages_about_a_basis_come_while_nobody_holds_the_session(
     forward, was_free = studio.on_message, []
 
     def is_free() -> bool:
-        got = studio._lock.acquire(timeout=1)
+        got = studio._lock.acquire(timeout=20)
         if got:
             studio._lock.release()
         return got

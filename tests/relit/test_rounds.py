@@ -30,6 +30,7 @@ def target(scene: lp.Scene) -> lp.Target:
     return lp.read_target(path).fitted_to(scene.size, resize=True)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("seeds", "refined"), [FEW, at_night(*MANY)])
 def test_error_bars_hold_the_answer_of_many_samples(
     scene: lp.Scene, target: lp.Target, seeds: int, refined: int

@@ -15,7 +15,7 @@ from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.scene_render import Stream, render
 
 #: Seconds of a piece of work, and in which a thread surely comes to its turn.
-PIECE_S, SOON_S = 0.02, 10
+PIECE_S, SOON_S = 0.02, 60
 
 
 class Work:

@@ -49,7 +49,7 @@ def neighbour() -> Iterator[Neighbour]:
 def tab(browser: Any) -> Iterator[Any]:
     """Opens tabs of one browser."""
     context = browser.new_context(viewport={"width": 1280, "height": 720})
-    context.set_default_timeout(20_000)
+    context.set_default_timeout(60_000)
     yield context.new_page
     context.close()
 
@@ -71,7 +71,7 @@ def test_a_neighbour_that_is_visited_gets_nothing_that_opens_the_session(
     assert page.url == server.address.url  # the token is seen no longer
     where = f"{neighbour.url}?of={server.address.url}"
     page.evaluate("(url) => { location.href = url; }", where)  # as a link would
-    assert neighbour.has_tried.wait(20)
+    assert neighbour.has_tried.wait(60)
     beside = tab()
     beside.goto(where)
     beside.wait_for_function("() => document.title === 'done'")

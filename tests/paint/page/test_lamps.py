@@ -102,6 +102,7 @@ def room(browser: Any, tmp_path: Path) -> Iterator[Room]:
     assert wrong == []
 
 
+@pytest.mark.long
 def test_lights_are_marked_dragged_and_taken_back(room: Room) -> None:
     bulb = (-0.5, 1, 0.5)
     assert room.mark("bulb") == pytest.approx(room.seen(bulb), abs=1)

@@ -7,22 +7,24 @@ Both are large and take half a minute each, so that they are no part of what tes
 
 import json
 import os
-import signal
 import socket
 import subprocess
 import sys
 import time
 import urllib.request
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
 from renderer import REPOSITORY
 
 import lightpaint as lp
+
+pytestmark = pytest.mark.long
 
 PAINTER = """\
 import lightpaint as lp
@@ -66,18 +68,24 @@ def served(folder: Path, *command: str) -> Iterator[str]:
             env=env,
             stdout=log,
             stderr=log,
-            start_new_session=True,
         )
     try:
         wait_for(lambda: answers(url), START_S)
         yield url
     finally:
-        os.killpg(server.pid, signal.SIGTERM)
-        try:
-            server.wait(10)
-        except subprocess.TimeoutExpired:
-            os.killpg(server.pid, signal.SIGKILL)
-            server.wait()
+        end_at_once(server)
+
+
+def end_at_once(server: "subprocess.Popen[bytes]") -> None:
+    """End a server and its kernels; asked for it, JupyterLab takes ten seconds."""
+    processes = psutil.Process(server.pid).children(recursive=True)
+    server.kill()
+    server.wait()
+    for process in processes:
+        with suppress(psutil.NoSuchProcess):
+            process.kill()
+    _, alive = psutil.wait_procs(processes, START_S)
+    assert alive == []
 
 
 def answers(url: str) -> bool:

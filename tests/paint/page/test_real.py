@@ -41,7 +41,7 @@ UNPAINTED = "Nothing is painted: the answer is the present lighting."
 PAINTER = "document.getElementById('lightpaint').painter"
 
 
-def until(is_so: Callable[[], Any], what: str, seconds: float = 20) -> Any:
+def until(is_so: Callable[[], Any], what: str, seconds: float = 60) -> Any:
     """What is looked for, once it is so."""
     end = time.monotonic() + seconds
     while not (found := is_so()):
@@ -241,7 +241,7 @@ def opened(browser: Any) -> Iterator[Callable[..., Person]]:
         about = {"viewport": {"width": 1280, "height": 720}, **how}
         context = beside.page.context if beside else browser.new_context(**about)
         contexts.append(context)
-        context.set_default_timeout(20_000)
+        context.set_default_timeout(60_000)
         page = context.new_page()
         page.on("response", lambda r: wrong.append(r.url) if r.status >= 400 else None)
         page.on("pageerror", lambda error: wrong.append(str(error)))
@@ -664,7 +664,7 @@ def test_one_waits_for_the_first_picture_and_paints_while_it_gets_better(
         now = me.seen(90, 50)
         me.press(*FIRM).drag(me.at(20, 20), me.at(30, 20), hold=True)
         folder.events[1].set()
-        folder.events[2].wait(20)
+        folder.events[2].wait(60)
         until(lambda: me.seen(90, 50) != now, "the page has the old picture")
         me.page.mouse.move(*me.at(40, 20), steps=3)
         me.page.mouse.up()
