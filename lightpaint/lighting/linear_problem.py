@@ -176,7 +176,7 @@ class SummedProblem(LinearProblem):
         return self.equations.target_norm2
 
     def remove_traces(self, weights: Doubles, is_constrained: Bools) -> Doubles:
-        """Return weights (n, 3) as they are: sums do not tell what a pixel shows."""
+        """Return weights (n, 3) unchanged: sums say nothing about single pixels."""
         return weights
 
 

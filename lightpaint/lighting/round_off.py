@@ -23,14 +23,14 @@ MAX_TRACE = 2.0**-11
 def remove_traces(
     basis: Basis, weights: Doubles, image: Floats, *, is_constrained: Bools
 ) -> Doubles:
-    """Return weights (n, 3) with 0 for those that show in no pixel.
+    """Return weights (n, 3) with 0 for those that are visible in no pixel.
 
-    is_constrained: (n,), lights with constraints, whose weights stay.
+    is_constrained: (n,), lights with constraints, whose weights are kept.
 
     A weight is a trace if it is small, and its light in each pixel is below the round-off of the
     other lights there, or of the picture's mean where there are none. Round-off is that of the
-    painting, `image`, or of the layers: of float16 if all of these are.
-    The weights stay for a basis that knows its noise: that is larger, and error bars show it.
+    painting, `image`, or of the layers: float16 if all of these are. A basis with known noise keeps
+    its weights: noise is larger, and error bars show it.
     """
     small = (weights > 0) & (weights <= MAX_TRACE) & ~(basis.is_fixed | is_constrained)[:, None]
     if basis.knows_noise or not small.any():

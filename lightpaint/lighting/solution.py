@@ -127,7 +127,7 @@ class Solution(Shown):
         was = np.array([light.emission for light in self.basis.lights], np.float64)
         for name, values in by_channel("was", was.T).items():
             table[name] = values
-        with np.errstate(divide="ignore", invalid="ignore"):  # of what was off, or is
+        with np.errstate(divide="ignore", invalid="ignore"):  # for lights that were off, or are
             table["stops"] = np.log2(table["y"].to_numpy() / luminance(was))
         return table
 

@@ -132,7 +132,7 @@ def _solve_once(problem: Problem, begin: Doubles, blocks: BinnedPixels | None) -
     """
     if problem.is_linear:
         return _solve_squares(problem, begin)
-    # The literal squares come first, which also tell what lights reach.
+    # The literal squares come first; they also show what each light reaches.
     all_lights = replace(problem, constraints=_without_sparse(problem.constraints))
     first = _solve_squares(replace(all_lights, loss=problem.squares), begin)
     reached = first.reached

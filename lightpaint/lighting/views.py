@@ -1,8 +1,8 @@
 """Several views of a scene as one long picture, so that methods for one serve all.
 
-Pixels of all views count the same, and neither the normal equations nor the noise in them depend
-on where a pixel lies. Put behind each other, the pixels of all views are one picture, and the
-solve, its error bars and its refinement need not know of views at all.
+Pixels of all views count the same, and neither the normal equations nor their noise depend on the
+place of a pixel. Concatenated, the pixels of all views form one picture, so the solve, its error
+bars and its refinement do not deal with views at all.
 """
 
 from collections.abc import Sequence
@@ -37,9 +37,7 @@ class Views:
         return len(self.bases)
 
     def join(self, images: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:
-        """Join images (h, w, …) of the views into one, (rows, ROW_PIXELS, …); a single view stays
-        as it is.
-        """
+        """Join images (h, w, …) of the views into one, (rows, ROW_PIXELS, …), or return a single one."""
         return images[0] if len(self) == 1 else join_rows(images)
 
     def part(self, joint: npt.NDArray[Any], k: int) -> npt.NDArray[Any]:
@@ -55,8 +53,8 @@ class Views:
 def joint_basis(bases: Sequence[Basis]) -> tuple[Basis, tuple[Basis, ...]]:
     """Return the basis of all views together, n long pictures, and the bases of the views.
 
-    The returned bases share the memory of the joint one: whoever drops the given ones stores every
-    pixel once. Raises BasisError if their lights are not the same.
+    The returned bases share the memory of the joint one: after the given ones are dropped, every
+    pixel is stored once. Raises BasisError if their lights are not the same.
     """
     first = bases[0]
     if len(bases) == 1:

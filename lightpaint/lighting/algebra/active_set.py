@@ -19,8 +19,9 @@ class _Working:
 
 
 def polish(q: Quadratic, x: Doubles, *, tolerance: float, max_steps: int) -> tuple[Doubles, int]:
-    """Find the optimum from a feasible x by its active set, exact in what is at its bounds. Returns
-    (x, steps).
+    """Find the optimum from a feasible x by an active set; unknowns at bounds equal them exactly.
+
+    Returns (x, steps).
 
     Each step is Newton's on the free unknowns. If it leaves the box, it is clipped there and
     the bounds it hit are held; if that would not lower the objective, it ends at the first limit.
@@ -84,7 +85,7 @@ def _working_set(q: Quadratic, x: Doubles) -> _Working:
 
 
 def _newton(q: Quadratic, x: Doubles, gradient: Doubles, working: _Working) -> Doubles:
-    """Return the step (n,) to the optimum of the free unknowns; held caps stay as they are."""
+    """Return the step (n,) to the optimum of the free unknowns; held caps do not change."""
     free = np.flatnonzero(working.free)
     held_caps = np.flatnonzero(working.capped & (q.A[:, working.free] > 0).any(axis=1))
     f, k = free.size, held_caps.size

@@ -41,10 +41,10 @@ def clipped_newton(
 
     M: (c, n, n), scaled to a unit diagonal, with rows of 0 where an unknown changes nothing;
     b, lower, upper: (c, n), or one bound for all. x: (c, n), between the bounds, to begin with.
-    size: (c,), what the KKT residuals are relative to.
-    Returns x, which equals the bounds that hold it to the last bit, the KKT residuals, (c,), the
-    number of steps, and whether the matrix of the last step may be singular: other x are then as
-    good (see nearest_optimum.py). Where a residual is above `tolerance`, x is of no use.
+    size: (c,), scale of the KKT residuals. Returns x, which equals the bounds that hold it to the
+    last bit, the KKT residuals, (c,), the number of steps, and whether the matrix of the last step
+    may be singular: other x are then as good (see nearest_optimum.py). If a residual is above
+    `tolerance`, x is useless.
     """
     matrix, counts = np.eye(0), np.einsum("cii->ci", M) > 0
     check = cancellation_check()
@@ -56,7 +56,7 @@ def clipped_newton(
         if step == MAX_STEPS or not is_open.any():
             break
         stays = ((x <= lower) & (gradient > 0)) | ((x >= upper) & (gradient < 0))
-        # Solved problems stay as they are while others still need steps.
+        # Solved problems do not change while others still need steps.
         move, matrix = _newton(M, gradient, counts & ~stays & is_open[:, None])
         x = np.minimum(np.maximum(x + move, lower), upper)
     return x, residual, step, is_suspect(matrix)

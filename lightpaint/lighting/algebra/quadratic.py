@@ -177,7 +177,7 @@ def scaled(
     counts = power > UNREACHED_POWER * power.max(initial=0)
     scale = np.where(counts, 1 / np.sqrt(np.where(counts, power, 1)), 1.0)
     inward = np.where(counts, scale, 0.0)
-    # No product of two scales: it could overflow where what it multiplies is small.
+    # Not multiplied by the product of two scales, which could overflow.
     M = (M * inward[:, None]) * inward
     b = b * inward
     low, high = low / scale, high / scale

@@ -125,7 +125,7 @@ def _constraint_bound(o: BoundedAnswer, place: int) -> ActiveBound:
         if cap.unknowns[0] == unknowns[0]
     )
     if forces.any() and knob.is_free:
-        # With a limit of luminance besides, a channel feels both.
+        # With a limit of luminance, too, both affect the channel.
         return ActiveBound(
             lights, "limits", estimate, _numbers(forces + cap * LUMINANCE), "emission"
         )
@@ -171,7 +171,7 @@ def _light_multiplier(knob: Knob, forces: Doubles) -> tuple[tuple[float, ...], P
     if knob.is_free:
         return _numbers(forces), "emission"
     sizes = np.array([float(x.columns[0][1] @ LUMINANCE) for x in knob.unknowns])
-    # Of several primaries, the one that brings most.
+    # Of several primaries, the one with the largest gain.
     rates = forces / sizes
     return (float(rates[np.argmax(np.abs(rates))]),), "luminance"
 

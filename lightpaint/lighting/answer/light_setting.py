@@ -23,14 +23,14 @@ class LightSetting:
     is_fixed: whether it stays as it is in the scene, with weight 1.
     members: names of the emitters it consists of; itself if none are given.
     unit_flux: watts it radiates per channel at an emission of 1; None if unknown.
-    constraint: its constraint in the solve, in few words; "" for none. is_active: whether the
+    constraint: short text of its constraint in the solve; "" for none. is_active: whether the
     constraint held it back.
-    reached: for each channel whether it reaches anything that counts; if not, its emission is
-    undetermined, and stays as it was.
+    reached: for each channel whether it reaches any counted pixel; if not, its emission is
+    undetermined, and does not change.
     standard_error: of the emission, from the noise of the basis, if known; None in channels that
     reach nothing.
     interval: 95 % interval of each channel, lower and upper end; as standard_error.
-    untold: whether the samples of the basis do not suffice to determine it.
+    untold: whether the basis has too few samples to determine it.
     """
 
     name: str

@@ -102,7 +102,7 @@ class Lighting(Shown, Mapping[str, LightSetting]):
 
     @property
     def fixed(self) -> frozenset[str]:
-        """Names of the lights that stay as they are."""
+        """Names of the fixed lights."""
         return frozenset(light.name for light in self.lights if light.is_fixed)
 
     @property

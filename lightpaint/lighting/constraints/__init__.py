@@ -1,1 +1,1 @@
-"""Constraints on lights: what people ask of them."""
+"""Constraints on lights."""

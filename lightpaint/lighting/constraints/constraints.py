@@ -1,4 +1,4 @@
-"""Constraints on lights, in the terms of people who light: locked, limited, dimmed.
+"""Constraints on lights, in the terms of lighting artists: locked, limited, dimmed.
 
 A lights file, the options of the command line and `Constraints.of` share keys and values. This
 module checks them once; `reduction.py` derives the unknowns of the solve from them.
@@ -65,10 +65,9 @@ class LightConstraint:
 
     @classmethod
     def of(cls, table: Mapping[str, Any], *, where: str = "constraint") -> "LightConstraint":
-        """Make a constraint of keys and values as they stand in a lights file.
+        """Make a constraint from keys and values as in a lights file.
 
-        Raises ConstraintError for values that mean nothing, and for keys that contradict
-        each other.
+        Raises ConstraintError for invalid values and for keys that contradict each other.
         """
         check_keys(table, LIGHT_KEYS, where)
         check_lengths(table, where)
@@ -164,7 +163,7 @@ class Constraints:
         sparse: int | None = None,
         where: str = "",
     ) -> "Constraints":
-        """Make constraints of the tables of a lights file.
+        """Make constraints from the tables of a lights file.
 
         light: name or pattern → keys and values (`{"key": {"color": "3200K"}}`).
         tie: lists of names, or tables with `lights` and `color`; one list of names is one tie.
@@ -193,8 +192,9 @@ class Constraints:
         )
 
     def and_then(self, others: "Constraints") -> "Constraints":
-        """Return these constraints and `others`, which replace what they contradict and ties of the
-        same lights.
+        """Return these constraints with `others`, which replace contradictory ones.
+
+        Ties in `others` replace those of the same lights.
 
         A constraint in both occurs once: `a.and_then(a.and_then(b)) == a.and_then(b)`.
         """

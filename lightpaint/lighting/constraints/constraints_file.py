@@ -52,7 +52,7 @@ def constraints_of(requests: SceneRequests) -> Constraints:
 
 
 def _without_moves(light: Any, source: str) -> Any:
-    """Return tables of lights without the keys of what may move, which are no constraints."""
+    """Return tables of lights without the keys for moves, which are no constraints."""
     if not isinstance(light, Mapping):
         return light
     tables = {}

@@ -9,8 +9,8 @@ In display space every answer changes the weight of every pixel. There the pictu
 a few thousand pixels, and one round from the last answer follows the brush; the answer of all
 pixels comes when the brush is lifted.
 
-Of several views those with paint count. Each has sums of its own, so that a stroke costs no more
-than with a single view.
+Only painted views count. Each has its own sums, so that a stroke costs no more than with a single
+view.
 """
 
 from collections.abc import Sequence
@@ -72,7 +72,7 @@ class LiveSolver:
         self.constrain(fit, constraints)
 
     def constrain(self, fit: Fit, constraints: Constraints) -> None:
-        """Change fit and constraints. Raises ConstraintError for what is impossible."""
+        """Change fit and constraints. Raises ConstraintError for impossible ones."""
         reduction = reduce_lights(constraints, self._basis.lights, fit)
         self._fit, self._constraints, self._reduction = fit, constraints, reduction
         self._pulls: _Pulls | None = None
@@ -109,10 +109,10 @@ class LiveSolver:
     def answer(self, start: Doubles, *, while_moving: bool = False) -> Doubles:
         """Return the best weights (n, 3), from the last ones.
 
-        Before anything is painted, lights stay as they are, within the constraints.
+        Before anything is painted, lights keep their present weights, within the constraints.
 
-        while_moving: whether a light is being moved. Sums over tiles would be formed anew for each
-        of its places, so that linear light, too, is averaged to a few thousand pixels.
+        while_moving: whether a light is being moved. Sums over tiles would have to be recomputed
+        for each of its places, so linear light, too, is averaged to a few thousand pixels.
         """
         views = tuple(view for view in self._views if view.is_painted)
         if not views:
@@ -239,10 +239,9 @@ def unpainted_weights(views: Sequence[LiveView], reduction: Reduction) -> Double
 
 
 def _nearest(weights: Doubles, views: Sequence[LiveView], reduction: Reduction) -> Doubles:
-    """Return the nearest weights (n, 3) that constraints allow, relative to the brightness of
-    lights.
+    """Return the nearest allowed weights (n, 3), relative to the brightness of lights.
 
-    Lights that keep to a range of white get its nearest one, as bright as they are.
+    Lights with a range of white get its nearest white, at the same brightness.
     """
     weights = snap_to_whites(reduction, weights)
     reduction = center_windows(reduction, weights)

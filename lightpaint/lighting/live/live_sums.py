@@ -40,7 +40,7 @@ class PaintedTiles:
         self._whole = self._rest.base.copy()
         everything = slice(0, len(importance)), slice(0, importance.shape[1])
         self._set_unpainted(everything)
-        # Where the sums of the rest are out of date.
+        # Region in which the sums of the rest are out of date.
         self._is_old: Slices | None = everything
 
     def _set_unpainted(self, region: Slices) -> None:

@@ -81,7 +81,7 @@ class TiledEquations:
 
     @property
     def equations(self) -> NormalEquations:
-        """M, b and ‖Ψ‖² as they are now."""
+        """The current M, b and ‖Ψ‖²."""
         M, b = self._M[-1][0, 0], self._b[-1][0, 0]
         return NormalEquations(M.copy(), b[:, :-1].copy(), b[:, -1].copy())
 
@@ -169,8 +169,8 @@ class TiledEquations:
             np.multiply(lit, np.sqrt(D)[:, :, :, None], out=channel)
             two = channel
             if n <= MAX_CHEAP_LIGHTS:
-                # Of one array and itself numpy forms half of the product, of two all of it, which
-                # is faster for few lights.
+                # For the product of an array with itself numpy computes only half, for two arrays
+                # all of it, which is faster for few lights.
                 two = _BUFFERS.array("two", lit.shape)
                 two[...] = channel
             np.matmul(channel, two.swapaxes(-1, -2), out=self._M[0][rows, columns])
@@ -248,7 +248,7 @@ def _pyramid(shape: tuple[int, int], node: tuple[int, ...]) -> list[Doubles]:
     rows, columns = shape
     levels = []
     while rows * columns > 1:
-        # Of every node there are both pairs, if only of zeros.
+        # Every node has both pairs, even if they are zeros.
         levels.append(np.zeros((rows + rows % 2, columns + columns % 2, *node)))
         rows, columns = -(-rows // 2), -(-columns // 2)
     return [*levels, np.zeros((1, 1, *node))]

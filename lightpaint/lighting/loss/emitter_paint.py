@@ -18,10 +18,10 @@ from lightpaint.images.estimate import box_mean
 #: a minimum in pixels.
 RADIUS, MIN_RADIUS = 1 / 30, 2
 
-#: Stops from which on paint is darker than what it covers.
+#: Stops from which paint counts as darker than the picture under it.
 DARKER_STOPS = 0.5
 
-#: Stops of red against blue from which on paint is warmer than what it covers.
+#: Stops of red against blue from which paint counts as warmer than the picture under it.
 WARMER_STOPS = 0.5
 
 #: Light, relative to the picture's mean, below which a ratio means nothing.

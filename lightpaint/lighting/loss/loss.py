@@ -20,7 +20,7 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.threads import parallel_map
 
 #: Pixels in a strip, and in all strips that keep what they compute: of 1920 x 1080 pixels. With
-#: more, the painting is encoded anew each time.
+#: more, the painting is encoded again each time.
 STRIP_PIXELS, MAX_KEPT_PIXELS = 2**13, 2**21
 
 #: Cuts one view's part out of an array of all views.
@@ -97,7 +97,7 @@ class PixelLoss(ABC):
 
     @cached_property
     def _kept_strips(self) -> list[tuple[slice, Self]]:
-        """All pixels in parts, which keep what they compute once."""
+        """All pixels in parts, which cache their computations."""
         return [(strip, self.subset(strip)) for strip in self._parts]
 
     @property

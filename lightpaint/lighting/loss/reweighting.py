@@ -1,5 +1,6 @@
-"""Iteratively reweighted squares: linear solves, each of squares that stand for the loss at the
-last answer.
+"""Iteratively reweighted least squares.
+
+Each linear solve minimises squares that approximate the loss at the last answer.
 
 The squares have the loss's own gradient, so the way to their optimum is downhill; the loss itself
 decides the length of each step, and therefore never rises. Once it stops falling, the answer is
@@ -30,8 +31,8 @@ KEPT_PROMISE, SHORTEST_STEP = 1e-4, 2.0**-20
 #: Share of the loss that is round-off of its sums.
 ROUND_OFF = 1e-12
 
-#: Largest share of the loss that a whole step may promise where no step falls any more: views of
-#: OpenColorIO are float32, and their slopes quotients of differences.
+#: Largest predicted decrease, as a share of the loss, at which a step that fails to lower the loss
+#: counts as converged: views of OpenColorIO are float32, and their slopes are finite differences.
 FLAT_FALL = 1e-5
 
 

@@ -1,8 +1,8 @@
 """Lights at the bounds of their gamuts under the moving brush.
 
-A gamut is a polygon of many corners, and many mixes of them give the same colour. Exact answers
-use all corners. Under the brush each light mixes the corners of one triangle, the middle and one
-side, and moves to the next triangle when it comes to the end of this one.
+A gamut is a polygon of many corners, and many mixes of them give the same colour. Exact answers use
+all corners. Under the brush each light mixes the corners of one triangle, made of the centre and
+one side, and moves to the next triangle when it reaches the edge.
 """
 
 import numpy as np

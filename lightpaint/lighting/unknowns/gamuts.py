@@ -1,10 +1,10 @@
 """Colours of lamps that keep their own unless the painting clearly needs others.
 
-A lamp that hardly shines, or whose light comes off a coloured surface, can lower the error by
-colours that nobody painted: a little green that makes up for other lamps. So each lamp is limited
-to mixes of its own colour, of whites, and of the light that the painting needs where the lamp
-counts. This light is redder or bluer than the lamps' light there by the ratio of the painted Ψ to
-the look, and by no more than the ratio of Ψ to the surface.
+A dim lamp, or one that lights a coloured surface, can lower the error by colours that nobody
+painted: a little green that compensates for other lamps. So each lamp is limited to mixes of its
+own colour, of whites, and of the light that the painting needs where the lamp counts. This light is
+redder or bluer than the lamps' light there by the ratio of the painted Ψ to the look, and at most
+by the ratio of Ψ to the surface.
 """
 
 from collections.abc import Callable, Sequence
@@ -36,8 +36,8 @@ OUTLIER_SHARE = 0.05
 #: Distance from whites that a lamp's colour may have, in (u', v'): too small to look green.
 WHITE_MARGIN = 0.004
 
-#: Largest distance from painted colours: people paint hues that much off. The distance allowed is
-#: twice that of the paint itself from whites, since whoever paints white means white.
+#: Largest distance from painted colours: painted hues are that inexact. The allowed distance is
+#: twice that of the paint itself from whites, so that white paint means white.
 PAINTED_MARGIN = 0.01
 
 #: Distance from whites of all temperatures that a colour may have, relative to that of the paint:
@@ -134,7 +134,7 @@ class Gamuts:
         lamps, whites = (reach_of(white_range(*k).colors) for k in (LAMP_KELVINS, ALL_KELVINS))
         self._reach = np.maximum(own_reach + 2 * REACH_STEP, lamps + WHITE_MARGIN)
         self._whites = whites
-        # Off-white lamps lie beside whites, and so does what they shine on; coloured ones are none.
+        # Off-white lamps lie near the whites, and so do surfaces under them; coloured lamps do not.
         self._off_white = np.maximum(own_reach - whites, 0).max(axis=1)
         is_near_white = self._off_white <= PAINTED_MARGIN
         self._tolerance = float(self._off_white[is_near_white].max(initial=0.0))
@@ -162,7 +162,7 @@ class Gamuts:
         return self._gamuts[light]
 
     def refresh(self) -> None:
-        """Forget what the painting needed. Gamuts that stay the same stay the same objects."""
+        """Discard gamuts, which are computed again on request. Equal ones stay the same objects."""
         self._former_gamuts |= self._gamuts
         self._gamuts, self._needed = {}, None
 

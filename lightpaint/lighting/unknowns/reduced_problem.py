@@ -222,10 +222,10 @@ def _solve_blocks(
 def _without_dark_channels(
     equations: NormalEquations, lit: Bools, start: Doubles, *, is_coupled: bool
 ) -> tuple[Doubles, Doubles]:
-    """Return M and b without the channels in which lights reach nothing: these stay as they are.
+    """Return M and b without channels in which a light reaches nothing: these keep their weights.
 
-    is_coupled: whether unknowns span channels. A light that reaches
-    something in one is then drawn to its start in the others.
+    is_coupled: whether unknowns span channels. A light that reaches something in one channel is
+    then pulled to its start in the others.
     """
     M = equations.M * (lit.T[:, :, None] & lit.T[:, None, :])
     b = equations.b * lit.T

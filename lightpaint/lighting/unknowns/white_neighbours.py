@@ -113,9 +113,9 @@ def center_windows(reduction: Reduction, weights: Doubles, width: int = 1) -> Re
 
 
 def snap_to_whites(reduction: Reduction, weights: Doubles) -> Doubles:
-    """Return weights (n, 3) with the nearest white of its range for each light that keeps to one.
+    """Return weights (n, 3) with the nearest white for each light with a range of whites.
 
-    Lights stay as bright as they are.
+    Lights keep their brightness.
     """
     return _snap(_groups(reduction), weights) if reduction.white_knobs else weights
 

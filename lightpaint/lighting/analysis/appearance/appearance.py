@@ -253,10 +253,10 @@ def compare_appearance(
 def _unpainted_change(
     solution: Solution, look: PaintComparison, predicted: Estimate
 ) -> UnpaintedChange | None:
-    """Return the change of unpainted pixels; None if they need not stay as they are.
+    """Return the change of unpainted pixels; None if they may change freely.
 
-    Both pictures are sums of the same planes, so that noise is no change. Lights that a person has
-    fixed are fixed in both.
+    Both pictures are sums of the same planes, so noise does not count as change. Lights fixed by
+    the user are fixed in both.
     """
     [target], basis = solution.problem.views.targets, solution.basis
     if not target.over_look or target.everything:

@@ -78,7 +78,7 @@ class ColorChoice:
     __repr__ = short_repr
 
 
-#: Of one view.
+#: For one view.
 Choices = tuple[ColorChoice, ...]
 
 

@@ -28,7 +28,7 @@ STEP = 2
 def block_differences(
     look: PaintComparison, light: Doubles, grain: Doubles
 ) -> tuple[Doubles, Doubles]:
-    """Return the mean ΔE in each block, (rows, columns), as it is, and without the part of noise.
+    """Return the mean ΔE in each block, (rows, columns), with and without the part of noise.
 
     Noise and error add as squares, since they are independent. But a painting over the same renders
     shares their noise: so noise explains at most the differences between pixels that remain

@@ -1,4 +1,4 @@
-"""Reasons that keep the lights from what was painted, and what each of them costs.
+"""Reasons that keep the lights from the painting, and the cost of each.
 
 All shares are of the answer's error over the paint, Σ D ‖V(ψ) − V(x)‖², which the fit minimises
 there; each takes another solve. A sample of the pixels finds reasons, and orders them. The share of
@@ -215,9 +215,7 @@ def _joint_reasons(sample: PixelSample, everything: float) -> tuple[Reason, ...]
 
 
 def _find_loosening(solution: Solution, sample: PixelSample, full_gain: float) -> Loosening:
-    """Find the strongest hold with `LOOSENED_SHARE` of `full_gain`, the gain without a hold, and
-    measure what it does.
-    """
+    """Find and measure the strongest hold with `LOOSENED_SHARE` of the gain without one, `full_gain`."""
     hold = _weaker_hold(sample, LOOSENED_SHARE * full_gain)
     weights = released_weights(solution, fit=replace(sample.problem.fit, hold=hold))
     [target] = solution.problem.views.targets

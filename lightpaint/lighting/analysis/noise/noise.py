@@ -71,7 +71,7 @@ class Noise:
         """(3, n, 3, n), covariance of the gradient including the hidden part."""
         covariance, lights = self.gradient.copy(), np.arange(self.hidden.shape[1])
         deviation = np.sqrt(self.hidden)
-        # Where channels are coupled, one path carries all three.
+        # A path carries all three channels, so coupled channels share its noise.
         coupled = covariance.any(axis=(1, 3))
         for c, d in zip(*np.nonzero(coupled), strict=True):
             covariance[c, lights, d, lights] += deviation[c] * deviation[d]

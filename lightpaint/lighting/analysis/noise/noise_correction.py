@@ -98,7 +98,7 @@ def _loss(solution: Solution, removed: NormalEquations) -> float:
     """Return the error of a solution with its pull, less the removed noise."""
     pull, weights = solution.problem.pull, solution.weights
     pulled = 0.0 if pull is None else float(pull.objective(weights).sum())
-    # As `NormalEquations.objective`, which does not allow squares below zero.
+    # As `NormalEquations.objective`, which would not allow a negative result.
     noise = (
         np.einsum("ic,cij,jc->", weights, removed.M, weights) - 2 * (removed.b.T * weights).sum()
     )

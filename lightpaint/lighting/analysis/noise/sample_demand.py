@@ -30,8 +30,8 @@ FLOOR = 0.3
 class SampleDemand:
     """The worth of further samples in each pixel of a view.
 
-    variance: (h, w) float64, what a pixel with its present samples adds to the squared error, in
-    the mean of its neighbours. density: (h, w), samples that a pixel should have, in proportion.
+    variance: (h, w) float64, contribution of a pixel with its present samples to the squared error,
+    averaged over neighbours. density: (h, w), ideal number of samples, up to a factor.
     """
 
     variance: Doubles
@@ -101,7 +101,7 @@ def _level(density: Doubles, have: Doubles, budget: float) -> float:
     demand, existing = density[counted], have[counted]
     order = np.argsort(existing / demand)
     demand, existing = demand[order], existing[order]
-    # With the k pixels that lack most, the level is (budget + Σ have) / Σ density.
+    # For the k pixels that need most, the level is (budget + Σ have) / Σ density.
     levels = (budget + np.cumsum(existing)) / np.cumsum(demand)
     reached = levels >= existing / demand
     return float(levels[np.flatnonzero(reached)[-1]])

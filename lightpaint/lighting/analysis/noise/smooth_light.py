@@ -1,13 +1,13 @@
 """Equations of many lights, from indirect light averaged along surfaces.
 
-The more lights share the samples of emitters, the noisier is each plane, and the more of M is
-noise: its bias and its own noise then decide the answer. An average over 5 x 5 pixels
-(`SurfaceFilter`) takes most of both out and changes the sums little. It is linear and the same for
-both halves, so the noise that is left in M is the sum of averaged half differences.
+The more lights share the samples, the noisier each plane is, and the more of M is noise, whose bias
+and variance then decide the answer. An average over 5 x 5 pixels (`SurfaceFilter`) removes most of
+both and changes the sums little. It is linear and the same for both halves, so the noise left in M
+is the sum of averaged half differences.
 
-How far a pixel is averaged follows from the noise of all lights together and from what the average
-changes beyond it: t = V / (V + B), as for pictures. So with more samples the sums go to those of
-the basis, and reflections or caustics stay as they are once they are clean.
+The weight of the average in a pixel follows from the noise of all lights together and from the
+change beyond it: t = V / (V + B), as for pictures. So with more samples the sums converge to those
+of the basis, and reflections or caustics are kept once they are clean.
 """
 
 from collections.abc import Sequence

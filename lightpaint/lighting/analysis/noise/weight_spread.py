@@ -33,7 +33,7 @@ def weight_spread(
     unbiased: NormalEquations,
     weights: Doubles,
 ) -> tuple[Doubles, list[Doubles], Doubles]:
-    """Return standard deviations of the weights, what their bounds leave, and the excess, (3 n,).
+    """Return standard deviations of the weights within bounds, and their excess beyond, (3 n,).
 
     The second is what they may do beyond, below and above, when they leave a bound or cap, in
     standard deviations as well; (n, 3) each.
