@@ -37,7 +37,7 @@ class Views:
         return len(self.bases)
 
     def join(self, images: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:
-        """Join images (h, w, …) of the views into one, (rows, ROW_PIXELS, …), or return a single one."""
+        """Join images (h, w, …) of the views into one, (rows, ROW_PIXELS, …), unless there is one."""
         return images[0] if len(self) == 1 else join_rows(images)
 
     def part(self, joint: npt.NDArray[Any], k: int) -> npt.NDArray[Any]:

@@ -215,7 +215,7 @@ def _joint_reasons(sample: PixelSample, everything: float) -> tuple[Reason, ...]
 
 
 def _find_loosening(solution: Solution, sample: PixelSample, full_gain: float) -> Loosening:
-    """Find and measure the strongest hold with `LOOSENED_SHARE` of the gain without one, `full_gain`."""
+    """Find and measure the strongest hold with `LOOSENED_SHARE` of `full_gain`, that of none."""
     hold = _weaker_hold(sample, LOOSENED_SHARE * full_gain)
     weights = released_weights(solution, fit=replace(sample.problem.fit, hold=hold))
     [target] = solution.problem.views.targets
