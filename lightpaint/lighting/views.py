@@ -37,7 +37,7 @@ class Views:
         return len(self.bases)
 
     def join(self, images: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:
-        """Join images (h, w, …) of the views into one, (rows, ROW_PIXELS, …), unless there is one."""
+        """Join images (h, w, …) of views into one, (rows, ROW_PIXELS, …); keep a single one."""
         return images[0] if len(self) == 1 else join_rows(images)
 
     def part(self, joint: npt.NDArray[Any], k: int) -> npt.NDArray[Any]:

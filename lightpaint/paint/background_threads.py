@@ -87,9 +87,9 @@ class ExactSolveLoop(_Loop):
 
 
 class LatestWork(_Loop):
-    """A thread's loop over the latest of what it is given; what came before is dropped.
+    """A thread's loop over the latest item given to it; earlier items are dropped.
 
-    work: done with it. report: receives errors.
+    work: called with the item. report: receives errors.
     """
 
     def __init__(self, work: Callable[[Any], None], report: Callable[[Message], None]) -> None:
@@ -98,13 +98,13 @@ class LatestWork(_Loop):
         self._latest: Any = None
 
     def give(self, latest: Any) -> None:
-        """Replace what is worked on next. None is nothing."""
+        """Replace the next item; None for none."""
         with self._condition:
             self._latest = latest
             self._condition.notify_all()
 
     def run(self) -> None:
-        """Work on what is given, until `stop` or an error."""
+        """Work on given items, until `stop` or an error."""
         while True:
             with self._condition:
                 self._condition.wait_for(lambda: self._latest is not None or not self._is_open)
@@ -134,7 +134,7 @@ class UnsavedRetry:
         self._is_over = Event()
 
     def stop(self) -> None:
-        """End the loop. Closing the store reports what is lost."""
+        """End the loop. Closing the store reports losses."""
         self._is_over.set()
 
     def run(self) -> None:

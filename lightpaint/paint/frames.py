@@ -1,7 +1,7 @@
 """Messages between page and session as JSON and bytes.
 
-A message is an object of JSON, whose `kind` names it, and a list of buffers. In a notebook the
-two travel as they are; on a socket they are one binary frame:
+A message is an object of JSON, whose `kind` names it, and a list of buffers. In a notebook the two
+travel separately; on a socket they are one binary frame:
 
     uint32 length of the JSON, little endian | JSON | padding to 8 bytes | buffers, each padded
 

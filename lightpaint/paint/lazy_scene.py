@@ -79,9 +79,7 @@ class LazyScene:
         return scene
 
     def remember(self, basis: Basis) -> None:
-        """Cache what the next session needs to begin without loading. basis: the one that is
-        cached.
-        """
+        """Cache facts that let the next session begin without loading. basis: the cached one."""
         if abs(_clock_s() - self._clock_s) > scene_facts.COARSE_S / 2:
             return  # the clock was set, so that file times do not tell the last change
         if self.record is None and self._scene is not None and self.settings.use_cache:

@@ -139,7 +139,7 @@ def _check_constraints(lights: Lights, constraints: Constraints) -> None:
 
 
 def _name_of(source: Paintable) -> str:
-    """Return the path of a source, as it was given or as the object stores it."""
+    """Return the path of a source, as given or as stored in the object."""
     if isinstance(source, Basis):
         return source.source or source.origin.scene
     return str(source.path)

@@ -154,8 +154,8 @@ class Canvas:
     ) -> Region:
         """Show other layers, or layers with other properties; return the region that changed.
 
-        steps: the pixels of layers that come back are those after these. at_rest: whether accents
-        follow what the layers cover by now; under the brush they stay.
+        steps: steps after which to take the pixels of layers that come back. at_rest: whether to
+        update accents to what the layers cover now; under the brush they stay.
         """
         missing = set(layers.ids) - set(self._layers)
         patches = _patches_by_layer(steps, self.view) if missing and steps else {}

@@ -122,7 +122,7 @@ class Canvases:
         return self._layers_at_rest.change_to(self.layers), kept
 
     def close(self) -> None:
-        """Close the open strokes and the open change; accents follow what layers cover now."""
+        """Close the open strokes and the open change; update accents to what layers cover now."""
         for view in self:
             view.close()
         self._layers_at_rest = self.layers

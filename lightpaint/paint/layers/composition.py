@@ -47,7 +47,7 @@ def accent(part: float) -> float:
 
 
 def accents(layers: Sequence[tuple[Layer, LayerPixels]]) -> list[float]:
-    """Return the accent of each of the layers that show, in one view.
+    """Return the accent of each visible layer, in one view.
 
     It depends on their coverage alone, and not on when they were made.
     """
@@ -98,7 +98,7 @@ def _compose_layer(shown: ShownLayer, pixels: Pixels, below: Pixels) -> Pixels:
 
 
 def _replace(layer: Layer, pixels: Pixels, below: Pixels, factor: np.float32) -> Pixels:
-    """Return the pixels of a layer that replaces what is below it, where it is painted."""
+    """Return the pixels with those of a `pixels` layer, where it is painted."""
     painted = pixels.importance > 0
     image = pixels.image
     if layer.strength != 1:

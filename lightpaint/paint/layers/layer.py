@@ -21,11 +21,11 @@ MAX_STRENGTH, MAX_FACTOR, MAX_NAME_LENGTH = 2.0, 1e4, 80
 class Layer:
     """A layer of a painting, without its pixels. Ids are never used twice in a session.
 
-    kind: `pixels` replaces what is below by light that counts as much as its importance; `paint`
-    mixes a colour over it by its coverage; `adjust` scales its luminance by `gain` and its colour
-    by `tint`, and `weigh` its importance by `times`, where the layer's mask covers; `group` has no
-    pixels, and holds the layers whose `group` is its id. strength: 0 to 2; `adjust` and `weigh`
-    take it as a power, so that 2 is twice the stops. importance: factor of how much it counts.
+    kind: `pixels` replaces the light below, with its own importance; `paint` mixes a colour over it
+    by its coverage; `adjust` scales its luminance by `gain` and its colour by `tint`, and `weigh`
+    its importance by `times`, where the layer's mask covers; `group` has no pixels, and holds the
+    layers whose `group` is its id. strength: 0 to 2; `adjust` and `weigh` take it as a power, so
+    that 2 is twice the stops. importance: factor of its importance.
     """
 
     id: int

@@ -71,8 +71,8 @@ class LayerStack:
     ) -> "LayerStack":
         """Return the stack with other layers of these ids; new ones lie on top.
 
-        order: the ids of all layers that stay, the lowest first; None for the order as it is.
-        Raises PaintError for an id that is not there.
+        order: the ids of all layers that stay, the lowest first; None for the present order. Raises
+        PaintError for an unknown id.
         """
         by_id = {layer.id: layer for layer in (*self.layers, *changed)}
         for layer in changed:
@@ -141,7 +141,7 @@ def stack_after(steps: Sequence[Step]) -> LayerStack:
 
 
 def next_layer_id(steps: Sequence[Step]) -> int:
-    """Return the first id that no layer of these steps has, nor any later one."""
+    """Return the first id above all ids of layers in these steps."""
     numbers = (int(n) for step in steps for n in step.fields.get("stack", {}).get("layers", ()))
     return 1 + max(numbers, default=PAINTING.id)
 

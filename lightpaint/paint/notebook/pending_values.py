@@ -11,9 +11,9 @@ MAX_CALLBACK_ROUNDS = 20
 class PendingValues:
     """Values by the names of their traits, in the order in which they were set.
 
-    lock: held while observers are called: two threads that tell would each take the other's
-    callbacks for theirs. apply: sets a value, and raises nothing. warn: receives in one line what
-    was not set.
+    lock: held while observers are called, since two notifying threads would each take the other's
+    callbacks for theirs. apply: sets a value, and raises nothing. warn: receives a line on values
+    that were not set.
     """
 
     def __init__(

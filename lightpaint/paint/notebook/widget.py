@@ -181,8 +181,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
     @property
     def solution(self) -> Solution | None:
-        """Exact answer to the paintings as they are now, with its analysis; None where nothing is
-        painted.
+        """Exact answer to the present paintings, with its analysis; None if nothing is painted.
 
         Raises LightpaintError.
         """
@@ -275,7 +274,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         super().observe(self._callback(handler), names, type)
 
     def unobserve(self, handler: Any, names: Any = traitlets.All, type: str = "change") -> None:
-        """Call `handler` no more."""
+        """Stop calling `handler`."""
         super().unobserve(self._callback(handler), names, type)
 
     def _callback(self, handler: Any) -> Any:

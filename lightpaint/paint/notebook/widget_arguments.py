@@ -42,7 +42,7 @@ LoadArguments = tuple[Mapping[int, Pixels], SessionRequests, str]
 
 
 def load_targets(session: Session, targets: Any) -> LoadArguments:
-    """Return what loads these paintings, one for each view; None leaves a view unpainted.
+    """Return the arguments that load paintings, one per view; None leaves a view unpainted.
 
     Raises LightpaintError.
     """
@@ -52,7 +52,7 @@ def load_targets(session: Session, targets: Any) -> LoadArguments:
 
 
 def load_target(session: Session, target: Any) -> LoadArguments:
-    """Return what loads this painting of the first view. Raises LightpaintError."""
+    """Return the arguments that load a painting of the first view. Raises LightpaintError."""
     fitted = _fit_target(target, session.views[0].size, "target")
     requests = _requests_for(session.requests, [fitted])
     return {0: _pixels_to_load(session, 0, fitted)}, requests, "painting from a cell"
@@ -149,7 +149,7 @@ def _pixels_to_load(session: Session, view: int, target: Target | None) -> Pixel
 
 
 def load_lighting(session: Session, lighting: Any) -> LoadArguments:
-    """Return what locks every light at this lighting. Raises LightpaintError."""
+    """Return the arguments that lock every light at this lighting. Raises LightpaintError."""
     if not isinstance(lighting, Lighting):
         raise PaintError(f"painter.lighting is a lp.Lighting, not {type(lighting).__name__}")
     weights = lighting.weights_for(session.basis)
@@ -163,7 +163,7 @@ def load_lighting(session: Session, lighting: Any) -> LoadArguments:
 
 
 def load_constraints(session: Session, constraints: Any) -> LoadArguments:
-    """Return what replaces all requests by these constraints. Raises LightpaintError."""
+    """Return the arguments that replace all constraints by these. Raises LightpaintError."""
     if not isinstance(constraints, Constraints | None):
         kind = type(constraints).__name__
         raise PaintError(f"painter.constraints is a lp.Constraints or None, not {kind}")

@@ -67,7 +67,7 @@ def values_of(emitter: NewEmitter) -> dict[str, Any]:
 
 
 def site_of_new(emitter: NewEmitter) -> Site:
-    """Return where a new light hangs, with what frozen paths know of its shape."""
+    """Return the site of a new light, with its shape for frozen paths."""
     site = emitter.site
     if emitter.size is None:
         return site

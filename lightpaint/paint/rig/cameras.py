@@ -30,7 +30,7 @@ class FirstHit:
 
 @contextmanager
 def in_this_thread() -> Iterator[None]:
-    """Hold Mitsuba, and let this thread use what another one has loaded or traced."""
+    """Hold Mitsuba, and let this thread use scenes and kernels of another thread."""
     import drjit as dr
     import mitsuba as mi
 

@@ -102,7 +102,7 @@ class LampRig:
 
     @cached_property
     def surfaces(self) -> tuple[str, ...]:
-        """Names of what new lights may hang on."""
+        """Names of rails, surfaces and shapes that new lights may hang on."""
         return surfaces_of(self.rigging, self.scene)
 
     @property
@@ -165,7 +165,7 @@ class LampRig:
         return "" if values and "kind" in values else why_not_searched(scene.light(name))
 
     def site(self, name: str, values: Mapping[str, Any]) -> Site:
-        """Return the place of a light with a pose. Raises LightpaintError for what it cannot do."""
+        """Return the place of a light in a pose. Raises LightpaintError for an impossible one."""
         if "kind" in values:
             if self.scene.has_media:
                 raise PaintError(f"{name} stands in fog or the like: it cannot be hung here")
@@ -276,9 +276,9 @@ class LampRig:
     # Places in the picture
 
     def pointed(self, request: PointLight, name: str, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the change of a light's pose that a request to point it comes to.
+        """Return the change of a light's pose by a pointing request.
 
-        values: its present pose, or of an added light all about it.
+        values: its present pose or, for an added light, all its properties.
         """
         with in_this_thread():
             return self._pointing(request, name, self.site(name, values))

@@ -205,7 +205,7 @@ class LightMover:
         self._offer(session, list(session.requests.placed), is_dragged=False)
 
     def _offer(self, session: Session, names: Sequence[str], *, is_dragged: bool) -> PictureUpdate:
-        """Offer the pictures of lights as they are now, and return what tells pages of them."""
+        """Offer the present pictures of lights, and return the messages that announce them."""
         pictures, offered = self._host.pictures, []
         clean = None if is_dragged else self._host.denoised(session.bases)
         for view, unmoved in zip(session.views, session.bases, strict=True):

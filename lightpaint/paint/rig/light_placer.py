@@ -51,9 +51,9 @@ class PlacerHost(Protocol):
         """Return the present paintings and requests."""
 
     def hang_lights(self, label: str, placed: Placed, *, before: Placed) -> bool:
-        """Move lights and add others, by name: one step, which pages are told of.
+        """Move lights and add others, by name, in one step, and notify pages.
 
-        before: where they were; returns False, and does nothing, if that is so no more.
+        before: their expected places; returns False, and changes nothing, if these have changed.
         """
 
     @property
@@ -64,7 +64,7 @@ class PlacerHost(Protocol):
         """Send a message to pages."""
 
     def report_progress(self, label: str, done: int, total: int, unit: str = "passes") -> None:
-        """Report how far a task is. Raises StoppedError once nobody wants the result any more."""
+        """Report progress of a task. Raises StoppedError once its result is no longer wanted."""
 
 
 class LightPlacer:
@@ -118,7 +118,7 @@ class LightPlacer:
         if not 1 <= request.count <= MAX_NEW:
             raise PaintError(f"count is {request.count}: expected 1 to {MAX_NEW} new lights")
         taken = {*snapshot.bases[0].names, *(x.name for x in scene.emitters)}
-        # A name that is free stays as it is where one light is added; others are numbered.
+        # A free name is kept if one light is added; otherwise names are numbered.
         name = free_name(kind, taken) if request.count == 1 else kind
         return NewLights(kind, count=request.count, freedom=freedom, name=name)
 
@@ -126,7 +126,7 @@ class LightPlacer:
         def check() -> None:
             if self._request is not request:
                 raise StoppedError
-            MITSUBA.let_others()  # who drags a light meanwhile is answered at once
+            MITSUBA.let_others()  # a user who drags a light meanwhile gets answers at once
 
         try:
             with cancellable(check), MITSUBA.low_priority():
@@ -150,7 +150,8 @@ class LightPlacer:
             self._publish(f"No light was {_done(request)}: {reason}.")
             return
         if after >= before:
-            # The search counts light; what is seen may differ, as in the dark.
+            # The search measures light, which may differ from the visible error, for example in the
+            # dark.
             reason = (
                 f"what was found is no closer to the eye (ΔE {after:.1f} instead of {before:.1f})"
             )

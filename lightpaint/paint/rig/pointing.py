@@ -10,11 +10,12 @@ from lightpaint.errors import PaintError
 from lightpaint.paint.rig.cameras import FirstHit
 from lightpaint.scene.properties.pose import Site
 
-#: A light hangs at most at this part of the way to the next surface, and there is room for it where
-#: that is at least this part of its distance from what it lights.
+#: Largest distance of a light, as a part of the way to the next surface; and least distance of that
+#: surface, relative to the light's distance from its target, for a light to fit.
 BEFORE_WALL, LEAST_ROOM = 0.9, 0.05
 
-#: Least distance of a light beyond what casts its shadow, relative to its distance from the shadow.
+#: Least distance of a light beyond the edge that casts its shadow, relative to its distance from
+#: the shadow.
 BEYOND_EDGE = 0.3
 
 #: Returns the distance from a point to the first surface in a direction.
@@ -24,7 +25,7 @@ Pose = dict[str, Any]
 
 
 def aimed(name: str, site: Site, hit: FirstHit) -> Pose:
-    """Return the change that points a light at what is seen. Raises PaintError if none does."""
+    """Return the change that points a light at a visible point. Raises PaintError if none does."""
     if site.direction is None:
         raise PaintError(f"{name} shines all around: it cannot be aimed")
     if site.position is None:

@@ -1,1 +1,1 @@
-"""The painter in a browser: HTTP, sockets, who may connect, and which page has the session."""
+"""The painter in a browser: HTTP, sockets, access, and ownership of the session."""

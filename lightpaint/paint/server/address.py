@@ -9,8 +9,7 @@ from enum import Enum
 
 from lightpaint.errors import PaintError
 
-#: Where it listens unless somebody says otherwise or another does already: at one place, so that
-#: the browser finds again what the page has put down for itself.
+#: Default port, always the same so that the browser finds the page's stored settings again.
 DEFAULT_PORT = 8421
 
 #: Names of the machine itself.
@@ -111,7 +110,7 @@ def _resolve(host: str) -> tuple[socket.AddressFamily, str, bool]:
             )
         except (OSError, ValueError):
             continue
-        # IPv4 first: that is what tunnels and people expect of `localhost`.
+        # IPv4 first, as tunnels and people expect of `localhost`.
         family, _, _, _, place = min(
             candidates, key=lambda candidate: candidate[0] != socket.AF_INET
         )

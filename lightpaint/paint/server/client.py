@@ -25,7 +25,7 @@ from lightpaint.paint.protocol import (
     TakeOver,
 )
 
-#: Queued messages of a page, and bytes of them, beyond which no more are read from its socket.
+#: Largest number of queued messages of a page, and of their bytes, before its socket is read on.
 MAX_QUEUED, MAX_QUEUED_BYTES = 64, 2**27
 
 #: Messages that wait to be sent, and seconds that one may take: a slower client is cut off, and
@@ -69,12 +69,14 @@ class IncomingMessage:
 
 
 class Client:
-    """A page or a program on its socket. page: a name that the page chose for itself, by which it
-    is known when it is back after a dropped connection; "" if it has none.
+    """A page or a program on its socket.
+
+    page: a name that the page chose, which identifies it after a dropped connection; "" if it has
+    none.
 
     Attributes:
-        is_observer: Whether it has begun as an observer, which it stays.
-        is_disconnected: Whether it sends no more; queued messages may still wait for an answer.
+        is_observer: Whether it began as an observer; it then stays one. is_disconnected: Whether it
+            has stopped sending; queued messages may still wait for an answer.
     """
 
     def __init__(self, socket: Socket, page: str = "") -> None:
@@ -279,7 +281,7 @@ def _merge(old: Message, new: Message) -> Message:
     if isinstance(old, PictureUpdate) and isinstance(new, PictureUpdate):
         return PictureUpdate(resources={**old.resources, **new.resources})
     if isinstance(old, AnswerUpdate) and isinstance(new, AnswerUpdate):
-        # Live answers leave out what is asked, which the one that is replaced may have said.
+        # Live answers omit requests, which the replaced one may have contained.
         names = [key for key in EditState.__dataclass_fields__ if getattr(new, key) is None]
         return replace(new, **{name: getattr(old, name) for name in names})
     return new

@@ -2,7 +2,7 @@
 
 Any page that is open in a browser can send requests to servers of the same machine, by whatever
 name it likes. So the guard looks at the name that a request calls this server by (a foreign name
-that leads here is an attack), and at what page the request comes from. And it wants a key.
+that leads here is an attack), and at what page the request comes from. And it requires a key.
 
 A browser attaches nothing by itself that opens anything: it sends a cookie to every port of a name,
 and so to every other server of the machine. The page has the launch token in the fragment of its
@@ -31,14 +31,14 @@ CONTENT_POLICY = {
     "frame-ancestors": "'none'",
 }
 
-#: Seconds in which a browser has to use the token that it was started with. Others who work on the
-#: machine can read that, as they can all command lines; it is good once.
+#: Seconds in which a browser has to use the token that it was started with. Other users of the
+#: machine can read it, like all command lines; it works once.
 ONE_TIME_TOKEN_S = 120.0
 
-#: Where a page exchanges its token for the key, and asks whether its key is known.
+#: Path at which a page exchanges its token for the key, or checks its key.
 KEY_PATH = "/key"
 
-#: The protocol of a page's socket, and what its key stands behind in another one.
+#: Subprotocol of a page's socket, and prefix of the one that carries the key.
 PROTOCOL, KEY_PROTOCOL = "lightpaint", "lightpaint-key."
 
 #: Answers to a request without a key, and to one with the key of an earlier server.
@@ -92,7 +92,7 @@ class Guard:
         elif scope["path"] in self.public or self.is_allowed(scope):
             await self.app(scope, receive, _with_headers(send, scope))
         else:
-            # Who has a key has that of an earlier start.
+            # This is a key from an earlier start.
             status, reason = (
                 (403, NO_KEY_TEXT) if _bearer_token(scope) is None else (410, OLD_KEY_TEXT)
             )
@@ -110,7 +110,7 @@ class Guard:
         return is_right and self._refusal(scope, is_socket=is_socket) is None
 
     def is_program(self, scope: Scope) -> bool:
-        """Return whether a request comes from a program that is no browser, and may.
+        """Return whether a request comes from an authorized program that is no browser.
 
         Browsers name the origin of every socket, and give none a header of a script's; a page of
         another origin is refused the header of what it fetches, since nothing here allows it. So a
@@ -138,7 +138,7 @@ class Guard:
             return False
         if name.lower() in (*LOOPBACK, *self._address.names):
             return True
-        # Whoever uses an address has been told of no foreign name that leads here.
+        # A request by IP address uses no foreign name that leads here.
         is_open = self._address.reach is not Reach.MACHINE
         return is_open and _is_address(name.removeprefix("[").removesuffix("]"))
 
@@ -177,7 +177,7 @@ def _bearer_token(scope: Scope) -> str | None:
 
 def _subprotocol_key(scope: Scope) -> str | None:
     """Return the key among a socket's subprotocols: a page cannot give a socket headers."""
-    # From the header itself: what servers make of it differs.
+    # From the header itself, since servers parse it differently.
     names = ",".join(_header(scope, b"sec-websocket-protocol")).split(",")
     keys = [name for x in names if (name := x.strip()).startswith(KEY_PROTOCOL)]
     return keys[0].removeprefix(KEY_PROTOCOL) if len(keys) == 1 else None

@@ -78,7 +78,7 @@ class BoundedHttp(H11Protocol):
     def _on_deadline(self) -> None:
         is_answered = self.cycle is None or self.cycle.response_complete
         if not is_answered or self.transport.get_write_buffer_size():
-            self._start_deadline()  # the answer is what takes long
+            self._start_deadline()  # the answer takes longest
         else:
             self._abort()
 

@@ -20,8 +20,8 @@ CONTENT_TYPES = {
 
 PAGE_FOLDER = Path(__file__).parents[1] / "page"
 
-#: What draws in it, and in pages of other rooms, served as `/viewer`. Modules of the page name it
-#: by its place in the package; of the many `..` in that, those beyond the root count for nothing.
+#: The viewer's modules, served as `/viewer`. Modules of the page import them by their path in the
+#: package; browsers ignore the `..` beyond the root.
 VIEWER_FOLDER = Path(__file__).parents[2] / "viewer"
 
 #: The module that begins it; a browser gets it with all that it imports.
@@ -52,7 +52,7 @@ def page_files(folder: Path = PAGE_FOLDER) -> dict[str, PageFile]:
         table["/favicon.ico"] = table[ICON]
     if root == PAGE_FOLDER.resolve():
         table |= _files_below(VIEWER_FOLDER.resolve(), "/viewer/")
-        # A browser takes ten milliseconds for each file, whoever serves it.
+        # A browser takes ten milliseconds per file, independent of the server.
         table[ENTRY_MODULE] = PageFile(
             CONTENT_TYPES[".js"], bundled(f"paint/page{ENTRY_MODULE}").encode()
         )

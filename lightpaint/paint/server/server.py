@@ -104,9 +104,9 @@ def page_app(
 class Server:
     """The server of one session.
 
-    host, port: as in `listen`; a host other than the loopback is for those who know why. listening:
-    the result of `listen`, which `close` closes. say: as in `Connections`. Raises PaintError where
-    it cannot listen.
+    host, port: as in `listen`; a host other than the loopback exposes the painter. listening: the
+    result of `listen`, which `close` closes. say: as in `Connections`. Raises PaintError where it
+    cannot listen.
 
     Attributes:
         address: Where it listens.

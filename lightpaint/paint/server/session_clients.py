@@ -1,10 +1,10 @@
 """The connections between clients and one session: its owner, and the order of requests.
 
-One page has the session. Another page is told so, and may take it over; the first one is then told.
-Requests of a page wait in a queue of its own, and one thread does them one after the other; of live
-paint only the newest counts. Events to a slow page replace those that they outdate.
+One page owns the session. Another page gets a notice and may take it over; then the first one gets
+a notice. Requests of a page wait in its queue, and one thread handles them in order; of live paint
+only the newest counts. Events to a slow page replace outdated ones.
 
-An error in the session is an answer to the page, and never ends the connection.
+An error in the session becomes an answer to the page, and never ends the connection.
 """
 
 import asyncio
@@ -151,7 +151,8 @@ class Connections:
             client.abandon()  # a task may be at the end of a wait, which swallows the cancelling
             for task in (sending, live_answer):
                 task.cancel()
-            # Not gathered: whoever gives this wait up would hear of their end, not of its own.
+            # Not gathered, since cancelling this wait would then report their end instead of its
+            # own.
             await asyncio.wait((sending, live_answer))
 
     async def resource(self, name: str) -> npt.NDArray[Any]:

@@ -16,8 +16,8 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 
 from lightpaint.paint.server.session_clients import Connections
 
-#: Seconds after which a connection is cut that has not taken what was still to be sent; uvicorn
-#: would wait longer, and then say so as an error at the terminal.
+#: Seconds before a connection with unsent data is cut; uvicorn would wait longer, and then print an
+#: error to the terminal.
 CUT_OFF_S = 2.0
 
 
@@ -36,7 +36,7 @@ class PageSocket(WebSocketsSansIOProtocol):
     def shutdown(self) -> None:
         """Close the socket, unless the page has: uvicorn then ends in an error of `websockets`."""
         if self.transport.is_closing():
-            self.transport.abort()  # nobody is there for what was still to be sent
+            self.transport.abort()  # no client is left to receive the rest
         else:
             super().shutdown()
 
@@ -49,7 +49,7 @@ class GracefulServer(uvicorn.Server):
         self._connections = connections
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-        """End the server; a second signal, while pages are told, changes nothing.
+        """End the server; a second signal, while pages are notified, changes nothing.
 
         uvicorn would skip the rest, and print the line at which it stopped.
         """

@@ -48,13 +48,13 @@ NO_CLOSER_TEXT = "No closer than the present lighting"
 #: Phrase for an answer that is farther from it.
 WORSE_TEXT = "Farther from the paint than the present lighting, which undo brings back"
 
-#: Advice on what keeps the lights from the paint; a page has a button for each.
+#: Kinds of advice on what limits the answer; a page has a button for each.
 ADVICE_TEXTS: dict[str, str] = {
     "hold": "Paint more or loosen the hold.",
     "colors": "The settings allow any colour.",
 }
 
-#: What lets lights have any colour: the painter has a setting for that, and no argument.
+#: How to allow any colour: in the painter it is a setting, not an argument.
 ANY_COLOR_TEXT = "any colour"
 
 #: Reasons for a miss, for the painter; and where lights have constraints.
@@ -90,7 +90,7 @@ def light_info(light: BasisLight, scale: float) -> LightInfo:
 def answer_findings(bases: Sequence[Basis], weights: Doubles) -> Findings:
     """Return the immediate findings on each light: emission, change, colour, share of the picture.
 
-    Of several views `shares` has its part of each, too.
+    With several views, `shares` has its part of each.
     """
     lit = [(basis.totals * weights) @ LUMINANCE for basis in bases]
     lights = tuple(
@@ -180,7 +180,7 @@ def judge(analyses: Sequence[Analysis], painted: Sequence[int]) -> Judgement:
 def unpainted_text(*, is_asked: bool, is_white: bool) -> str:
     """Describe the answer while nothing is painted, or all paint is undone.
 
-    is_asked: whether something is asked of the lights. is_white: whether all are to be white.
+    is_asked: whether there are constraints. is_white: whether all lights have to be white.
     """
     stay = "the answer is the present lighting"
     if is_white:
@@ -194,15 +194,15 @@ def unpainted_text(*, is_asked: bool, is_white: bool) -> str:
 def sketch_headline(appearance: Appearance) -> str:
     """Describe the progress of a painting, and the best next step, without judging it.
 
-    A sketch begins with a stroke, of which little can come about before more is said. What it does
-    to what is not painted is part of it.
+    The first strokes of a sketch can change little on their own. The sentence includes the effect
+    on unpainted parts.
     """
     if appearance.is_close:
         return headline(appearance)
     phrase = _progress_phrase(appearance)
     if appearance.place is None:
         return f"{phrase}. Paint what matters most, or give it more importance."
-    # One reason at a time: the next one is told when that has been seen to.
+    # One reason at a time: the next one appears once this is resolved.
     first = replace(appearance, reasons=appearance.causes[:1])
     missing = spoken_missing(appearance)
     text = f"{phrase}. {missing[0].upper()}{missing[1:]} is missing: {spoken_reason(first)}."
@@ -232,7 +232,7 @@ def _progress_phrase(appearance: Appearance) -> str:
 def why_not_closer(analysis: Analysis) -> list[str]:
     """Return at most four sentences on the reasons that keep the lights from the paint.
 
-    Where it is missed most stands in `sketch_headline`, below the pictures.
+    `sketch_headline`, below the pictures, has the place of the largest error.
     """
     appearance, diagnosis = analysis.appearance, analysis.diagnosis
     if not (parts := error_shares(diagnosis)):
@@ -259,7 +259,7 @@ def removable_reason(appearance: Appearance) -> Reason | None:
 
 
 def advice(appearance: Appearance) -> Advice | None:
-    """Return the same for a page, whose button it is: what to let go of, and what that brings."""
+    """Return the same as data for a page's button: the obstacle to remove, and the gain."""
     if (cause := removable_reason(appearance)) is None:
         is_missed = not appearance.is_close and appearance.place is not None
         return Advice("reach", (), None, None) if is_missed and not appearance.causes else None
@@ -291,8 +291,8 @@ def preview_text(
 ) -> tuple[str, bool]:
     """Describe the effect of a change before it is made, and whether it changes more than it gains.
 
-    closes: share of the miss that it takes away. rest: its change where nobody painted. delta_e:
-    over the paint, now and then. is_at_cost: whether it changes the rest by more than it gains.
+    closes: share of the error that it removes. rest: its change of unpainted parts. delta_e: over
+    the paint, before and after. is_at_cost: whether it changes the rest by more than it gains.
     """
     current, expected = map(spoken_amount, delta_e)
     if closes >= 0.005:

@@ -1,4 +1,4 @@
-"""The history of a session: steps, and what each of them changes in canvases and requests."""
+"""The history of a session: steps, and their changes of canvases and requests."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -16,7 +16,7 @@ from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.steps import Patch, Step
 from lightpaint.paint.store.store import Store
 
-#: Steps that a page is told of, backwards and forwards.
+#: Number of steps listed to a page, backwards and forwards.
 LISTED_STEPS = 50
 
 #: Views, and the region of each that changed.
@@ -42,7 +42,7 @@ class History:
         self._views.close()
 
     def append_requests(self, label: str, requests: SessionRequests) -> None:
-        """Set requests from now on: a step. Raises LightpaintError for what cannot be asked."""
+        """Set requests, as a step. Raises LightpaintError for impossible ones."""
         self._live_answer.check(requests)
         self.close_stroke("stroke")
         before = self._live_answer.requests_at_rest
@@ -53,7 +53,7 @@ class History:
     def replace_all(
         self, layers: LayerStack, patches: Sequence[Patch], requests: SessionRequests, label: str
     ) -> Changes:
-        """Replace the layers, their pixels and the requests: one step. Returns what changed."""
+        """Replace the layers, their pixels and the requests, as one step. Returns the changes."""
         before, change = self._live_answer.requests, self._views.layers.change_to(layers)
         fields: dict[str, Any] = {"before": before.as_json(), "after": requests.as_json()}
         fields |= {"stack": change} if change else {}
@@ -67,7 +67,7 @@ class History:
         return self._store.steps[: self._store.position]
 
     def move(self, by: int) -> Changes:
-        """Move back or forth by one step, and return what it has changed.
+        """Move back or forth by one step, and return its changes.
 
         Raises NothingToUndoError at either end, PaintError for a step whose pixels are lost.
         """

@@ -48,7 +48,7 @@ class LiveAnswer:
         self.set_views(views)
 
     def set_views(self, views: Sequence[LiveView]) -> None:
-        """Continue with these views; lights that are new begin as they are present."""
+        """Continue with these views; new lights start at their present emission."""
         before, self._basis = self._basis, views[0].basis
         if before.names != self._basis.names:
             self.weights = weights_by_name(self.weights, before.names, self._basis.lights)
@@ -100,7 +100,7 @@ class LiveAnswer:
 
     def _apply(self, requests: SessionRequests) -> None:
         self.requests = requests
-        # Where lights come or go, their views follow, and with them a solver of its own.
+        # If lights were added or removed, new views follow, with a new solver.
         if self._lights_of(requests).names == self._basis.names:
             self._live.constrain(self.fit, self._constraints(requests))
 
@@ -118,7 +118,7 @@ class LiveAnswer:
         return True
 
     def solve(self) -> None:
-        """Solve for the weights, with the paint as it is."""
+        """Solve for the weights, with the present paint."""
         is_moving = (
             self.before_slider is not None and self.before_slider.poses != self.requests.poses
         )
@@ -138,7 +138,7 @@ class LiveAnswer:
 def weights_by_name(weights: Doubles, names: Sequence[str], lights: Lights) -> Doubles:
     """Return weights (n, 3) of `lights` from those of lights with these names.
 
-    Lights that are not among them begin as they are present.
+    Other lights start at their present emission.
     """
     made = np.array(lights.present_weights)
     there = dict(zip(names, weights, strict=True))

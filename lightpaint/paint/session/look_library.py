@@ -60,7 +60,7 @@ class LookLibrary:
             self._offer_thumbnails(look)
 
     def infos(self) -> tuple[LookInfo, ...]:
-        """Return what clients show of each look."""
+        """Return the descriptions of looks for clients."""
         return tuple(
             LookInfo(
                 id=look.id,
@@ -149,7 +149,7 @@ class LookLibrary:
         return self._with_layers(look)
 
     def _with_layers(self, look: StoredLook) -> StoredLook:
-        """Return a look of the painting as it is, with its layers; a plain painting has none."""
+        """Return a look of the present painting, with its layers; a plain painting has none."""
         if self._session.views.layers == LayerStack():
             return look
         layers, pixels = LayeredPaintings.of(self._session.views).as_fields()
@@ -192,7 +192,7 @@ class LookLibrary:
         return replace(SessionRequests(locks), poses=requests.poses, added=requests.added)
 
     def _proposed_look(self, message: Propose) -> StoredLook:
-        """Return the painting as it is with a proposed lighting."""
+        """Return a look of the present painting with a proposed lighting."""
         name, session = self._clean_name(message.name), self._session
         weights, lights = session.weights.copy(), session.basis.lights
         names = list(session.basis.names)

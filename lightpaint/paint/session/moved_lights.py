@@ -42,12 +42,12 @@ class NoPlaneSource:
             raise PaintError("there is no scene to render: its lights cannot be moved")
 
     def lights(self, lights: Lights, placed: Placed) -> Lights:
-        """Return the lights as they are. Raises PaintError for any place."""
+        """Return the lights unchanged. Raises PaintError for any place."""
         self.check(placed)
         return lights
 
     def bases(self, bases: Sequence[Basis], placed: Placed) -> list[Basis]:
-        """Return the bases as they are. Raises PaintError for any place."""
+        """Return the bases unchanged. Raises PaintError for any place."""
         self.check(placed)
         return list(bases)
 

@@ -38,9 +38,9 @@ class PictureTable:
         self._families: dict[str, Callable[[str], Picture]] = {}
 
     def offer_family(self, prefix: str, make: Callable[[str], Picture]) -> None:
-        """Add pictures that change under the brush, and of which no generations are kept.
+        """Add pictures that change under the brush and have no generation numbers.
 
-        prefix: what their names begin with, up to a slash. make: makes one by the rest of its name.
+        prefix: of their names, up to a slash. make: makes a picture from the rest of its name.
         """
         self._families[prefix] = make
 

@@ -223,7 +223,7 @@ class Session:
         raise PaintError(f"a session has no answer to {type(message).__name__}")
 
     def answer_update(self, **fields_of_answer: Any) -> AnswerUpdate:
-        """Return the weights as they are, with further fields, while the brush is down."""
+        """Return the present weights, with further fields, while the brush is down."""
         fields = {"stroke": self._stroke, "exact": False, "version": self.version}
         mode, weights = self.live_answer.mode, self.weights
         return AnswerUpdate(**{**fields, "mode": mode, "weights": weights, **fields_of_answer})
@@ -337,7 +337,7 @@ class Session:
         layer = layers[request.layer if request.properties is None else request.properties.id]
         pixels = self.views[request.view].check_pixels(layer, request.region, arrays)
         if request.stroke != self._stroke:
-            # Of a stroke whose end was never heard, what is there is kept.
+            # Keep a stroke whose end never arrived, as far as it got.
             self._history.close_stroke("stroke")
             self._stroke = request.stroke
         self.views.open_layers(layers)
@@ -352,7 +352,7 @@ class Session:
         return self.answer_update(**(self.edit_state if request.done else {}))
 
     def _change_layers(self, request: protocol.ChangeLayers) -> Message:
-        """Change layers, their order, or both; what is not done is open, as a stroke is."""
+        """Change layers, their order, or both. An unfinished change is open, like a stroke."""
         layers = self.views.layers.with_layers(request.layers, request.order)
         copies = {int(number): source for number, source in request.copies.items()}
         for number, source in copies.items():

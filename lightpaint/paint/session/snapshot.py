@@ -91,10 +91,10 @@ class SessionSnapshot:
         return mean(differences)
 
     def explain(self, view: int = 0) -> tuple[list[str], npt.NDArray[np.uint8]]:
-        """Return why the painting of a view is not met: sentences, and a picture (h, w) of where.
+        """Return why the answer differs from a view's painting: sentences, and a picture (h, w).
 
-        The picture is what the best answer without any request misses: nothing held, any colour, no
-        constraints. 255 stands for a miss by all that a display has.
+        The picture shows the error of the best answer without any request: nothing held, any
+        colour, no constraints. 255 stands for the whole range of a display.
         """
         target = self.targets[view]
         if target is None:
@@ -113,10 +113,9 @@ class SessionSnapshot:
     def preview(
         self, weights: Doubles, view: int = 0, *, clean: DenoisedPlanes | None = None
     ) -> "ChangePreview":
-        """Return what the answer to these requests would change of the present one, (n, 3), in a
-        view.
+        """Return a preview in a view: the answer to these requests beside present weights, (n, 3).
 
-        Where the view is not painted, the text is about another one. clean: denoised planes of the
+        If the view is not painted, the text is about another one. clean: denoised planes of the
         view, for its pictures.
         """
         solution = self.solution()

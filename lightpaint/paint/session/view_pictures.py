@@ -97,8 +97,8 @@ def _rough_plane(planes: RoughPlanes, k: int) -> Picture:
 def view_info(view: Canvas, basis: Basis) -> ViewInfo:
     """Return the description of a view for clients.
 
-    basis: of the view, with every light where the scene has it: moves change no scale. Planes of
-    lights that were added are sent as they are.
+    basis: of the view, with lights at their places in the scene, so that moves change no scale.
+    Planes of added lights are sent unscaled.
     """
     objects, (height, width) = basis.objects, view.size
     return ViewInfo(
@@ -110,5 +110,5 @@ def view_info(view: Canvas, basis: Basis) -> ViewInfo:
 
 
 def plane_scale(basis: Basis, k: int) -> float:
-    """Return what the plane of light k is divided by to be sent. basis: as of `view_info`."""
+    """Return the divisor of light k's plane for sending. basis: as in `view_info`."""
     return scale_of(basis.planes.plane(k)) if k < len(basis.lights) else 1.0

@@ -15,7 +15,7 @@ from lightpaint.errors import PaintError
 from lightpaint.paint.store.canvas_pixels import Pixels, Region
 from lightpaint.paint.store.steps import Patch
 
-#: Fast, which is what counts under the hand.
+#: The fastest level, since strokes must not wait.
 ZLIB_LEVEL = 1
 
 

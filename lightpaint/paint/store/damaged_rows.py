@@ -25,7 +25,7 @@ class Losses:
         return bool(self.names) or self.may_be_more
 
     def text(self, named: str, kind: str) -> str:
-        """Say it. named: those with a name. kind: what they are, in the plural."""
+        """Return the losses as text. named: rows with a name. kind: a plural noun for the rows."""
         if not self.names:
             return f"an unknown number of {kind}"
         return named + " and perhaps more" * self.may_be_more

@@ -27,7 +27,7 @@ READ_VERSIONS = (2, VERSION)
 #: Free pages (of 16 KiB) returned to the disk at a start: 64 MB, in a moment.
 VACUUM_PAGES = 4096
 
-#: FULL: what is written survives a power failure.
+#: FULL: committed data survive a power failure.
 SYNCHRONOUS = "FULL"
 
 TABLES = """
@@ -111,7 +111,7 @@ def _store_identity(database: sqlite3.Connection, identity: str) -> None:
         database.execute("INSERT OR REPLACE INTO about VALUES ('identity', ?)", (identity,))
 
 
-#: Parts of errors: a session that another process has, and what to do instead.
+#: Parts of errors: a session that another process has open, and the remedy.
 IN_USE = "is in use"
 OTHER_FOLDER = "choose another folder (folder=...)"
 START_AFRESH = f"{OTHER_FOLDER}, or start afresh, which keeps it under another name (new=True)"
@@ -176,7 +176,7 @@ def _translated_errors(path: Path | None) -> Iterator[None]:
 
 
 class DamagedError(PaintError):
-    """An error of a session file that is not as it was written."""
+    """An error of a damaged session file."""
 
 
 def damaged_error(path: Path | None, error: Exception) -> DamagedError:
@@ -223,7 +223,7 @@ def rewrite(
         except BaseException:
             temporary.unlink(missing_ok=True)
             raise
-    database.close()  # before its place is taken: it removes what is called like its own log
+    database.close()  # before its place is taken, since closing removes files named like its log
     return open_database(path, identity)
 
 

@@ -1,8 +1,7 @@
 """Recovery of a damaged session file: its readable contents are copied into a new one.
 
-A disk that returns other bytes than it was given damages single pages. Every row is therefore read
-by itself and checked as a whole, pixels included; what is lost is named. The damaged file stays
-beside the new one.
+A faulty disk damages single pages. Every row is therefore read separately and checked completely,
+pixels included; losses are named. The damaged file stays beside the new one.
 """
 
 import json
@@ -34,7 +33,7 @@ from lightpaint.paint.store.steps import Identity, name_in_view
 from lightpaint.screen import some_names
 from lightpaint.storage.json_records import read_record, strict_json
 
-#: Errors that a value raises which is not as it was written.
+#: Errors raised by damaged values.
 DAMAGE_ERRORS = (
     *(sqlite3.Error, ArithmeticError, AttributeError, IndexError, LookupError),
     *(LightpaintError, TypeError, ValueError),
@@ -45,11 +44,10 @@ HEADER_BYTES, MAX_RESTORED_BYTES = 100, 2**36
 
 
 def recover(path: Path, identity: Identity | None) -> str:
-    """Replace the damaged session at `path` by what can be read of it; return the result in one
-    line.
+    """Replace the damaged session at `path` by its readable part; return the result in one line.
 
-    Raises PaintError where nothing can be read, OutputError for a place that cannot be written;
-    nothing is changed then.
+    Raises PaintError if nothing can be read, OutputError if the new file cannot be written; nothing
+    is changed then.
     """
     with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
         copy, new = Path(folder) / "damaged.db", Path(folder) / path.name
@@ -83,7 +81,7 @@ def _restore_length(file: Path) -> None:
 
 
 def _copy_readable(copy: Path, new: Path, path: Path, identity: Identity | None) -> list[str]:
-    """Write what can be read of `copy` to `new`. Returns what was lost. path: for errors."""
+    """Write the readable part of `copy` to `new`, and return the losses. path: for errors."""
     try:
         old = sqlite3.connect(copy, isolation_level=None)
         with closing(old):
@@ -162,7 +160,7 @@ def _read_steps(
 
 
 def _check_step(row: Row | None, pixels: Row | None, identity: Identity | None) -> None:
-    """Raise one of DAMAGES unless it is a step as they are written."""
+    """Raise one of DAMAGES unless the row is a valid step."""
     if row is None:
         raise ValueError("no row")
     _, kind, label, fields, places = row

@@ -122,7 +122,7 @@ class SessionRequests:
         """Return these requests with these values, None for defaults. Raises PaintError."""
         if unknown := [key for key in values if key not in (*FIT_KEYS, *ALL_LIGHTS_KEYS)]:
             raise PaintError(f"nothing is called {unknown[0]!r} in what can be set")
-        # Not by `in`: 0 lets go of what is held, and equals False.
+        # Not by `in`: a hold of 0 is valid, and equals False.
         merged = {**self.values, **values}
         set_values = {k: v for k, v in merged.items() if v is not None and v is not False}
         return replace(self, values=set_values)
@@ -133,8 +133,8 @@ class SessionRequests:
     ) -> "SessionRequests":
         """Return requests equal to constraints on these lights, and those of `values` in FIT_KEYS.
 
-        Raises ConstraintError for lights that do not exist, PaintError for what a session cannot
-        express.
+        Raises ConstraintError for lights that do not exist, PaintError for constraints that a
+        session cannot express.
         """
         pairs = zip(lights, tables_by_light(constraints, lights), strict=True)
         by_light = {light.name: entry for light, (entry, _) in pairs if entry}

@@ -12,7 +12,7 @@ from lightpaint.paint.store.compression import is_marked
 from lightpaint.paint.store.lazy_arrays import PackedArray, PackedArrays
 from lightpaint.paint.store.steps import Patch
 
-#: A step as it is stored: id, kind, label, fields and places, the last two as JSON.
+#: A stored step: id, kind, label, fields and places, the last two as JSON.
 StepRow = tuple[int, str, str, str, str]
 
 

@@ -1,9 +1,8 @@
 """The history of a session: steps of paint, requests and looks.
 
-A step has the state before it and after it, so that it can be undone and redone without knowing how
-it came about. The pixels of a layer are what its patches left: `replay` works from the last one
-backwards, since a pixel is as the last patch on it left it, so that a long history costs no more
-than the patches that still show.
+A step has the state before it and after it, so that undo and redo need no other steps. Patches make
+up the pixels of a layer. `replay` goes backwards from the last one, since the last patch on a pixel
+decides its value, so that a long history costs no more than the patches still visible.
 """
 
 from collections.abc import Mapping, Sequence

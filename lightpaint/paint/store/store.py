@@ -52,7 +52,7 @@ from lightpaint.paint.store.steps import Identity, Step, StoredLook
 from lightpaint.paint.store.write_queue import WriteJob, WriteQueue
 from lightpaint.storage.json_records import strict_json
 
-#: Errors that a value raises which is not as it was written.
+#: Errors raised by damaged values.
 DAMAGE_ERRORS = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
 
 
@@ -89,12 +89,12 @@ class Store:
 
     @classmethod
     def open(cls, path: Path, identity: Identity | None) -> "Store":
-        """Return the session at `path`, as it was left, or a new one; for this process alone.
+        """Open the session at `path`, or create it, for this process alone.
 
-        identity: None where it is still to be known (`set_identity`).
+        identity: None if not known yet (`set_identity`).
 
-        Raises PaintError for one that another process has, that is damaged, or that is of other
-        lights or another size; OutputError for a place that cannot be written.
+        Raises PaintError if another process has it open, if it is damaged, or if its lights or size
+        differ; OutputError if it cannot be written.
         """
         return cls(path, identity)
 
@@ -125,10 +125,10 @@ class Store:
         return self._queue.unsaved
 
     def recover(self) -> str:
-        """Continue with what can be read of the file, which turned out to be damaged.
+        """Continue with the readable part of the file, which turned out to be damaged.
 
-        Returns the losses in one line, which is also among the remarks. Raises PaintError where
-        recovery is not possible.
+        Returns the losses in one line, which is also among the remarks. Raises PaintError if
+        recovery is impossible.
         """
         with self._lock:
             if self.path is None or self.flush() is not None:

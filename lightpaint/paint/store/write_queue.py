@@ -1,8 +1,8 @@
-"""Writes to a session file, which wait in memory while its disk refuses them.
+"""Writes to a session file, which wait in memory if the disk refuses them.
 
-A file that somebody deletes is written again with the next step: the system keeps an open file. A
-full disk ends nothing: what cannot be written stays in memory, in order, `unsaved` says so, and
-`flush` or the next step writes it.
+A deleted file is written again with the next step, since the system keeps an open file. On a full
+disk, pending writes stay in memory, in order, `unsaved` says so, and `flush` or the next step
+writes them.
 """
 
 import sqlite3
@@ -19,11 +19,11 @@ WriteJob = Callable[[sqlite3.Connection], object]
 
 
 class WriteQueue:
-    """The database of one session, and what is still to be written to it, in order.
+    """The database of one session, and its pending writes, in order.
 
     Attributes:
         database: Open, with an exclusive lock on its file.
-        identity: Identity of the painted views; None where it is still to be known.
+        identity: Identity of the painted views; None if not known yet.
         unsaved: Why the last steps are in memory only, in one line; None if all is written.
     """
 
@@ -36,13 +36,13 @@ class WriteQueue:
         self._pending: list[WriteJob] = []
 
     def add(self, write: WriteJob) -> None:
-        """Append what is to be written; `flush` writes it."""
+        """Append a write, which `flush` carries out."""
         self._pending.append(write)
 
     def flush(self, position: int) -> str | None:
-        """Write what is pending, in one transaction. Returns why that is not possible, or None.
+        """Carry out pending writes in one transaction. Returns why that is impossible, or None.
 
-        position: how many steps are done.
+        position: number of steps that are done.
         """
         if not self._pending and self._is_file_there():
             return self.unsaved
@@ -71,7 +71,7 @@ class WriteQueue:
         self._file = self._file_id = None
         try:
             self.database.close()
-        except sqlite3.Error as error:  # what is beside the file goes into it next time
+        except sqlite3.Error as error:  # the next start merges the files beside it
             unsaved = unsaved or first_line(error)
         return unsaved
 

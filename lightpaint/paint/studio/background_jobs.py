@@ -51,7 +51,7 @@ class JobHost(Protocol):
     def snapshot_and_lighting(
         self, requests: SessionRequests | None = None
     ) -> tuple[SessionSnapshot, Lighting]:
-        """Return the paintings and requests as they are now, and the last answer.
+        """Return the present paintings and requests, and the last answer.
 
         requests: replace those of the session, if given.
         """
@@ -73,7 +73,7 @@ class JobHost(Protocol):
         """Send a message to pages."""
 
     def report_progress(self, label: str, done: int, total: int, unit: str = "passes") -> None:
-        """Report how far a task is. Raises StoppedError once nobody wants the result any more."""
+        """Report progress of a task. Raises StoppedError once its result is no longer wanted."""
 
 
 def _absolute_names(files: Iterable[Path]) -> tuple[str, ...]:
@@ -101,7 +101,7 @@ class BackgroundJobs:
         self._stop_count = 0  # how often exports were stopped
 
     def handle(self, message: JobRequest) -> list[Message]:
-        """Start a job, or stop one. Raises PaintError for what this session cannot do."""
+        """Start a job, or stop one. Raises PaintError for jobs that this session cannot run."""
         starters: dict[type, tuple[TaskName, Callable[[Any], None]]] = {
             protocol.Export: ("export", partial(self._run_export, stop_count=self._stop_count)),
             protocol.Verify: ("verify", self._run_verify),
@@ -159,8 +159,9 @@ class BackgroundJobs:
     def _exact_answer(
         self, check: Callable[[], None]
     ) -> tuple[tuple[Subject, ...], SessionSnapshot, Lighting]:
-        """Return the subjects with lights where they hang, the paintings as they are now, and the
-        exact answer to them. check: raises to stop.
+        """Return the subjects with their present lights, the paintings, and the exact answer.
+
+        check: raises to stop.
         """
         self._host.finish_planes(check)
         snapshot, lighting = self._host.snapshot_and_lighting()

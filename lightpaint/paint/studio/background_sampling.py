@@ -18,7 +18,7 @@ SAMPLING = "sampling"
 
 
 class SamplingHost(Protocol):
-    """The studio, as what adds samples sees it."""
+    """The part of the studio that background sampling uses."""
 
     subjects: tuple[Subject, ...]
     is_open: bool

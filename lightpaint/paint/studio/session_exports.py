@@ -46,8 +46,9 @@ def export(
 ) -> Iterator[Path]:
     """Write the requested files into the folder of the session; yield each one once it exists.
 
-    subjects: of all views. Where nothing is painted, files that need a painting are left out.
-    Raises PaintError for what this session cannot export, OutputError for what cannot be written.
+    subjects: of all views. If nothing is painted, files that need a painting are left out. Raises
+    PaintError for files that this session cannot export, OutputError for files that cannot be
+    written.
     """
     if not snapshot.painted_views:
         what = [name for name in what if name not in NEEDS_PAINTING]
@@ -93,7 +94,7 @@ def answer_png(basis: Basis, lighting: Lighting, transform: ViewTransform) -> by
 def _write_report(
     subjects: Sequence[Subject], snapshot: SessionSnapshot, progress: Progress
 ) -> list[Path]:
-    """Run `solve` on the paintings as they are; return the reports."""
+    """Run `solve` on the present paintings; return the reports."""
     answer = subjects[0].folder / ANSWER_FOLDER
     settings = replace(snapshot.settings, force=True)
     painted_subjects = [subjects[k] for k in snapshot.painted_views]

@@ -136,7 +136,7 @@ class Studio:
         self._write_retry.stop()
         with self._lock:
             if self._session is not None:
-                # Everything is kept before any solve, and no answer is needed any more.
+                # Everything is stored before any solve, so a pending answer can be dropped.
                 with suppress(OutdatedError), cancellable(raise_outdated):
                     self._session.client_left(with_stroke=True)
                 self._session.store.close()
@@ -225,9 +225,9 @@ class Studio:
         return [self.state(), *self._mover.rig_messages()] if self._mover.follow() else messages
 
     def hang_lights(self, label: str, placed: Placed, *, before: Placed) -> bool:
-        """Move lights and add others, by name: one step, which pages are told of.
+        """Move lights and add others, by name, in one step, and notify pages.
 
-        before: where they were; returns False, and does nothing, if that is so no more.
+        before: their expected places; returns False, and changes nothing, if these have changed.
         """
         with self._publish_lock:
             with self._lock:
