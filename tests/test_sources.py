@@ -23,7 +23,7 @@ def test_a_painting_is_read_once_and_anew_when_it_is_asked_for(tmp_path: Path) -
     assert painting.content.image.max() == 0.25
     _painted(tmp_path / "p.exr", 0.5)
     assert painting.content.image.max() == 0.25
-    again = painting.unread()
+    again = painting.without_content()
     assert again == painting
     assert again.content.image.max() == 0.5
 
@@ -46,10 +46,10 @@ def test_what_was_read_is_not_sent(tmp_path: Path) -> None:
 def test_a_file_as_it_is_sent(file: Any) -> None:
     # As if it had been read.
     vars(file)["content"] = object()
-    for same in (file.unread(), pickle.loads(pickle.dumps(file))):
+    for same in (file.without_content(), pickle.loads(pickle.dumps(file))):
         assert same == file
         assert "content" not in vars(same)
     if isinstance(file, SceneFile):
         film = SceneFilm(file, resolution="8x8")
-        assert film.unread() == film
-        assert "content" not in vars(film.unread().scene)
+        assert film.without_content() == film
+        assert "content" not in vars(film.without_content().scene)

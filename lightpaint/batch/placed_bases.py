@@ -35,25 +35,25 @@ def obtain_placed_bases(
 
     Places and planes that are missing are computed, once for all looks of the group.
     """
-    record = group.found()
+    record = group.read_record()
     views = {} if record is not None else _views(group, cache)
-    own = job_fields(task, cache)
-    keys = [key_of_scene(scene, own["settings"]) for scene in own["scenes"]]
-    views |= dict(zip(keys, own["scenes"], strict=True))
-    settings: Settings = own["settings"]
-    before = {
+    fields = job_fields(task, cache)
+    keys = [key_of_scene(scene, fields["settings"]) for scene in fields["scenes"]]
+    views |= dict(zip(keys, fields["scenes"], strict=True))
+    settings: Settings = fields["settings"]
+    unmoved_bases = {
         key: obtain_scene_basis(key, scene, settings, engine, cache, listen)
         for key, scene in views.items()
     }
     if record is None:
-        deciding = {key: before[key] for key in _views(group, cache)}
+        deciding = {key: unmoved_bases[key] for key in _views(group, cache)}
         record = _find(group, deciding, engine, listen)
         first = next(iter(deciding))
         _draw(group, record, views[first].content, deciding[first])
     bases = []
-    for key, old_key, scene in zip(task.bases, keys, own["scenes"], strict=True):
+    for key, old_key, scene in zip(task.bases, keys, fields["scenes"], strict=True):
         basis = obtain_moved_basis(
-            scene, before[old_key], record, str(group.file), settings, engine, listen
+            scene, unmoved_bases[old_key], record, str(group.file), settings, engine, listen
         )
         cache.put(key, basis)
         bases.append(basis)
@@ -73,10 +73,10 @@ def _views(group: PlaceGroup, cache: WorkerCache) -> dict[str, SceneFile]:
 
 def _draw(group: PlaceGroup, record: PlacementRecord, scene: Scene, basis: Basis) -> None:
     """Draw plan and elevation of the room with its lights, before and after."""
-    [placed] = record.hung_in([scene]).scenes
-    lit = {member.name: member.emission for member in placed.emitters}
-    lights = [HungLight(place, lit[place.name]) for place in placed.emitter_places]
-    drawing = rig_drawing(basis.features, lights, up=placed.up)
+    [placed_scene] = record.hung_in([scene]).scenes
+    emissions = {member.name: member.emission for member in placed_scene.emitters}
+    lights = [HungLight(place, emissions[place.name]) for place in placed_scene.emitter_places]
+    drawing = rig_drawing(basis.features, lights, up=placed_scene.up)
     if drawing is not None:
         write_bytes(group.picture, png_bytes(drawing))
 
@@ -91,7 +91,7 @@ def _find(
         if engine.is_apart:
             files = save_bases(list(bases.values()), stack)
         item = SharedPlacing(
-            f"places of {label}", group.tasks, tuple(bases), files, group.made_of, SEARCH_S
+            f"places of {label}", group.tasks, tuple(bases), files, group.fingerprint, SEARCH_S
         )
         [result] = engine.run([item])
     if result.failure:

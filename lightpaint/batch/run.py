@@ -57,21 +57,21 @@ def run_batch(
         Interrupted: On Ctrl-C; the same call continues from there.
     """
     options = options or RunOptions()
-    with lock_folder(plan.folder, shared=options.apart), ExitStack() as stack:
-        if not options.apart:
+    with lock_folder(plan.folder, shared=options.shares_folder), ExitStack() as stack:
+        if not options.shares_folder:
             for swept_folder in (plan.folder, plan.folder / THUMBNAILS):
                 sweep(swept_folder)
-        run = _Run(plan, options, listener(progress), on_step or (lambda look, done: None))
+        run = _Run(plan, options, listener(progress), on_step or (lambda look, result: None))
         try:
             run.run_all(stack)
         except KeyboardInterrupt:
-            remaining = len(run.outcome.waiting)
-            raise Interrupted(f"{remaining} looks are left; the same command goes on") from None
+            count = len(run.outcome.waiting)
+            raise Interrupted(f"{count} looks are left; the same command goes on") from None
         finally:
             with suppress(LightpaintError):
-                if not options.apart:
+                if not options.shares_folder:
                     run.journal.rewrite(plan.steps)
-        if options.apart:
+        if options.shares_folder:
             return run.outcome
         run.outcome.rows = write_gallery(plan.folder, plan, run.journal.lines)
         return run.outcome
@@ -87,15 +87,17 @@ class _Run:
         listen: Listener,
         on_step: Callable[[PlannedLook, ItemResult], None],
     ) -> None:
-        self.journal = Journal(plan.folder, "/".join(sorted(plan.chosen)) if options.apart else "")
+        self.journal = Journal(
+            plan.folder, "/".join(sorted(plan.chosen_names)) if options.shares_folder else ""
+        )
         self.outcome = BatchOutcome()
         self._plan, self._options, self._listen, self._on_step = plan, options, listen, on_step
         self._looks = {look.entry.name: look for look in plan.looks}
         self._cache = plan.cache
-        self._tries: dict[tuple[str, str], int] = {}
+        self._try_counts: dict[tuple[str, str], int] = {}
         self._engine: Engine = InProcess(self._cache, self._listen)
         self._start_s = time.monotonic()
-        self._finished = 0
+        self._finished_count = 0
 
     def run_all(self, stack: ExitStack) -> None:
         """Run every remaining step after the steps that it depends on."""
@@ -119,8 +121,8 @@ class _Run:
         answers = [step for step in answers if step not in by_sums]
         for keys in dict.fromkeys(step.task.bases for step in by_sums):
             self._solve_by_sums([step for step in by_sums if step.task.bases == keys])
-        for together in by_bases(answers, self._looks):
-            self._run_with_bases(together)
+        for group in by_bases(answers, self._looks):
+            self._run_with_bases(group)
         self._cache.keep_only(())
         for kind in ("render", "export"):
             self._run_steps([x for x in remaining if x.task.kind == kind])
@@ -156,15 +158,15 @@ class _Run:
         task = steps[0].task
         self._cache.keep_only(task.bases)
         with ExitStack() as stack:
-            files, formers = task.files, task.formers
+            files, former_look_files = task.files, task.former_look_files
             try:
-                obtained = self._obtain_bases(task)
+                bases = self._obtain_bases(task)
                 if not all(step.task.is_by_sums for step in steps):
-                    write_task_planes(self._plan.folder, task, obtained, self._cache)
+                    write_task_planes(self._plan.folder, task, bases, self._cache)
                 if self._engine.is_apart:
                     # Workers read the bases that this process rendered and no longer needs.
-                    files = save_bases(obtained, stack) if obtained else files
-                    formers = save_former_looks(obtained, stack)
+                    files = save_bases(bases, stack) if bases else files
+                    former_look_files = save_former_looks(bases, stack)
                     self._cache.keep_only(())
             except (LightpaintError, MemoryError) as error:
                 if is_disk_full(error):
@@ -174,17 +176,26 @@ class _Run:
                     self._fail(self._looks[step.task.look], step, reason)
                 return
             for wave in waves(steps, self._looks):
-                saved: dict[str, Any] = {"files": files, "formers": formers}
-                wave_steps = [replace(step, task=replace(step.task, **saved)) for step in wave]
+                file_fields: dict[str, Any] = {
+                    "files": files,
+                    "former_look_files": former_look_files,
+                }
+                wave_steps = [
+                    replace(step, task=replace(step.task, **file_fields)) for step in wave
+                ]
                 self._run_steps(wave_steps)
                 if self._is_stopped():
                     return
 
     def _obtain_bases(self, task: Task) -> list[Basis]:
         """Return the bases of a task, its lights where those that share their places want them."""
-        how = self._engine, self._cache, self._listen
+        arguments = self._engine, self._cache, self._listen
         group = self._plan.group_of(task)
-        return obtain_bases(task, *how) if group is None else obtain_placed_bases(task, group, *how)
+        return (
+            obtain_bases(task, *arguments)
+            if group is None
+            else obtain_placed_bases(task, group, *arguments)
+        )
 
     def _run_steps(self, steps: Sequence[PlanStep]) -> None:
         """Run steps that do not depend on each other, and retry failed ones as often as allowed."""
@@ -229,15 +240,15 @@ class _Run:
     def _can_begin(self, step: PlanStep) -> bool:
         """Return False if the look, or a look that it combines, has failed."""
         look = self._looks[step.task.look]
-        failed = [name for name in look.entry.of if name in self.outcome.failed]
-        if failed:
-            self._fail(look, step, f"it is made of {failed[0]}, which failed")
+        failed_parts = [name for name in look.entry.combined_looks if name in self.outcome.failed]
+        if failed_parts:
+            self._fail(look, step, f"it is made of {failed_parts[0]}, which failed")
         return look.entry.name not in self.outcome.failed
 
     def _may_retry(self, result: ItemResult) -> bool:
         key = (result.look, result.kind)
-        self._tries[key] = self._tries.get(key, 0) + 1
-        return self._tries[key] <= self._options.retry
+        self._try_counts[key] = self._try_counts.get(key, 0) + 1
+        return self._try_counts[key] <= self._options.retry
 
     def _record(self, step: PlanStep, result: ItemResult) -> None:
         """Record the result of a step, and report it."""
@@ -245,13 +256,13 @@ class _Run:
         if result.failure:
             self._fail(look, step, result.failure, result)
         else:
-            self.journal.add(JournalLine(result.look, step.task.kind, "done", step.made_of))
+            self.journal.add(JournalLine(result.look, step.task.kind, "done", step.fingerprint))
             if step.task.kind == look.steps[-1].task.kind:
                 self.outcome.done.append(result.look)
                 self.outcome.waiting.remove(result.look)
-            self._finished += 1
+            self._finished_count += 1
             self._on_step(look, replace(result, left_s=self._seconds_left))
-        self._listen("steps", self._finished, self._total, "steps")
+        self._listen("steps", self._finished_count, self._total, "steps")
 
     def _fail(
         self, look: PlannedLook, step: PlanStep, reason: str, result: ItemResult | None = None
@@ -264,7 +275,7 @@ class _Run:
         self.outcome.failed[name] = reason
         if name in self.outcome.waiting:
             self.outcome.waiting.remove(name)
-        self.journal.add(JournalLine(name, step.task.kind, "failed", step.made_of, reason))
+        self.journal.add(JournalLine(name, step.task.kind, "failed", step.fingerprint, reason))
         self._on_step(look, result or ItemResult(name, step.task.kind, reason))
 
     def _is_stopped(self) -> bool:
@@ -273,10 +284,10 @@ class _Run:
     @property
     def _seconds_left(self) -> float | None:
         """Remaining seconds at the pace of the steps so far; None before the first."""
-        if not self._finished:
+        if not self._finished_count:
             return None
         spent_s = time.monotonic() - self._start_s
-        return spent_s / self._finished * (self._total - self._finished)
+        return spent_s / self._finished_count * (self._total - self._finished_count)
 
 
 def _close_after(results: Iterator[ItemResult]) -> Iterator[ItemResult]:

@@ -10,8 +10,8 @@ class RunOptions:
     """Options of a run.
 
     workers: processes; 1 for this process alone. keep_going: whether the other looks go on after a
-    failure. retry: how often a failed step is tried again. apart: whether other processes do other
-    looks of the plan at the same time in the same folder; the last one writes the gallery.
+    failure. retry: how often a failed step is tried again. shares_folder: whether other processes
+    do other looks of the plan at the same time in the same folder; the last one writes the gallery.
     cluster: address of a Dask scheduler whose workers do the work. shared_fs: whether they see the
     same files under the same paths. task_limit_s: seconds after which a worker counts as hung.
     """
@@ -19,7 +19,7 @@ class RunOptions:
     workers: int = 1
     keep_going: bool = True
     retry: int = 0
-    apart: bool = False
+    shares_folder: bool = False
     cluster: str | None = None
     shared_fs: bool = False
     task_limit_s: float | None = None

@@ -76,7 +76,7 @@ def obtain_scene_basis(
 
 def obtain_moved_basis(
     scene: SceneFile,
-    before: Basis,
+    unmoved_basis: Basis,
     record: PlacementRecord,
     places: str,
     settings: Settings,
@@ -85,13 +85,15 @@ def obtain_moved_basis(
 ) -> Basis:
     """Return the basis of a scene with moved lights; an engine renders their planes.
 
-    before: the basis without the moves. places: the file of `record`, for workers.
+    unmoved_basis: the basis without the moves. places: the file of `record`, for workers.
     """
     film = on_film(scene.content, settings.quality, settings.resolution)
-    [moved] = record.hung_in([film]).scenes
+    [moved_scene] = record.hung_in([film]).scenes
     files = (*_scene_files(scene), places)
     scene_film = SceneFilm(scene, settings.quality, settings.resolution, files, places=places)
-    return moved_basis(moved, before, settings, listen, render=PartwiseRender(engine, scene_film))
+    return moved_basis(
+        moved_scene, unmoved_basis, settings, listen, render=PartwiseRender(engine, scene_film)
+    )
 
 
 def save_bases(bases: Sequence[Basis], stack: ExitStack) -> tuple[str, ...]:

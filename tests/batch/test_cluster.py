@@ -181,7 +181,7 @@ class Hears:
         self.workers[worker] = what
 
     @property
-    def begun(self) -> Counter[str]:
+    def starts(self) -> Counter[str]:
         """How often each item was begun."""
         return Counter(text.split(" begun by ")[0] for text in self.said if " begun by " in text)
 
@@ -229,15 +229,15 @@ def test_a_cluster_does_what_one_process_does(
     hears = Hears()
     run_item(here, "all", workers, hears)
     assert contents(here / "all") == expected
-    parts = [name for name in hears.begun if name.startswith("part ")]
+    parts = [name for name in hears.starts if name.startswith("part ")]
     assert len(parts) == len(plan_of_parts(here)) >= 4
-    assert all(hears.begun[name] == 1 for name in parts)
+    assert all(hears.starts[name] == 1 for name in parts)
     # One for the basis, and one for the lighting that is had by sums.
-    assert hears.begun["training"] == 2
-    assert all(hears.begun[f"{name}: answer"] == 1 for name in ("bright", "third", "third-warmer"))
+    assert hears.starts["training"] == 2
+    assert all(hears.starts[f"{name}: answer"] == 1 for name in ("bright", "third", "third-warmer"))
     # The only final render is one of both workers.
-    assert hears.begun["bright 0"] == hears.begun["bright 1"] == 1
-    assert hears.begun["bright: render"] == 0
+    assert hears.starts["bright 0"] == hears.starts["bright 1"] == 1
+    assert hears.starts["bright: render"] == 0
     assert list(hears.workers.values()) == [None, None]
     assert len({text.split()[-1] for text in hears.said if " begun by " in text}) == 2
     # Again nothing is done; and on a shared disk it is the same.
@@ -257,7 +257,7 @@ def test_a_worker_killed_in_the_middle_of_a_basis_costs_one_part(
     run_item(here, "killed", workers, hears)
     assert killer.thread is not None
     assert contents(here / "killed") == expected
-    again = {name: count for name, count in hears.begun.items() if count > 1}
+    again = {name: count for name, count in hears.starts.items() if count > 1}
     assert again == {"training": 2, "part 3": 2}
     assert any("is lost; trying elsewhere" in text for text in hears.said)
     # What was kept of the parts has gone.
@@ -280,7 +280,7 @@ def test_a_worker_killed_in_the_middle_of_a_look_costs_one_try(
     run_item(here, "look", workers, hears)
     assert killer.thread is not None
     assert contents(here / "look") == expected
-    again = {name: count for name, count in hears.begun.items() if count > 1}
+    again = {name: count for name, count in hears.starts.items() if count > 1}
     assert again == {"training": 2, "bright: answer": 2}
 
 
@@ -300,8 +300,8 @@ def test_a_worker_that_hangs_and_one_without_memory_are_replaced(
     run_item(here, "hung", workers, hears, task_limit_s=5.0)
     assert contents(here / "hung") == expected
     # On a busy machine others may take too long as well.
-    assert hears.begun["part 2"] >= 2
-    assert hears.begun["third: answer"] >= 2
+    assert hears.starts["part 2"] >= 2
+    assert hears.starts["third: answer"] >= 2
 
 
 def test_a_batch_that_was_killed_goes_on_with_the_parts_that_it_has(
@@ -322,9 +322,9 @@ def test_a_batch_that_was_killed_goes_on_with_the_parts_that_it_has(
     assert kept >= 2
     run_item(here, "stopped", workers, second)
     assert contents(here / "stopped") == expected
-    parts = sum(name.startswith("part ") for name in second.begun)
+    parts = sum(name.startswith("part ") for name in second.starts)
     assert parts == len(plan_of_parts(here)) - kept
-    assert "training" not in second.begun
+    assert "training" not in second.starts
 
 
 def plan_of_parts(here: Path) -> list[Any]:

@@ -69,9 +69,9 @@ def test_those_that_share_a_folder_keep_others_out(here: Path) -> None:
     def meanwhile(*_: Any) -> None:
         with pytest.raises(OutputError, match="another batch is at work"):
             run_batch(planned)
-        told.append(run_batch(planned.select("p1"), RunOptions(apart=True)).done)
+        told.append(run_batch(planned.select("p1"), RunOptions(shares_folder=True)).done)
 
-    run_batch(planned.select("p0"), RunOptions(apart=True), on_step=meanwhile)
+    run_batch(planned.select("p0"), RunOptions(shares_folder=True), on_step=meanwhile)
     assert told == [["p1"]]
     assert not (here / "out" / "index.html").exists()
     assert set(run_batch(plan(here / "looks.toml", here / "out")).skipped) == {"p0", "p1"}

@@ -42,7 +42,7 @@ def here_done(item: WorkItem) -> ItemResult:
 
 def sent(store: ParcelStore, parcel: Parcel) -> None:
     """Send what is lacking, as the engine does."""
-    files = {its: file for file, its in (*parcel.files, *parcel.carried)}
+    files = {its: file for file, its in (*parcel.files, *parcel.local_files)}
     for sum_ in store.missing(parcel):
         for data, is_first, is_last in pieces(Path(files[sum_]).read_bytes()):
             store.put(sum_, data, is_first=is_first, is_last=is_last)
@@ -68,7 +68,7 @@ def test_a_look_done_elsewhere_is_the_look_done_here(
     assert not (here / "out").exists()
     assert done.files is not None
     unpack(elsewhere, done.files)
-    assert contents(here / "out/p0") == contents(here / item.writes)
+    assert contents(here / "out/p0") == contents(here / item.output_folder)
     # And again, as the same answer; but not over what was changed by hand.
     unpack(elsewhere, done.files)
     (here / "out/p0/lighting.json").write_text("mine", encoding="utf-8")
@@ -121,7 +121,7 @@ def test_other_content_under_the_same_name_is_sent_anew(here: Path, store: Parce
 
     def look(given: WorkItem) -> ItemResult:
         assert isinstance(given, Task)
-        [painting] = [file for file in given.reads if file.endswith("p0.exr")]
+        [painting] = [file for file in given.source_files if file.endswith("p0.exr")]
         seen.append(Path(painting).read_bytes())
         return ItemResult("p0", "answer")
 
@@ -158,7 +158,7 @@ def test_files_that_are_only_here_are_carried_to_a_shared_disk_too(
 
     def look(given: WorkItem) -> ItemResult:
         assert isinstance(given, Task)
-        assert given.reads == item.reads
+        assert given.source_files == item.source_files
         [file] = given.files
         assert file != item.files[0]
         assert Path(file).read_bytes() == only_here.read_bytes()

@@ -122,13 +122,13 @@ def test_looks_hang_their_lights_once_and_dim_them_each(here: Path) -> None:
 def test_places_that_were_found_are_not_searched_for_again(here: Path) -> None:
     """A batch that was stopped after its search goes on from there."""
     first = plan(here / "looks.toml", here / "out")
-    run_batch(first.select("day"), RunOptions(apart=True))
+    run_batch(first.select("day"), RunOptions(shares_folder=True))
     outcome, heard = run_all(here)
     assert "poses" not in heard.labels
     assert sorted(outcome.done) == sorted(set(NAMES) - {"day"})
     # Half a file counts as none.
     (here / "out" / "places" / "day.json").write_text('{"moves": [', encoding="utf-8")
-    assert plan(here / "looks.toml", here / "out").groups[0].found() is None
+    assert plan(here / "looks.toml", here / "out").groups[0].read_record() is None
 
 
 @pytest.mark.nightly

@@ -82,7 +82,7 @@ LATER: dict[str, Callable[[ClusterWorkers], object]] = {
     "refresh": lambda at: (setattr(at, "_looked_s", -1e9), at.refresh()),
     "is_there": lambda at: at.is_known("tcp://127.0.0.1:1"),
     "submit": lambda at: at.submit(None, "tcp://127.0.0.1:1", "key"),  # type: ignore[arg-type]
-    "unfit": lambda at: at._unfit(["tcp://127.0.0.1:1"]),
+    "unfit": lambda at: at._reasons_against(["tcp://127.0.0.1:1"]),
 }
 
 
@@ -135,12 +135,12 @@ def test_what_others_say_under_our_topic_is_passed_over() -> None:
     events = [{"item": "a", "worker": "w"}, {}, None, {"item": 1, "worker": "w"}, "text"]
     cluster._workers = SimpleNamespace(events=deque(events))  # type: ignore[assignment]
     cluster._read_events()
-    assert cluster.begun == [("a", "w")]
+    assert cluster.starts == [("a", "w")]
 
 
 @pytest.mark.parametrize("record", [b"{}", b"junk", b"\xff", b'{"answers": 3}', b"[1]", b"[]"])
 def test_a_record_that_is_none_is_one_line(tmp_path: Path, record: bytes) -> None:
-    item: Any = SimpleNamespace(writes=str(tmp_path / "look"), kind="answer")
+    item: Any = SimpleNamespace(output_folder=str(tmp_path / "look"), kind="answer")
     with pytest.raises(OutputError, match=r"a worker's result.json is damaged"):
         unpack(item, {"result.json": record, "lighting.json": b"{}"})
     assert not (tmp_path / "look").exists()

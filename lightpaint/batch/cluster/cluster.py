@@ -70,8 +70,8 @@ class Cluster:
         self._assignments: list[_Assignment] = []
         self._failed_at: dict[str, set[str]] = {}
         #: Pairs of item and worker in the order of starts; an item that occurs twice was lost once.
-        self.begun: list[tuple[str, str]] = []
-        self._returned = Counter[tuple[str, str]]()
+        self.starts: list[tuple[str, str]] = []
+        self._result_counts = Counter[tuple[str, str]]()
 
     @property
     def is_gone(self) -> bool:
@@ -91,26 +91,28 @@ class Cluster:
         self._cancel_all()
         # The events of items that have already returned may still be on their way.
         deadline_s = time.monotonic() + FINAL_EVENTS_S
-        while self._returned - Counter(self.begun) and time.monotonic() < deadline_s:
+        while self._result_counts - Counter(self.starts) and time.monotonic() < deadline_s:
             time.sleep(POLL_S)
             self._read_events()
         self._workers.close()
 
     def run(self, items: Sequence[WorkItem]) -> Iterator[ItemResult]:
         """Run the items; see `Engine`."""
-        waiting, tries = deque(items), Counter[str]()
+        queue, try_counts = deque(items), Counter[str]()
         readers = Counter(
-            os.path.abspath(file) for item in items for file in {*item.needs, *item.carried}
+            os.path.abspath(file)
+            for item in items
+            for file in {*item.input_files, *item.local_files}
         )
-        common = {file for file, count in readers.items() if count > 1}
+        common_files = {file for file, count in readers.items() if count > 1}
         try:
-            while waiting or self._assignments:
+            while queue or self._assignments:
                 self._workers.refresh()
-                self._take_back_from_dead(waiting, tries)
-                yield from self._give_up(waiting, tries)
-                yield from self._assign(waiting, common)
-                yield from self._collect(waiting, tries)
-                self._end_hung_workers(waiting, tries)
+                self._take_back_from_dead(queue, try_counts)
+                yield from self._give_up(queue, try_counts)
+                yield from self._assign(queue, common_files)
+                yield from self._collect(queue, try_counts)
+                self._end_hung_workers(queue, try_counts)
                 time.sleep(POLL_S)
         finally:
             self._cancel_all()
@@ -122,32 +124,36 @@ class Cluster:
                 assignment.future.cancel(force=True)
         self._assignments = []
 
-    def _assign(self, waiting: deque[WorkItem], common: set[str]) -> Iterator[ItemResult]:
+    def _assign(self, queue: deque[WorkItem], common_files: set[str]) -> Iterator[ItemResult]:
         """Give every worker an item, and a second one where there are enough for all."""
-        loads = Counter(assignment.worker for assignment in self._assignments)
+        load_counts = Counter(assignment.worker for assignment in self._assignments)
         for depth in range(1, ITEMS_PER_WORKER + 1):
             for worker in self._workers.addresses:
-                enough = depth == 1 or len(waiting) >= len(self._workers.addresses)
-                item = self._next_for(worker, waiting) if loads[worker] < depth and enough else None
+                has_enough = depth == 1 or len(queue) >= len(self._workers.addresses)
+                item = (
+                    self._next_for(worker, queue)
+                    if load_counts[worker] < depth and has_enough
+                    else None
+                )
                 if item is not None:
-                    waiting.remove(item)
-                    loads[worker] += 1
+                    queue.remove(item)
+                    load_counts[worker] += 1
                     try:
-                        self._submit(item, worker, common)
+                        self._submit(item, worker, common_files)
                     except LightpaintError as error:
                         yield ItemResult(item.name, item.kind, str(error))
 
-    def _next_for(self, worker: str, waiting: deque[WorkItem]) -> WorkItem | None:
+    def _next_for(self, worker: str, queue: deque[WorkItem]) -> WorkItem | None:
         """Return the next item that the worker has not failed at, unless all workers have."""
-        for item in waiting:
+        for item in queue:
             failed_at = self._failed_at.get(item.name, set())
             if worker not in failed_at or failed_at >= set(self._workers.addresses):
                 return item
         return None
 
-    def _submit(self, item: WorkItem, worker: str, common: set[str]) -> None:
+    def _submit(self, item: WorkItem, worker: str, common_files: set[str]) -> None:
         parcel = pack(item, self._contents, run=self._run, is_shared=self._is_shared)
-        self._workers.send_files(parcel, worker, common)
+        self._workers.send_files(parcel, worker, common_files)
         key = f"{self._run}-{item.kind}-{item.name}-{secrets.token_hex(4)}"
         future = self._workers.submit(parcel, worker, key)
         self._assignments.append(_Assignment(item, parcel, worker, future))
@@ -167,19 +173,19 @@ class Cluster:
             event = self._workers.events.popleft()
             if not _is_event(event):  # another client of the scheduler sent it
                 continue
-            self.begun.append((event["item"], event["worker"]))
+            self.starts.append((event["item"], event["worker"]))
             for assignment in self._assignments:
-                if (item_label(assignment.item), assignment.worker) == self.begun[-1]:
+                if (item_label(assignment.item), assignment.worker) == self.starts[-1]:
                     assignment.since_s = time.monotonic()
                     self._listen.at_work(f"worker {assignment.worker}", item_label(assignment.item))
             self._listen.note(f"{event['item']} begun by {event['worker']}")
 
-    def _collect(self, waiting: deque[WorkItem], tries: Counter[str]) -> Iterator[ItemResult]:
+    def _collect(self, queue: deque[WorkItem], try_counts: Counter[str]) -> Iterator[ItemResult]:
         """Yield results that have arrived."""
         self._read_events()
         for assignment in list(self._assignments):
             if assignment.future.status in ("cancelled", "lost"):
-                self._take_back([assignment], waiting, tries)
+                self._take_back([assignment], queue, try_counts)
                 continue
             if assignment.future.status not in ("finished", "error"):
                 continue
@@ -189,19 +195,19 @@ class Cluster:
             self._assignments.remove(assignment)
             self._note_idle(assignment.worker)
             self._start_clocks()
-            self._returned[item_label(assignment.item), assignment.worker] += not isinstance(
+            self._result_counts[item_label(assignment.item), assignment.worker] += not isinstance(
                 result, list
             )
             if isinstance(result, list):  # the worker restarted at the same address
                 self._workers.forget_files(assignment.worker, result)
-                waiting.appendleft(assignment.item)
+                queue.appendleft(assignment.item)
                 continue
             if (
-                result.is_lost and tries[result.look] + 1 < MAX_TRIES
+                result.is_lost and try_counts[result.look] + 1 < MAX_TRIES
             ):  # it ran out of memory, and another worker may have more
-                tries[result.look] += 1
+                try_counts[result.look] += 1
                 self._failed_at.setdefault(result.look, set()).add(assignment.worker)
-                waiting.append(assignment.item)
+                queue.append(assignment.item)
                 continue
             yield result if result.files is None else _unpack_result(assignment.item, result)
 
@@ -226,17 +232,17 @@ class Cluster:
                 return None
             return ItemResult(item.name, item.kind, f"{type(error).__name__}: {first_line(error)}")
 
-    def _take_back_from_dead(self, waiting: deque[WorkItem], tries: Counter[str]) -> None:
+    def _take_back_from_dead(self, queue: deque[WorkItem], try_counts: Counter[str]) -> None:
         """Take back the items of workers that are gone."""
         self._read_events()
         self._take_back(
             [x for x in self._assignments if x.worker not in self._workers.addresses],
-            waiting,
-            tries,
+            queue,
+            try_counts,
         )
 
     def _take_back(
-        self, assignments: Sequence[_Assignment], waiting: deque[WorkItem], tries: Counter[str]
+        self, assignments: Sequence[_Assignment], queue: deque[WorkItem], try_counts: Counter[str]
     ) -> None:
         """Take back items from their workers."""
         for assignment in assignments:
@@ -245,19 +251,19 @@ class Cluster:
             self._assignments.remove(assignment)
             self._note_idle(assignment.worker)
             if assignment.since_s is not None:  # the worker had begun it
-                tries[assignment.item.name] += 1
+                try_counts[assignment.item.name] += 1
                 name = item_label(assignment.item)
                 self._listen.say(f"{name}: worker {assignment.worker} is lost; trying elsewhere")
-            waiting.appendleft(assignment.item)
+            queue.appendleft(assignment.item)
         self._start_clocks()
 
-    def _give_up(self, waiting: deque[WorkItem], tries: Counter[str]) -> Iterator[ItemResult]:
+    def _give_up(self, queue: deque[WorkItem], try_counts: Counter[str]) -> Iterator[ItemResult]:
         """Yield failures for items that have lost too many workers."""
-        for item in [x for x in waiting if tries[x.name] >= MAX_TRIES]:
-            waiting.remove(item)
+        for item in [x for x in queue if try_counts[x.name] >= MAX_TRIES]:
+            queue.remove(item)
             yield ItemResult(item.name, item.kind, LOST_TEXT, is_lost=True)
 
-    def _end_hung_workers(self, waiting: deque[WorkItem], tries: Counter[str]) -> None:
+    def _end_hung_workers(self, queue: deque[WorkItem], try_counts: Counter[str]) -> None:
         """End workers that take too long over an item."""
         for assignment in list(self._assignments):
             limit_s = self._limit_s or max(MIN_LIMIT_S, LIMIT_FACTOR * assignment.item.expected_s)
@@ -266,7 +272,7 @@ class Cluster:
             name = item_label(assignment.item)
             self._listen.say(f"{name}: worker {assignment.worker} takes over {limit_s:.0f} s")
             self._take_back(
-                [x for x in self._assignments if x.worker == assignment.worker], waiting, tries
+                [x for x in self._assignments if x.worker == assignment.worker], queue, try_counts
             )
             self._workers.end(assignment.worker, "it took too long")
             return

@@ -29,14 +29,14 @@ PIECE_BYTES = 2**26
 class Parcel:
     """A work item for another machine.
 
-    files: those that it needs, by absolute path, with the SHA-256 of each. carried: the same of
+    files: those that it needs, by absolute path, with the SHA-256 of each. local_files: the same of
     files that exist only here. place: folder that relative paths start from. is_shared: whether
     `files` are there under the same paths. run: identifies the batch.
     """
 
     item: WorkItem
     files: tuple[tuple[str, str], ...]
-    carried: tuple[tuple[str, str], ...]
+    local_files: tuple[tuple[str, str], ...]
     place: str
     is_shared: bool
     run: str
@@ -54,8 +54,8 @@ class FileHashes:
             status = os.stat(file)
             key = file, status.st_size, status.st_mtime_ns
             if key not in self._digests:
-                with open(file, "rb") as opened:
-                    self._digests[key] = hashlib.file_digest(opened, "sha256").hexdigest()
+                with open(file, "rb") as stream:
+                    self._digests[key] = hashlib.file_digest(stream, "sha256").hexdigest()
         except OSError as error:
             raise BatchError(f"cannot read {file}: {error.strerror or error}") from error
         return self._digests[key]
@@ -64,12 +64,12 @@ class FileHashes:
 def pack(item: WorkItem, contents: FileHashes, *, run: str, is_shared: bool) -> Parcel:
     """Return the item with its files. Raises BatchError for a file that cannot be read."""
 
-    def summed(paths: Iterable[str]) -> tuple[tuple[str, str], ...]:
-        whole = dict.fromkeys(os.path.abspath(file) for file in paths)
-        return tuple((file, contents.sha256(file)) for file in whole)
+    def with_hashes(paths: Iterable[str]) -> tuple[tuple[str, str], ...]:
+        absolute_paths = dict.fromkeys(os.path.abspath(file) for file in paths)
+        return tuple((file, contents.sha256(file)) for file in absolute_paths)
 
-    files, carried = summed(item.needs), summed(item.carried)
-    return Parcel(item, files, carried, os.getcwd(), is_shared, run)
+    files, local_files = with_hashes(item.input_files), with_hashes(item.local_files)
+    return Parcel(item, files, local_files, os.getcwd(), is_shared, run)
 
 
 class ParcelStore:
@@ -99,7 +99,7 @@ class ParcelStore:
 
     def run_parcel(self, parcel: Parcel, run_item: Callable[[WorkItem], ItemResult]) -> ItemResult:
         """Run an item here by `run_item`; all its files have to be in the store."""
-        before = os.getcwd()
+        folder_before = os.getcwd()
         try:
             if parcel.is_shared:
                 return self._run_in_place(parcel, run_item)
@@ -108,7 +108,7 @@ class ParcelStore:
             failure = f"a worker cannot do it: {error}"
             return ItemResult(parcel.item.name, parcel.item.kind, failure)
         finally:
-            os.chdir(before)
+            os.chdir(folder_before)
 
     def _run_in_place(
         self, parcel: Parcel, run_item: Callable[[WorkItem], ItemResult]
@@ -135,8 +135,8 @@ class ParcelStore:
         item, start_folder = parcel.item, f"{root}{parcel.place}"
         os.makedirs(start_folder, exist_ok=True)
         target = None
-        if item.writes:
-            target = Path(f"{root}{_absolute(parcel, item.writes)}")
+        if item.output_folder:
+            target = Path(f"{root}{_absolute(parcel, item.output_folder)}")
             shutil.rmtree(target, ignore_errors=True)
         links = {}
         for file, digest in parcel.files:
@@ -154,24 +154,24 @@ class ParcelStore:
                 result.is_lost or result.is_disk_full,
             )
             return replace(result, failure=failure, is_disk_full=False, is_lost=is_lost)
-        written = (x for x in sorted(target.rglob("*")) if x.is_file())
+        files = (x for x in sorted(target.rglob("*")) if x.is_file())
         return replace(
             result,
             files={
                 file.relative_to(target).as_posix(): _without_root(file.read_bytes(), root)
-                for file in written
+                for file in files
                 if file not in links or not file.samefile(links[file])
             },
         )
 
     def _path_map(self, parcel: Parcel, root: Path | None = None) -> Callable[[str], str]:
         """Return a function from local paths to paths in the store and, given a root, under it."""
-        carried = {file: str(self._file(digest)) for file, digest in parcel.carried}
+        local_files = {file: str(self._file(digest)) for file, digest in parcel.local_files}
         moved_paths: set[str] = set()
         if root is not None:
             moved_paths |= {file for file, _ in parcel.files}
-            if parcel.item.writes:
-                moved_paths.add(_absolute(parcel, parcel.item.writes))
+            if parcel.item.output_folder:
+                moved_paths.add(_absolute(parcel, parcel.item.output_folder))
             moved_paths |= {
                 str(folder) for file in tuple(moved_paths) for folder in Path(file).parents
             }
@@ -180,9 +180,9 @@ class ParcelStore:
         folders = {os.path.dirname(file) for file, _ in parcel.files} & moved_paths
 
         def move(text: str) -> str:
-            if (whole := _absolute(parcel, text)) in carried:
-                return carried[whole]
-            is_moved = whole in moved_paths or os.path.dirname(whole) in folders
+            if (absolute_path := _absolute(parcel, text)) in local_files:
+                return local_files[absolute_path]
+            is_moved = absolute_path in moved_paths or os.path.dirname(absolute_path) in folders
             return f"{root}{text}" if os.path.isabs(text) and is_moved else text
 
         return move
@@ -193,7 +193,7 @@ class ParcelStore:
 
 def files_to_send(parcel: Parcel) -> tuple[tuple[str, str], ...]:
     """Return the files that have to be in a worker's store."""
-    return parcel.carried if parcel.is_shared else parcel.files + parcel.carried
+    return parcel.local_files if parcel.is_shared else parcel.files + parcel.local_files
 
 
 def _without_root(data: bytes, root: Path) -> bytes:
@@ -218,9 +218,9 @@ def _absolute(parcel: Parcel, path: str) -> str:
 
 def pieces(data: bytes) -> Iterable[tuple[bytes, bool, bool]]:
     """Yield pieces of a file, with whether each is the first and the last."""
-    starts: Sequence[int] = range(0, max(len(data), 1), PIECE_BYTES)
-    for start in starts:
-        yield data[start : start + PIECE_BYTES], start == 0, start == starts[-1]
+    offsets: Sequence[int] = range(0, max(len(data), 1), PIECE_BYTES)
+    for start in offsets:
+        yield data[start : start + PIECE_BYTES], start == 0, start == offsets[-1]
 
 
 def unpack(item: WorkItem, files: dict[str, bytes]) -> None:
@@ -228,9 +228,9 @@ def unpack(item: WorkItem, files: dict[str, bytes]) -> None:
 
     Raises OutputError for files that must not be replaced, like those that are written locally.
     """
-    folder = Path(item.writes)
-    if outside := [name for name in files if not is_below(name)]:
-        raise OutputError(f"a worker would write {some_names(outside)} beside {folder}")
+    folder = Path(item.output_folder)
+    if outside_names := [name for name in files if not is_below(name)]:
+        raise OutputError(f"a worker would write {some_names(outside_names)} beside {folder}")
     answers = _recorded_answers(files[RECORD]) if RECORD in files else ()
     adds_to = folder / "lighting.json" if item.kind == "render" else None
     results = ResultFolder(

@@ -89,7 +89,9 @@ class ClusterWorkers:
         if time.monotonic() - self._looked_s < LOOK_S:
             return
         addresses = [x for x in self._all_addresses() if x not in self._left_out]
-        for worker, reason in self._unfit(sorted(set(addresses) - set(self.addresses))).items():
+        for worker, reason in self._reasons_against(
+            sorted(set(addresses) - set(self.addresses))
+        ).items():
             self._left_out[worker] = reason
             self._listen.say(f"worker {worker} is left out: {reason}")
         self.addresses = [worker for worker in addresses if worker not in self._left_out]
@@ -123,22 +125,24 @@ class ClusterWorkers:
             "it is back"
         )
 
-    def _unfit(self, workers: list[str]) -> dict[str, str]:
+    def _reasons_against(self, workers: list[str]) -> dict[str, str]:
         """Return the new workers that cannot be used, and why."""
         if not workers:
             return {}
         ask = partial(self._client.run, cluster_worker.versions, workers=workers)
         replies = self._ask(partial(ask, on_error="return"))
-        own, unfit = own_versions(), {}
+        own_packages, reasons = own_versions(), {}
         for worker, reply in replies.items():
             if isinstance(reply, Exception):
-                unfit[worker] = f"lightpaint does not run there ({first_line(reply)})"
-            elif differing := [name for name in own if reply.get(name) != own[name]]:
-                unfit[worker] = ", ".join(
-                    f"it has {name} {reply.get(name)}, and here is {own[name]}"
-                    for name in differing
+                reasons[worker] = f"lightpaint does not run there ({first_line(reply)})"
+            elif differing_names := [
+                name for name in own_packages if reply.get(name) != own_packages[name]
+            ]:
+                reasons[worker] = ", ".join(
+                    f"it has {name} {reply.get(name)}, and here is {own_packages[name]}"
+                    for name in differing_names
                 )
-        return unfit
+        return reasons
 
     def send_files(self, parcel: Parcel, worker: str, common: set[str]) -> None:
         """Send a worker the files that it lacks; those in `common` go to all workers at once."""

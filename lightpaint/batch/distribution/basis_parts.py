@@ -24,7 +24,7 @@ class PartwiseRender:
 
     def __init__(self, engine: Engine, film: SceneFilm) -> None:
         self._engine = engine
-        self._film = film.unread()
+        self._film = film.without_content()
 
     def __call__(
         self,
@@ -68,7 +68,7 @@ class PartwiseRender:
 
     def _film_of(self, scene: Scene) -> SceneFilm:
         """Return the film of `scene`, which may have only some of the lights."""
-        return replace(self._film, only=scene.chosen)
+        return replace(self._film, light_names=scene.chosen)
 
     def _add_all(
         self,

@@ -27,7 +27,7 @@ def distributed_renderer(
 
     def render(relit: Scene) -> Estimate:
         # The answer has written this scene; writing it again gives the same file.
-        path = str(Path(task.writes) / "relit.xml")
+        path = str(Path(task.output_folder) / "relit.xml")
         scene = SceneFile(
             path,
             relit.sensor,

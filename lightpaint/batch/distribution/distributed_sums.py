@@ -70,18 +70,22 @@ def _render_sums(
     paintings = tuple(
         PaintingOfSums(_file_of(job), job.fit.emitters, job.settings.resize) for job in jobs
     )
-    reads = tuple(dict.fromkeys(str(x) for job in jobs for x in job.views[0].target.files))
+    source_files = tuple(dict.fromkeys(str(x) for job in jobs for x in job.views[0].target.files))
     items = []
     for k, part in enumerate(parts):
         pixels = (part.bottom - part.top) * scene.size[1]
         expected_s = render_seconds(2 * pixels * part.spp, len(scene.lights))
         options: dict[str, Any] = {"film": film, "part": part, "seed": settings.seed}
-        options |= {"guide_file": str(spool.guide_file), "paintings": paintings, "files": reads}
+        options |= {
+            "guide_file": str(spool.guide_file),
+            "paintings": paintings,
+            "files": source_files,
+        }
         items.append(SumsOfRows(f"rows {k}", expected_s=expected_s, **options))
     results: dict[str, list[Sums]] = {}
     total: list[Sums] = []
-    following = iter(items)
-    item = next(following, None)
+    remaining_items = iter(items)
+    item = next(remaining_items, None)
     listen("basis", 0, len(items), "ranges of rows")
     for count, result in enumerate(engine.run(items)):
         if result.failure:
@@ -92,7 +96,7 @@ def _render_sums(
         while item is not None and item.name in results:
             next_sums = results.pop(item.name)
             total = [a + b for a, b in zip(total, next_sums, strict=True)] if total else next_sums
-            item = next(following, None)
+            item = next(remaining_items, None)
     spool.drop()
     return total
 
@@ -112,4 +116,4 @@ def _file_of(job: Job) -> Painting:
     """Return the job's painting, not yet read."""
     [painting] = job.targets
     assert isinstance(painting, Painting)
-    return painting.unread()
+    return painting.without_content()

@@ -36,51 +36,54 @@ class Processes:
 
     def run(self, items: Sequence[WorkItem]) -> Iterator[ItemResult]:
         """Run the items; see `Engine`."""
-        waiting, tries = list(items), dict.fromkeys((item.name for item in items), 0)
+        queue, try_counts = list(items), dict.fromkeys((item.name for item in items), 0)
         # When a process dies, any of the running items may be the cause: each is then run alone.
         suspects: list[WorkItem] = []
         try:
-            while waiting or suspects:
-                if waiting:
-                    yield from self._run_parallel(waiting, suspects)
+            while queue or suspects:
+                if queue:
+                    yield from self._run_parallel(queue, suspects)
                 while suspects:
                     item = suspects.pop(0)
-                    tries[item.name] += 1
-                    lost: list[WorkItem] = []
-                    yield from self._run_parallel([item], lost)
-                    if lost and tries[item.name] < MAX_TRIES:
+                    try_counts[item.name] += 1
+                    lost_items: list[WorkItem] = []
+                    yield from self._run_parallel([item], lost_items)
+                    if lost_items and try_counts[item.name] < MAX_TRIES:
                         suspects.append(item)
-                    elif lost:
+                    elif lost_items:
                         yield ItemResult(item.name, item.kind, LOST_TEXT, is_lost=True)
         except BaseException:
             self._stop_pool()
             raise
 
-    def _run_parallel(self, waiting: list[WorkItem], lost: list[WorkItem]) -> Iterator[ItemResult]:
-        """Run the items in `waiting`, one for each worker at a time, until a worker dies.
-        Removes the started items from `waiting`, and adds those that were running to `lost`.
+    def _run_parallel(
+        self, queue: list[WorkItem], lost_items: list[WorkItem]
+    ) -> Iterator[ItemResult]:
+        """Run the items in `queue`, one for each worker at a time, until a worker dies.
+
+        Removes the started items from `queue`, and adds those that were running to `lost_items`.
         """
-        running: dict[Future[ItemResult], WorkItem] = {}
+        running_items: dict[Future[ItemResult], WorkItem] = {}
         # The pool does not tell which process runs an item, so the display numbers the slots.
         slots: dict[Future[ItemResult], str] = {}
         free_slots = [f"worker {k + 1}" for k in reversed(range(self.workers))]
         pool = self._start_pool()
-        while waiting or running:
+        while queue or running_items:
             try:
-                while waiting and len(running) < self.workers:
-                    future = pool.submit(_run_item, waiting[0])
-                    running[future], slots[future] = waiting[0], free_slots.pop()
-                    self._listen.at_work(slots[future], item_label(waiting[0]))
-                    del waiting[0]
-                finished, _ = wait(running, return_when=FIRST_COMPLETED)
-                for future in finished:
+                while queue and len(running_items) < self.workers:
+                    future = pool.submit(_run_item, queue[0])
+                    running_items[future], slots[future] = queue[0], free_slots.pop()
+                    self._listen.at_work(slots[future], item_label(queue[0]))
+                    del queue[0]
+                futures, _ = wait(running_items, return_when=FIRST_COMPLETED)
+                for future in futures:
                     result = future.result()
-                    del running[future]
+                    del running_items[future]
                     free_slots.append(slots.pop(future))
                     self._listen.at_work(free_slots[-1], None)
                     yield result
             except BrokenProcessPool:
-                lost += running.values()
+                lost_items += running_items.values()
                 for place in slots.values():
                     self._listen.at_work(place, None)
                 self._stop_pool()

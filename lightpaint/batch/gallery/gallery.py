@@ -87,8 +87,8 @@ def gallery_page(
     folder: of the small pictures and planes. bases: planes of each row, by its folder. places: the
     section on lights that hang at the same places in several looks.
     """
-    finished = [row for row in rows if row.state == "done"]
-    mixers = mixers_html(folder, finished, bases or {})
+    finished_rows = [row for row in rows if row.state == "done"]
+    mixers = mixers_html(folder, finished_rows, bases or {})
     records = []
     for row in rows:
         record = {k: v for k, v in asdict(row).items() if v not in (None, "", ())}
@@ -106,7 +106,7 @@ def gallery_page(
         about=escape(counts_text(rows)),
         failed=" failed" if any(row.state == "failed" for row in rows) else "",
         looks=script_json(records),
-        transforms=script_json(transforms_of(finished) if mixers else {}),
+        transforms=script_json(transforms_of(finished_rows) if mixers else {}),
         mixers="\n".join(mixers.values()),
         places=places,
         style=styles("batch/gallery/gallery.css", "viewer/mixer/mixer.css"),
@@ -128,11 +128,13 @@ def contact_sheet(folder: Path, rows: list[SummaryRow]) -> Any:
     """Return small pictures side by side with their names, (H, W, 3) uint8.
     Only the first MAX_PICTURES are drawn.
     """
-    pictured = rows[:MAX_PICTURES]
-    columns = max(1, min(COLUMNS, len(pictured)))
-    height = max([round(WIDTH * row.size[1] / row.size[0]) for row in pictured], default=WIDTH)
+    rows_with_pictures = rows[:MAX_PICTURES]
+    columns = max(1, min(COLUMNS, len(rows_with_pictures)))
+    height = max(
+        [round(WIDTH * row.size[1] / row.size[0]) for row in rows_with_pictures], default=WIDTH
+    )
     height = min(height, 2 * WIDTH)
-    count = -(-len(pictured) // columns)
+    count = -(-len(rows_with_pictures) // columns)
     size = (
         columns * (WIDTH + GAP) + GAP,
         count * (height + CAPTION_HEIGHT + GAP) + 2 * GAP + CAPTION_HEIGHT,
@@ -143,7 +145,7 @@ def contact_sheet(folder: Path, rows: list[SummaryRow]) -> Any:
     if len(rows) > MAX_PICTURES:
         title += f"; the first {MAX_PICTURES} are shown"
     draw.text((GAP, GAP), shorten_to_width(title, font, size[0] - 2 * GAP), FAINT, font)
-    for k, row in enumerate(pictured):
+    for k, row in enumerate(rows_with_pictures):
         x = GAP + k % columns * (WIDTH + GAP)
         y = 2 * GAP + CAPTION_HEIGHT + k // columns * (height + CAPTION_HEIGHT + GAP)
         _draw(sheet, folder, row, (x, y, WIDTH, height), font)
@@ -156,12 +158,12 @@ def _draw(
     """Draw one look in its box (x, y, width, height), with its name and miss below."""
     (x, y, width, height), draw = box, ImageDraw.Draw(sheet)
     if row.picture:
-        with Image.open(folder / row.picture) as opened:
-            scale = min(width / opened.width, height / opened.height)
-            size = max(1, round(scale * opened.width)), max(1, round(scale * opened.height))
+        with Image.open(folder / row.picture) as image:
+            scale = min(width / image.width, height / image.height)
+            size = max(1, round(scale * image.width)), max(1, round(scale * image.height))
             filter_ = Image.Resampling.NEAREST if scale > 2 else Image.Resampling.LANCZOS
-            small = opened.resize(size, filter_)
-        sheet.paste(small, (x + (width - size[0]) // 2, y + (height - size[1]) // 2))
+            thumbnail = image.resize(size, filter_)
+        sheet.paste(thumbnail, (x + (width - size[0]) // 2, y + (height - size[1]) // 2))
     else:
         draw.rectangle((x, y, x + width - 1, y + height - 1), outline=FAINT)
         text = {"failed": "failed", "waiting": "not done yet"}.get(row.state, "no picture")

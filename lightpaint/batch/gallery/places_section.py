@@ -14,14 +14,16 @@ def places_section(plan: Plan) -> str:
 
     Looks that are placed alone are in their own reports instead.
     """
-    found = [(group, group.found()) for group in plan.groups if len(group.tasks) > 1]
-    parts = "".join(_group_html(group, record) for group, record in found if record is not None)
+    placed_groups = [(group, group.read_record()) for group in plan.groups if len(group.tasks) > 1]
+    parts = "".join(
+        _group_html(group, record) for group, record in placed_groups if record is not None
+    )
     return f'<section class="places"><h2>Where the lights hang</h2>{parts}</section>' * bool(parts)
 
 
 def _group_html(group: PlaceGroup, record: PlacementRecord) -> str:
-    hung = hung_of(record, None)
-    listed = "".join(f"<li>{escape(change.text)}</li>" for change in hung.changes)
+    placement = hung_of(record, None)
+    items = "".join(f"<li>{escape(change.text)}</li>" for change in placement.changes)
     picture = ""
     if group.picture.is_file():
         data = base64.b64encode(group.picture.read_bytes()).decode("ascii")
@@ -29,4 +31,4 @@ def _group_html(group: PlaceGroup, record: PlacementRecord) -> str:
             '<img alt="Plan and elevation of the room with its lights." '
             f'src="data:image/png;base64,{data}">'
         )
-    return f"<p>{escape(hung.shared_sentence)}</p><ul>{listed}</ul>{picture}"
+    return f"<p>{escape(placement.shared_sentence)}</p><ul>{items}</ul>{picture}"

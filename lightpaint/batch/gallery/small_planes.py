@@ -65,11 +65,8 @@ def write_planes(folder: Path, key: str, basis: Basis) -> None:
     write_text(path, json.dumps(record, ensure_ascii=False, allow_nan=False) + "\n")
 
 
-def write_task_planes(
-    folder: Path, task: Task, obtained: Sequence[Basis], cache: WorkerCache
-) -> None:
-    """Write the small planes of a task's bases. obtained: those that were not read from files."""
-    bases = list(obtained)
+def write_task_planes(folder: Path, task: Task, bases: Sequence[Basis], cache: WorkerCache) -> None:
+    """Write the small planes of a task's bases. bases: those that were not read from files."""
     if not bases:
         source = content(job_fields(task, cache)["basis"])
         bases = [source.basis if isinstance(source, LightGroups) else source]

@@ -32,16 +32,16 @@ def entry_of(job: Job, folder: Path | None = None, variation: str = "") -> LookE
         basis,
         by_sensor=job.by_sensor,
         variation=variation,
-        of=() if folder is None else (job.folder.name,),
+        combined_looks=() if folder is None else (job.folder.name,),
     )
 
 
 def write_solve_gallery(
-    folder: Path, entries: Sequence[LookEntry], failed: Mapping[str, str], bases: Sequence[Basis]
+    folder: Path, entries: Sequence[LookEntry], failures: Mapping[str, str], bases: Sequence[Basis]
 ) -> list[SummaryRow]:
     """Write the gallery of the looks in `folder`, by the names of their folders there.
 
-    failed: reasons by name. bases: one for each view, shared by all looks.
+    failures: reasons by name. bases: one for each view, shared by all looks.
     """
     looks, lines = [], {}
     keys = tuple(json.dumps({"view": k}) for k in range(len(bases)))
@@ -49,12 +49,12 @@ def write_solve_gallery(
         write_planes(folder, key, basis)
     for entry in entries:
         name = entry.name
-        made_of = "" if name in failed else _content(folder / name / "lighting.json")
-        step = PlanStep(Task(name, "answer", "", bases=keys), made_of, True)
+        fingerprint = "" if name in failures else _content(folder / name / "lighting.json")
+        step = PlanStep(Task(name, "answer", "", bases=keys), fingerprint, True)
         looks.append(PlannedLook(entry, folder / name, (step,)))
         line_key: tuple[str, Kind] = (name, "answer")
-        state = "failed" if name in failed else "done"
-        lines[line_key] = JournalLine(name, "answer", state, made_of, failed.get(name, ""))  # type: ignore[arg-type]
+        state = "failed" if name in failures else "done"
+        lines[line_key] = JournalLine(name, "answer", state, fingerprint, failures.get(name, ""))  # type: ignore[arg-type]
     names = frozenset(entry.name for entry in entries)
     plan = Plan(Path(folder.resolve().name), folder, tuple(looks), {}, names)
     return write_gallery(folder, plan, lines)

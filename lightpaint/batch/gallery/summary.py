@@ -110,7 +110,9 @@ def rows_of(plan: Plan, lines: Mapping[tuple[str, Kind], JournalLine]) -> list[S
         for folder in view_folders(look):
             row = _row(plan, look, folder, state, reason)
             # A look that combines others is shown through their view transform.
-            view = row.view or next((views[x] for x in look.entry.of if views.get(x)), None)
+            view = row.view or next(
+                (views[x] for x in look.entry.combined_looks if views.get(x)), None
+            )
             views.setdefault(look.entry.name, view)
             if state == "done":
                 row = _with_picture(row, plan.folder, folder, view, _key(look, lines), widest)
@@ -123,9 +125,9 @@ def state_of(look: PlannedLook, lines: Mapping[tuple[str, Kind], JournalLine]) -
     state: State = "done"
     for step in look.steps:
         line = lines.get((step.task.look, step.task.kind))
-        if line is not None and line.state == "failed" and line.made_of == step.made_of:
+        if line is not None and line.state == "failed" and line.made_of == step.fingerprint:
             return "failed", line.why
-        if line is None or line.made_of != step.made_of:
+        if line is None or line.made_of != step.fingerprint:
             state = "waiting"
     return state, ""
 
@@ -209,19 +211,19 @@ def _with_picture(
     with suppress(LightpaintError, OSError):
         if not _is_whole(path):
             predicted = read_estimate(folder / "predicted.exr")[0]
-            small = block_mean(predicted.image, max(1, -(-predicted.image.shape[1] // widest)))
+            thumbnail = block_mean(predicted.image, max(1, -(-predicted.image.shape[1] // widest)))
             if predicted.half_difference.any():
-                small = denoised(small)
+                thumbnail = denoised(thumbnail)
             stops = choose_exposure(predicted.image)
             transform = ViewTransform(*view) if view else ViewTransform("srgb", stops)
             with replacing(path) as temporary:
-                picture = Image.fromarray(to_8_bit(np.clip(transform.encode(small), 0, 1)))
+                picture = Image.fromarray(to_8_bit(np.clip(transform.encode(thumbnail), 0, 1)))
                 options = {"quality": QUALITY, "subsampling": 0}
                 picture.save(
                     temporary, "JPEG", **options, comment=f"{transform.name} {transform.stops!r}"
                 )
-        with Image.open(path) as opened:
-            size, comment = opened.size, opened.info.get("comment", b"").decode()
+        with Image.open(path) as image:
+            size, comment = image.size, image.info.get("comment", b"").decode()
         # A mixer needs the view transform as well, whether or not it was chosen here.
         transform_name, _, stops = comment.partition(" ")
         view = (transform_name, float(stops)) if stops else view
@@ -232,10 +234,10 @@ def _with_picture(
 def _is_whole(path: Path) -> bool:
     """Return whether there is a small picture that can be shown."""
     try:
-        with Image.open(path) as opened:
-            opened.load()
-            name, _, stops = opened.info.get("comment", b"").decode().partition(" ")
-            return opened.format == "JPEG" and bool(name) and math.isfinite(float(stops))
+        with Image.open(path) as image:
+            image.load()
+            name, _, stops = image.info.get("comment", b"").decode().partition(" ")
+            return image.format == "JPEG" and bool(name) and math.isfinite(float(stops))
     except (OSError, SyntaxError, ValueError):
         return False
 
@@ -274,8 +276,8 @@ def summary_csv(rows: list[SummaryRow]) -> str:
     for row in rows:
         lights = {light.name: _light_cells(light) for light in row.lights}
         cells = [_cell(getattr(row, column)) for column in COLUMNS]
-        none = [""] * len(LIGHT_COLUMNS)
-        table.writerow([*cells, *(x for name in names for x in lights.get(name, none))])
+        empty_cells = [""] * len(LIGHT_COLUMNS)
+        table.writerow([*cells, *(x for name in names for x in lights.get(name, empty_cells))])
     return text.getvalue()
 
 

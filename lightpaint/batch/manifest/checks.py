@@ -33,7 +33,7 @@ CONSTRAINT_KEYS = ("light", "tie", "prefer_current", "sparse")
 
 def check_combination(mistakes: Mistakes, table: Table) -> None:
     """Add keys that are missing or contradict each other to the mistakes."""
-    label, look = table.where, table.values
+    label, look = table.label, table.values
     subjects = subject_keys(look)
     if not table.has(*SUBJECT_KEYS):
         mistakes.add(
@@ -48,50 +48,54 @@ def check_combination(mistakes: Mistakes, table: Table) -> None:
         mistakes.add(label, "light_groups stand for scene and basis: give them alone")
     if "pattern" in look and not table.has("light_groups"):
         mistakes.add(label, "pattern is of light_groups: leave it out, or give them")
-    several = "views" in look or "sensors" in look
+    has_several_views = "views" in look or "sensors" in look
     if "sensor" in look and "sensors" in look:
         mistakes.add(label, "sensor and sensors at once: give one of them")
     elif "views" in look and ("sensor" in look or "sensors" in look):
         mistakes.add(label, "views name their sensors: leave sensor and sensors out")
-    elif several and basis_keys:
+    elif has_several_views and basis_keys:
         mistakes.add(label, "a basis has only one view: give the scene to solve for several")
     elif basis_keys and not table.has("scene"):
         _check_basis_keys(mistakes, label, look)
-    want, is_given = look.get("want", ()), "lighting" in look or "lightings" in look
-    if is_given and (idle := [x for x in ("solve", "verify", "report", "lights") if x in want]):
-        mistakes.add(label, f"want has {idle[0]!r}, and its lighting is given: leave it out")
-    elif "lights" in want:
+    steps, is_given = look.get("want", ()), "lighting" in look or "lightings" in look
+    if is_given and (
+        unusable := [x for x in ("solve", "verify", "report", "lights") if x in steps]
+    ):
+        mistakes.add(label, f"want has {unusable[0]!r}, and its lighting is given: leave it out")
+    elif "lights" in steps:
         check_by_sums(mistakes, table)
     if "share" in look:
         _check_share(mistakes, table, is_given=is_given)
-    if is_given and (idle := [word for word in look.get("variations", ()) if word in SOLVED_WORDS]):
-        mistakes.add(label, f"variations has {idle[0]!r}, and its lighting is given")
+    if is_given and (
+        unusable := [word for word in look.get("variations", ()) if word in SOLVED_WORDS]
+    ):
+        mistakes.add(label, f"variations has {unusable[0]!r}, and its lighting is given")
 
 
 def _check_share(mistakes: Mistakes, table: Table, *, is_given: bool) -> None:
     """Add keys that contradict `share = "places"` to the mistakes."""
     look = table.values
     if is_given:
-        mistakes.add(table.where, "share is of places that are searched for: its lighting is given")
+        mistakes.add(table.label, "share is of places that are searched for: its lighting is given")
     elif any(key in look for key in BASES):
-        mistakes.add(table.where, "share needs lights of a scene: leave the basis out")
+        mistakes.add(table.label, "share needs lights of a scene: leave the basis out")
     elif "lights" in look.get("want", ()):
-        mistakes.add(table.where, "want has 'lights', and places need images: want 'solve' instead")
+        mistakes.add(table.label, "want has 'lights', and places need images: want 'solve' instead")
     elif look.get("settings", {}).get("move_lights") is False:
         mistakes.add(
-            table.where, "share is of lights that move, and move_lights is false: leave one out"
+            table.label, "share is of lights that move, and move_lights is false: leave one out"
         )
 
 
 def check_by_sums(mistakes: Mistakes, table: Table) -> None:
     """Add keys that contradict a request for the lighting alone to the mistakes."""
-    label, look = table.where, table.values
+    label, look = table.label, table.values
     if len(look["want"]) > 1:
         mistakes.add(label, "want has 'lights', which is the lighting alone: leave the rest out")
     if "views" in look or "variations" in look:
         mistakes.add(label, "want has 'lights', which is of one view, without variations")
     settings = look.get("settings", {})
-    if settings.get("literal") is not True and "settings" not in table.unclear:
+    if settings.get("literal") is not True and "settings" not in table.unclear_keys:
         mistakes.add(label, "want has 'lights': settings need literal = true, or images are needed")
     for key in ("time_s", "error", "noise_correction", "refine", "suggest"):
         if settings.get(key):
@@ -103,8 +107,12 @@ def _check_basis_keys(mistakes: Mistakes, label: str, look: Mapping[str, Any]) -
     for step in ("verify", "render"):
         if step in look.get("want", ()):
             mistakes.add(label, f"want has {step!r}, which needs the scene: give scene = ...")
-    if idle := [key for key in SOURCE_KEYS if key in look and key not in (*BASES, "pattern")]:
-        mistakes.add(label, f"{some_names(idle)} cannot change a saved basis: leave it out")
+    if unusable_keys := [
+        key for key in SOURCE_KEYS if key in look and key not in (*BASES, "pattern")
+    ]:
+        mistakes.add(
+            label, f"{some_names(unusable_keys)} cannot change a saved basis: leave it out"
+        )
 
 
 def check_step_tables(mistakes: Mistakes, table: Table) -> None:
@@ -112,11 +120,11 @@ def check_step_tables(mistakes: Mistakes, table: Table) -> None:
     for step in ("render", "export"):
         if (
             step in table.values
-            and "want" not in table.unclear
+            and "want" not in table.unclear_keys
             and step not in table.values.get("want", ())
         ):
             mistakes.add(
-                table.where, f"[{step}] says how, and want does not have {step!r}: add it there"
+                table.label, f"[{step}] says how, and want does not have {step!r}: add it there"
             )
 
 
@@ -125,8 +133,8 @@ def check_handover(mistakes: Mistakes, label: str, handover: Handover, entry: An
     has_groups = isinstance(entry.basis, GroupsFile)
     for form in handover.to:
         if FORMS[form][has_groups] is None:
-            needed = "light groups" if form == "nuke" else "a scene, and no light groups"
-            mistakes.add(f"{label}, export", f"{form!r} is of {needed}: leave it out")
+            requirement = "light groups" if form == "nuke" else "a scene, and no light groups"
+            mistakes.add(f"{label}, export", f"{form!r} is of {requirement}: leave it out")
         elif not has_groups and not entry.scenes and form not in ("csv", "json"):
             mistakes.add(f"{label}, export", f"{form!r} needs the scene: give scene = ...")
     if handover.stage and "usd" in handover.to and not Path(handover.stage).is_file():
@@ -140,12 +148,14 @@ def check_handover(mistakes: Mistakes, label: str, handover: Handover, entry: An
 
 def check_sequence(mistakes: Mistakes, table: Table) -> None:
     """Add a sequence's errors to the mistakes: it needs looks and frames, or a path of sensors."""
-    label, values = table.where, table.values
+    label, values = table.label, table.values
     path, frames = values.get("sensors"), values.get("frames")
-    lacking = [key for key in ("name", "through") if not table.has(key)]
-    lacking += ["frames"] if not table.has("frames", "sensors") else []
-    if lacking:
-        mistakes.add(label, f"{lacking[0]} is missing: give name, through and frames (or sensors)")
+    missing_keys = [key for key in ("name", "through") if not table.has(key)]
+    missing_keys += ["frames"] if not table.has("frames", "sensors") else []
+    if missing_keys:
+        mistakes.add(
+            label, f"{missing_keys[0]} is missing: give name, through and frames (or sensors)"
+        )
     if "name" in values and not is_name(values["name"]):
         mistakes.add(label, f"{values['name']!r} is no name for a folder: say name = ...")
     if len(values.get("through", "..")) < 2 and not table.has("sensors"):
@@ -158,8 +168,8 @@ def check_sequence(mistakes: Mistakes, table: Table) -> None:
 
 def settings_of(mistakes: Mistakes, label: str, look: Mapping[str, Any]) -> Settings:
     values = mistakes.settings(look.get("settings", {}), label)
-    want = look.get("want", SOLVE_STEPS)
-    return Settings(**values, verify="verify" in want, report="report" in want)
+    steps = look.get("want", SOLVE_STEPS)
+    return Settings(**values, verify="verify" in steps, report="report" in steps)
 
 
 def constraints_of(manifest: Manifest, label: str, look: Mapping[str, Any]) -> Constraints:
@@ -182,8 +192,12 @@ def _constraints(mistakes: Mistakes, label: str, table: Mapping[str, Any]) -> Co
     """Return the constraints of a table; errors are added light by light and key by key."""
     values = {key: value for key, value in table.items() if key in CONSTRAINT_KEYS}
     for key in (key for key in table if key not in values):
-        near = near_key(key, CONSTRAINT_KEYS)
-        hint = f": did you mean {near!r}?" if near else f"; known are {', '.join(CONSTRAINT_KEYS)}"
+        suggestion = near_key(key, CONSTRAINT_KEYS)
+        hint = (
+            f": did you mean {suggestion!r}?"
+            if suggestion
+            else f"; known are {', '.join(CONSTRAINT_KEYS)}"
+        )
         mistakes.add(label, f"unknown key {key!r}{hint}")
     lights = values.pop("light", None)
     if isinstance(lights, dict):
@@ -203,8 +217,10 @@ def _is_light(mistakes: Mistakes, label: str, name: str, values: Any) -> bool:
     # A Duv alone is incomplete.
     fields = values if isinstance(values, dict) else {}
     single_keys = [{name: {key: value}} for key, value in fields.items() if key != "duv"]
-    wrong = [single for single in single_keys if not _is_valid(mistakes, label, light=single)]
-    return not wrong and _is_valid(mistakes, label, light={name: values})
+    invalid_keys = [
+        single_key for single_key in single_keys if not _is_valid(mistakes, label, light=single_key)
+    ]
+    return not invalid_keys and _is_valid(mistakes, label, light={name: values})
 
 
 def _is_valid(mistakes: Mistakes, label: str, **arguments: Any) -> bool:
@@ -218,7 +234,7 @@ def _is_valid(mistakes: Mistakes, label: str, **arguments: Any) -> bool:
 
 def check_files(manifest: Manifest, table: Table) -> None:
     """Add files that do not exist to the mistakes, so that a misspelt name fails at once."""
-    label, look = table.where, table.values
+    label, look = table.label, table.values
     groups = look.get("light_groups")
     if groups is not None and not (manifest.folder / groups).exists():
         manifest.mistakes.add(label, f"light_groups: no such file or folder: {groups}")
@@ -230,14 +246,14 @@ def check_files(manifest: Manifest, table: Table) -> None:
     for key in ("painting", "lighting"):
         patterns = [look[key]] if key in look else look.get(f"{key}s", [])
         for path in patterns:
-            if not matching(manifest.folder, path):
+            if not files_named(manifest.folder, path):
                 manifest.mistakes.add(label, f"{key}: no such file: {path}")
     for sensor, path in look.get("views", {}).items():
         if not (manifest.folder / path).is_file():
             manifest.mistakes.add(label, f"views.{sensor}: no such file: {path}")
 
 
-def matching(base: Path, path: str) -> list[str]:
+def files_named(base: Path, path: str) -> list[str]:
     """Return the files that a path or a pattern names, in the order of their names."""
     full_path = str(base / path)
     if not has_magic(path) or Path(full_path).is_file():

@@ -16,7 +16,7 @@ from lightpaint.batch.manifest.checks import (
     check_handover,
     check_step_tables,
     constraints_of,
-    matching,
+    files_named,
     settings_of,
 )
 from lightpaint.batch.manifest.keys import (
@@ -44,15 +44,16 @@ MAX_LOOKS = 10_000
 class LookEntry:
     """A look with all its inputs and options.
 
-    name: of its folder. where: its name in errors. scenes, basis: to light. paintings: one for each
-    view; none if a lighting is given. variation: its word, if it varies another look, `varied`.
-    shares_places: whether its lights hang where those of other looks do. places: file of where, if
-    they may move; known once its scene is read. lighting: a file with the lighting. of: names of
-    looks whose lightings it combines; share, space: between two of them. want: steps.
+    name: of its folder. label: its name in errors. scenes, basis: to light. paintings: one for
+    each view; none if a lighting is given. variation: its word, if it varies another look, which
+    is `varied_look`. shares_places: whether its lights hang where those of other looks do. places:
+    file with the places of lights that may move; set once its scene is read. lighting: a file with
+    the lighting. combined_looks: names of the looks whose lightings it combines; share, space:
+    between two of them. want: steps.
     """
 
     name: str
-    where: str
+    label: str
     scenes: tuple[SceneFile, ...] = ()
     basis: BasisFile | GroupsFile | None = None
     paintings: tuple[Painting, ...] = ()
@@ -63,11 +64,11 @@ class LookEntry:
     final: Final = field(default_factory=Final)
     handover: Handover = field(default_factory=Handover)
     variation: str = ""
-    varied: str = ""
+    varied_look: str = ""
     shares_places: bool = False
     places: str = ""
     lighting: str = ""
-    of: tuple[str, ...] = ()
+    combined_looks: tuple[str, ...] = ()
     share: float = 0.0
     space: Space = "log"
 
@@ -134,7 +135,7 @@ class _Sources:
             # The folder of light groups may hold paintings and masks as well.
             pictures = [look[key] for key in ("painting", "mask") if key in look]
             pictures += look.get("paintings", [])
-            painted_files = [x for path in pictures for x in matching(self._base, path)]
+            painted_files = [x for path in pictures for x in files_named(self._base, path)]
             path = str(self._base / look["light_groups"])
             leave_out = tuple(painted_files) if Path(path).is_dir() else ()
             file = GroupsFile(path, look.get("pattern"), leave_out)
@@ -149,7 +150,7 @@ def _table_looks(
     manifest: Manifest, sources: _Sources, table: Table
 ) -> tuple[list[LookEntry], LookEntry | None]:
     """Return the looks of one table or, if it has mistakes, the part of it that is clear."""
-    mistakes, label, look = manifest.mistakes, table.where, table.values
+    mistakes, label, look = manifest.mistakes, table.label, table.values
     mistakes_before = len(mistakes.lines)
     check_combination(mistakes, table)
     check_files(manifest, table)
@@ -165,25 +166,25 @@ def _table_looks(
         handover=mistakes.handover(look.get("export", {}), label, manifest.folder),
         shares_places="share" in look,
     )
-    expanded: list[LookEntry] = []
+    looks: list[LookEntry] = []
     try:
         _painting(manifest, look, "")  # checks the view transform, whatever else is wrong
-        if len(mistakes.lines) == mistakes_before and not table.unclear:
+        if len(mistakes.lines) == mistakes_before and not table.unclear_keys:
             entry = replace(entry, basis=sources.basis(look))
-            expanded = list(islice(_subject_looks(manifest, sources, entry, look), MAX_LOOKS + 1))
-            expanded += [
-                _variation_entry(x, word) for word in look.get("variations", ()) for x in expanded
+            looks = list(islice(_subject_looks(manifest, sources, entry, look), MAX_LOOKS + 1))
+            looks += [
+                _variation_entry(x, word) for word in look.get("variations", ()) for x in looks
             ]
     except LightpaintError as error:
         mistakes.add(label, str(error))
-    example = expanded[0] if expanded else _partial_entry(manifest, sources, table, entry)
+    example = looks[0] if looks else _partial_entry(manifest, sources, table, entry)
     if "export" in entry.want and (example.scenes or example.basis):
         check_handover(mistakes, label, entry.handover, example)
-    for name in {x.name for x in expanded} or {entry.name} - {""}:
+    for name in {x.name for x in looks} or {entry.name} - {""}:
         if not is_name(name):
             mistakes.add(label, f"{name!r} is no name for a folder: say name = ...")
-    if len(mistakes.lines) == mistakes_before and not table.unclear:
-        return expanded, None
+    if len(mistakes.lines) == mistakes_before and not table.unclear_keys:
+        return looks, None
     return [], example
 
 
@@ -193,7 +194,7 @@ def _partial_entry(
     """Return the scenes and the basis of a table with mistakes, as far as they are known."""
     look, base = table.values, manifest.folder
     # Any sensor, or none, will do to check the lights of a scene.
-    if table.unclear & (set(SOURCE_KEYS) - {"sensor", "sensors"}):
+    if table.unclear_keys & (set(SOURCE_KEYS) - {"sensor", "sensors"}):
         return entry
     if "scene" in look and (base / look["scene"]).is_file():
         sensors = [*look.get("views", ()), *look.get("sensors", ())]
@@ -225,7 +226,7 @@ def _subject_looks(
     patterns = [look[key]] if key in look else look[f"{key}s"]
     is_one = key in look and not has_magic(look[key])
     sensors: Sequence[Any] = look.get("sensors") or [look.get("sensor")]
-    for file in (file for path in patterns for file in matching(manifest.folder, path)):
+    for file in (file for path in patterns for file in files_named(manifest.folder, path)):
         # Answers are all called lighting.json: their folders tell them apart.
         stem = Path(file).parent.name if Path(file).name == "lighting.json" else Path(file).stem
         name = look.get("name", "")
@@ -254,13 +255,17 @@ def _painting(manifest: Manifest, look: Mapping[str, Any], file: str) -> Paintin
 def _variation_entry(entry: LookEntry, word: str) -> LookEntry:
     """Return a variation of a look: solved with other settings, or derived from its answer."""
     name = f"{entry.name}-{word.replace(' ', '-')}"
-    variation = replace(entry, name=name, variation=word, varied=entry.name)
+    variation = replace(entry, name=name, variation=word, varied_look=entry.name)
     if word not in SHIFTED_WORDS:
         if not entry.is_solved:
             raise LightpaintError(f"variations has {word!r}, and its lighting is given")
         return variation
     return replace(
-        variation, paintings=(), lighting="", of=(entry.name,), want=_lighting_steps(entry.want)
+        variation,
+        paintings=(),
+        lighting="",
+        combined_looks=(entry.name,),
+        want=_lighting_steps(entry.want),
     )
 
 

@@ -25,13 +25,15 @@ def files_matching(pattern: str, base: Path = Path()) -> list[str]:
     Raises BatchError if there are too many files to visit.
     """
     parts = Path(pattern).parts
-    fixed = next(k for k, part in enumerate(parts) if has_magic(part))
+    fixed_count = next(k for k, part in enumerate(parts) if has_magic(part))
     # Several `**` in a row mean the same as one.
-    whole = parts[fixed:]
+    pattern_tail = parts[fixed_count:]
     pattern_parts = [
-        x for k, x in enumerate(whole) if x != "**" or whole[max(k - 1, 0) : k] != ("**",)
+        x
+        for k, x in enumerate(pattern_tail)
+        if x != "**" or pattern_tail[max(k - 1, 0) : k] != ("**",)
     ]
-    start = os.path.join("" if base == Path() else base, *parts[:fixed])
+    start = os.path.join("" if base == Path() else base, *parts[:fixed_count])
     paths = dict.fromkeys(_Search(pattern).walk(start, tuple(pattern_parts), 0))
     return [path for path in paths if os.path.isfile(path)]
 

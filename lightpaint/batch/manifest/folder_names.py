@@ -22,7 +22,7 @@ JOURNAL, JOURNAL_PART = "journal.jsonl", "journal-"
 THUMBNAILS, PLACES = "thumbnails", "places"
 
 
-def folded(name: str) -> str:
+def fold_name(name: str) -> str:
     """Return the form that two names share if macOS or Windows takes them for the same file."""
     return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
 
@@ -32,7 +32,7 @@ def is_reserved(name: str) -> bool:
 
     Hidden names are reserved, too: for files that are being written, and for the cache of a farm.
     """
-    name = folded(name)
+    name = fold_name(name)
     if name.startswith(JOURNAL_PART) and name.endswith(".jsonl"):
         return True
     return name.startswith(".") or name in (*FILES, JOURNAL, THUMBNAILS, PLACES)
@@ -43,18 +43,18 @@ def name_clashes(names: Iterable[str]) -> list[list[str]]:
 
     A name that occurs twice clashes with itself, and is a group of one.
     """
-    alike: dict[str, list[str]] = {}
+    names_by_form: dict[str, list[str]] = {}
     for name in names:
-        alike.setdefault(folded(name), []).append(name)
-    return [list(dict.fromkeys(same)) for same in alike.values() if len(same) > 1]
+        names_by_form.setdefault(fold_name(name), []).append(name)
+    return [list(dict.fromkeys(same)) for same in names_by_form.values() if len(same) > 1]
 
 
 def check_gallery(folder: Path, *, force: bool = False) -> None:
     """Raise OutputError if a gallery would replace files that no batch has written."""
-    existing = [folder / name for name in FILES if (folder / name).exists()]
-    if existing and not force and not _is_summary(folder / SUMMARY):
+    existing_files = [folder / name for name in FILES if (folder / name).exists()]
+    if existing_files and not force and not _is_summary(folder / SUMMARY):
         raise OutputError(
-            f"{existing[0]} is there, and of no batch: name another folder (folder=...), or "
+            f"{existing_files[0]} is there, and of no batch: name another folder (folder=...), or "
             "replace it (force=True)"
         )
 

@@ -37,8 +37,10 @@ def _texts(value: Any) -> bool:
     return all(isinstance(x, str) and x for x in value)
 
 
-def _table_of(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
-    return lambda value: isinstance(value, dict) and bool(value) and all(map(fits, value.values()))
+def _table_of(is_valid: Callable[[Any], bool]) -> Callable[[Any], bool]:
+    return lambda value: (
+        isinstance(value, dict) and bool(value) and all(map(is_valid, value.values()))
+    )
 
 
 def _is_plain(value: Any) -> bool:
@@ -50,12 +52,12 @@ def _is_number(value: Any) -> bool:
 
 
 def _some_of(words: Iterable[str]) -> Check:
-    allowed = tuple(words)
+    allowed_words = tuple(words)
 
-    def fits(value: Any) -> bool:
-        return _texts(value) and set(value) <= set(allowed) and len(set(value)) == len(value)
+    def is_valid(value: Any) -> bool:
+        return _texts(value) and set(value) <= set(allowed_words) and len(set(value)) == len(value)
 
-    return fits, f"a list of some of {', '.join(map(repr, allowed))}, each once"
+    return is_valid, f"a list of some of {', '.join(map(repr, allowed_words))}, each once"
 
 
 TEXT: Check = (lambda value: isinstance(value, str) and value != "", "a text")
@@ -183,23 +185,27 @@ class Mistakes:
         valid = set()
         for key, value in table.items():
             if key not in keys:
-                near = near_key(key, keys)
-                hint = f": did you mean {near!r}?" if near else f"; known are {', '.join(keys)}"
+                suggestion = near_key(key, keys)
+                hint = (
+                    f": did you mean {suggestion!r}?"
+                    if suggestion
+                    else f"; known are {', '.join(keys)}"
+                )
                 self.add(label, f"unknown key {key!r}{hint}")
                 continue
-            fits, words = keys[key]
-            if fits(value):
+            is_valid, expected = keys[key]
+            if is_valid(value):
                 valid.add(key)
             else:
-                self.add(label, f"{key} is {one_line(repr(value), limit=120)}: expected {words}")
+                self.add(label, f"{key} is {one_line(repr(value), limit=120)}: expected {expected}")
         return valid
 
     def unclear_keys(
         self, table: Mapping[str, Any], keys: Mapping[str, Check], valid: Collection[str]
     ) -> frozenset[str]:
-        """Return the known keys that misspelt or wrong ones stand for. valid: of `check_keys`."""
-        wrong = [key for key in table if key not in valid]
-        return frozenset(key if key in keys else near_key(key, keys) for key in wrong) - {""}
+        """Return the known keys that misspelt or invalid ones stand for. valid: of `check_keys`."""
+        invalid_keys = [key for key in table if key not in valid]
+        return frozenset(key if key in keys else near_key(key, keys) for key in invalid_keys) - {""}
 
     def settings(self, table: Mapping[str, Any], label: str) -> dict[str, Any]:
         """Return the valid settings of a table, by name."""

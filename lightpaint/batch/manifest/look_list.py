@@ -39,15 +39,17 @@ def _check_names(manifest: Manifest, looks: Sequence[LookEntry]) -> None:
     for look in looks:
         if is_reserved(look.name):
             manifest.mistakes.add(
-                look.where,
+                look.label,
                 f"a look cannot be called {look.name!r}, where the batch has files of its own: "
                 "say name = ...",
             )
-    for same in name_clashes(look.name for look in looks):
-        labels = some_names(dict.fromkeys(x.where for x in looks if x.name in same), " and ")
-        names = " and ".join(map(repr, same))
+    for names_of_folder in name_clashes(look.name for look in looks):
+        labels = some_names(
+            dict.fromkeys(x.label for x in looks if x.name in names_of_folder), " and "
+        )
+        names = " and ".join(map(repr, names_of_folder))
         text = f"more than one look would be called {names}: say name = ... in one of them"
-        if len(same) > 1:
+        if len(names_of_folder) > 1:
             text = (
                 f"{names} would be one folder on disks that do not tell case: say name = ... "
                 "in one of them"
@@ -57,9 +59,9 @@ def _check_names(manifest: Manifest, looks: Sequence[LookEntry]) -> None:
 
 def _sequence_looks(manifest: Manifest, looks: LookEntries, table: Table) -> list[LookEntry]:
     """Return a look for each frame; none if the sequence has mistakes."""
-    mistakes, label, values = manifest.mistakes, table.where, table.values
+    mistakes, label, values = manifest.mistakes, table.label, table.values
     by_name = {look.name: look for look in looks.complete}
-    before = len(mistakes.lines)
+    mistakes_before = len(mistakes.lines)
     check_sequence(mistakes, table)
     check_step_tables(mistakes, table)
     final = mistakes.final(values.get("render", {}), label)
@@ -70,14 +72,18 @@ def _sequence_looks(manifest: Manifest, looks: LookEntries, table: Table) -> lis
             mistakes.add(label, f"through: no look is called {name!r}")
     if ends:
         _check_ends(mistakes, label, ends, values)
-    if len(mistakes.lines) > before or table.unclear or len(ends) < len(values["through"]):
+    if (
+        len(mistakes.lines) > mistakes_before
+        or table.unclear_keys
+        or len(ends) < len(values["through"])
+    ):
         return []
-    want = tuple(values.get("want", GIVEN_LIGHTING_STEPS))
-    options: dict[str, Any] = {"want": want, "final": final, "handover": handover}
-    looks_of_frames = [replace(frame, where=label, **options) for frame in _frames(values, ends)]
-    if "render" in want and not ends[0].scenes:
+    steps = tuple(values.get("want", GIVEN_LIGHTING_STEPS))
+    options: dict[str, Any] = {"want": steps, "final": final, "handover": handover}
+    looks_of_frames = [replace(frame, label=label, **options) for frame in _frames(values, ends)]
+    if "render" in steps and not ends[0].scenes:
         mistakes.add(label, "want has 'render', which needs the scene of its looks")
-    if "export" in want:
+    if "export" in steps:
         check_handover(mistakes, label, handover, looks_of_frames[0])
     return looks_of_frames
 
@@ -104,11 +110,11 @@ def _may_become(name: str, entry: LookEntry) -> bool:
 
 def _frames(values: Mapping[str, Any], ends: Sequence[LookEntry]) -> Iterator[LookEntry]:
     """Yield each frame: a mix of two of `ends`, through their sensor or its own on a path."""
-    path, through = values.get("sensors"), values["through"]
+    path, look_names = values.get("sensors"), values["through"]
     frames = len(path) if path else values["frames"]
     digits = len(str(frames - 1))
     for k in range(frames):
-        first, share = frame_position(k, frames, len(through))
+        first, share = frame_position(k, frames, len(look_names))
         scenes = ends[first].scenes
         yield replace(
             ends[first],
@@ -118,7 +124,7 @@ def _frames(values: Mapping[str, Any], ends: Sequence[LookEntry]) -> Iterator[Lo
             paintings=(),
             lighting="",
             variation="",
-            of=tuple(through[first : first + 2]),
+            combined_looks=tuple(look_names[first : first + 2]),
             share=share,
             space=values.get("space", "log"),
         )

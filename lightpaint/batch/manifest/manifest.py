@@ -37,19 +37,19 @@ SOURCE_GROUPS = ("scene", "basis", "light_groups", "pattern"), ("sensor", "senso
 
 @dataclass(frozen=True)
 class Table:
-    """A table of a manifest. where: its name in errors. values: by key, all valid.
+    """A table of a manifest. label: its name in errors. values: by key, all valid.
 
-    unclear: keys that were also given, but wrongly or misspelt. Their values are unknown, but to
-    report them as missing would be wrong.
+    unclear_keys: keys that are also there, but misspelt or with invalid values. Checks count them
+    as present, so that they are not reported as missing as well.
     """
 
-    where: str
+    label: str
     values: Mapping[str, Any]
-    unclear: frozenset[str] = frozenset()
+    unclear_keys: frozenset[str] = frozenset()
 
     def has(self, *keys: str) -> bool:
         """Return whether any of these keys is given, with a valid value or not."""
-        return any(key in self.values or key in self.unclear for key in keys)
+        return any(key in self.values or key in self.unclear_keys for key in keys)
 
 
 @dataclass(frozen=True)
@@ -84,9 +84,9 @@ def read_manifest(path: str | Path) -> Manifest:
     except ValueError as error:
         raise BatchError(f"{path} is not TOML: {one_line(str(error))}") from None
     mistakes = Mistakes(str(path))
-    right = mistakes.check_keys(data, TABLES, "")
-    unclear = mistakes.unclear_keys(data, TABLES, right)
-    if "defaults" in unclear:  # it may have had any key
+    valid_keys = mistakes.check_keys(data, TABLES, "")
+    unclear_keys = mistakes.unclear_keys(data, TABLES, valid_keys)
+    if "defaults" in unclear_keys:  # it may have had any key
         defaults = Table("defaults", {}, frozenset(DEFAULT_KEYS))
     else:
         defaults = _table(data.get("defaults", {}), DEFAULT_KEYS, "defaults", mistakes)
@@ -95,10 +95,10 @@ def read_manifest(path: str | Path) -> Manifest:
         ):  # reported once, not for each look that they are merged into
             valid = mistakes.settings(defaults.values["settings"], "defaults")
             defaults = replace(defaults, values={**defaults.values, "settings": valid})
-    looks = _tables(data["look"] if "look" in right else [], LOOK_KEYS, "look", mistakes)
-    sequence_tables = data["sequence"] if "sequence" in right else []
+    looks = _tables(data["look"] if "look" in valid_keys else [], LOOK_KEYS, "look", mistakes)
+    sequence_tables = data["sequence"] if "sequence" in valid_keys else []
     sequences = _tables(sequence_tables, SEQUENCE_KEYS, "sequence", mistakes)
-    if not data.get("look") and "look" not in unclear:
+    if not data.get("look") and "look" not in unclear_keys:
         mistakes.add("", "it has no look: begin one with [[look]]")
     return Manifest(path, tuple(_merge(defaults, x) for x in looks), tuple(sequences), mistakes)
 
@@ -107,9 +107,9 @@ def _table(
     raw: Mapping[str, Any], keys: Mapping[str, Check], label: str, mistakes: Mistakes
 ) -> Table:
     """Return a table's valid values, and add errors to the mistakes."""
-    right = mistakes.check_keys(raw, keys, label)
-    values = {key: value for key, value in raw.items() if key in right}
-    return Table(label, values, mistakes.unclear_keys(raw, keys, right))
+    valid_keys = mistakes.check_keys(raw, keys, label)
+    values = {key: value for key, value in raw.items() if key in valid_keys}
+    return Table(label, values, mistakes.unclear_keys(raw, keys, valid_keys))
 
 
 def _tables(
@@ -136,11 +136,11 @@ def _display_name(table: Mapping[str, Any]) -> str:
 
 def _merge(defaults: Table, table: Table) -> Table:
     """Return a look merged over the defaults, tables of values key by key."""
-    values, look, unclear = dict(defaults.values), table.values, defaults.unclear
+    values, look, unclear_keys = dict(defaults.values), table.values, defaults.unclear_keys
     for keys in SOURCE_GROUPS:
         if table.has(*keys):
             values = {key: value for key, value in values.items() if key not in keys}
-            unclear = unclear - set(keys)
+            unclear_keys = unclear_keys - set(keys)
     for key, value in look.items():
         if key in MERGED_TABLES and isinstance(values.get(key), dict):
             value = {**values[key], **value}
@@ -149,9 +149,9 @@ def _merge(defaults: Table, table: Table) -> Table:
         values[key] = value
     _drop_unused(values, look)
     still_unclear = {
-        key for key in unclear if key not in look or key in (*MERGED_TABLES, "constraints")
+        key for key in unclear_keys if key not in look or key in (*MERGED_TABLES, "constraints")
     }
-    return Table(table.where, {**values, **_as_list(values)}, table.unclear | still_unclear)
+    return Table(table.label, {**values, **_as_list(values)}, table.unclear_keys | still_unclear)
 
 
 def _drop_unused(values: dict[str, Any], look: Mapping[str, Any]) -> None:

@@ -50,14 +50,14 @@ def interpolate(ends: Sequence[Lighting], share: float, *, space: Space) -> Ligh
     Raises LightingError if the two have different lights, or have them at different places.
     """
     first, second = ends
-    apart = [
+    moved_names = [
         place.name
         for place, end_place in zip(first.places, second.places, strict=False)
         if not place.site.is_near(end_place.site)
     ]
-    if apart:
+    if moved_names:
         raise LightingError(
-            f"the lightings of a sequence have {some_names(apart)} at different places, and "
+            f"the lightings of a sequence have {some_names(moved_names)} at different places, and "
             "no lamp travels between two looks: let these share places"
         )
     if first.members != second.members or first.fixed != second.fixed:
@@ -84,12 +84,12 @@ def _mix_in_stops(first: Doubles, second: Doubles, share: float) -> Doubles:
     """
     if share in (0.0, 1.0):
         return second if share else first
-    bright = [float(luminance(rgb)) for rgb in (first, second)]
-    least = max(bright) * 2.0**-OFF_STOPS
-    if least == 0:
+    brightness = [float(luminance(rgb)) for rgb in (first, second)]
+    minimum = max(brightness) * 2.0**-OFF_STOPS
+    if minimum == 0:
         return np.zeros(3)
-    hues = [rgb / y for rgb, y in zip((first, second), bright, strict=True) if y > least]
-    y = max(bright[0], least) ** (1 - share) * max(bright[1], least) ** share
+    hues = [rgb / y for rgb, y in zip((first, second), brightness, strict=True) if y > minimum]
+    y = max(brightness[0], minimum) ** (1 - share) * max(brightness[1], minimum) ** share
     if len(hues) == 1 or np.ptp(first) == np.ptp(second) == 0:
         return np.asarray(y * hues[0])
     return np.asarray(y * _mix_hues(hues[0], hues[1], share))

@@ -40,9 +40,9 @@ def parse_variations(names: Iterable[str]) -> tuple[str, ...]:
     Raises BatchError for an unknown word.
     """
     words = dict.fromkeys(word.replace("-", " ") for word in names)
-    if unknown := [word for word in words if word not in VARIATIONS]:
+    if unknown_words := [word for word in words if word not in VARIATIONS]:
         known_names = ", ".join(word.replace(" ", "-") for word in VARIATIONS)
-        raise BatchError(f"there is no variation {unknown[0]!r}: known are {known_names}")
+        raise BatchError(f"there is no variation {unknown_words[0]!r}: known are {known_names}")
     return tuple(words)
 
 

@@ -15,7 +15,7 @@ from lightpaint.batch.work.render_cost import SAMPLE_S, render_seconds
 LOOK_S, PIXEL_S, PIXEL_LIGHT_S, REPORT_S = 0.07, 1.7e-6, 1.6e-7, 1.2e-5
 
 #: Assumed cost of a basis that is a file.
-SAVED = Cost("", 12, (360, 640), 0, 0)
+SAVED_BASIS_COST = Cost("", 12, (360, 640), 0, 0)
 
 
 @dataclass(frozen=True)
@@ -29,34 +29,34 @@ class CostEstimate:
 
 def estimate(plan: Plan) -> CostEstimate:
     """Estimate the rest of `plan`, if no basis is cached."""
-    remaining = [look for look in plan.chosen_looks if not look.failure and not look.is_done]
-    needed = dict.fromkeys(
+    remaining_looks = [look for look in plan.chosen_looks if not look.failure and not look.is_done]
+    keys = dict.fromkeys(
         key
-        for look in remaining
+        for look in remaining_looks
         for step in look.steps
         if not step.is_done
         for key in step.task.bases
         if key in plan.costs
     )
-    costs = [plan.costs[key] for key in needed]
+    costs = [plan.costs[key] for key in keys]
     return CostEstimate(
         sum(render_seconds(cost.samples, cost.lights) for cost in costs),
-        sum(look_seconds(look, plan) for look in remaining),
+        sum(look_seconds(look, plan) for look in remaining_looks),
         max((cost.memory for cost in costs), default=0),
     )
 
 
 def look_seconds(look: PlannedLook, plan: Plan) -> float:
     """Return the seconds for the remaining steps of a look, on two cores."""
-    costs = [plan.costs.get(key, SAVED) for key in look.steps[0].task.bases]
+    costs = [plan.costs.get(key, SAVED_BASIS_COST) for key in look.steps[0].task.bases]
     pixels = sum(cost.size[0] * cost.size[1] for cost in costs)
-    want, spent_s = look.entry.want, 0.0
+    steps, spent_s = look.entry.want, 0.0
     if not look.steps[0].is_done:
         lights = max((cost.lights for cost in costs), default=0)
         spent_s += LOOK_S
         spent_s += pixels * (PIXEL_S + PIXEL_LIGHT_S * lights) * look.entry.is_solved
-        spent_s += REPORT_S * pixels * ("report" in want)
-        spent_s += SAMPLE_S * sum(cost.samples for cost in costs) * ("verify" in want)
+        spent_s += REPORT_S * pixels * ("report" in steps)
+        spent_s += SAMPLE_S * sum(cost.samples for cost in costs) * ("verify" in steps)
     if any(step.task.kind == "render" and not step.is_done for step in look.steps):
         spent_s += SAMPLE_S * _final_samples(look, costs)
     return spent_s

@@ -14,7 +14,12 @@ from lightpaint.errors import OutputError
 from lightpaint.version import __version__
 
 #: Settings that no places depend on.
-UNPLACED: dict[str, Any] = {"verify": True, "verify_spp": None, "report": True, "suggest": 0}
+IRRELEVANT_TO_PLACES: dict[str, Any] = {
+    "verify": True,
+    "verify_spp": None,
+    "report": True,
+    "suggest": 0,
+}
 
 
 class Fingerprints:
@@ -27,21 +32,21 @@ class Fingerprints:
         self._sums: dict[Path, str] = {}
         self._answers: dict[str, str] = {}
 
-    def answer(self, entry: LookEntry, reads: Sequence[Path], places: str = "") -> str:
+    def answer(self, entry: LookEntry, source_files: Sequence[Path], places: str = "") -> str:
         """Return the fingerprint of an answer; call this for the looks that it combines first.
 
-        reads: files whose content counts. places: fingerprint of its lights' places.
+        source_files: files whose content counts. places: fingerprint of its lights' places.
         Raises OutputError if one cannot be read.
         """
-        made_of = [
+        inputs = [
             __version__,
             self._request(entry),
-            sorted(self._content(file) for file in reads),
-            [self._answers[name] for name in entry.of],
+            sorted(self._content(file) for file in source_files),
+            [self._answers[name] for name in entry.combined_looks],
             *(["lights"] if entry.is_by_sums else []),
             *([places] if places else []),
         ]
-        self._answers[entry.name] = _sha256(json.dumps(made_of, default=str))
+        self._answers[entry.name] = _sha256(json.dumps(inputs, default=str))
         return self._answers[entry.name]
 
     def places(self, looks: Sequence[tuple[LookEntry, Sequence[Path]]]) -> str:
@@ -49,16 +54,16 @@ class Fingerprints:
 
         Raises OutputError if one cannot be read.
         """
-        made_of = []
-        for entry, reads in looks:
-            plain = replace(entry, settings=replace(entry.settings, **UNPLACED))
-            made_of.append([self._request(plain), sorted(map(self._content, reads))])
-        return _sha256(json.dumps([__version__, made_of], default=str))
+        inputs = []
+        for entry, source_files in looks:
+            normalized = replace(entry, settings=replace(entry.settings, **IRRELEVANT_TO_PLACES))
+            inputs.append([self._request(normalized), sorted(map(self._content, source_files))])
+        return _sha256(json.dumps([__version__, inputs], default=str))
 
     def _request(self, entry: LookEntry) -> Any:
-        """Return the request of a look as plain values; its steps have separate fingerprints."""
-        plain = replace(entry, where="", want=(), final=Final(), handover=Handover(), places="")
-        return _relative(asdict(plain), self._base)
+        """Return the request of a look as normalized values; its steps have separate fingerprints."""
+        normalized = replace(entry, label="", want=(), final=Final(), handover=Handover(), places="")
+        return _relative(asdict(normalized), self._base)
 
     def render(self, entry: LookEntry) -> str:
         """Return the fingerprint of a final render."""
@@ -74,8 +79,8 @@ class Fingerprints:
         """Return the SHA-256 of a file; each is read once."""
         if file not in self._sums:
             try:
-                with file.open("rb") as opened:
-                    self._sums[file] = hashlib.file_digest(opened, "sha256").hexdigest()
+                with file.open("rb") as stream:
+                    self._sums[file] = hashlib.file_digest(stream, "sha256").hexdigest()
             except OSError as error:
                 raise OutputError(f"cannot read {file}: {error.strerror or error}") from error
         return self._sums[file]

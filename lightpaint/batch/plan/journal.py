@@ -43,19 +43,24 @@ class Journal:
     """
 
     def __init__(self, folder: Path, part: str = "") -> None:
-        self._path = self._whole = folder / JOURNAL
+        self._path = self._main_path = folder / JOURNAL
         if part:
             name = hashlib.sha256(part.encode()).hexdigest()[:16]
             self._path = folder / f"{JOURNAL_PART}{name}.jsonl"
-        read = {file: _read_journal(file) for file in [self._whole, *_parts(folder)]}
+        read = {file: _read_journal(file) for file in [self._main_path, *_parts(folder)]}
         lines = (line for file_content in read.values() for line in file_content.lines)
         self._lines = {(line.look, line.kind): line for line in lines}
         self.remarks = tuple(
-            file_content.remark(file) for file, file_content in read.items() if file_content.damaged
+            file_content.remark(file)
+            for file, file_content in read.items()
+            if file_content.damaged_count
         )
-        own = read.get(self._path, _JournalContent())
+        own_content = read.get(self._path, _JournalContent())
         # The next line overwrites half a line; a whole line without its newline gets one first.
-        self._half, self._lacks_end = own.half, own.lacks_end
+        self._half_line_offset, self._lacks_end = (
+            own_content.half_line_offset,
+            own_content.lacks_end,
+        )
 
     @property
     def lines(self) -> Mapping[tuple[str, Kind], JournalLine]:
@@ -67,13 +72,13 @@ class Journal:
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
             with self._path.open("ab") as file:
-                if self._half is not None:
-                    file.truncate(self._half)
-                self._half = os.fstat(file.fileno()).st_size
+                if self._half_line_offset is not None:
+                    file.truncate(self._half_line_offset)
+                self._half_line_offset = os.fstat(file.fileno()).st_size
                 file.write((b"\n" if self._lacks_end else b"") + _to_text(line).encode())
                 file.flush()
                 os.fsync(file.fileno())
-            self._half, self._lacks_end = None, False
+            self._half_line_offset, self._lacks_end = None, False
         except OSError as error:
             raise OutputError(f"cannot write {self._path}: {error.strerror or error}") from error
         self._lines[line.look, line.kind] = line
@@ -81,11 +86,11 @@ class Journal:
     def rewrite(self, steps: Iterable[tuple[str, Kind]]) -> None:
         """Rewrite the file with the lines of these steps alone, in this order, and merge parts."""
         lines = [self._lines[step] for step in steps if step in self._lines]
-        write_text(self._whole, "".join(map(_to_text, lines)))
-        for file in _parts(self._whole.parent):
+        write_text(self._main_path, "".join(map(_to_text, lines)))
+        for file in _parts(self._main_path.parent):
             file.unlink(missing_ok=True)
         self._lines = {(line.look, line.kind): line for line in lines}
-        self._half, self._lacks_end = None, False
+        self._half_line_offset, self._lacks_end = None, False
 
 
 def _to_text(line: JournalLine) -> str:
@@ -101,20 +106,22 @@ def _parts(folder: Path) -> list[Path]:
 class _JournalContent:
     """The content of a journal file.
 
-    damaged: number of unreadable lines. half: offset at which an incomplete last line begins, if
-    there is one. lacks_end: whether the last line lacks only its newline.
+    damaged_count: number of unreadable lines. half_line_offset: where an incomplete last line
+    begins, if there is one. lacks_end: whether the last line lacks only its newline.
     """
 
     lines: tuple[JournalLine, ...] = ()
-    damaged: int = 0
-    half: int | None = None
+    damaged_count: int = 0
+    half_line_offset: int | None = None
     lacks_end: bool = False
 
     def remark(self, path: Path) -> str:
         """Return a remark on the damage for the user."""
-        lines, they = ("a line", "its step") if self.damaged == 1 else ("lines", "their steps")
-        count = "" if self.damaged == 1 else f"{self.damaged} "
-        return f"{path} has {count}{lines} that cannot be read: {they} will be done again"
+        lines, steps = (
+            ("a line", "its step") if self.damaged_count == 1 else ("lines", "their steps")
+        )
+        count = "" if self.damaged_count == 1 else f"{self.damaged_count} "
+        return f"{path} has {count}{lines} that cannot be read: {steps} will be done again"
 
 
 def _read_journal(path: Path) -> _JournalContent:
@@ -126,11 +133,13 @@ def _read_journal(path: Path) -> _JournalContent:
     parsed = [_parse_line(row) for row in rows]
     # A kill may have cut the last line; its step is begun again anyway.
     end = _parse_line(last)
-    half = len(data) - len(last) if last and end is None else None
-    damaged = sum(
+    half_line_offset = len(data) - len(last) if last and end is None else None
+    damaged_count = sum(
         line is None and bool(row.strip()) for row, line in zip(rows, parsed, strict=True)
     )
-    return _JournalContent(tuple(x for x in (*parsed, end) if x), damaged, half, end is not None)
+    return _JournalContent(
+        tuple(x for x in (*parsed, end) if x), damaged_count, half_line_offset, end is not None
+    )
 
 
 def _parse_line(row: bytes) -> JournalLine | None:

@@ -31,26 +31,30 @@ def collect_errors(entry: LookEntry, cache: WorkerCache, mistakes: Mistakes) -> 
         except LOOK_ERRORS:
             return None
         except LightpaintError as error:
-            mistakes.add(entry.where, str(error))
+            mistakes.add(entry.label, str(error))
             return None
 
     lights: Sequence[BasisLight] | None = None
     for scene in map(cache.scene, entry.scenes):
-        loaded = attempt(partial(content, scene))
-        if loaded is None:  # the lights can be checked without a sensor
-            plain = cache.scene(replace(scene, sensor=None))
-            loaded = attempt(partial(content, plain))
-        if loaded is None:
+        loaded_scene = attempt(partial(content, scene))
+        if loaded_scene is None:  # the lights can be checked without a sensor
+            without_sensor = cache.scene(replace(scene, sensor=None))
+            loaded_scene = attempt(partial(content, without_sensor))
+        if loaded_scene is None:
             continue
-        lights = basis_lights(loaded)
-        attempt(partial(on_film, loaded, entry.settings.quality, entry.settings.resolution))
+        lights = basis_lights(loaded_scene)
+        attempt(partial(on_film, loaded_scene, entry.settings.quality, entry.settings.resolution))
         if "render" in entry.want:
-            attempt(partial(on_film, loaded, None, entry.final.resolution))
+            attempt(partial(on_film, loaded_scene, None, entry.final.resolution))
     if entry.basis is not None:
-        saved = cache.source(entry.basis.unread())
-        loaded = attempt(partial(content, saved))
-        if loaded is not None:
-            lights = loaded.basis.lights if isinstance(loaded, LightGroups) else loaded.lights
+        source = cache.source(entry.basis.without_content())
+        loaded_scene = attempt(partial(content, source))
+        if loaded_scene is not None:
+            lights = (
+                loaded_scene.basis.lights
+                if isinstance(loaded_scene, LightGroups)
+                else loaded_scene.lights
+            )
         if not entry.scenes:
             attempt(partial(check_nothing_unused, entry.settings, entry.basis))
     if lights is not None:

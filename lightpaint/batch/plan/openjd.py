@@ -55,8 +55,13 @@ def template_of(plan: Plan, folder: Path, command: Sequence[str]) -> dict[str, A
         if base not in (file, *file.parents):
             # The default of a PATH parameter may not lie outside the folder of the job.
             return {"type": "STRING", "default": str(file), "description": description}
-        inside = os.path.relpath(file, base)
-        definition = {"type": "PATH", "objectType": kind, "dataFlow": flow, "default": inside}
+        relative_path = os.path.relpath(file, base)
+        definition = {
+            "type": "PATH",
+            "objectType": kind,
+            "dataFlow": flow,
+            "default": relative_path,
+        }
         return {**definition, "description": description}
 
     manifest = path(plan.manifest, "FILE", "IN", "The looks.")
@@ -65,7 +70,7 @@ def template_of(plan: Plan, folder: Path, command: Sequence[str]) -> dict[str, A
     program = {"type": "STRING", "default": "lightpaint", "description": "The command."}
     return {
         "specificationVersion": "jobtemplate-2023-09",
-        "name": _plain(plan.manifest.stem)[:128] or "looks",
+        "name": _without_braces(plan.manifest.stem)[:128] or "looks",
         "parameterDefinitions": [
             {"name": "Manifest", **manifest},
             {"name": "Output", **output},
@@ -95,11 +100,11 @@ def _steps(plan: Plan, command: Sequence[str]) -> list[dict[str, Any]]:
 
 
 def _step(
-    name: str, arguments: Sequence[str], before: Sequence[dict[str, Any]], **fields: Any
+    name: str, arguments: Sequence[str], earlier_steps: Sequence[dict[str, Any]], **fields: Any
 ) -> dict[str, Any]:
     args = ["batch", "{{Param.Manifest}}", "-o", "{{Param.Output}}", *arguments]
     command = {"command": "{{Param.Lightpaint}}", "args": args}
-    dependencies = [{"dependsOn": step["name"]} for step in before]
+    dependencies = [{"dependsOn": step["name"]} for step in earlier_steps]
     return {
         "name": name,
         **({"dependencies": dependencies} if dependencies else {}),
@@ -110,25 +115,27 @@ def _step(
 
 def _waves(looks: Sequence[PlannedLook]) -> list[tuple[str, list[PlannedLook]]]:
     """Group looks: the first of each basis, those that share one, then those made of others."""
-    first: list[PlannedLook] = []
-    sharing: list[PlannedLook] = []
-    combined: list[PlannedLook] = []
+    first_looks: list[PlannedLook] = []
+    sharing_looks: list[PlannedLook] = []
+    combined_looks: list[PlannedLook] = []
     seen_keys: set[str] = set()
     for look in looks:
         keys = set(look.steps[0].task.bases)
-        if look.entry.of:
-            combined.append(look)
+        if look.entry.combined_looks:
+            combined_looks.append(look)
         elif keys <= seen_keys:
-            sharing.append(look)
+            sharing_looks.append(look)
         else:
-            first.append(look)
+            first_looks.append(look)
             seen_keys |= keys
-    waves = [("Bases", first), ("Looks", sharing)]
-    while combined:
-        names = {look.entry.name for look in combined}
-        ready = [look for look in combined if not names & set(look.entry.of)]
-        waves.append((f"Made {len(waves) - 1}", ready))
-        combined = [look for look in combined if look not in ready]
+    waves = [("Bases", first_looks), ("Looks", sharing_looks)]
+    while combined_looks:
+        names = {look.entry.name for look in combined_looks}
+        ready_looks = [
+            look for look in combined_looks if not names & set(look.entry.combined_looks)
+        ]
+        waves.append((f"Made {len(waves) - 1}", ready_looks))
+        combined_looks = [look for look in combined_looks if look not in ready_looks]
     return [(name, wave) for name, wave in waves if wave]
 
 
@@ -140,6 +147,6 @@ def _pattern(look: PlannedLook) -> str:
     return escape(name)
 
 
-def _plain(text: str) -> str:
+def _without_braces(text: str) -> str:
     """Return text without the braces that mark expressions in a format string."""
     return text.replace("{{", "").replace("}}", "")

@@ -19,12 +19,12 @@ from lightpaint.screen import some_names
 class PlaceGroup:
     """A group of looks.
 
-    file: of the record. tasks: of the looks whose paintings decide. made_of: fingerprint of these.
+    file: of the record. tasks: of the looks whose paintings decide. fingerprint: of these.
     """
 
     file: Path
     tasks: tuple[Task, ...]
-    made_of: str
+    fingerprint: str
 
     @property
     def looks(self) -> tuple[str, ...]:
@@ -36,7 +36,7 @@ class PlaceGroup:
         """File of the plan and the elevation of the room."""
         return self.file.with_suffix(".png")
 
-    def found(self) -> PlacementRecord | None:
+    def read_record(self) -> PlacementRecord | None:
         """Return the record, if it belongs to these paintings and they are unchanged."""
         if not self.file.is_file():
             return None
@@ -44,16 +44,18 @@ class PlaceGroup:
             record = read_placement(self.file)
         except LightpaintError:
             return None
-        return record if record.made_of == self.made_of else None
+        return record if record.made_of == self.fingerprint else None
 
 
-def group_entries(entries: Iterable[LookEntry], rigged: Iterable[str]) -> list[list[LookEntry]]:
+def group_entries(
+    entries: Iterable[LookEntry], names_with_moves: Iterable[str]
+) -> list[list[LookEntry]]:
     """Return groups of the entries whose lights may move; the paintings of each group decide.
 
-    rigged: names of these. Variations follow the look that they vary. Raises BatchError for looks
-    that cannot share places.
+    names_with_moves: names of these. Variations follow the look that they vary. Raises BatchError
+    for looks that cannot share places.
     """
-    names, groups = set(rigged), dict[str, list[LookEntry]]()
+    names, groups = set(names_with_moves), dict[str, list[LookEntry]]()
     for entry in entries:
         if entry.name in names:
             groups.setdefault(_key(entry), []).append(entry)
@@ -62,14 +64,14 @@ def group_entries(entries: Iterable[LookEntry], rigged: Iterable[str]) -> list[l
     return list(groups.values())
 
 
-def deciding(group: Sequence[LookEntry]) -> list[LookEntry]:
+def deciding_looks(group: Sequence[LookEntry]) -> list[LookEntry]:
     """Return the looks of a group whose paintings decide: all but variations, if there are any."""
     return [entry for entry in group if not entry.variation] or list(group)
 
 
 def file_of_group(folder: Path, group: Sequence[LookEntry]) -> Path:
     """Return the file of a group's record in the folder of the batch."""
-    return folder / PLACES / f"{deciding(group)[0].name}.json"
+    return folder / PLACES / f"{deciding_looks(group)[0].name}.json"
 
 
 def places_of(entries: Sequence[LookEntry], files: Mapping[str, str]) -> dict[str, str]:
@@ -77,27 +79,27 @@ def places_of(entries: Sequence[LookEntry], files: Mapping[str, str]) -> dict[st
 
     files: of the looks that are solved. A look stands behind those that it is made of.
     """
-    made = dict(files)
+    place_files = dict(files)
     for entry in entries:
-        if entry.of and (place := made.get(entry.of[0])):
-            made[entry.name] = place
-    return made
+        if entry.combined_looks and (place := place_files.get(entry.combined_looks[0])):
+            place_files[entry.name] = place
+    return place_files
 
 
 def _key(entry: LookEntry) -> str:
     if entry.shares_places:
-        return repr(replace(entry.scenes[0].unread(), sensor=None))
-    return entry.varied or entry.name
+        return repr(replace(entry.scenes[0].without_content(), sensor=None))
+    return entry.varied_look or entry.name
 
 
 def _check_alike(group: Sequence[LookEntry]) -> None:
     """Raise BatchError if the bases of a group's looks are rendered in different ways."""
     first = render_settings(group[0].settings)
     for entry in group[1:]:
-        its = render_settings(entry.settings)
-        if others := [key for key, value in its.items() if value != first[key]]:
-            key = others[0]
+        settings = render_settings(entry.settings)
+        if different_keys := [key for key, value in settings.items() if value != first[key]]:
+            key = different_keys[0]
             raise BatchError(
                 f"{some_names([group[0].name, entry.name], ' and ')} share places, and {key} is "
-                f"{first[key]!r} in one and {its[key]!r} in the other: give both the same"
+                f"{first[key]!r} in one and {settings[key]!r} in the other: give both the same"
             )

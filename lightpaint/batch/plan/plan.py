@@ -15,10 +15,10 @@ from lightpaint.screen import some_names
 
 @dataclass(frozen=True)
 class PlanStep:
-    """A step of one look. made_of: fingerprint of its inputs. is_done: True if it need not run."""
+    """A step of one look. fingerprint: of its inputs. is_done: True if it need not run."""
 
     task: Task
-    made_of: str
+    fingerprint: str
     is_done: bool
 
 
@@ -56,7 +56,7 @@ class Cost:
 
 @dataclass(frozen=True)
 class Plan:
-    """The plan of a manifest. costs: of each basis, by its key. chosen: names of the looks to do.
+    """The plan of a manifest. costs: of each basis, by its key. chosen_names: of the looks to do.
 
     cache: scenes that the checks have loaded, so that they are not loaded twice. remarks: on the
     batch as a whole. groups: looks that share places of lights.
@@ -66,7 +66,7 @@ class Plan:
     folder: Path
     looks: tuple[PlannedLook, ...]
     costs: Mapping[str, Cost]
-    chosen: frozenset[str]
+    chosen_names: frozenset[str]
     cache: WorkerCache = field(default_factory=WorkerCache, repr=False, compare=False)
     remarks: tuple[str, ...] = ()
     groups: tuple[PlaceGroup, ...] = ()
@@ -74,7 +74,7 @@ class Plan:
     @property
     def chosen_looks(self) -> tuple[PlannedLook, ...]:
         """Looks to do."""
-        return tuple(look for look in self.looks if look.entry.name in self.chosen)
+        return tuple(look for look in self.looks if look.entry.name in self.chosen_names)
 
     def group_of(self, task: Task) -> PlaceGroup | None:
         """Return the group that a task's lights are placed for; None if none may move."""
@@ -92,32 +92,32 @@ class Plan:
         """
         if pattern is None:
             return self
-        chosen = {x.entry.name for x in self.looks if fnmatchcase(x.entry.name, pattern)}
-        if not chosen:
+        chosen_names = {x.entry.name for x in self.looks if fnmatchcase(x.entry.name, pattern)}
+        if not chosen_names:
             names = some_names(look.entry.name for look in self.looks)
             raise BatchError(f"no look matches {pattern!r}: there are {names}")
         for look in reversed(self.looks):  # a look stands behind those that it combines
-            if look.entry.name in chosen:
-                chosen |= set(look.entry.of)
-        return replace(self, chosen=frozenset(chosen))
+            if look.entry.name in chosen_names:
+                chosen_names |= set(look.entry.combined_looks)
+        return replace(self, chosen_names=frozenset(chosen_names))
 
 
 def by_bases(steps: Sequence[PlanStep], looks: Mapping[str, PlannedLook]) -> list[list[PlanStep]]:
     """Group steps that share their bases; a group follows the groups that its looks combine."""
     remaining, groups = list(steps), []
     while remaining:
-        ready = {step.task.look: step.task.bases for step in remaining}
-        pending, waits = dict(ready), True
-        while waits:
-            waits = False
-            for look, bases in list(ready.items()):
-                made_of = [x for x in looks[look].entry.of if x in pending]
-                if any(ready.get(x) != bases for x in made_of):
-                    del ready[look]
-                    waits = True
-        for keys in dict.fromkeys(ready.values()):
-            groups.append([step for step in remaining if ready.get(step.task.look) == keys])
-        remaining = [step for step in remaining if step.task.look not in ready]
+        bases_by_look = {step.task.look: step.task.bases for step in remaining}
+        pending, has_changed = dict(bases_by_look), True
+        while has_changed:
+            has_changed = False
+            for look, bases in list(bases_by_look.items()):
+                part_names = [x for x in looks[look].entry.combined_looks if x in pending]
+                if any(bases_by_look.get(x) != bases for x in part_names):
+                    del bases_by_look[look]
+                    has_changed = True
+        for keys in dict.fromkeys(bases_by_look.values()):
+            groups.append([step for step in remaining if bases_by_look.get(step.task.look) == keys])
+        remaining = [step for step in remaining if step.task.look not in bases_by_look]
     return groups
 
 
@@ -126,7 +126,11 @@ def waves(steps: Sequence[PlanStep], looks: Mapping[str, PlannedLook]) -> list[l
     remaining, groups = list(steps), []
     while remaining:
         names = {step.task.look for step in remaining}
-        wave = [step for step in remaining if not names & set(looks[step.task.look].entry.of)]
+        wave = [
+            step
+            for step in remaining
+            if not names & set(looks[step.task.look].entry.combined_looks)
+        ]
         groups.append(wave)
         remaining = [step for step in remaining if step not in wave]
     return groups

@@ -20,7 +20,7 @@ from lightpaint.batch.plan.journal import Journal
 from lightpaint.batch.plan.look_errors import collect_errors
 from lightpaint.batch.plan.place_groups import (
     PlaceGroup,
-    deciding,
+    deciding_looks,
     file_of_group,
     group_entries,
     places_of,
@@ -86,10 +86,13 @@ def plan(
 
 @dataclass(frozen=True)
 class _CheckedLook:
-    """A look with all defaults resolved. reads: its files. failure: why it cannot be done."""
+    """A look with all defaults resolved. source_files: the files that it reads, but for bases.
+
+    failure: why it cannot be done; "" if it can.
+    """
 
     entry: LookEntry
-    reads: tuple[Path, ...]
+    source_files: tuple[Path, ...]
     failure: str
     remarks: tuple[str, ...]
 
@@ -111,8 +114,8 @@ class _Planner:
         self._folders = {entry.name: folder / entry.name for entry in entries}
         self.cache, self.journal = WorkerCache(), Journal(folder)
         self._fingerprints = Fingerprints(manifest.folder)
-        self._failed: set[str] = set()
-        self._rigged: list[str] = []
+        self._failed_looks: set[str] = set()
+        self._looks_with_moves: list[str] = []
         self.groups: dict[str, PlaceGroup] = {}
         self.costs: dict[str, Cost] = {}
 
@@ -122,85 +125,89 @@ class _Planner:
         Errors in the manifest are added to its mistakes; errors in a look's own files become its
         failure.
         """
-        checked = [self._checked(entry) for entry in entries]
+        checked = [self._check_look(entry) for entry in entries]
         places = self._group(checked)
-        return tuple(self._planned(x, places.get(x.entry.name, "")) for x in checked)
+        return tuple(self._plan_look(x, places.get(x.entry.name, "")) for x in checked)
 
-    def _checked(self, entry: LookEntry) -> "_CheckedLook":
+    def _check_look(self, entry: LookEntry) -> "_CheckedLook":
         """Return one look with all defaults resolved."""
         failure = ""
         remarks: tuple[str, ...] = ()
-        reads: tuple[Path, ...] = ()
+        source_files: tuple[Path, ...] = ()
         try:
-            entry, reads, remarks = self._resolve_entry(entry)
+            entry, source_files, remarks = self._resolve_entry(entry)
         except LOOK_ERRORS as error:
             failure = str(error)
         except LightpaintError as error:
-            self._mistakes.add(entry.where, str(error))
+            self._mistakes.add(entry.label, str(error))
             failure = str(error)
             self.collect_errors(entry)
-        if not failure and (failed := self._failed & set(entry.of)):
-            failure = f"it is made of {some_names(sorted(failed))}, which failed"
+        if not failure and (failed_parts := self._failed_looks & set(entry.combined_looks)):
+            failure = f"it is made of {some_names(sorted(failed_parts))}, which failed"
         if failure:
-            self._failed.add(entry.name)
-        return _CheckedLook(entry, reads if not failure else (), failure, remarks)
+            self._failed_looks.add(entry.name)
+        return _CheckedLook(entry, source_files if not failure else (), failure, remarks)
 
     def _group(self, checked: Sequence["_CheckedLook"]) -> dict[str, str]:
         """Group looks that share places; return the file of the places of each, by its name."""
         looks = {x.entry.name: x for x in checked if not x.failure}
         entries, files = [x.entry for x in looks.values()], dict[str, str]()
         try:
-            groups = group_entries(entries, self._rigged)
+            groups = group_entries(entries, self._looks_with_moves)
         except LightpaintError as error:
             self._mistakes.add("", str(error))
             return {}
         for group in groups:
             file = file_of_group(self._folder, group)
-            its = [(entry, looks[entry.name].reads) for entry in deciding(group)]
-            tasks = [self._answer(entry, reads) for entry, reads in its]
-            made_of = self._fingerprints.places(its)
-            self.groups[str(file)] = PlaceGroup(file, tuple(tasks), made_of)
+            looks_with_files = [
+                (entry, looks[entry.name].source_files) for entry in deciding_looks(group)
+            ]
+            tasks = [
+                self._answer_task(entry, source_files) for entry, source_files in looks_with_files
+            ]
+            fingerprint = self._fingerprints.places(looks_with_files)
+            self.groups[str(file)] = PlaceGroup(file, tuple(tasks), fingerprint)
             files |= {entry.name: str(file) for entry in group}
         return places_of(entries, files)
 
-    def _planned(self, look: "_CheckedLook", places: str) -> PlannedLook:
+    def _plan_look(self, look: "_CheckedLook", places: str) -> PlannedLook:
         """Return the plan of a look. places: file of its lights' places; "" if none may move."""
         entry, is_possible = look.entry, not look.failure
         if places:
             entry = replace(entry, places=places)
-            for key, old in zip(bases_of(entry), bases_of(look.entry), strict=True):
-                if old in self.costs:
-                    self.costs[key] = self.costs[old]
-        steps = self._steps(entry, look.reads, is_possible=is_possible)
+            for key, old_key in zip(bases_of(entry), bases_of(look.entry), strict=True):
+                if old_key in self.costs:
+                    self.costs[key] = self.costs[old_key]
+        steps = self._steps(entry, look.source_files, is_possible=is_possible)
         folder = self._folders[entry.name]
         return PlannedLook(entry, folder, steps, look.failure, look.remarks)
 
-    def _answer(self, entry: LookEntry, reads: Sequence[Path]) -> Task:
-        how: dict[str, Any] = {"force": self._force, "command": self._command}
-        return answer_task(entry, self._folders, reads=reads, **how)
+    def _answer_task(self, entry: LookEntry, source_files: Sequence[Path]) -> Task:
+        options: dict[str, Any] = {"force": self._force, "command": self._command}
+        return answer_task(entry, self._folders, source_files=source_files, **options)
 
     def collect_errors(self, entry: LookEntry) -> None:
         """Add all errors of a look that cannot be planned, not only the first."""
         collect_errors(entry, self.cache, self._mistakes)
 
     def _steps(
-        self, entry: LookEntry, reads: Sequence[Path], *, is_possible: bool
+        self, entry: LookEntry, source_files: Sequence[Path], *, is_possible: bool
     ) -> tuple[PlanStep, ...]:
         """Return the steps of a look: its answer, and its render and exports if requested."""
         folder = self._folders[entry.name]
-        answer = self._answer(entry, reads)
+        answer = self._answer_task(entry, source_files)
         tasks, group = [answer], self.groups.get(entry.places)
-        places = "" if group is None else group.made_of
-        made_of = [self._fingerprints.answer(entry, reads, places)]
+        places = "" if group is None else group.fingerprint
+        fingerprints = [self._fingerprints.answer(entry, source_files, places)]
         if "render" in entry.want:
             tasks.append(render_task(answer, entry, folder))
-            made_of.append(self._fingerprints.render(entry))
+            fingerprints.append(self._fingerprints.render(entry))
         if "export" in entry.want:
             tasks.append(export_task(answer, entry, folder))
-            made_of.append(self._fingerprints.export(entry))
+            fingerprints.append(self._fingerprints.export(entry))
         is_whole = is_possible and is_as_written(folder)
         steps = []
-        for task, fingerprint in zip(tasks, made_of, strict=True):
+        for task, fingerprint in zip(tasks, fingerprints, strict=True):
             line = self.journal.lines.get((task.look, task.kind))
             is_done = line is not None and (line.state, line.made_of) == ("done", fingerprint)
             # A new answer invalidates its render and exports.
@@ -217,7 +224,7 @@ class _Planner:
         scenes = tuple(map(self.cache.scene, entry.scenes))
         # At most one saved basis stays in memory, and only the cache holds it.
         self.cache.keep_only(bases_of(entry))
-        basis = None if entry.basis is None else self.cache.source(entry.basis.unread())
+        basis = None if entry.basis is None else self.cache.source(entry.basis.without_content())
         if not entry.is_solved:
             return entry, *self._check_lighting_look(replace(entry, scenes=scenes, basis=basis))
         settings, constraints = entry.settings, entry.constraints
@@ -231,7 +238,7 @@ class _Planner:
         if entry.is_by_sums:
             _check_by_sums(job)
         elif job.all_rigging and entry.basis is None:
-            self._rigged.append(entry.name)
+            self._looks_with_moves.append(entry.name)
         elif entry.shares_places:
             raise BatchError(
                 f"share = 'places', and no light may move in {scenes[0].path}: say in its lights "
@@ -240,9 +247,9 @@ class _Planner:
         self._note_costs(entry, [view.scene for view in job.views], job.settings)
         if entry.final.resolution is not None and "render" in entry.want:
             on_film(scenes[0].content, None, entry.final.resolution)
-        reads = tuple(dict.fromkeys(job.results.reads))
+        source_files = tuple(dict.fromkeys(job.results.reads))
         entry = replace(entry, settings=settings, constraints=constraints)
-        return entry, reads, job.remarks
+        return entry, source_files, job.remarks
 
     def _job(
         self,
@@ -253,7 +260,7 @@ class _Planner:
         constraints: Constraints,
     ) -> Job:
         """Return the job of a look, which reads, checks and releases the look's painting."""
-        paintings = tuple(painting.unread() for painting in entry.paintings)
+        paintings = tuple(painting.without_content() for painting in entry.paintings)
         settings = replace(settings, force=self._force, command=self._command)
         folder = self._folders[entry.name]
         return Job(tuple(scenes), paintings, folder, basis, constraints, settings, entry.by_sensor)
@@ -264,26 +271,28 @@ class _Planner:
         scene = scenes[0] if scenes else None
         basis = None if entry.basis is None else entry.basis.content
         groups = basis if isinstance(basis, LightGroups) else None
-        reads: tuple[Path, ...] = () if scene is None else scene.read_files
+        source_files: tuple[Path, ...] = () if scene is None else scene.read_files
         if groups is not None:
-            reads += tuple(groups.files)
+            source_files += tuple(groups.files)
         elif entry.basis is not None:
-            reads += (Path(entry.basis.path),)
+            source_files += (Path(entry.basis.path),)
         if entry.lighting:
             lighting = read_lighting(entry.lighting)
-            reads += (Path(entry.lighting),)
+            source_files += (Path(entry.lighting),)
             if scene is not None:
                 lights = scene_of(scene, lighting).lights
-                if (lit := set(lighting)) != (named := {light.name for light in lights}):
+                lighting_names, scene_names = set(lighting), {light.name for light in lights}
+                if lighting_names != scene_names:
                     raise BatchError(
-                        f"{entry.lighting} has the lights {some_names(sorted(lit))}, and the scene "
-                        f"{some_names(sorted(named))}: load it with the same lights and groups"
+                        f"{entry.lighting} has the lights {some_names(sorted(lighting_names))}, "
+                        f"and the scene {some_names(sorted(scene_names))}: load it with the same "
+                        "lights and groups"
                     )
             elif isinstance(basis, LightGroups | Basis):
                 names = (basis.basis if isinstance(basis, LightGroups) else basis).names
                 if set(lighting) != set(names):
                     raise BatchError(f"{entry.lighting} is of other lights than {entry.basis}")
-        folders = [str(self._folders[name] / "lighting.json") for name in entry.of]
+        folders = [str(self._folders[name] / "lighting.json") for name in entry.combined_looks]
         lightings = tuple([entry.lighting] if entry.lighting else folders)
         views = view_names(scenes) if entry.by_sensor else [""]
         options: dict[str, Any] = {"views": views, "groups": groups, "force": self._force}
@@ -295,7 +304,7 @@ class _Planner:
         self._note_costs(entry, films, settings)
         if scene is not None and entry.final.resolution is not None and "render" in entry.want:
             on_film(scene, None, entry.final.resolution)
-        return reads, ()
+        return source_files, ()
 
     def _note_costs(
         self, entry: LookEntry, films: Sequence[Scene | None], settings: Settings

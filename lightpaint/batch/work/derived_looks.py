@@ -27,15 +27,15 @@ def derived_folder(
     force: bool = False,
 ) -> ResultFolder:
     """Return the result folder of a derived answer. views: folders in it, one for each picture."""
-    reads = tuple(map(Path, lightings))
+    input_files = tuple(map(Path, lightings))
     files = answer_files(folder, scene=scene, groups=groups)
     files += [folder / view / "predicted.exr" for view in views]
     if scene is not None:
-        reads += scene.read_files
+        input_files += scene.read_files
     if groups is not None:
-        reads += tuple(groups.files)
+        input_files += tuple(groups.files)
     answers = tuple(map(Path, lightings))
-    return ResultFolder(folder, tuple(files), reads, answers, force=force)
+    return ResultFolder(folder, tuple(files), input_files, answers, force=force)
 
 
 def publish_derived(

@@ -16,7 +16,7 @@ class PassRenderer:
     def __init__(self, scene: Scene, final: Final) -> None:
         self._scene, self._final = scene, final
         self._passes = passes_of(scene, final.spp)
-        self._loaded: Any = scene.load()
+        self._loaded_scene: Any = scene.load()
 
     def sum(self, passes: range) -> dict[int, Doubles]:
         """Return the undivided sums, (h, w, 3), of the given passes for each half, by the half."""
@@ -25,11 +25,13 @@ class PassRenderer:
             half, spp = self._passes[k]
             seed, stream = self._final.seed, Stream.VERIFICATION
             with tracing():
-                summed = pass_sum(self._loaded, self._scene, k, spp, seed=seed, stream=stream)
-            sums[half] = sums[half] + summed if half in sums else summed
+                pass_total = pass_sum(
+                    self._loaded_scene, self._scene, k, spp, seed=seed, stream=stream
+                )
+            sums[half] = sums[half] + pass_total if half in sums else pass_total
         return sums
 
     def close(self) -> None:
         """Release the scene."""
-        self._loaded = None
+        self._loaded_scene = None
         gc.collect()

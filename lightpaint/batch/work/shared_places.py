@@ -19,25 +19,25 @@ class SharedPlacing:
     """An item that searches for places; its value is the record as text.
 
     tasks: answers of the looks whose paintings decide. bases: keys of the bases of all their views;
-    files: where these are saved, "" if they are in memory. made_of: fingerprint, for the record.
+    files: where these are saved, "" if they are in memory. fingerprint: of the group.
     """
 
     name: str
     tasks: tuple[Task, ...]
     bases: tuple[str, ...]
     files: tuple[str, ...]
-    made_of: str
+    fingerprint: str
     expected_s: float
     kind: Literal["places"] = "places"
-    writes: str = ""
+    output_folder: str = ""
 
     @property
-    def needs(self) -> tuple[str, ...]:
+    def input_files(self) -> tuple[str, ...]:
         """Files of the scene and of the paintings."""
-        return tuple(dict.fromkeys(file for task in self.tasks for file in task.reads))
+        return tuple(dict.fromkeys(file for task in self.tasks for file in task.source_files))
 
     @property
-    def carried(self) -> tuple[str, ...]:
+    def local_files(self) -> tuple[str, ...]:
         """Saved bases."""
         return tuple(file for file in self.files if file)
 
@@ -59,7 +59,7 @@ def find_shared_places(item: SharedPlacing, cache: WorkerCache, listen: Listener
     placement = find_places(jobs, bases, listen)
     looks: Sequence[str] = [task.look for task in item.tasks]
     looks = looks if len(looks) > 1 else ()
-    return record_of(placement, looks=looks, made_of=item.made_of).to_json()
+    return record_of(placement, looks=looks, made_of=item.fingerprint).to_json()
 
 
 def _fields(task: Task, cache: WorkerCache) -> dict[str, Any]:

@@ -69,7 +69,7 @@ class Spool:
 
     def keep_guide_table(self, table: Floats) -> None:
         """Store the table of the emitter guide. Raises OSError."""
-        _write(self.guide_file, compressed=True, learned=table)
+        _write(self.guide_file, is_compressed=True, learned=table)
 
     def part(self, part: Part) -> tuple[Floats, Floats] | None:
         """Return the sums of a part; None if they are not stored, or damaged."""
@@ -111,9 +111,9 @@ def read_guide_table(file: str) -> Floats:
         raise BasisError(f"cannot read {file}: {first_line(error)}") from error
 
 
-def _write(file: Path, *, compressed: bool = False, **arrays: Any) -> None:
+def _write(file: Path, *, is_compressed: bool = False, **arrays: Any) -> None:
     """Write all arrays to `file`, or nothing."""
     temporary = file.with_name(f".{file.name}.half")
     with temporary.open("wb") as stream:
-        (np.savez_compressed if compressed else np.savez)(stream, **arrays)
+        (np.savez_compressed if is_compressed else np.savez)(stream, **arrays)
     temporary.replace(file)

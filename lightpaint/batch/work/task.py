@@ -30,19 +30,19 @@ class Task:
     """A step of one look, of files and plain values.
 
     look: name. kind: step. job: the text of `Job.to_json`; without a target if it is derived.
-    lightings: files that it combines; reads: all other files but bases; share, space: between two
+    lightings: files that it combines; source_files: all others but bases; share, space: between two
     lightings; mireds: how much warmer. final: options of the final render. handover: exports for
     other programs. bases: keys of its bases; files: where these are saved, "" if they have to be
-    obtained; formers: of the looks before lights were moved. places: file of the places of lights
-    that may move, which a search for all looks that share them writes. expected_s: rough estimate
-    of its time. is_by_sums: whether only the lighting is requested.
+    obtained; former_look_files: the pictures before lights were moved. places: file of the places
+    of lights that may move, which one search for all looks that share them writes. expected_s:
+    rough estimate of its time. is_by_sums: whether only the lighting is requested.
     """
 
     look: str
     kind: Kind
     job: str
     lightings: tuple[str, ...] = ()
-    reads: tuple[str, ...] = ()
+    source_files: tuple[str, ...] = ()
     share: float = 0.0
     space: Space = "log"
     mireds: float = 0.0
@@ -50,7 +50,7 @@ class Task:
     handover: Handover = field(default_factory=Handover)
     bases: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
-    formers: tuple[str, ...] = ()
+    former_look_files: tuple[str, ...] = ()
     places: str = ""
     expected_s: float = 0.0
     is_by_sums: bool = False
@@ -62,7 +62,7 @@ class Task:
         return self.look
 
     @property
-    def writes(self) -> str:
+    def output_folder(self) -> str:
         """Folder of the results; see `WorkItem`."""
         return str(json.loads(self.job)["folder"])
 
@@ -72,18 +72,18 @@ class Task:
         return bool(json.loads(self.job)["settings"]["force"])
 
     @property
-    def needs(self) -> tuple[str, ...]:
+    def input_files(self) -> tuple[str, ...]:
         """Files that it reads (see `WorkItem`); a render needs those beside its lighting, too."""
-        existing: list[str] = []
+        results: list[str] = []
         if self.kind == "render":
-            existing = [str(x) for x in sorted(Path(self.writes).rglob("*")) if x.is_file()]
+            results = [str(x) for x in sorted(Path(self.output_folder).rglob("*")) if x.is_file()]
         places = [self.places] if self.places and self.kind == "answer" else []
-        return tuple(dict.fromkeys([*self.reads, *self.lightings, *places, *existing]))
+        return tuple(dict.fromkeys([*self.source_files, *self.lightings, *places, *results]))
 
     @property
-    def carried(self) -> tuple[str, ...]:
+    def local_files(self) -> tuple[str, ...]:
         """Saved bases; see `WorkItem`."""
-        return tuple(file for file in (*self.files, *self.formers) if file)
+        return tuple(file for file in (*self.files, *self.former_look_files) if file)
 
     def with_paths(self, move: PathMap) -> "Task":
         """Return the same task with other paths."""
@@ -92,9 +92,9 @@ class Task:
             job=json.dumps(_map_paths(json.loads(self.job), move)),
             bases=tuple(json.dumps(_map_paths(json.loads(key), move)) for key in self.bases),
             lightings=tuple(map(move, self.lightings)),
-            reads=tuple(map(move, self.reads)),
+            source_files=tuple(map(move, self.source_files)),
             files=tuple(file and move(file) for file in self.files),
-            formers=tuple(file and move(file) for file in self.formers),
+            former_look_files=tuple(file and move(file) for file in self.former_look_files),
             places=self.places and move(self.places),
         )
 
@@ -120,12 +120,12 @@ def answer_task(
     entry: LookEntry,
     folders: Mapping[str, Path],
     *,
-    reads: Sequence[Path] = (),
+    source_files: Sequence[Path] = (),
     force: bool,
     command: str,
 ) -> Task:
-    """Return the task of a look's answer. folders: of all looks, by name. reads: input files."""
-    lightings = [str(folders[name] / "lighting.json") for name in entry.of]
+    """Return the task of a look's answer. folders: of all looks, by name."""
+    lightings = [str(folders[name] / "lighting.json") for name in entry.combined_looks]
     return Task(
         entry.name,
         "answer",
@@ -140,7 +140,7 @@ def answer_task(
             placement=PlacementFile(entry.places) if entry.places else None,
         ),
         tuple([entry.lighting] if entry.lighting else lightings),
-        tuple(map(str, reads)),
+        tuple(map(str, source_files)),
         entry.share,
         entry.space,
         SHIFTED_WORDS.get(entry.variation, 0.0),
@@ -156,7 +156,9 @@ def answer_task(
 def render_task(answer: Task, entry: LookEntry, folder: Path) -> Task:
     """Return the task of a look's final render. answer: the task of its answer, in `folder`."""
     lighting = str(folder / "lighting.json")
-    return Task(entry.name, "render", answer.job, (lighting,), answer.reads, final=entry.final)
+    return Task(
+        entry.name, "render", answer.job, (lighting,), answer.source_files, final=entry.final
+    )
 
 
 def export_task(answer: Task, entry: LookEntry, folder: Path) -> Task:
@@ -165,7 +167,7 @@ def export_task(answer: Task, entry: LookEntry, folder: Path) -> Task:
     # An export to light groups needs their names.
     bases = answer.bases if isinstance(entry.basis, GroupsFile) else ()
     options: dict[str, Any] = {"handover": entry.handover, "bases": bases}
-    return Task(entry.name, "export", answer.job, (lighting,), answer.reads, **options)
+    return Task(entry.name, "export", answer.job, (lighting,), answer.source_files, **options)
 
 
 def bases_of(entry: LookEntry) -> tuple[str, ...]:
@@ -191,8 +193,8 @@ def key_of_scene(scene: SceneFile, settings: Settings, places: str = "") -> str:
 
 def render_settings(settings: Settings) -> dict[str, Any]:
     """Return the settings that a rendered basis depends on, by name."""
-    rendered = ("spp", "time_s", "error", "seed", "resolution", "quality", "use_cache", "exact_spp")
-    return {name: getattr(settings, name) for name in rendered}
+    names = ("spp", "time_s", "error", "seed", "resolution", "quality", "use_cache", "exact_spp")
+    return {name: getattr(settings, name) for name in names}
 
 
 def _map_paths(content: Any, move: PathMap) -> Any:

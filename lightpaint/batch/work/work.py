@@ -120,9 +120,9 @@ def job_fields(task: Task, cache: WorkerCache) -> dict[str, Any]:
 
 def _answer(task: Task, cache: WorkerCache, listen: Listener) -> None:
     fields = job_fields(task, cache)
-    formers = task.formers or ("",) * len(task.bases)
-    for key, file, former in zip(task.bases, task.files, formers, strict=True):
-        cache.load(key, file, former)
+    former_look_files = task.former_look_files or ("",) * len(task.bases)
+    for key, file, former_look_file in zip(task.bases, task.files, former_look_files, strict=True):
+        cache.load(key, file, former_look_file)
     if task.lightings:
         _derive_answer(task, fields, cache)
         return
@@ -207,9 +207,9 @@ def _export(task: Task, cache: WorkerCache, listen: Listener) -> None:
         Path(task.handover.stage) if task.handover.stage else None,
     )
     names = names_of_forms(task.handover.to, source)
-    files, reads = tuple(folder / name for name in names.values()), (lighting, *source.files)
+    files, input_files = tuple(folder / name for name in names.values()), (lighting, *source.files)
     force = fields["settings"].force
-    results = ResultFolder(folder, files, reads, (lighting,), force=force)
+    results = ResultFolder(folder, files, input_files, (lighting,), force=force)
     results.check()
     answer = read_lighting(lighting)
     writers, remark = writers_of(names, answer, source, folder, listen)

@@ -30,16 +30,16 @@ class WorkItem(Protocol):
         """Kind: `answer` or `render` of a look, `training`, `part`, `rows`, `passes`, `places`."""
 
     @property
-    def needs(self) -> tuple[str, ...]:
+    def input_files(self) -> tuple[str, ...]:
         """Files that it reads."""
 
     @property
-    def carried(self) -> tuple[str, ...]:
-        """Further files that it reads, which were made for it and exist only on this machine."""
+    def local_files(self) -> tuple[str, ...]:
+        """Temporary files that it reads as well; they exist only on this machine."""
 
     @property
-    def writes(self) -> str:
-        """Folder that it fills; "" if its result is returned."""
+    def output_folder(self) -> str:
+        """Folder that it fills; "" if it returns its result."""
 
     @property
     def expected_s(self) -> float:
@@ -78,16 +78,17 @@ class ItemResult:
 
 @dataclass(frozen=True)
 class SceneFilm:
-    """A scene by its file, on the film that its basis is rendered on. files: all files of the
-    scene. only: names of the lights that are rendered, if not all. places: file of the places of
-    lights that moved or are new; "" if none did.
+    """A scene by its file, on the film that its basis is rendered on.
+
+    files: all files of the scene. light_names: the lights to render, if not all. places: file of
+    the places of lights that moved or are new; "" if none did.
     """
 
     scene: SceneFile
     quality: Quality | None = None
     resolution: str | None = None
     files: tuple[str, ...] = ()
-    only: tuple[str, ...] = ()
+    light_names: tuple[str, ...] = ()
     places: str = ""
 
     def with_paths(self, move: PathMap) -> "SceneFilm":
@@ -99,14 +100,14 @@ class SceneFilm:
             places=self.places and move(self.places),
         )
 
-    def unread(self) -> "SceneFilm":
+    def without_content(self) -> "SceneFilm":
         """Return the same film, with nothing loaded yet."""
-        return replace(self, scene=self.scene.unread())
+        return replace(self, scene=self.scene.without_content())
 
     @property
     def key(self) -> str:
         """Key that equal films share."""
-        film = [vars_of(self.scene), self.quality, self.resolution, self.only]
+        film = [vars_of(self.scene), self.quality, self.resolution, self.light_names]
         return json.dumps([*film, *([self.places] if self.places else [])])
 
 
@@ -119,11 +120,11 @@ class GuideTraining:
     seed: int
     expected_s: float
     kind: Literal["training"] = "training"
-    writes: str = ""
-    carried: tuple[str, ...] = ()
+    output_folder: str = ""
+    local_files: tuple[str, ...] = ()
 
     @property
-    def needs(self) -> tuple[str, ...]:
+    def input_files(self) -> tuple[str, ...]:
         """Files of the scene."""
         return self.film.files
 
@@ -143,15 +144,15 @@ class PartOfBasis:
     guide_file: str
     expected_s: float
     kind: Literal["part"] = "part"
-    writes: str = ""
+    output_folder: str = ""
 
     @property
-    def needs(self) -> tuple[str, ...]:
+    def input_files(self) -> tuple[str, ...]:
         """Files of the scene."""
         return self.film.files
 
     @property
-    def carried(self) -> tuple[str, ...]:
+    def local_files(self) -> tuple[str, ...]:
         """File of the guide's table."""
         return (self.guide_file,) if self.guide_file else ()
 
@@ -195,15 +196,15 @@ class SumsOfRows:
     files: tuple[str, ...]
     expected_s: float
     kind: Literal["rows"] = "rows"
-    writes: str = ""
+    output_folder: str = ""
 
     @property
-    def needs(self) -> tuple[str, ...]:
+    def input_files(self) -> tuple[str, ...]:
         """Files of the scene and of the paintings."""
         return (*self.film.files, *self.files)
 
     @property
-    def carried(self) -> tuple[str, ...]:
+    def local_files(self) -> tuple[str, ...]:
         """File of the guide's table."""
         return (self.guide_file,)
 
@@ -233,11 +234,11 @@ class Passes:
     files: tuple[str, ...]
     expected_s: float
     kind: Literal["passes"] = "passes"
-    writes: str = ""
-    carried: tuple[str, ...] = ()
+    output_folder: str = ""
+    local_files: tuple[str, ...] = ()
 
     @property
-    def needs(self) -> tuple[str, ...]:
+    def input_files(self) -> tuple[str, ...]:
         """Files of the scene."""
         return self.files
 

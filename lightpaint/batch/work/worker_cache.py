@@ -30,10 +30,10 @@ class WorkerCache:
 
     def __init__(self) -> None:
         self._scenes: dict[str, SceneFile] = {}
-        self._saved: dict[str, BasisFile | GroupsFile] = {}
+        self._sources: dict[str, BasisFile | GroupsFile] = {}
         self._bases: dict[str, Basis] = {}
         self._renderer: PartRenderer | PassRenderer | None = None
-        self._rendered = ""
+        self._renderer_key = ""
         self._targets: dict[str, Target] = {}
 
     def scene(self, file: SceneFile) -> SceneFile:
@@ -42,7 +42,7 @@ class WorkerCache:
 
     def source(self, file: BasisFile | GroupsFile) -> BasisFile | GroupsFile:
         """Return the shared basis or light groups that equal `file`; the first use reads them."""
-        return self._saved.setdefault(repr(file), file)
+        return self._sources.setdefault(repr(file), file)
 
     def basis(self, key: str) -> Basis | None:
         """Return the basis of a key, if it is stored here. key: of `key_of_scene`."""
@@ -52,14 +52,14 @@ class WorkerCache:
         """Store the basis of a key."""
         self._bases[key] = basis
 
-    def load(self, key: str, file: str, former: str = "") -> None:
+    def load(self, key: str, file: str, former_look_file: str = "") -> None:
         """Load the basis of a key from a file that was written for workers.
 
-        former: of the look before its lights were moved; "" if they were not.
+        former_look_file: the picture before lights were moved; "" if none was.
         """
         if file and key not in self._bases:
             basis = read_basis(file)
-            look = read_estimate(Path(former))[0] if former else None
+            look = read_estimate(Path(former_look_file))[0] if former_look_file else None
             self._bases[key] = replace(basis, former=look)
 
     def film(self, film: SceneFilm) -> Scene:
@@ -67,32 +67,32 @@ class WorkerCache:
         scene = on_film(self.scene(film.scene).content, film.quality, film.resolution)
         if film.places:
             [scene] = read_placement(Path(film.places)).hung_in([scene]).scenes
-        return scene.only(film.only) if film.only else scene
+        return scene.only(film.light_names) if film.light_names else scene
 
     def renderer(self, item: PartOfBasis | SumsOfRows) -> PartRenderer:
         """Return the renderer of a part; it stays loaded until an item of another basis comes."""
         key = repr((item.film.key, item.seed, item.guide_file))
-        if not isinstance(self._renderer, PartRenderer) or self._rendered != key:
+        if not isinstance(self._renderer, PartRenderer) or self._renderer_key != key:
             self.release_renderer()
             scene = self.film(item.film)
             guide_table = read_guide_table(item.guide_file) if item.guide_file else None
-            self._renderer, self._rendered = PartRenderer(scene, item.seed, guide_table), key
+            self._renderer, self._renderer_key = PartRenderer(scene, item.seed, guide_table), key
         return self._renderer
 
     def frame(self, item: Passes) -> PassRenderer:
         """Return the renderer of passes; it stays loaded until another scene's item comes."""
         key = repr((item.relit, item.final))
-        if not isinstance(self._renderer, PassRenderer) or self._rendered != key:
+        if not isinstance(self._renderer, PassRenderer) or self._renderer_key != key:
             self.release_renderer()
             scene = self.film(SceneFilm(item.relit, None, item.final.resolution))
-            self._renderer, self._rendered = PassRenderer(scene, item.final), key
+            self._renderer, self._renderer_key = PassRenderer(scene, item.final), key
         return self._renderer
 
     def target(self, request: PaintingOfSums, size: tuple[int, int]) -> Target:
         """Return a painting at the size of its basis, read once."""
         key = repr((request, size))
         if key not in self._targets:
-            read = request.painting.unread().content
+            read = request.painting.without_content().content
             self._targets[key] = read.fitted_to(size, resize=request.resize)
         return self._targets[key]
 
@@ -106,4 +106,4 @@ class WorkerCache:
     def keep_only(self, keys: Collection[str]) -> None:
         """Release all bases but those of these keys."""
         self._bases = {key: basis for key, basis in self._bases.items() if key in keys}
-        self._saved = {k: x for k, x in self._saved.items() if key_of_basis(x) in keys}
+        self._sources = {k: x for k, x in self._sources.items() if key_of_basis(x) in keys}

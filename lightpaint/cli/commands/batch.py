@@ -138,7 +138,7 @@ def _dry(planned: Plan) -> CommandOutcome:
     table, looks = terminal.table("look", "what", "of"), []
     for look in planned.chosen_looks:
         action = look.failure or ("done earlier" if look.is_done else ", ".join(look.entry.want))
-        inputs = ", ".join([*(x.path for x in look.entry.paintings), *look.entry.of])
+        inputs = ", ".join([*(x.path for x in look.entry.paintings), *look.entry.combined_looks])
         table.row(look.entry.name, visible(action), inputs or look.entry.lighting)
         looks.append({"look": look.entry.name, "is_done": look.is_done, "want": look.entry.want})
     terminal.print_table(table)

@@ -177,7 +177,7 @@ def share(text: str) -> float:
 
 
 class number:  # noqa: N801 (used as a function)
-    """A type for numbers > 0, or >= 0, up to `most`.
+    """A type for numbers > 0, or >= 0, up to `maximum`.
 
     about: the quantity, with a space before.
     """

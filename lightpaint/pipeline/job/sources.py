@@ -35,7 +35,7 @@ class ReadOnce:
     The content stays in this process: a copy that is sent elsewhere reads the file there.
     """
 
-    def unread(self) -> Self:
+    def without_content(self) -> Self:
         """Return the same file, not read yet."""
         return type(self)(**vars_of(self))
 
