@@ -16,10 +16,7 @@ HERE = Path(lightpaint.__file__).parent
 CLASSES_TWICE: dict[str, str] = {}
 
 #: Names that two modules have, each with its reason.
-MODULES_TWICE = {
-    "lights": "modules of cli/commands/ are called like the commands that people type",
-    "solve": "modules of cli/commands/ are called like the commands that people type",
-}
+MODULES_TWICE: dict[str, str] = {}
 
 
 def _classes() -> Iterator[tuple[str, str]]:

@@ -15,7 +15,7 @@ from renderer import LIGHTS, write_room
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.cli import main
-from lightpaint.cli.commands.paint import solve_command
+from lightpaint.cli.commands.paint_command import command_for_paintings
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import BasisError, OutputError, TargetError
 from lightpaint.images.formats.exr import write_rgb
@@ -71,7 +71,9 @@ def test_what_is_painted_in_two_views_is_solved_alike(room: Path, tmp_path: Path
         sources,
         tmp_path,
         settings=Settings(spp=16, resolution="1/2", verify=False),
-        command=lambda paintings, requests: solve_command(str(room), paintings, options, requests),
+        command=lambda paintings, requests: command_for_paintings(
+            str(room), paintings, options, requests
+        ),
     )
     identity = session_identity(subjects, {k: its.loaded_scene for k, its in enumerate(subjects)})
     assert identity is not None

@@ -29,10 +29,8 @@ def report_fault(command: str, error: BaseException, arguments: Sequence[str]) -
     """
     message = one_line(str(error), limit=MAX_ERROR_LENGTH)
     error_text = f"{type(error).__name__}: {message}" if message else type(error).__name__
-    written = _write_details(_details(error, arguments))
-    details_note = (
-        f"the details are in {written}" if written else "the details could not be written"
-    )
+    path = _write_details(_details(error, arguments))
+    details_note = f"the details are in {path}" if path else "the details could not be written"
     lines.err(f"{command}: a bug in lightpaint: {error_text}; {details_note}")
     return FAULT
 
@@ -52,18 +50,18 @@ def _details(error: BaseException, arguments: Sequence[str]) -> str:
 
 def _libraries() -> list[str]:
     """Return the versions of libraries that are loaded already: loading one might fail again."""
-    loaded = ((name, sys.modules.get(name)) for name in ("mitsuba", "drjit", "numpy"))
-    return [f"{name} {module.__version__}" for name, module in loaded if module is not None]
+    modules = ((name, sys.modules.get(name)) for name in ("mitsuba", "drjit", "numpy"))
+    return [f"{name} {module.__version__}" for name, module in modules if module is not None]
 
 
 def _write_details(text: str) -> Path | None:
     """Write the details to a file that only the user can read; None if no folder allows it."""
-    now = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
+    timestamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
     for folder in _folders():
         try:
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             # mkstemp creates it for its owner alone, and never replaces a file.
-            descriptor, name = tempfile.mkstemp(".txt", f"lightpaint-{now}-", folder)
+            descriptor, name = tempfile.mkstemp(".txt", f"lightpaint-{timestamp}-", folder)
             with os.fdopen(descriptor, "w", encoding="utf-8", errors="backslashreplace") as file:
                 file.write(text)
             return Path(name)

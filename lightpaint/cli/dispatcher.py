@@ -16,15 +16,15 @@ from lightpaint.cli.output.output_mode import CommandOutcome, OutputMode, using_
 from lightpaint.cli.output.vocabulary import spoken
 from lightpaint.errors import BatchError, LightpaintError
 
-#: Modules of commands that are not in `render_commands`.
+#: Modules of the commands that are not in `render_commands`.
 _MODULES = {
-    "batch": "batch",
+    "batch": "batch_command",
     "cache": "maintenance",
     "doctor": "maintenance",
-    "export": "export",
-    "lights": "lights",
-    "paint": "paint",
-    "solve": "solve",
+    "export": "export_command",
+    "lights": "lights_command",
+    "paint": "paint_command",
+    "solve": "solve_command",
 }
 
 #: The scene or the film needs too much memory, which is not a bug.

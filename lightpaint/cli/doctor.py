@@ -91,8 +91,8 @@ def _llvm() -> list[Finding]:
             export = f"export DRJIT_LIBLLVM_PATH={llvm.path}"
             findings.append(Finding("for plain mitsuba", "info", export))
         else:
-            skipped = f"skipped, {llvm.problem}: {llvm.path} ({llvm.origin})"
-            findings.append(Finding("LLVM", "info", skipped))
+            skipped_text = f"skipped, {llvm.problem}: {llvm.path} ({llvm.origin})"
+            findings.append(Finding("LLVM", "info", skipped_text))
     if not any(finding.state == "ok" for finding in findings):
         findings.append(Finding("LLVM", "missing", "no usable one", INSTALL_LLVM))
     return findings
@@ -111,8 +111,8 @@ def _gpu() -> Finding:
         ).stdout.split("\n")
     except (OSError, subprocess.SubprocessError):
         return Finding("GPU", "info", "none found, none needed")
-    listed = ", ".join(name.strip() for name in names if name.strip())
-    return Finding("GPU", "info", f"{listed}: used with -m cuda_ad_rgb")
+    names_text = ", ".join(name.strip() for name in names if name.strip())
+    return Finding("GPU", "info", f"{names_text}: used with -m cuda_ad_rgb")
 
 
 def _backend(variant: str | None) -> Finding:

@@ -32,17 +32,17 @@ class LookSet:
     gallery: folder of their gallery; None if a page of somebody else is there. keep_going: True to
     go on after a failure. variation_names: by folder, the variation of another look.
     derived_folders: by the folder of an answer, the variations computed from it, and their folders.
-    failed: names of failed looks, with the reason. entries: the looks in the gallery. shifted:
-    documents of the variations computed from answers.
+    failures: names of failed looks, with the reason. entries: the looks in the gallery.
+    shifted_looks: documents of the variations computed from answers.
     """
 
     gallery: Path | None
     keep_going: bool
     variation_names: Mapping[Path, str]
     derived_folders: Mapping[Path, Mapping[str, ResultFolder]]
-    failed: dict[str, str]
+    failures: dict[str, str]
     entries: list[LookEntry] = field(default_factory=list)
-    shifted: list[dict[str, Any]] = field(default_factory=list)
+    shifted_looks: list[dict[str, Any]] = field(default_factory=list)
 
     def finish_look(self, job: Job, lighting: Lighting, bases: Sequence[Basis]) -> None:
         """Write the variations that are computed from an answer."""
@@ -52,25 +52,27 @@ class LookSet:
             self.entries.append(entry_of(job, place.folder, word))
             files = [file for file in place.files if file.is_file()]
             relation = {"variation": word, "of": str(job.folder)}
-            self.shifted.append(files_document(place.folder, files, **relation))
+            self.shifted_looks.append(files_document(place.folder, files, **relation))
 
     def continues_after(self, job: Job, error: Exception) -> bool:
         """Return True if the other looks are solved in spite of an error."""
         if not self.keep_going or is_disk_full(error):
             return False
         self._enter(job)
-        self.failed[job.folder.name] = str(error)
+        self.failures[job.folder.name] = str(error)
         return True
 
     def show(self, bases: Sequence[Basis]) -> None:
         """Print the failures, and write the gallery."""
-        for name, reason in self.failed.items():
+        for name, reason in self.failures.items():
             terminal.complain("solve", f"{name}: {reason}")
         if self.gallery is None:
             return
         entry_names = {entry.name for entry in self.entries}
-        lost = [LookEntry(name, "") for name in self.failed if name not in entry_names]
-        rows = write_solve_gallery(self.gallery, [*self.entries, *lost], self.failed, bases)
+        failed_entries = [LookEntry(name, "") for name in self.failures if name not in entry_names]
+        rows = write_solve_gallery(
+            self.gallery, [*self.entries, *failed_entries], self.failures, bases
+        )
         terminal.write(f"{self.gallery / FILES[0]}: {counts_text(rows)}")
 
     def _enter(self, job: Job) -> None:
@@ -81,7 +83,7 @@ class LookSet:
 def look_set(
     jobs: Sequence[Job],
     words: Sequence[str],
-    failed: dict[str, str],
+    failures: dict[str, str],
     *,
     output: Path | None,
     keep_going: bool,
@@ -89,7 +91,7 @@ def look_set(
 ) -> tuple[list[Job], LookSet]:
     """Return all jobs, variations after the looks that they vary, and the set of looks.
 
-    words: variations. failed: receives the reason of each failure, by the name of the folder, if
+    words: variations. failures: receives the reason of each failure, by the name of the folder, if
     the others go on. output: the option's value.
     """
     _check_apart([job.folder for job in jobs], words)
@@ -102,13 +104,13 @@ def look_set(
         except LOOK_ERRORS as error:
             if not keep_going:
                 raise
-            failed[job.folder.name] = str(error)
+            failures[job.folder.name] = str(error)
             continue
         all_jobs += [job, *variations.values()]
         variation_names |= {sibling.folder: word for word, sibling in variations.items()}
         derived_folders[job.folder] = places
     gallery = _gallery_folder(output, [job.folder for job in jobs], force=force)
-    return all_jobs, LookSet(gallery, keep_going, variation_names, derived_folders, failed)
+    return all_jobs, LookSet(gallery, keep_going, variation_names, derived_folders, failures)
 
 
 def _check_apart(folders: Sequence[Path], words: Sequence[str]) -> None:
@@ -128,9 +130,9 @@ def _gallery_folder(output: Path | None, folders: Sequence[Path], *, force: bool
     """
     place = folders[0].parent if folders else output or Path()
     try:
-        if reserved := next((x.name for x in folders if is_reserved(x.name)), ""):
+        if reserved_name := next((x.name for x in folders if is_reserved(x.name)), ""):
             raise OutputError(
-                f"{reserved} is a folder of the gallery of several looks: give the "
+                f"{reserved_name} is a folder of the gallery of several looks: give the "
                 "painting another name"
             )
         check_gallery(place, force=force)

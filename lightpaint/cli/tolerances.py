@@ -31,7 +31,11 @@ class Tolerances:
 
     def document(self, appearance: Appearance) -> dict[str, object]:
         """Return the requirements and whether they are met, for programs."""
-        required = {"max_miss": self.max_miss, "min_fit": self.min_fit}
-        if not (required := {name: value for name, value in required.items() if value is not None}):
+        requirements = {"max_miss": self.max_miss, "min_fit": self.min_fit}
+        if not (
+            requirements := {
+                name: value for name, value in requirements.items() if value is not None
+            }
+        ):
             return {}
-        return {"asked": required, "is_met": not self.shortfalls(appearance)}
+        return {"asked": requirements, "is_met": not self.shortfalls(appearance)}

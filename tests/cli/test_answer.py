@@ -15,7 +15,7 @@ from rich.cells import cell_len
 from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.basis.lights import BasisLight
 from lightpaint.cli import main
-from lightpaint.cli.commands.answer_text import _what_holds, change
+from lightpaint.cli.commands.answer_text import _limit_sentences, change
 from lightpaint.cli.options.job_options import BY_OPTION
 from lightpaint.cli.output import terminal
 from lightpaint.cli.output.vocabulary import spoken
@@ -226,5 +226,5 @@ def test_what_holds_the_lights_is_said_with_its_option(reason: Reason, where: st
         solution=SimpleNamespace(problem=SimpleNamespace(constraints=constraints)),
         analysis=SimpleNamespace(appearance=SimpleNamespace(reasons=(reason,))),
     )
-    [sentence] = _what_holds(look)  # type: ignore[arg-type]
+    [sentence] = _limit_sentences(look)  # type: ignore[arg-type]
     assert said in spoken(sentence)

@@ -198,7 +198,7 @@ sys.exit(main())
     ("module", "number"),
     [
         ("lightpaint.cli.options.parser", signal.SIGINT),
-        ("lightpaint.cli.commands.lights", signal.SIGTERM),
+        ("lightpaint.cli.commands.lights_command", signal.SIGTERM),
         ("numpy", signal.SIGINT),
         ("mitsuba", signal.SIGINT),
     ],

@@ -27,7 +27,7 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
 from lightpaint.basis.file.basis_file import write_basis
-from lightpaint.cli.commands.paint import solve_command
+from lightpaint.cli.commands.paint_command import command_for_paintings
 from lightpaint.cli.options.command_arguments import values_of
 from lightpaint.cli.options.job_options import settings_of
 from lightpaint.cli.options.parser import command_parser
@@ -105,7 +105,7 @@ def test_several_views_are_named_by_sensors_or_are_bases(make_basis: Any) -> Non
     ]
     assert values["options"] == ("--spp=8",)
     paintings = {"a": "x/painting-a.exr", "b c": "x/painting-b c.exr"}
-    command = solve_command("scene.xml", paintings, values["options"], SessionRequests())
+    command = command_for_paintings("scene.xml", paintings, values["options"], SessionRequests())
     words = shlex.split(command)[1:]
     options = command_parser().parse_args(words)
     assert options.views == list(paintings.items())

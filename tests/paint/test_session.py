@@ -14,7 +14,7 @@ from renderer import REPOSITORY
 import lightpaint as lp
 from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.origin import Origin
-from lightpaint.cli.commands.paint import options_of
+from lightpaint.cli.commands.paint_command import options_of
 from lightpaint.colour.color import LUMINANCE, kelvin_to_rgb
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import DEFAULT_HOLD

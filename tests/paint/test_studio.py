@@ -21,7 +21,7 @@ from lightpaint.basis.cache.denoised_planes import (
     cache_denoised_planes,
     read_denoised_planes,
 )
-from lightpaint.cli.commands.paint import solve_command
+from lightpaint.cli.commands.paint_command import command_for_paintings
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.paint import protocol, subject
 from lightpaint.paint.protocol import Message
@@ -41,7 +41,7 @@ class IncomingMessage:
     """A studio of saved bases, and all that it says."""
 
     def __init__(self, folder: Path, *bases: lp.Basis, scene: Any = None) -> None:
-        command = partial(solve_command, "room.basis.exr")
+        command = partial(command_for_paintings, "room.basis.exr")
         how = {"command": lambda paths, requests: command(paths, (), requests), "scene": scene}
         subjects = [Subject(f"view {k}", folder, basis=its, **how) for k, its in enumerate(bases)]
         self.messages: list[Message] = []

@@ -35,16 +35,16 @@ from lightpaint.screen import some_names, some_of
 Table = Literal["short", "full"]
 
 #: Largest number of lights that are all shown; of more, this number of the most important ones.
-ALL, MOST = 16, 10
+MAX_FULL_LIGHTS, SHORT_LIST_LIGHTS = 16, 10
 
 #: Width of a name in a table that fits 80 columns with a swatch.
-NAME = 30
+NAME_WIDTH = 30
 
 #: Share of its present emission at which a light counts as off.
-OFF = 2.0**-10
+OFF_SHARE = 2.0**-10
 
 #: Largest distance from Planck's locus of a colour that is shown as a temperature.
-WHITE = 0.02
+WHITE_MAX_DUV = 0.02
 
 
 def show_look(look: Look, folder: Path, *, table: Table = "short") -> None:
@@ -61,10 +61,10 @@ def show_look(look: Look, folder: Path, *, table: Table = "short") -> None:
     terminal.tell(fit_sentence(look.solution, instead="--literal turns this off"))
     certificate = look.solution.certificate
     if curve := certificate.curve:
-        listed = ", ".join(f"{100 * missed:.1f} % with {count}" for count, missed in curve)
-        terminal.write(f"missed of the painting (RMS, with noise), by number of lights: {listed}")
+        counts_text = ", ".join(f"{100 * missed:.1f} % with {count}" for count, missed in curve)
+        terminal.write(f"RMS miss of the painting, with noise, by number of lights: {counts_text}")
     terminal.write(f"results in {folder}{'' if str(folder).endswith('/') else '/'}")
-    if note := left_open(look):
+    if note := undetermined_remark(look):
         terminal.say(note)
     if not certificate.converged:
         terminal.say(
@@ -76,20 +76,17 @@ def show_look(look: Look, folder: Path, *, table: Table = "short") -> None:
 
 
 def _sentences(look: Look, table: Table) -> list[str]:
-    """Return the main limit on the lights and better colours; in full, all causes and certainty
-    too.
+    """Return the main reason why the answer is not closer, and whether other colours are closer.
 
-    They end with options to change.
-
-    And if other colours come closer.
+    In full, return all reasons and the certainty. Sentences end with the options to change.
     """
     choice = closer_choice(look.analysis.color_choices)
     closer = [f"Other colours come closer: --colors {choice}."] if choice else []
     if table == "short":
         is_told = not look.analysis.appearance.is_close
-        return [*(_what_holds(look)[:1] if is_told else []), *closer]
+        return [*(_limit_sentences(look)[:1] if is_told else []), *closer]
     sentences = [
-        *error_sentences(look.diagnosis, look.analysis.appearance, holds=_what_holds(look)),
+        *error_sentences(look.diagnosis, look.analysis.appearance, holds=_limit_sentences(look)),
         *closer,
     ]
     if look.uncertainty is not None:
@@ -97,7 +94,7 @@ def _sentences(look: Look, table: Table) -> list[str]:
     return sentences
 
 
-def _what_holds(look: Look) -> list[str]:
+def _limit_sentences(look: Look) -> list[str]:
     """Return the reasons that keep the lights from the painting, the main first, with options."""
     if not look.analysis.appearance.reasons:
         return bound_sentences(look.diagnosis)
@@ -111,9 +108,9 @@ def _spoken_cause(look: Look, reason: Reason) -> str:
     keys = KEYS_BY_KIND.get(reason.kind, ())
     options = [
         f"--{'limit' if key == 'limits' else key} {name}"
-        for name, wish, origin in look.solution.problem.constraints.lights
+        for name, constraint, origin in look.solution.problem.constraints.lights
         for key in keys
-        if key in wish
+        if key in constraint
         and key != "duv"
         and origin.startswith(BY_OPTION)
         and any(name == light or fnmatchcase(light, name) for light in reason.names)
@@ -129,12 +126,11 @@ def spoken_settings(settings: Settings) -> str:
     transform = values.pop("transform")
     values |= {"view": transform and spoken_view(transform), "command": None}
     # Mention skipped stages, but not stages that always run.
-    chosen = {name: value for name, value in values.items() if value not in (None, "")}
-    chosen = {name: value for name, value in chosen.items() if name not in ("verify", "report")}
-    return ", ".join(f"{name} {value}" for name, value in chosen.items() if value is not False)
+    given = {k: v for k, v in values.items() if v is not False and v not in (None, "")}
+    return ", ".join(f"{k} {v}" for k, v in given.items() if k not in ("verify", "report"))
 
 
-def left_open(look: Look) -> str:
+def undetermined_remark(look: Look) -> str:
     """Return one line on lights that the painting does not determine; "" if there are none."""
     unreached = look.solution.certificate.unreached
     dark = [name for name in unreached if not look.basis.image(name).any()]
@@ -150,13 +146,13 @@ def left_open(look: Look) -> str:
 
 def _show_short(look: Look) -> None:
     """Print a row for each important light, in 80 columns, and a summary of the others."""
-    lights, present = look.lighting.lights, look.basis.lights
+    lights, present_lights = look.lighting.lights, look.basis.lights
     shares = energy_shares(look.basis, look.lighting)
     errors = spoken_errors(look.uncertainty, len(shares))
     important = _important_lights(look)
     table, swatches = terminal.table("light", "stops", "colour", "±", "share"), []
     for k in important:
-        change_text = change(present[k], lights[k])
+        change_text = change(present_lights[k], lights[k])
         is_off = change_text == "off"
         swatches.append(None if is_off else _color(look, lights[k]))
         table.row(
@@ -165,13 +161,13 @@ def _show_short(look: Look) -> None:
             "" if is_off else _spoken_color(look, lights[k]),
             errors[k],
             f"{100 * shares[k]:.1f} %",
-            room=NAME,
+            room=NAME_WIDTH,
         )
     terminal.print_table(table, swatches)
     if note := untold_lights(look.lighting):
         terminal.tell(note)
-    if rest := sorted(set(range(len(lights))) - set(important)):
-        terminal.tell(_spoken_rest(look, rest))
+    if other_indices := sorted(set(range(len(lights))) - set(important)):
+        terminal.tell(_other_lights_text(look, other_indices))
     if any(lights[k].is_active for k in important):
         terminal.write("* limited by a constraint (--table full shows which)")
 
@@ -179,27 +175,28 @@ def _show_short(look: Look) -> None:
 def _important_lights(look: Look) -> list[int]:
     """Return indices of the lights that matter or changed most in the picture, in order."""
     weights = look.solution.weights
-    if len(weights) <= ALL:
+    if len(weights) <= MAX_FULL_LIGHTS:
         return list(range(len(weights)))
     change_size = np.abs(weights - look.basis.present_weights)
     power = (change_size + weights) * look.basis.totals @ LUMINANCE
-    return sorted(np.argsort(-power, kind="stable")[:MOST].tolist())
+    return sorted(np.argsort(-power, kind="stable")[:SHORT_LIST_LIGHTS].tolist())
 
 
-def _spoken_rest(look: Look, rest: list[int]) -> str:
+def _other_lights_text(look: Look, other_indices: list[int]) -> str:
     """Return the number of other lights, their changes, and their share of the picture."""
-    changes = [change(look.basis.lights[k], look.lighting.lights[k]) for k in rest]
+    light_changes = [change(look.basis.lights[k], look.lighting.lights[k]) for k in other_indices]
     counts = {
-        "off": changes.count("off"),
-        "switched on": changes.count("on"),
-        "kept": changes.count("kept"),
-        "brighter": sum(x.startswith("+") for x in changes),
-        "dimmer": sum(x.startswith("−") for x in changes),
-        "as they were": changes.count("0.0"),
+        "off": light_changes.count("off"),
+        "switched on": light_changes.count("on"),
+        "kept": light_changes.count("kept"),
+        "brighter": sum(x.startswith("+") for x in light_changes),
+        "dimmer": sum(x.startswith("−") for x in light_changes),
+        "as they were": light_changes.count("0.0"),
     }
     text = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
-    share = energy_shares(look.basis, look.lighting)[rest].sum()
-    return f"and {len(rest)} more ({text}): together {spoken_percent(float(share))} of the picture"
+    share = energy_shares(look.basis, look.lighting)[other_indices].sum()
+    percent = spoken_percent(float(share))
+    return f"and {len(other_indices)} more ({text}): together {percent} of the picture"
 
 
 def change(light: BasisLight, setting: LightSetting) -> str:
@@ -207,7 +204,7 @@ def change(light: BasisLight, setting: LightSetting) -> str:
     if light.is_fixed or not any(setting.reached):
         return "kept"
     before, after = (float(luminance(np.array(x.emission))) for x in (light, setting))
-    if after <= OFF * before:
+    if after <= OFF_SHARE * before:
         return "off"
     if before == 0:
         return "on"
@@ -230,7 +227,7 @@ def _spoken_color(look: Look, light: LightSetting) -> str:
     is_white = (
         appearance.kelvin is not None
         and appearance.duv is not None
-        and abs(appearance.duv) <= WHITE
+        and abs(appearance.duv) <= WHITE_MAX_DUV
     )
     return f"{appearance.kelvin:.0f} K" if is_white else appearance.hex
 
@@ -244,13 +241,15 @@ def _show_all(look: Look) -> None:
     columns = ["constraint (* limits it)"] if has_constraints else []
     table = terminal.table(*headings, *amounts, *columns)
     errors = spoken_errors(look.uncertainty, len(shares))
-    for k, (light, now) in enumerate(zip(look.lighting.lights, look.basis.lights, strict=True)):
+    for k, (light, present_light) in enumerate(
+        zip(look.lighting.lights, look.basis.lights, strict=True)
+    ):
         appearance = look.lighting.photometry(light)
         table.row(
             light.name,
             light.plugin,
-            "" if light.is_fixed else terminal.numbers(now.emission),
-            "kept" if light.is_fixed else _solved(light),
+            "" if light.is_fixed else terminal.numbers(present_light.emission),
+            "kept" if light.is_fixed else _emission_text(light),
             errors[k],
             "" if light.is_fixed else light.unit,
             f"{100 * shares[k]:.1f} %",
@@ -261,11 +260,11 @@ def _show_all(look: Look) -> None:
     terminal.print_table(table)
 
 
-def _solved(light: LightSetting) -> str:
+def _emission_text(light: LightSetting) -> str:
     if not any(light.emission):
         return "off"
-    solved = terminal.numbers(light.emission)
+    emission_text = terminal.numbers(light.emission)
     if all(light.reached):
-        return solved
+        return emission_text
     note = f"{unreached_channels(light)} kept" if any(light.reached) else "kept"
-    return f"{solved} ({note})"
+    return f"{emission_text} ({note})"

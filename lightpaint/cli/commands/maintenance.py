@@ -22,17 +22,19 @@ def cache(*, action: str, names: Sequence[str]) -> CommandOutcome:
         tables.show_kept(listed_entries)
         size = sum(entry.size for entry in listed_entries) / 1e6
         terminal.write(f"kept in {folder()}: {size:.0f} of at most {bases.MAX_BYTES / 1e6:.0f} MB")
-        listed = [documents.kept_document(entry) for entry in reversed(listed_entries)]
-        return CommandOutcome(lambda: {**fields, "kept": listed})
-    dropped = bases.entries() if action == "clear" else _kept_by_names(names)
-    freed = bases.delete_entries(dropped)
+        kept_documents = [documents.kept_document(entry) for entry in reversed(listed_entries)]
+        return CommandOutcome(lambda: {**fields, "kept": kept_documents})
+    deleted = bases.entries() if action == "clear" else _kept_by_names(names)
+    freed_bytes = bases.delete_entries(deleted)
     if action == "clear":
-        freed += delete_orphans()
+        freed_bytes += delete_orphans()
     if action == "drop":
-        tables.show_kept(dropped)
-    terminal.write(f"{len(dropped)} deleted from {folder()}: {freed / 1e6:.1f} MB are free")
-    deleted = [documents.kept_document(entry) for entry in dropped]
-    return CommandOutcome(lambda: {"folder": str(folder()), "dropped": deleted, "freed": freed})
+        tables.show_kept(deleted)
+    terminal.write(f"{len(deleted)} deleted from {folder()}: {freed_bytes / 1e6:.1f} MB are free")
+    deleted_documents = [documents.kept_document(entry) for entry in deleted]
+    return CommandOutcome(
+        lambda: {"folder": str(folder()), "dropped": deleted_documents, "freed": freed_bytes}
+    )
 
 
 def _kept_by_names(names: Sequence[str]) -> list[bases.Entry]:

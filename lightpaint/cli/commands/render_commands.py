@@ -8,8 +8,8 @@ from typing import Any
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file.basis_file import write_basis
-from lightpaint.cli.commands.lights import note_scene
-from lightpaint.cli.commands.solve import solve
+from lightpaint.cli.commands.lights_command import note_scene
+from lightpaint.cli.commands.solve_command import solve
 from lightpaint.cli.options.job_options import folders_of, is_folder
 from lightpaint.cli.output import documents, tables, terminal
 from lightpaint.cli.output.output_mode import CommandOutcome
@@ -53,19 +53,23 @@ def basis(*, scene: SceneFile, output: Path, settings: Settings) -> CommandOutco
     if output.suffix.lower() != ".exr":
         raise OutputError(f"{output} must end in .exr: a basis is an EXR")
     check_writable(output.parent)
-    loaded = on_film(scene.content, settings.quality, settings.resolution)
-    note_scene(loaded)
-    check_files([output], loaded.read_files)
+    scene_on_film = on_film(scene.content, settings.quality, settings.resolution)
+    note_scene(scene_on_film)
+    check_files([output], scene_on_film.read_files)
     with terminal.TerminalListener() as listen:
-        of_film = remarks_of_film(loaded, settings)
-        for remark in (*remarks_of_scene(loaded), *of_film, *remarks_of_memory(loaded)):
+        of_film = remarks_of_film(scene_on_film, settings)
+        for remark in (
+            *remarks_of_scene(scene_on_film),
+            *of_film,
+            *remarks_of_memory(scene_on_film),
+        ):
             listen.say(remark)
-        rendered = obtain(loaded, settings, listen)
-    write_basis(output, rendered)
-    note = " and what is kept" if rendered.is_fixed.any() else ""
-    count = int((~rendered.is_fixed).sum())
-    terminal.write(f"{output}: {count} lights{note}, {rendered.origin.spp} samples per pixel")
-    return CommandOutcome(lambda: documents.basis_document(output, rendered))
+        basis_on_film = obtain(scene_on_film, settings, listen)
+    write_basis(output, basis_on_film)
+    note = " and what is kept" if basis_on_film.is_fixed.any() else ""
+    count = int((~basis_on_film.is_fixed).sum())
+    terminal.write(f"{output}: {count} lights{note}, {basis_on_film.origin.spp} samples per pixel")
+    return CommandOutcome(lambda: documents.basis_document(output, basis_on_film))
 
 
 def template(
@@ -80,10 +84,10 @@ def template(
     _check_template(output, force=force)
     if not isinstance(source, SceneFile):
         return _template_of_basis(source, output, transform, settings)
-    loaded = on_film(source.content, settings.quality, settings.resolution)
-    note_scene(loaded)
-    check_files(_replaced(output), loaded.read_files)
-    for remark in remarks_of_film(loaded, settings):
+    scene_on_film = on_film(source.content, settings.quality, settings.resolution)
+    note_scene(scene_on_film)
+    check_files(_replaced_files(output), scene_on_film.read_files)
+    for remark in remarks_of_film(scene_on_film, settings):
         terminal.say(remark)
     options: dict[str, Any] = {
         "transform": transform,
@@ -93,12 +97,12 @@ def template(
         "use_cache": settings.use_cache,
     }
     with terminal.TerminalListener() as listen:
-        for remark in remarks_of_scene(loaded, is_rendered=False):
+        for remark in remarks_of_scene(scene_on_film, is_rendered=False):
             listen.say(remark)
         if is_folder(output):
-            files = render_template(loaded, output, progress=listen, **options)
+            files = render_template(scene_on_film, output, progress=listen, **options)
         else:
-            files = [output, render_look(loaded, output, progress=listen, **options)]
+            files = [output, render_look(scene_on_film, output, progress=listen, **options)]
     return _show_template(output, files)
 
 
@@ -113,7 +117,8 @@ def _template_of_basis(
     content = source.content
     basis = content if isinstance(content, Basis) else content.basis
     check_files(
-        _replaced(output), [Path(source.path)] if isinstance(content, Basis) else content.files
+        _replaced_files(output),
+        [Path(source.path)] if isinstance(content, Basis) else content.files,
     )
     if not isinstance(content, Basis):
         for remark in content.remarks:
@@ -135,8 +140,8 @@ def _show_template(
     for line in template_lines(output, files, is_denoised=is_denoised):
         terminal.write(line)
     folder = output if is_tree else output.parent
-    shown = {"picture": str(picture), "light": str(linear)}
-    return CommandOutcome(lambda: documents.files_document(folder, files, **shown))
+    paths = {"picture": str(picture), "light": str(linear)}
+    return CommandOutcome(lambda: documents.files_document(folder, files, **paths))
 
 
 def template_lines(output: Path, files: Sequence[Path], *, is_denoised: bool = True) -> list[str]:
@@ -164,25 +169,29 @@ def template_lines(output: Path, files: Sequence[Path], *, is_denoised: bool = T
 
 def demo(*, folder: Path, variant: str | None, settings: Settings) -> CommandOutcome:
     """Run `lightpaint demo -o DIR`."""
-    written = write_demo(folder)
+    demo_files = write_demo(folder)
     options = [f"--spp {settings.spp}"] if settings.spp else []
     options += [f"-m {variant}"] if variant else []
-    files = shlex.join(map(str, (written.scene, written.painting, "-o", written.answer)))
+    files = shlex.join(map(str, (demo_files.scene, demo_files.painting, "-o", demo_files.answer)))
     command = " ".join(("lightpaint solve", files, *options))
     terminal.say(
         f"wrote a gallery and a painting of it in the evening to {folder}; this solves for it:"
     )
     terminal.say(command)
-    scene = SceneFile(str(written.scene), variant=variant)
+    scene = SceneFile(str(demo_files.scene), variant=variant)
     settings = replace(settings, command=from_any_folder(command))
-    painting = Painting(str(written.painting))
-    solved = solve(jobs=[Job((scene,), (painting,), written.answer, settings=settings)])
+    painting = Painting(str(demo_files.painting))
+    outcome = solve(jobs=[Job((scene,), (painting,), demo_files.answer, settings=settings)])
     terminal.write("")
-    terminal.write(f"Open {written.answer / 'report.html'} in a browser. Then paint your own:")
-    terminal.write(f"lightpaint template {shlex.quote(str(written.scene))}")
-    fields = {"scene": str(written.scene), "painting": str(written.painting), "command": command}
-    results = solved.document
-    return replace(solved, document=lambda: fields | (results() if results is not None else {}))
+    terminal.write(f"Open {demo_files.answer / 'report.html'} in a browser. Then paint your own:")
+    terminal.write(f"lightpaint template {shlex.quote(str(demo_files.scene))}")
+    fields = {
+        "scene": str(demo_files.scene),
+        "painting": str(demo_files.painting),
+        "command": command,
+    }
+    results = outcome.document
+    return replace(outcome, document=lambda: fields | (results() if results is not None else {}))
 
 
 def relight(
@@ -194,20 +203,20 @@ def relight(
     answers = [read_lighting(path) for path in lightings]
     names = [a.target or path.stem for a, path in zip(answers, lightings, strict=True)]
     folders = folders_of(output, names)
-    loaded = _loaded(scene)
+    scene_on_film = _loaded(scene)
     results = [
-        relit_folder(loaded, path, folder, force=settings.force)
+        relit_folder(scene_on_film, path, folder, force=settings.force)
         for path, folder in zip(lightings, folders, strict=True)
     ]
     for place in results:
         place.check()
     for lighting, place in zip(answers, results, strict=True):
         folder = place.folder
-        if lighting.scene_identity not in ("", scene_of(loaded, lighting).identity):
+        if lighting.scene_identity not in ("", scene_of(scene_on_film, lighting).identity):
             terminal.say(f"{folder}: the lighting was solved for an earlier state of the scene")
         with terminal.TerminalListener() as listen:
             options: dict[str, Any] = {"spp": settings.spp, "seed": settings.seed}
-            relight_look({"": loaded}, lighting, place, progress=listen, **options)
+            relight_look({"": scene_on_film}, lighting, place, progress=listen, **options)
             listen.note(f"{folder} relit and rendered")
         terminal.write(f"{folder}: relit.xml, relit.exr, relit.png")
     return CommandOutcome(
@@ -246,8 +255,8 @@ def _check_template(output: Path, *, force: bool) -> None:
     """Raise OutputError if a template cannot or should not be written there."""
     is_tree = is_folder(output)
     check_name(output)
-    check_files(_replaced(output), ())
-    for file in _replaced(output):
+    check_files(_replaced_files(output), ())
+    for file in _replaced_files(output):
         if file.exists() and not force:
             raise OutputError(
                 f"{file} exists and may have been painted on: choose another name with -o, or "
@@ -263,7 +272,7 @@ def _check_template(output: Path, *, force: bool) -> None:
     check_writable(output if is_tree else output.parent)
 
 
-def _replaced(output: Path) -> list[Path]:
+def _replaced_files(output: Path) -> list[Path]:
     """Return the files that a template at `output` may replace."""
     if not is_folder(output):
         return [output, output.with_suffix(".png")]
@@ -273,8 +282,8 @@ def _replaced(output: Path) -> list[Path]:
 
 def _loaded(scene: SceneFile) -> Scene:
     """Return the scene, without remarks on single lights."""
-    loaded = scene.content
-    note_scene(loaded)
+    scene_on_film = scene.content
+    note_scene(scene_on_film)
     if note := use_variant().note:
         terminal.say(note)
-    return loaded
+    return scene_on_film

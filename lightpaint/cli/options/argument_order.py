@@ -36,11 +36,11 @@ class CommandParser(Parser):
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Parse arguments as argparse does, but report unknown ones with this command's help."""
-        ordered = in_order(self, args or ())
-        options, unknown = argparse.ArgumentParser.parse_known_args(self, ordered, namespace)
-        if unknown:
-            self.error(f"unrecognized arguments: {' '.join(unknown)}")
-        return options, unknown
+        words = in_order(self, args or ())
+        options, unknown_words = argparse.ArgumentParser.parse_known_args(self, words, namespace)
+        if unknown_words:
+            self.error(f"unrecognized arguments: {' '.join(unknown_words)}")
+        return options, unknown_words
 
 
 def in_order(parser: argparse.ArgumentParser, words: Sequence[str]) -> list[str]:
@@ -49,37 +49,37 @@ def in_order(parser: argparse.ArgumentParser, words: Sequence[str]) -> list[str]
     An option without its value comes last, so that it takes nothing else, and completion, which
     sees only the words so far, knows that it needs one.
     """
-    plain: list[str] = []
+    paths: list[str] = []
     options: list[str] = []
-    incomplete: list[str] = []
-    for _, parts, is_open in _split(parser, words, plain):
-        (incomplete if is_open else options).extend(parts)
-    if any(word.startswith("-") for word in plain):
-        return [*options, *incomplete, "--", *plain]
-    return [*options, *plain, *incomplete]
+    incomplete_options: list[str] = []
+    for _, parts, is_open in _split(parser, words, paths):
+        (incomplete_options if is_open else options).extend(parts)
+    if any(word.startswith("-") for word in paths):
+        return [*options, *incomplete_options, "--", *paths]
+    return [*options, *paths, *incomplete_options]
 
 
 def options_but(
-    parser: argparse.ArgumentParser, words: Sequence[str], *dropped: str
+    parser: argparse.ArgumentParser, words: Sequence[str], *excluded: str
 ) -> tuple[str, ...]:
-    """Return the words of all options but those that go to `dropped`, quoted for a shell."""
+    """Return the words of all options but those that go to `excluded`, quoted for a shell."""
     options = _split(parser, words, [])
-    remaining = [parts for option, parts, _ in options if option and option.dest not in dropped]
-    return tuple(shlex.quote(part) for parts in remaining for part in parts)
+    kept_options = [parts for option, parts, _ in options if option and option.dest not in excluded]
+    return tuple(shlex.quote(part) for parts in kept_options for part in parts)
 
 
 def _split(
-    parser: argparse.ArgumentParser, words: Sequence[str], plain: list[str]
+    parser: argparse.ArgumentParser, words: Sequence[str], paths: list[str]
 ) -> Iterator[tuple[argparse.Action | None, list[str], bool]]:
-    """Yield each option, its words, and whether it lacks its value; others go to `plain`."""
+    """Yield each option, its words, and whether it lacks its value; others go to `paths`."""
     remaining = [*words]
     while remaining:
         word = remaining.pop(0)
         if word == "--":
-            plain += remaining
+            paths += remaining
             return
         if _is_plain(word):
-            plain.append(word)
+            paths.append(word)
             continue
         option = _option(parser, word)
         parts = _with_value(option, word, remaining)
@@ -100,16 +100,16 @@ def _option(parser: argparse.ArgumentParser, word: str) -> argparse.Action | Non
     return next(iter(matches.values())) if len(matches) == 1 else None
 
 
-def _with_value(action: argparse.Action | None, word: str, left: list[str]) -> list[str]:
-    """Return the words of an option: itself, and its value from `left` if it takes one."""
+def _with_value(action: argparse.Action | None, word: str, next_words: list[str]) -> list[str]:
+    """Return the words of an option: itself, and its value from `next_words` if it takes one."""
     if action is None or action.nargs not in (None, "?"):
         return [word]
     if action.nargs == "?":
         # An option with an optional value takes a number, but no path.
-        is_given = bool(left) and _NUMBER.fullmatch(left[0]) is not None
-        value = left.pop(0) if is_given else str(action.const)
-    elif left and _is_plain(left[0]):
-        value = left.pop(0)
+        is_given = bool(next_words) and _NUMBER.fullmatch(next_words[0]) is not None
+        value = next_words.pop(0) if is_given else str(action.const)
+    elif next_words and _is_plain(next_words[0]):
+        value = next_words.pop(0)
     else:
         return [word]
     if word.startswith("--"):

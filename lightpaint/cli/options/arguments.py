@@ -38,7 +38,7 @@ def group(text: str) -> tuple[str, list[str]]:
     return name.strip(), names_of(members)
 
 
-def named(text: str) -> tuple[str, Any]:
+def light_value(text: str) -> tuple[str, Any]:
     """Parse a value for a light, `NAME=VALUE`."""
     name, equals, value = text.rpartition("=")
     if not name.strip() or not equals or not value.strip():
@@ -57,18 +57,18 @@ def _value(text: str) -> Any:
 
 def lock(text: str) -> tuple[str, Any]:
     """Parse a light to keep as it is, `NAME_FIELD`, or at a level, `NAME=LEVEL`."""
-    return named(text) if "=" in text else (text.strip(), True)
+    return light_value(text) if "=" in text else (text.strip(), True)
 
 
 def limits(text: str) -> tuple[str, dict[str, Any]]:
     """Parse levels to stay between, `NAME=MIN:MAX`."""
     if "=" not in text:
         raise argparse.ArgumentTypeError(f"{text!r} is not NAME=MIN:MAX")
-    name, value = named(text)
-    least, colon, most = str(text.rpartition("=")[2]).partition(":")
+    name, value = light_value(text)
+    min_text, colon, max_text = str(text.rpartition("=")[2]).partition(":")
     if not colon:
         raise argparse.ArgumentTypeError(f"{value!r} is not MIN:MAX; one of them may be left out")
-    return name, {k: _value(v) for k, v in (("min", least), ("max", most)) if v.strip()}
+    return name, {k: _value(v) for k, v in (("min", min_text), ("max", max_text)) if v.strip()}
 
 
 def kelvin(text: str) -> tuple[str, list[float], float | None]:
@@ -76,7 +76,7 @@ def kelvin(text: str) -> tuple[str, list[float], float | None]:
     try:
         main, comma, option = text.partition(",")
         key, _, duv = option.partition("=")
-        name, value = named(main)
+        name, value = light_value(main)
         ends = [float(end.strip().upper().removesuffix("K")) for end in value.split(":")]
         if comma and key.strip() != "duv":
             raise ValueError(key)
@@ -90,8 +90,10 @@ def kelvin(text: str) -> tuple[str, list[float], float | None]:
 class Kelvin(argparse.Action):
     """An action that stores temperatures in `kelvin` and distances from the locus in `duv`."""
 
-    def __call__(self, _parser: Any, options: argparse.Namespace, given: Any, *_: Any) -> None:
-        name, ends, duv = given
+    def __call__(
+        self, _parser: Any, options: argparse.Namespace, parsed_value: Any, *_: Any
+    ) -> None:
+        name, ends, duv = parsed_value
         options.kelvin = [*options.kelvin, (name, ends)]
         # The last option of a light counts, even if it has no duv.
         options.duv = [entry for entry in options.duv if entry[0] != name]
@@ -100,7 +102,7 @@ class Kelvin(argparse.Action):
 
 def move(text: str) -> tuple[str, Any]:
     """Parse where a light may go, `NAME=METRES` or `NAME=@RAIL`."""
-    name, value = named(text)
+    name, value = light_value(text)
     if isinstance(value, str) and value.startswith("@") and value[1:].strip():
         return name, {"on": value[1:].strip()}
     return name, _number_of(text, value, "NAME=1.0, in units of the scene, or NAME=@RAIL")
@@ -108,24 +110,31 @@ def move(text: str) -> tuple[str, Any]:
 
 def aim(text: str) -> tuple[str, Any]:
     """Parse how far a light may turn, `NAME=DEGREES` or `NAME=any`."""
-    name, value = named(text)
+    name, value = light_value(text)
     return name, True if value == "any" else _number_of(text, value, "NAME=30 or NAME=any")
 
 
 def cone(text: str) -> tuple[str, list[float]]:
     """Parse how wide a spot may open, `NAME=LEAST:MOST`."""
-    name, value = named(text)
-    least, colon, most = str(value).partition(":")
+    name, value = light_value(text)
+    min_text, colon, max_text = str(value).partition(":")
     expected = "NAME=10:45, in degrees"
-    ends = [_number_of(text, end, expected) for end in ((least, most) if colon else (least,) * 2)]
+    ends = [
+        _number_of(text, end, expected)
+        for end in ((min_text, max_text) if colon else (min_text,) * 2)
+    ]
     return name, ends
 
 
 def new_light(text: str) -> dict[str, Any]:
     """Parse lights to add, `KIND[:COUNT][@WHERE]`."""
-    what, at, where = text.partition("@")
-    kind, colon, count = what.partition(":")
-    if not kind.strip() or (at and not where.strip()) or (colon and not count.strip().isdecimal()):
+    kind_and_count, separator, place = text.partition("@")
+    kind, colon, count = kind_and_count.partition(":")
+    if (
+        not kind.strip()
+        or (separator and not place.strip())
+        or (colon and not count.strip().isdecimal())
+    ):
         raise argparse.ArgumentTypeError(
             f"{text!r} is not KIND, KIND:2 or KIND:2@WHERE, like spot:2@ceiling"
         )
@@ -133,7 +142,7 @@ def new_light(text: str) -> dict[str, Any]:
 
     table: dict[str, Any] = {"kind" if kind in KINDS else "like": kind.strip()}
     table |= {"count": int(count)} if colon else {}
-    return table | ({"on": names_of(where)} if at else {})
+    return table | ({"on": names_of(place)} if separator else {})
 
 
 def _number_of(text: str, value: Any, expected: str) -> float:
@@ -145,15 +154,15 @@ def _number_of(text: str, value: Any, expected: str) -> float:
 
 def primaries(text: str) -> tuple[str, list[str]]:
     """Parse colours to mix, `NAME=COLOR,...`."""
-    name, _ = named(text)
+    name, _ = light_value(text)
     return name, names_of(text.rpartition("=")[2])
 
 
 class at_least:  # noqa: N801 (used as a function)
     """A type for integers with a lower bound, and maybe an upper one."""
 
-    def __init__(self, bound: int, *, most: int | None = None) -> None:
-        self.bound, self.most = bound, most
+    def __init__(self, bound: int, *, maximum: int | None = None) -> None:
+        self.bound, self.maximum = bound, maximum
 
     def __call__(self, text: str) -> int:
         try:
@@ -162,8 +171,10 @@ class at_least:  # noqa: N801 (used as a function)
             value = self.bound - 1
         if value < self.bound:
             raise argparse.ArgumentTypeError(f"{text!r} is not a whole number >= {self.bound}")
-        if self.most is not None and value > self.most:
-            raise argparse.ArgumentTypeError(f"{text!r} is too large: expected at most {self.most}")
+        if self.maximum is not None and value > self.maximum:
+            raise argparse.ArgumentTypeError(
+                f"{text!r} is too large: expected at most {self.maximum}"
+            )
         return value
 
 
@@ -179,22 +190,22 @@ def share(text: str) -> float:
 class number:  # noqa: N801 (used as a function)
     """A type for numbers > 0, or >= 0, up to `maximum`.
 
-    about: the quantity, with a space before.
+    quantity: the quantity, with a space before.
     """
 
     def __init__(
-        self, about: str = "", *, may_be_zero: bool = False, most: float = BRIGHTEST
+        self, quantity: str = "", *, may_be_zero: bool = False, maximum: float = BRIGHTEST
     ) -> None:
-        self.about, self.may_be_zero, self.most = about, may_be_zero, most
+        self.quantity, self.may_be_zero, self.maximum = quantity, may_be_zero, maximum
 
     def __call__(self, text: str) -> float:
         try:
             value = float(text)
         except ValueError:
             value = -1.0
-        if not (0 < value <= self.most or (self.may_be_zero and value == 0)):
+        if not (0 < value <= self.maximum or (self.may_be_zero and value == 0)):
             bound = ">= 0" if self.may_be_zero else "> 0"
-            if value > self.most:
-                bound = f"<= {self.most:g}"
-            raise argparse.ArgumentTypeError(f"{text!r} is not a number{self.about} {bound}")
+            if value > self.maximum:
+                bound = f"<= {self.maximum:g}"
+            raise argparse.ArgumentTypeError(f"{text!r} is not a number{self.quantity} {bound}")
         return value

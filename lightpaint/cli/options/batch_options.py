@@ -14,16 +14,18 @@ def add_batch(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--apart",
         action="store_true",
-        help="with --only: share the folder with others that do other looks at the same time; the "
-        "next run without it writes the gallery",
+        help="with --only: share the folder with processes that do other looks at the same time; "
+        "the next run without this option writes the gallery",
     )
     parser.add_argument(
         "--export",
         choices=("openjd",),
-        help="do nothing, but write an Open Job Description template for a farm to the folder that "
-        "is named behind the manifest",
+        help="write a job for a render farm, as an Open Job Description template, into the "
+        "folder that follows the manifest, and do nothing else",
     )
-    parser.add_argument("--log", metavar="FILE", help="add a line with its time for each step")
+    parser.add_argument(
+        "--log", metavar="FILE", help="append a line with the time of each step to this file"
+    )
     add_force(parser)
 
 
@@ -33,7 +35,7 @@ def _add_looks(parser: argparse.ArgumentParser) -> None:
         "paths",
         metavar="looks.toml",
         nargs="+",
-        help="manifest of looks; with --init a scene, then paintings",
+        help="manifest of looks; with --init a scene, followed by paintings",
     )
     add_output(
         parser,
@@ -42,14 +44,19 @@ def _add_looks(parser: argparse.ArgumentParser) -> None:
         "(default: looks.toml)",
     )
     parser.add_argument(
-        "--init", action="store_true", help="write a first manifest, and do nothing else"
+        "--init",
+        action="store_true",
+        help="write a first manifest for a scene and paintings, and do nothing else",
     )
     parser.add_argument(
         "--dry-run",
         action="store_true",
-        help="only check it, and say what would be done, with time and memory",
+        help="check the manifest and print the steps to do, with estimates of time and memory, "
+        "but do none",
     )
-    parser.add_argument("--only", metavar="PATTERN", help="only looks of such names, like 'dusk-*'")
+    parser.add_argument(
+        "--only", metavar="PATTERN", help="do only looks whose names match, like 'dusk-*'"
+    )
 
 
 def _add_failures(parser: argparse.ArgumentParser) -> None:
@@ -60,17 +67,17 @@ def _add_failures(parser: argparse.ArgumentParser) -> None:
         dest="keep_going",
         action="store_true",
         default=True,
-        help="a look that fails stops no other (default)",
+        help="continue with the other looks after one has failed (default)",
     )
     group.add_argument(
         "--stop-early",
         dest="keep_going",
         action="store_false",
-        help="begin nothing more once a look has failed",
+        help="start nothing more after a look has failed",
     )
     parser.add_argument(
         "--retry",
-        type=arguments.at_least(0, most=100),
+        type=arguments.at_least(0, maximum=100),
         default=0,
         metavar="N",
         help="try a failed step up to N more times (default: %(default)s)",
@@ -81,28 +88,28 @@ def _add_workers(parser: argparse.ArgumentParser) -> None:
     """Add options for workers: local processes, or a cluster."""
     parser.add_argument(
         "--workers",
-        type=arguments.at_least(1, most=1024),
+        type=arguments.at_least(1, maximum=1024),
         default=1,
         metavar="N",
-        help="processes that share the looks; 1 for this one alone (default: %(default)s)",
+        help="number of processes that share the looks (default: %(default)s)",
     )
     parser.add_argument(
         "--cluster",
         metavar="ADDRESS",
-        help="have workers of a Dask cluster do the work, bases in parts among it, by the address "
-        "of its scheduler, like tcp://scheduler:8786",
+        help="let workers of a Dask cluster do the looks, and parts of bases; ADDRESS is that of "
+        "its scheduler, like tcp://scheduler:8786",
     )
     parser.add_argument(
         "--shared-fs",
         dest="shared_fs",
         action="store_true",
-        help="with --cluster: workers see all files under the same paths, so that none is sent",
+        help="with --cluster: send no files, because workers see them all under the same paths",
     )
     parser.add_argument(
         "--task-limit",
         dest="task_limit_s",
         type=arguments.number(" of seconds"),
         metavar="SECONDS",
-        help="with --cluster: a worker that takes longer over something counts as hung, and "
-        "another does it (default: 20 times what it is expected to take, at least 300)",
+        help="with --cluster: give a step to another worker after this time, because the first "
+        "one is probably hung (default: 20 times what it is expected to take, at least 300)",
     )

@@ -41,7 +41,7 @@ def values_of(options: Namespace, words: Sequence[str]) -> dict[str, Any]:
                 "scene": scene_of(options),
                 "cd_per_unit": options.cd_per_unit,
                 "sheet": (output or Path("lights.png")) if is_drawn else None,
-                "is_asked": output is not None,
+                "is_named": output is not None,
                 "force": options.force,
             }
         case "basis":
@@ -66,7 +66,7 @@ def values_of(options: Namespace, words: Sequence[str]) -> dict[str, Any]:
         case "export":
             return {
                 "lighting": Path(options.lighting),
-                "to": options.to,
+                "forms": options.to,
                 "scene": scene_to_export(options),
                 "groups": GroupsFile(options.groups, options.pattern) if options.groups else None,
                 "stage": Path(options.stage) if options.stage else None,
@@ -101,16 +101,16 @@ def _solve_arguments(options: Namespace, settings: Settings) -> dict[str, Any]:
     from lightpaint.batch.manifest.variations import parse_variations
     from lightpaint.cli.solve_variations import look_set
 
-    failed: dict[str, str] = {}
-    jobs, several = look_set(
-        jobs_of(options, settings, failed),
+    failures: dict[str, str] = {}
+    jobs, set_of_looks = look_set(
+        jobs_of(options, settings, failures),
         parse_variations(options.variations),
-        failed,
+        failures,
         output=Path(options.output) if options.output else None,
         keep_going=options.keep_going,
         force=options.force,
     )
-    return {"jobs": jobs, "several": several, **arguments}
+    return {"jobs": jobs, "look_set": set_of_looks, **arguments}
 
 
 def _batch_arguments(options: Namespace) -> dict[str, Any]:
@@ -120,7 +120,7 @@ def _batch_arguments(options: Namespace) -> dict[str, Any]:
         "output": Path(options.output) if options.output else None,
         "is_first": options.init,
         "is_dry": options.dry_run,
-        "only": options.only,
+        "name_pattern": options.only,
         "form": options.export,
         "run_options": _run_options(options),
         "force": options.force,
@@ -133,8 +133,8 @@ def _run_options(options: Namespace) -> "RunOptions":
     from lightpaint.batch.run_options import RunOptions
 
     if options.cluster is None and (options.shared_fs or options.task_limit_s is not None):
-        idle = "--shared-fs" if options.shared_fs else "--task-limit"
-        raise BatchError(f"{idle} concerns workers of a cluster: give --cluster ADDRESS, too")
+        option = "--shared-fs" if options.shared_fs else "--task-limit"
+        raise BatchError(f"{option} concerns workers of a cluster: give --cluster ADDRESS, too")
     if options.cluster is not None and options.workers > 1:
         raise BatchError(
             f"--cluster {options.cluster} and --workers {options.workers}: give one of them"
@@ -161,16 +161,16 @@ def _paint_arguments(
     session_name = f"{scene_name(Path(source.path))}.paint"
     [folder] = folders_of(options.output and Path(options.output), [session_name])
     # The command that the page shows for exported paintings has only options that `solve` knows.
-    dropped = ["output", "new", "host", "port", "with_browser", "view", "exposure"]
-    dropped += ["as_json", "is_quiet", "is_verbose"]
-    dropped += ["lights"] * isinstance(source, GroupsFile) + ["sensors"] * (len(sources) > 1)
+    excluded = ["output", "new", "host", "port", "with_browser", "view", "exposure"]
+    excluded += ["as_json", "is_quiet", "is_verbose"]
+    excluded += ["lights"] * isinstance(source, GroupsFile) + ["sensors"] * (len(sources) > 1)
     return {
         "sources": sources,
         "folder": folder,
         "settings": settings,
         "constraints": constraints,
         "choice": transform_of(options),
-        "options": options_but(options.parser, words[words.index("paint") + 1 :], *dropped),
+        "options": options_but(options.parser, words[words.index("paint") + 1 :], *excluded),
         "new": options.new,
         "host": options.host,
         "port": options.port,

@@ -37,11 +37,11 @@ def settings_of(options: Namespace, words: Sequence[str]) -> Settings:
 
 
 def jobs_of(
-    options: Namespace, settings: Settings, failed: dict[str, str] | None = None
+    options: Namespace, settings: Settings, failures: dict[str, str] | None = None
 ) -> "list[Job]":
     """Return the jobs of `solve`, one for each painting, or one for several views.
 
-    All are created, and so checked, before the first runs. failed: receives the reason of each
+    All are created, and so checked, before the first runs. failures: receives the reason of each
     failure, by the name of the folder, if the others are to go on.
     """
     # Imported late: jobs import much that other commands do not need.
@@ -64,8 +64,8 @@ def jobs_of(
         folder = Path(options.output or Path(paths[0]).stem)
         if options.output and options.variations:
             folder /= Path(paths[0]).stem
-        how: dict[str, Any] = {"by_sensor": True, "rigging": rigging}
-        return [Job(scenes, tuple(paintings), folder, None, constraints, settings, **how)]
+        job_fields: dict[str, Any] = {"by_sensor": True, "rigging": rigging}
+        return [Job(scenes, tuple(paintings), folder, None, constraints, settings, **job_fields)]
     # One scene, loaded once for all jobs.
     source = () if basis is not None else (scene_of(options),)
     output = options.output and Path(options.output)
@@ -79,9 +79,9 @@ def jobs_of(
             job = Job(source, (painting,), folder, basis, constraints, settings, rigging=rigging)
             jobs.append(job)
         except LOOK_ERRORS as error:
-            if failed is None or not options.keep_going or len(paintings) == 1:
+            if failures is None or not options.keep_going or len(paintings) == 1:
                 raise
-            failed[folder.name] = str(error)
+            failures[folder.name] = str(error)
     if options.lights_file:
         for job in jobs:  # if no scene has read it
             check_files(job.results.files, [Path(options.lights_file)])
@@ -144,9 +144,9 @@ def folders_of(output: Path | None, names: Sequence[str]) -> list[Path]:
         if not is_name(name) and is_utf_8(Path(name)):
             advice = "choose one with -o" if len(names) == 1 else "solve it alone, with -o"
             raise OutputError(f"{one_line(repr(name))} cannot be the name of a folder: {advice}")
-    if twice := sorted({name for name in names if names.count(name) > 1}):
+    if repeated := sorted({name for name in names if names.count(name) > 1}):
         raise OutputError(
-            f"results would overwrite each other in {some_names(twice)}: run those of one name "
+            f"results would overwrite each other in {some_names(repeated)}: run those of one name "
             "separately, each with its own -o"
         )
     return [(output or Path()) / name for name in names]

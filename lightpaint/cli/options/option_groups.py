@@ -11,9 +11,12 @@ def add_scene(parser: argparse.ArgumentParser) -> None:
     add_view(parser)
 
 
-def add_view(parser: argparse.ArgumentParser, *, several: bool = False) -> None:
-    """Add the options for a scene's sensor and for loading it. several: allow several sensors."""
-    if several:
+def add_view(parser: argparse.ArgumentParser, *, is_repeatable: bool = False) -> None:
+    """Add the options for a scene's sensor and for loading it.
+
+    is_repeatable: whether several sensors may be given.
+    """
+    if is_repeatable:
         parser.add_argument(
             "-s",
             "--sensor",
@@ -35,14 +38,14 @@ def add_view(parser: argparse.ArgumentParser, *, several: bool = False) -> None:
         action="append",
         default=[],
         metavar="key=value",
-        help="set a $parameter of the scene; may be repeated",
+        help="set the $parameter of the scene; may be repeated",
     )
     parser.add_argument(
         "--integrator",
         metavar="PLUGIN",
-        help="integrator instead of the scene's own, which this Mitsuba may lack: path, "
-        "direct, or with options like path:max_depth=8; it inherits max_depth, rr_depth "
-        "and hide_emitters (default: the scene's)",
+        help="integrator that replaces the scene's own, for example because this Mitsuba lacks "
+        "it: path, direct, or with options like path:max_depth=8; it inherits max_depth, "
+        "rr_depth and hide_emitters (default: the scene's)",
     )
     add_variant(parser)
 
@@ -54,7 +57,7 @@ def add_lights(parser: argparse.ArgumentParser) -> None:
         type=arguments.names_of,
         action="extend",
         metavar="a,b,window_*",
-        help="lights to adjust, by name or pattern; the others stay as they are (default: all)",
+        help="lights to adjust, by name or pattern; all others stay as they are (default: all)",
     )
     parser.add_argument(
         "--group",
@@ -68,9 +71,9 @@ def add_lights(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--lights-file",
         metavar="F.toml",
-        help="lights, groups and constraints (default: <scene>.lights.toml if it exists); "
-        "--lights replaces its list, --group adds to its groups or replaces the one of that "
-        "name; with a saved basis only its constraints apply",
+        help="file with lights, groups and constraints (default: <scene>.lights.toml if it "
+        "exists). --lights replaces its list; --group adds a group, or replaces one of the "
+        "same name. With a saved basis only its constraints apply",
     )
     parser.add_argument(
         "--no-lights-file",
@@ -82,8 +85,8 @@ def add_lights(parser: argparse.ArgumentParser) -> None:
         "--no-group-alike",
         dest="group_alike",
         action="store_false",
-        help="adjust unnamed emitters one by one, even if more than 24 are similar "
-        "(default: similar ones form one light)",
+        help="adjust unnamed emitters one by one, even if more than 24 are similar (default: "
+        "similar ones form one light)",
     )
 
 
@@ -128,14 +131,15 @@ def add_budget(parser: argparse.ArgumentParser) -> None:
         dest="time_s",
         type=arguments.number(" of seconds"),
         metavar="SECONDS",
-        help="instead: seconds to render the basis, added to samples of earlier runs; "
-        "they include compilation, but not the verification",
+        help="seconds to render the basis, instead of --spp. They include compilation, but not "
+        "the verification; samples of earlier runs are added",
     )
     parser.add_argument(
         "--quality",
         choices=("preview", "final"),
-        help="preview: 32 samples per pixel on about 30,000 pixels, each a block of film pixels; "
-        "final: 256 on the whole film; --spp, --time and --resolution take precedence",
+        help="preview: 32 samples per pixel on about 30,000 pixels, each of which is a block of "
+        "film pixels; final: 256 on the whole film. --spp, --time and --resolution take "
+        "precedence",
     )
     add_resolution(parser)
     add_seed(parser)
@@ -145,7 +149,7 @@ def add_spp(parser: "argparse._ActionsContainer", default: str) -> None:
     """Add the option for samples per pixel."""
     parser.add_argument(
         "--spp",
-        type=arguments.at_least(2, most=2**20),
+        type=arguments.at_least(2, maximum=2**20),
         metavar="N",
         help=f"samples per pixel (default: {default})",
     )
@@ -168,7 +172,7 @@ def add_resolution(parser: argparse.ArgumentParser) -> None:
         "--resolution",
         metavar="1/N|WxH",
         help="render one pixel for each square block of film pixels, like 1/4 or 320x180; "
-        "incomplete blocks at the right and at the bottom are left out (default: the whole "
+        "incomplete blocks at the right and bottom edges are left out (default: the whole "
         "film)",
     )
 
@@ -179,14 +183,13 @@ def add_cache(parser: argparse.ArgumentParser) -> None:
         "--no-cache",
         dest="use_cache",
         action="store_false",
-        help="neither use a basis of earlier runs nor keep this one (default: do both)",
+        help="do not use bases of earlier runs, and do not keep this one (default: do both)",
     )
     parser.add_argument(
         "--exact-spp",
         action="store_true",
         help="use exactly the requested samples per pixel, even if the cache has a basis with "
-        "more, "
-        "which stays there (default: use the cached one)",
+        "more (default: use that one)",
     )
 
 
@@ -197,14 +200,14 @@ def add_unit(parser: argparse.ArgumentParser) -> None:
         dest="cd_per_unit",
         type=arguments.number(" of cd/m²"),
         metavar="CD/M2",
-        help="cd/m² that a radiance of 1 in the scene stands for, to show lumen, candela and lux "
+        help="luminance in cd/m² of a radiance of 1 in the scene, to show lumen, candela and lux "
         "(default: relative numbers without units)",
     )
 
 
-def add_output(parser: "argparse._ActionsContainer", metavar: str, about: str) -> None:
+def add_output(parser: "argparse._ActionsContainer", metavar: str, description: str) -> None:
     """Add the option for the output."""
-    parser.add_argument("-o", "--output", metavar=metavar, help=about)
+    parser.add_argument("-o", "--output", metavar=metavar, help=description)
 
 
 def add_server(parser: argparse.ArgumentParser) -> None:
@@ -212,12 +215,12 @@ def add_server(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--new",
         action="store_true",
-        help="start a new session; the present one is kept under another name (default: continue "
-        "it)",
+        help="start a new session, and keep the present one under another name (default: continue"
+        " the present one)",
     )
     parser.add_argument(
         "--port",
-        type=arguments.at_least(0, most=65535),
+        type=arguments.at_least(0, maximum=65535),
         metavar="N",
         help="port of the page; 0 for any free one (default: 8421, or any free one if that is "
         "taken)",
@@ -225,14 +228,15 @@ def add_server(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--host",
         metavar="ADDRESS",
-        help="listen at this address of the machine, or at all (0.0.0.0), so that other machines "
-        "can reach the page: anyone with its token can paint (default: this machine only)",
+        help="listen at this address of the machine, or at all of them (0.0.0.0), so that other "
+        "machines can reach the page; anyone with its token can then paint (default: this "
+        "machine only)",
     )
     parser.add_argument(
         "--no-browser",
         dest="with_browser",
         action="store_false",
-        help="only print the address of the page",
+        help="print the address of the page, and open no browser",
     )
 
 
@@ -241,7 +245,7 @@ def add_force(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--force",
         action="store_true",
-        help="replace results of another painting, or changed by hand (default: refuse)",
+        help="replace results of another painting, and results changed by hand (default: refuse)",
     )
 
 
@@ -251,7 +255,7 @@ def add_output_mode(parser: argparse.ArgumentParser) -> None:
         "--json",
         dest="as_json",
         action="store_true",
-        help="print the results as one JSON document on stdout, for other programs",
+        help="print the results on stdout as one JSON document, for other programs",
     )
     group = parser.add_mutually_exclusive_group()
     group.add_argument(
@@ -259,12 +263,12 @@ def add_output_mode(parser: argparse.ArgumentParser) -> None:
         "--quiet",
         dest="is_quiet",
         action="store_true",
-        help="neither progress nor remarks: only results and errors",
+        help="print only results and errors, without progress and remarks",
     )
     group.add_argument(
         "-v",
         "--verbose",
         dest="is_verbose",
         action="store_true",
-        help="also settings, and the time of each stage",
+        help="also print settings, and the time of each stage",
     )

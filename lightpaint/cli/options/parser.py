@@ -6,6 +6,7 @@ from collections.abc import Callable
 from lightpaint.cli.options import arguments
 from lightpaint.cli.options.argument_order import CommandParser, Parser
 from lightpaint.cli.options.batch_options import add_batch
+from lightpaint.cli.options.constraint_options import add_constraints, add_rigging
 from lightpaint.cli.options.option_groups import (
     add_budget,
     add_cache,
@@ -23,13 +24,11 @@ from lightpaint.cli.options.option_groups import (
     add_view_transform,
 )
 from lightpaint.cli.options.solve_options import (
-    add_constraints,
     add_error,
     add_fit,
     add_method,
     add_paintings,
     add_pattern,
-    add_rigging,
     add_several,
     add_tolerances,
     add_variations,
@@ -39,7 +38,7 @@ from lightpaint.version import __version__
 
 #: Exit codes, for scripts.
 EXIT_CODES = (
-    "Exit codes: 0 done; 1 done, but not as asked (verify disagrees, --max-miss, --min-fit); "
+    "Exit codes: 0 done; 1 done, but a check failed (verify, --max-miss, --min-fit); "
     "2 an error that you can fix, in one line; 70 a bug in lightpaint; "
     "130 Ctrl-C, 143 SIGTERM, 129 the terminal closed."
 )
@@ -55,9 +54,11 @@ def command_parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(
         dest="command", metavar="COMMAND", required=True, parser_class=CommandParser
     )
-    for name, (about, add_options) in _COMMANDS.items():
-        description = about[0].upper() + about[1:] + "."
-        command = commands.add_parser(name, help=about, description=description, epilog=EXIT_CODES)
+    for name, (summary, add_options) in _COMMANDS.items():
+        description = summary[0].upper() + summary[1:] + "."
+        command = commands.add_parser(
+            name, help=summary, description=description, epilog=EXIT_CODES
+        )
         add_options(command)
         add_output_mode(command)
     return parser
@@ -67,10 +68,12 @@ def _lights(parser: argparse.ArgumentParser) -> None:
     add_scene(parser)
     add_lights(parser)
     add_unit(parser)
-    where = parser.add_mutually_exclusive_group()
-    add_output(where, "F.png", "picture of each light alone (default: lights.png)")
-    where.add_argument(
-        "--no-sheet", action="store_true", help="only list the lights; so does --json without -o"
+    output_group = parser.add_mutually_exclusive_group()
+    add_output(output_group, "F.png", "picture of each light alone (default: lights.png)")
+    output_group.add_argument(
+        "--no-sheet",
+        action="store_true",
+        help="list the lights without drawing them, as --json without -o does",
     )
     parser.add_argument(
         "--force",
@@ -92,8 +95,8 @@ def _template(parser: argparse.ArgumentParser) -> None:
         "scene",
         metavar="SCENE|BASIS|LIGHTS",
         nargs="?",
-        help="scene XML, a *.basis.exr, or light groups of another renderer: an EXR or a folder of "
-        "them (--lights may name these, too)",
+        help="scene XML, a *.basis.exr, or light groups of another renderer: an EXR or a folder "
+        "of them (--lights may name light groups, too)",
     )
     add_view(parser)
     add_lights(parser)
@@ -154,7 +157,7 @@ def _paint(parser: argparse.ArgumentParser) -> None:
         metavar="SCENE|BASIS|LIGHTS",
         nargs="*",
         help="scene XML, a *.basis.exr (or several, one per view of a scene), or light groups of "
-        "another renderer (--lights may name these, too)",
+        "another renderer (--lights may name light groups, too)",
     )
     add_output(
         parser,
@@ -170,39 +173,41 @@ def _paint(parser: argparse.ArgumentParser) -> None:
     add_budget(parser)
     add_error(parser)
     add_cache(parser)
-    add_view(parser, several=True)
+    add_view(parser, is_repeatable=True)
     # The parser is kept for the command that answers exported paintings.
     parser.set_defaults(targets=[], masks=None, views=[], parser=parser)
 
 
 def _export(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("lighting", metavar="lighting.json", help="the file that solve wrote")
+    parser.add_argument("lighting", metavar="lighting.json", help="file that solve wrote")
     parser.add_argument(
         "--to",
         type=arguments.names_of,
         action="extend",
         required=True,
         metavar="csv,json,mitsuba,usd,blender,nuke",
-        help="one or several formats. csv, json: fixtures with colour, kelvin, lumen and DMX; "
-        "mitsuba: a "
-        "patch for the scene's XML; usd: a layer that overrides lights of a stage; blender: a "
-        "Python script that sets lights by name; nuke: a script that scales light groups",
+        help="one format or several. csv, json: fixtures with colour, kelvin, lumen and DMX; "
+        "mitsuba: a patch for the XML of the scene; usd: a layer that overrides the lights "
+        "of a stage; blender: a Python script that sets lights by name; nuke: a script that "
+        "scales light groups",
     )
-    what = parser.add_mutually_exclusive_group()
-    what.add_argument("--scene", metavar="SCENE.xml", help="scene that the lighting was solved for")
-    what.add_argument(
+    source_group = parser.add_mutually_exclusive_group()
+    source_group.add_argument(
+        "--scene", metavar="SCENE.xml", help="scene that the lighting was solved for"
+    )
+    source_group.add_argument(
         "--lights",
         dest="groups",
         metavar="FILE.exr",
-        help="light groups of another renderer that the lighting was solved from, or a folder of "
-        "them",
+        help="light groups of another renderer that the lighting was solved from: an EXR or a "
+        "folder of them",
     )
     add_pattern(parser)
     parser.add_argument(
         "--stage",
         metavar="FILE.usd",
-        help="for usd: the stage whose lights are overridden, by the names they have in the scene "
-        "(default: prims below /lights)",
+        help="for usd: stage whose lights the layer overrides, found by their names in the scene "
+        "(default: new prims below /lights)",
     )
     add_view(parser)
     add_output(parser, "DIR", "folder for the files (default: that of lighting.json)")
@@ -231,29 +236,28 @@ def _cache(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         choices=("list", "drop", "clear"),
         default="list",
-        help="list the bases, drop those of NAME, or clear all (default: %(default)s)",
+        help="list the bases, drop those of NAME, or clear them all (default: %(default)s)",
     )
     parser.add_argument(
         "names",
         metavar="NAME",
         nargs="*",
-        help="scene or file of the bases to drop, as list shows them; may be a pattern like "
-        "'hall*'",
+        help="scene or file of the bases to drop, as shown by list; may be a pattern like 'hall*'",
     )
 
 
 #: The description of each command, and the function that adds its options.
 _COMMANDS: dict[str, tuple[str, Callable[[argparse.ArgumentParser], None]]] = {
-    "demo": ("solve a painting that is included, to see how it works", _demo),
+    "demo": ("solve the example that comes with lightpaint", _demo),
     "lights": ("list the lights of a scene", _lights),
     "basis": ("render the image of each light alone", _basis),
-    "template": ("render the current look, to paint over", _template),
+    "template": ("render the current look as a template to paint over", _template),
     "solve": ("find the lighting that comes closest to a painting", _solve),
-    "paint": ("paint in the browser, and see the closest lighting at once", _paint),
+    "paint": ("paint in the browser, and see the closest lighting as you paint", _paint),
     "batch": ("solve many looks from one manifest; a stopped batch continues", add_batch),
     "export": ("write a lighting for other programs, fixtures and consoles", _export),
-    "relight": ("write lightings into the scene and render it", _relight),
-    "verify": ("render results again and compare them with the prediction", _verify),
-    "cache": ("list or delete the bases kept from earlier runs", _cache),
+    "relight": ("write lightings into the scene, and render it", _relight),
+    "verify": ("render results again, and compare them with the prediction", _verify),
+    "cache": ("list or delete the bases that earlier runs kept", _cache),
     "doctor": ("check what works on this machine and what to install", add_variant),
 }

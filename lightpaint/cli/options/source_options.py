@@ -115,8 +115,8 @@ def basis_of(options: Namespace) -> BasisFile | GroupsFile | None:
             "to solve for several"
         )
     is_groups = isinstance(basis, GroupsFile)
-    idle = [name for name in LOADING if getattr(options, name) and name != "lights"]
-    check_needed([*idle, *(["lights"] if names and not is_groups else [])], basis)
+    unusable_options = [name for name in LOADING if getattr(options, name) and name != "lights"]
+    check_needed([*unusable_options, *(["lights"] if names and not is_groups else [])], basis)
     if names:
         raise BasisError(
             f"--lights {light_list} chooses lights of a scene: of light groups, keep the "

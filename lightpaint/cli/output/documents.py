@@ -98,9 +98,9 @@ def _in_file(path: Path) -> Any:
     return json.loads(path.read_text(encoding="utf-8"))
 
 
-def files_document(folder: Path, files: Sequence[Path], **others: Any) -> dict[str, Any]:
+def files_document(folder: Path, files: Sequence[Path], **fields: Any) -> dict[str, Any]:
     """Return files that were written, and their folder."""
-    return {**others, "folder": str(folder), "files": [str(file) for file in files]}
+    return {**fields, "folder": str(folder), "files": [str(file) for file in files]}
 
 
 def verified_document(folder: Path, result: Verification) -> dict[str, Any]:

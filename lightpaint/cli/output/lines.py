@@ -40,10 +40,14 @@ def _block(color: str | None) -> str:
 def err(line: str) -> None:
     """Print a line of progress, a remark or an error to stderr."""
     with unsilenced():
-        print(cut(line), file=sys.stderr, flush=True)
+        print(shortened_line(line), file=sys.stderr, flush=True)
 
 
-def cut(line: str) -> str:
+def shortened_line(line: str) -> str:
     """Return a line as `err` prints it."""
-    shown = visible(line[: MAX_LINE_LENGTH + 1])
-    return shown if len(shown) <= MAX_LINE_LENGTH else f"{shown[:MAX_LINE_LENGTH]} …"
+    visible_line = visible(line[: MAX_LINE_LENGTH + 1])
+    return (
+        visible_line
+        if len(visible_line) <= MAX_LINE_LENGTH
+        else f"{visible_line[:MAX_LINE_LENGTH]} …"
+    )

@@ -16,9 +16,9 @@ class Stopwatch:
 
     def read(self) -> tuple[float, float]:
         """Return seconds since the last reading, and in all."""
-        now = time.perf_counter()
-        lap, self._last = now - self._last, now
-        return lap, now - self._began
+        now_s = time.perf_counter()
+        lap, self._last = now_s - self._last, now_s
+        return lap, now_s - self._began
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,8 @@ def output_mode() -> OutputMode:
 @contextmanager
 def using_output_mode(mode: OutputMode) -> Iterator[None]:
     """Use an output mode within the block."""
-    before = _MANNER.set(mode)
+    token = _MANNER.set(mode)
     try:
         yield
     finally:
-        _MANNER.reset(before)
+        _MANNER.reset(token)

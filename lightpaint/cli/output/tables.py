@@ -23,8 +23,8 @@ def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
     amounts = () if cd_per_unit is None else ("luminous", "flux")
     table = terminal.table(*headings, *amounts)
     for light in scene.lights:
-        single = light.member_names == (light.name,) and not light.is_fixed
-        if not single:
+        is_single = light.member_names == (light.name,) and not light.is_fixed
+        if not is_single:
             state = "kept as it is" if light.is_fixed else terminal.numbers(light.emission)
             unit = "" if light.is_fixed else light.unit
             count = f"{len(light.members)} emitter{'s' if len(light.members) > 1 else ''}"
@@ -41,16 +41,16 @@ def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
             )
         # One row is enough for many similar lamps without names.
         for member in () if light.is_found else light.members:
-            measured = photometry_of(member, cd_per_unit)
+            light_photometry = photometry_of(member, cd_per_unit)
             table.row(
-                member.name if single else f"  {member.name}",
+                member.name if is_single else f"  {member.name}",
                 member.plugin,
                 terminal.numbers(member.emission),
                 member.kind.unit if member.kind is not None else MULTIPLE,
                 member.form,
                 f"{member.sampling_weight:g}",
-                measured.color,
-                *measured.amounts[: len(amounts)],
+                light_photometry.color,
+                *light_photometry.amounts[: len(amounts)],
             )
     terminal.print_table(table)
 
@@ -99,7 +99,7 @@ def show_suggestions(
     amounts = () if cd_per_unit is None else ("luminous", "flux")
     table = terminal.table(*headings, *amounts)
     for light in suggestions:
-        measured = light.photometry(cd_per_unit)
+        light_photometry = light.photometry(cd_per_unit)
         table.row(
             light.name,
             spoken_position(light),
@@ -107,8 +107,8 @@ def show_suggestions(
             "W/sr",
             spoken_percent(light.gain_share),
             spoken_percent(light.missed_share),
-            measured.color,
-            *measured.amounts[: len(amounts)],
+            light_photometry.color,
+            *light_photometry.amounts[: len(amounts)],
         )
     terminal.print_table(table)
     terminal.write("paste this into <scene>, and solve again:")

@@ -62,11 +62,11 @@ def print_table(rows: Rows, swatches: Sequence[str | None] = ()) -> None:
     width = None if sys.stdout.isatty() else 1000
     page = Console(highlight=False, width=width, file=io.StringIO(), color_system=None)
     page.print(rows)
-    printed = page.file.getvalue().rstrip().split("\n")  # type: ignore[attr-defined]
+    table_lines = page.file.getvalue().rstrip().split("\n")  # type: ignore[attr-defined]
     if not (swatches and has_truecolour()):
-        write_lines("\n".join(printed))
+        write_lines("\n".join(table_lines))
         return
-    for row, color in zip(printed, (None, *swatches), strict=True):
+    for row, color in zip(table_lines, (None, *swatches), strict=True):
         lines.out(row.rstrip(), swatch=color or "")
 
 
@@ -150,7 +150,7 @@ class TerminalListener:
         self._bars: Progress | None = None
         self._tasks: dict[str, TaskID] = {}
         self._workers: dict[str, TaskID] = {}
-        self._others: set[str] = set()  # workers without a line
+        self._workers_without_line: set[str] = set()  # workers without a line
 
     def __enter__(self) -> "TerminalListener":
         if sys.stderr.isatty() and not output_mode().is_quiet:
@@ -167,7 +167,7 @@ class TerminalListener:
     def __exit__(self, *_: object) -> None:
         if self._bars is not None:
             self._bars.stop()
-        self._bars, self._tasks, self._workers, self._others = None, {}, {}, set()
+        self._bars, self._tasks, self._workers, self._workers_without_line = None, {}, {}, set()
 
     def __call__(self, label: str, done: int, total: int, unit: str = "passes") -> None:
         """Show that `done` of `total` pieces of the work `label` are finished."""
@@ -185,21 +185,23 @@ class TerminalListener:
         if self._bars is None:
             return
         if task is None:
-            self._others.discard(worker)
+            self._workers_without_line.discard(worker)
             if worker in self._workers:
                 self._bars.remove_task(self._workers.pop(worker))
         elif worker in self._workers:
             self._bars.reset(self._workers[worker], description=visible(f"{worker}: {task}"))
         elif len(self._workers) < MAX_WORKER_LINES:
-            self._others.discard(worker)
+            self._workers_without_line.discard(worker)
             self._workers[worker] = self._bars.add_task(visible(f"{worker}: {task}"), total=None)
         else:
-            self._others.add(worker)
-        if self._others or "others" in self._tasks:
-            others = f"and {len(self._others)} more at work"
+            self._workers_without_line.add(worker)
+        if self._workers_without_line or "others" in self._tasks:
+            others = f"and {len(self._workers_without_line)} more at work"
             if "others" not in self._tasks:
                 self._tasks["others"] = self._bars.add_task(others, total=None)
-            self._bars.update(self._tasks["others"], description=others, visible=bool(self._others))
+            self._bars.update(
+                self._tasks["others"], description=others, visible=bool(self._workers_without_line)
+            )
 
     def say(self, text: str) -> None:
         """Print a remark, above the bars if there are any."""
@@ -209,7 +211,7 @@ class TerminalListener:
         if self._bars is None:
             say(text)
             return
-        self._bars.console.out(lines.cut(f"lightpaint: {spoken(text)}"), highlight=False)
+        self._bars.console.out(lines.shortened_line(f"lightpaint: {spoken(text)}"), highlight=False)
 
     def note(self, text: str) -> None:
         """Print a finished stage with its time, in verbose mode."""
@@ -219,7 +221,7 @@ class TerminalListener:
 
 def _counted(count: int, unit: str) -> str:
     """Return a number of things. unit: their plural, of which the first word counts."""
-    things, _, rest = unit.partition(" ")
+    plural, _, rest = unit.partition(" ")
     if count == 1:
-        things = {"passes": "pass"}.get(things, things.removesuffix("s"))
-    return " ".join(filter(None, (str(count), things, rest)))
+        plural = {"passes": "pass"}.get(plural, plural.removesuffix("s"))
+    return " ".join(filter(None, (str(count), plural, rest)))

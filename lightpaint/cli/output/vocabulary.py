@@ -82,7 +82,7 @@ _ARGUMENT = re.compile(
 
 def spoken(text: str) -> str:
     """Return `text` of the library with the options of the command line."""
-    text = _LIGHT.sub(lambda its: f"--{OPTIONS_OF_KEYS.get(its[2], its[2])} {its[1]}", text)
+    text = _LIGHT.sub(lambda match: f"--{OPTIONS_OF_KEYS.get(match[2], match[2])} {match[1]}", text)
     text = _NEW.sub(_spoken_new, _UNKNOWN.sub("", text)).replace(f"{BY_OPTION}: ", "")
     return _ARGUMENT.sub(_spoken, text)
 

@@ -19,7 +19,7 @@ import pytest
 from renderer import REPOSITORY
 
 import lightpaint as lp
-from lightpaint.cli.commands.paint import solve_command
+from lightpaint.cli.commands.paint_command import command_for_paintings
 from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
@@ -217,7 +217,9 @@ def subject(basis: lp.Basis, tmp_path: Path) -> Subject:
     return make_subject(
         BasisFile(str(path)),
         tmp_path / "room",
-        command=lambda paintings, requests: solve_command(str(path), paintings, (), requests),
+        command=lambda paintings, requests: command_for_paintings(
+            str(path), paintings, (), requests
+        ),
     )
 
 

@@ -24,7 +24,7 @@ from lightpaint.files import scene_name
 from lightpaint.screen import some_of, visible
 
 #: Most looks that are listed at the end; of more only unfinished ones.
-LISTED = 40
+MAX_LISTED = 40
 
 
 def batch(
@@ -34,7 +34,7 @@ def batch(
     is_first: bool,
     is_dry: bool,
     form: str | None,
-    only: str | None,
+    name_pattern: str | None,
     run_options: RunOptions,
     force: bool,
     log: Path | None,
@@ -54,58 +54,58 @@ def batch(
     # The same command in all reports, however often and from wherever the batch is run.
     manifest, output_folder = (str(Path(x).absolute()) for x in (paths[0], folder))
     command = shlex.join(["lightpaint", "batch", manifest, "-o", output_folder])
-    planned = plan(paths[0], folder, force=force, command=command).select(only)
+    plan_ = plan(paths[0], folder, force=force, command=command).select(name_pattern)
     if is_dry:
-        return _dry(planned)
+        return _show_plan(plan_)
     if form is not None:
-        return _export(planned, Path(paths[1]), force=force)
-    of_looks = (x for look in planned.chosen_looks for x in look.remarks)
-    remarks = list(dict.fromkeys((*planned.remarks, *of_looks)))
-    for remark in remarks[:LISTED]:
+        return _export(plan_, Path(paths[1]), force=force)
+    of_looks = (x for look in plan_.chosen_looks for x in look.remarks)
+    remarks = list(dict.fromkeys((*plan_.remarks, *of_looks)))
+    for remark in remarks[:MAX_LISTED]:
         terminal.say(remark)
-    if len(remarks) > LISTED:
-        terminal.say(f"and {len(remarks) - LISTED} more remarks, each when its look is done")
+    if len(remarks) > MAX_LISTED:
+        terminal.say(f"and {len(remarks) - MAX_LISTED} more remarks, each when its look is done")
     listen = terminal.TerminalListener()
     note = _log(log)
-    note(f"{command}: {len(planned.chosen_looks)} looks")
+    note(f"{command}: {len(plan_.chosen_looks)} looks")
 
-    def on_step(look: PlannedLook, done: ItemResult) -> None:
-        name, left = f"{look.entry.name}: {done.kind}", time_left(done)
-        if done.failure:
-            note(f"{name} failed: {done.failure}")
+    def on_step(look: PlannedLook, result: ItemResult) -> None:
+        name, left = f"{look.entry.name}: {result.kind}", time_left(result)
+        if result.failure:
+            note(f"{name} failed: {result.failure}")
             return
-        note(f"{name} done in {done.spent_s:.2f} s")
-        listen.say(f"{name} done in {done.spent_s:.1f} s{left}")
+        note(f"{name} done in {result.spent_s:.2f} s")
+        listen.say(f"{name} done in {result.spent_s:.1f} s{left}")
 
-    def time_left(done: ItemResult) -> str:
-        return "" if done.left_s is None else f", {spoken_time(done.left_s)} left"
+    def time_left(result: ItemResult) -> str:
+        return "" if result.left_s is None else f", {spoken_time(result.left_s)} left"
 
     with listen:
-        outcome = run_batch(planned, run_options, listen, on_step=on_step)
+        outcome = run_batch(plan_, run_options, listen, on_step=on_step)
     note(f"done {len(outcome.done)}, failed {len(outcome.failed)}")
-    return _outcome(planned, outcome)
+    return _outcome(plan_, outcome)
 
 
-def _export(planned: Plan, folder: Path, *, force: bool) -> CommandOutcome:
+def _export(plan_: Plan, folder: Path, *, force: bool) -> CommandOutcome:
     """Write a job for a farm, and print how to run it here."""
-    path = write_openjd(folder, planned, command=("--only", LOOK_PARAMETER, "--apart"), force=force)
-    terminal.write(f"{path}: {len(planned.chosen_looks)} looks; run them here with")
+    path = write_openjd(folder, plan_, command=("--only", LOOK_PARAMETER, "--apart"), force=force)
+    terminal.write(f"{path}: {len(plan_.chosen_looks)} looks; run them here with")
     terminal.write(f"openjd run {shlex.quote(str(path))}")
     return CommandOutcome(lambda: documents.files_document(folder, [path]))
 
 
-def _outcome(planned: Plan, outcome: BatchOutcome) -> CommandOutcome:
+def _outcome(plan_: Plan, outcome: BatchOutcome) -> CommandOutcome:
     """Print the results of a run, and return them for programs."""
-    _show(planned, outcome.rows)
-    folder = planned.folder
-    for name, reason in list(outcome.failed.items())[:LISTED]:
+    _show(plan_, outcome.rows)
+    folder = plan_.folder
+    for name, reason in list(outcome.failed.items())[:MAX_LISTED]:
         terminal.complain("batch", f"{name}: {reason}")
-    if len(outcome.failed) > LISTED:
-        terminal.complain("batch", f"and {len(outcome.failed) - LISTED} more, in summary.csv")
+    if len(outcome.failed) > MAX_LISTED:
+        terminal.complain("batch", f"and {len(outcome.failed) - MAX_LISTED} more, in summary.csv")
     if outcome.skipped:
         count = len(outcome.skipped)
-        done = "1 look was" if count == 1 else f"{count} looks were"
-        terminal.say(f"{done} done earlier and {'is' if count == 1 else 'are'} unchanged")
+        sentence = "1 look was" if count == 1 else f"{count} looks were"
+        terminal.say(f"{sentence} done earlier and {'is' if count == 1 else 'are'} unchanged")
     if outcome.waiting:
         terminal.complain("batch", f"stopped before {some_of(outcome.waiting)}")
     if outcome.rows:
@@ -120,45 +120,49 @@ def _outcome(planned: Plan, outcome: BatchOutcome) -> CommandOutcome:
     )
 
 
-def _show(planned: Plan, rows: list[SummaryRow]) -> None:
+def _show(plan_: Plan, rows: list[SummaryRow]) -> None:
     """Print a row for each look; of very many, only the unfinished ones."""
-    shown = rows if len(rows) <= LISTED else [row for row in rows if row.state != "done"][:LISTED]
-    if not shown:
+    shown_rows = (
+        rows
+        if len(rows) <= MAX_LISTED
+        else [row for row in rows if row.state != "done"][:MAX_LISTED]
+    )
+    if not shown_rows:
         return
     table = terminal.table("look", "state", "ΔE", "render", "folder")
-    for row in shown:
-        agrees = "" if row.agrees is None else "agrees" if row.agrees else "disagrees"
-        missed = "" if row.delta_e is None else f"{row.delta_e:.1f}"
-        table.row(row.look, row.state, missed, agrees, str(planned.folder / row.folder))
+    for row in shown_rows:
+        agreement = "" if row.agrees is None else "agrees" if row.agrees else "disagrees"
+        delta_e = "" if row.delta_e is None else f"{row.delta_e:.1f}"
+        table.row(row.look, row.state, delta_e, agreement, str(plan_.folder / row.folder))
     terminal.print_table(table)
 
 
-def _dry(planned: Plan) -> CommandOutcome:
+def _show_plan(plan_: Plan) -> CommandOutcome:
     """Print what would be done and its cost, without doing it."""
     table, looks = terminal.table("look", "what", "of"), []
-    for look in planned.chosen_looks:
+    for look in plan_.chosen_looks:
         action = look.failure or ("done earlier" if look.is_done else ", ".join(look.entry.want))
         inputs = ", ".join([*(x.path for x in look.entry.paintings), *look.entry.combined_looks])
         table.row(look.entry.name, visible(action), inputs or look.entry.lighting)
         looks.append({"look": look.entry.name, "is_done": look.is_done, "want": look.entry.want})
     terminal.print_table(table)
-    needed = estimate(planned)
+    cost = estimate(plan_)
     terminal.write(
-        f"bases {spoken_time(needed.bases_s)} unless they are in the cache, looks "
-        f"{spoken_time(needed.looks_s)}, by one process on two cores; "
-        f"{needed.memory / 1e9:.1f} GB of memory"
+        f"bases {spoken_time(cost.bases_s)} unless they are in the cache, looks "
+        f"{spoken_time(cost.looks_s)}, by one process on two cores; "
+        f"{cost.memory / 1e9:.1f} GB of memory"
     )
-    failed = [look.entry.name for look in planned.chosen_looks if look.failure]
-    if failed:
-        terminal.complain("batch", f"cannot be done: {some_of(failed)}")
-    return CommandOutcome(lambda: {"looks": looks, **vars(needed)}, 1 if failed else 0)
+    failed_names = [look.entry.name for look in plan_.chosen_looks if look.failure]
+    if failed_names:
+        terminal.complain("batch", f"cannot be done: {some_of(failed_names)}")
+    return CommandOutcome(lambda: {"looks": looks, **vars(cost)}, 1 if failed_names else 0)
 
 
 def spoken_time(seconds: float) -> str:
     """Return a duration as `0:07`, `12:30`, `3:05:00`."""
-    whole = round(seconds)
-    hours, minutes, rest = whole // 3600, whole // 60 % 60, whole % 60
-    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
+    total_s = round(seconds)
+    hours, minutes, seconds_left = total_s // 3600, total_s // 60 % 60, total_s % 60
+    return f"{hours}:{minutes:02}:{seconds_left:02}" if hours else f"{minutes}:{seconds_left:02}"
 
 
 def _log(path: Path | None) -> Callable[[str], Any]:

@@ -17,34 +17,36 @@ def lights(
     scene: SceneFile,
     cd_per_unit: float | None,
     sheet: Path | None,
-    is_asked: bool = True,
+    is_named: bool = True,
     force: bool = False,
 ) -> CommandOutcome:
     """Run `lightpaint lights SCENE`.
 
-    sheet: file of the light sheet; None for none. is_asked: True if the user named it; otherwise a
+    sheet: file of the light sheet; None for none. is_named: True if the user named it; otherwise a
     sheet that cannot be written is not an error.
     """
-    loaded = scene.content
-    if sheet is not None and is_asked:
-        check_sheet(loaded, sheet, force=force)
-    note_scene(loaded)
-    for remark in remarks_of_scene(loaded):
+    content = scene.content
+    if sheet is not None and is_named:
+        check_sheet(content, sheet, force=force)
+    note_scene(content)
+    for remark in remarks_of_scene(content):
         terminal.say(remark)
-    tables.show_lights(loaded, cd_per_unit)
-    is_drawn = sheet is not None and _draw_sheet(loaded, sheet, is_asked=is_asked, force=force)
-    drawn = {"sheet": str(sheet)} if is_drawn else {}
-    return CommandOutcome(lambda: {**documents.lights_document(loaded, cd_per_unit), **drawn})
+    tables.show_lights(content, cd_per_unit)
+    is_drawn = sheet is not None and _draw_sheet(content, sheet, is_named=is_named, force=force)
+    sheet_fields = {"sheet": str(sheet)} if is_drawn else {}
+    return CommandOutcome(
+        lambda: {**documents.lights_document(content, cd_per_unit), **sheet_fields}
+    )
 
 
-def _draw_sheet(scene: Scene, sheet: Path, *, is_asked: bool, force: bool) -> bool:
+def _draw_sheet(scene: Scene, sheet: Path, *, is_named: bool, force: bool) -> bool:
     """Write the light sheet; print the reason and return False if it cannot be written."""
     try:
         check_sheet(scene, sheet, force=force)
         with terminal.TerminalListener() as listen:
             reason = render_sheet(scene, sheet, listen)
     except (OutputError, BackendError) as error:
-        if is_asked and isinstance(error, OutputError):
+        if is_named and isinstance(error, OutputError):
             raise
         reason = str(error)
     if reason:
@@ -55,11 +57,11 @@ def _draw_sheet(scene: Scene, sheet: Path, *, is_asked: bool, force: bool) -> bo
     return True
 
 
-def note_scene(loaded: Scene) -> None:
+def note_scene(scene: Scene) -> None:
     """Print details of a loaded scene, in verbose mode."""
-    height, width = loaded.size
+    height, width = scene.size
     terminal.note(
-        f"{loaded.path} read: {len(loaded.emitters)} emitters, {len(loaded.lights)} lights, "
-        f"{width}x{height} pixels through {loaded.sensor_names[loaded.sensor]}, "
+        f"{scene.path} read: {len(scene.emitters)} emitters, {len(scene.lights)} lights, "
+        f"{width}x{height} pixels through {scene.sensor_names[scene.sensor]}, "
         f"{use_variant().variant}"
     )

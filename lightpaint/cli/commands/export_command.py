@@ -16,7 +16,7 @@ from lightpaint.storage.staging import finish
 def export(
     *,
     lighting: Path,
-    to: Sequence[str],
+    forms: Sequence[str],
     scene: SceneFile | None,
     groups: GroupsFile | None,
     stage: Path | None,
@@ -27,14 +27,14 @@ def export(
     finish(lighting.parent)
     answer, folder = read_lighting(lighting), output or lighting.parent
     source, listen = Source(content(scene), content(groups), stage), terminal.TerminalListener()
-    names = names_of_forms(to, source)
+    names = names_of_forms(forms, source)
     writers, remark = writers_of(names, answer, source, folder, listen)
     file_writers = {folder / name: make for name, make in writers.items()}
     check_files(list(file_writers), [lighting, *source.files])
     check_writable(folder)
-    if not force and (existing := [file for file in file_writers if file.exists()]):
+    if not force and (existing_files := [file for file in file_writers if file.exists()]):
         raise OutputError(
-            f"{existing[0]} exists: name another folder (folder=...), or pass force=True"
+            f"{existing_files[0]} exists: name another folder (folder=...), or pass force=True"
         )
     texts = {file: make() for file, make in file_writers.items()}
     for file, text in texts.items():

@@ -21,43 +21,47 @@ if TYPE_CHECKING:
     from lightpaint.cli.solve_variations import LookSet
 
 #: No requirements.
-ANY = Tolerances()
+NO_REQUIREMENTS = Tolerances()
 
 
 def solve(
     *,
     jobs: Sequence[Job],
     table: Table = "short",
-    tolerances: Tolerances = ANY,
-    several: "LookSet | None" = None,
+    tolerances: Tolerances = NO_REQUIREMENTS,
+    look_set: "LookSet | None" = None,
 ) -> CommandOutcome:
     """Run `lightpaint solve SCENE|BASIS TARGET...` or `SCENE --target SENSOR=TARGET...`.
 
-    several: the set of looks, if there are several.
+    look_set: the set of looks, if there are several.
     """
-    listen, results, shortfalls, obtained = terminal.TerminalListener(), [], [], None
-    hung: PlacementRecord | None = None
+    listen, results, shortfalls, bases = terminal.TerminalListener(), [], [], None
+    placement_record: PlacementRecord | None = None
     # The remarks of all jobs come before the first one runs; the listener drops repeats.
     for remark in (remark for job in jobs for remark in job.remarks):
         listen.say(remark)
     for job in jobs:
         listen.note(f"files read; {spoken_settings(job.fit)}")
-        if several is not None and job.folder in several.variation_names and hung is not None:
-            job = job.with_placement(hung)
-        elif hung is not None:
+        if (
+            look_set is not None
+            and job.folder in look_set.variation_names
+            and placement_record is not None
+        ):
+            job = job.with_placement(placement_record)
+        elif placement_record is not None:
             # The basis is that of lights which another painting moved.
-            obtained, hung = None, None
+            bases, placement_record = None, None
         try:
             with listen:
-                looks = run(job, listen, bases=None if obtained is None else list(obtained))
+                looks = run(job, listen, bases=None if bases is None else list(bases))
             # Several paintings of one scene share its basis, and variations the places of lights.
-            obtained = [look.basis for look in looks]
+            bases = [look.basis for look in looks]
             if (placement := looks[0].placement) is not None and not placement.is_empty:
-                hung = record_of(placement)
-            if several is not None:
-                several.finish_look(job, looks[0].lighting, obtained)
+                placement_record = record_of(placement)
+            if look_set is not None:
+                look_set.finish_look(job, looks[0].lighting, bases)
         except LOOK_ERRORS as error:
-            if several is None or not several.continues_after(job, error):
+            if look_set is None or not look_set.continues_after(job, error):
                 raise
             continue
         _show(job, looks, table)
@@ -66,13 +70,13 @@ def solve(
             shortfalls += [
                 f"{view.folder} {x}" for x in tolerances.shortfalls(look.analysis.appearance)
             ]
-    if several is not None:
-        several.show(obtained or [])
+    if look_set is not None:
+        look_set.show(bases or [])
     if jobs and not jobs[0].scenes and jobs[0].groups is None:
         terminal.say("solved from a saved basis, without a render: lightpaint relight makes one")
     if shortfalls:
         terminal.complain("solve", some_of(shortfalls, joint="; "))
-    variations = [] if several is None else several.shifted
+    variations = [] if look_set is None else look_set.shifted_looks
 
     def document() -> dict[str, Any]:
         results_document = {"results": [documents.result_document(*x, tolerances) for x in results]}
@@ -80,7 +84,7 @@ def solve(
 
     return CommandOutcome(
         document,
-        1 if shortfalls or (several is not None and several.failed) else 0,
+        1 if shortfalls or (look_set is not None and look_set.failures) else 0,
     )
 
 

@@ -31,7 +31,7 @@ RISK = (
 )
 
 #: Who can reach the painter, printed if the user chose an address.
-REACH = {
+REACH_TEXTS = {
     Reach.MACHINE: "programs of this machine, and nobody else, can reach the painter at {name}",
     Reach.ADDRESS: "other machines can reach the painter at {name}; " + RISK,
     Reach.ALL: "other machines can reach the painter at every address of this one; " + RISK,
@@ -61,7 +61,7 @@ def paint(
     from lightpaint.cli.output.vocabulary import from_any_folder
 
     def command(paintings: Mapping[str, str], requests: "SessionRequests") -> str:
-        return from_any_folder(solve_command(sources[0].path, paintings, options, requests))
+        return from_any_folder(command_for_paintings(sources[0].path, paintings, options, requests))
 
     subjects = make_subjects(
         sources,
@@ -78,7 +78,7 @@ def paint(
             terminal.say(remark)
     addresses = []
 
-    def opened(server: "Server") -> None:
+    def on_open(server: "Server") -> None:
         addresses.append(server.url)
         _announce(server, subject.name, folder, is_reachable=host is not None)
         if with_browser and _has_browser():
@@ -88,7 +88,7 @@ def paint(
 
     try:
         paint_in_browser(
-            subjects, opened, new=new, host=host, port=port, say=lambda text: _say(text)
+            subjects, on_open, new=new, host=host, port=port, say=lambda text: _print_lines(text)
         )
     except KeyboardInterrupt:
         if not addresses:  # it had not started
@@ -106,7 +106,9 @@ def _announce(server: "Server", name: str, folder: Path, *, is_reachable: bool) 
     name: of the scene or basis. is_reachable: whether the user gave an address to listen at.
     """
     if is_reachable:
-        reach_text = REACH[server.address.reach].format(name=server.address.name, folder=folder)
+        reach_text = REACH_TEXTS[server.address.reach].format(
+            name=server.address.name, folder=folder
+        )
         is_open = server.address.reach is not Reach.MACHINE
         (partial(terminal.complain, "paint") if is_open else terminal.say)(reach_text)
     sentence = f"painting {name} at {server.url} (Ctrl-C ends it; everything is kept in {folder})"
@@ -117,7 +119,7 @@ def _announce(server: "Server", name: str, folder: Path, *, is_reachable: bool) 
         terminal.write(sentence)
 
 
-def _say(text: str) -> None:
+def _print_lines(text: str) -> None:
     """Print a message of the server; that of a bug has many lines."""
     for line in text.rstrip().split("\n"):
         terminal.say(line)
@@ -138,7 +140,7 @@ def _has_browser() -> bool:
     return True
 
 
-def solve_command(
+def command_for_paintings(
     source: str, paintings: Mapping[str, str], options: Sequence[str], requests: SessionRequests
 ) -> str:
     """Return the command that gives the same answer to exported paintings as their session.
