@@ -61,8 +61,10 @@ class Fingerprints:
         return _sha256(json.dumps([__version__, inputs], default=str))
 
     def _request(self, entry: LookEntry) -> Any:
-        """Return the request of a look as normalized values; its steps have separate fingerprints."""
-        normalized = replace(entry, label="", want=(), final=Final(), handover=Handover(), places="")
+        """Return the request of a look as plain values; its steps have separate fingerprints."""
+        normalized = replace(
+            entry, label="", want=(), final=Final(), handover=Handover(), places=""
+        )
         return _relative(asdict(normalized), self._base)
 
     def render(self, entry: LookEntry) -> str:
