@@ -1,1 +1,3 @@
-"""Colours as numbers: spaces, temperatures, view transforms, displays. No files are read here."""
+"""Colours as numbers: spaces, temperatures, view transforms, displays. Nothing here reads
+pictures.
+"""

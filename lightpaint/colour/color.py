@@ -24,7 +24,8 @@ KELVIN_RANGE = (1000.0, 100_000.0)
 #: |Duv| beyond which a colour has no correlated colour temperature (CIE 15:2018, 9.5).
 LARGEST_DUV = 0.05
 
-#: Newton's steps from the nearest tabulated black body to the nearest of all, with one to spare.
+#: Number of Newton steps from the nearest tabulated black body to the nearest one, with one to
+#: spare.
 NEWTON_STEPS = 5
 
 
@@ -33,15 +34,14 @@ def luminance(rgb: Floats) -> Floats:
     return np.asarray(rgb @ LUMINANCE)
 
 
-@lru_cache(1024)  # 0.6 ms each, and 64 lights with ranges ask for 128
+@lru_cache(1024)  # 0.6 ms each, and 64 lights with ranges need 128
 def kelvin_to_rgb(kelvin: float, duv: float = 0.0) -> Doubles:
-    """Return linear Rec.709 of luminance 1, (3,), read-only, of a correlated colour temperature.
+    """Return the linear Rec.709 colour with luminance 1 of a correlated colour temperature, (3,).
 
     The locus is Planck's at all temperatures; `duv` is the distance from it in CIE 1960 (u, v),
     positive towards green (Ohno 2013). D65 is 6504 K with a Duv of 0.0032. Rec.709 does not contain
     all of these colours: below 1901 K a black body's blue is negative. Lights cannot emit that, so
-    negative components are set to 0 before the luminance is scaled to 1.
-
+    negative components are set to 0 before the luminance is scaled to 1. The array is read-only.
     Raises ColorError outside 1000 to 100,000 K and a Duv of ±0.05.
     """
     lowest, highest = KELVIN_RANGE
@@ -63,11 +63,10 @@ def kelvin_to_rgb(kelvin: float, duv: float = 0.0) -> Doubles:
 
 
 def cct_and_duv(rgb: Floats) -> tuple[float, float] | None:
-    """Return the correlated colour temperature in kelvin and the Duv of a colour (3,), by Ohno
-    2013.
+    """Return the correlated colour temperature in kelvin and the Duv of a colour (3,) (Ohno 2013).
 
     Returns None for black, for a colour more than 0.05 from Planck's locus, and outside 1000 to
-    100,000 K. Raises ColorError unless it is three finite numbers.
+    100,000 K. Raises ColorError unless the colour is three finite numbers.
     """
     return _cct_and_duv(*_three_numbers(rgb).tolist())
 
@@ -82,8 +81,8 @@ def _cct_and_duv(*light: float) -> tuple[float, float] | None:
         return None
     uv = uv_of(xyz)
     mired = nearest_mired(uv)
-    # Newton's steps end where the difference is perpendicular to the locus, so that the temperature
-    # given to `kelvin_to_rgb` comes back, to 1e-9.
+    # Newton's method ends where the difference is perpendicular to the locus, so it returns the
+    # temperature that was given to `kelvin_to_rgb`, to 1e-9.
     for _ in range(NEWTON_STEPS):
         at, tangent, bend = _locus(mired)
         mired += float((uv - at) @ tangent / (tangent @ tangent - (uv - at) @ bend))
@@ -91,18 +90,18 @@ def _cct_and_duv(*light: float) -> tuple[float, float] | None:
     at, tangent, _ = _locus(mired)
     kelvin, duv = 1e6 / mired, float((uv - at) @ _towards_green(tangent))
     lowest, highest = KELVIN_RANGE
-    # The ends of the range come back up to round-off.
+    # The ends of the range are only reproduced up to round-off.
     if not (lowest - 0.1 <= kelvin <= highest + 10 and abs(duv) <= LARGEST_DUV + 1e-5):
         return None
     return kelvin, duv
 
 
 def hex_to_rgb(text: str) -> Floats:
-    """Return linear Rec.709 in [0, 1], (3,), of a display colour like `#ffaa66` or `#fa6`.
+    """Return a display colour such as `#ffaa66` or `#fa6` as linear Rec.709 in [0, 1], (3,).
 
     Raises ColorError for any other text.
     """
-    # colour.notation.HEX_to_RGB accepts #ffaa6 too, and takes a second to import.
+    # colour.notation.HEX_to_RGB also accepts #ffaa6, and takes a second to import.
     match = re.fullmatch(r"#?([0-9a-fA-F]{6}|[0-9a-fA-F]{3})", text.strip())
     if match is None:
         raise ColorError(f"{text!r} is not a colour: expected six hexadecimal digits, like #ffaa66")
@@ -111,7 +110,7 @@ def hex_to_rgb(text: str) -> Floats:
 
 
 def rgb_to_hex(rgb: Floats) -> str:
-    """Return the display colour of a light, like `#ffaa66`, with its brightest channel at full.
+    """Return the display colour of a light, such as `#ffaa66`, with its brightest channel at full.
 
     rgb: (3,) linear Rec.709. Black is `#000000`; negative components become 0. Raises ColorError
     unless it is three finite numbers.
@@ -131,7 +130,7 @@ def _three_numbers(rgb: Floats) -> Floats:
 
 
 def _locus(mired: float) -> tuple[Doubles, Doubles, Doubles]:
-    """Return CIE 1960 (u, v) of a black body of 1e6/mired kelvin, and two derivatives by mired."""
+    """Return CIE 1960 (u, v) of a black body at 1e6/mired kelvin, and two derivatives by mired."""
     step = 1e-4 * mired
     kelvin = 1e6 / (mired + step * np.array([-1, 0, 1]))
     before, at, after = uv_of_black_body(kelvin)

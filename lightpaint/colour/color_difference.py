@@ -1,6 +1,6 @@
 """The visible difference of two colours, CIEDE2000 (CIE 142-2001; Sharma, Wu and Dalal 2005).
 
-colour-science would take a second to import, and three times as long per pixel.
+Importing colour-science would take a second, and it takes three times as long per pixel.
 """
 
 import numpy as np
@@ -22,16 +22,16 @@ _MATRIX = np.array(
 
 
 def delta_e(a: Floats, b: Floats) -> Floats:
-    """Return CIEDE2000, (…,), between two images as a display would show them.
+    """Return CIEDE2000, (…,), between two images as shown on a display.
 
-    a, b: (…, 3) linear Rec.709 at the exposure they are viewed at, white = 1. Values that a display
-    cannot show are clipped, as the display would.
+    a, b: (…, 3) linear Rec.709 at the viewing exposure, white = 1. Values outside the display's
+    range are clipped, as the display would.
     """
     return ciede2000(lab(np.clip(a, 0, 1)), lab(np.clip(b, 0, 1)))
 
 
 def lab(image: Floats) -> Doubles:
-    """Return CIE L*a*b* under D65, (…, 3), of linear Rec.709 (…, 3), white = 1."""
+    """Return linear Rec.709 (…, 3), white = 1, as CIE L*a*b* under D65, (…, 3)."""
     x, y = REC709[6:]
     white = np.array([x / y, 1.0, (1 - x - y) / y])
     ratio = np.asarray(image, np.float64) @ (_MATRIX / white[:, None]).T
@@ -48,7 +48,7 @@ def ciede2000(first: Doubles, second: Doubles) -> Doubles:
     stretch = 1.5 - 0.5 * _levelled(mean)
     C1, h1 = _polar(stretch * a1, b1)
     C2, h2 = _polar(stretch * a2, b2)
-    # The difference of hue, the short way round; greys have no hue.
+    # The hue difference along the shorter arc; greys have no hue.
     are_coloured = C1 * C2 > 0
     turn = np.where(are_coloured, (h2 - h1 + 180) % 360 - 180, 0.0)
     turn = np.where(are_coloured & (h2 - h1 == 180), 180.0, turn)
@@ -61,7 +61,7 @@ def ciede2000(first: Doubles, second: Doubles) -> Doubles:
     dL = (L2 - L1) / (1 + 0.015 * lighter / np.sqrt(20 + lighter))
     dC = (C2 - C1) / (1 + 0.045 * C)
     dH = 2 * np.sqrt(C1 * C2) * np.sin(np.radians(turn / 2)) / (1 + 0.015 * C * T)
-    # The rotation is less than 2, so that this is a sum of squares, up to round-off.
+    # |rotation| < 2, so this is a non-negative quadratic form, up to round-off.
     return np.asarray(np.sqrt(np.maximum(dL**2 + dC**2 + dH**2 + rotation * dC * dH, 0)))
 
 
@@ -75,7 +75,7 @@ def _polar(a: Doubles, b: Doubles) -> tuple[Doubles, Doubles]:
 
 
 def _between(h1: Doubles, h2: Doubles) -> Doubles:
-    """Return the hue half way between two, on the shorter side."""
+    """Return the hue halfway between two hues, along the shorter arc."""
     half = (h1 + h2) / 2
     return np.where(np.abs(h1 - h2) <= 180, half, np.where(half < 180, half + 180, half - 180))
 

@@ -1,7 +1,7 @@
-"""Colours that a light may have: all mixes of given ones, as a polygon in CIE 1976 (u', v').
+"""Colours that a light may have: all mixes of given colours, as a polygon in CIE 1976 (u', v').
 
-There mixes of two lights lie on the straight line between them, so that mixes of colours in a
-convex polygon stay in it. The polygon is given by how far it reaches in a fixed set of directions.
+There the mixes of two lights lie on the straight line between them, so mixes of colours in a convex
+polygon stay in it. The polygon is described by its extent in a fixed set of directions.
 """
 
 from dataclasses import dataclass
@@ -14,14 +14,14 @@ from lightpaint.colour.color import luminance
 from lightpaint.colour.planckian_locus import uv_of, xyz_of
 from lightpaint.colour.primaries import REC709, rgb_to_xyz
 
-#: Directions in which a polygon is bounded, in degrees; closer together where the curve of whites
-#: bounds it towards green.
+#: Directions in which a polygon is bounded, in degrees; denser where the curve of whites bounds it
+#: towards green.
 DEGREES = (0, 30, 60, 90, 120, 135, 150, 165, 180, 210, 240, 270, 300, 330)
 
-#: The same as vectors, (k, 2), of length 1.
+#: The same directions as unit vectors, (k, 2).
 DIRECTIONS = np.stack([np.cos(np.deg2rad(DEGREES)), np.sin(np.deg2rad(DEGREES))], axis=1)
 
-#: Distance beyond a bound that counts as round-off, in (u', v').
+#: Distance beyond a bound, in (u', v'), that counts as round-off.
 ROUND_OFF = 1e-9
 
 
@@ -31,12 +31,12 @@ def chromaticity(rgb: Floats) -> Doubles:
 
 
 def reach_of(rgb: Floats) -> Doubles:
-    """Return the reach (k,) of colours (n, 3), linear, in each direction."""
+    """Return the extent (k,) of linear colours (n, 3) in each direction."""
     return np.asarray((chromaticity(rgb) @ DIRECTIONS.T).max(axis=0))
 
 
 def sides_of(reach: Doubles) -> Doubles:
-    """Return linear functions, (…, k, 3), of light that are >= 0 within a reach (…, k).
+    """Return linear functions of light, (…, k, 3), that are >= 0 within a reach (…, k).
 
     u' = 4 X / W and v' = 9 Y / W with W = X + 15 Y + 3 Z, so that d·(u', v') <= r is
     r W - 4 d₁ X - 9 d₂ Y >= 0.
@@ -49,9 +49,9 @@ def sides_of(reach: Doubles) -> Doubles:
 
 @dataclass(frozen=True, eq=False)
 class ColorHull:
-    """A set of colours: those that reach no further than `reach`, (k,), in each direction.
+    """A set of colours: those that extend no further than `reach`, (k,), in each direction.
 
-    own: (3,), one of them, linear.
+    own: (3,), linear, one of these colours.
     """
 
     reach: Doubles
@@ -59,9 +59,9 @@ class ColorHull:
 
     @cached_property
     def primaries(self) -> Doubles:
-        """Colours (m, 3), linear Rec.709 of luminance 1, whose non-negative mixes are the hull.
+        """Colours (m, 3), linear Rec.709 with luminance 1, whose non-negative mixes are the hull.
 
-        The hull is cut to Rec.709.
+        The hull is clipped to Rec.709.
         """
         corners = chromaticity(np.eye(3))
         for direction, reach in zip(DIRECTIONS, self.reach, strict=True):
@@ -72,9 +72,10 @@ class ColorHull:
         return rgb
 
     def fan(self, side: int) -> Doubles:
-        """Return the three colours, (3, 3), of the triangle between a side and the middle.
+        """Return the colours at the corners, (3, 3), of the triangle between a side and the centre.
 
-        Each colour of the hull is a mix of three colours of one triangle; on the boundary, of two.
+        Each colour of the hull is a mix of the three colours of one triangle; on the boundary, of
+        two.
         """
         primaries = self.primaries
         return np.stack(
@@ -86,7 +87,9 @@ class ColorHull:
         )
 
     def side_towards(self, rgb: Doubles) -> int:
-        """Return the side in whose triangle, or beyond which, a colour (3,), linear, lies."""
+        """Return the side whose triangle, or the sector beyond it, contains a linear colour
+        (3,).
+        """
         corners = chromaticity(self.primaries)
         middle = chromaticity(self.primaries.mean(axis=0))
         to_corners, to_color = corners - middle, chromaticity(rgb) - middle
@@ -102,14 +105,14 @@ class ColorHull:
         return sides_of(self.reach)
 
     def has(self, rgb: Doubles) -> bool:
-        """Return True if the hull contains the colour of a light (3,), linear; black is in every
-        hull.
+        """Return True if the hull contains the colour of a light (3,), linear; every hull contains
+        black.
         """
         return bool((self._sides @ rgb >= -ROUND_OFF * rgb.sum()).all())
 
     def nearest(self, rgb: Doubles) -> Doubles:
-        """Return a light (3,), linear, mixed with the hull's own colour until it is inside, as
-        bright.
+        """Return a light (3,), linear, mixed with the hull's own colour until it is inside, at the
+        same luminance.
         """
         if self.has(rgb):
             return rgb
@@ -126,7 +129,7 @@ def _cross(first: Doubles, second: Doubles) -> Doubles:
 
 
 def _cut(corners: Doubles, direction: Doubles, reach: float) -> Doubles:
-    """Return the part of a convex polygon, (m, 2), that reaches no further (Sutherland–Hodgman)."""
+    """Return the part of a convex polygon, (m, 2), within `reach` (Sutherland–Hodgman)."""
     room = reach - corners @ direction
     corners_kept = []
     for k, (a, left) in enumerate(zip(corners, room, strict=True)):

@@ -6,13 +6,13 @@ from lightpaint.arrays import Floats
 from lightpaint.colour.color import cct_and_duv
 from lightpaint.colour.color_difference import lab
 
-#: Largest distance from Planck's locus, and lowest temperature, of light that is called white.
+#: Maximum distance from Planck's locus, and minimum temperature, of light that is called white.
 WHITE_DUV, WARMEST = 0.015, 2100.0
 
-#: White is warm below the first temperature and cool above the second, in kelvin.
+#: Temperatures in kelvin below which white is warm, and above which it is cool.
 WARM, COOL = 3700.0, 7500.0
 
-#: Largest hue angle of CIE L*a*b*, in degrees, of each name.
+#: Upper end of the range of each name, as a hue angle of CIE L*a*b* in degrees.
 HUES = (
     (20.0, "pink"),
     (55.0, "red"),
@@ -27,7 +27,7 @@ HUES = (
 
 
 def hue_name(rgb: Floats) -> str:
-    """Return the everyday name of a colour of light: `warm white`, `green`.
+    """Return the everyday name of a light's colour, such as `warm white` or `green`.
 
     rgb: (3,) linear Rec.709, of any brightness but black.
     """

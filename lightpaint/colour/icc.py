@@ -1,8 +1,8 @@
 """Embedded ICC profiles: from a file's own RGB or grey to linear Rec.709.
 
-Profiles of three curves and a matrix, and of one curve for grey, are understood (ICC.1:2022, F.2
-and F.3): those are the working spaces of paint programs. Profiles of tables over all three colours
-(printers, some scanners) are refused.
+Supported are profiles with three curves and a matrix, and with one curve for grey (ICC.1:2022, F.2
+and F.3), which include the working spaces of paint programs. Profiles with tables over all three
+colours (printers, some scanners) are rejected.
 """
 
 import struct
@@ -18,11 +18,11 @@ from lightpaint.errors import ImageError
 
 Curve = Callable[[Floats], Floats]
 
-#: XYZ of D50, the white that all profiles refer to.
+#: XYZ of D50, the white point of all profiles.
 D50 = np.array([0.9642, 1.0, 0.8249])
 
-#: Largest difference in light, of 1, at which a profile still counts as sRGB: programs ship curves
-#: of 1024 points and matrices of four decimals.
+#: Maximum difference in light, relative to 1, at which a profile counts as sRGB: programs ship
+#: curves with 1024 points and matrices with four decimals.
 SRGB_TOLERANCE = 2e-3
 
 
@@ -56,7 +56,7 @@ class Profile:
 
 
 def read_icc(data: bytes) -> Profile:
-    """Return the profile in these bytes. Raises ImageError if it is damaged or of another kind."""
+    """Return the profile in these bytes. Raises ImageError if it is damaged or not supported."""
     try:
         return _read(data)
     except (struct.error, IndexError, ValueError, UnicodeDecodeError) as error:
@@ -64,14 +64,14 @@ def read_icc(data: bytes) -> Profile:
 
 
 def gamma_profile(gamma: float, primaries: tuple[float, ...] | None) -> Profile:
-    """Return the profile of PNG's gAMA and cHRM: light is value^gamma, of these primaries."""
+    """Return the profile for PNG's gAMA and cHRM: light = value^gamma, in these primaries."""
     matrix = np.eye(3) if primaries is None else to_rec709(primaries)
     curve = _power(gamma)
     return Profile(f"gamma {gamma:.3g}", (curve, curve, curve), matrix)
 
 
 def srgb_profile(name: str, primaries: tuple[float, ...]) -> Profile:
-    """Return the profile of sRGB's curve with other primaries."""
+    """Return the profile with sRGB's curve and other primaries."""
     return Profile(name, (decode_display,) * 3, to_rec709(primaries))
 
 
@@ -144,9 +144,9 @@ def _curve(tag: bytes) -> Curve:
 
 
 def _parametric(kind: int, values: list[float]) -> Curve:
-    """Return ICC's parametric curve: (a x + b)^g + e from x = d on, c x + f below.
+    """Return ICC's parametric curve: (a x + b)^g + e for x >= d, and c x + f below.
 
-    Types 0 to 4 leave out some of the parameters.
+    Types 0 to 4 omit some of the parameters.
     """
     g, a, b, c, d, e, f = values[0], 1.0, 0.0, 0.0, -1.0, 0.0, 0.0
     if kind in (1, 2):

@@ -18,7 +18,7 @@ import numpy as np
 from lightpaint.arrays import RGB
 from lightpaint.colour.color import cct_and_duv, luminance, rgb_to_hex
 
-#: Luminous counterparts of the units of emission. Multiples of a scene's emission have none.
+#: Luminous counterparts of emission units. Multiples of a scene's emission have none.
 LUMINOUS_UNITS = {"W/(m² sr)": "cd/m²", "W/sr": "cd", "W/m²": "lx"}
 
 
@@ -27,11 +27,11 @@ class Photometry:
     """The photometric quantities of one light.
 
     y: luminance-weighted emission, 0.2126 R + 0.7152 G + 0.0722 B.
-    hex: its display colour, brightest channel at full. kelvin, duv: its correlated colour
-    temperature; None if it has none: off, of unknown colour, far from Planck's locus. flux_w:
-    radiant flux per channel; None for a light without a flux of its own, like the sun. flux_y: the
-    same, luminance-weighted. luminous, luminous_unit, flux_lm: in cd/m², cd or lx, and in lumens;
-    only with a scale.
+    hex: its display colour, with the brightest channel at full. kelvin, duv: its correlated colour
+    temperature; None if undefined: off, of unknown colour, or far from Planck's locus. flux_w:
+    radiant flux per channel; None for a light without a flux, such as the sun. flux_y: the same,
+    luminance-weighted. luminous, luminous_unit, flux_lm: in cd/m², cd or lx, and in lumens; only
+    with a scale.
     """
 
     y: float
@@ -46,24 +46,24 @@ class Photometry:
 
     @property
     def color(self) -> str:
-        """Colour and temperature, `#ffaa66 2856 K`, as far as the light has them."""
+        """Colour and temperature, such as `#ffaa66 2856 K`, as far as they are defined."""
         kelvin = "" if self.kelvin is None else f"{self.kelvin:.0f} K"
         return " ".join(filter(None, (self.hex, kelvin)))
 
     def without_colour(self) -> "Photometry":
-        """Return the same for a light of unknown colour."""
+        """Return the same quantities for a light of unknown colour."""
         return replace(self, hex=None, kelvin=None, duv=None)
 
     @property
     def amounts(self) -> tuple[str, str]:
-        """Luminous quantity and luminous flux in words, each "" if there is none."""
+        """Luminous quantity and luminous flux as text, each "" if undefined."""
         luminous = (
             "" if self.luminous is None else f"{_in_words(self.luminous)} {self.luminous_unit}"
         )
         return luminous, "" if self.flux_lm is None else f"{_in_words(self.flux_lm)} lm"
 
     def fields(self) -> dict[str, Any]:
-        """Return the fields for JSON (docs/formats.md); missing quantities are left out."""
+        """Return the fields for JSON (docs/formats.md); undefined quantities are left out."""
         by_name = {
             "y": self.y,
             "hex": self.hex,
@@ -83,14 +83,14 @@ def photometry(
 ) -> Photometry:
     """Return the photometric quantities of a light with `emission` in `unit`.
 
-    unit_flux: watts that it radiates per channel at an emission of 1.
+    unit_flux: watts radiated per channel at an emission of 1.
     cd_per_unit: cd/m² that radiance 1 stands for.
     """
     is_colour = unit in LUMINOUS_UNITS
     y = float(luminance(np.array(emission)))
     flux = None if unit_flux is None else _times(emission, unit_flux)
     flux_y = None if flux is None else float(luminance(np.array(flux)))
-    # A multiple of several emissions has no colour of its own; their total flux has one.
+    # A multiple of several emissions has no colour, but their total flux has one.
     colour = emission if is_colour else flux
     has_colour = colour is not None and any(colour)
     temperature = cct_and_duv(np.array(colour)) if has_colour else None
@@ -110,7 +110,9 @@ def photometry(
 
 
 def lambertian_flux(area: float) -> float:
-    """Return the watts per unit of radiance of a surface equally bright from all sides: π A."""
+    """Return the watts per unit of radiance of a surface that is equally bright from all sides: π
+    A.
+    """
     return math.pi * area
 
 
@@ -125,10 +127,10 @@ def spot_flux(cutoff: float, beam_width: float) -> float:
     Its intensity is constant up to the beam width b, and then falls linearly with the angle to 0 at
     the cutoff c:
 
-        2π (∫₀ᵇ sin θ dθ + ∫ᵇᶜ (c − θ)/(c − b) sin θ dθ) = 2π (1 − (sin c − sin b)/(c − b))
+      2π (∫₀ᵇ sin θ dθ + ∫ᵇᶜ (c − θ)/(c − b) sin θ dθ) = 2π (1 − (sin c − sin b)/(c − b))
     """
     c, b = cutoff, min(beam_width, cutoff)
-    # (sin c − sin b)/(c − b) without the difference of two numbers that may be equal.
+    # (sin c − sin b)/(c − b), without subtracting numbers that may be equal.
     half = (c - b) / 2
     sinc = math.sin(half) / half if half > 1e-8 else 1.0
     return 2 * math.pi * (1 - math.cos((c + b) / 2) * sinc)

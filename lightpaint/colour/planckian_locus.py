@@ -1,7 +1,7 @@
-"""Planck's locus: CIE 1960 (u, v) of black bodies by their temperature.
+"""Planck's locus: CIE 1960 (u, v) of black bodies by temperature.
 
 Planck's law is summed over the CIE 1931 colour matching functions, nanometre by nanometre, as in
-colour-science. That library takes a second to import, and every answer names temperatures.
+colour-science. That library takes a second to import, and every answer reports temperatures.
 """
 
 from functools import cache
@@ -11,16 +11,16 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
 
-#: Second radiation constant in m K, as CIE 15:2004 rounds it.
+#: Second radiation constant in m K, as rounded in CIE 15:2004.
 C2 = 0.014388
 
-#: Mireds of the tabulated black bodies, from which the search for the nearest starts; they reach
+#: Mireds of the tabulated black bodies, where the search for the nearest one starts; they extend
 #: beyond 1000 and 100,000 K.
 TABLE_MIREDS = np.concatenate([[5.0], np.geomspace(10, 2000, 400)])
 
 
 def uv_of_black_body(kelvin: Doubles) -> Doubles:
-    """Return CIE 1960 (u, v), (k, 2), of black bodies of temperatures (k,)."""
+    """Return CIE 1960 (u, v), (k, 2), of black bodies at temperatures (k,)."""
     wavelength, observer = _observer()
     radiance = wavelength[:, None] ** -5 / np.expm1(C2 / (wavelength[:, None] * kelvin))
     return uv_of(radiance.T @ observer)
@@ -33,7 +33,7 @@ def uv_of(xyz: Floats) -> Doubles:
 
 
 def xyz_of(uv: Floats | tuple[float, float]) -> Doubles:
-    """Return XYZ of luminance 1, (3,), of CIE 1960 (u, v)."""
+    """Return XYZ with luminance 1, (3,), for CIE 1960 (u, v)."""
     u, v = uv
     return np.asarray(np.array([3 * u, 2 * v, 4 - u - 10 * v]) / (2 * v))
 
@@ -50,7 +50,7 @@ def _table_uv() -> Doubles:
 
 @cache
 def _observer() -> tuple[Doubles, Doubles]:
-    """Return wavelengths in metres, (m,), and the colour matching functions there, (m, 3)."""
+    """Return wavelengths in metres, (m,), and the colour matching functions at these, (m, 3)."""
     text = files("lightpaint.colour").joinpath("cie_1931.csv").read_text("utf-8")
     table = np.loadtxt(text.splitlines(), delimiter=",")
     return table[:, 0] * 1e-9, table[:, 1:]

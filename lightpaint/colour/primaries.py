@@ -17,7 +17,7 @@ from lightpaint.signals import interruptible_between_pieces
 @cache
 def colour_science() -> ModuleType:
     """Return the module `colour`."""
-    # An interrupt in the middle of the import would cause complaints when the process ends.
+    # An interrupt in the middle of the import would cause error messages when the process ends.
     with interruptible_between_pieces(), warnings.catch_warnings():
         # It warns about missing plotting libraries, which are not needed here.
         warnings.simplefilter("ignore")
@@ -25,13 +25,13 @@ def colour_science() -> ModuleType:
     return cast("ModuleType", colour)
 
 
-#: CIE xy of red, green, blue and white of Rec.709, the primaries of every image in memory.
+#: CIE xy of red, green, blue and white of Rec.709, the primaries of all images in memory.
 REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 
 #: CIE XYZ itself, as a set of primaries.
 XYZ = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1 / 3, 1 / 3)
 
-#: Tolerance for numbers that files round to three decimals, or to float16.
+#: Tolerance for numbers that files round to three decimals or to float16.
 ROUNDING = 1e-3
 
 #: From XYZ to the cone responses of Bradford's adaptation (Lam 1985; ICC.1:2022, annex E).
@@ -49,15 +49,15 @@ SPACES = {
 
 
 def primaries_in(space: str) -> tuple[float, ...]:
-    """Return CIE xy of red, green, blue and white of a space, by its name in colour-science."""
+    """Return CIE xy of red, green, blue and white of a space, named as in colour-science."""
     color_space = colour_science().RGB_COLOURSPACES[space]
     return tuple(map(float, (*color_space.primaries.ravel(), *color_space.whitepoint)))
 
 
 @lru_cache(64)
 def rgb_to_xyz(primaries: tuple[float, ...]) -> Doubles:
-    """Return the matrix (3, 3) from linear RGB of these primaries (SMPTE RP 177) to XYZ, white at Y
-    = 1.
+    """Return the matrix (3, 3) from linear RGB in these primaries to XYZ, with white at Y = 1
+    (SMPTE RP 177).
 
     It is read-only. Raises ImageError if the primaries span no colours.
     """
@@ -73,7 +73,7 @@ def rgb_to_xyz(primaries: tuple[float, ...]) -> Doubles:
 
 
 def adaptation(white: Doubles, to: Doubles) -> Doubles:
-    """Return the matrix (3, 3) from XYZ as seen under `white` to how it looks under `to`
+    """Return the matrix (3, 3) that adapts XYZ from white point `white` to white point `to`
     (Bradford).
 
     colour-science has this too, but most paintings have a profile, and its import would delay them.
@@ -83,10 +83,10 @@ def adaptation(white: Doubles, to: Doubles) -> Doubles:
 
 
 def to_rec709(primaries: tuple[float, ...]) -> Doubles:
-    """Return the matrix (3, 3) from linear RGB of these primaries to linear Rec.709.
+    """Return the matrix (3, 3) from linear RGB in these primaries to linear Rec.709.
 
-    A different white is adapted: white in the file becomes white here. XYZ has no white of its own,
-    holds colours as measured, and is taken as it is.
+    A different white is adapted, so that white in the file becomes white here. XYZ is converted
+    without adaptation, since it holds colours as measured and has no white of its own.
     """
     to_xyz, source_to_xyz = rgb_to_xyz(REC709), rgb_to_xyz(primaries)
     is_same_white = np.allclose(primaries[6:], REC709[6:], rtol=0, atol=ROUNDING)
@@ -96,18 +96,18 @@ def to_rec709(primaries: tuple[float, ...]) -> Doubles:
 
 
 def are_same(a: Sequence[float] | None, b: Sequence[float] | None) -> bool:
-    """Return True if both are the same primaries up to the rounding of files; None is Rec.709."""
+    """Return True if both are the same primaries up to rounding in files; None is Rec.709."""
     return np.allclose(a or REC709, b or REC709, rtol=0, atol=ROUNDING)
 
 
 def is_rec709(primaries: Sequence[float] | None) -> bool:
-    """Return True for Rec.709's primaries; a file that declares none has them."""
+    """Return True for the primaries of Rec.709; None, an undeclared value, counts as such."""
     return are_same(primaries, None)
 
 
 def converted(image: Floats, matrix: Floats) -> Floats:
     """Return each pixel of (h, w, 3) multiplied by a (3, 3) matrix, as float32."""
-    # The caller finds NaN and Inf, and counts them.
+    # The caller detects and counts NaN and Inf.
     with np.errstate(invalid="ignore", over="ignore"):
         return np.asarray(image.astype(np.float32, copy=False) @ matrix.T.astype(np.float32))
 

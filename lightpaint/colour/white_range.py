@@ -1,8 +1,8 @@
-"""Ranges of white: the part of Planck's locus between two temperatures, in short straight pieces.
+"""Ranges of white: the part of Planck's locus between two temperatures, as a polyline.
 
 The locus is curved, and the straight line between two distant whites lies off it, towards pink:
-half way between 2200 K and 9000 K by 0.015 in Duv. Between two whites that are `STEP` apart the
-distance is neither visible nor measurable.
+halfway between 2200 K and 9000 K by 0.015 in Duv. Between whites that are `STEP` apart the
+deviation is neither visible nor measurable.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from lightpaint.colour.color import kelvin_to_rgb, luminance
 from lightpaint.colour.planckian_locus import uv_of
 from lightpaint.colour.primaries import REC709, rgb_to_xyz
 
-#: Largest step between neighbouring whites, in mireds. The chord is less than 3e-5 off the locus,
+#: Maximum step between neighbouring whites, in mireds. The chord is less than 3e-5 off the locus,
 #: and neighbours differ by less than two just noticeable steps.
 STEP = 8.0
 
@@ -25,8 +25,8 @@ STEP = 8.0
 class WhiteRange:
     """The whites between two temperatures.
 
-    low, high: in kelvin. duv: distance of all of them from Planck's locus in CIE 1960 (u, v),
-    positive towards green.
+    low, high: in kelvin. duv: their distance from Planck's locus in CIE 1960 (u, v), positive
+    towards green.
     """
 
     low: float
@@ -41,7 +41,9 @@ class WhiteRange:
 
     @cached_property
     def colors(self) -> Doubles:
-        """Colours of the whites, (k, 3), linear Rec.709 of luminance 1; negative blue becomes 0."""
+        """Colours of the whites, (k, 3), linear Rec.709 with luminance 1; negative blue becomes
+        0.
+        """
         kelvin = [self.low, *(1e6 / self.mireds[1:-1]).tolist(), self.high]
         return np.array([kelvin_to_rgb(float(x), self.duv) for x in kelvin])
 
@@ -56,7 +58,7 @@ class WhiteRange:
 
     @cached_property
     def _tristimulus(self) -> Doubles:
-        """X + 15 Y + 3 Z of the whites, (k,): their weights in (u, v) of a mix."""
+        """X + 15 Y + 3 Z of the whites, (k,): their weights when mixing in (u, v)."""
         return np.asarray(self.colors @ rgb_to_xyz(REC709).T @ np.array([1.0, 15.0, 3.0]))
 
     def places(self, rgb: Floats) -> Doubles:
@@ -72,19 +74,19 @@ class WhiteRange:
         part = np.clip((offsets * segments).sum(axis=2) / np.square(segments).sum(axis=1), 0, 1)
         distance = np.square(offsets - part[..., None] * segments).sum(axis=2)
         k = np.argmin(distance, axis=1)
-        # Convert the fraction of the way in (u, v) to a fraction of the light.
+        # Convert the fraction of the distance in (u, v) to a fraction of the light.
         t = np.take_along_axis(part, k[:, None], axis=1)[:, 0]
         first, second = (1 - t) / self._tristimulus[k], t / self._tristimulus[k + 1]
         return np.where(lit, k + second / (first + second), self.last / 2)
 
     def at(self, places: Doubles) -> Doubles:
-        """Return the whites at such places, (n,), as linear colours (n, 3) of luminance 1."""
+        """Return the whites at these positions, (n,), as linear colours (n, 3) with luminance 1."""
         k = np.minimum(places.astype(np.intp), self.last - 1)
         part = (places - k)[:, None]
         return np.asarray((1 - part) * self.colors[k] + part * self.colors[k + 1])
 
     def nearest(self, rgb: Floats) -> Doubles:
-        """Return the whites nearest to colours (n, 3), linear, as bright as these are."""
+        """Return the whites nearest to linear colours (n, 3), with the same luminance."""
         return np.asarray(np.asarray(luminance(rgb))[:, None] * self.at(self.places(rgb)))
 
     def greener(self, rgb: Floats) -> Doubles:
@@ -96,7 +98,7 @@ class WhiteRange:
         lit = rgb.max(axis=1) > 0
         places = self.places(rgb)
         k = np.minimum(places.astype(np.intp), self.last - 1)
-        # Towards cooler whites the locus runs with green on its right.
+        # Towards cooler whites, green is to the right of the locus.
         along = np.diff(self._uv, axis=0)[k]
         across = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.hypot(*along.T)[:, None]
         to_xyz = rgb_to_xyz(REC709).T
@@ -104,7 +106,9 @@ class WhiteRange:
         return np.where(lit, (offset * across).sum(axis=1), 0.0)
 
     def window(self, place: float, width: int) -> tuple[int, int]:
-        """Return the first and last white of `width` pieces about a place, within the range."""
+        """Return the first and last white of a window of `width` pieces around a position, within
+        the range.
+        """
         width = min(width, self.last)
         first = min(max(round(place - width / 2), 0), self.last - width)
         return first, first + width
@@ -112,7 +116,7 @@ class WhiteRange:
     def tangent(self, window: tuple[int, int], reach: float) -> Doubles:
         """Return the line of a window extended by `reach` mireds at both ends, within the range.
 
-        The result is its ends, (2, 3) linear, of luminance 1 and never negative.
+        The result is its end points, (2, 3) linear, with luminance 1 and never negative.
         """
         first, last = window
         a, b = self.colors[first], self.colors[last]
@@ -126,14 +130,14 @@ class WhiteRange:
 
 @lru_cache(64)
 def white_range(low: float, high: float, duv: float = 0.0) -> WhiteRange:
-    """Return the range, cached with its whites. Raises ColorError as `kelvin_to_rgb` does."""
+    """Return the range, cached with its whites. Raises ColorError like `kelvin_to_rgb`."""
     whites = WhiteRange(low, high, duv)
     whites.colors.setflags(write=False)
     return whites
 
 
 def _moved_color(color: Doubles, way: Doubles) -> Doubles:
-    """Return a colour (3,) moved by `way`, (3,), or as much of it as leaves no channel below 0."""
+    """Return a colour (3,) moved by `way`, (3,), or by as much of it as keeps all channels >= 0."""
     with np.errstate(divide="ignore"):
         room = np.where(way < 0, color / np.where(way < 0, -way, 1), np.inf)
     return np.asarray(np.maximum(color + min(1.0, float(room.min())) * way, 0))

@@ -1,1 +1,1 @@
-"""Picture files in and out, and images in memory: with their noise, denoised, in blocks."""
+"""Reading and writing pictures, and images in memory: noise, denoising, blocks."""

@@ -11,10 +11,10 @@ from lightpaint.threads import parallel_map
 Job = TypeVar("Job")
 Result = TypeVar("Result")
 
-#: Pixels of a band, about.
+#: Approximate number of pixels in a band.
 BAND_PIXELS = 2**18
 
-#: Pixels of a picture from which jobs that need several whole ones wait for each other.
+#: Number of pixels in a picture from which jobs that need several such pictures run one by one.
 LARGE_PICTURE = 2**22
 
 
@@ -25,9 +25,9 @@ def bands_of(size: tuple[int, ...]) -> Iterator[slice]:
 
 
 def by_bands(make: Callable[..., npt.NDArray[Any]], *pictures: npt.NDArray[Any]) -> Any:
-    """Return `make(*pictures)`, (h, …), of a function that makes each pixel of its own place.
+    """Return `make(*pictures)`, (h, …), for a function that computes each pixel independently.
 
-    pictures: (h, w, …) each. The result has the bits that all pixels at once would give.
+    pictures: (h, w, …) each. The result has the same bits as a single call on whole pictures.
     """
     top, *others = bands_of(pictures[0].shape)
     if not others:
@@ -44,7 +44,7 @@ def by_bands(make: Callable[..., npt.NDArray[Any]], *pictures: npt.NDArray[Any])
 
 
 def sum_by_bands(make: Callable[..., Any], *pictures: npt.NDArray[Any]) -> Any:
-    """Return Σ make(*bands), numbers or arrays, added in the order of the bands.
+    """Return Σ make(*bands), a number or an array, summed in the order of the bands.
 
     pictures: (h, w, …) each.
     """
@@ -58,9 +58,9 @@ def sum_by_bands(make: Callable[..., Any], *pictures: npt.NDArray[Any]) -> Any:
 def in_turns(
     work: Callable[[Job], Result], jobs: Iterable[Job], size: tuple[int, ...]
 ) -> list[Result]:
-    """Return work(job) of each job: side by side, or where pictures are large one by one.
+    """Return work(job) for each job: in parallel, or one by one if the pictures are large.
 
-    size: (height, width) of the pictures, of which each job has several at a time.
+    size: (height, width) of the pictures, of which each job holds several at a time.
     """
     is_large = size[0] * size[1] >= LARGE_PICTURE
     return [work(job) for job in jobs] if is_large else parallel_map(work, jobs)

@@ -18,7 +18,7 @@ from lightpaint.images.bands import LARGE_PICTURE
 from lightpaint.images.estimate import box_mean, shifted
 from lightpaint.images.pixel_blocks import block_mean
 
-#: Key of the text of a denoised PNG that names the denoiser and the file of the raw render.
+#: Key of the text in a denoised PNG that names the denoiser and the file of the raw render.
 DENOISED_KEY = "lightpaint.denoised"
 
 #: Remark, shown once, if only simpler filters are available.
@@ -27,28 +27,28 @@ MISSING_REMARK = (
     "ones, pip install pyoidn (Linux and Windows, x86-64); the solution is the same"
 )
 
-#: `fast` takes a quarter of the time of `high`, and leaves 1.5 times the error.
+#: `fast` takes a quarter of the time of `high`, but leaves 1.5 times the error.
 Quality = Literal["fast", "high"]
 
 #: Pixels that pad a picture for Open Image Denoise. At unpadded borders even a flat picture comes
 #: out 0.7 to 1.2 times as bright; with padding, within half a percent.
 MARGIN = 16
 
-#: Megabytes that Open Image Denoise may take for a large picture, beside the picture itself.
+#: Memory in megabytes that Open Image Denoise may use for a large picture, besides the picture.
 TILES_MB = 512
 
-#: Parameters of the plain filter: window radius in pixels; ratio of light, as a natural logarithm,
-#: and distance in pixels at which a neighbour's weight is 1/√e; exponent of the cosine between
-#: normals; smallest albedo to divide by.
+#: Parameters of the plain filter: window radius in pixels; log ratio of light, and distance in
+#: pixels, at which a neighbour's weight is 1/√e; exponent of the cosine between normals; smallest
+#: albedo to divide by.
 RADIUS, RATIO, NEAR, SHARPNESS, DARKEST = 3, 0.3, 2.0, 32, 0.02
 
 
 @dataclass(frozen=True)
 class Features:
-    """Nearly noise-free features of each pixel, which show a denoiser the edges.
+    """Nearly noise-free features of each pixel that show a denoiser where edges are.
 
-    albedo: (h, w, 3) float32 in [0, 1]; normal: (h, w, 3) float32, of unit length or 0 where no
-    surface is seen; position: (h, w, 3) float32 of that surface in the scene, None if unknown.
+    albedo: (h, w, 3) float32 in [0, 1]. normal: (h, w, 3) float32, of unit length, or 0 where no
+    surface is seen. position: (h, w, 3) float32 of the surface in the scene, None if unknown.
     """
 
     albedo: Floats
@@ -67,7 +67,7 @@ class Features:
         return self.albedo.shape[0], self.albedo.shape[1]
 
     def reduced(self, factor: int) -> "Features":
-        """Return the features of the picture with a pixel for each block of factor x factor."""
+        """Return the features averaged over blocks of factor × factor pixels."""
         position = None if self.position is None else block_mean(self.position, factor)
         return Features(block_mean(self.albedo, factor), block_mean(self.normal, factor), position)
 
@@ -75,10 +75,10 @@ class Features:
 def denoised(
     image: Floats, features: Features | None = None, *, quality: Quality = "fast"
 ) -> Floats:
-    """Return a rendered picture without its noise, by Open Image Denoise or else a plain filter.
+    """Return a rendered picture without its noise, using Open Image Denoise or a plain filter.
 
-    image: (h, w, 3) linear. features: those of the image; they are ignored if their size differs.
-    Returns (h, w, 3) float32, equal up to round-off on every machine.
+    image: (h, w, 3) linear. features: features of the image, ignored if their size differs. Returns
+    (h, w, 3) float32, equal up to round-off on every machine.
     """
     image = np.ascontiguousarray(image, np.float32)
     mean = float(image.mean(dtype=np.float64))
@@ -86,7 +86,8 @@ def denoised(
         return image
     if features is not None and features.size != image.shape[:2]:
         features = None
-    # The network was trained on pictures of usual brightness, and scenes have units of their own.
+    # The network was trained on pictures of ordinary brightness, but the units of scenes are
+    # arbitrary.
     scaled = image / np.float32(mean)
     if oidn_is_installed():
         try:
@@ -127,7 +128,7 @@ def _denoise_with_oidn(image: Floats, features: Features | None, quality: Qualit
     guides: dict[str, Any] = {}
     if features is not None:
         guides = {"albedo": padded(features.albedo), "normal": padded(features.normal)}
-        # `high` has a network of its own for features that have no noise.
+        # `high` has a separate network for features without noise.
         guides["clean_aux"] = quality == "high"
     height, width = image.shape[:2]
     denoise = _in_tiles if height * width >= LARGE_PICTURE else pyoidn.denoise
@@ -139,7 +140,9 @@ def _denoise_with_oidn(image: Floats, features: Features | None, quality: Qualit
 def _in_tiles(
     image: Floats, *, hdr: bool, quality: Quality, clean_aux: bool = False, **guides: Floats
 ) -> Floats:
-    """Denoise as `pyoidn.denoise` does, in tiles that take `TILES_MB`, and keep nothing."""
+    """Denoise like `pyoidn.denoise`, but in tiles within `TILES_MB`, and release the device
+    afterwards.
+    """
     import pyoidn
 
     denoised = np.empty_like(image)
@@ -168,7 +171,7 @@ def _denoise_with_filter(image: Floats, features: Features | None) -> Floats:
     """
     albedo = np.float32(1) if features is None else np.maximum(features.albedo, DARKEST)
     light = np.maximum(image, 0) / albedo
-    # Compare means of a few pixels, since single pixels are noisy.
+    # Means of a few pixels are compared, since single pixels are noisy.
     level = np.log(box_mean(light.mean(axis=-1), 1) + 1e-3).astype(np.float32)
     total, weights = np.zeros_like(light), np.zeros_like(level)
     for dy, dx in product(range(-RADIUS, RADIUS + 1), repeat=2):
@@ -176,7 +179,7 @@ def _denoise_with_filter(image: Floats, features: Features | None) -> Floats:
         weight *= np.float32(np.exp(-0.5 * (dy * dy + dx * dx) / NEAR**2))
         if features is not None:
             cosine = (shifted(features.normal, dy, dx) * features.normal).sum(axis=-1)
-            # Background pixels have no normal: only their light is compared.
+            # Background pixels have no normal, so only their light is compared.
             has_normal = np.square(features.normal).sum(axis=-1) > 0
             weight *= np.where(has_normal, np.clip(cosine, 0, 1) ** SHARPNESS, 1)
         weights += weight

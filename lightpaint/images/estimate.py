@@ -58,20 +58,20 @@ class Estimate:
         return self.image.shape[0], self.image.shape[1]
 
     def reduced(self, factor: int) -> "Estimate":
-        """Return the estimate of the picture with a pixel for each block of factor x factor."""
+        """Return the estimate averaged over blocks of factor × factor pixels."""
         return Estimate(block_mean(self.image, factor), block_mean(self.half_difference, factor))
 
     def variance(self, *, radius: int = 2) -> Floats:
-        """Return the variance of each pixel of `image`, (h, w, 3), pooled over its neighbours.
+        """Return the variance of each pixel of `image`, (h, w, 3), averaged over its neighbours.
 
-        One pair of halves gives one squared difference per pixel, too rough to divide by. The
-        result is its mean over a window of (2 radius + 1)² pixels.
+        A pair of halves gives one squared difference per pixel, which is too rough to divide by. So
+        it is averaged over a window of (2 radius + 1)² pixels.
         """
         return box_mean(np.square(self.half_difference, dtype=np.float64), radius)
 
 
 def box_mean(values: Floats, radius: int) -> Floats:
-    """Return means over a square window, cut off at the borders. values: (h, w, …)."""
+    """Return means over a square window, which is clipped at the borders. values: (h, w, …)."""
     for axis in (0, 1):
         length = values.shape[axis]
         total = np.cumsum(values, axis=axis, dtype=np.float64)
@@ -84,7 +84,7 @@ def box_mean(values: Floats, radius: int) -> Floats:
 
 
 def shifted(values: Floats, dy: int, dx: int) -> Floats:
-    """Return each pixel's neighbour at this offset; beyond the border, the last pixel."""
+    """Return each pixel's neighbour at this offset; border pixels are repeated outwards."""
     height, width = values.shape[:2]
     y = np.clip(np.arange(height) + dy, 0, height - 1)
     x = np.clip(np.arange(width) + dx, 0, width - 1)
@@ -92,14 +92,16 @@ def shifted(values: Floats, dy: int, dx: int) -> Floats:
 
 
 def write_estimate(path: Path, estimate: Estimate, attributes: dict[str, str]) -> None:
-    """Write R, G, B, and the half difference as a separate layer, in float32."""
+    """Write R, G, B and, as a separate layer, the half difference, in float32."""
     channels = rgb_channels(estimate.image)
     channels |= rgb_channels(estimate.half_difference, HALF_DIFFERENCE)
     write_parts(path, [ExrPart("rgb", channels, attributes)])
 
 
 def read_estimate(path: Path) -> tuple[Estimate, Mapping[str, str]]:
-    """Return an estimate that `write_estimate` wrote, and the text attributes of its header."""
+    """Read a file of `write_estimate`. Returns the estimate and the text attributes of its
+    header.
+    """
     parts = read_parts(path)
     if len(parts) > 1:
         raise ImageError(

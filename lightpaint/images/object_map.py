@@ -19,9 +19,9 @@ class Objects:
     """The objects whose surfaces are seen first in each pixel.
 
     Attributes:
-        index: (h, w) int32, the object that covers most of each pixel; -1 for none.
-        names: Names of the objects, in the order of their indices. Several may share one. An object
-            without a name has that of its mesh file, its material or its kind.
+        index: (h, w) int32, index of the object that covers most of each pixel; -1 for none.
+        names: Names of the objects, by index. Several may share a name. An object without a name is
+            named after its mesh file, its material or its kind.
 
     Raises:
         SizeError: If `index` is not a picture of indices into `names`.
@@ -52,6 +52,6 @@ class Objects:
         return self.index.shape[0], self.index.shape[1]
 
     def mask(self, name: str) -> Bools:
-        """Return (h, w), True where objects of that name are seen."""
+        """Return (h, w), True where an object of that name is seen."""
         indices = [k for k, other in enumerate(self.names) if other == name]
         return np.isin(self.index, indices)

@@ -15,14 +15,14 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Floats
 
-#: Brightest value of a picture as half floats: the 24 stops below it have the same precision.
+#: Brightest value of a picture in half floats; the 24 stops below it have the same precision.
 BRIGHTEST = 1024.0
 
-#: Level of deflate: the usual 6 saves another 4 % in twice the time.
+#: Deflate level: the default 6 saves another 4 % but takes twice the time.
 DEFLATE_LEVEL = 3
 
-#: Bits of half floats that are dropped: the 7 that stay keep light to 1/256, on average to half
-#: that.
+#: Number of low bits of half floats that are dropped: the remaining 7 mantissa bits keep light to
+#: 1/256, and to half that on average.
 DROPPED_BITS = 3
 
 
@@ -37,11 +37,11 @@ class PackedPicture:
 
 
 def pack_picture(image: Floats, *, dropped: int = DROPPED_BITS) -> PackedPicture:
-    """Return a picture (h, w, 3) of light, packed."""
+    """Pack a picture of light, (h, w, 3)."""
     brightest = float(image.max(initial=0))
     scale = 2.0 ** np.ceil(np.log2(brightest / BRIGHTEST)) if brightest > 0 else 1.0
     halves = np.asarray(np.clip(image / scale, 0, 65504), np.float16).view(np.uint16)
-    # Half floats >= 0 are ordered like their bits, so that the bits can be rounded as integers.
+    # Half floats >= 0 are ordered like their bit patterns, so they can be rounded as integers.
     codes = (halves.astype(np.int32) + (1 << dropped >> 1)) >> dropped
     red, green, blue = np.moveaxis(codes, -1, 0)
     planes = np.stack([green, red - green, blue - green])
@@ -55,9 +55,11 @@ def pack_picture(image: Floats, *, dropped: int = DROPPED_BITS) -> PackedPicture
 
 
 def _predicted(planes: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
-    """Return the prediction of each number from its neighbours, (3, h, w); 0 beyond the border."""
+    """Return the prediction of each number from its neighbours, (3, h, w), with 0 beyond the
+    border.
+    """
     padded = np.pad(planes, ((0, 0), (1, 0), (1, 0)))
     left, above, corner = padded[:, 1:, :-1], padded[:, :-1, 1:], padded[:, :-1, :-1]
-    # JPEG-LS's: a plane through the three, clamped to the two neighbours.
+    # As in JPEG-LS: a plane through the three, clamped to the range of the two neighbours.
     least, most = np.minimum(left, above), np.maximum(left, above)
     return np.asarray(np.clip(left + above - corner, least, most))

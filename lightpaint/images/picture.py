@@ -1,4 +1,4 @@
-"""Reading of pictures in any format of paint programs, as linear Rec.709."""
+"""Reads pictures in any format of paint programs, as linear Rec.709."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -29,7 +29,7 @@ Mask = npt.NDArray[np.bool_]
 #: Sublayer of a painted EXR layer that is > 0 where the light may also be brighter.
 AT_LEAST = "at_least"
 
-#: JPEG's rounding keeps white within this many codes of the largest.
+#: Number of codes by which JPEG's rounding may reduce white below the largest code.
 JPEG_WHITE = 2
 
 
@@ -38,17 +38,17 @@ class Picture:
     """A picture in linear Rec.709.
 
     kind: `exr`, `png`, `tiff`, `jpeg`, `psd`, `ora` or `kra`.
-    image: (h, w, 3) float32, not premultiplied, 0 where it is not finite.
-    finite: (h, w), where the file holds neither NaN nor Inf.
-    alpha: (h, w) float32; None if there is none, or if an integer file is opaque everywhere.
-    weight: (h, w) float32, the channel W of an EXR; RGB is then not unpremultiplied.
-    stored: (h, w), where the file has pixels; None if everywhere.
-    saturated: (h, w, 3), where the light is that of `image` or brighter: the file has no larger
-    number, or its layer `at_least` marks it.
+    image: (h, w, 3) float32, not premultiplied, 0 where not finite.
+    finite: (h, w), True where the file holds neither NaN nor Inf.
+    alpha: (h, w) float32; None if absent, or if an integer file is opaque everywhere.
+    weight: (h, w) float32, the channel W of an EXR; in that case RGB is not unpremultiplied.
+    stored: (h, w), True where the file has pixels; None if everywhere.
+    saturated: (h, w, 3), True where the light is that of `image` or brighter, because the file
+    cannot hold a larger number or its layer `at_least` marks it.
     transform: the transform that decoded the numbers; None if the file holds light.
     codes: largest possible integer; None for floats.
-    lossy: True if compression changed the numbers.
-    notes: remarks for the user, a line each.
+    lossy: whether compression changed the numbers.
+    notes: remarks for the user, one line each.
     attributes: texts in the header of an EXR.
     """
 
@@ -78,12 +78,11 @@ def read_picture(
     transform: ViewTransform | TransformChoice | None = None,
     otherwise: ViewTransform | None = None,
 ) -> Picture:
-    """Return the picture in a file of any format that paint programs write.
+    """Return the picture in a file of any supported format.
 
     layer: layer, part or view of an EXR; required if it has several. transform: the view transform
-    that encoded integers; its open parts come from lightpaint's own text in a PNG, else from
-    `otherwise`, else from sRGB. Files of floats hold light, and need no transform.
-
+    that encoded integers. Its open parts come from lightpaint's own text in a PNG, else from
+    `otherwise`, else from sRGB. Files of floats hold light and need no transform.
     Raises ImageError, with one line that names the file, if it cannot be read.
     """
     path = Path(path)
@@ -106,8 +105,8 @@ def read_picture(
 def read_mask(path: str | Path) -> npt.NDArray[np.float32]:
     """Return an importance mask, (h, w) float32.
 
-    An EXR gives the first of its channels Y, W, A and R. Other files give their numbers, from 0 to
-    1 and not decoded to light: the brightest channel, times alpha.
+    From an EXR, the first existing channel of Y, W, A and R. From other files the stored numbers,
+    scaled to [0, 1] but not decoded to light: the brightest channel, times alpha.
     """
     path = Path(path)
     kind = file_kind(path)
@@ -164,7 +163,7 @@ def _picture_of_layer(layer: ExrLayer) -> Picture:
 
 
 def _at_least(layer: ExrLayer) -> Mask | None:
-    """Return where an EXR marks light that may be brighter, as the largest code of 8 bits does."""
+    """Return where an EXR marks light that may be brighter, as the largest 8-bit code implies."""
     inner = replace(layer, prefix=f"{layer.prefix}.{AT_LEAST}" if layer.prefix else AT_LEAST)
     marks = [inner.channel(*names) for names in zip(*RGB_NAMES, strict=True)]
     if all(mark is None for mark in marks):
@@ -213,7 +212,9 @@ def _picture_of_bitmap(
 
 
 def _saturated(bitmap: Bitmap) -> Mask:
-    """Return where the numbers are the largest possible, (h, w, 3): under alpha, alpha itself."""
+    """Return where numbers have their maximum, (h, w, 3); with premultiplied alpha that is
+    alpha.
+    """
     assert bitmap.codes is not None
     if bitmap.premultiplied and bitmap.alpha is not None:
         alpha = bitmap.alpha[..., None]
@@ -224,8 +225,8 @@ def _saturated(bitmap: Bitmap) -> Mask:
 def _without_partial(alpha: Floats) -> tuple[Floats, tuple[str, ...]]:
     """Return alpha with partly transparent pixels cleared, and a note if there were any.
 
-    Photoshop blends such pixels of its merged picture with white and Krita does not. The file does
-    not say which program wrote it, so their colours are unknown.
+    Photoshop blends such pixels of its merged picture with white, but Krita does not, and the file
+    does not say which program wrote it. So their colours are unknown.
     """
     partial = (alpha > 0) & (alpha < 1)
     if not partial.any():
@@ -259,7 +260,7 @@ def _mask_of(bitmap: Bitmap) -> npt.NDArray[np.float32]:
 
 
 def _only_finite(image: Floats) -> Mask:
-    """Return where all channels are finite, and set other pixels of `image` to 0 in place."""
+    """Return where all channels are finite, and set all other pixels of `image` to 0 in place."""
     finite = np.asarray(np.isfinite(image).all(axis=-1))
     if not finite.all():
         image[~finite] = 0
@@ -267,14 +268,16 @@ def _only_finite(image: Floats) -> Mask:
 
 
 def _looks_straight(image: Floats, alpha: Floats) -> bool:
-    """Return True if most transparent pixels have a colour: rare in premultiplied light."""
+    """Return True if most transparent pixels have a colour, which is rare in premultiplied
+    light.
+    """
     clear = alpha == 0
     return bool((image.any(axis=-1) & clear).sum() > clear.sum() / 2)
 
 
 @contextmanager
 def _naming_file(file: str) -> Iterator[None]:
-    """Put the file's name before errors like `is damaged`, and make foreign names in them visible.
+    """Prefix errors such as `is damaged` with the file's name, and escape foreign names in them.
 
     Names inside the file may contain control characters for a terminal.
     """

@@ -1,7 +1,7 @@
-"""Images at two sizes: a pixel of the smaller one is a block of pixels of the larger.
+"""Images at two sizes, where a pixel of the smaller one is a block of pixels of the larger.
 
-Blocks are squares that start at the top left corner. A remainder at the right and at the bottom,
-always narrower than a block, belongs to none. So the two sizes alone determine the blocks.
+Blocks are squares, starting at the top left corner. A remainder at the right and at the bottom,
+which is narrower than a block, belongs to none. So the two sizes alone determine the blocks.
 """
 
 from typing import Any
@@ -13,38 +13,40 @@ from lightpaint.arrays import Doubles, Floats
 
 Size = tuple[int, int]
 
-#: Largest side of blocks whose pixels are added one after the other, four times as fast as NumPy's
+#: Largest side of blocks whose pixels are summed one after the other, four times as fast as NumPy's
 #: mean.
 MAX_ADDED_SIDE = 8
 
 
 def whole_factor(larger: Size, smaller: Size) -> int | None:
-    """Return the side of the largest blocks of which `larger` has as many as `smaller` has pixels.
+    """Return the side of the largest blocks that `larger` has as many of as `smaller` has pixels.
 
-    Both are (height, width) or both (width, height). Returns None if no such blocks exist.
+    Both are (height, width) or both (width, height). Returns None if there are no such blocks.
     """
     factor = min(larger[0] // smaller[0], larger[1] // smaller[1])
     return factor if factor >= 1 and blocks_in(larger, factor) == smaller else None
 
 
 def blocks_in(size: Size, factor: int) -> Size:
-    """Return the number of blocks of factor x factor pixels in an image of that size, per side."""
+    """Return the number of blocks of factor × factor pixels along each side of an image."""
     return size[0] // factor, size[1] // factor
 
 
 def left_over(size: Size, factor: int) -> Size:
-    """Return the number of pixels, per side, that are in no block of factor x factor."""
+    """Return the number of pixels along each side that do not fill a block of factor × factor."""
     return size[0] % factor, size[1] % factor
 
 
 def covered(image: Floats, smaller: Size) -> Floats:
-    """Return the part of `image` that one of size `smaller` shows, a whole number of blocks."""
+    """Return the part of `image` that is covered by blocks, one for each pixel of size
+    `smaller`.
+    """
     factor = whole_factor(image.shape[:2], smaller) or 1
     return image[: smaller[0] * factor, : smaller[1] * factor]
 
 
 def block_mean(image: Floats, factor: int) -> Floats:
-    """Return means over blocks of factor x factor pixels, in the precision of `image`, (h, w, …).
+    """Return means over blocks of factor × factor pixels of `image`, (h, w, …), in its precision.
 
     A box-filtered render with a pixel for each block estimates the same values.
     """
@@ -61,9 +63,9 @@ def block_mean(image: Floats, factor: int) -> Floats:
 
 
 def block_sums(image: npt.NDArray[Any], factor: int) -> Doubles:
-    """Return sums over blocks of factor x factor pixels of `image`, (h, w, …), in float64.
+    """Return sums over blocks of factor × factor pixels of `image`, (h, w, …), in float64.
 
-    Here the remainders at the right and at the bottom form smaller blocks.
+    Remainders at the right and at the bottom form smaller blocks here.
     """
     values = np.asarray(image, np.float64)
     if factor == 1:
@@ -86,5 +88,5 @@ def _in_blocks(image: Floats, factor: int) -> Floats:
 
 
 def enlarged(image: npt.NDArray[Any], factor: int) -> npt.NDArray[Any]:
-    """Return an image with every pixel repeated factor x factor times."""
+    """Return an image with every pixel repeated factor × factor times."""
     return image.repeat(factor, axis=0).repeat(factor, axis=1)

@@ -1,4 +1,4 @@
-"""Resampling of images to any size."""
+"""Resamples images to any size."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from lightpaint.arrays import Floats
 
 
 def resampled(planes: Floats, size: tuple[int, int]) -> Floats:
-    """Return (h, w, n) float32 at `size`: area means where it shrinks, interpolated where it grows.
+    """Return (h, w, n) float32 at `size`: averaged where it shrinks, interpolated where it grows.
 
     size: (height, width).
     """

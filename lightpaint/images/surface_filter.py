@@ -17,27 +17,27 @@ from lightpaint.arrays import Bools, Floats
 from lightpaint.images.denoiser import DARKEST, Features
 from lightpaint.threads import parallel_map
 
-#: Pixels on either side that pictures are averaged over; it is two standard deviations.
+#: Radius of the filter in pixels, which is two standard deviations.
 RADIUS = 4
 
-#: Distance from a tangent plane at which a weight is 1/e, in widths of a pixel, and by how much it
-#: grows for each pixel in between: surfaces bend.
+#: Distance from a tangent plane, in pixel widths, at which a weight is 1/e; and its increase per
+#: pixel of distance, since surfaces bend.
 NEAR_PLANE, BEND = 3.0, 0.25
 
 #: Number of times that the cosine between two normals is squared.
 SQUARINGS = 5
 
-#: Rows of a band, whose weights and pictures a processor's cache holds.
+#: Number of rows in a band, whose weights and pictures fit into a processor's cache.
 BAND_ROWS = 32
 
-#: Pixels of a picture up to which the weights are kept for the next one: 160 bytes for each.
+#: Number of pixels in a picture up to which the weights are kept, at 160 bytes per pixel.
 KEPT_PIXELS = 2**19
 
 
 class SurfaceFilter:
-    """Means over the neighbours on a surface, of any number of pictures of the same surfaces.
+    """Means over neighbours on a surface, for any number of pictures of the same surfaces.
 
-    features: with positions. radius: pixels on either side.
+    features: surface features, with positions. radius: window radius in pixels.
     """
 
     def __init__(self, features: Features, radius: int = RADIUS) -> None:
@@ -49,7 +49,7 @@ class SurfaceFilter:
         self._per_width = _pixels_per_length(position, np.asarray(self._normal.any(axis=0)))
 
     def __call__(self, image: Floats) -> Floats:
-        """Return a picture that is filtered, (h, w, 3) float32."""
+        """Return the filtered picture, (h, w, 3) float32."""
         filtered = np.empty((*self.size, 3), np.float32)
 
         def fill(band: "_Band") -> None:
@@ -60,7 +60,7 @@ class SurfaceFilter:
 
     @property
     def is_quick(self) -> bool:
-        """True if weights are kept; else each picture takes ten times as long."""
+        """True if the weights are kept; otherwise each picture takes ten times as long."""
         return self.size[0] * self.size[1] <= KEPT_PIXELS
 
     @cached_property
@@ -75,7 +75,7 @@ class SurfaceFilter:
         return bands
 
     def _filtered(self, band: "_Band", image: Floats) -> Floats:
-        """Return the rows of a band, (rows, w, 3)."""
+        """Return the filtered rows of a band, (rows, w, 3)."""
         albedo = self._albedo[:, band.top : band.bottom]
         rows = slice(max(band.top - self.radius, 0), band.bottom + self.radius)
         light = _planar(image[rows]) / self._albedo[:, rows]
@@ -83,7 +83,9 @@ class SurfaceFilter:
         return np.moveaxis(mean * albedo, 0, -1)
 
     def _framed(self, planes: Floats, first: int, band: "_Band") -> Floats:
-        """Return rows `first` and on with zeros around them: what `radius` reaches of a band."""
+        """Return planes that start at row `first`, padded with zeros to all that `radius` reaches
+        from a band.
+        """
         r = self.radius
         above = first - (band.top - r)
         below = band.bottom - band.top + 2 * r - above - planes.shape[-2]
@@ -100,15 +102,16 @@ class _Band:
 
     @property
     def _offsets(self) -> list[tuple[int, int]]:
-        """Half of all neighbours: the others are these, seen from the other end."""
+        """Half of all neighbours; the other half is the same pairs seen from the other end."""
         r = self.of.radius
         return [(y, x) for y, x in product(range(r + 1), range(-r, r + 1)) if (y, x) > (0, 0)]
 
     @cached_property
     def weights(self) -> Floats:
-        """Weights of the pairs that begin in these rows or `radius` above, (pairs, r + rows, ...).
+        """Weights of the pairs that begin in these rows or up to `radius` above, (pairs, r + rows,
+        ...).
 
-        Of pairs with an end outside of the picture they are 0.
+        They are 0 for pairs with an end outside the picture.
         """
         of, r = self.of, self.of.radius
         rows = slice(max(self.top - r, 0), self.bottom + r)
@@ -137,7 +140,7 @@ class _Band:
 
     @cached_property
     def total(self) -> Floats:
-        """Sum of the weights of each pixel, (rows, w), its own 1 among them."""
+        """Sum of the weights of each pixel, (rows, w), including its own weight 1."""
         size = (
             1,
             self.bottom - self.top + 2 * self.of.radius,
@@ -148,7 +151,7 @@ class _Band:
     def sums(self, light: Floats) -> Floats:
         """Return weighted sums over neighbours, (c, rows, w).
 
-        light: (c, r + rows + r, r + w + r), r being the radius.
+        light: (c, r + rows + r, r + w + r), where r is the radius.
         """
         r, rows, columns = self.of.radius, self.bottom - self.top, self.of.size[1]
 
@@ -158,7 +161,7 @@ class _Band:
         total = shifted(light, 0, 0).copy()
         weighed = np.empty_like(total)
         for weight, (dy, dx) in zip(self.weights, self._offsets, strict=True):
-            # A pair adds to both of its ends.
+            # A pair contributes to both of its ends.
             for (y, x), (neighbour_y, neighbour_x) in (
                 ((0, 0), (dy, dx)),
                 ((-dy, -dx), (-dy, -dx)),
@@ -171,15 +174,16 @@ class _Band:
 
 
 def _planar(image: Floats) -> Floats:
-    """Return (h, w, 3) as (3, h, w) float32, in which rows lie together."""
+    """Return (h, w, 3) as contiguous (3, h, w) float32."""
     return np.ascontiguousarray(np.moveaxis(image, -1, 0), np.float32)
 
 
 def _pixels_per_length(position: Floats, is_seen: Bools) -> Floats:
-    """Return how many pixels make up a unit of length at each pixel, (h, w); 0 for the background.
+    """Return the number of pixels per unit of length at each pixel, (h, w); 0 for the background.
 
-    position: (3, h, w); is_seen: (h, w). The length of a pixel is the least distance to one of four
-    neighbours, there and in the eight pixels around: where an object ends, the nearer one decides.
+    position: (3, h, w). is_seen: (h, w). The length of a pixel is the smallest distance to any of
+    its four neighbours, minimised over the eight pixels around it, so that the nearer object
+    decides at an edge.
     """
     length = np.full(is_seen.shape, np.inf, np.float32)
     for pixel, neighbour in ((np.s_[:-1, :], np.s_[1:, :]), (np.s_[:, :-1], np.s_[:, 1:])):

@@ -1,1 +1,1 @@
-"""Folders and files of results: published together, read back strictly."""
+"""Folders and files of results: published together, and read back strictly."""

@@ -1,4 +1,6 @@
-"""Strict reading of JSON and TOML that others wrote: values of the expected types, or an error."""
+"""Strict reading of JSON and TOML from outside: values have the expected types, or an error is
+raised.
+"""
 
 import json
 import math
@@ -11,24 +13,24 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 
 from lightpaint.screen import some_names
 
-#: Longest string that is read, in characters, and most values of a list or an object.
+#: Maximum length of a string in characters, and maximum number of values in a list or an object.
 MAX_CHARACTERS, MAX_VALUES = 2**14, 2**17
 
-#: Most dots of TOML: the count of each line, squared, summed over all lines. The parser's time for
+#: Maximum of the squared number of dots in a line of TOML, summed over lines. The parser's time for
 #: a dotted key grows with the square of its parts, 24 ns each.
 MAX_DOTS = 10**8
 
-#: Origins of annotations like `int | None`; a Literal in one makes it the second.
+#: Origins of annotations such as `int | None`; with a Literal inside it is the second.
 UNIONS = (UnionType, Union)
 
 _Record = TypeVar("_Record")
 
 
 def strict_json(text: str) -> Any:
-    """Return the value of the JSON in `text`, without any of Python's extensions of JSON.
+    """Parse JSON without Python's extensions.
 
     Raises ValueError for invalid JSON, NaN and Infinity, numbers beyond float64, text that is not
-    Unicode (a lone surrogate), a key that is repeated in an object, and values nested too deeply.
+    Unicode (a lone surrogate), a repeated key in an object, and excessive nesting.
     """
     try:
         data = json.loads(
@@ -38,7 +40,7 @@ def strict_json(text: str) -> Any:
             parse_float=_finite_float,
             parse_int=_bounded_int,
         )
-        if "\\u" in text:  # only an escape can bring a lone surrogate into decoded text
+        if "\\u" in text:  # only an escape can produce a lone surrogate in decoded text
             json.dumps(data, ensure_ascii=False).encode()
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
@@ -48,9 +50,9 @@ def strict_json(text: str) -> Any:
 
 
 def strict_toml(text: str) -> dict[str, Any]:
-    """Return the content of the TOML in `text`.
+    """Parse TOML.
 
-    Raises ValueError for invalid TOML, and for lines that would take the parser forever.
+    Raises ValueError for invalid TOML, and for lines that would take the parser extremely long.
     """
     dots = [line.count(".") for line in text.splitlines()]
     if sum(n * n for n in dots) > MAX_DOTS:
@@ -63,7 +65,7 @@ def strict_toml(text: str) -> dict[str, Any]:
 
 
 def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    # Python's parser would silently keep the last of two equal keys.
+    # Python's parser would silently keep the last of several equal keys.
     record = dict(pairs)
     if len(record) < len(pairs):
         raise ValueError(f"a key is repeated among {some_names(key for key, _ in pairs)}")
@@ -94,13 +96,12 @@ def read_record(
     others: bool = False,
     is_exact: bool = False,
 ) -> _Record:
-    """Return the dataclass `kind` from a JSON object, its fields by name.
+    """Build the dataclass `kind` from a JSON object with its fields by name.
 
-    Each value must match the field's annotation: an int is a whole number >= 0, and neither true
-    nor a string passes for a number. A field may be missing if it has a default and is not
-    `required`. others: whether unknown keys are ignored, as they are in nested records unless the
-    reading is exact.
-
+    Each value must match the field's annotation: an int is a whole number >= 0, and neither
+    booleans nor strings are accepted as numbers. A field may be missing if it has a default and is
+    not in `required`. others: whether unknown keys are ignored. is_exact: whether unknown keys are
+    rejected in nested records too.
     Raises ValueError, without naming the file, and the errors of `kind` itself.
     """
     if not isinstance(data, dict):
@@ -125,7 +126,9 @@ def read_record(
 
 
 def fields_of(record: Any, *optional: str) -> dict[str, Any]:
-    """Return a dataclass's fields for JSON, by name; `optional` ones only if not the default."""
+    """Return a dataclass's fields for JSON by name; `optional` fields only if not at their
+    default.
+    """
     default = {field.name: field.default for field in fields(record)}
     return {
         name: value
@@ -135,11 +138,11 @@ def fields_of(record: Any, *optional: str) -> dict[str, Any]:
 
 
 def _read(kind: Any, value: Any, is_exact: bool) -> Any:
-    """Return `value` as the annotation `kind` wants it; raise TypeError if it is something else."""
+    """Return `value` converted to the annotation `kind`. Raises TypeError if it does not match."""
     outer, inner = get_origin(kind), get_args(kind)
     if kind is Any:
         return value
-    # Exact types instead of isinstance, for which true would pass as the number 1.
+    # Types are compared exactly, since isinstance would accept True as the number 1.
     if kind is float and type(value) in (int, float):
         return float(value)
     if kind is int and type(value) is int and value >= 0:
@@ -170,7 +173,7 @@ def _read(kind: Any, value: Any, is_exact: bool) -> Any:
 
 
 def _read_one_of(kinds: tuple[Any, ...], value: Any, is_exact: bool) -> Any:
-    """Return `value` as the first of several annotations that it is of; None is the last."""
+    """Return `value` as the first matching annotation; None is tried last."""
     if value is None and NoneType in kinds:
         return None
     for kind in kinds:
@@ -180,7 +183,7 @@ def _read_one_of(kinds: tuple[Any, ...], value: Any, is_exact: bool) -> Any:
 
 
 def _expected(kind: Any) -> str:
-    """Return the values that an annotation allows, in words."""
+    """Return the values that an annotation allows, as text."""
     outer, inner = get_origin(kind), get_args(kind)
     if outer is Literal:
         return ("one of " if inner[1:] else "") + ", ".join(map(repr, inner))

@@ -1,9 +1,10 @@
-"""Files that appear in a folder together: after any kill it has all old files, or all new ones.
+"""Publishes several files in a folder together: after any kill it has all old files or all new
+ones.
 
-New files are written to a hidden folder beside the real one, which stays as it is meanwhile. At the
-end a journal is written and the files are moved, one by one, in less than a millisecond. A kill
-within that time leaves a mixture, until `finish` completes the journal when the folder is next
-used.
+New files are written to a hidden folder beside the real one, which stays unchanged meanwhile. At
+the end a journal is written, and the files are moved one by one, in less than a millisecond. If the
+process is killed during that time, the folder is left mixed until `finish` completes the journal
+when it is next used.
 """
 
 import fcntl
@@ -29,7 +30,7 @@ MARK = ".lightpaint-"
 #: Name of the journal in a hidden folder.
 JOURNAL = ".lightpaint.json"
 
-#: Seconds after which a hidden folder counts as abandoned, on file systems without locks.
+#: Age in seconds from which a hidden folder counts as abandoned, on file systems without locks.
 LEFTOVER_S = 86_400.0
 
 
@@ -37,7 +38,7 @@ LEFTOVER_S = 86_400.0
 class _Journal:
     """The moves and deletions that a folder still needs, by names relative to it.
 
-    move: files to bring there from the hidden folder. gone: files to delete there.
+    move: files to move there from the hidden folder. gone: files to delete there.
     """
 
     move: tuple[str, ...] = ()
@@ -50,25 +51,24 @@ class _Journal:
 
 
 def is_below(name: str) -> bool:
-    """Return True if a relative name stays in its folder."""
+    """Return True if a relative name does not lead out of its folder."""
     return not Path(name).is_absolute() and ".." not in Path(name).parts
 
 
 @contextmanager
 def staged(folder: Path, gone: Iterable[Path] = ()) -> Iterator[Path]:
-    """Yield a hidden folder to write to; its files then appear in `folder`, all at once.
+    """Yield a hidden folder to write to; afterwards its files appear in `folder`, all at once.
 
-    If the block raises, or the process is killed, `folder` is as it was. Its files of other names
-    stay. The hidden folder is a sibling, so that relative paths from it are valid from `folder`
-    too.
+    If the block raises, or the process is killed, `folder` stays unchanged. Files with other names
+    stay in it. The hidden folder is a sibling of `folder`, so relative paths are valid from both.
 
     Args:
-        folder: It may not exist yet.
-        gone: Its files that are deleted when the new ones appear.
+        folder: The folder to publish to, which need not exist.
+        gone: Files in it to delete when the new ones appear.
 
     Raises:
-        OutputError: For every refusal of the system. It names `folder`, not the hidden one, as do
-            all errors of the block.
+        OutputError: For any error of the system. Its message, like those of all errors in the
+            block, names `folder` rather than the hidden folder.
     """
     real = Path(os.path.realpath(folder))
     finish(folder)
@@ -93,7 +93,9 @@ def staged(folder: Path, gone: Iterable[Path] = ()) -> Iterator[Path]:
 
 
 def finish(folder: Path) -> None:
-    """Complete what killed runs left unfinished in `folder`, and delete their hidden folders."""
+    """Complete what killed processes left unfinished in `folder`, and delete their hidden
+    folders.
+    """
     real = Path(os.path.realpath(folder))
     for stage in _hidden_folders(real):
         with suppress(OSError):
@@ -101,12 +103,12 @@ def finish(folder: Path) -> None:
 
 
 def _make_hidden_folder(folder: Path) -> tuple[Path, int]:
-    """Create a hidden folder for `folder`, and return it with a descriptor that holds its lock.
+    """Create a hidden folder for `folder`. Returns it with a descriptor that holds its lock.
 
-    It lies beside `folder`, or in it if nothing can be moved between the two.
+    It lies beside `folder`, or inside it if files cannot be moved between the two.
     """
     real = Path(os.path.realpath(folder))
-    # Use the path as it was given, unless that does not show the real place.
+    # Use the path as given, unless it is indirect.
     is_indirect = folder.is_symlink() or folder.name == "" or ".." in folder.parts
     place = real if is_indirect else folder
     place.parent.mkdir(parents=True, exist_ok=True)
@@ -121,7 +123,9 @@ def _make_hidden_folder(folder: Path) -> tuple[Path, int]:
 
 
 def _discard(stage: Path, parents: Iterable[Path]) -> None:
-    """Delete `stage`, unless files in it are still to be moved, and the parents made for it."""
+    """Delete the parents that were created for `stage`, and `stage` itself unless it still has
+    files to move.
+    """
     if _journal_in(stage) is None:
         shutil.rmtree(stage, ignore_errors=True)
     for parent in parents:
@@ -130,7 +134,7 @@ def _discard(stage: Path, parents: Iterable[Path]) -> None:
 
 
 def _hidden_folders(real: Path) -> list[Path]:
-    """Return the hidden folders of `real` that exist."""
+    """Return the existing hidden folders of `real`."""
     parent, prefix = real.parent, f".{real.name}{MARK}"
     folders: list[Path] = []
     for place, start in ((parent, prefix), (real, MARK)):
@@ -140,7 +144,7 @@ def _hidden_folders(real: Path) -> list[Path]:
 
 
 def _files_in(folder: Path) -> set[str]:
-    """Return names relative to `folder` of everything in it but folders, hidden files too."""
+    """Return the names, relative to `folder`, of all files in it, including hidden ones."""
     return {
         (Path(top) / name).relative_to(folder).as_posix()
         for top, folders, files in os.walk(folder)
@@ -149,13 +153,13 @@ def _files_in(folder: Path) -> set[str]:
 
 
 def _flush(stage: Path) -> None:
-    """Flush all files in `stage` to the disk, before they are renamed."""
+    """Flush all files in `stage` to disk before they are renamed."""
     for name in _files_in(stage):
         flush(stage / name)
 
 
 def _publish(stage: Path, folder: Path, gone: set[str]) -> None:
-    """Move all that is in `stage` to `folder`, and delete the files `gone` there."""
+    """Move everything in `stage` to `folder`, and delete the files `gone` there."""
     real, new = Path(os.path.realpath(folder)), _files_in(stage)
     try:
         if not real.exists() and stage.parent.samefile(real.parent):
@@ -168,9 +172,9 @@ def _publish(stage: Path, folder: Path, gone: set[str]) -> None:
 
 
 def _finish_stage(stage: Path, real: Path, *, is_mine: bool = False) -> None:
-    """Complete the journal in `stage`, if it has one, and delete `stage`.
+    """Complete the journal in `stage`, if there is one, and delete `stage`.
 
-    is_mine: whether this process holds the lock.
+    is_mine: whether this process holds its lock.
     """
     if not (is_mine or _is_abandoned(stage)):
         return
@@ -184,7 +188,7 @@ def _finish_stage(stage: Path, real: Path, *, is_mine: bool = False) -> None:
             (real / name).unlink(missing_ok=True)
             with suppress(OSError):
                 if (folder := (real / name).parent) != real:
-                    folder.rmdir()  # only if it is empty
+                    folder.rmdir()  # only if empty
     shutil.rmtree(stage, ignore_errors=True)
 
 
@@ -193,7 +197,7 @@ def _write_journal(folder: Path, journal: _Journal) -> None:
 
 
 def _journal_in(folder: Path) -> _Journal | None:
-    """Return the journal in `folder`; None if there is none, or it is not one of ours."""
+    """Return the journal in `folder`; None if it is missing or invalid."""
     try:
         text = read_text(folder / JOURNAL, "journal", OutputError, limit=MAX_TEXT)
         return read_record(_Journal, strict_json(text))
@@ -202,7 +206,7 @@ def _journal_in(folder: Path) -> _Journal | None:
 
 
 def _is_abandoned(folder: Path) -> bool:
-    """Return True if no process works in this folder any more."""
+    """Return True if no process uses this folder any more."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -216,7 +220,7 @@ def _is_abandoned(folder: Path) -> bool:
 
 
 def is_mounted(folder: Path) -> bool:
-    """Return True if something is mounted at `folder`, a real path, or it is the root of a disk."""
+    """Return True if `folder`, a real path, is a mount point or the root of a disk."""
     if os.path.ismount(folder):
         return True
     with suppress(OSError):

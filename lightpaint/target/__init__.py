@@ -1,1 +1,1 @@
-"""The room of targets: a painted EXR becomes a `Target`, an image with importance."""
+"""Targets: a painting becomes a `Target`, an image with importance."""

@@ -1,7 +1,7 @@
-"""The view through which a picture was painted over a known look, if it was.
+"""Finds the view through which a picture was painted over a known look, if it was.
 
-A picture that another program made of its light does not tell the view. But most of a painting is
-unpainted: there it is the look itself, through one view, up to the rounding of its file.
+A picture from another program does not state its view. But most of a painting is unpainted, and
+there it equals the look through one view, up to rounding in its file.
 """
 
 from collections.abc import Iterator
@@ -16,25 +16,25 @@ from lightpaint.colour.display.view_transform import TransformChoice, ViewTransf
 from lightpaint.images.picture import Picture
 from lightpaint.target.painted_pixels import LOSSY, ROUNDING, compressed_like, lossy_difference
 
-#: Share of the telling pixels that have to be the look itself.
+#: Minimum share of informative pixels that must equal the look.
 MOST = 0.5
 
-#: Display values of telling pixels: between black and white, where many pictures are alike; and the
-#: least share of such pixels in a picture.
+#: Display values of informative pixels: not near black or white, where many pictures are alike; and
+#: the minimum share of such pixels in a picture.
 TELLING, ENOUGH = (0.04, 0.96), 0.01
 
-#: Stops within which exposures are equal up to the rounding of a file.
+#: Difference in stops up to which exposures are equal up to rounding in a file.
 BIN = 0.04
 
 
 def view_of_look(
     path: Path, picture: Picture, look: Floats, choice: TransformChoice
 ) -> ViewTransform | None:
-    """Return the view through which most of `picture` is `look`; None if most of it is not.
+    """Return the view through which most of `picture` equals `look`; None if it does not.
 
-    path: the file of the picture. look: (h, w, 3) linear. choice: the part of
-    the view that is given; the rest is searched, the exposure, too. A file that holds light has no
-    view, and is compared in sRGB.
+    path: the file of the picture. look: (h, w, 3) linear. choice: the part of the view that is
+    given; the remainder, including the exposure, is searched. A file that holds light has no view,
+    and is compared in sRGB.
     """
     if picture.size != look.shape[:2]:
         return None
@@ -62,7 +62,7 @@ def _plausible(display: Floats, look: Floats, choice: TransformChoice) -> Iterat
 
 
 def _stops_between(view: ViewTransform, display: Floats, look: Floats) -> float:
-    """Return the approximate exposure at which that view shows most of `look` as displayed."""
+    """Return the approximate exposure at which that view shows most of `look` as in `display`."""
     light, look_brightness = luminance(view.decode(display)), luminance(look)
     low, high = TELLING
     is_unclipped = (display > low).all(axis=-1) & (display < high).all(axis=-1)
@@ -70,7 +70,7 @@ def _stops_between(view: ViewTransform, display: Floats, look: Floats) -> float:
     if not is_unclipped.any():
         return 0.0
     stops = np.log2(light[is_unclipped] / look_brightness[is_unclipped])
-    # Unpainted pixels share the most common exposure; paint has many.
+    # Unpainted pixels share the most common exposure; painted ones vary.
     counts = np.bincount(np.floor((stops - stops.min()) / BIN).astype(np.intp))
     smoothed = np.convolve(counts, [1, 1, 1], "same")
     commonest = stops.min() + BIN * (np.argmax(smoothed) + 0.5)
@@ -80,7 +80,7 @@ def _stops_between(view: ViewTransform, display: Floats, look: Floats) -> float:
 def _agreement(
     path: Path, picture: Picture, display: Floats, encoded_look: Floats
 ) -> tuple[float, float]:
-    """Return the share of telling pixels that are the same, and their closeness; larger is better.
+    """Return the share of informative pixels that are equal, and their closeness; larger is better.
 
     display, encoded_look: (h, w, 3), display values of the picture and of the look.
     """
@@ -98,7 +98,7 @@ def _agreement(
     is_same = difference[is_informative] <= tolerance
     if not is_same.any():
         return 0.0, 0.0
-    # In fiftieths, and tenths of a code: of equals the first one wins.
+    # Rounded to fiftieths and tenths of a code, so that the first of nearly equal views wins.
     return round(50 * float(is_same.mean())) / 50, -round(
         2550 * float(difference[is_informative][is_same].mean())
     )

@@ -1,12 +1,11 @@
-"""The painted pixels: those in which a picture differs from its template.
+"""Finds the painted pixels: those in which a picture differs from its template.
 
-A file from a paint program was rounded to its format, and maybe compressed; pixels that differ by
-more are paint. Faint paint counts less, so that a soft brush leaves a soft importance.
+A file from a paint program was rounded to its format, and perhaps compressed; pixels that differ by
+more are paint. Faint paint counts less, so a soft brush leaves a soft importance.
 
-The tolerance for rounding is that of 8 bits for all formats. A file does not tell the history of
-its
-pixels: GIMP writes half floats into a float EXR, and 16-bit PNGs from 8-bit layers; profiles are
-converted back and forth. So a painting counts the same in every format.
+The rounding tolerance is that of 8 bits for all formats, because a file does not tell the history
+of its pixels: GIMP writes half floats into a float EXR, and 16-bit PNGs from 8-bit layers, and
+profiles are converted back and forth. So a painting counts the same in every format.
 """
 
 import io
@@ -23,28 +22,28 @@ from lightpaint.images.estimate import box_mean
 from lightpaint.images.picture import Picture
 from lightpaint.target.template import Template
 
-#: Difference at which paint counts fully, of the display's range.
+#: Difference in display values from which paint counts fully.
 FULL = 0.04
 
-#: Difference in display values between 8 bits of two programs: half a code each; some truncate
-#: instead of rounding, some dither.
+#: Tolerance in display values between the 8-bit roundings of two programs: half a code each; some
+#: truncate instead of rounding, some dither.
 ROUNDING = 1.6 / 255
 
 #: Weight of a relative change of light above display white, in display values: about the slope of
 #: display curves there.
 BEYOND_WHITE = 0.44
 
-#: Radius in pixels that averages out the differences between compressors, the tolerance after that,
-#: and the radius at which paint is still localised.
+#: Radius in pixels of the mean that hides differences between compressors, the tolerance after it,
+#: and a radius at which paint is still localised.
 LOSSY_RADIUS, LOSSY, SHARP_RADIUS = 4, 2.5 / 255, 1
 
 
 def painted_where(path: Path, picture: Picture, template: Template) -> npt.NDArray[np.float32]:
-    """Return, (h, w) in [0, 1], 0 where `picture` is `template` up to rounding, 1 where it surely
-    is not.
+    """Return the paint in each pixel, (h, w): 0 if `picture` equals `template` up to rounding, 1 if
+    it surely does not.
 
-    path: the file of the picture, which tells its compression. Pixels that it does not store were
-    not painted. Raises SizeError if the two differ in size.
+    path: the file of the picture, which tells its compression. Pixels that it does not store are
+    unpainted. Raises SizeError if the two differ in size.
     """
     if picture.size != template.size:
         raise SizeError(
@@ -53,7 +52,7 @@ def painted_where(path: Path, picture: Picture, template: Template) -> npt.NDArr
             "mask=... what was painted"
         )
     difference, tolerance = _difference(path, picture, template)
-    # The slope is smooth at both ends, so that nothing is decided by a hair's breadth.
+    # The slope is smooth at both ends, so that no pixel is decided by a hair's breadth.
     share = np.clip((difference - tolerance) / (FULL - tolerance), 0, 1)
     painted = (share * share * (3 - 2 * share)).astype(np.float32)
     if picture.stored is None:
@@ -62,11 +61,11 @@ def painted_where(path: Path, picture: Picture, template: Template) -> npt.NDArr
 
 
 def _difference(path: Path, picture: Picture, template: Template) -> tuple[Floats, float]:
-    """Return the largest difference of the channels, (h, w), in display values, and the file's own
+    """Return the largest difference over channels, (h, w), in display values, and the file's
     tolerance.
     """
     if picture.codes is None:
-        # Its template may be an EXR, or the PNG, which ends at white.
+        # Its template may be the EXR, or the PNG, which ends at white.
         looks = [*template.looks, template.transform.decode(template.shown)]
         differences = [_difference_of_light(picture, look, template) for look in looks]
         return _closest(differences, ROUNDING), ROUNDING
@@ -76,14 +75,14 @@ def _difference(path: Path, picture: Picture, template: Template) -> tuple[Float
 
 
 def _closest(differences: Sequence[Floats], tolerance: float) -> Floats:
-    """Return, of several looks that may be its template, the difference with the most unpainted
-    pixels.
+    """Return the difference with the most unpainted pixels, among the looks that may be the
+    template.
     """
     return max(differences, key=lambda difference: float((difference <= tolerance).mean()))
 
 
 def _difference_of_codes(path: Path, picture: Picture, look: Floats) -> Floats:
-    """Return the difference as the painting's own display shows it."""
+    """Return the difference as shown by the painting's own display."""
     transform = picture.transform
     assert transform is not None  # A file of integers always has one.
     codes, look_codes = transform.encode(picture.image), transform.encode(look)
@@ -93,7 +92,7 @@ def _difference_of_codes(path: Path, picture: Picture, look: Floats) -> Floats:
 
 
 def _difference_of_light(picture: Picture, look: Floats, template: Template) -> Floats:
-    """Return the difference as a display shows it; beyond white, the relative one."""
+    """Return the difference as shown by a display; beyond white, the relative difference."""
     transform = template.transform
     shown = np.abs(transform.encode(picture.image) - transform.encode(look))
     size = np.maximum(np.maximum(np.abs(look), np.abs(picture.image)), transform.white)
@@ -103,7 +102,8 @@ def _difference_of_light(picture: Picture, look: Floats, template: Template) -> 
 
 def lossy_difference(codes: Floats, look_codes: Floats) -> Floats:
     """Return the difference of display values (h, w, 3) beyond the effect of compression, (h,
-    w)."""
+    w).
+    """
     rough = np.asarray(codes - look_codes, np.float64)
     small, large = (
         largest(np.abs(box_mean(rough, radius))) for radius in (SHARP_RADIUS, LOSSY_RADIUS)
@@ -112,7 +112,7 @@ def lossy_difference(codes: Floats, look_codes: Floats) -> Floats:
 
 
 def compressed_like(path: Path, display: Floats) -> Floats:
-    """Return `display` after the compression of the JPEG at `path`."""
+    """Return `display` compressed with the settings of the JPEG at `path`."""
     from PIL import Image, JpegImagePlugin
 
     eight = Image.fromarray(to_8_bit(display))
@@ -125,12 +125,12 @@ def compressed_like(path: Path, display: Floats) -> Floats:
     try:
         eight.save(buffer, "JPEG", qtables=list(tables.values()), subsampling=sampling)
     except (OSError, ValueError):
-        return display  # tables that this encoder does not take
+        return display  # the encoder does not accept these tables
     return np.asarray(Image.open(buffer), np.float32) / 255
 
 
 def _without_pinholes(share: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
-    """Return the share without holes of single pixels that paint happened to leave as they were."""
+    """Return the paint without single-pixel holes, where paint happened to equal the template."""
     return -_largest_around(-_largest_around(share))
 
 

@@ -1,7 +1,7 @@
-"""Our own file of a painting: its light, its importance, and its way of painting.
+"""lightpaint's own file format for paintings: light, importance, and how it was painted.
 
-An EXR does not tell the display, and marks unpainted pixels only by importance. A painting from
-this program tells both, so that its answer is the same as while it was painted.
+An EXR does not state its display, and marks unpainted pixels only by importance. A painting from
+lightpaint records both, so that its solution is the same as during painting.
 """
 
 import json
@@ -27,7 +27,7 @@ FORMAT: Literal["lightpaint-painting 1"] = "lightpaint-painting 1"
 
 @dataclass(frozen=True)
 class Painted:
-    """The way a target was painted, see `Target`. view, stops: the transform; "" for none."""
+    """The way a target was painted; see `Target`. view, stops: the transform; "" for none."""
 
     format: Literal["lightpaint-painting 1"] = FORMAT
     over_look: bool = False
@@ -37,7 +37,7 @@ class Painted:
 
     @property
     def transform(self) -> ViewTransform | None:
-        """The view transform of the painting."""
+        """The view transform of the painting, or None."""
         return ViewTransform(self.view, self.stops) if self.view else None
 
 
@@ -53,8 +53,7 @@ def write_painting(path: Path, target: Target) -> None:
 
 
 def painted_of(attributes: Mapping[str, str], path: Path) -> Painted | None:
-    """Return the way the EXR at `path` was painted; None if it does not tell. Raises
-    TargetError."""
+    """Return how the EXR at `path` was painted; None if it does not say. Raises TargetError."""
     if KEY not in attributes:
         return None
     try:

@@ -1,4 +1,4 @@
-"""A painting for the solve: linear pixels with the weight of each."""
+"""A painting prepared for the solve: linear pixels with their weights."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -16,19 +16,21 @@ from lightpaint.images.resampling import resampled
 from lightpaint.keywords import keywords
 from lightpaint.screen import Shown
 
-#: Excess over a half from which one of two shares prevails, beyond the rounding of float32.
+#: Margin above one half by which a share prevails, beyond float32 rounding.
 TIE = 1e-5
 
 #: Negative luminance that resampling leaves beside bright edges, as a share of the brightest.
 NEGATIVE = 1e-3
 
 
-#: The name of targets made of arrays, unless they are given one.
+#: The name of a target made from arrays, unless another is given.
 UNNAMED = "target"
 
 
 def titled(name: str) -> str:
-    """Return a target as messages call it: `target evening.exr`, or `the target` without a name."""
+    """Return a target's name for messages: `target evening.exr`, or `the target` if it has no
+    name.
+    """
     return "the target" if name == UNNAMED else f"target {name}"
 
 
@@ -38,22 +40,21 @@ class Target(Shown):
     """The painted image Ψ and its importance D.
 
     Attributes:
-        name: The name in messages and results.
+        name: Its name in messages and results.
         image: (h, w, 3) float32, linear Rec.709, finite.
         importance: (h, w) float32 >= 0, the weight of each pixel's squared residual.
-        everything: Whether nothing tells what was painted, so that every pixel counts 1.
+        everything: Whether it is unknown what was painted, so that every pixel counts 1.
         not_finite: Number of pixels with NaN or Inf, which have no importance.
-        at_least: (h, w, 3) bool, where the painting was at the largest value of its file, which
-            means this or anything brighter; None if its file has no such value.
-        notes: Remarks for people on how it was read, a sentence each.
-        content: The identity of the scene that it was painted on, if a template tells.
-        sensor: Id of the sensor it was painted through, if a template tells.
+        at_least: (h, w, 3) bool, True where the painting has the largest value of its file, which
+            means this light or any brighter; None if its file has no such value.
+        notes: Remarks for the user on how it was read, one sentence each.
+        content: The identity of the scene that it was painted on, if known from a template.
+        sensor: Id of the sensor that it was painted through, if known from a template.
         transform: The view transform of the display while it was painted; None if unknown.
-        through_view: Whether its values are those of a display, and not light.
+        through_view: Whether its values came from a display rather than from light.
         over_look: Whether it was painted over the current look, which unpainted pixels keep.
-        reads_emitters: Whether paint over emitters in view has still to be interpreted: as paint
-        for
-            what they light, or for their glow, if painted over the current look.
+        reads_emitters: Whether paint over visible emitters still has to be interpreted: as paint
+            for what they light or, if painted over the current look, for their glow.
         files: The files that it was read from: the painting first, then mask and template.
         full_size_share: `painted_share` of the painting as it was read; None if it has not been
             cropped or averaged since.
@@ -63,7 +64,7 @@ class Target(Shown):
         >>> left = np.arange(16) < 8
         >>> lp.Target.of(image, np.tile(left, (16, 1)), name="left half")
         Target 'left half', 16x16
-          counts   50 % of the pixels
+          counts     50 % of the pixels
           light    0.5 to 0.5
     """
 
@@ -117,13 +118,12 @@ class Target(Shown):
     def of(
         cls, image: npt.ArrayLike, importance: npt.ArrayLike | None = None, *, name: str = UNNAMED
     ) -> "Target":
-        """Make a target of arrays, which are copied as float32.
+        """Create a target from arrays, which are copied as float32.
 
-        image: (h, w, 3) floats, linear Rec.709, finite. Single components may be negative, as those
-        of colours that Rec.709 lacks; where it counts luminance may not, beyond a thousandth of
-        the brightest. importance: (h, w) >= 0, or a mask of bools; without one every pixel counts
-        1. name: the name in messages and results.
-
+        image: (h, w, 3) floats, linear Rec.709, finite. Single components may be negative, as in
+        colours outside Rec.709; the luminance of pixels that count must not be, beyond a thousandth
+        of the brightest. importance: (h, w) >= 0, or a boolean mask; without it every pixel counts
+        1. name: its name in messages and results.
         Raises TargetError or SizeError for invalid arrays.
         """
         array = np.asarray(image)
@@ -139,9 +139,9 @@ class Target(Shown):
         counts = np.ones(array.shape[:2]) if importance is None else np.asarray(importance)
         if counts.dtype.kind not in "bfui":
             raise TargetError(f"{titled(name)}: importance of {counts.dtype}: expected numbers")
-        with np.errstate(over="ignore"):  # what float32 cannot hold is infinite, and refused
+        with np.errstate(over="ignore"):  # values beyond float32 become infinite, and are rejected
             pixels, counts = array.astype(np.float32), counts.astype(np.float32)
-        if counts.shape == pixels.shape[:2]:  # else that is told
+        if counts.shape == pixels.shape[:2]:  # otherwise the constructor reports the shapes
             _check_is_light(name, pixels, counts > 0)
         return cls(name, pixels, counts, everything=importance is None)
 
@@ -169,14 +169,14 @@ class Target(Shown):
     def painted_share(self) -> float:
         """The share of its pixels with any paint, however faint, 0 to 1.
 
-        It is that of the painting as it was read: a mean over pixels is painted if one of them is,
-        so that a smaller picture would have a larger share.
+        It refers to the painting as it was read: a mean over pixels is painted if one of them is,
+        so a reduced picture would have a larger share.
         """
         return share_of(self.importance) if self.full_size_share is None else self.full_size_share
 
     @property
     def spoken_share(self) -> str:
-        """`painted_share` in words, like `63.7 %`, the same in all places."""
+        """`painted_share` as text, such as `63.7 %`, the same everywhere."""
         return spoken_share(self.painted_share)
 
     def resized(self, size: tuple[int, int]) -> "Target":
@@ -197,7 +197,7 @@ class Target(Shown):
         )
 
     def cropped(self, height: int, width: int) -> "Target":
-        """Return the pixels from the top left corner on."""
+        """Return the top left part of the target, of this size."""
         part = (slice(height), slice(width))
         return replace(
             self,
@@ -208,10 +208,10 @@ class Target(Shown):
         )
 
     def reduced(self, factor: int) -> "Target":
-        """Return a pixel for each block of factor x factor: their mean, weighted by importance.
+        """Return the target averaged over blocks of factor × factor pixels, weighted by importance.
 
-        The importance of a block is the mean of its pixels'. For images that are constant
-        in each block, the squared residual is then the same as before up to a constant.
+        The importance of a block is the mean over its pixels. For images that are constant in each
+        block, the squared residual stays the same up to a constant.
         """
         if factor == 1:
             return self
@@ -227,8 +227,9 @@ class Target(Shown):
         )
 
     def without(self, holes: npt.NDArray[np.bool_]) -> "Target":
-        """Return the target with importance 0 at the pixels `holes`, (h, w), which the basis
-        lacks."""
+        """Return the target with importance 0 in the pixels `holes`, (h, w), which the basis
+        lacks.
+        """
         lost = holes & (self.importance > 0)
         if not lost.any():
             return self
@@ -239,12 +240,12 @@ class Target(Shown):
         )
 
     def _at_least(self, mean: Callable[[Floats], Floats]) -> npt.NDArray[np.bool_] | None:
-        """Return `at_least` of another size, whose pixels are the `mean` of these.
+        """Return `at_least` at another size, whose pixels are the `mean` of these.
 
-        Brighter than such a mean is as good if most of its pixels mean "at least", or if it has a
-        part of a patch that does. There the excess lies in the patch: a lamp outshines its
-        surroundings.
-        Single pixels are texture: brighter than their mean exceeds the exact pixels between them.
+        Light brighter than such a mean is acceptable if most of its pixels mean "at least", or if
+        it contains part of a patch that does: then the excess lies in the patch, since a lamp
+        outshines its surroundings. Single pixels are texture: there, light brighter than the mean
+        would exceed the exact pixels between them.
         """
         if self.at_least is None:
             return None
@@ -257,9 +258,9 @@ class Target(Shown):
     def fitted_to(self, size: tuple[int, int], *, resize: bool) -> "Target":
         """Return the target at `size` (height, width) of the basis.
 
-        A target with a square block of pixels for each pixel is reduced, like one painted at full
-        size for a basis on a reduced film. Raises SizeError if it has another size and may not be
-        resampled.
+        A target with a square block of pixels for each pixel of the basis is averaged, for example
+        if it was painted in full size for a basis on a reduced film. Raises SizeError if it has
+        another size and must not be resampled.
         """
         if factor := whole_factor(self.size, size):
             return self.reduced(factor)
@@ -295,12 +296,12 @@ def share_of(importance: Floats) -> float:
 
 
 def spoken_share(share: float) -> str:
-    """Return a share of the pixels to three digits, like `63.7 %`."""
+    """Return a share of the pixels as text with three digits, such as `63.7 %`."""
     return f"{100 * share:.3g} %"
 
 
 def _patches(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Return `mask` (h, w, n) without parts less than three pixels wide: its opening by 3 x 3."""
+    """Return `mask` (h, w, n) without parts narrower than three pixels: its opening by 3 × 3."""
     core = ~_grown(~mask)
     return _grown(core) & mask
 

@@ -1,4 +1,4 @@
-"""Readers that make targets of painted files: the image, and the pixels that count."""
+"""Reads painted files as targets: the image, and the pixels that count."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,14 +28,14 @@ from lightpaint.target.template import (
     template_files,
 )
 
-#: The meaning of paint: the look of the picture, or the light that falls there.
+#: The meaning of paint: the look of the picture, or the light that falls on surfaces.
 Paint = Literal["look", "light"]
 
-#: Share of the picture from which the difference may be a conversion instead of paint.
+#: Painted share of the picture from which the difference may be a conversion rather than paint.
 NEARLY_ALL = 0.97
 
-#: Ratio to the light of the template's brightest parts that is implausible for lamps, and the share
-#: of the paint that may need that without a remark.
+#: Ratio to the light on the template's brightest parts beyond which light is implausible; and the
+#: share of paint that may need such light without a remark.
 BEYOND, FEW = 10.0, 0.01
 
 
@@ -43,8 +43,8 @@ BEYOND, FEW = 10.0, 0.01
 class _Reading:
     """The state of reading a target.
 
-    template, folder: of the painting, if known. transform: the view of the painting. look: the name
-    of a template without folder in messages.
+    template, folder: template of the painting, and its folder, if known. transform: the view of the
+    painting. look: name in messages of a template without a folder.
     """
 
     path: Path
@@ -57,7 +57,7 @@ class _Reading:
 
     @property
     def painted_on(self) -> str:
-        """The name of the template in messages: the file in it that the painting resembles."""
+        """The name of the template in messages: its file that corresponds to the painting."""
         if self.look:
             return self.look
         name = LIGHT if self.picture.codes is None else SHOWN
@@ -77,24 +77,24 @@ def read_target(
 ) -> Target:
     """Read a painting: an EXR in linear light, or a PNG, TIFF, JPEG or layered file.
 
-    Importance comes from the first of these: `mask`; an EXR's W channel; alpha; the difference from
-    the template it was painted on; without any of them, every pixel counts the same. Pixels of
-    alpha 0 have no colour, which a mask does not change.
+    Importance comes from the first of these that exists: `mask`; an EXR's W channel; alpha; the
+    difference from the template it was painted on. Without any of them, every pixel counts the
+    same. Pixels with alpha 0 have no colour and never count, even with a mask.
 
     Args:
         path: The painting.
         mask: Picture of the importance, black for pixels that do not count.
-        layer: The layer, part or view of an EXR.
-        transform: The encoding of 8 and 16 bits. Open parts come from `template`, else from the
-            file, else from a template that is found for it, else from sRGB.
-        template: Folder of `lightpaint template`.
+        layer: Layer, part or view of an EXR.
+        transform: View transform that encoded 8 or 16 bits. Open parts come from `template`, else
+            from the file, else from a template found for it, else from sRGB.
+        template: Folder written by `lightpaint template`.
         find: Whether to look for a template beside the painting if none is given.
-        paint: `light` takes colours for the light that falls on a surface, and multiplies them by
+        paint: `light` takes colours as the light that falls on a surface, and multiplies them by
             its albedo: 1 makes white look like 1 (Schoeneman et al. 1993, section 3).
 
     Raises:
-        ImageError: For files that cannot be read.
-        TargetError: For a painting that cannot be solved for.
+        ImageError: If a file cannot be read.
+        TargetError: If the painting cannot be solved for.
         SizeError: If target and mask or template differ in size.
 
     Examples:
@@ -109,10 +109,9 @@ def read_over_look(
 ) -> Target | None:
     """Return the painting at `path` if it was painted over `look`; None if it was not.
 
-    Only for a painting that does not say itself what counts, and of which no template is known.
-
-    look: (h, w, 3) linear, what a basis or light groups show as they are. name: what messages call
-    it. layer, transform: as in `read_target`.
+    For a painting that does not itself say what counts, and whose template is unknown. look: (h, w,
+    3) linear, the present look of a basis or of light groups. name: name of the look in messages.
+    layer, transform: as in `read_target`.
     """
     picture = read_picture(path, layer=layer, transform=transform)
     view = view_of_look(path, picture, look, transform)
@@ -122,19 +121,17 @@ def read_over_look(
         picture = read_picture(path, layer=layer, transform=view)
     template = Template(look, view)
     if not painted_where(path, picture, template).any():
-        return None  # the look itself, of which all counts
+        return None  # it is the look itself, so all of it counts
     shown = None if picture.transform is None else view
     through = "" if shown is None else f" through {shown.spoken}"
     return _target_of(_Reading(path, picture, template, None, shown, (), f"{name}{through}"))
 
 
 def _target_of(reading: _Reading, mask: str | Path | None = None, paint: Paint = "look") -> Target:
-    """Find the painted pixels and make a target. For the arguments see `read_target`. Arguments as
-    of `read_target`.
-    """
+    """Find the painted pixels and create the target. mask, paint: as in `read_target`."""
     picture, template = reading.picture, reading.template
     importance, notes = _importance(reading, mask)
-    # Pixels that the file does not store were not painted, whatever a mask says.
+    # Pixels that the file does not store were not painted, whatever the mask.
     is_there = picture.finite if picture.stored is None else picture.finite & picture.stored
     counted = np.where(is_there, 1 if importance is None else importance, 0)
     image, painted = picture.image, painted_of(picture.attributes, reading.path)
@@ -155,7 +152,7 @@ def _target_of(reading: _Reading, mask: str | Path | None = None, paint: Paint =
         transform=reading.transform,
         through_view=picture.transform is not None
         or (painted is not None and painted.through_view),
-        # A layer that was saved alone lay over something. Pixels outside a mask do not count.
+        # A layer saved alone was painted over something. Pixels outside a mask do not count.
         over_look=template is not None
         or (painted is not None and painted.over_look)
         or (picture.transform is not None and picture.alpha is not None and mask is None),
@@ -176,14 +173,12 @@ def _opened(
     *,
     find: bool,
 ) -> _Reading:
-    """Open the picture, and the template it was painted on. For the arguments see `read_target`.
-    Arguments as in `read_target`.
-    """
+    """Read the picture and the template it was painted on. Arguments as in `read_target`."""
     choice, opened = TransformChoice.of(transform), None
     notes: tuple[str, ...] = ()
     folder = None if template is None else Path(template)
     if folder is not None:
-        # A file in it stands for the folder.
+        # A file in the folder stands for the folder.
         folder = folder.parent if folder.is_file() else folder
         opened = read_template(folder)
         choice = TransformChoice.of(choice.over(opened.transform))
@@ -198,7 +193,7 @@ def _opened(
                 f"{opened.size[1]}x{opened.size[0]}: give the template it was painted on"
             )
         notes = (f"not compared with {folder / SHOWN}, which has another size",)
-        # The painting has another template, and so another transform.
+        # The painting has another template, and therefore another transform.
         opened, otherwise = None, None
         picture = read_picture(path, layer=layer, transform=choice)
     own_marks = painted_of(picture.attributes, path)
@@ -209,9 +204,7 @@ def _opened(
 
 
 def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | None, list[str]]:
-    """Return the importance (h, w), None if nothing tells it, and remarks. And what is to be said
-    of it.
-    """
+    """Return the importance (h, w), or None if it is unknown, and remarks on it."""
     path, picture, template = reading.path, reading.picture, reading.template
     if mask is not None:
         importance = read_mask(mask)
@@ -227,7 +220,7 @@ def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | No
         return picture.weight, []
     is_opaque = picture.alpha is None or bool((picture.alpha == 1).all())
     if template is None and picture.alpha is None and picture.transform is not None:
-        # Display values without a known meaning, which a template would tell.
+        # Without a template, the meaning of display values is unknown.
         view = f"{picture.transform.name} at {picture.transform.stops:+g} stops"
         return None, [f"no template is known: all of it counts, as seen through {view}"]
     if template is None or not is_opaque:
@@ -249,23 +242,25 @@ def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | No
 
 
 def _of_all(picture: Picture, template: Template) -> str:
-    """Return a clause on what happened to a template of which little remains, other than paint."""
+    """Return a clause on what, other than paint, happened to a template of which little remains."""
     transform = picture.transform or template.transform
     codes, template_codes = (transform.encode(x) for x in (picture.image, template.image))
-    if picture.lossy:  # which leaves the means of a few pixels as they are
+    if picture.lossy:  # compression preserves the means of a few pixels
         codes, template_codes = (box_mean(x, SHARP_RADIUS) for x in (codes, template_codes))
     return explain_mismatch(codes, template_codes)
 
 
 def _lit(reading: _Reading, counted: Floats) -> tuple[Floats, Floats, list[str]]:
-    """Return the look of surfaces under the painted light: image and importance."""
+    """Return image and importance of a painting of light: its colours times the surfaces'
+    albedo.
+    """
     if reading.template is None or reading.template.albedo is None:
         raise TargetError(
             f"to read {reading.path} as light its template is needed, which knows what surfaces "
             "reflect: give the folder that lightpaint template wrote as template=..."
         )
     albedo = reading.template.albedo
-    # Metals, glass and the background reflect no diffuse light, which leaves their light open.
+    # Metals, glass and the background reflect no diffuse light, so paint on them says nothing.
     blind = (largest(albedo) <= 0) & (counted > 0)
     counted_light = np.where(blind, 0, counted)
     if not counted_light.any():
@@ -276,7 +271,7 @@ def _lit(reading: _Reading, counted: Floats) -> tuple[Floats, Floats, list[str]]
 
 
 def _beyond(reading: _Reading, counted: Floats) -> list[str]:
-    """Return a remark if paint needs a colour that a surface hardly reflects."""
+    """Return a remark if paint needs a colour that the surface hardly reflects."""
     template = reading.template
     if template is None or template.albedo is None:
         return []

@@ -23,7 +23,7 @@ from lightpaint.storage.staging import is_below, staged
 
 FORMAT: Literal["lightpaint-template 1"] = "lightpaint-template 1"
 
-#: The files of a template: its origin, the pictures to paint on, and those that help.
+#: The files of a template: its origin, pictures to paint on, and pictures that help.
 ABOUT, LIGHT, SHOWN, ALBEDO = "template.json", "template.exr", "template.png", "albedo.exr"
 CLEAN, NORMALS, DEPTH, MATTES, LIGHTS = (
     "clean.exr",
@@ -33,10 +33,10 @@ CLEAN, NORMALS, DEPTH, MATTES, LIGHTS = (
     "lights",
 )
 
-#: The files that are not pictures of single objects or lights.
+#: Its files except the pictures of single objects or lights.
 PLAIN = (LIGHT, SHOWN, CLEAN, ALBEDO, NORMALS, DEPTH, ABOUT)
 
-#: Longest template.json that is read, in bytes.
+#: Maximum size of template.json in bytes.
 MAX_ABOUT = 2**20
 
 
@@ -44,11 +44,10 @@ MAX_ABOUT = 2**20
 class Template:
     """The look to paint over.
 
-    image: (h, w, 3) linear Rec.709, as it was rendered. transform: of template.png. scene:
-    name of the file, content: its hash (see `Scene.content`), sensor: its id. albedo: (h, w, 3) in
-    [0, 1], what surfaces reflect diffusely; None if not rendered.
-    clean: (h, w, 3), `image` without its grain, as template.png shows it; None if it shows `image`
-    itself.
+    image: (h, w, 3) linear Rec.709, as rendered. transform: the transform of template.png. scene:
+    name of its file. content: its hash (see `Scene.content`). sensor: its id. albedo: (h, w, 3) in
+    [0, 1], share of light that surfaces reflect diffusely; None if not rendered.
+    clean: (h, w, 3), the denoised `image` as in template.png; None if that shows `image` itself.
     """
 
     image: Floats
@@ -66,12 +65,14 @@ class Template:
 
     @property
     def looks(self) -> list[Floats]:
-        """The pictures that a painting may have begun with, linear, that of template.png first."""
+        """The pictures that a painting may have started from, linear; that of template.png
+        first.
+        """
         return [self.image] if self.clean is None else [self.clean, self.image]
 
     @property
     def shown(self) -> Floats:
-        """The values of template.png, in [0, 1], rounded to its 16 bits."""
+        """The values of template.png in [0, 1], rounded to its 16 bits."""
         return np.round(self.transform.encode(self.looks[0]) * 65535) / 65535
 
 
@@ -85,7 +86,9 @@ class _Shown:
 
 @dataclass(frozen=True)
 class _About:
-    """Content of template.json. size: (width, height); files: of the template, relative to it."""
+    """Content of template.json. size: (width, height). files: files of the template, relative to
+    it.
+    """
 
     format: Literal["lightpaint-template 1"]
     scene: str
@@ -106,11 +109,11 @@ def write_template(
     lights: Mapping[str, Floats],
     texts: Mapping[str, Mapping[str, str]] | None = None,
 ) -> list[Path]:
-    """Write a template into `folder`, in place of an earlier one, completely or not at all.
+    """Write a template into `folder` atomically, replacing an earlier one.
 
-    Returns its files. normals: (h, w, 3), depth: (h, w); mattes: by name of object, (h, w) in
-    [0, 1]; None is not written. lights: by name, (h', w', 3) linear, each light alone. texts: for
-    the headers of pictures, under SHOWN and LIGHTS.
+    Returns its files. normals: (h, w, 3). depth: (h, w). mattes: by object name, (h, w) in [0, 1].
+    None skips a file. lights: by name, (h', w', 3) linear, the image of each light alone. texts:
+    texts for the headers of pictures, by SHOWN and LIGHTS.
     """
     all_texts, mattes = texts or {}, mattes or {}
     matte_files = [f"{MATTES}/{name}.png" for name in file_names(mattes)]
@@ -150,7 +153,7 @@ def write_template(
 
 
 def _thumbnail(look: Floats, transform: str, texts: Mapping[str, str] | None) -> bytes:
-    """Return a linear picture as PNG, whatever its brightness."""
+    """Return a linear picture as PNG, exposed to be visible at any brightness."""
     bright = max(float(np.percentile(look.max(axis=-1), 99)), 1e-12)
     shown = ViewTransform(transform, float(np.clip(-np.log2(bright), -60, 60)))
     return png_bytes(to_8_bit(shown.encode(look)), texts)
@@ -179,7 +182,9 @@ def earlier_files(folder: Path) -> list[Path]:
 
 
 def files_in_the_way(folder: Path) -> list[Path]:
-    """List the files that a new template in `folder` would replace, whatever they are."""
+    """Return the existing files that a new template in `folder` might replace, whatever they
+    are.
+    """
     plain = [folder / name for name in PLAIN]
     # The names of objects and lights are not known yet.
     pictures = [*(folder / MATTES).glob("*.png"), *(folder / LIGHTS).glob("*.png")]
@@ -188,7 +193,7 @@ def files_in_the_way(folder: Path) -> list[Path]:
 
 
 def template_files(folder: Path) -> list[Path]:
-    """Return the files of the template in `folder` that are read."""
+    """Return the files of the template in `folder` that `read_template` reads."""
     return [folder / name for name in (ABOUT, LIGHT, CLEAN, ALBEDO)]
 
 
@@ -200,9 +205,9 @@ def write_look(
     clean: Floats | None = None,
     texts: Mapping[str, str] | None = None,
 ) -> Path:
-    """Write only the look: a linear EXR, and beside it a 16-bit PNG. Returns the path of the PNG.
+    """Write only the look: a linear EXR, and a 16-bit PNG beside it. Returns the path of the PNG.
 
-    clean: for the PNG instead of `image`; texts: for its header.
+    clean: picture for the PNG instead of `image`. texts: texts for its header.
     """
     write_rgb(path, image)
     picture = path.with_suffix(".png")
@@ -212,7 +217,7 @@ def write_look(
 
 
 def read_template(folder: Path) -> Template:
-    """Read a template of `write_template`. Raises TargetError for anything else."""
+    """Read a template written by `write_template`. Raises TargetError if it is not one."""
     try:
         record = _read_about(folder)
         transform = ViewTransform(record.view.name, record.view.stops)
@@ -249,14 +254,14 @@ def _read_picture(path: Path, size: tuple[int, int]) -> Floats:
 def find_template(painting: Path) -> Path | None:
     """Return the folder of the template that `painting` was most likely painted on.
 
-    That is its own folder, `template/` in it, or `template/` in the current folder.
+    The candidates are its own folder, `template/` in it, and `template/` in the current folder.
     """
     places = (painting.parent, painting.parent / "template", Path("template"))
     return next((place for place in places if (place / ABOUT).is_file()), None)
 
 
 def file_names(names: Iterable[str]) -> list[str]:
-    """Return a file name for each name, valid on any system, unique even without case."""
+    """Return a file name for each name, valid on all systems and unique even without case."""
     files: list[str] = []
     used: set[str] = set()
     for name in names:
@@ -270,5 +275,5 @@ def file_names(names: Iterable[str]) -> list[str]:
 
 
 def texts_of(transform: ViewTransform) -> dict[str, str]:
-    """Return the text of a PNG that tells its transform."""
+    """Return the text for a PNG that names its transform."""
     return {TRANSFORM_KEY: f"{transform.name} {transform.stops!r}"}

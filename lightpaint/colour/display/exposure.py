@@ -1,4 +1,4 @@
-"""Exposure at which to show linear light: metered as a camera does, ignoring lamps in view."""
+"""Chooses the exposure for linear light by metering like a camera, ignoring lamps in view."""
 
 import numpy as np
 
@@ -6,36 +6,36 @@ from lightpaint.arrays import Bools, Floats, largest
 from lightpaint.colour.color import luminance
 from lightpaint.colour.srgb import MAX_STOPS
 
-#: Luminance of middle grey, where white is 1; and the percentile of the lit pixels that counts as
-#: highlights: the brightest few do not decide the exposure.
+#: Luminance of middle grey relative to white; and the percentile of lit pixels that counts as
+#: highlights, so that the few brightest pixels do not decide the exposure.
 MIDDLE_GREY, HIGHLIGHTS = 0.18, 98
 
-#: A median below this is black, so that its logarithm stays finite.
+#: Luminance below which a median counts as black, so that its logarithm stays finite.
 DARKEST = 1e-30
 
-#: A picture this many stops below white and middle grey is nearly black, darker than paintings of
-#: nights.
+#: Stops below both white and middle grey from which a picture is nearly black, darker than
+#: paintings of nights.
 NEARLY_BLACK = 3.0
 
-#: A picture is too bright if its median is more stops above middle grey, and its highlights more
-#: stops above white, than these.
+#: Stops of the median above middle grey, and of the highlights above white, beyond which a picture
+#: is too bright.
 ABOVE_GREY, BEYOND_WHITE = 1.0, 0.5
 
-#: Most stops below middle grey to which exposing for highlights may bring the median; the second
-#: applies if highlights may be lamps.
+#: Maximum stops below middle grey to which exposing for highlights may move the median; the second
+#: value applies if highlights may be lamps.
 BELOW_GREY, BELOW_GREY_UNKNOWN = 2.5, 1.0
 
 
 def choose_exposure(image: Floats, emitters_seen: Bools | None = None) -> float:
-    """Return the exposure in stops at which to show a linear picture, as a camera meters it.
+    """Return the exposure in stops at which to show a linear picture, metered like a camera.
 
     It is 0 for a picture that can be seen as it is: neither nearly black nor mostly far brighter
-    than middle grey. Other pictures are exposed for their highlights, the 98th percentile at white,
-    as far as that leaves the median near middle grey: in a bright room the median decides, and a
-    night with a lamp in it stays a night.
+    than middle grey. Other pictures are exposed for their highlights, with the 98th percentile at
+    white, as far as that keeps the median near middle grey: in a bright room the median decides,
+    and a night with a lamp in it stays a night.
 
     image: (h, w, 3) linear. emitters_seen: (h, w), pixels that show an emitter, which are not
-    metered; None if that is not known, so that highlights may be lamps.
+    metered; None if unknown, so that highlights may be lamps.
     """
     brightest = largest(image)
     is_metered = brightest > 0

@@ -1,7 +1,7 @@
-"""View transforms of an OpenColorIO configuration (the extra `lightpaint[ocio]`).
+"""View transforms from an OpenColorIO configuration (the extra `lightpaint[ocio]`).
 
-The configuration is the one that the environment variable OCIO names, else OpenColorIO's built-in
-default. Its displays' values are taken as sRGB-like code values of the picture.
+The configuration is the one named by the environment variable OCIO, or OpenColorIO's built-in
+default. The values of its displays are interpreted like sRGB code values.
 """
 
 import os
@@ -26,10 +26,10 @@ LINEAR_REC709 = (
     "Utility - Linear - sRGB",
 )
 
-#: Largest error of a grey on the way to light and back: one step of 8 bits.
+#: Maximum error of a grey after a round trip: one 8-bit step.
 MAX_ROUND_TRIP_ERROR = 1 / 255
 
-#: Relative step of the numerical derivatives: between the noise of float32 and curvature.
+#: Relative step of numerical derivatives, a compromise between float32 noise and curvature.
 STEP = 1e-2
 
 
@@ -109,7 +109,7 @@ def _library_and_config(source: str) -> tuple[Any, Any]:
             "views of OpenColorIO need an extra package: pip install 'lightpaint[ocio]'"
         ) from None
     ocio: Any = PyOpenColorIO
-    # Its log repeats errors that are raised anyway, or is about roles that are not used here.
+    # Its log repeats errors that are raised anyway, or concerns roles that are not used here.
     level = ocio.GetLoggingLevel()
     ocio.SetLoggingLevel(ocio.LOGGING_LEVEL_NONE)
     try:
@@ -147,7 +147,7 @@ def _display_and_view(display_and_view: str, config: Any) -> tuple[str, str]:
 def _processors(
     ocio: Any, config: Any, display: str, view: str, *, inverse: bool = False
 ) -> list[Any]:
-    """Return the steps from linear Rec.709 to the display, in order, or back."""
+    """Return the processors from linear Rec.709 to the display, in order, or for the inverse."""
     direction = ocio.TRANSFORM_DIR_INVERSE if inverse else ocio.TRANSFORM_DIR_FORWARD
     linear = next((n for n in LINEAR_REC709 if config.getColorSpace(n) is not None), None)
     source = linear or "scene_linear"

@@ -9,18 +9,18 @@ import numpy as np
 from lightpaint.arrays import Floats
 from lightpaint.colour.srgb import decode_display, encode_display
 
-#: AgX's log range, in stops about middle grey.
+#: The range of AgX's logarithm, in stops relative to middle grey.
 AGX_STOPS = (-10.0, 6.5)
 MIDDLE_GREY = 0.18
 
-#: AgX's inset: Rec.709's primaries seen in a space whose primaries lie 1/0.8 as far from white.
-#: The row is each primary's share X + Y + Z of white.
+#: AgX's inset: Rec.709 in a space whose primaries lie 1/0.8 as far from white. The row is each
+#: primary's share of X + Y + Z of white.
 AGX_INSET = 0.8 * np.eye(3) + 0.2 * np.array([0.211994645, 0.392150825, 0.395854530])
 
 
 @dataclass(frozen=True)
 class Curve:
-    """A tone curve: the same curve for each channel, after a matrix.
+    """A tone curve: the same curve for each channel, after an optional matrix.
 
     forward: from light in [0, white] to display values. inverse: from display values to light.
     with_derivative: from light in [0, white] to display values and their derivatives.
@@ -74,7 +74,7 @@ def _linear_with_derivative(light: Floats) -> tuple[Floats, Floats]:
     return light, np.ones_like(light)
 
 
-# Narkowicz, ACES Filmic Tone Mapping Curve (2016): y = x (a x + b) / (x (c x + d) + e), a fit of
+# Narkowicz, ACES Filmic Tone Mapping Curve (2016): y = x (a x + b) / (x (c x + d) + e), a fit to
 # the curve of the ACES reference transforms. It reaches 1 at `_FILMIC_WHITE`.
 _A, _B, _C, _D, _E = 2.51, 0.03, 2.43, 0.59, 0.14
 _FILMIC_WHITE = ((_D - _B) + math.sqrt((_D - _B) ** 2 + 4 * (_A - _C) * _E)) / (2 * (_A - _C))
@@ -87,7 +87,7 @@ def _filmic(light: Floats) -> Floats:
 
 def _filmic_inverse(display: Floats) -> Floats:
     y = decode_display(display)
-    # The positive root of (a - c y) x² - (d y - b) x - e y = 0, in the form without cancellation.
+    # The positive root of (a - c y) x² - (d y - b) x - e y = 0, in a form without cancellation.
     square, linear, constant = _A - _C * y, _D * y - _B, _E * y
     root = np.sqrt(linear**2 + 4 * square * constant)
     with_derivative = (linear + root) / (2 * square)
@@ -107,8 +107,8 @@ class _Sigmoid:
     """AgX's curve: a power of a hyperbola on each side of a pivot, 0 at 0 and 1 at 1.
 
     Sobotka, AgX (2022), after Siragusano's tunable sigmoid; contrast 2, toe 3, shoulder 3.25. On a
-    side of width a and height b the curve is y = h(s v) / s with h(u) = u / (1 + u^p)^(1/p), and s
-    is chosen so that it meets the end point.
+    side with width a and height b the curve is y = h(s v) / s with h(u) = u / (1 + u^p)^(1/p),
+    where s is chosen so that it meets the end point.
     """
 
     pivot = (-AGX_STOPS[0] / (AGX_STOPS[1] - AGX_STOPS[0]), 0.5)
@@ -177,7 +177,7 @@ def _agx_with_derivative(light: Floats) -> tuple[Floats, Floats]:
     return shown, slope
 
 
-#: The built-in curves by their names.
+#: The built-in curves by name.
 BUILT_IN = {
     "srgb": Curve(encode_display, decode_display, _srgb_with_derivative),
     "linear": Curve(lambda x: x, lambda x: x, _linear_with_derivative),

@@ -1,4 +1,4 @@
-"""View transforms as tables, for programs without code for them, like the painter's page."""
+"""View transforms as tables, for programs without their code, such as the painter's page."""
 
 import numpy as np
 
@@ -7,9 +7,9 @@ from lightpaint.colour.display.view_transform import ViewTransform
 
 
 def lattice_of(transform: ViewTransform, side: int, low: float, high: float) -> Floats:
-    """Return display values, (side, side, side, 3) float32, axes r, g, b over log2 of light.
+    """Return display values, (side, side, side, 3) float32, with axes r, g, b in log2 of light.
 
-    low, high: stops at the ends of an axis; the first point stands for all light below.
+    low, high: stops at the ends of an axis; the first point stands for all light below it.
     """
     axis = _axis(side, low, high)
     light = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
@@ -18,7 +18,9 @@ def lattice_of(transform: ViewTransform, side: int, low: float, high: float) -> 
 
 
 def curve_of(transform: ViewTransform, side: int, low: float, high: float) -> Floats:
-    """Return the diagonal of `lattice_of`, (side,) float32: enough if channels do not mix."""
+    """Return the diagonal of `lattice_of`, (side,) float32, which suffices if channels do not
+    mix.
+    """
     grey = np.repeat(_axis(side, low, high)[:, None], 3, axis=1)
     return np.asarray(transform.encode(grey)[:, 0], np.float32)
 

@@ -1,13 +1,13 @@
 """View transforms: from linear light to display values, and back.
 
-Every picture on display, and every painting of 8 or 16 bits, goes through a `ViewTransform`: an
-exposure and one of
+Every displayed picture, and every painting with 8 or 16 bits, goes through a `ViewTransform`, which
+is an exposure and one of these:
 
-    srgb      the display's own curve, IEC 61966-2-1; white at 1
-    linear    no curve: the numbers are light; white at 1
-    filmic    a shoulder up to 7.2, then the sRGB curve
-    agx       AgX's base: colours drawn together, 16.5 stops in one sigmoid; white at 16.3
-    ocio:DISPLAY/VIEW   of the OpenColorIO configuration (`lightpaint.colour.display.ocio`)
+    srgb    the display's own curve, IEC 61966-2-1; white at 1
+    linear  no curve: the numbers are light; white at 1
+    filmic  a shoulder up to 7.2, then the sRGB curve
+    agx     AgX's base: colours drawn together, 16.5 stops in one sigmoid; white at 16.3
+    ocio:DISPLAY/VIEW   from the OpenColorIO configuration (`lightpaint.colour.display.ocio`)
 
 Display values lie in [0, 1]. Encoding clips what the display cannot show: light brighter than
 `ViewTransform.white`, and negative light.
@@ -34,33 +34,33 @@ class Encoding(Protocol):
         """Light of the grey that the display shows as white."""
 
     def encode(self, image: Floats) -> Floats:
-        """Return display values in [0, 1] of linear light."""
+        """Return linear light as display values in [0, 1]."""
 
     def decode(self, image_display: Floats) -> Floats:
-        """Return linear light of display values in [0, 1]."""
+        """Return display values in [0, 1] as linear light."""
 
     def encode_planes(self, planes: Floats) -> Floats:
-        """Return `encode` of linear light (3, p), a row for each channel."""
+        """Return `encode` of linear light with channels first, (3, p)."""
 
     def with_slopes(self, planes: Floats) -> tuple[Floats, Floats]:
-        """Return display values (3, p) of linear light (3, p), and their derivatives.
+        """Return display values (3, p) for linear light (3, p), and their derivatives.
 
-        Derivatives are (3, 3, p), of display value i by linear channel j, 0 where clipped; or
-        (3, p), of each channel by itself, if channels do not mix.
+        Derivatives are (3, 3, p), of display value i by linear channel j, and 0 where clipped. If
+        channels do not mix, they are (3, p).
         """
 
 
 @keywords()
 @dataclass(frozen=True)
 class ViewTransform:
-    """A view transform at an exposure. Build it with `ViewTransform.parse`, or by its name.
+    """A view transform at an exposure. Create it with `ViewTransform.parse`, or by name.
 
     Attributes:
         name: `srgb`, `linear`, `filmic`, `agx` or `ocio:DISPLAY/VIEW`.
-        stops: Light is scaled by 2^stops before it is encoded.
+        stops: Exposure: light is scaled by 2^stops before encoding.
 
     Raises:
-        ViewError: For an unknown name.
+        ViewError: If the name is unknown.
 
     Examples:
         >>> lp.ViewTransform("agx", 1.0).spoken
@@ -83,9 +83,9 @@ class ViewTransform:
     @staticmethod
     @keywords()
     def parse(text: str, stops: float = 0.0) -> "ViewTransform":
-        """Return the transform that `text` names: `ViewTransform.parse(t.name, t.stops) == t`.
+        """Return the transform named `text`, so that `ViewTransform.parse(t.name, t.stops) == t`.
 
-        `ocio` is the default display and view of the configuration.
+        `ocio` stands for the default display and view of the configuration.
         """
         name = text.strip()
         if name.lower() == "ocio":
@@ -96,12 +96,12 @@ class ViewTransform:
 
     @property
     def spoken(self) -> str:
-        """Its name, with the exposure if there is one: `srgb at +1.5 stops`."""
+        """Its name, with the exposure unless that is 0: `srgb at +1.5 stops`."""
         return f"{self.name} at {self.stops:+.1f} stops" if self.stops else self.name
 
     @property
     def white(self) -> float:
-        """Linear light of the grey that the display shows as white; it shows nothing brighter."""
+        """Linear light of the grey shown as white, the brightest that the display can show."""
         return _encoding(self.name).white / float(2.0**self.stops)
 
     @property
@@ -111,24 +111,26 @@ class ViewTransform:
         return isinstance(encoding, Curve) and encoding.matrix is None
 
     def encode(self, image: Floats) -> Floats:
-        """Return display values in [0, 1] of a linear Rec.709 image (..., 3)."""
+        """Return a linear Rec.709 image (..., 3) as display values in [0, 1]."""
         return _encoding(self.name).encode(image * 2.0**self.stops)
 
     def decode(self, image_display: Floats) -> Floats:
-        """Return linear Rec.709 of display values in [0, 1], (..., 3). Clipping is not undone."""
+        """Return display values in [0, 1], (..., 3), as linear Rec.709. Clipping cannot be
+        undone.
+        """
         linear = _encoding(self.name).decode(np.clip(image_display, 0, 1))
         return np.asarray(linear / 2.0**self.stops)
 
     def encode_planes(self, planes: Floats) -> Floats:
-        """Return `encode` of channels in planes, (3, p) linear."""
+        """Return `encode` of linear light with channels first, (3, p)."""
         return _encoding(self.name).encode_planes(planes * 2.0**self.stops)
 
     def with_slopes(self, planes: Floats) -> tuple[Floats, Floats]:
-        """Return `encode` of channels in planes, and its derivatives.
+        """Return `encode` of light with channels first, and its derivatives.
 
-        planes: (3, p) linear. Returns display values, (3, p), and derivatives of display value i by
-        linear channel j, (3, 3, p), 0 where the display clips; if channels do not mix, which they
-        do in `agx` and `ocio:` alone, their diagonal, (3, p).
+        planes: (3, p) linear. Returns display values, (3, p), and the derivatives of display value
+        i by linear channel j, (3, 3, p), which are 0 where the display clips. If channels do not
+        mix (they do only in `agx` and `ocio:`), only their diagonal, (3, p).
         """
         scale = 2.0**self.stops
         shown, slopes = _encoding(self.name).with_slopes(planes * scale)
@@ -138,14 +140,14 @@ class ViewTransform:
 @keywords()
 @dataclass(frozen=True)
 class TransformChoice:
-    """A choice of transform that may be partial; the picture's own transform fills the rest.
+    """A choice of transform that may be partial; the picture's own transform completes it.
 
     Attributes:
         name: As in `ViewTransform.parse`; None if left open.
         stops: Exposure; None if left open.
 
     Raises:
-        ViewError: For an unknown name, or an exposure out of range.
+        ViewError: If the name is unknown, or the exposure out of range.
 
     Examples:
         >>> lp.TransformChoice(stops=1.0).over(lp.ViewTransform("agx"))
@@ -177,7 +179,9 @@ class TransformChoice:
         return self.name is not None and self.stops is not None
 
     def over(self, fallback: ViewTransform | None) -> ViewTransform:
-        """Return the chosen transform, its open parts from `fallback`, or sRGB if that is None."""
+        """Return the chosen transform, with open parts from `fallback`, or from sRGB if that is
+        None.
+        """
         fallback = fallback or ViewTransform()
         return ViewTransform.parse(
             fallback.name if self.name is None else self.name,

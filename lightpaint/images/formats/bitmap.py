@@ -1,8 +1,8 @@
 """PNG, TIFF, JPEG and PSD: the stored numbers of a picture, and their meaning.
 
-OpenImageIO decodes, with the formats' own libraries. It gets no file that declares more than
-MAX_PIXELS. Files that it would misread (CMYK, Lab, several pages, a Photoshop file without its
-merged picture) are refused here.
+OpenImageIO decodes them with the formats' own libraries. Files that declare more than MAX_PIXELS,
+or that it would misread (CMYK, Lab, several pages, Photoshop files without a merged picture), are
+rejected here.
 """
 
 from dataclasses import dataclass
@@ -20,13 +20,13 @@ from lightpaint.images.formats.png import PNG_HEAD, longest_png, read_png_head
 from lightpaint.images.formats.psd import check_psd
 from lightpaint.images.formats.tiff import check_tiff
 
-#: Most pixels that are decoded: 8192x4096, for which decoding takes about 1 GB.
+#: Maximum number of pixels that are decoded: 8192x4096, for which decoding takes about 1 GB.
 MAX_PIXELS = 2**25
 
-#: Longest file that is opened, in bytes.
+#: Maximum size in bytes of a file that is opened.
 MAX_FILE = 2**31
 
-#: TIFF's PhotometricInterpretation: those that are read, and names of those that are not.
+#: TIFF's PhotometricInterpretation: supported values, and names of unsupported ones.
 TIFF_COLOURS = {0: "grey", 1: "grey", 2: "RGB", 3: "palette", 6: "YCbCr"}
 TIFF_OTHERS = {4: "a mask", 5: "CMYK", 8: "Lab", 9: "Lab", 10: "Lab", 32844: "LogLuv"}
 
@@ -35,11 +35,11 @@ TIFF_OTHERS = {4: "a mask", 5: "CMYK", 8: "Lab", 9: "Lab", 10: "Lab", 32844: "Lo
 class Bitmap:
     """A picture as stored numbers.
 
-    kind: `png`, `tiff`, `jpeg` or `psd`. values: (h, w, 3) uint8, uint16, float16 or float32;
-    grey is repeated. alpha: (h, w) of the same type, None if there is none or all is opaque.
-    premultiplied: True if `values` are multiplied by it. codes: largest possible integer; None for
-    floats. profile: meaning of the numbers; None is sRGB. lossy: True if compression changed them.
-    shown: the view transform that the file declares, as `name stops`.
+    kind: `png`, `tiff`, `jpeg` or `psd`. values: (h, w, 3) uint8, uint16, float16 or float32; grey
+    is repeated. alpha: (h, w) of the same type; None if absent or opaque everywhere. premultiplied:
+    whether `values` are multiplied by alpha. codes: largest possible integer; None for floats.
+    profile: meaning of the numbers; None for sRGB. lossy: whether compression changed them. shown:
+    the view transform declared in the file, as `name stops`.
     """
 
     kind: str
@@ -53,8 +53,8 @@ class Bitmap:
 
 
 def read_bitmap(path: Path, kind: str) -> Bitmap:
-    """Return the picture in a file of this kind, upright. Raises ImageError without the file's
-    name.
+    """Return the picture in a file of this kind, upright. Raises ImageError, without naming the
+    file.
     """
     if path.stat().st_size > MAX_FILE:
         raise ImageError("is too long to be a picture")
@@ -109,7 +109,7 @@ def _decoded(path: Path, kind: str) -> tuple[Any, npt.NDArray[Any]]:
 
     OpenImageIO.geterror()  # clears the error of an earlier file
     plain = OpenImageIO.ImageSpec()
-    plain["oiio:UnassociatedAlpha"] = 1  # else OpenImageIO multiplies display values by alpha
+    plain["oiio:UnassociatedAlpha"] = 1  # otherwise OpenImageIO multiplies display values by alpha
     file = OpenImageIO.ImageInput.open(str(path), plain)
     if file is None:
         raise ImageError(f"is damaged: {first_line(OpenImageIO.geterror(), path=path)}")
@@ -142,7 +142,7 @@ def _check_size(spec: Any) -> None:
 
 
 def _check_pages(file: Any, first: Any) -> None:
-    """Refuse a second page of the same size: it is a layer, which would be lost silently."""
+    """Reject a second page of the same size: it is a layer that would be lost silently."""
     size = first.width, first.height
     for page in range(1, 64):
         if not file.seek_subimage(page, 0):
@@ -182,7 +182,7 @@ def _largest(dtype: np.dtype[Any]) -> int:
 
 
 def _upright(pixels: npt.NDArray[Any], orientation: int) -> npt.NDArray[Any]:
-    """Return pixels turned and mirrored as EXIF's Orientation says."""
+    """Return pixels rotated and mirrored according to EXIF's Orientation."""
     if orientation in (5, 6, 7, 8):
         pixels = pixels.swapaxes(0, 1)
     if orientation in (3, 4, 7, 8):

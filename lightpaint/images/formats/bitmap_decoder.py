@@ -1,4 +1,4 @@
-"""Decoding of a bitmap's numbers to linear Rec.709, through its profile and a view transform."""
+"""Decodes a bitmap's numbers to linear Rec.709, through its profile and a view transform."""
 
 from collections.abc import Callable
 from typing import Any
@@ -14,12 +14,12 @@ from lightpaint.colour.srgb import encode_display
 from lightpaint.errors import ImageError
 from lightpaint.images.formats.bitmap import Bitmap
 
-#: Pixels that are converted at a time.
+#: Number of pixels converted at a time.
 STRIP_PIXELS = 2**18
 
 
 def transform_of(bitmap: Bitmap) -> ViewTransform | None:
-    """Return the view transform that a file declares, None if it declares none."""
+    """Return the view transform declared in a file; None if it declares none."""
     if bitmap.shown is None:
         return None
     name, _, stops = bitmap.shown.rpartition(" ")
@@ -32,7 +32,7 @@ def transform_of(bitmap: Bitmap) -> ViewTransform | None:
 
 
 def light_of_floats(bitmap: Bitmap, alpha: Floats | None) -> Floats:
-    """Return linear Rec.709 of floats, (h, w, 3) float32, not premultiplied."""
+    """Return floats as linear Rec.709, (h, w, 3) float32, not premultiplied."""
     image = np.array(bitmap.values, np.float32)
     if bitmap.profile is not None:
         if not bitmap.profile.is_linear:
@@ -47,7 +47,7 @@ def light_of_floats(bitmap: Bitmap, alpha: Floats | None) -> Floats:
 
 
 def light_of_integers(bitmap: Bitmap, alpha: Floats | None, transform: ViewTransform) -> Floats:
-    """Return linear Rec.709 of integers, converted strip by strip."""
+    """Return integers as linear Rec.709, converted strip by strip."""
     assert bitmap.codes is not None
     profile = bitmap.profile
     if profile is not None and profile.is_srgb:
@@ -69,15 +69,16 @@ def light_of_integers(bitmap: Bitmap, alpha: Floats | None, transform: ViewTrans
 def _decoder(
     codes: int, profile: Profile | None, transform: ViewTransform, *, by_table: bool
 ) -> Callable[[npt.NDArray[Any]], Floats]:
-    """Return the function from numbers (h, w, 3) to light.
+    """Return the function from stored numbers (h, w, 3) to light.
 
-    by_table: True to decode integers with a table; otherwise it takes values in [0, 1].
+    by_table: whether it takes integers and looks them up in a table; otherwise it takes values in
+    [0, 1].
     """
 
     def curve(function: Callable[[Floats], Floats]) -> Callable[[npt.NDArray[Any]], Floats]:
         if not by_table:
             return function
-        # The same numbers occur again and again.
+        # A table is fast, since the same numbers recur.
         table = np.asarray(function(np.arange(codes + 1) / codes), np.float32)
         return lambda values: table[values]
 
@@ -99,10 +100,12 @@ def _decoder(
 
 
 def _through(transform: ViewTransform, shown: Floats, *, is_linear: bool, name: str) -> Floats:
-    """Return scene light, linear Rec.709, of the light that a display is to show."""
+    """Return scene light, linear Rec.709, from light as shown by a display."""
     scale = np.float32(2.0**transform.stops)
     if transform.name == "srgb" or (transform.name == "linear" and is_linear):
-        return shown / scale  # Colours beyond Rec.709 survive, which display values could not hold.
+        return (
+            shown / scale
+        )  # Keeps colours outside Rec.709, which display values cannot represent.
     if transform.name == "linear":
         raise ImageError(
             f"has the colour profile {name!r}, but the view transform is linear: choose another "
@@ -112,7 +115,7 @@ def _through(transform: ViewTransform, shown: Floats, *, is_linear: bool, name: 
 
 
 def unpremultiply(image: Floats, alpha: Floats) -> None:
-    """Divide by alpha in place, where it is > 0."""
-    # Division by a tiny alpha may give Inf, which the caller counts as such.
+    """Divide by alpha in place where it is > 0."""
+    # Division by a tiny alpha may give Inf, which the caller handles.
     with np.errstate(over="ignore", invalid="ignore"):
         image /= np.where(alpha > 0, alpha, np.float32(1))[..., None]

@@ -1,7 +1,7 @@
-"""OpenEXR files in and out, with the OpenEXR project's own module.
+"""Reads and writes OpenEXR files with the OpenEXR project's own module.
 
-A file is a list of `ExrPart`s; a part is a set of named channels of one size. Faults that the
-reference library ignores (a cut-off file, missing parts, deep pixels) raise ImageError here.
+A file is a list of `ExrPart`s; a part is a set of named channels of equal size. Faults that the
+reference library ignores (truncated files, missing parts, deep pixels) raise ImageError here.
 """
 
 import re
@@ -23,12 +23,12 @@ from lightpaint.images.formats.library_output import silenced
 from lightpaint.screen import some_names
 from lightpaint.version import __version__
 
-#: Prefix of lightpaint's own text attributes, and the one that all its files have.
+#: Prefix of lightpaint's text attributes, and the attribute that all its files have.
 OWN = "lightpaint."
 VERSION_KEY = f"{OWN}version"
 
-#: A file that declares more bytes of pixels than this, and more than 64 times its own length, is
-#: refused before decoding. Only empty pictures compress better than that.
+#: A file is rejected before decoding if its declared size in bytes exceeds both MAX_BYTES and
+#: MAX_COMPRESSION times its length. Only empty pictures compress better than that.
 MAX_BYTES = 2**29
 MAX_COMPRESSION = 64
 
@@ -36,10 +36,11 @@ MAX_COMPRESSION = 64
 #: they shrink below this share.
 SAMPLE_STEP, MIN_SAMPLE_BYTES, MAX_PACKED_SHARE = 16, 2**16, 0.6
 
-#: Pixels (height, width) by channel name.
+#: Arrays (height, width) by channel name.
 Channels = Mapping[str, npt.NDArray[Any]]
 
-#: OpenEXR's filter between two samples of chroma: weights of the nearest, the next, … per side.
+#: OpenEXR's filter for interpolating chroma: weights of the nearest, second nearest, … sample on
+#: each side.
 CHROMA_FILTER = (0.627123, -0.186077, 0.087929, -0.043159, 0.019597, -0.007540, 0.002128)
 
 
@@ -47,12 +48,13 @@ CHROMA_FILTER = (0.627123, -0.186077, 0.087929, -0.043159, 0.019597, -0.007540, 
 class ExrPart:
     """A part of an EXR file.
 
-    channels: name → (height, width) array, float16 or float32 (uint32 when read so).
+    channels: name → (height, width) array, float16 or float32 (uint32 if read as such).
     attributes: text attributes of the header.
-    display: (height, width) of the display window, the picture; None if it is `size`.
-    offset: (y, x) of the first stored pixel in it: programs crop empty borders or keep a margin.
+    display: (height, width) of the display window, which is the picture; None if equal to `size`.
+    offset: (y, x) of the first stored pixel in that window: programs crop empty borders or keep a
+    margin.
     primaries: CIE xy of red, green, blue and white, if the header declares `chromaticities`.
-    views: names of the views whose channels the part holds, the one without prefix first.
+    views: names of the views in the part, beginning with the one whose channels have no prefix.
     """
 
     name: str
@@ -70,7 +72,7 @@ class ExrPart:
         return height, width
 
     def in_display_window(self) -> "ExrPart":
-        """Return the part cut or padded with zeros to its display window."""
+        """Return the part cropped or padded with zeros to its display window."""
         height, width = self.display or self.size
         if (height, width) == self.size and self.offset == (0, 0):
             return self
@@ -98,15 +100,17 @@ class ExrPart:
 
 
 def read_headers(path: Path) -> tuple[list[dict[str, str]], tuple[int, int]]:
-    """Return the text attributes of each part of an EXR file, and its (height, width)."""
-    head_of(path, 16)  # OpenEXR itself would wait forever for a file that never answers
+    """Return the text attributes of each part of an EXR file, and the file's (height, width)."""
+    head_of(path, 16)  # OpenEXR itself would wait forever for a pipe
     with silenced():
         headers = [header for _, header in _declared(path)]
         return [_texts(header) for header in headers], _windows(headers[0])[0]
 
 
 def read_channels(path: Path) -> set[str]:
-    """Return the names of all channels in an EXR file, without pixels. Raises ImageError."""
+    """Return the names of all channels in an EXR file, without reading pixels. Raises
+    ImageError.
+    """
     with silenced():
         declared = _declared(path)
         return {channel.name for _, header in declared for channel in header["channels"]}
@@ -115,9 +119,9 @@ def read_channels(path: Path) -> set[str]:
 def read_parts(path: Path) -> list[ExrPart]:
     """Return all parts of the EXR file at `path`.
 
-    Channels stored at lower resolution, like chroma, are interpolated. Of mip maps the largest is
-    read. Raises ImageError if the file is missing, not an EXR, cut off, deep, or declares many more
-    pixels than its length makes likely.
+    Channels stored at lower resolution, such as chroma, are interpolated. Of mip maps the largest
+    level is read. Raises ImageError if the file is missing, not an EXR, truncated, deep, or
+    declares far more pixels than its length makes plausible.
     """
     path = Path(path)
     head = head_of(path, 16)
@@ -141,7 +145,7 @@ def read_parts(path: Path) -> list[ExrPart]:
 
 
 def _declared(path: Path) -> list[tuple[str | None, dict[str, Any]]]:
-    """Return the name and header of each part, without its pixels. Raises ImageError."""
+    """Return the name and header of each part, without pixels. Raises ImageError."""
     try:
         header = OpenEXR.File(str(path), header_only=True)
         declared = [(part.name(), dict(part.header)) for part in header.parts]
@@ -152,10 +156,12 @@ def _declared(path: Path) -> list[tuple[str | None, dict[str, Any]]]:
 
 
 def _why_unreadable(path: Path, reason: str) -> str:
-    """Return the error for a file with an unreadable header. reason: the library's."""
+    """Return the error message for a file with an unreadable header. reason: the library's
+    message.
+    """
     if kind_of(head_of(path, 16)) != "exr":
         return f"{path} is not a readable OpenEXR file: {reason}"
-    # The library repeats the file's name, and says no more about one that is cut off.
+    # The library repeats the file's name, and gives no reason for a truncated file.
     detail = re.sub(r"(^Unable|\s*when attempting) to open .*", "", reason)
     suffix = f" ({detail})" if detail else ""
     return f"{path} is cut off or damaged in its header{suffix}: export it again"
@@ -167,7 +173,7 @@ def _texts(header: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _part(path: Path, part: Any) -> ExrPart:
-    """Return a part in our own terms from the library's."""
+    """Convert a part of the library to an `ExrPart`."""
     if not part.channels:
         raise ImageError(f"{path} has a part without channels")
     (x0, y0), (x1, y1) = ((int(x), int(y)) for x, y in part.header["dataWindow"])
@@ -196,8 +202,8 @@ def _part(path: Path, part: Any) -> ExrPart:
 def _interpolated(pixels: Floats, size: tuple[int, int], sampling: tuple[int, int]) -> Floats:
     """Return a subsampled channel at full resolution.
 
-    Chroma, stored for every other pixel, is interpolated with OpenEXR's own filter; other steps
-    linearly. Beyond the last sample it is constant.
+    Chroma, stored for every second pixel, is interpolated with OpenEXR's own filter; other steps
+    are interpolated linearly. The last sample is extended to the border.
     """
     result = pixels.astype(np.float32)
     for axis, (length, step) in enumerate(zip(size, sampling, strict=True)):
@@ -219,10 +225,10 @@ def _interpolated(pixels: Floats, size: tuple[int, int], sampling: tuple[int, in
 
 
 def write_parts(path: Path, parts: Sequence[ExrPart]) -> None:
-    """Write a multi-part EXR without loss, with ZIP where that helps, all of it or nothing.
+    """Write a multi-part EXR file without loss, atomically, compressed with ZIP if that helps.
 
-    The first part records the version of lightpaint, so that nobody takes it for the render of
-    another program. All parts must have the same display window, by default their own size.
+    The first part records the version of lightpaint, so that the file is not mistaken for another
+    program's render. All parts must have the same display window, by default their own size.
     """
     exr_parts = []
     for k, part in enumerate(parts):
@@ -246,18 +252,18 @@ def write_parts(path: Path, parts: Sequence[ExrPart]) -> None:
     with replacing(path) as temporary:
         try:
             OpenEXR.File(exr_parts).write(str(temporary))
-        except RuntimeError as error:  # raised for a full disk and the like
+        except RuntimeError as error:  # raised if the disk is full, for example
             raise OutputError(
                 f"cannot write {path}: {first_line(error, path=temporary)}"
             ) from error
 
 
 def is_worth_packing(channels: Channels) -> bool:
-    """Return True if ZIP saves much. Noisy floats hardly shrink and take long to unpack."""
+    """Return True if ZIP saves much. Noisy floats hardly shrink, but take long to decompress."""
     lines = [pixels[::SAMPLE_STEP] for pixels in channels.values()]
     if sum(x.nbytes for x in lines) < MIN_SAMPLE_BYTES:
         return True
-    # As in EXR's ZIP: bytes of equal significance together.
+    # Like EXR's ZIP, grouped by the significance of bytes.
     data = b"".join(
         np.ascontiguousarray(x).view(np.uint8).reshape(-1, x.itemsize).T.tobytes() for x in lines
     )
@@ -277,7 +283,7 @@ def write_rgb(path: Path, image: Floats, *, attributes: Mapping[str, str] | None
 
 
 def _windows(header: Mapping[str, Any]) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Return (height, width) of the display window and the data window's (y, x) in it."""
+    """Return (height, width) of the display window, and (y, x) of the data window within it."""
     (x0, y0), (x1, y1) = ((int(x), int(y)) for x, y in header["displayWindow"])
     x, y = (int(v) for v in header["dataWindow"][0])
     return (y1 - y0 + 1, x1 - x0 + 1), (y - y0, x - x0)
@@ -305,7 +311,7 @@ def _check_headers(path: Path, declared: list[tuple[str | None, dict[str, Any]]]
             raise ImageError(f"{path} declares an empty image of {width}x{height} pixels")
         (height_shown, width_shown), _ = _windows(header)
         pixels = max(width * height, width_shown * height_shown)
-        # Half floats become float32 later, so that four bytes are counted.
+        # Four bytes per number, since half floats are converted to float32 later.
         size += pixels * 4 * max(len(header.get("channels", ())), 1)
     if size > max(MAX_BYTES, MAX_COMPRESSION * path.stat().st_size):
         raise ImageError(

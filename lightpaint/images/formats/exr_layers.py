@@ -20,23 +20,24 @@ from lightpaint.errors import ImageError
 from lightpaint.images.formats.exr import ExrPart
 from lightpaint.screen import some_names
 
-#: Attribute of an EXR with separate layers of Krita, which has no merged picture.
+#: Attribute of EXR files with separate Krita layers, which have no merged picture.
 KRITA_LAYERS = "krita_layers_info"
 
-#: Names of colour channels and alpha in various programs, in lower case.
+#: Names of colour and alpha channels in various programs, in lower case.
 RGB_NAMES = (("r", "g", "b"), ("red", "green", "blue"))
 ALPHA_NAMES = ("a", "alpha")
 
-#: Text attribute in which Blender and others name the colour space, and its values without meaning.
+#: Text attribute in which Blender and others store the colour space, and its values without
+#: meaning.
 COLOR_SPACE = "colorInteropID"
 UNSPECIFIED = ("", "data", "unknown")
 
 
 @dataclass(frozen=True)
 class ExrLayer:
-    """A colour image in a part: its channels are those with this prefix.
+    """A colour image in a part, whose channels have this prefix.
 
-    name: its name for people; "" if it is the only layer in its file and has none.
+    name: its name for display; "" if it is the only layer in its file and has no name.
     """
 
     name: str
@@ -48,7 +49,7 @@ class ExrLayer:
         return linear_rgb(self.part, self.prefix)
 
     def channel(self, *names: str) -> npt.NDArray[np.float32] | None:
-        """Return the first of these channels that the layer has, (h, w) float32."""
+        """Return the first of these channels that exists in the layer, (h, w) float32."""
         name = channel_named(self.part.channels, self.prefix, *names)
         return None if name is None else self.part.channels[name].astype(np.float32, copy=False)
 
@@ -73,13 +74,13 @@ def vector_channels(names: Iterable[str]) -> dict[str, tuple[str, str, str]]:
 
 
 def channel_named(names: Iterable[str], layer: str, *lasts: str) -> str | None:
-    """Return the channel of `layer`, a prefix, whose name ends in the first match of `lasts`."""
+    """Return the channel of `layer`, a prefix, with the first existing suffix among `lasts`."""
     channels = _by_layer(names).get(layer, {})
     return next((channels[x] for x in map(str.casefold, lasts) if x in channels), None)
 
 
 def _by_layer(names: Iterable[str]) -> dict[str, dict[str, str]]:
-    """Return layer → last part of a name, in lower case → the channel, the first of duplicates."""
+    """Return layer → lower-case suffix → channel; of duplicates the first."""
     layers: dict[str, dict[str, str]] = {}
     for name in names:
         layer, _, last = name.rpartition(".")
@@ -88,10 +89,10 @@ def _by_layer(names: Iterable[str]) -> dict[str, dict[str, str]]:
 
 
 def linear_rgb(part: ExrPart, layer: str = "") -> Floats:
-    """Return the colour of `layer`, a prefix of channels in `part`, as (h, w, 3) float32 Rec.709.
+    """Return the colour of `layer`, a channel prefix in `part`, as (h, w, 3) float32 Rec.709.
 
-    Its channels are R, G, B; or Y, which is grey; or Y, RY and BY, luminance and chroma. Other
-    primaries that the header declares are converted. Raises ImageError, listing the channels, if it
+    Its channels are R, G, B; or Y for grey; or Y, RY and BY for luminance and chroma. Other
+    primaries declared in the header are converted. Raises ImageError, listing the channels, if it
     has none of these, or if its colour space is unknown.
     """
     primaries = primaries_of(part)
@@ -109,14 +110,14 @@ def linear_rgb(part: ExrPart, layer: str = "") -> Floats:
     luminance = luminance.astype(np.float32, copy=False)
     chroma = [part.channels.get(_joined(layer, name)) for name in ("RY", "BY")]
     if chroma[0] is None or chroma[1] is None:
-        # Grey needs no conversion: it has the colour of white, which is adapted.
+        # Grey needs no conversion, since white is adapted to white.
         return np.repeat(luminance[..., None], 3, axis=-1)
     image = _from_chroma(luminance, chroma[0], chroma[1], primaries or REC709)
     return _in_rec709(image, primaries)
 
 
 def colour_layers(parts: Sequence[ExrPart]) -> list[ExrLayer]:
-    """Return every layer of a file that holds a colour, in the file's order, the unnamed first."""
+    """Return all colour layers of a file in file order, within a part the unnamed one first."""
     layers = []
     for part in parts:
         prefixes = dict.fromkeys(name.rpartition(".")[0] for name in part.channels)
@@ -126,11 +127,12 @@ def colour_layers(parts: Sequence[ExrPart]) -> list[ExrLayer]:
 
 
 def choose_layer(parts: Sequence[ExrPart], requested: str | None = None) -> ExrLayer:
-    """Return the layer called `requested`: by its name, its part's or view's name, or its prefix.
+    """Return the layer called `requested`, by its own name, its part's or view's name, or its
+    prefix.
 
-    Without a request it returns the only layer, or the only one without a prefix, unless Krita
-    wrote the file: there that layer is only the background. Raises ImageError, listing the layers,
-    if there is none or more than one.
+    Without a request, returns the only layer, or the only one without a prefix, unless Krita wrote
+    the file: there the layer without a prefix is only the background. Raises ImageError, listing
+    the layers, if there is no such layer or more than one.
     """
     layers = colour_layers(parts)
     if not layers:
@@ -172,9 +174,7 @@ def _layer_name(part: ExrPart, prefix: str, *, several: bool) -> str:
 
 
 def _views(layer: ExrLayer) -> list[str]:
-    """Return the names of the view that the layer is: the part's, or the first in a multi-view
-    part.
-    """
+    """Return the view names of the layer: that of its part, or the first of a multi-view part."""
     if layer.prefix:
         return []
     return [v for v in (layer.part.attributes.get("view"), *layer.part.views[:1]) if v]
@@ -182,13 +182,13 @@ def _views(layer: ExrLayer) -> list[str]:
 
 def _is_colour(part: ExrPart, prefix: str) -> bool:
     if _joined(prefix, "Y") in part.channels:
-        # With an X, this Y is a coordinate, not luminance.
+        # Next to an X, this Y is a coordinate rather than luminance.
         return _joined(prefix, "X") not in part.channels
     return prefix in colour_channels(part.channels)
 
 
 def _from_chroma(y: Floats, ry: Floats, by: Floats, primaries: tuple[float, ...]) -> Floats:
-    """Return RGB of luminance and RY = (R − Y)/Y, BY = (B − Y)/Y, as OpenEXR defines them."""
+    """Return RGB from luminance and RY = (R − Y)/Y, BY = (B − Y)/Y, as OpenEXR defines them."""
     red, green, blue = rgb_to_xyz(primaries)[1]
     image = np.empty((*y.shape, 3), np.float32)
     with np.errstate(invalid="ignore", over="ignore"):
@@ -203,7 +203,7 @@ def _in_rec709(image: Floats, primaries: tuple[float, ...] | None) -> Floats:
 
 
 def primaries_of(part: ExrPart) -> tuple[float, ...] | None:
-    """Return the primaries that a part declares, by numbers or by name; None for Rec.709's.
+    """Return the primaries that a part declares, as numbers or by name; None for Rec.709.
 
     Raises ImageError, without naming the file, if the name is not that of a known linear space.
     """

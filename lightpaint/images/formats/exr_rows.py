@@ -1,8 +1,8 @@
-"""Reading single rows of a multi-part OpenEXR file.
+"""Reads single rows of a multi-part OpenEXR file.
 
-The OpenEXR project's own module reads whole files. Finding rows needs little: headers, tables of
-offsets, and lines that are uncompressed or compressed by ZIP. All other files are left to that
-module.
+The OpenEXR project's own module reads only whole files. Reading rows takes little code: headers,
+offset tables, and scan lines that are uncompressed or ZIP-compressed. All other files are left to
+that module.
 """
 
 import os
@@ -23,34 +23,34 @@ from lightpaint.errors import ImageError
 
 MAGIC, MULTI_PART = 20000630, 0x1000
 
-#: Version flags of parts that are not read here: tiles, deep pixels.
+#: Version flags of unsupported parts: tiles, deep pixels.
 UNSUPPORTED = 0x200 | 0x800
 
-#: Lines of a chunk by compression: none, ZIP of single lines, ZIP of 16 lines.
+#: Number of lines in a chunk, by compression: none, ZIP of single lines, ZIP of 16 lines.
 LINES = {0: 1, 2: 1, 3: 16}
 
 TYPES: dict[int, np.dtype[Any]] = {0: np.dtype("<u4"), 1: np.dtype("<f2"), 2: np.dtype("<f4")}
 
-#: Bytes that contain most headers, and the longest header that is read.
+#: Number of bytes that is enough for most headers, and maximum size of a header.
 FIRST_READ, MAX_HEADER = 2**18, 2**26
 
-#: Bytes of a part that are read at a time where many rows of it are.
+#: Number of bytes of a part read at a time when many rows are read.
 READ_BYTES = 2**22
 
-#: Header of a chunk: its part, its first line, the number of bytes that follow.
+#: Header of a chunk: its part, its first line, and the number of bytes that follow.
 HEAD = struct.Struct("<iii")
 
 
 class RowsUnsupportedError(Exception):
-    """A file of a kind that is not read here."""
+    """A file of an unsupported kind."""
 
 
 @dataclass(frozen=True)
 class PartLayout:
     """The layout of a part's pixels in its file.
 
-    display: (height, width) of the picture. channels: names and types in the order of the file.
-    texts: its text attributes. lines: rows of a chunk. offsets: (chunks,), positions in the file.
+    display: (height, width) of the picture. channels: names and types in file order. texts: its
+    text attributes. lines: rows in a chunk. offsets: (chunks,), positions in the file.
     """
 
     number: int
@@ -64,14 +64,14 @@ class PartLayout:
 
     @property
     def line_bytes(self) -> int:
-        """Bytes of a row, all channels together."""
+        """Number of bytes in a row, for all channels together."""
         return self.size[1] * sum(kind.itemsize for kind in self.channels.values())
 
 
 class RowFile:
-    """An open file whose rows are read on request; later replacements do not affect it.
+    """An open file whose rows are read on request, unaffected by a later replacement of the file.
 
-    Raises NotByRowsError for a file of another kind, and OSError.
+    Raises RowsUnsupportedError for a file of an unsupported kind, and OSError.
     """
 
     def __init__(self, path: Path) -> None:
@@ -97,7 +97,7 @@ class RowFile:
             return file.read(count)
 
     def _all_layouts(self) -> tuple[PartLayout, ...]:
-        """Return the layouts of all parts, reading as much of the beginning as needed."""
+        """Return the layouts of all parts, reading as much of the file's beginning as needed."""
         limit = min(MAX_HEADER, self.length)
         for length in (FIRST_READ, limit):
             try:
@@ -125,9 +125,9 @@ class RowFile:
     def read_rows(
         self, part: PartLayout, top: int, bottom: int, names: Sequence[str], out: Floats
     ) -> None:
-        """Read rows of some channels of a part into (channels, bottom - top, w) float32.
+        """Read rows of some channels of a part into an array (channels, bottom - top, w) float32.
 
-        Raises ImageError for a file that is cut off or damaged.
+        Raises ImageError if the file is truncated or damaged.
         """
         starts = dict(zip(part.channels, _starts(part), strict=True))
         last, step = -(-bottom // part.lines), self._chunks_at_a_time(part)
@@ -140,7 +140,7 @@ class RowFile:
                     copy_as_singles(values, target[rows.start - top : rows.stop - top])
 
     def _chunks_at_a_time(self, part: PartLayout) -> int:
-        """Return how many chunks to read at a time."""
+        """Return the number of chunks to read at a time."""
         return max(1, READ_BYTES // (part.line_bytes * part.lines))
 
     def channels(self, part: PartLayout) -> dict[str, npt.NDArray[Any]]:
@@ -192,7 +192,7 @@ class RowFile:
 
 
 def _attributes(head: bytes, position: int) -> tuple[dict[str, tuple[str, bytes]], int]:
-    """Return name → type and value of the attributes of the header at `position`, and its end."""
+    """Return name → (type, value) of the attributes of the header at `position`, and its end."""
     attributes = {}
     while head[position]:
         name, position = _text(head, position)
@@ -247,19 +247,19 @@ def _layout(
 def _values(
     part: PartLayout, lines: npt.NDArray[np.uint8], starts: Mapping[str, int], name: str
 ) -> npt.NDArray[Any]:
-    """Return the values of a channel, (rows, w), in the bytes of some rows."""
+    """Return the values of a channel, (rows, w), from the bytes of some rows."""
     kind, start = part.channels[name], starts[name]
     return np.ascontiguousarray(lines[:, start : start + part.size[1] * kind.itemsize]).view(kind)
 
 
 def _starts(part: PartLayout) -> list[int]:
-    """Return the positions of the channels in the bytes of a row."""
+    """Return the position of each channel in the bytes of a row."""
     sizes = [part.size[1] * kind.itemsize for kind in part.channels.values()]
     return [sum(sizes[:k]) for k in range(len(sizes))]
 
 
 def zip_filtered(data: bytes) -> bytes:
-    """Return bytes filtered for ZIP: differences, every other byte before the rest."""
+    """Return bytes filtered for ZIP: even bytes before odd bytes, then differences."""
     values = np.frombuffer(data, np.uint8)
     separated = np.concatenate([values[0::2], values[1::2]])
     steps = np.empty_like(separated)

@@ -1,7 +1,7 @@
-"""Writing a multi-part OpenEXR file part by part, with only one part in memory.
+"""Writes a multi-part OpenEXR file part by part, with only one part in memory.
 
-The OpenEXR project's own module takes all pixels of a file at once. Writing scan lines needs
-little: headers, tables of offsets, and lines that are uncompressed or compressed by ZIP.
+The OpenEXR project's own module takes all pixels of a file at once. Writing scan lines takes little
+code: headers, offset tables, and lines that are uncompressed or ZIP-compressed.
 """
 
 import struct
@@ -18,13 +18,14 @@ from lightpaint.images.formats.exr import VERSION_KEY, Channels, is_worth_packin
 from lightpaint.images.formats.exr_rows import HEAD, LINES, MAGIC, MULTI_PART, TYPES, zip_filtered
 from lightpaint.version import __version__
 
-#: Version number of a file, flag for names longer than 31 characters, and that length.
+#: Version number of a file; the flag for names longer than LONGEST_NAME characters; and that
+#: length.
 VERSION, LONG_NAMES, LONGEST_NAME = 2, 0x400, 31
 
-#: Bytes of a header at most, with as many channels as a light has, but for its texts.
+#: Upper bound in bytes for the header of a light's part, without its texts.
 PLAIN_HEAD_BYTES = 2048
 
-#: OpenEXR's numbers for no compression and for ZIP of 16 lines; and the level of ZIP.
+#: OpenEXR's codes for no compression and for ZIP of 16 lines; and the ZIP level.
 PLAIN, ZIPPED, LEVEL = 0, 3, 4
 
 
@@ -32,8 +33,8 @@ PLAIN, ZIPPED, LEVEL = 0, 3, 4
 class PartHead:
     """The header of a part.
 
-    size: (height, width). channels: name → type of its pixels. texts: its text attributes.
-    display: (height, width) of the picture; None for `size`. is_packed: True to compress by ZIP.
+    size: (height, width). channels: name → type of its pixels. texts: its text attributes. display:
+    (height, width) of the picture; None for `size`. is_packed: whether to compress with ZIP.
     """
 
     name: str
@@ -52,7 +53,7 @@ class PartHead:
         *,
         display: tuple[int, int] | None = None,
     ) -> "PartHead":
-        """Return the header of a part with these pixels, compressed where that helps."""
+        """Return the header for a part with these pixels, compressed if that helps."""
         height, width = next(iter(channels.values())).shape
         kinds = {channel: pixels.dtype for channel, pixels in channels.items()}
         packed = is_worth_packing(channels)
@@ -60,7 +61,7 @@ class PartHead:
 
     @property
     def lines(self) -> int:
-        """Rows of a chunk."""
+        """Number of rows in a chunk."""
         return LINES[ZIPPED if self.is_packed else PLAIN]
 
     @property
@@ -69,7 +70,7 @@ class PartHead:
         return -(-self.size[0] // self.lines)
 
     def encoded(self) -> bytes:
-        """Return the header's attributes as bytes of the file."""
+        """Return the header's attributes as the bytes of the file."""
         height, width = self.size
         shown = self.display or self.size
         window = struct.pack("<4i", 0, 0, width - 1, height - 1)
@@ -94,7 +95,7 @@ class PartHead:
         )
 
     def _table(self) -> bytes:
-        """Return names and types of the channels, in their order in a line."""
+        """Return names and types of the channels, in the order of a line."""
         kinds = {kind: number for number, kind in TYPES.items()}
         entries = [
             name.encode() + b"\0" + struct.pack("<iIii", kinds[self.channels[name]], 0, 1, 1)
@@ -103,10 +104,10 @@ class PartHead:
         return b"".join([*entries, b"\0"])
 
     def packed(self, channels: Channels) -> Iterator[tuple[int, bytes]]:
-        """Yield the first line and the bytes of each chunk of the pixels."""
+        """Yield the first line and the bytes of each chunk of pixels."""
         for first in range(0, self.size[0], self.lines):
             rows = slice(first, first + self.lines)
-            # A line holds its channels one after the other.
+            # A line stores its channels one after the other.
             parts = [
                 np.ascontiguousarray(channels[name][rows])
                 .view(np.uint8)
@@ -157,9 +158,9 @@ def write_streamed(
 
 
 def room_for(name: str, texts: Mapping[str, str], height: int) -> int:
-    """Return how many bytes a part takes at most before the pixels of a file.
+    """Return an upper bound for the bytes that a part takes before the pixels of a file.
 
-    texts: its attributes, and those that the file has for it. height: rows of pixels.
+    texts: its text attributes, including any of the file. height: number of rows.
     """
     return (
         PLAIN_HEAD_BYTES

@@ -1,4 +1,4 @@
-"""The format of a picture file, from its first bytes instead of its name."""
+"""Detects the format of a picture file from its first bytes rather than its name."""
 
 import sys
 from pathlib import Path
@@ -7,7 +7,7 @@ from lightpaint.errors import ImageError
 from lightpaint.file_reading import file_length
 from lightpaint.files import is_utf_8, one_line
 
-#: First bytes of files, their usual name, and the kind that reads them; "" if they are not read.
+#: First bytes of files, the usual name of the format, and its kind; "" if it is not supported.
 SIGNATURES = (
     (b"\x76\x2f\x31\x01", "OpenEXR", "exr"),
     (b"\x89PNG\r\n\x1a\n", "PNG", "png"),
@@ -30,7 +30,7 @@ SIGNATURES = (
 
 def head_of(path: Path, length: int) -> bytes:
     """Return the first bytes of an image file. Raises ImageError if it cannot be read."""
-    if not is_utf_8(path):  # which the libraries that read pixels require
+    if not is_utf_8(path):  # required by the libraries that read pixels
         raise ImageError(f"{one_line(str(path))} is a name that is not UTF-8: rename the file")
     file_length(path, "image file", ImageError, limit=sys.maxsize)
     try:
@@ -41,10 +41,10 @@ def head_of(path: Path, length: int) -> bytes:
 
 
 def kind_of(head: bytes) -> str:
-    """Return `exr`, `png`, `jpeg`, `tiff`, `psd` or `zip`; "" for files that are not read."""
+    """Return `exr`, `png`, `jpeg`, `tiff`, `psd` or `zip`; "" if the format is not supported."""
     return next((kind for mark, _, kind in SIGNATURES if head.startswith(mark)), "")
 
 
 def name_of(head: bytes) -> str:
-    """Return the usual name of the format of such a file; "" if it is unknown."""
+    """Return the usual name of the file format; "" if it is unknown."""
     return next((name for mark, name, _ in SIGNATURES if head.startswith(mark)), "")

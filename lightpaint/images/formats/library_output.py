@@ -1,4 +1,4 @@
-"""Silencing of libraries that print to the terminal on their own."""
+"""Silences libraries that print to the terminal."""
 
 import errno
 import fcntl
@@ -9,24 +9,24 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
 
-#: Descriptors belong to the whole process: two threads would restore each other's.
+#: File descriptors belong to the whole process: concurrent threads would restore each other's.
 _silence_lock = threading.RLock()
 
 
 @contextmanager
 def unsilenced() -> Iterator[None]:
-    """Print in this block without being silenced by another thread's library call."""
+    """Print within the block without being silenced by another thread's library call."""
     with _silence_lock:
         yield
 
 
 @contextmanager
 def silenced() -> Iterator[None]:
-    """Keep what libraries in C and C++ print about damaged files off the user's terminal.
+    """Keep messages of C and C++ libraries about damaged files off the user's terminal.
 
-    They write to the process's own descriptors and, through Python, to `sys.stdout`, which is
-    another place in a notebook. An ImageError reports the same faults. A descriptor that was closed
-    when the process started stays closed.
+    They write to the process's file descriptors and, through Python, to `sys.stdout`, which in a
+    notebook is somewhere else. An ImageError reports the same faults. Descriptors that were closed
+    when the process started stay closed.
     """
     with _silence_lock:
         _flush_standard_streams()
@@ -56,7 +56,7 @@ def _flush_standard_streams() -> None:
 
 def _copy_if_open(fd: int) -> int | None:
     try:
-        # At least 3: a closed standard descriptor must not be reused for the copy.
+        # At least 3, so that the copy does not take the place of a closed standard descriptor.
         return fcntl.fcntl(fd, fcntl.F_DUPFD_CLOEXEC, 3)
     except OSError as error:
         if error.errno != errno.EBADF:

@@ -1,4 +1,4 @@
-"""Layered files of OpenRaster and Krita: zip archives that contain a merged picture, a PNG."""
+"""Layered OpenRaster and Krita files: zip archives that contain a merged picture as PNG."""
 
 import struct
 import tempfile
@@ -17,10 +17,10 @@ from lightpaint.images.formats.png import PNG_HEAD, longest_png
 LAYERED = {b"image/openraster": "ora", b"application/x-krita": "kra"}
 MERGED = "mergedimage.png"
 
-#: Longest merged picture that is unpacked, in bytes.
+#: Maximum size in bytes of a merged picture.
 MAX_MERGED = 2**30
 
-#: Errors of reading a damaged archive, whose offsets and lengths may be any numbers.
+#: Exceptions raised by a damaged archive, whose offsets and lengths are arbitrary.
 DAMAGES = (
     zipfile.BadZipFile,
     NotImplementedError,
@@ -34,7 +34,7 @@ DAMAGES = (
 
 
 def layered_kind(path: Path, head: bytes) -> str:
-    """Return `ora` or `kra`, from the archive's first member, which is not compressed."""
+    """Return `ora` or `kra`, according to the archive's first member, which is uncompressed."""
     length = int.from_bytes(head[26:28], "little") + int.from_bytes(head[28:30], "little")
     media_type = head[30 + length :]
     for mark, kind in LAYERED.items():
@@ -46,7 +46,7 @@ def layered_kind(path: Path, head: bytes) -> str:
 
 
 def read_merged(path: Path, kind: str) -> Bitmap:
-    """Return the merged picture of such a file. Raises ImageError without the file's name."""
+    """Return the merged picture of a layered file. Raises ImageError, without naming the file."""
     try:
         with zipfile.ZipFile(path) as archive, tempfile.TemporaryDirectory() as folder:
             member = archive.getinfo(MERGED)
@@ -70,7 +70,7 @@ def read_merged(path: Path, kind: str) -> Bitmap:
 
 
 def _copy(source: IO[bytes], target: IO[bytes], length: int) -> None:
-    """Copy as much as the archive declares; refuse more."""
+    """Copy `length` bytes. Raises ImageError if there are more."""
     copied = 0
     while chunk := source.read(2**20):
         copied += len(chunk)

@@ -1,4 +1,4 @@
-"""PNG files: 8 bits to look at, 16 bits to paint on and read back, and their metadata."""
+"""PNG files: 8 bits for viewing, 16 bits for painting, and their metadata."""
 
 import io
 import struct
@@ -21,16 +21,16 @@ from lightpaint.errors import ImageError, OutputError
 from lightpaint.files import replacing, write_bytes
 from lightpaint.keywords import keywords
 
-#: Longest chunk before a PNG's pixels, in bytes: profiles of printers have a few million.
+#: Maximum size in bytes of a chunk before a PNG's pixels: printer profiles have a few million.
 MAX_CHUNK = 2**24
 
-#: Length in bytes of a PNG's head, which declares its size.
+#: Number of bytes at the start of a PNG that include its size.
 PNG_HEAD = 26
 
-#: Bytes at the start of a PNG in which its texts are searched.
+#: Number of bytes at the start of a PNG that are searched for texts.
 MAX_TEXTS = 2**12
 
-#: Level of compression: renders come out no larger than at the usual 6, in a third of the time.
+#: Compression level: renders are no larger than at the default 6, in a third of the time.
 COMPRESSION_LEVEL = 3
 
 #: Key of the text in a PNG that names its view transform.
@@ -40,9 +40,9 @@ TRANSFORM_KEY = "lightpaint.view"
 def write_png_16(
     path: Path, image_display: Floats, *, texts: Mapping[str, str] | None = None
 ) -> None:
-    """Write display values in [0, 1], (h, w) or (h, w, 3), as a 16-bit PNG, all of it or nothing.
+    """Write display values in [0, 1], (h, w) or (h, w, 3), as a 16-bit PNG, atomically.
 
-    texts: Latin-1, stored in the file.
+    texts: Latin-1 texts to store in the file.
     """
     import OpenImageIO
 
@@ -72,7 +72,7 @@ def png_bytes(image_8_bit: npt.NDArray[Any], texts: Mapping[str, str] | None = N
 
 
 def png_has_text(path: Path, key: str) -> bool:
-    """Return True if the file at `path` is a PNG of `png_bytes` with a text of that key."""
+    """Return True if the file at `path` is a PNG from `png_bytes` with a text of this key."""
     with path.open("rb") as file:
         head = file.read(MAX_TEXTS)
     return head.startswith(b"\x89PNG") and b"tEXt" + key.encode() + b"\0" in head
@@ -80,12 +80,12 @@ def png_has_text(path: Path, key: str) -> bool:
 
 @keywords()
 def display_picture(image: Floats, *, stops: float | None = None, zoom: int = 1) -> Image.Image:
-    """Return a linear image as a picture that notebooks show.
+    """Return a linear image as a picture that notebooks can show.
 
     Args:
         image: (h, w, 3) linear.
-        stops: Exposure, chosen if not given.
-        zoom: Side of a pixel of `image` in the picture.
+        stops: Exposure; by default chosen automatically.
+        zoom: Side of an image pixel in the picture.
 
     Examples:
         >>> lp.display_picture(target.image, zoom=8).size
@@ -99,29 +99,29 @@ def display_picture(image: Floats, *, stops: float | None = None, zoom: int = 1)
 def write_png(
     path: Path, image: Floats, *, stops: float = 0.0, texts: Mapping[str, str] | None = None
 ) -> None:
-    """Write a linear image, display-encoded, as 8-bit sRGB PNG, all of it or nothing."""
+    """Write a linear image as a display-encoded 8-bit sRGB PNG, atomically."""
     write_bytes(path, png_bytes(to_8_bit(encode_display(image, stops=stops)), texts))
 
 
 def longest_png(head: bytes) -> int:
-    """Return the largest plausible size in bytes of a PNG that begins like `head`.
+    """Return the largest plausible size in bytes of a PNG that starts with `head`.
 
-    That is the size of its pixels without compression, plus space for profiles, texts and a
-    thumbnail. Raises ImageError, without naming the file, if it does not begin like a PNG.
+    It is the size of its uncompressed pixels, plus space for profiles, texts and a thumbnail.
+    Raises ImageError, without naming the file, if `head` is not that of a PNG.
     """
     if len(head) < PNG_HEAD or not head.startswith(b"\x89PNG\r\n\x1a\n"):
         raise ImageError("is damaged: it does not begin like a PNG")
     width, height, bits, colour = struct.unpack_from(">IIBB", head, 16)
     channels = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}.get(colour, 4)
-    # Adam7 interlacing has seven pictures, each with one extra byte per row.
+    # Adam7 interlacing stores seven pictures, each with one extra byte per row.
     row = -(-width * channels * bits // 8) + 1
     return int(2 * MAX_CHUNK + 8 * height + row * height * 1001 // 1000)
 
 
 def read_png_head(path: Path) -> tuple[str | None, Profile | None]:
-    """Return the view transform that a PNG declares in its small chunks, and its colour profile.
+    """Return the view transform and the colour profile that a PNG declares in its small chunks.
 
-    The precedence is the standard's: cICP, iCCP, sRGB, then gAMA and cHRM.
+    The precedence follows the standard: cICP, iCCP, sRGB, then gAMA and cHRM.
     """
     chunks = dict(_chunks(path))
     text = chunks.get(b"tEXt", b"")
@@ -145,9 +145,9 @@ def read_png_head(path: Path) -> tuple[str | None, Profile | None]:
 
 
 def _chunks(path: Path) -> Iterator[tuple[bytes, bytes]]:
-    """Yield type and content of the chunks before the pixels; of texts, only our own.
+    """Yield type and content of the chunks before the pixels; of texts, only lightpaint's own.
 
-    Raises ImageError if a checksum is wrong: the library would ignore that chunk.
+    Raises ImageError if a checksum is wrong, since the library would ignore that chunk.
     """
     with path.open("rb") as file:
         file.seek(8)
@@ -163,7 +163,7 @@ def _chunks(path: Path) -> Iterator[tuple[bytes, bytes]]:
 
 
 def _of_cicp(content: bytes) -> Profile | None:
-    """Return the profile of coding-independent code points (ITU-T H.273): sRGB, Display P3."""
+    """Return the profile for coding-independent code points (ITU-T H.273): sRGB or Display P3."""
     srgb, display_p3 = b"\x01\x0d", b"\x0c\x0d"
     if content[:2] == srgb:
         return None

@@ -1,4 +1,4 @@
-"""Checks that a Photoshop file has a merged picture in grey or RGB, which is all that is read."""
+"""Checks that a Photoshop file has a merged picture in grey or RGB, the only supported form."""
 
 import struct
 from collections.abc import Iterator
@@ -9,16 +9,16 @@ import numpy as np
 
 from lightpaint.errors import ImageError
 
-#: Colour modes that are read, and names of those that are not.
+#: Supported colour modes, and names of unsupported ones.
 PSD_COLOURS = {1: "grey", 3: "RGB"}
 PSD_OTHERS = {0: "black and white", 2: "indexed colours", 4: "CMYK", 7: "multichannel", 9: "Lab"}
 
 
 def check_psd(path: Path, *, max_pixels: int) -> bool:
-    """Refuse Photoshop files of other colour modes, and those without a merged picture.
+    """Reject Photoshop files in other colour modes or without a merged picture, with ImageError.
 
-    max_pixels: most pixels that are read. Returns True if an extra channel is transparency, and not
-    a saved selection.
+    max_pixels: maximum number of pixels. Returns True if an extra channel is transparency rather
+    than a saved selection.
     """
     with path.open("rb") as file:
         head = file.read(26)
@@ -40,17 +40,17 @@ def check_psd(path: Path, *, max_pixels: int) -> bool:
         file.seek(length - len(layers), 1)
         _check_packed_rows(file, head)
     for ident, data in _resources(resources):
-        # VersionInfo: a version, then a flag for the merged picture.
+        # VersionInfo: a version number, then a flag for the merged picture.
         if ident == 1057 and len(data) >= 5 and not data[4]:
             raise ImageError(
                 "has no merged picture: save it with maximised compatibility, or export a PNG"
             )
-    # With transparency the number of layers is negative.
+    # The number of layers is negative if there is transparency.
     return len(layers) == 6 and layers[4] >= 0x80
 
 
 def _check_packed_rows(file: BinaryIO, head: bytes) -> None:
-    """Refuse rows that are too short for their pixels, which the library skips silently."""
+    """Reject rows that are too short for their pixels, which the library skips silently."""
     if file.read(2) != b"\0\1":
         return
     channels, height, width, depth = struct.unpack(">HIIH", head[12:24])

@@ -1,7 +1,7 @@
 """Checks that the numbers in a TIFF's header agree with each other and with the file.
 
-The library silently fills in missing fields by rules of its own: a header that has lost a field, or
-lists fewer strips than the picture needs, would be read as another picture.
+The library silently fills in missing fields by its own rules: a header that lost a field, or lists
+fewer strips than the picture needs, would be read as a different picture.
 """
 
 import struct
@@ -10,14 +10,14 @@ from typing import BinaryIO
 
 from lightpaint.errors import ImageError
 
-#: Fields of a directory (TIFF 6.0, section 8), and types of their values: format and size.
+#: Fields of a directory (TIFF 6.0, section 8), and their value types: format and size.
 WIDTH, HEIGHT, BITS, COMPRESSION, SAMPLES, PLANAR = 256, 257, 258, 259, 277, 284
 STRIPS = (273, 279)  # offsets, lengths
 TILES = (324, 325)
 ROWS_PER_STRIP, TILE_WIDTH, TILE_HEIGHT = 278, 322, 323
 TYPES = {1: ("B", 1), 3: ("H", 2), 4: ("I", 4), 16: ("Q", 8)}
 
-#: Largest count of a field: pictures that are read have fewer values in each.
+#: Maximum number of values in a field; supported pictures have fewer.
 MAX_COUNT = 2**22
 
 Fields = dict[int, tuple[int, ...]]
@@ -30,7 +30,7 @@ def check_tiff(path: Path) -> None:
         with path.open("rb") as file:
             fields = _first_directory(file)
     except (struct.error, ValueError, OverflowError, OSError):
-        # Too short, or an impossible offset.
+        # Truncated, or with an impossible offset.
         raise ImageError("is cut off or damaged") from None
     if not {WIDTH, HEIGHT, BITS} <= fields.keys():
         raise ImageError("is damaged: its header lacks width, height or bits: export it again")
@@ -47,7 +47,7 @@ def check_tiff(path: Path) -> None:
 def _check_chunks(
     fields: Fields, image: tuple[int, int], samples: int, planar: int, bits: int, size: int
 ) -> None:
-    """Check that all strips or tiles exist, lie in the file, and hold all their pixels."""
+    """Check that all strips or tiles exist, lie within the file, and hold all their pixels."""
     height, width = image
     if TILE_WIDTH in fields:
         chunk = _single_value(fields, TILE_HEIGHT), _single_value(fields, TILE_WIDTH)
