@@ -1,4 +1,4 @@
-"""Progress of long work, for those who wait for it, and a way to cancel it.
+"""Reports on the progress of long work, and a way to cancel it.
 
 Long work reports through a plain callable, so that a terminal, a notebook and a test can all
 listen; the caller chooses which. Listeners of the pipeline may receive remarks, too.
@@ -17,7 +17,7 @@ class Progress(Protocol):
     def __call__(self, label: str, done: int, total: int, unit: str = "passes") -> None:
         """Report that `done` of `total` pieces of the work named `label` are finished.
 
-        unit: what is counted; given only if it is not passes.
+        unit: counted unit, if not passes.
         """
 
 
@@ -28,7 +28,7 @@ class Listener(Progress, Protocol):
         """Show a remark, in plain text."""
 
     def note(self, text: str) -> None:
-        """Record a finished stage and what it used: detail for the verbose."""
+        """Record a finished stage and its resources, for verbose output."""
 
     def at_work(self, worker: str, task: str | None) -> None:
         """Show the present task of one of several workers; None if it is idle."""

@@ -116,7 +116,7 @@ def obtain_bases_of(job: Job, bases: list[Basis] | None, listen: Listener) -> li
     else:
         obtained = list(bases)
         bases.clear()
-    # With the present requests of the scene's lights file, whenever the bases were made.
+    # With the present requests of the lights file, even for bases from before it changed.
     return [
         basis if view.scene is None else basis.with_requests(view.scene.requests)
         for basis, view in zip(obtained, job.views, strict=True)

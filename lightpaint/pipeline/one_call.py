@@ -125,7 +125,7 @@ def _job(
 ) -> Job:
     """Return the job that the arguments of `paint_with_light` describe.
 
-    scene, target: what to read, and the options for reading it.
+    scene, target: sources, with the options for reading them.
     """
     constraints, rigging = requests
     (scenes, scene_options), (targets, target_options) = scene, target

@@ -116,7 +116,7 @@ def moved_basis(
 ) -> Basis:
     """Return the basis of a scene whose lights have moved, with as many samples as `before`.
 
-    before: of the scene as it was; if it is of `scene` itself, it is returned.
+    before: basis of the scene before the move; if it is of `scene` itself, it is returned.
     """
     if before.origin.scene_identity == scene.identity:
         return before
@@ -126,5 +126,5 @@ def moved_basis(
     if settings.error is None:
         settings = replace(settings, spp=max(2, round(before.origin.mean_spp)))
     found = obtain(scene, settings, listen, before=before, render=render)
-    # What was painted over, and holds what was not painted, is the scene before the move.
+    # The look that was painted over, and that unpainted parts keep, is from before the move.
     return replace(found, former=Estimate(before.present_look, before.present_noise))

@@ -215,7 +215,7 @@ def _look(
 
 
 def _exposure(scene: Scene, basis: Basis | None, look: Floats) -> float:
-    """Return the exposure in stops at which to show the scene as it is."""
+    """Return the exposure in stops at which to show the present scene."""
     if basis is not None:
         return meter_exposure(look, basis)
     return choose_exposure(look, emitters_seen(scene))

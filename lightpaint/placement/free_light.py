@@ -1,7 +1,7 @@
 """A light with its freedom: its pose as a few numbers, and the permitted poses.
 
-These numbers are coordinates of its place along what it can slide on, of its direction across its
-axis, of its cone or its size. A search changes them and asks for the nearest permitted pose.
+These numbers are coordinates of its place on its rail or surface, of its direction across its axis,
+of its cone or its size. A search changes them and asks for the nearest permitted pose.
 """
 
 import math

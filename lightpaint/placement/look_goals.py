@@ -19,10 +19,10 @@ from lightpaint.lighting.unknowns.reduction import Reduction
 
 @dataclass(frozen=True)
 class LookGoal:
-    """A look that lights are to give.
+    """The goal of one look.
 
-    goal: (p, 3); importance: (p, 3), >= 0. reduction: the unknowns that its constraints leave.
-    pull: what holds weights, beside the picture.
+    goal: (p, 3); importance: (p, 3), >= 0. reduction: of its unknowns by constraints. pull: penalty
+    on weights, beside the picture.
     """
 
     goal: Floats

@@ -15,7 +15,7 @@ class Movable:
     """A light, or a mirrored pair of lights, which move as one.
 
     columns: their indices among the columns of the fit. mirror: of the second; None for one light.
-    group: what it was added for; None for a light that is there.
+    group: group of new lights; None for an existing light.
     """
 
     light: FreeLight

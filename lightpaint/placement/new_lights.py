@@ -22,7 +22,7 @@ MAX_COUNT = 32
 #: Cones of new spots without a freedom of their own, in degrees.
 NEW_CONE = (8.0, 50.0)
 
-#: How a mirror is written, like "x = 0".
+#: Syntax of a mirror, like "x = 0".
 _MIRROR = re.compile(r"\s*([xyz])\s*=\s*([-+.\deE]+)\s*")
 
 

@@ -161,7 +161,7 @@ class _Result:
         return is_long or (its.turn is not None and its.turn > WIDE_ERROR)
 
     def grown(self, k: int) -> dict[str, Any]:
-        """Return what is known of the `k`-th new light: the pictures without and with it."""
+        """Return the `k`-th new light, with the pictures without and with it."""
         pixels = self.size[0] * self.size[1]
         pictures = [its.picture[:pixels].reshape(*self.size, 3) for its in self.growth[k : k + 2]]
         return {
@@ -194,7 +194,7 @@ def _searched(
     slots: list[Movable],
     progress: Progress,
 ) -> Found:
-    """Return what is worth it of all moves and new lights."""
+    """Return the moves and new lights that are worth it."""
     total = TURNS * len(movables) + len(slots) + STEPS
     done = 0
 
@@ -217,7 +217,7 @@ def _searched(
 def _placement(
     scenes: Sequence[Scene], result: _Result, lights: Sequence[NewLight], first: int
 ) -> Placement:
-    """Return the placement of what was found. first: the index of the first new light's column."""
+    """Return the placement of a search result. first: the index of the first new light's column."""
     found, moves, additions = result.found, list[Move](), list[AddedLight]()
     arrangement, order = found.arrangement, _additions(found)
     for k, (movable, site) in enumerate(zip(arrangement.movables, arrangement.sites, strict=True)):

@@ -1,4 +1,4 @@
-"""Better places of lights: what was moved, what was added, and what it gives."""
+"""Better places of lights: moves, additions, and their gain."""
 
 import math
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from lightpaint.scene.lights.new_emitter import NewEmitter
 from lightpaint.scene.properties.pose import Pose, Site
 from lightpaint.scene.scene import Scene
 
-#: What a painter can do about a place that the picture hardly tells.
+#: Advice on a place that the picture hardly determines.
 HARDLY_VISIBLE = "hardly visible from here: paint a second view"
 
 

@@ -1,8 +1,7 @@
 """The convex solve inside a search for places: the best lighting for some columns.
 
-Places are searched for, weights never are: for each choice of places the best weights under the
-constraints follow by the same solve as ever. So a search has few unknowns, and no bad starts in
-weights.
+The search is over places only: for each choice of places, the usual solve gives the best weights
+under the constraints. So a search has few unknowns, and no bad starts in weights.
 """
 
 from collections.abc import Mapping, Sequence
@@ -38,10 +37,11 @@ class Fitted:
 class Ranking:
     """A measure of candidates for a light's place.
 
-    It knows what is missed without that light, and the columns of others that may make up for it.
+    It has the residual without that light, and the columns of other lights that may compensate for
+    it.
 
-    root: (p, c), square root of importance; residual: (p, c), weighed with it. others, inverses:
-    for each channel the columns (k, p), weighed, and the inverse of their inner products.
+    root: (p, c), square root of importance; residual: (p, c), weighted with it. others, inverses:
+    for each channel the weighted columns (k, p), and the inverse of their inner products.
     """
 
     root: Floats
@@ -70,7 +70,7 @@ class Ranking:
         (k, others), with the columns of others.
         """
         alone = power - np.einsum("ki,ki->k", cross @ self.inverses[c], cross)
-        # What others replace almost wholly has no gain that could be told from noise.
+        # If others can replace it almost completely, its gain is lost in noise.
         is_own = alone > LEAST_OWN * power
         squares = np.square(np.maximum(reached, 0))
         gain: Floats = np.divide(squares, alone, out=np.zeros_like(power), where=is_own)
@@ -87,11 +87,11 @@ class Ranking:
 
 
 class PlacementFit:
-    """Goals on a small film, and the columns of all lights where they are now.
+    """Goals on a small film, and the columns of all lights at their present places.
 
-    Looks that share places have weights of their own, so they are no more than further channels:
-    3 for each look, which share the columns. So a search need not know of looks. A look counts by
-    the share that it misses, be it bright or dark.
+    Looks that share places have separate weights, so they act as further channels: 3 for each look,
+    which share the columns. So a search does not deal with looks. A look counts by its relative
+    error, whether it is bright or dark.
 
     columns: (n, p, 3) at unit emission. goals: of each look.
     """
@@ -141,7 +141,7 @@ class PlacementFit:
         return np.asarray(np.square(self._residual(columns, weights)).sum(axis=1))
 
     def ranking(self, fitted: Fitted) -> "Ranking":
-        """Return what ranks candidates for the place of a light that is not in `fitted`."""
+        """Return the ranking of candidates for the place of a light that is not in `fitted`."""
         others, inverses, columns = [], [], fitted.columns
         for c in self.channels:
             free = self._free(fitted.weights, c)

@@ -1,4 +1,4 @@
-"""Placements as JSON: what moved and what is new, for other looks and other machines."""
+"""Placements as JSON: moves and new lights, for other looks and other machines."""
 
 import json
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ MAX_BYTES = 2**22
 class PlacementRecord:
     """A placement without its scenes and pictures.
 
-    made_of: fingerprint of what went into it. Others: as in `Placement`.
+    made_of: fingerprint of its inputs. Others: as in `Placement`.
     """
 
     moves: tuple[Move, ...]

@@ -62,7 +62,7 @@ class LightShares:
 
     @classmethod
     def of_pictures(cls, names: Sequence[str], pictures: Iterable[Estimate]) -> "LightShares":
-        """Return those of what each light adds, one picture in memory at a time."""
+        """Return the block sums of each light's picture, with one picture in memory at a time."""
         sums, blocks, noise = [], [], []
         for picture in pictures:
             sums.append(picture.image.sum(axis=(0, 1), dtype=np.float64))
@@ -84,7 +84,7 @@ def with_light_tests(
     """Return `verification` with the test of each light that shines, and its power for an error of
     ERROR in it.
 
-    predicted: what it was held against.
+    predicted: the prediction that it was compared with.
     """
     factor = whole_factor(verification.verified.size, predicted.size) or 1
     verified = verification.verified.reduced(factor)

@@ -91,12 +91,12 @@ def set_emission(
 ) -> dict[str, Floats]:
     """Set the emission of `emitter` to `rgb`, in the unit of its kind.
 
-    stem: what the names of images begin with.
+    stem: prefix of the names of images.
 
-    Returns the images, (h, w, 3) linear, that have to lie beside the relit scene, by file name.
+    Returns the images, (h, w, 3) linear, to write beside the relit scene, by file name.
     """
     kind = emitter.kind
-    assert kind is not None  # what cannot be scaled is never set
+    assert kind is not None  # emitters that cannot be scaled are never set
     if kind.scaling is Scaling.COLOUR:
         changes.set("rgb", kind.parameter, " ".join(f"{np.float32(v):.9g}" for v in rgb))
     elif kind.scaling is Scaling.FACTORS:

@@ -81,8 +81,9 @@ def writers_of(
 ) -> tuple[dict[str, Callable[[], str]], str]:
     """Return a function for the text of each file, by its name, and a remark; "" without one.
 
-    names: of the files, by form, from `names_of_forms`. folder: of the files. listen: hears what a
-    form leaves out. Mitsuba gets the lighting itself, other programs the result of `_exported`.
+    names: of the files, by form, from `names_of_forms`. folder: of the files. listen: receives
+    remarks on what a form leaves out. Mitsuba gets the lighting itself, other programs the result
+    of `_exported`.
 
     Raises LightpaintError if the lighting belongs to another source.
     """

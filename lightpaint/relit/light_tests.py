@@ -1,9 +1,9 @@
 """Tests of a verification that look for an error in one light each: matched filters.
 
-What an error in a light would look like is known: a share of that light's own picture. So the
-difference of prediction and render is summed with weights that bring this picture out best against
-the noise, block by block and with the channels' correlations (a matched filter). It sees an error
-of 5 % with a fraction of the samples that the sum of the picture needs.
+An error in a light has a known shape: a share of that light's own picture. So the difference of
+prediction and render is summed with weights that maximise this picture against the noise, block by
+block and with the channels' correlations (a matched filter). It detects an error of 5 % with a
+fraction of the samples that the sum of the picture needs.
 """
 
 from dataclasses import dataclass
@@ -85,7 +85,7 @@ def light_tests(
     tests = []
     for light_blocks, its_half in zip(blocks.astype(np.float64), half_differences, strict=True):
         lit = light_blocks + its_half, light_blocks - its_half
-        # Each half's weights, and with them what the other half has.
+        # The weights of each half, applied to the other half.
         a = [_times(x, light) for x, light in zip(inverses, lit, strict=True)]
         x, y = _dot(a[0], sums[1]), _dot(a[1], sums[0])
         x_signal, y_signal = _dot(a[0], lit[1]), _dot(a[1], lit[0])

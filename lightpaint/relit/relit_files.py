@@ -127,7 +127,7 @@ def _sampled_emitters(
 
 
 def _sampling_weight(emitter: Emitter, *, is_sampled: bool) -> float | None:
-    """Return the sampling weight to write, or None to leave it as it is."""
+    """Return the sampling weight to write, or None to leave it unchanged."""
     if not is_sampled:
         return 0.0
     return 1.0 if emitter.sampling_weight == 0 else None

@@ -28,8 +28,8 @@ def refine_by_rendering(
     Newton step.
 
     views: scene and basis of each view; the solution is of all of them. spp: samples per pixel
-    of each render, on the film of the basis; as many as the basis has by default. Every round
-    draws random numbers of its own, which neither the basis nor a verification uses.
+    of each render, on the film of the basis; as many as the basis has by default. Every round uses
+    its own random numbers, different from those of the basis and of verifications.
     """
     for k in range(rounds):
         mixed = []

@@ -31,7 +31,7 @@ from lightpaint.relit.verification import (
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, render_in_stages
 
-#: Parts of its samples, of so many, after which a verification is looked at.
+#: Numerators and denominator of the parts of its samples after which a verification is tested.
 LOOKS, ALL_PARTS = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64), 64
 
 #: Least samples of each pixel at a look, one for each half.
@@ -115,7 +115,7 @@ def can_tell(
     missed = [share for name, share in shares.items() if power[name] < LOW_POWER]
     if sum(missed) <= 1 - CHECKED and max(missed, default=0.0) < LARGE:
         return True
-    # With all samples the render has so much less noise.
+    # With all samples the render would have this much less noise.
     at_end = Estimate(verified.image, verified.half_difference * done**0.5)
     tests = light_tests(predicted, at_end, lights.blocks, lights.noise)
     power = detection_power(predicted, at_end, lights, tests, limit=limit)

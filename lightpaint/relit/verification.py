@@ -120,7 +120,7 @@ def largest_difference(
 ) -> float:
     """Return the largest of the differences in standard errors, for comparison with `limit`.
 
-    One of many lights strays further than one alone, so theirs count for so much less.
+    The largest of many lights' deviations exceeds a single one's, so they are scaled down.
     """
     lights = max(map(abs, z_lights.values()), default=0.0)
     lights *= limit / limit_of_tests(max(len(z_lights), 1), once=limit)

@@ -1,4 +1,4 @@
-"""Edits of a few elements of an XML file that leave the rest as it is.
+"""Edits of a few elements of an XML file that leave the rest unchanged.
 
 Positions are byte offsets into the UTF-8 form of the text (see scene/checks/tokens.py); the file's
 own encoding comes back when it is written.
@@ -42,8 +42,8 @@ class Element:
 class XmlFile:
     """The text of an XML file, and the edits to make in it.
 
-    Raises SceneError if it is not there any more, or if a tag cannot be read, lacks its end or is
-    closed by another's.
+    Raises SceneError if the file is gone, or if a tag is unreadable, unclosed or closed by
+    another's end tag.
     """
 
     def __init__(self, path: Path) -> None:
@@ -53,7 +53,7 @@ class XmlFile:
             raise SceneError(f"cannot read {path}: {error.strerror or error}") from None
         self._encoding = encoding_of(raw)
         try:
-            # Like Mitsuba, take any other bytes for UTF-8 as they are.
+            # Like Mitsuba, read any other bytes as UTF-8.
             self.text = (
                 raw if self._encoding == "utf-8" else raw.decode(self._encoding).encode("utf-8")
             )

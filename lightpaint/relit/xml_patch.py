@@ -1,4 +1,4 @@
-"""A lighting as a patch of the scene's own XML, for `patch` and for people who read the changes."""
+"""A lighting as a patch of the scene's own XML, for `patch` and for readers."""
 
 import difflib
 import os

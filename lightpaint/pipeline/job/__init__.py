@@ -1,1 +1,1 @@
-"""A job: what a run is asked to do, checked once."""
+"""A job: the request of a run, checked once."""

@@ -183,7 +183,7 @@ class Job:
         return copy(self)._set(placement=placement)
 
     def to_json(self) -> str:
-        """Return this job as text, to run it elsewhere; paths stay as they were given.
+        """Return this job as text, to run it elsewhere; paths stay as given.
 
         Raises LightpaintError for a job of objects in memory.
         """
@@ -202,7 +202,7 @@ class Job:
     @staticmethod
     @keywords()
     def from_json(text: str) -> "Job":
-        """Return the job that `to_json` wrote, with the files as they are now on this machine.
+        """Return the job that `to_json` wrote, with the present files on this machine.
 
         Raises LightpaintError for invalid text, and for a job that cannot run here.
         """
@@ -248,7 +248,7 @@ class Job:
             )
 
     def _rigging_for(self, scenes: Sequence[Scene]) -> Rigging:
-        """Return all that may move in the scene. Raises for what cannot, before rendering."""
+        """Return the rigging of the scene. Raises for lights that cannot move, before rendering."""
         if not scenes:
             if self.rigging:
                 raise LightpaintError("lights can only move in their scene: give it, too")
@@ -275,7 +275,7 @@ class Job:
     def _result_folder(
         self, views: Sequence[PaintedView], scenes: Sequence[Scene], targets: Sequence[Target]
     ) -> ResultFolder:
-        """Return the result folder, with all files that are read. targets: as they were read."""
+        """Return the result folder, with all input files. targets: as read."""
         scene = scenes[0] if scenes else None
         files = answer_files(self.folder, scene=scene, groups=self.groups)
         for view in views:
@@ -321,7 +321,7 @@ class Job:
         return f"1/{factor}" if target.content and factor and factor > 1 else None
 
     def _remarks(self, targets: Sequence[Target], scenes: Sequence[Scene]) -> list[str]:
-        """Return remarks for the user before this runs. targets, scenes: as they were read."""
+        """Return remarks for the user before this runs. targets, scenes: as read."""
         remarks = []
         if self.groups is not None:
             remarks += [*self.groups.remarks, *spoken_unreadable(self.groups, self.folder)]

@@ -95,8 +95,8 @@ def remarks_of_target(
 ) -> list[str]:
     """Return remarks on how `target` was read.
 
-    size: that of the basis. fit: the settings with all decided. film: size of the whole film, if
-    the scene is rendered.
+    size: of the basis. fit: the resolved settings. film: size of the whole film, if the scene is
+    rendered.
     """
     remarks = []
     if scene is not None and target.content not in ("", scene.content):

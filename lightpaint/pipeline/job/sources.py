@@ -118,7 +118,7 @@ class Painting(ReadOnce):
         return read_target(**vars_of(self))
 
     def over(self, look: Floats, name: str) -> Target | None:
-        """Return the target if it was painted over that look and nothing else marks what counts.
+        """Return the target if it was painted over that look and nothing else marks the paint.
 
         look: (h, w, 3) linear, the present look of a basis or light groups called `name`.
         """
@@ -178,7 +178,7 @@ def vars_of(record: Any) -> dict[str, Any]:
 
 
 def content(source: Any) -> Any:
-    """Return the content of a file of a job; return objects in memory, and None, as they are."""
+    """Return the content of a file of a job; return objects in memory, and None, unchanged."""
     return source.content if isinstance(source, File) else source
 
 

@@ -1,4 +1,4 @@
-"""The folder of results: what its answer belongs to, and which files may be replaced."""
+"""The folder of results: the painting of its answer, and which files may be replaced."""
 
 import json
 import os
@@ -33,7 +33,7 @@ REMEDY = "name another folder (folder=...), or replace it (force=True)"
 class _Record:
     """The content of result.json.
 
-    answers: what the results answer, relative to the folder: paintings, or the lighting.json of a
+    answers: sources of the results, relative to the folder: paintings, or the lighting.json of a
     relit scene. files: paths relative to the folder, with the CRC-32 of each file as written.
     """
 
@@ -45,14 +45,14 @@ class _Record:
 
 @dataclass(frozen=True)
 class ResultFolder:
-    """A folder for results, and the rules for what may be replaced in it.
+    """A folder for results, and the rules for replacing files in it.
 
     Existing files stay, unless they are lightpaint's unchanged answer to the same painting, or
     `force` is set. Files that are read stay in any case.
 
     folder: it may not exist yet. files: files in it that may be written. reads: files that are
     read. answers: paintings, by file or, for those in memory, by name. adds_to: the lighting that
-    was read; if it lies in the folder, the new files belong to it, and it stays.
+    was read; if it is in the folder, the new files belong to it, and it stays.
     """
 
     folder: Path
@@ -106,7 +106,7 @@ class ResultFolder:
 
     @property
     def _answers(self) -> list[str]:
-        """`answers` as they are recorded."""
+        """`answers` as recorded in the file."""
         return [
             os.path.relpath(os.path.realpath(answer), self._real)
             if isinstance(answer, Path)
@@ -151,7 +151,7 @@ class ResultFolder:
             return None
 
     def _write_record(self, stage: Path, earlier: _Record | None) -> None:
-        """Record the files in `stage`, and what they answer."""
+        """Record the files in `stage`, and their sources."""
         answers, files = tuple(self._answers), {}
         if self._belongs_to_lighting:
             if earlier is None:  # results of an older version stay without a record

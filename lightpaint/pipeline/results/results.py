@@ -174,9 +174,8 @@ def write_predicted(
 ) -> None:
     """Write predicted.exr, with a note of the sensor, film and samples for its verification.
 
-    origin: that of the basis. spp, size: samples per pixel of the verification, and (height, width)
-    of its film, by default the whole one. scene: its parameters are needed again by the relit
-    scene.
+    origin: of the basis. spp, size: samples per pixel of the verification, and (height, width) of
+    its film, by default the whole one. scene: its parameters are needed again by the relit scene.
     """
     film = {} if size is None else {"width": size[1], "height": size[0]}
     parameters = {} if scene is None or not scene.parameters else {"parameters": scene.parameters}

@@ -13,7 +13,7 @@ from lightpaint.arrays import Floats, aligned
 from lightpaint.scene.scene import Scene
 
 #: Longest paths, in vertices, of integrators without a limit of their own; their light is frozen
-#: without Russian roulette, and what is beyond is a thousandth of a bright room's.
+#: without Russian roulette, and the light beyond is a thousandth even in a bright room.
 MOST_VERTICES = 16
 
 

@@ -1,14 +1,13 @@
 """The camera's paths, frozen once, and the image of any light at any place as a sum over them.
 
-A path tracer adds at each vertex of a camera's path the light that arrives from a light and is
+A path tracer adds, at each vertex of a camera path, the light that arrives from a light and is
 reflected back along the path. The paths do not depend on lights that no ray meets by chance
-(points, spots, suns), so they are traced once and kept. The image of such a light, wherever it
-hangs, is then one shadow ray from each vertex: no scene is loaded anew and no kernel compiled.
-Every place is seen along the same paths, so what differs between two places is the light alone.
+(points, spots, suns), so they are traced once and kept. The image of such a light at any place then
+takes one shadow ray from each vertex: no scene is loaded and no kernel compiled. All places use the
+same paths, so the noise of a comparison cancels.
 
-First hits are many and well spread, for direct light has edges. A few of them go on; what these
-bring, light by way of other surfaces, is smooth and is averaged along surfaces (images/
-surface_filter.py).
+First hits are many and well spread, since direct light has edges. Only a few of them are continued:
+indirect light is smooth, and is averaged along surfaces (images/surface_filter.py).
 """
 
 import math
@@ -36,13 +35,14 @@ from lightpaint.scene.runtime.render_lock import tracing
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, pass_seed
 
-#: Shadow rays of one launch; more hold no more cores and more memory.
+#: Shadow rays of one launch; more would only take more memory.
 LANES = 2**20
 
 #: Values at the vertices that are kept for the next question, of as many origins as that makes.
 KEPT_VALUES = 2**24
 
-#: A light ends this much before it would meet what it hangs on, relative to its distance.
+#: Shadow rays stop short of a light by this, relative to its distance, to miss its mounting
+#: surface.
 SHADOW_EPSILON = 1e-3
 
 #: Values of an origin that a launch reads: position, axis, two half sides of a panel, kind.
@@ -62,7 +62,7 @@ class PanelSite(Site):
 
 @dataclass(frozen=True)
 class _Origin:
-    """The origin of light, without the cone of a spot: what a shadow ray depends on."""
+    """The parameters of a shadow ray: the origin of light, without the cone of a spot."""
 
     position: tuple[float, ...]
     axis: tuple[float, ...]
@@ -163,7 +163,7 @@ class FrozenPaths:
         return vertices.points
 
     def _sums(self, vertices: Vertices, sites: Sequence[Site]) -> Floats:
-        """Return the images of what lights add at vertices, (k, h · w, 3)."""
+        """Return the images of lights from their contributions at vertices, (k, h · w, 3)."""
         sums = np.empty((len(sites), self.size[0] * self.size[1], 3), np.float32)
         origins = [_Origin.of(site) for site in sites]
         # Sites of one origin, like the directions of a spot, share its shadow rays.
@@ -188,7 +188,7 @@ class FrozenPaths:
         return sums
 
     def _shone(self, vertices: Vertices, origins: Sequence[_Origin]) -> "list[_Shone]":
-        """Return what origins add at vertices; what was asked for lately is kept."""
+        """Return contributions of origins at vertices; recent ones are cached."""
         number = 0 if vertices is self.direct else 1
         cached = {x: self._kept[number, x] for x in origins if (number, x) in self._kept}
         missing = [x for x in dict.fromkeys(origins) if x not in cached]
@@ -283,9 +283,9 @@ def _share_in_cone(cosine: Floats, cutoff: float, beam: float) -> Floats:
 
 
 def _added(loaded: Any, vertices: Vertices, row: Sequence[Any], at: tuple[Any, Any]) -> Any:
-    """Return what origins add at vertices, as a color of Mitsuba. row: the values of one.
+    """Return contributions of origins at vertices, as a color of Mitsuba. row: the values of one.
 
-    Each vertex looks at a point of its own of a panel. at: that point, from -1 to 1 twice.
+    Each vertex samples its own point of a panel. at: that point, two coordinates from -1 to 1.
     """
     import drjit as dr
     import mitsuba as mi

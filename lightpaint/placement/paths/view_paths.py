@@ -57,16 +57,15 @@ class ViewPaths:
         return np.concatenate([part.points(part.direct) for part in self.parts])
 
     def contributions(self, site: Site) -> Floats:
-        """Return what a light adds at each first hit, (v, 3), as if it shone all around."""
+        """Return a light's contribution at each first hit, (v, 3), as if it shone all around."""
         return np.concatenate([part.contributions(part.direct, site) for part in self.parts])
 
 
 class SearchPaths:
     """All paths of a search, made when they are first asked for.
 
-    Two films serve it. Places all over are compared on a small one; what a bright piece of metal
-    or the edge of a shadow tells is lost there, so the last steps and the judgement are on a
-    larger one.
+    It uses two films. Places all over the scene are compared on a small one. That loses highlights
+    on metal and edges of shadows, so the last steps and the judgement use a larger one.
 
     Args:
         small, large: The scenes on small and on larger films, which differ in the sensor alone.

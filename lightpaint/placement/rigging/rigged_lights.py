@@ -157,7 +157,7 @@ def _pair(
 
 
 def surfaces_of(rigging: Rigging, scene: Scene) -> tuple[str, ...]:
-    """Return the names of what lights may hang on: rails and surfaces, then shapes with an id."""
+    """Return the names of mounts for lights: rails and surfaces, then shapes with an id."""
     named = (name for name in scene.shape_names if not name.startswith("_"))
     return tuple(dict.fromkeys([*(name for name, _, _ in rigging.on), *named]))
 

@@ -1,4 +1,4 @@
-"""Requests for lights that may move, in the terms of people who hang them: rails, new lights.
+"""Requests for lights that may move, in the terms of riggers: rails, new lights.
 
 A lights file, the options of the command line and `Rigging.of` share keys and values. They are
 checked here, once; docs/formats.md lists them.
@@ -73,7 +73,7 @@ class Rigging:
         pair: Sequence[Mapping[str, Any]] = (),
         where: str = "",
     ) -> "Rigging":
-        """Make it of the tables of a lights file.
+        """Make a rigging from the tables of a lights file.
 
         light: name or pattern → its keys `move`, `aim` and `cone`. on: rails and surfaces by name.
         new, pair: lights to add; mirrored lights. where: the name of the source in errors.
@@ -109,7 +109,7 @@ class Rigging:
 
 
 def rigging_of(requests: SceneRequests) -> Rigging:
-    """Return what the keys of a lights file let move. Raises ConstraintError."""
+    """Return the rigging that the keys of a lights file describe. Raises ConstraintError."""
     keys = requests.keys
     light = keys.get("light")
     if isinstance(light, Mapping):
@@ -119,7 +119,7 @@ def rigging_of(requests: SceneRequests) -> Rigging:
             if isinstance(table, Mapping) and any(key in MOVES for key in table)
         }
     else:
-        light = None  # constraints_file.py says what is wrong with it
+        light = None  # constraints_file.py reports the error
     try:
         return Rigging.of(
             light,

@@ -1,4 +1,4 @@
-"""Checks of what a lights file says of places: one clear line names the key of a wrong value."""
+"""Checks of places in a lights file: one clear line names the key of a wrong value."""
 
 import math
 import re

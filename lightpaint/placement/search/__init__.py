@@ -1,1 +1,1 @@
-"""The search: candidates by direct light, steps of all poses together, and what is worth it."""
+"""The search: candidates by direct light, steps of all poses together, and judgement of changes."""

@@ -1,8 +1,8 @@
-"""The judgement which moves and new lights are worth it, and how sure their places are.
+"""The judgement of which moves and new lights are worth it, with error bars of their places.
 
 Weights are fitted along some paths and judged along others, which no pose was fitted to. Places are
-fitted once more along each set of other paths; their spread is the error bar, for the slope of what
-is missed alone would promise too much.
+fitted again along each set of other paths, and their spread is the error bar. The derivatives of the
+error alone would be too optimistic.
 """
 
 import math
@@ -18,7 +18,7 @@ from lightpaint.placement.placement_fit import PlacementFit
 from lightpaint.placement.search.pose_steps import PoseSteps
 from lightpaint.scene.properties.pose import Site
 
-#: Least gain of a move or a new light, as a share of what is missed, and in standard errors.
+#: Least gain of a move or a new light, as a share of the error, and in standard errors.
 WORTH, SURE = 0.01, 3.0
 
 #: Pixels whose noise one light explains by chance, of many places that it is tried at; and the
@@ -34,11 +34,11 @@ REFIT_STEPS, REFIT_SHARE = 5, 0.5
 
 @dataclass(frozen=True)
 class Found:
-    """An arrangement that is worth it.
+    """A judged arrangement.
 
-    arrangement: with its moves and new lights; what is not worth a move stays where it was. gains:
-    the share of what was missed that each movable gives, beside the others; 0 without a move.
-    before, after: what is missed, as a share of ‖Ψ‖², on paths that no pose was fitted to.
+    arrangement: with its moves and new lights; lights not worth moving are back in place. gains:
+    the share of the error that each movable removes, besides the others; 0 without a move. before,
+    after: error as a share of ‖Ψ‖², on paths that no pose was fitted to.
     """
 
     arrangement: Arrangement
@@ -85,16 +85,16 @@ class PlacementJudge:
         return self._steps.descend(start, at, steps, first_share=REFIT_SHARE, progress=progress)
 
     def judged(self, start: Arrangement, best: Arrangement) -> Found:
-        """Return what is worth it of `best`, whose first movables are those of `start`."""
+        """Return the worthwhile changes of `best`, whose first movables are those of `start`."""
         movables, count_before = best.movables, len(start.movables)
         alternatives = [
             self._changes(start, best, at) for at in (self._paths.refine, self._paths.judge)
         ]
 
         def missed(changed: Bools) -> Doubles:
-            """Return what is missed with some of the changes, (2, p).
+            """Return the error with some of the changes, (2, p).
 
-            By the paths that the weights are fitted on, and by the others.
+            The rows are for the paths that weights are fitted on, and for the others.
             """
             columns = []
             for old, new in alternatives:
@@ -207,7 +207,7 @@ class PlacementJudge:
         return changes[0], changes[1]
 
     def _with_changes(self, start: Arrangement, best: Arrangement, changed: Bools) -> Arrangement:
-        """Return `best` without what has not changed."""
+        """Return `best` without unchanged lights."""
         movables, sites = [], []
         for k, (movable, site) in enumerate(zip(best.movables, best.sites, strict=True)):
             if changed[k]:
@@ -235,8 +235,8 @@ def _error(sites: Sequence[Site], slides: bool) -> PoseError:
 
 
 def standard_error(differences: Doubles) -> float:
-    """Return the standard error of a sum over pixels, (2, p): by how much two sets of paths differ.
+    """Return the standard error of a sum over pixels, (2, p), from two sets of paths.
 
-    They share what is signal, and have independent noise at each pixel.
+    They share the signal, and have independent noise at each pixel.
     """
     return float(np.sqrt(np.square(differences[0] - differences[1]).sum() / 2))

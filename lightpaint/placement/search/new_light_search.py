@@ -16,7 +16,7 @@ from lightpaint.placement.search.judgement import NOTHING, PlacementJudge
 from lightpaint.placement.search.pose_search import SHORT_STEPS, PoseSearch
 from lightpaint.scene.properties.pose import Site
 
-#: Least fall of what is missed for which a new light goes elsewhere once all are there.
+#: Least decrease of the error for which a new light moves once all are added.
 WORTH_AGAIN = 0.05
 
 #: Steps of all lights together, after each one that is added.
@@ -25,7 +25,7 @@ STEPS = 6
 #: Weight, relative to the largest, below which a light is off.
 OFF = 1e-6
 
-#: Most rise of what is missed for which two lights near each other become one.
+#: Largest increase of the error for which two nearby lights are merged.
 MERGED_RISE = 0.03
 
 #: Distance of lights that may be one, relative to the spread of visible points.

@@ -20,15 +20,15 @@ from lightpaint.placement.space.free_space import as_position
 from lightpaint.scene.properties.pose import Site
 from lightpaint.threads import one_thread
 
-#: Degrees between directions, and number of cones.
+#: Degrees between trial directions, and number of trial cones.
 APART, CONES = 20.0, 3
 
-#: One of so many first hits counts.
+#: Every second first hit is used.
 THINNING = 2
 
 
 class PoseCandidates:
-    """Candidates along few first hits. ranking: on all pixels, without the light in question."""
+    """Candidate poses, ranked on some first hits. ranking: on all pixels, without that light."""
 
     def __init__(self, paths: ViewPaths, ranking: Ranking) -> None:
         self._paths = paths
@@ -36,7 +36,7 @@ class PoseCandidates:
         self._points = np.ascontiguousarray(paths.points[::THINNING])
         thinned = ranking.at(paths.indices()[::THINNING])
         self._ranking, self._root = thinned, thinned.root.astype(np.float32)
-        # For each channel: residual and columns of others, weighed twice, (1 + others, v).
+        # For each channel: residual and columns of others, weighted twice, (1 + others, v).
         self._weighed = [
             np.concatenate([thinned.residual[None, :, c], thinned.others[c]]).astype(np.float32)
             * self._root[:, c]
@@ -46,7 +46,7 @@ class PoseCandidates:
     def gains(
         self, light: FreeLight, places: Floats
     ) -> Iterator[tuple[Doubles, Callable[[int], Site]]]:
-        """Yield the gains of poses at each place, (k,), with what makes the k-th pose."""
+        """Yield the gains of poses at each place, (k,), and a function that makes the k-th pose."""
         directions, cones = light.directions(APART), light.cones(CONES).tolist()
         if light.site.position is None:
             yield from self._suns(light)
@@ -59,7 +59,7 @@ class PoseCandidates:
                 continue
             cosine = directions.astype(np.float32) @ away_from(place, self._points).T
             if isinstance(at_place, PanelSite):
-                # Seen from afar a panel is a point whose light falls with the cosine.
+                # From afar, a panel acts as a point whose light falls off with the cosine.
                 gains = self._gains(added * at_place.side**2, np.maximum(cosine, 0))
                 yield gains, partial(_aimed, at_place, directions)
                 continue
@@ -78,7 +78,7 @@ class PoseCandidates:
             yield self._gains(added, None), partial(_aimed, site, None)
 
     def _gains(self, added: Floats, shares: Floats | None) -> Doubles:
-        """Return gains of what is added at first hits, (v, 3), by shares of it, (k, v)."""
+        """Return gains of contributions at first hits, (v, 3), for shares of them, (k, v)."""
         inner = [block * added[:, c % 3] for c, block in enumerate(self._weighed)]
         power = np.square(np.tile(added, (1, len(inner) // 3)) * self._root)
         if shares is None:

@@ -41,7 +41,7 @@ class PoseRules:
     def usable(self, movable: Movable, places: Floats) -> Bools:
         """Return which places, (k,), are free, see the picture and are seen as the light may be."""
         clear = movable.light.freedom.clear
-        # What hangs on a surface is as near to it as was asked for.
+        # Lights on a surface keep the requested distance from it.
         is_usable = self._paths.usable(places, None if clear is None else 0.9 * clear)
         if movable.group is not None and not movable.group.in_view:
             is_usable &= ~self._paths.in_view(places)

@@ -1,9 +1,9 @@
 """The search for better poses of lights: by blocks first, then all together.
 
-A descent alone cannot turn a beam that misses what it should light: there is no slope. So each free
-light in turn is tried at places, directions and cones all over its freedom, ranked by direct light
-and compared by all light; then Gauss-Newton steps move all of them at once, their weights
-eliminated. Every comparison is of the same frozen paths, so its noise cancels.
+Descent alone cannot turn a beam that misses its target, since there is no slope. So each free light
+in turn is tried at places, directions and cones over its whole freedom, ranked by direct light and
+compared by all light. Then Gauss-Newton steps move all lights at once, with their weights
+eliminated. All comparisons use the same frozen paths, so their noise cancels.
 """
 
 import math
@@ -26,7 +26,8 @@ PLACES_ON_LINES, PLACES, PLACES_OF_NEW = 24, 64, 112
 #: Places near which more are tried, and how many.
 BESIDE, AROUND = 6, 8
 
-#: Most turns of each light, and the share by which one has to lower what is missed for another.
+#: Largest number of rounds over all lights, and the share by which a round has to lower the error
+#: for another one.
 TURNS, WORTH_A_TURN = 2, 0.15
 
 #: Candidates that all light is computed for; those of them that are refined, far from each other
@@ -36,7 +37,7 @@ COMPARED, REFINED, SHORT_STEPS = 32, 3, 3
 #: Closest two refined candidates, relative to the spread of visible points, and in degrees.
 NEAREST, NARROWEST = 0.15, 25.0
 
-#: Least fall of what is missed that a trial is kept for.
+#: Least decrease of the error for which a trial is kept.
 KEPT_GAIN = 0.005
 
 
@@ -46,8 +47,8 @@ class PoseSearch:
     Args:
         fit: The goal, and the columns of all lights.
         paths: To search along.
-        rules: What poses have to keep to besides the freedom of each light.
-        seed: Of the places that are tried.
+        rules: Restrictions of poses besides the freedom of each light.
+        seed: Of the trial places.
     """
 
     def __init__(

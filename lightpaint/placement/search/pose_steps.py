@@ -22,7 +22,7 @@ RIDGE, RIDGE_GROWTH, RIDGE_SHRINK, LEAST_RIDGE, TRIALS = 1e-2, 6.0, 4.0, 1e-5, 5
 #: the last have; and by how much they shorten after a step that helped, or one that hardly did.
 FIRST_STEP, LAST_SHARE, SHORTER, MUCH_SHORTER = 0.04, 0.15, 0.6, 0.4
 
-#: Share of what is missed below which a step hardly helped.
+#: Decrease, as a share of the error, below which a step counts as no progress.
 HARDLY = 1e-4
 
 
@@ -78,9 +78,9 @@ class PoseSteps:
         first_share: float = 1.0,
         progress: Callable[[], None] = lambda: None,
     ) -> Arrangement:
-        """Return the arrangement after at most so many steps; see `step`.
+        """Return the arrangement after a limited number of steps; see `step`.
 
-        first_share: of `first_step` that the first differences have.
+        first_share: size of the first differences, relative to `first_step`.
         """
         step, last, ridge = first_share * self.first_step, LAST_SHARE * self.first_step, RIDGE
         for _ in range(steps):

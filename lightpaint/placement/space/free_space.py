@@ -1,9 +1,9 @@
-"""Places where a light could stand and shine on what the camera sees.
+"""Places where a light could stand and shine on surfaces that the camera sees.
 
 Light that reaches a visible point in a straight line comes from between that point and the next
 surface. So rays go from the camera to surfaces, and from there into the half space before them, and
 places are chosen along these: inside a room, out through its windows, behind the camera. Of many
-such places a few remain that are far apart.
+such places, a few distant ones are kept.
 """
 
 from collections.abc import Iterable, Sequence

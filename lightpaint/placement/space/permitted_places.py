@@ -200,7 +200,7 @@ class EitherPlaces:
         return self._part(place)[1]
 
     def tangents(self, place: Doubles) -> Doubles:
-        """Return what the nearest kind says."""
+        """Return the tangents of the nearest kind of place."""
         return self._part(place)[0].tangents(place)
 
     def random(self, count: int, rng: np.random.Generator) -> Doubles:

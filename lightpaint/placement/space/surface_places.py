@@ -1,4 +1,4 @@
-"""Places on surfaces of a loaded scene: what a ceiling, a wall or a shelf has room for."""
+"""Free places on surfaces of a loaded scene, such as a ceiling, a wall or a shelf."""
 
 from collections.abc import Sequence
 from typing import Any

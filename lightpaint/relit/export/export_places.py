@@ -73,14 +73,14 @@ class Conversion:
     def frame(self, place: EmitterPlace, old_axes: Doubles | None = None) -> Doubles:
         """Return the axes x, y and z of a light in the program, as the rows of (3, 3).
 
-        old_axes: of the light as it is there, whose length and roll stay; None for a new one.
+        old_axes: of the existing light, whose lengths and roll are kept; None for a new one.
         """
         if place.direction is None:
             return np.eye(3) if old_axes is None else old_axes
         way = self.rotation @ np.array(place.direction)
         if old_axes is not None and old_axes[2].any():
             return np.asarray(old_axes @ rotation_between((-old_axes[2]).tolist(), way).T)
-        # As in the element of a new panel: its height is along the first vector across.
+        # As in the element of a new panel, whose height is along the first perpendicular vector.
         up = self.rotation @ across(place.direction)[0]
         return np.stack([np.cross(up, -way), up, -way])
 

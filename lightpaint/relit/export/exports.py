@@ -25,8 +25,8 @@ EXPORTS = ("lights.csv", "set_lights.py", "relit.nk", LAYERS, "relit.exr")
 #: Renderers whose groups a Blender script may set; a pattern may be of Blender as well.
 BLENDER = ("Blender", "pattern")
 
-#: Where a spreadsheet may take text for a formula: at the beginning of a cell, which in some
-#: countries is also behind a semicolon, and before what begins one, full-width signs too.
+#: Positions where a spreadsheet may read text as a formula: at the beginning of a cell, in some
+#: countries also after a semicolon, before a sign that begins one, including full-width signs.
 _FORMULA = re.compile(r"(\A|[;\t\r\n])(?=['=+\-@\t\r\n＝＋－＠])")
 
 #: The largest finite float16.
@@ -89,7 +89,7 @@ def lights_table(groups: LightGroups, lighting: Lighting) -> str:
     unreached = lighting.certificate.unreached if lighting.certificate is not None else ()
     for light in lighting.lights:
         y = float(luminance(np.array(light.weight)))
-        # Adding 0 takes the sign from what rounds to it.
+        # Adding 0 turns −0 into 0.
         stops = f"{round(math.log2(y), 3) + 0.0:+.3f}" if y > 0 else "off"
         stops = "unknown" if light.name in unreached else stops
         numbers = [f"{v:.9g}" for v in (*light.weight, y)]

@@ -43,7 +43,7 @@ class FixturePlace:
     """The place of a fixture, in units of the scene.
 
     x, y, z: where it hangs; None at infinity. target_x, target_y, target_z: a point it points at.
-    pan: degrees around what is up, clockwise from above, from the scene's far side: −z if y is up,
+    pan: degrees around the up axis, clockwise from above, from the scene's far side: −z if y is up,
     y if z is up. tilt: degrees from straight down. cutoff, beam: degrees from the axis of a spot.
     change: `moved`, `new` or "".
     """
@@ -139,7 +139,7 @@ def pan_and_tilt(direction: Position, up: Position) -> tuple[float, float]:
     sideways, along = float(way @ right), float(way @ ahead)
     if math.hypot(sideways, along) < 1e-6:
         return 0.0, tilt
-    # Adding 0 takes the sign from what rounds to it.
+    # Adding 0 turns −0 into 0.
     return round(math.degrees(math.atan2(sideways, along)), 6) + 0.0, tilt
 
 

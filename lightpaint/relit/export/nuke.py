@@ -43,9 +43,9 @@ class _Source:
 
 
 def nuke_script(groups: LightGroups, lighting: Lighting, folder: Path) -> str:
-    """Return the text of relit.nk: Σ multiplier × layer, and the rest as it is.
+    """Return the text of relit.nk: Σ multiplier × layer, and the rest unchanged.
 
-    folder: its folder, beside the copy by `copied_part` of layers that Nuke would mix up.
+    folder: its folder, which also has the copy (`copied_part`) of layers that Nuke would confuse.
     """
     lights, beauty = _sources(groups, folder)
     sources = [*lights, *([beauty] if beauty is not None else [])]
@@ -59,7 +59,7 @@ def nuke_script(groups: LightGroups, lighting: Lighting, folder: Path) -> str:
         lines += [*_node("Read", inputs="0", **_file_knobs(file), raw="true", name=f"Read_{k}")]
         lines.append(f"set R{k} [stack 0]")
 
-    # Multipliers are of Rec.709; what comes out has the primaries of the file again.
+    # Multipliers apply in Rec.709; the output has the primaries of the file again.
     primaries = groups.layers[0].primaries
     matrix = None if primaries is None else to_rec709(primaries)
     to_light = None if needs_copy(groups) else matrix
@@ -87,7 +87,7 @@ def spoken_unreadable(groups: LightGroups, folder: Path) -> list[str]:
     files = dict.fromkeys(x.file for x in [*lights, *([beauty] if beauty is not None else [])])
     if not (bad := [file for file in files if _is_evaluated(file)]):
         return []
-    # What the path holds may be on its way to a terminal.
+    # The path may be printed to a terminal.
     listed = one_line(str(bad[0])) + (f" and {len(bad) - 1} more" if len(bad) > 1 else "")
     characters = "".join(sorted({c for file in bad for c in EVALUATED.findall(_path(file))}))
     return [

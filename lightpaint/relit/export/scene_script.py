@@ -44,11 +44,11 @@ def scene_script(
     """Return the script, which leaves emitters without a plain colour, like a sky, to the user.
 
     emitters: name, Mitsuba's parameter and emission of each that is adjusted. places: of all
-    emitters in the answer. up: what is up in the scene.
+    emitters in the answer. up: the scene's up axis.
     """
     rows, left = [], []
     for name, parameter, emission in emitters:
-        if parameter not in KINDS:  # a multiple, which says nothing of what it is to be
+        if parameter not in KINDS:  # a multiple, which gives no absolute emission
             left.append(name)
             continue
         numbers = ", ".join(f"{channel:.9g}" for channel in emission)

@@ -1,4 +1,4 @@
-"""A lighting as a layer of USD that overrides lights of a stage, adds new ones, and nothing else.
+"""A lighting as a USD layer that only overrides lights of a stage and adds new ones.
 
 UsdLux's intensity is radiance; for lights that normalize it, the flux of their whole surface. So
 that neither radius nor size of a prim matter, panels and skies are written unnormalized, at their
@@ -69,7 +69,7 @@ def usd_overrides(
         folder: The folder of the layer.
         places: Of all emitters in the answer. Those that moved or are new are in the layer, in the
             stage's axes and the scene's units.
-        up: What is up in the scene.
+        up: The scene's up axis.
         about: A description for its comment.
 
     Raises OutputError if the library is not installed, or cannot read the stage.

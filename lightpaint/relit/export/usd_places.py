@@ -93,9 +93,9 @@ class UsdPlaces:
         return added
 
     def move(self) -> tuple[str, ...]:
-        """Set the places of lights that moved; return the names of those that stay as they are.
+        """Set the places of lights that moved; return the names of those left unchanged.
 
-        Those are lights that hang elsewhere in the stage than in the scene, and meshes.
+        These are meshes, and lights whose places differ between stage and scene.
         """
         left = []
         for place in self._changed:
