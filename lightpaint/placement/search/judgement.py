@@ -1,8 +1,8 @@
 """The judgement of which moves and new lights are worth it, with error bars of their places.
 
 Weights are fitted along some paths and judged along others, which no pose was fitted to. Places are
-fitted again along each set of other paths, and their spread is the error bar. The derivatives of the
-error alone would be too optimistic.
+fitted again along each set of other paths, and their spread is the error bar; an error bar from the
+derivatives alone would be too optimistic.
 """
 
 import math
