@@ -10,7 +10,7 @@ from typing import Any, TypeVar, cast
 MAX_LIST_LENGTH, MAX_LENGTH_IN_MESSAGE = 800, 300
 
 #: Invisible characters that control a terminal, end the line, or reverse the order of what follows.
-#: (Those that only join letters, as in Persian names or in emoji, are left alone.)
+#: (Joiners, as in Persian names or emoji, are allowed.)
 _INVISIBLE = re.compile(
     "[\x00-\x1f\x7f-\x9f\xad\u061c\u180e\u200b\u200e\u200f\u2028-\u202e\u2060-\u206f"
     "\ufeff\ufff9-\ufffb\U000e0000-\U000e007f\ud800-\udfff]"
@@ -25,7 +25,7 @@ def visible(text: str) -> str:
 
 
 def some_names(names: Iterable[str], joint: str = ", ") -> str:
-    """Return names as they stand in a message: as many as fit, and how many more there are."""
+    """Return names for a message: as many as fit, and the number of others."""
     return some_of([_shortened(visible(name)) for name in names], joint, MAX_LENGTH_IN_MESSAGE)
 
 

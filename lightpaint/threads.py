@@ -38,8 +38,8 @@ def one_thread() -> AbstractContextManager[object]:
 def linear_algebra() -> tuple[str, str]:
     """Return NumPy's BLAS with its version, and its kernel: `openblas 0.3.31`, `Haswell`.
 
-    Kernels add in different orders, so that results differ in their last digits. "" for what is
-    unknown: an unlisted library, or one that names no kernel.
+    Kernels add in different orders, so results differ in their last digits. "" if unknown: an
+    unlisted library, or one that names no kernel.
     """
     libraries = [x for x in _controller().info() if x.get("user_api") == "blas"]
     # SciPy brings its own BLAS: NumPy's comes first.

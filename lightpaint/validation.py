@@ -1,4 +1,4 @@
-"""Checks of values, each with the words that an error uses for what was expected."""
+"""Checks of values, each with the text of the expectation for errors."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -8,7 +8,7 @@ from typing import Any, get_args
 
 from lightpaint.errors import LightpaintError
 
-#: A test of a value, and words for what was expected if it fails.
+#: A test of a value, and the text of the expectation if it fails.
 Check = tuple[Callable[[Any], bool], str]
 
 
@@ -25,7 +25,7 @@ MAX_PRIMARIES = 16
 
 
 def is_amount(value: float) -> bool:
-    """Return True for an amount of light, or of what makes it, that can be computed with."""
+    """Return whether an amount of light or emission is in the range of computations."""
     return 0 <= value <= BRIGHTEST
 
 
@@ -51,7 +51,7 @@ def whole(least: int, most: float = math.inf) -> Check:
 
 
 def number(about: str, *, may_be_zero: bool = False) -> Check:
-    """Expect a number > 0, or >= 0, that can be computed with. about: what it is."""
+    """Expect a number > 0, or >= 0, in the range of computations. about: the quantity."""
 
     def fits(value: Any) -> bool:
         if not isinstance(value, Real) or _is_bool(value):
@@ -62,7 +62,7 @@ def number(about: str, *, may_be_zero: bool = False) -> Check:
 
 
 def between(least: float, most: float, about: str) -> Check:
-    """Expect a number between the two, `most` not included. about: what it is."""
+    """Expect a number between the two, `most` not included. about: the quantity."""
 
     def fits(value: Any) -> bool:
         return isinstance(value, Real) and not _is_bool(value) and least <= float(value) < most

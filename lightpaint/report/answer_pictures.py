@@ -121,8 +121,8 @@ def target_picture(
 ) -> npt.NDArray[Any]:
     """Return the painting, laid over the dimmed current look by its importance.
 
-    current: (h, w, 3) linear, the scene as it is. Fully painted pixels are exactly the
-    display encoding of the target. finish: see `over_unpainted`.
+    current: (h, w, 3) linear, the present scene. Fully painted pixels are exactly the display
+    encoding of the target. finish: see `over_unpainted`.
     """
     share = painted_coverage(target, solution)
     options: Any = {"transform": transform, "finish": finish}
@@ -242,7 +242,7 @@ def round_up(value: float) -> float:
 
 
 def spoken_view(transform: ViewTransform) -> str:
-    """Return `agx, exposure +1.5 stops`, or "" for sRGB as it is."""
+    """Return `agx, exposure +1.5 stops`, or "" for plain sRGB."""
     name = [] if transform.name == "srgb" else [transform.name]
     return ", ".join(
         [*name, *([f"exposure {transform.stops:+.1f} stops"] if transform.stops else [])]

@@ -18,7 +18,8 @@ from lightpaint.basis.cache.denoised_planes import (
 
 Result = TypeVar("Result")
 
-#: Rows that a long list shows unfolded, and how many more it shows rather than fold so few.
+#: Rows of a long list that are always visible, and the largest number of further rows that are not
+#: folded.
 ROWS_SHOWN, SPARE_ROWS = 10, 3
 
 #: Pixels of a plane in a page from left to right, and of all planes together, at most.

@@ -89,7 +89,7 @@ class CleanLooks:
 
     @classmethod
     def raw(cls, basis: Basis, predicted: Floats, verified: Floats | None) -> "CleanLooks":
-        """Make the looks as they were rendered."""
+        """Make the looks as rendered."""
         present = basis.present_look
         return cls(present, predicted, verified, {})
 

@@ -59,10 +59,10 @@ def comparison_image(
 ) -> npt.NDArray[np.uint8]:
     """Draw the pictures in a row, (H, W, 3) uint8 sRGB, all at one exposure, with captions.
 
-    predicted, verified: (h, w, 3) linear, the latter possibly with a block of pixels for each; what
-    is smaller is shown with larger pixels. Three pictures where `verified` is None. The
-    residual is false-coloured luminance of prediction minus target, of raw data; pixels that
-    do not count are grey, dim and hatched. appearance: the result of `compare_appearance`, if
+    predicted, verified: (h, w, 3) linear, the latter possibly at a multiple of the size; smaller
+    pictures are shown with larger pixels. Three pictures where `verified` is None. The residual is
+    false-coloured luminance of prediction minus target, of raw data; pixels that do not count are
+    grey, dim and hatched. appearance: the result of `compare_appearance`, if
     known. looks: shown instead of raw renders. missed: the result of `residual_of`. Raises
     SizeError if target and basis differ in size.
     """

@@ -42,7 +42,7 @@ def error_sentences(
     d = diagnosis
     if not (parts := error_shares(d)):
         return [NO_ERROR]
-    # What is kept has a bound of its own below.
+    # Kept lights have a separate bound below.
     lights = "the adjusted lights" if any(x.kind == "kept" for x in d.bounds) else "the lights"
     words = {
         "unreachable": f"is out of reach of any mix of {lights}{hold_clause(appearance)}",
@@ -71,10 +71,10 @@ def hold_clause(appearance: Appearance | None) -> str:
 def bound_sentences(
     diagnosis: Diagnosis, appearance: Appearance | None = None, *, any_color: str = ANY_COLOR
 ) -> list[str]:
-    """Return at most two sentences on what holds the lights, the most important first.
+    """Return at most two sentences on limits of the lights, the most important first.
 
     appearance: the result of `compare_appearance`; its reasons come with their shares, and single
-    bounds only if there are none. any_color: how to let lights have any colour.
+    bounds only without reasons. any_color: how to allow any colour.
     """
     if appearance is not None and appearance.reasons:
         sentences = [spoken_cause(reason, any_color=any_color) for reason in appearance.reasons]

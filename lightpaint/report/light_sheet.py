@@ -156,10 +156,9 @@ def _rest_sentence(shares: Doubles, shown: list[int]) -> str:
 
 
 def _grid(count: int, size: tuple[int, int]) -> _Grid:
-    """Return the grid for so many pictures of the (height, width), as near to ASPECT as
-    possible."""
+    """Return the grid for a number of pictures of a size (h, w), as near to ASPECT as possible."""
     width = next(wide for most, wide in WIDTHS.items() if count <= most)
-    # Panoramas and towers have room for their words, and no more than a screen of height.
+    # Very wide or tall pictures keep room for text, and at most a screen of height.
     height = min(max(round(width * size[0] / size[1]), width // 4), 2 * width)
     # An empty cell is as bad as a sheet that is far too wide.
     grids = [_Grid(width, height, columns, -(-count // columns)) for columns in range(1, count + 1)]

@@ -30,9 +30,9 @@ def relative_residual(solution: Solution) -> float:
     """Return the RMS error of the prediction over the RMS of the painting: √(Σ_c E_c / Σ_c ‖Ψ_c‖²).
 
     E_c: objective of channel c; ‖Ψ_c‖² = Σ_pixels D Ψ_c². All channels together, weighted
-    by importance; in display space, both of display values. 0 is a perfect match, 1 is what all
-    lights off would give. Without the square root a miss of 10 % of the light would look like
-    one of 1 %.
+    by importance; in display space, both of display values. 0 is a perfect match, 1 the value with
+    all lights off. Without the square root an error of 10 % of the light would look like one of 1
+    %.
     """
     norm2 = _norm2(solution)
     # A painting that is black wherever it counts is met by darkness alone.
@@ -114,11 +114,10 @@ def relative_errors(uncertainty: Uncertainty) -> Doubles:
 
 
 def picture_errors(basis: Basis, uncertainty: Uncertainty) -> Doubles:
-    """Return the half width of each light's 95 % interval, (n,), over what the light does.
+    """Return the half width of each light's 95 % interval, relative to its contribution, (n,).
 
-    All in luminance summed over the picture. A light that makes less than LEAST_SHARE of the
-    picture's light, or is off, counts as if it made that much: so an error is large only if it
-    shows. 0 where nothing is known.
+    All in luminance summed over the picture. A light with less than LEAST_SHARE of the picture's
+    light counts as if it had that share, so only visible errors are large. 0 if unknown.
     """
     low, high = uncertainty.interval
     side = np.maximum(uncertainty.weights - low, high - uncertainty.weights)

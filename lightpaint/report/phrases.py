@@ -47,9 +47,9 @@ def spoken_amount(delta_e: float) -> str:
 
 
 def spoken_lights(names: Sequence[str], *, start: bool = False) -> str:
-    """Return `light key`, `lights key, fill`, or `light_3` alone if the name says what it is.
+    """Return `light key`, `lights key, fill`, or `light_3` alone if the name already says "light".
 
-    start: of a sentence. Of very many, the first are named, with the number of others.
+    start: whether it begins a sentence. A long list is cut, with the number of other lights.
     """
     listed = some_of([name or "without a name" for name in names], room=MAX_NAME_CHARACTERS)
     if all(re.search("light|lamp", name, re.IGNORECASE) for name in names):
@@ -82,7 +82,7 @@ def spoken_where(place: Place) -> str:
 
 
 def spoken_place(place: Place) -> str:
-    """Return a sentence on where light is missing, and what it lacks."""
+    """Return a sentence on where light is missing, and which light."""
     place_text = f"{spoken_region(place)} ({spoken_percent(place.share)})"
     change = spoken_difference(place.painted, place.reached)
     return (
@@ -119,9 +119,9 @@ def spoken_percent(share: float) -> str:
 
 
 def spoken_percents(shares: Iterable[float]) -> list[str]:
-    """Return whole percentages of parts of one thing, which add up to what the parts are together.
+    """Return whole percentages of parts of a whole, which add up to the rounded sum.
 
-    Each is at least 1 %. Those that rounding changes most give way.
+    Each is at least 1 %. The parts that rounding changes most are adjusted.
     """
     exact = [100 * share for share in shares]
     percents = [max(1, round(x)) for x in exact]

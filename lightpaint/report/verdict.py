@@ -1,4 +1,4 @@
-"""The verdict on a result, in sentences: whether the lights make what was painted."""
+"""The verdict on a result, in sentences: whether the lights produce the painting."""
 
 import numpy as np
 
@@ -50,7 +50,7 @@ def verdict(
     *,
     appearance: Appearance | None = None,
 ) -> str:
-    """Return how near the lights come to what was painted, and whether a render confirms it.
+    """Return sentences on how close the answer is, and whether a render confirms it.
 
     Args:
         solution: The answer.
@@ -82,9 +82,9 @@ def verdict(
 
 
 def headline(appearance: Appearance) -> str:
-    """Say whether the lights make what was painted, what is missing and why, and what else changes.
+    """Return sentences on whether the answer is close, what it lacks and why, and side effects.
 
-    A cause is named only if a third of what the fit misses is due to it.
+    A cause is named only if it accounts for a third of the error.
     """
     addition = spoken_elsewhere(appearance.unpainted_change) if appearance.changes_unpainted else ""
     present = f"{spoken_present(appearance)} " if appearance.is_worse else ""
@@ -141,7 +141,7 @@ def spoken_missing(appearance: Appearance) -> str:
 
 
 def spoken_reason(appearance: Appearance) -> str:
-    """Say what keeps the lights from the worst place: the main cause first."""
+    """Return the causes of the largest error as text: the main cause first."""
     assert appearance.place is not None
     if appearance.causes:
         *most, last = (spoken_holding(reason) for reason in appearance.causes)

@@ -22,7 +22,7 @@ DOMINANT_SHARE = 0.5
 
 
 def emitter_remarks(target: Target, solution: Solution, predicted: Estimate) -> list[str]:
-    """Return sentences for people. target: of one view, as it was given to the solve."""
+    """Return remarks for the user. target: of one view, as given to the solve."""
     sees_emitter = solution.basis.emitters_seen
     painted = target.importance > 0
     ignored = ignored_paint(target, sees_emitter, solution.problem.fit.emitters)
@@ -95,7 +95,7 @@ def _too_bright(
 ) -> list[str]:
     """Return a warning of lights that come out far brighter in view than they were painted."""
     basis = solution.basis
-    # Where the painting means "at least", nothing is too bright.
+    # Where the painting means "at least this bright", nothing is too bright.
     if target.at_least is not None:
         ignored = ignored & ~target.at_least.any(axis=-1)
     brightest_light = _brightest_lights(basis, solution.weights, ignored)

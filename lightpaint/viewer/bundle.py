@@ -3,9 +3,9 @@
 The modules are small and import each other by path. A server serves them as they are; a page of one
 file, and a notebook, need one script. `bundled` makes it without other tools: each module becomes a
 function that is called once, and its exports become constants of the script. The script evaluates
-no text and loads nothing, so that it runs under the strictest content policy, as `blob:` in
-JupyterLab, VS Code and marimo, and inline in a page from a disk. `bundled` refuses syntax that it
-does not understand, and tests bundle every module that ships.
+no text and loads nothing, so it runs under the strictest content policy, as `blob:` in JupyterLab,
+VS Code and marimo, and inline in a page opened from a disk. `bundled` refuses syntax that it does
+not understand, and tests bundle every module that ships.
 """
 
 import posixpath

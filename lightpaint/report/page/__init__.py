@@ -1,1 +1,1 @@
-"""report.html and its sections, its mixer, and what notebooks show."""
+"""report.html with its sections and its mixer, and the output in notebooks."""

@@ -37,7 +37,7 @@ MAX_PNG_BYTES = 150_000
 #: Lines of a picture in a row that tell how well they pack.
 STRIP_LINES = 8
 
-#: JPEG quality of pictures with their noise, which is what takes the room.
+#: JPEG quality of noisy pictures, which take up most of the file.
 RAW_QUALITY = 75
 
 #: Width of the lights' pictures in the table, in pixels.
@@ -86,8 +86,8 @@ def thumbnail(
 ) -> tuple[Floats, float]:
     """Return a small display-encoded picture of one light, and its exposure in stops.
 
-    image: (h, w, 3) linear. The 98th percentile of what it lights, without visible emitters,
-    becomes white. The reduction is in linear light. is_clean: whether to denoise it then.
+    image: (h, w, 3) linear. The 98th percentile of its light, without visible emitters, becomes
+    white. The picture is reduced in linear light. is_clean: whether to denoise the result.
     """
     width = image.shape[1]
     stops = exposure_of(image, emitters_seen)
@@ -112,9 +112,7 @@ def resized(image: Floats, factor: float) -> Floats:
 
 
 def exposure_of(image: Floats, emitters_seen: npt.NDArray[np.bool_]) -> float:
-    """Return stops that bring the 98th percentile of what a light lights to white, without visible
-    emitters.
-    """
+    """Return the stops that make a light's 98th percentile white, without visible emitters."""
     bright = largest(image)
     lit = bright[(bright > 0) & ~emitters_seen]
     lit = lit if lit.size else bright[bright > 0]
@@ -182,8 +180,8 @@ def maps(
 ) -> str:
     """Return false-colour pictures: the error, the importance, and where the render disagrees.
 
-    predicted: (h, w, 3) linear, as rendered; current: behind what does not count. missed: the
-    result of `residual_of`.
+    predicted: (h, w, 3) linear, as rendered; current: background of pixels that do not count.
+    missed: the result of `residual_of`.
     """
     missed = missed or residual_of(solution, predicted, transform=transform)
     picture = residual_picture(missed, solution, current, transform=transform, finish=to_8_bit)

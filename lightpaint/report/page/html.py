@@ -1,4 +1,4 @@
-"""Pieces of HTML for several parts of the report; callers escape what goes in."""
+"""Pieces of HTML for several parts of the report; callers escape the contents."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -38,7 +38,7 @@ def fold(summary: str, content: str) -> str:
 
 
 def breakable_name(name: str) -> Html:
-    """Return a name, escaped, that may break after what joins its words, and in very long ones."""
+    """Return a name, escaped, that may break after joining characters and in very long words."""
     words = re.findall(r"[^_./-]{1,14}[_./-]*|[_./-]+", name, re.DOTALL)
     return Html("<wbr>".join(map(escape, words)))
 
@@ -58,7 +58,7 @@ def row(name: str, *cells: str) -> str:
 
 
 def cell(content: str) -> str:
-    """Return a cell of a row; a cell stays as it is."""
+    """Return a cell of a row; return a cell unchanged."""
     return content if content.startswith("<td") else f"<td>{content}</td>"
 
 

@@ -132,7 +132,7 @@ def _compact_planes(
     planes = cached_clean_planes(basis) if is_clean else None
     count = len(lights) + len(mixes)
     factor = page_reduction(basis, count)
-    # Where many pixels make one, their mean has hardly any noise left to take out.
+    # The mean of many pixels has hardly any noise left to remove.
     must_denoise = is_clean and planes is None and factor < CLEAN_REDUCTION
 
     def small(k: int) -> Floats:
@@ -242,7 +242,7 @@ def _plane_data(picture: PackedPicture) -> dict[str, Any]:
 
 
 def lighting_data(lighting: Lighting) -> dict[str, Any]:
-    """Return the data of the answer's file without what only holds for the answer itself."""
+    """Return the data of the answer's file without statements that hold for the answer only."""
     lights = tuple(
         replace(
             light,

@@ -102,7 +102,7 @@ def solution_html(solution: Solution) -> str:
 
     def row(k: int) -> Sequence[str]:
         light, setting = basis.lights[k], lighting.lights[k]
-        # What a page of the report stacks stands in a line here.
+        # Parts that the report page stacks are side by side here.
         change_text = change(light, setting).replace("<small>", " ").replace("</small>", "")
         change_text += f", {UNTOLD_HERE}" if setting.untold else ""
         colour = _swatch(setting.emission, lighting.photometry(setting))

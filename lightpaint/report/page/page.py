@@ -258,8 +258,7 @@ def _exposure(transform: ViewTransform, predicted: Floats, origin: str) -> str:
 
 
 def _next_steps(basis: Basis, target: Target, verification: Verification | None) -> str:
-    """Return how to change the painting and solve again, for readers who open the page much
-    later."""
+    """Return instructions to change the painting and solve again, for readers much later."""
     text = (
         "Open the painting with its layers, change it, save it under the same name, and run the "
         "command again. The basis is kept"

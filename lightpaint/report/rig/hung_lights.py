@@ -63,7 +63,7 @@ class HungLights:
 
     @property
     def sentence(self) -> str:
-        """The sentence on what the changes bring together, and for which looks."""
+        """The sentence on the total gain of the changes, and their looks."""
         if self.looks:
             return f"{self.shared_sentence} Each look has levels of its own."
         if not self.changes:
@@ -75,7 +75,7 @@ class HungLights:
 
     @property
     def shared_sentence(self) -> str:
-        """The sentence on what the changes bring all looks that share them."""
+        """The sentence on the gain for all looks that share the changes."""
         *others, last = self.looks
         names = f"{some_names(others)} and {some_names([last])}"
         if not self.changes:

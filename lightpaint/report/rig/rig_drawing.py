@@ -1,7 +1,7 @@
-"""Drawings of where lights hang: a plan from above, and an elevation from the side.
+"""Drawings of the places of lights: a plan from above, and an elevation from the side.
 
-The room is what the camera sees of it: its pixels as points, in their own colours but dim. Lights
-that moved have a ring where they were and an arrow to where they are; spots have their beams.
+The room is drawn as the camera sees it: its pixels as points, in dimmed colours. Moved lights have
+a ring at the old place and an arrow to the new one; spots have their beams.
 """
 
 import math
@@ -18,7 +18,7 @@ from lightpaint.report.rig.panels import FINER, GROUND, Panel, in_column, in_row
 from lightpaint.report.rig.view_geometry import ViewGeometry
 from lightpaint.screen import visible
 
-#: Colours of texts, and of what has changed.
+#: Colours of texts and of changes.
 TEXT, FAINT, EDGE = (226, 226, 226), (142, 142, 146), (58, 58, 62)
 CHANGED = (255, 176, 66)
 
@@ -95,7 +95,7 @@ def _drawn(
 
 
 def _room(panel: Panel, geometry: ViewGeometry, colors: Doubles) -> npt.NDArray[np.uint8]:
-    """Draw what the camera sees as points, those that hide the rest left out."""
+    """Draw the visible surfaces as points, without those that hide the rest."""
     towards = np.cross(panel.right, panel.up)
     # Ceilings from above, the near wall from the side.
     faces = geometry.normals @ towards > -0.3
@@ -140,7 +140,7 @@ def _draw_beam(
     geometry: ViewGeometry,
     light: HungLight,
 ) -> None:
-    """Draw the cone of a spot, or where a panel points, as far as what it lights."""
+    """Draw the cone of a spot, or the direction of a panel, up to the surface that it lights."""
     site = light.place.site
     if site.direction is None or site.position is None:
         return

@@ -1,7 +1,7 @@
 """The geometry of a picture: the position of its camera, and the projection of points into it.
 
-A basis knows the position of what each pixel shows, and not its camera. The projection follows from
-these pairs of pixels and points (direct linear transform, Hartley & Zisserman 2004, §7.1).
+A basis has the surface position of each pixel, but no camera. The projection follows from these
+pairs of pixels and points (direct linear transform, Hartley & Zisserman 2004, §7.1).
 """
 
 import math
@@ -103,7 +103,7 @@ class ViewGeometry:
         length = np.linalg.norm(away, axis=1)
         cosine = away @ np.array(site.direction) / np.maximum(length, 1e-12)
         near = np.flatnonzero(cosine > np.cos(np.radians(NEAR_AXIS)))
-        # Of what the beam passes it lights the first.
+        # The beam lights the first surface on its way.
         near = near[length[near] < 1.1 * length[near].min()] if len(near) else near
         if not len(near):
             return None
