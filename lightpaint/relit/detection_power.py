@@ -1,7 +1,8 @@
-"""The power of a verification: the chance that it detects an error in each light.
+"""The power of a verification: the probability that it detects an error in each light.
 
-Agreement of prediction and render means little for a light whose part of the picture drowns in
-their noise. So this module computes the chance that the render had detected a small error in it.
+Agreement of prediction and render means little for a light whose contribution drowns in their
+noise. So this module computes the probability that the render would have detected a small error in
+the light.
 """
 
 from collections.abc import Iterable, Sequence
@@ -26,7 +27,7 @@ from lightpaint.relit.verification import (
     noise_of,
 )
 
-#: Relative error of a light that a render should detect.
+#: Relative error of a light that a verification should detect.
 ERROR = 0.05
 
 NORMAL = NormalDist()
@@ -34,10 +35,10 @@ NORMAL = NormalDist()
 
 @dataclass(frozen=True)
 class LightShares:
-    """The parts of lights that shine in a prediction, in sums over blocks.
+    """The contributions of the lit lights to a prediction, summed over blocks.
 
-    names: of m lights. sums: (m, 3), over all pixels. blocks, noise: (m, rows, columns, 3), over
-    blocks, of the picture and of its half difference.
+    names: names of m lights. sums: (m, 3), over all pixels. blocks, noise: (m, rows, columns, 3),
+    over blocks, of the contribution and of its half difference.
     """
 
     names: tuple[str, ...]
@@ -47,7 +48,9 @@ class LightShares:
 
     @classmethod
     def of(cls, basis: Basis, lighting: Lighting) -> "LightShares":
-        """Return those of the lights of `basis` that `lighting` adjusts and leaves on."""
+        """Return the shares of the lights of `basis` that `lighting` adjusts and does not switch
+        off.
+        """
         lit = [x for x in lighting.lights if not x.is_fixed and any(x.weight)]
         names = tuple(x.name for x in lit)
         return cls.of_pictures(
@@ -62,7 +65,9 @@ class LightShares:
 
     @classmethod
     def of_pictures(cls, names: Sequence[str], pictures: Iterable[Estimate]) -> "LightShares":
-        """Return the block sums of each light's picture, with one picture in memory at a time."""
+        """Return the shares from the contribution of each light, with one picture in memory at a
+        time.
+        """
         sums, blocks, noise = [], [], []
         for picture in pictures:
             sums.append(picture.image.sum(axis=(0, 1), dtype=np.float64))
@@ -81,10 +86,9 @@ class LightShares:
 def with_light_tests(
     verification: Verification, predicted: Estimate, lights: LightShares
 ) -> Verification:
-    """Return `verification` with the test of each light that shines, and its power for an error of
-    ERROR in it.
+    """Return `verification` with a test for each lit light, and its power for an error of ERROR.
 
-    predicted: the prediction that it was compared with.
+    predicted: the prediction that was verified.
     """
     factor = whole_factor(verification.verified.size, predicted.size) or 1
     verified = verification.verified.reduced(factor)
@@ -103,15 +107,15 @@ def detection_power(
     limit: float = LIMIT,
     error: float = ERROR,
 ) -> dict[str, float]:
-    """Return the probability, for each light, that a relative error in it exceeds `limit`.
+    """Return, for each light, the probability that a relative error in it is detected at `limit`.
 
     It is that of the most sensitive test: the light's own, the sum of the picture, or the pattern
-    of blocks; so with all three it is at least as much. Of the sums, the most sensitive channel
-    counts, since one path carries the noise of all. With the error d, a block's product of halves
-    has the mean d² and, beside the variance 4 S² of noise alone, 4 S d², where S is the variance of
-    the block's difference. The light's own noise is taken out of d².
+    of blocks; so all three together have at least this power. For the sum, the most sensitive
+    channel counts, since all channels of a path share its noise. With an error d, a block's product
+    of halves has the mean d² and, besides the variance 4 S² of pure noise, 4 S d², where S is the
+    variance of the block's difference. The light's own noise is subtracted from d².
 
-    predicted, verified: as in `compare`, of one size. tests: of the same.
+    predicted, verified: as in `compare`, of equal size. tests: tests of the same pair.
     """
     squares, magnitude = noise_of(predicted, verified)
     deviation = np.sqrt(squares.sum(axis=(0, 1)))
@@ -135,5 +139,5 @@ def detection_power(
 
 
 def _two_sided(off: float, limit: float) -> float:
-    """Return the probability that a normal number of mean `off` lies beyond `limit`, either way."""
+    """Return the probability that a normal variable with mean `off` lies beyond ±`limit`."""
     return NORMAL.cdf(off - limit) + NORMAL.cdf(-off - limit)

@@ -1,4 +1,4 @@
-"""The emission of one light, written into its element of the scene XML."""
+"""Writes the emission of a light into its element of the scene XML."""
 
 import re
 from dataclasses import dataclass, field
@@ -23,9 +23,9 @@ class Changes:
     _missing: list[str] = field(default_factory=list)
 
     def set(self, kind: str, name: str, value: str) -> None:
-        """Give the element a child `<kind name=… value=…/>`, in the place of its namesake.
+        """Set the child `<kind name=… value=…/>`, replacing one with that name.
 
-        name: in snake_case; a namesake keeps its spelling, for Mitsuba refuses a mixture.
+        name: in snake_case. An existing child keeps its spelling, since Mitsuba rejects a mixture.
         """
         child = self._child_named(name)
         if child is None:
@@ -34,7 +34,7 @@ class Changes:
             self.xml.replace(child, tag(kind, name=child.attributes["name"], value=value))
 
     def set_element(self, name: str, text: str) -> None:
-        """Give the element the child `text`, called `name`, in the place of its namesake."""
+        """Set the child called `name` to the XML `text`, replacing one with that name."""
         child = self._child_named(name)
         if child is None:
             self._missing.append(text)
@@ -43,7 +43,7 @@ class Changes:
             self.xml.replace(child, text.replace(f'"{name}"', f'"{spelling}"', 1))
 
     def number(self, name: str, otherwise: float) -> float:
-        """Return the present number of the child called `name`, or `otherwise`."""
+        """Return the number in the child called `name`, or `otherwise` if there is none."""
         child = self._child_named(name)
         text = child.attributes.get("value", "") if child is not None else f"{otherwise}"
         try:
@@ -54,7 +54,7 @@ class Changes:
             ) from None
 
     def child(self, name: str) -> "Changes":
-        """Return changes of the child called `name`, which must be an element of its own."""
+        """Return changes of the child called `name`, which must not be a reference."""
         child = self._child_named(name)
         if child is None or child.tag == "ref":
             raise SceneError(
@@ -64,7 +64,7 @@ class Changes:
         return Changes(self.xml, child)
 
     def _child_named(self, name: str) -> Element | None:
-        """Return the child of that name, or None if there is certainly none."""
+        """Return the child called `name`; None if there certainly is none."""
         child = self.element.child_named(name)
         unknown = next((c for c in self.element.children if "$" in c.name), None)
         if child is None and unknown is not None:
@@ -81,7 +81,7 @@ class Changes:
         return f"<{self.element.tag}> {id_or_name!r}"
 
     def finish(self) -> None:
-        """Hand on the insertions; call once, last."""
+        """Pass on the insertions; must be called once, last."""
         if self._missing:
             self.xml.insert_first(self.element, self._missing)
 
@@ -91,9 +91,8 @@ def set_emission(
 ) -> dict[str, Floats]:
     """Set the emission of `emitter` to `rgb`, in the unit of its kind.
 
-    stem: prefix of the names of images.
-
-    Returns the images, (h, w, 3) linear, to write beside the relit scene, by file name.
+    stem: prefix of the names of images. Returns the images that must lie beside the relit scene,
+    (h, w, 3) linear, by file name.
     """
     kind = emitter.kind
     assert kind is not None  # emitters that cannot be scaled are never set
@@ -117,8 +116,8 @@ def set_emission(
 def _scale_image(
     changes: Changes, scene: Scene, emitter: Emitter, parameter: str, rgb: RGB, stem: str
 ) -> dict[str, Floats]:
-    """Scale the image of `emitter` by `rgb` and refer to the result."""
-    # The number separates emitters whose names give the same file name.
+    """Scale the image of `emitter` by `rgb`, and refer to the scaled copy."""
+    # The index distinguishes emitters whose names give the same file name.
     safe = re.sub(r"[^\w-]+", "_", emitter.name)
     name = f"{stem}.{scene.emitters.index(emitter)}.{safe}.exr"
     holder = changes if emitter.plugin == "envmap" else changes.child(parameter)

@@ -1,4 +1,4 @@
-"""The forms in which an answer goes to other programs: their requirements, and their texts."""
+"""The formats in which an answer can be exported: their requirements, and their texts."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from lightpaint.relit.xml_patch import emitters_of, scene_patch
 from lightpaint.scene.scene import Scene
 from lightpaint.screen import some_names
 
-#: Name of the file in each form, for a scene and for light groups; None if there is none.
+#: Name of the file in each format, for a scene and for light groups; None if not available.
 FORMS: dict[str, tuple[str | None, str | None]] = {
     "csv": ("fixtures.csv", "fixtures.csv"),
     "json": ("fixtures.json", "fixtures.json"),
@@ -32,9 +32,9 @@ FORMS: dict[str, tuple[str | None, str | None]] = {
 
 @dataclass(frozen=True)
 class Source:
-    """The origin of a lighting: a scene, light groups, or neither.
+    """The source of a lighting: a scene, light groups, or neither.
 
-    stage: of USD, with lights of the scene's names.
+    stage: USD stage with lights named as in the scene.
     """
 
     scene: Scene | None = None
@@ -43,7 +43,7 @@ class Source:
 
     @property
     def files(self) -> list[Path]:
-        """The files that the source was read from."""
+        """The files from which the source was read."""
         files = [] if self.stage is None else [self.stage]
         if self.scene is not None:
             files += self.scene.read_files
@@ -51,9 +51,9 @@ class Source:
 
 
 def names_of_forms(forms: Iterable[str], source: Source) -> dict[str, str]:
-    """Return the name of the file of each form, after checking its requirements.
+    """Return the file name for each format, after checking its requirements.
 
-    Raises LightpaintError for an unknown form, or one whose requirements are not met.
+    Raises LightpaintError for an unknown format, or one whose requirements are not met.
     """
     names = {}
     for form in forms:
@@ -79,13 +79,11 @@ def names_of_forms(forms: Iterable[str], source: Source) -> dict[str, str]:
 def writers_of(
     names: Mapping[str, str], lighting: Lighting, source: Source, folder: Path, listen: Listener
 ) -> tuple[dict[str, Callable[[], str]], str]:
-    """Return a function for the text of each file, by its name, and a remark; "" without one.
+    """Return a function that makes the text of each file, by file name, and a remark or "".
 
-    names: of the files, by form, from `names_of_forms`. folder: of the files. listen: receives
-    remarks on what a form leaves out. Mitsuba gets the lighting itself, other programs the result
-    of `_exported`.
-
-    Raises LightpaintError if the lighting belongs to another source.
+    names: file names by format, from `names_of_forms`. folder: folder of the files. listen: is told
+    what a format leaves out. Mitsuba gets the lighting itself, other programs the result of
+    `_exported`. Raises LightpaintError if the lighting belongs to another source.
     """
     elsewhere, remark = lighting, ""
     if set(names) != {"mitsuba"}:
@@ -97,10 +95,11 @@ def writers_of(
 
 
 def _exported(lighting: Lighting, source: Source) -> tuple[Lighting, str]:
-    """Return the lighting for other programs, in which undetermined lights keep their own colour.
+    """Return the lighting for other programs, in which undetermined lights keep the scene's
+    colours.
 
-    Also returns a remark on that; "" without one. Raises LightingError for a lighting of another
-    scene.
+    Also returns a remark on these lights, or "". Raises LightingError if the lighting belongs to
+    another scene.
     """
     if source.scene is None:
         return lighting, ""
@@ -119,7 +118,7 @@ def _exported(lighting: Lighting, source: Source) -> tuple[Lighting, str]:
 def _writer_of(
     form: str, lighting: Lighting, source: Source, folder: Path, listen: Listener
 ) -> Callable[[], str]:
-    """Return a function for the text of one form; for the arguments see `writers_of`."""
+    """Return a function that makes the text of one format. See `writers_of` for the arguments."""
     if form in ("csv", "json"):
         return lambda: (fixtures_csv if form == "csv" else fixtures_json)(lighting)
     if source.light_groups is not None:
@@ -162,7 +161,7 @@ def _writer_of(
 def _of_groups(
     form: str, lighting: Lighting, groups: LightGroups, folder: Path, listen: Listener
 ) -> Callable[[], str]:
-    """Return the same for light groups."""
+    """Return a function that makes the text of one format for light groups."""
     lighting.weights_for(groups.basis)
     if form == "blender":
         return lambda: blender_script(groups, lighting)

@@ -1,9 +1,10 @@
-"""Tests of a verification that look for an error in one light each: matched filters.
+"""Tests of a verification for an error in one light at a time: matched filters.
 
-An error in a light has a known shape: a share of that light's own picture. So the difference of
-prediction and render is summed with weights that maximise this picture against the noise, block by
-block and with the channels' correlations (a matched filter). It detects an error of 5 % with a
-fraction of the samples that the sum of the picture needs.
+The effect of an error in a light is known: it is proportional to the light's own picture. So the
+difference of prediction and render is summed with the weights that bring out this picture best
+against the noise, block by block and taking account of correlations between channels (a matched
+filter). It detects an error of 5 % with a fraction of the samples that the sum of the picture
+needs.
 """
 
 from dataclasses import dataclass
@@ -14,25 +15,25 @@ from lightpaint.arrays import Doubles, Floats
 from lightpaint.images.estimate import Estimate, box_mean
 from lightpaint.relit.verification import PRECISION, block_sums
 
-#: Blocks on either side over which the noise is averaged before it weighs the blocks.
+#: Radius in blocks over which the noise is averaged before it weights the blocks.
 SMOOTH = 1
 
-#: Share of a block's mean variance that every mix of its channels is taken to have at least, when
-#: blocks are weighed: few pixels show no colour noise where there is some.
+#: Minimum variance of every mix of channels in a block, as a share of its mean variance, when
+#: blocks are weighted: with few pixels, existing colour noise may not show.
 FLOOR = 0.01
 
-#: Variance below which there is none.
+#: Variance below which it counts as zero.
 TINY = 1e-38
 
 
 @dataclass(frozen=True)
 class LightTests:
-    """The outcome of the tests.
+    """The results of the tests.
 
-    z: (n,), the difference along the picture of each light, in standard errors. Where the
-    prediction is true its mean is 0, and it scatters as a standard normal number, or less in
-    pictures of few blocks. sensitivity, overlap: (n,), what a relative error of the light adds, see
-    `mean`. freedom: (n,), the degrees of freedom of the variance.
+    z: (n,), the difference along the picture of each light, in standard errors. If the prediction
+    is true, it has the mean 0 and a standard normal distribution, or a narrower one in pictures
+    with few blocks. sensitivity, overlap: (n,), the effect of a relative error of the light; see
+    `mean`. freedom: (n,), degrees of freedom of the variance.
     """
 
     z: Doubles
@@ -41,12 +42,12 @@ class LightTests:
     freedom: Doubles
 
     def mean(self, error: float) -> Doubles:
-        """Return the mean, under a relative error of each light, of the quotient behind z."""
+        """Return the mean of the quotient t behind z, for a relative error of each light."""
         grown = 1 + np.clip(error**2 * self.overlap, 0, 1)
         return np.asarray(np.maximum(error * self.sensitivity, 0) / np.sqrt(grown))
 
     def limits(self, limit: float) -> Doubles:
-        """Return the quotient from which on the z of each light exceeds `limit`."""
+        """Return the quotient t at which the z of each light reaches `limit`."""
         squares = np.square(limit * (8 * self.freedom + 3) / (8 * self.freedom + 1))
         with np.errstate(over="ignore"):
             return np.sqrt(self.freedom * np.expm1(squares / self.freedom))
@@ -57,20 +58,22 @@ def light_tests(
 ) -> LightTests:
     """Test for an error in each of n lights.
 
-    Let D_A and D_B be the differences of the first and of the second halves of both images, in sums
-    over blocks. Their noise is independent. A block's weights a_A = S_A⁻¹ L_A are made of the first
-    halves alone: C_A is the scatter of the pixels of D_A, S_A that of its neighbours too, L_A the
-    picture of the light. They meet D_B; and the other way round, x = a_A·D_B and y = a_B·D_A:
+    Let D_A and D_B be the differences between the two images' first and second halves, summed over
+    blocks. Their noise is independent. The weights of a block, a_A = S_A⁻¹ L_A, are computed from
+    the first halves alone: C_A is the scatter of the pixels of D_A, S_A includes that of
+    neighbouring blocks, and L_A is the picture of the light. They are applied to D_B, and
+    those of the second halves to D_A, which gives x = a_A·D_B and y = a_B·D_A:
 
-        t = Σ (x + y) / √(V + W),   V = Σ (a_A·C_B a_A + a_B·C_A a_B),   W = 2 Σ x y in [0, V]
+      t = Σ (x + y) / √(V + W),   V = Σ (a_A·C_B a_A + a_B·C_A a_B),   W = 2 Σ x y in [0, V]
 
-    So weights and noise are unrelated, and Σ (x + y) is 0 in the mean for noise of any distribution
-    and has the variance V. W is what x and y have in common where a few bright paths of a light are
-    in its picture as in the difference. Where few pixels make V, t is Student's, with their number
-    of degrees of freedom; z is the normal number that is as rare (Wallace 1959).
+    So weights and noise are independent, and for noise of any distribution Σ (x + y) has mean 0 and
+    variance V. W accounts for the correlation of x and y if the same few bright paths of a light
+    are in its picture and in the difference. If few pixels contribute to V, t has a Student
+    distribution with degrees of freedom according to their number; z is the equally rare normal
+    value (Wallace 1959).
 
-    predicted, verified: as in `compare`, of one size. blocks, half_differences: (n, rows, columns,
-    3), of the picture of each light and of its half difference, as of `LightShares`.
+    predicted, verified: as in `compare`, of equal size. blocks, half_differences: (n, rows,
+    columns, 3), of the picture of each light and of its half difference, as in `LightShares`.
     """
     difference = predicted.image.astype(np.float64) - verified.image
     half = predicted.half_difference.astype(np.float64) - verified.half_difference
@@ -85,7 +88,7 @@ def light_tests(
     tests = []
     for light_blocks, its_half in zip(blocks.astype(np.float64), half_differences, strict=True):
         lit = light_blocks + its_half, light_blocks - its_half
-        # The weights of each half, applied to the other half.
+        # Weights from each half, and quantities of the other half to which they are applied.
         a = [_times(x, light) for x, light in zip(inverses, lit, strict=True)]
         x, y = _dot(a[0], sums[1]), _dot(a[1], sums[0])
         x_signal, y_signal = _dot(a[0], lit[1]), _dot(a[1], lit[0])
@@ -105,7 +108,9 @@ def light_tests(
 
 
 def _pixels_that_count(values: Floats) -> Doubles:
-    """Return how many pixels of each block make its scatter: (Σ x²)² / Σ x⁴, at least 1."""
+    """Return the effective number of pixels in the scatter of each block: (Σ x²)² / Σ x⁴, at least
+    1.
+    """
     squares = np.square(values).sum(axis=-1)
     fourth = block_sums(np.square(squares))
     return np.maximum(np.square(block_sums(squares)) / np.maximum(fourth, TINY), 1)
@@ -121,7 +126,7 @@ def _scatter(values: Floats) -> Doubles:
 
 
 def _smooth(scatter: Floats) -> Doubles:
-    """Return means over neighbouring blocks, with some variance in every mix of the channels."""
+    """Return means over neighbouring blocks, with a minimum variance in every mix of channels."""
     mean = np.asarray(box_mean(scatter, SMOOTH), np.float64)
     trace = np.trace(mean, axis1=-2, axis2=-1)[..., None, None]
     return np.asarray(mean + FLOOR * trace / 3 * np.eye(3))

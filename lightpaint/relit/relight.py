@@ -1,7 +1,7 @@
 """Writes a lighting into the user's own scene XML.
 
-The original text is edited, not written anew, so that comments, includes and defaults
-survive and a diff shows the lights and nothing else.
+The original text is edited rather than rewritten, so comments, includes and defaults are preserved,
+and a diff shows the lights and nothing else.
 """
 
 import os
@@ -32,20 +32,19 @@ UNUSED = re.compile(r"- \$(\w+)=")
 def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
     """Write `scene` with the emissions of `lighting` to `path`, and load it back.
 
-    Only the lights change in it: values of `$name` parameters that the scene was loaded with are
-    not written, and are given again whenever it is loaded, as to the scene itself (the scene
-    returned has those that it still asks for). The file refers to the original folder by relative
-    path, so it loads in plain Mitsuba from where it lies. Included files that hold lights are
-    copied beside it, and so are scaled images of lights that emit one. A light that is off keeps
-    its emitter, is black and is never sampled.
+    Only the lights change. Values of `$name` parameters are not written, and must be given again
+    when the file is loaded; the returned scene has those that it still uses. The file refers to the
+    original folder by a relative path, so plain Mitsuba can load it in place. Included files that
+    contain lights are copied beside it, and so are scaled images of image lights. A light that is
+    off keeps its emitter, which is black and never sampled.
 
-    Which emitters make up each light is what `lighting` says, however `scene` ties them; those it
-    keeps are not touched. In the scene returned every emitter is a light.
+    `lighting` decides which emitters belong to each light, however `scene` groups them, and the
+    emitters that it keeps are not changed. In the returned scene every emitter is a light.
 
     Args:
         scene: The scene of the lighting.
         lighting: A setting for all its emitters.
-        path: XML to write.
+        path: XML file to write.
 
     Raises:
         LightingError: If the two name different emitters.
@@ -78,9 +77,10 @@ def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
 
 
 def _loaded(path: Path, scene: Scene) -> Scene:
-    """Load a written scene with those of the parameters that it still uses.
+    """Load a written scene with the parameters that it still uses.
 
-    Parameters that only lights used have no use now, and Mitsuba refuses a value without use.
+    Parameters that only lights used are unused now, and Mitsuba rejects values for unused
+    parameters.
     """
     left = dict(scene.parameters)
     while True:
@@ -94,10 +94,10 @@ def _loaded(path: Path, scene: Scene) -> Scene:
 
 
 def settle(scene: Scene, lighting: Lighting, path: Path, home: Path) -> bool:
-    """Make the relit XML at `path` right for its later place `home`, with all beside it.
+    """Correct the relit XML at `path`, and the files beside it, for its final location `home`.
 
-    Only relative paths change, and only if the two have different places among folders. Returns
-    whether anything changed.
+    Only relative paths change, and only if they differ between the two locations. Returns whether
+    anything changed.
     """
 
     def ways(to: Path) -> list[str]:
@@ -113,11 +113,10 @@ def settle(scene: Scene, lighting: Lighting, path: Path, home: Path) -> bool:
 
 
 def check_relightable(scene: Scene, path: Path) -> list[Path]:
-    """Raise the errors that `relight` would raise for some lighting, before a costly render.
+    """Raise the errors that `relight` might raise for some lighting, before a costly render.
 
-    Returns all files that it might write.
-
-    The probe is a colour that no light has, so that every light takes its most demanding change.
+    Returns all files that it might write. The probe is a colour that no light has, so that every
+    light undergoes its most demanding change.
     """
     probe: dict[str, RGB] = {
         light.name: (0.5, 0.5, 0.5) if light.is_scalar else (0.5, 0.25, 0.125)
@@ -128,10 +127,10 @@ def check_relightable(scene: Scene, path: Path) -> list[Path]:
 
 
 def scene_of(scene: Scene, lighting: Lighting) -> Scene:
-    """Return `scene` with its emitters tied and placed as `lighting` ties and places them.
+    """Return `scene` with its emitters grouped and placed as in `lighting`.
 
-    Raises LightingError unless it names exactly the emitters of `scene`, and gives each light
-    in the unit that the scene has it in.
+    Raises LightingError unless it names exactly the emitters of `scene`, with each light in the
+    scene's unit.
     """
     scene = placed_scene(scene, lighting)
     emitter_names = {name for members in lighting.members.values() for name in members}
@@ -154,7 +153,7 @@ def scene_of(scene: Scene, lighting: Lighting) -> Scene:
 
 
 def placed_scene(scene: Scene, lighting: Lighting) -> Scene:
-    """Return `scene` with the lights that `lighting` has moved or added, unless it has them."""
+    """Return `scene` with the lights that `lighting` moved or added, unless it has them already."""
     names = {emitter.name for emitter in scene.emitters}
     new = [x for x in lighting.places if x.new and x.name not in names]
     if new:

@@ -15,7 +15,7 @@ from lightpaint.scene.scene import Scene
 
 
 def settings_of(scene: Scene, emission: Mapping[str, RGB]) -> Iterator[tuple[Emitter, RGB]]:
-    """Return the setting of each adjusted emitter. emission: by name of light."""
+    """Yield each adjusted emitter with its emission. emission: emission by light name."""
     for light in scene.lights:
         if not light.is_fixed:
             for member in light.members:
@@ -24,10 +24,10 @@ def settings_of(scene: Scene, emission: Mapping[str, RGB]) -> Iterator[tuple[Emi
 
 @dataclass
 class _Edits:
-    """The changes in one file: the settings of the emitters in it, by byte offset.
+    """The changes in one file. settings: settings of its emitters, by byte offset.
 
-    integrators: the replacements of elements, by byte offset; at None, an addition.
-    moved: children to set of the elements of moved lights, by byte offset: XML by name.
+    integrators: replacements of elements, by byte offset; None for an addition.
+    moved: child elements to set in the elements of moved lights, by byte offset, as XML by name.
     added: lines of the elements of new lights.
     """
 
@@ -79,7 +79,7 @@ def relit_files(
         is_root = edit.original == root
         target = path if is_root else path.parent / _place_of_include(edit.original, root)
         content, images = _edit(edit, target.parent, scene, path.stem)
-        # Mitsuba looks for images beside the scene, also for those of an included file.
+        # Mitsuba looks for images beside the scene, even for those of an included file.
         written |= {path.parent / name: image for name, image in images.items()}
         written[target] = content
     originals = {file.resolve() for file in scene.originals}
@@ -91,7 +91,7 @@ def relit_files(
 
 
 def _edit_integrators(scene: Scene, edits: dict[Path, _Edits]) -> None:
-    """Add edits that replace the scene's own integrator by the one that it was loaded with."""
+    """Add edits that replace the scene's own integrator by the one it was loaded with."""
     if scene.instead is None:
         return
     text = scene.instead.xml
@@ -113,11 +113,10 @@ def _included_twice(file: Path, first: Emitter, second: Emitter) -> SceneError:
 def _sampled_emitters(
     settings: Mapping[Emitter, RGB], unchanged: Sequence[Emitter]
 ) -> set[Emitter]:
-    """Return those of `settings` that a render may sample: the lit ones that are not only hit by
-    chance.
+    """Return the emitters among `settings` to be sampled: lit ones that are not only hit by chance.
 
-    Mitsuba refuses a scene in which no emitter may be sampled: black ones may where there are no
-    others, and at last those that are hit by chance.
+    Mitsuba rejects a scene without any sampled emitter. So if there are no others, black ones are
+    sampled, and as a last resort those that are hit by chance.
     """
     can_be_sampled = {emitter for emitter in settings if not emitter.hit_by_chance}
     lit = {emitter for emitter in can_be_sampled if any(settings[emitter])}
@@ -134,7 +133,9 @@ def _sampling_weight(emitter: Emitter, *, is_sampled: bool) -> float | None:
 
 
 def _place_of_include(file: Path, root: Path) -> Path:
-    """Return the path of an edited copy, relative to relit.xml, at which Mitsuba finds it first."""
+    """Return the path of an edited copy, relative to relit.xml, where Mitsuba finds it before the
+    original.
+    """
     try:
         return file.resolve().relative_to(root.resolve().parent)
     except ValueError:
@@ -147,11 +148,11 @@ def _place_of_include(file: Path, root: Path) -> Path:
 def _edit(edit: _Edits, folder: Path, scene: Scene, stem: str) -> tuple[bytes, dict[str, Floats]]:
     """Return the edited XML for `folder`, and the images that it refers to, by name.
 
-    stem: the beginning of image names.
+    stem: prefix of image names.
     """
     xml = XmlFile(edit.original)
     if xml.root.tag == "scene":
-        # Assets and includes lie where the original lies.
+        # Assets and includes stay beside the original.
         origin = os.path.relpath(edit.original.resolve().parent, folder.resolve())
         lines = [tag("path", value=Path(origin).as_posix())]
         lines += [text for at, text in edit.integrators.items() if at is None]

@@ -1,4 +1,4 @@
-"""Renders of the solved scene that improve the answer."""
+"""Refines the answer with renders of the solved scene."""
 
 import tempfile
 from collections.abc import Sequence
@@ -24,12 +24,11 @@ def refine_by_rendering(
     seed: int = 0,
     progress: Progress = silent,
 ) -> Solution:
-    """Repeat `rounds` times: render the scene under the solution's lighting and take a
-    Newton step.
+    """Render the scene under the solution's lighting and take a Newton step, `rounds` times.
 
-    views: scene and basis of each view; the solution is of all of them. spp: samples per pixel
-    of each render, on the film of the basis; as many as the basis has by default. Every round uses
-    its own random numbers, different from those of the basis and of verifications.
+    views: scene and basis of each view in the solution. spp: samples per pixel of each render, on
+    the film of the basis; by default as many as the basis has. Every round uses random numbers that
+    neither the other rounds, the basis nor a verification uses.
     """
     for k in range(rounds):
         mixed = []
@@ -51,7 +50,7 @@ def _mixed(
     label: str,
     progress: Progress,
 ) -> Estimate:
-    """Render one view of the solved scene, of the size of its basis."""
+    """Render one view of the solved scene at the size of its basis."""
     height, width = basis.size
     with tempfile.TemporaryDirectory(prefix="lightpaint-") as folder:
         relit = relight(scene, solution.lighting, Path(folder) / "relit.xml")

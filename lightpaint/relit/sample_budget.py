@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from lightpaint.images.pixel_blocks import Size, whole_factor
 from lightpaint.scene.scene import Scene
 
-#: Least samples per pixel of a verification: with fewer, a smaller film serves as well.
+#: Minimum samples per pixel of a verification; with fewer, a smaller film is just as good.
 FEWEST = 4
 
 
@@ -13,8 +13,8 @@ FEWEST = 4
 class VerificationBudget:
     """The size and the samples of a verification.
 
-    scene: relit, on the film of the render. spp: samples per pixel. share: of the samples of the
-    basis.
+    scene: the relit scene on the film to render. spp: samples per pixel. share: its samples
+    relative to those of the basis.
     """
 
     scene: Scene
@@ -32,14 +32,14 @@ def verification_budget(
 ) -> VerificationBudget:
     """Return a verification of `relit` that takes no longer than its basis, or the requested one.
 
-    The samples of the basis go to the whole film, or to the largest one of whole blocks with FEWEST
-    in each pixel; the comparison is of means over blocks of the basis, so that both are equal. A
-    sample costs no more in an ordinary render than in a basis. A film that no blocks fit into takes
-    at least two samples in each pixel, for two halves, whatever the basis has.
+    The samples of the basis are spent on the whole film, or on the largest film of whole blocks
+    that has FEWEST in each pixel; the comparison uses means over the blocks of the basis, so either
+    film serves. A sample of an ordinary render costs no more than one of a basis. A film that
+    cannot be divided into blocks gets at least two samples in each pixel, for two halves, whatever
+    the basis has.
 
-    basis_size: (height, width); basis_spp: samples per pixel. most_spp: the most
-    samples per pixel, without asked_spp. asked_spp: samples per pixel of the whole film, whatever
-    they cost.
+    basis_size: (height, width). basis_spp: samples per pixel. most_spp: maximum samples per pixel,
+    unless asked_spp is given. asked_spp: samples per pixel of the whole film, whatever they cost.
     """
     samples = basis_spp * basis_size[0] * basis_size[1]
     whole = relit.size[0] * relit.size[1]
@@ -50,7 +50,7 @@ def verification_budget(
         if factor % part:
             continue
         scene = relit if part == 1 else relit.reduced(f"1/{part}")
-        # A block that is not a pixel of Mitsuba's film costs a sample in each of its pixels.
+        # A block that is not a pixel of Mitsuba's film costs a sample in each of its film pixels.
         saves = scene.film.block == relit.film.block
         if part < factor and not (saves and whole_factor(scene.size, basis_size) == factor // part):
             continue
@@ -58,7 +58,7 @@ def verification_budget(
         spp = samples // pixels
         if spp >= FEWEST or part == factor:
             spp = max(2, spp if most_spp is None else min(spp, most_spp))
-            # The same number in each pixel of a block, for either half.
+            # Each film pixel of a block gets the same number, in both halves.
             spp = max(spp, 2 * scene.film.block_pixels)
             return VerificationBudget(scene, spp, spp * pixels / samples)
     raise AssertionError("the last factor is always taken")

@@ -1,13 +1,14 @@
-"""A verification that stops as soon as it can tell.
+"""A verification that stops as soon as it is conclusive.
 
-It is a group-sequential test: it looks at the render after a few samples, and each time that their
-number has grown by half or a third. It goes on while an error would probably not show in a large
-part of the light and more samples would help. That depends on the noise, and not on how well the
-two agree, so the difference in standard errors is as likely at one look as at any other. Only a
-difference beyond the limit ends it at once.
+It is a group-sequential test: it examines the render after a few samples, and again each time their
+number has grown by a third to a half. It continues while an error in a large part of the light
+would probably not be detected and more samples would help. That depends on the noise, but not on
+how well prediction and render agree, so the difference in standard errors has the same distribution
+at every look. Only a difference beyond the limit stops it at once.
 
-The chance of a false alarm is spent evenly on the looks: the limit of each is so far out that all
-looks together pass sound renders as often as one look at `LIMIT` does, whenever it ends.
+The probability of a false alarm is divided among the looks: the limit of each is raised so that all
+looks together pass correct renders as often as a single look does at `LIMIT`, whenever the test
+stops.
 """
 
 from dataclasses import replace
@@ -31,17 +32,17 @@ from lightpaint.relit.verification import (
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, render_in_stages
 
-#: Numerators and denominator of the parts of its samples after which a verification is tested.
+#: Numbers of parts, out of ALL_PARTS, of the samples after which the render is examined.
 LOOKS, ALL_PARTS = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64), 64
 
-#: Least samples of each pixel at a look, one for each half.
+#: Minimum samples per pixel at a look, one for each half.
 FIRST_LOOK = 2
 
-#: Share of the picture's light in which an error has to show before it ends, and share from which
-#: on it has to show in any one light.
+#: Share of the picture's light in which an error must be detectable before the test stops; and
+#: share from which on a single light must be among it.
 CHECKED, LARGE = 0.65, 1 / 7
 
-#: Share of the picture's light that does not count although more samples would check it.
+#: Share of the picture's light that may stay unchecked although more samples would check it.
 UNCHECKED = 0.1
 
 
@@ -55,13 +56,12 @@ def verify_in_stages(
     seed: int = 0,
     progress: Progress = silent,
 ) -> Verification:
-    """Render the relit scene until an error of 5 % in the lights would have been seen.
+    """Render the relit scene until an error of 5 % in the lights would have been detected.
 
-    It ends where an error would probably show in lights that make CHECKED of the picture's light,
-    among them all that make LARGE each; or where all samples would show one in less than UNCHECKED
-    more. predicted: the sum of `basis`
-    under `lighting`, of the size of `relit` or on a reduced film of it. spp: samples per pixel at
-    most.
+    It stops when an error would probably be detected in lights that make up CHECKED of the
+    picture's light, including every light with a share of LARGE or more; or when all samples would
+    check less than UNCHECKED in addition. predicted: the sum of `basis` under `lighting`, of the
+    size of `relit` or on a reduced film of it. spp: maximum samples per pixel.
     """
     lights, stages = LightShares.of(basis, lighting), stages_of(spp, relit.film.block_pixels)
     limit = limit_of_tests(len(stages))
@@ -84,9 +84,9 @@ def verify_in_stages(
 
 
 def stages_of(spp: int, block_pixels: int = 1) -> list[int]:
-    """Return the samples per pixel at each look, the last of which is `spp`.
+    """Return the samples per pixel at each look; the last is `spp`.
 
-    Both halves have equal ones, in multiples of `block_pixels`.
+    Both halves have equal numbers, in multiples of `block_pixels`.
     """
     step = 2 * block_pixels
     stages = [spp * part // ALL_PARTS for part in LOOKS]
@@ -102,9 +102,9 @@ def can_tell(
     *,
     limit: float = LIMIT,
 ) -> bool:
-    """Return whether a verification may end here.
+    """Return whether a verification may stop.
 
-    predicted, verified: as in `compare`, of one size. done: share of the samples that are rendered.
+    predicted, verified: as in `compare`, of equal size. done: share of the samples rendered so far.
     """
     tests = light_tests(predicted, verified, lights.blocks, lights.noise)
     z_lights = dict(zip(lights.names, tests.z.tolist(), strict=True))
@@ -115,7 +115,7 @@ def can_tell(
     missed = [share for name, share in shares.items() if power[name] < LOW_POWER]
     if sum(missed) <= 1 - CHECKED and max(missed, default=0.0) < LARGE:
         return True
-    # With all samples the render would have this much less noise.
+    # With all samples, the noise of the render would be lower by this factor.
     at_end = Estimate(verified.image, verified.half_difference * done**0.5)
     tests = light_tests(predicted, at_end, lights.blocks, lights.noise)
     power = detection_power(predicted, at_end, lights, tests, limit=limit)

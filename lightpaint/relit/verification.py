@@ -1,8 +1,7 @@
-"""The comparison of a prediction with an independent render, relative to the noise of both.
+"""Compares a prediction with an independent render, relative to the noise of both.
 
-The predicted image Σ w_i Φ_i and the render of the relit scene estimate the same picture
-from different samples. They differ by noise; if they differ by more, something is wrong,
-and the difference in units of the noise (z) tells.
+The predicted image Σ w_i Φ_i and the render of the relit scene estimate the same picture, so their
+difference in units of the noise (z) tells whether the prediction is right.
 """
 
 from collections.abc import Iterable, Mapping
@@ -20,16 +19,16 @@ from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.keywords import keywords
 from lightpaint.screen import Shown
 
-#: Side of the blocks of pixels over which differences are averaged before the tests.
+#: Side of the blocks of pixels over which differences are summed before the tests.
 BLOCK = 8
-#: Standard errors at which a difference counts as real: far enough out that sound renders
-#: pass thousands of times in a row.
+#: Standard errors beyond which a difference counts as real: so many that correct renders pass
+#: thousands of times in a row.
 LIMIT = 5.0
 
 #: Power below which an error would probably not have been detected.
 LOW_POWER = 0.5
 
-#: Relative round-off of float32 sums, below which a difference means nothing.
+#: Relative round-off of float32 sums; smaller differences are meaningless.
 PRECISION = 1e-5
 
 
@@ -39,25 +38,26 @@ class Verification(Shown):
     """The difference between prediction and verification.
 
     Attributes:
-        verified: The independent render. If pixels of the prediction are blocks of its own, all
-            else refers to its block means, at the size (h, w) of the prediction.
-        z: (h, w, 3), difference per pixel in standard errors, the noise pooled over neighbours.
+        verified: The independent render. If each pixel of the prediction is a block of its pixels,
+            everything else refers to its block means, at the size (h, w) of the prediction.
+        z: (h, w, 3), difference in each pixel in standard errors, with noise pooled over
+            neighbours.
         z_rms: Root mean square of the differences of 8x8 blocks in their own standard errors. About
-            1 if there is only noise; a little more where the noise is rare bright samples.
-        z_mean: (3,), difference of the whole image's sum, in standard errors.
-        z_pattern: The correlation of the differences of the two halves, block by block, in standard
-            errors (see `_pattern`): noise has none, a local error has.
-        rmse: Of the pixels, in radiance.
-        noise_rmse: The same for noise alone.
-        delta_e_mean: CIEDE2000 at an exposure metered on the render, mean.
-        delta_e_95: The same, 95th percentile.
-        z_lights: For each light that shines, the difference along its picture, in standard errors
+            1 if there is only noise; slightly more if the noise consists of rare bright samples.
+        z_mean: (3,), difference of the sums over the whole image, in standard errors.
+        z_pattern: Correlation between the differences of the two halves, block by block, in
+            standard errors (see `_pattern`): 0 on average for noise, larger for a local error.
+        rmse: Root mean square difference of the pixels, in radiance.
+        noise_rmse: The value of `rmse` expected from noise alone.
+        delta_e_mean: Mean CIEDE2000, at an exposure metered on the render.
+        delta_e_95: 95th percentile of the same.
+        z_lights: For each lit light, the difference along its picture in standard errors
             (light_tests.py); empty if not computed.
-        power: For each light that shines, the probability that this render would have disagreed
-            with an error of 5 % in it (detection_power.py); None if not computed.
-        limit: Standard errors at which a difference counts as real; farther out where the render
-            was looked at several times before its end, so that sound renders pass as often.
-        spp: Samples per pixel that were rendered; None where that is not known.
+        power: For each lit light, the probability that this render would have disagreed with an
+            error of 5 % in it (detection_power.py); None if not computed.
+        limit: Standard errors beyond which a difference counts as real; larger if the render was
+            examined several times, so that correct renders pass as often.
+        spp: Samples per pixel that were rendered; None if unknown.
 
     Examples:
         >>> scene = lp.load_scene("room.xml")
@@ -90,27 +90,29 @@ class Verification(Shown):
 
     @property
     def difference(self) -> float:
-        """The largest of the differences in standard errors, for comparison with `limit`."""
+        """The largest of the differences in standard errors, to be compared with `limit`."""
         return largest_difference(self.z_mean, self.z_pattern, self.z_lights, limit=self.limit)
 
     @property
     def agrees(self) -> bool:
-        """True if the difference can be noise alone."""
+        """True if noise alone can explain the difference."""
         return self.difference <= self.limit
 
     @property
     def unseen(self) -> tuple[str, ...]:
-        """Lights in which an error of 5 % would probably not have been detected, the least
-        first."""
+        """Lights in which an error of 5 % would probably not have been detected, least likely
+        first.
+        """
         power = self.power or {}
         return tuple(sorted((x for x in power if power[x] < LOW_POWER), key=power.__getitem__))
 
 
 def limit_of_tests(count: int, *, once: float = LIMIT) -> float:
-    """Return the limit, in standard errors, that passes sound renders as often as `once` does once.
+    """Return the limit, in standard errors, at which `count` tests pass correct renders as often as
+    one test does at `once`.
 
-    By Bonferroni's inequality the chance of a false alarm is at most the sum of those of each test,
-    however the tests hang together and whichever of them are made.
+    By Bonferroni's inequality the probability of a false alarm is at most the sum over the tests,
+    however they are correlated and whichever of them are made.
     """
     return -NormalDist().inv_cdf(NormalDist().cdf(-once) / count)
 
@@ -118,9 +120,9 @@ def limit_of_tests(count: int, *, once: float = LIMIT) -> float:
 def largest_difference(
     z_mean: Iterable[float], z_pattern: float, z_lights: Mapping[str, float], *, limit: float
 ) -> float:
-    """Return the largest of the differences in standard errors, for comparison with `limit`.
+    """Return the largest of the differences in standard errors, to be compared with `limit`.
 
-    The largest of many lights' deviations exceeds a single one's, so they are scaled down.
+    The extreme of many lights is larger than that of one, so their differences are scaled down.
     """
     lights = max(map(abs, z_lights.values()), default=0.0)
     lights *= limit / limit_of_tests(max(len(z_lights), 1), once=limit)
@@ -130,7 +132,7 @@ def largest_difference(
 def differences(
     predicted: Estimate, verified: Estimate
 ) -> tuple[tuple[float, float, float], float]:
-    """Return `z_mean` and `z_pattern` of two estimates of one size."""
+    """Return `z_mean` and `z_pattern` of two estimates of equal size."""
     squares, magnitude = noise_of(predicted, verified)
     difference = predicted.image.astype(np.float64) - verified.image
     red, green, blue = difference.sum(axis=(0, 1)) / np.sqrt(squares.sum(axis=(0, 1)))
@@ -139,9 +141,9 @@ def differences(
 
 
 def compare(predicted: Estimate, verified: Estimate) -> Verification:
-    """Test the difference of two independent estimates of one picture.
+    """Test the difference of two independent estimates of the same picture.
 
-    verified: of the size of `predicted`, or with a block of pixels for each pixel of it. Raises
+    verified: of the size of `predicted`, or with a block of pixels for each of its pixels. Raises
     SizeError otherwise.
     """
     factor = whole_factor(verified.size, predicted.size)
@@ -158,7 +160,7 @@ def _judge(predicted: Estimate, verified: Estimate) -> Verification:
     pooled = predicted.variance() + verified.variance() + np.square(PRECISION * magnitude)
     z = difference / np.sqrt(pooled + np.finfo(np.float32).tiny)
 
-    # A block's mean difference, over the standard error that its own pixels show.
+    # A block's difference, divided by the standard error estimated from its own pixels.
     block_z = block_sums(difference) / np.sqrt(block_sums(squares))
     z_mean, z_pattern = differences(predicted, verified)
 
@@ -178,41 +180,45 @@ def _judge(predicted: Estimate, verified: Estimate) -> Verification:
 
 
 def noise_of(predicted: Estimate, verified: Estimate) -> tuple[Doubles, Doubles]:
-    """Return the variance of the difference and the brightness of both, (h, w, 3) each."""
+    """Return the variance of the difference, and the summed brightness of both, (h, w, 3) each."""
     squares = np.square(predicted.half_difference, dtype=np.float64)
     squares += np.square(verified.half_difference, dtype=np.float64)
-    # Round-off is noise, too; it avoids 0/0 where no light falls.
+    # Round-off counts as noise, too; it avoids 0/0 where no light falls.
     magnitude = np.abs(predicted.image).astype(np.float64) + np.abs(verified.image)
     squares += np.square(PRECISION * magnitude) + np.finfo(np.float32).tiny
     return squares, magnitude
 
 
 def brightness_weights(magnitude: Floats) -> Doubles:
-    """Return the weight of each block in the pattern, (rows, columns): bright ones count less."""
+    """Return the weight of each block in the pattern, (rows, columns), which decreases with
+    brightness.
+    """
     brightness = block_sums(magnitude.sum(axis=-1, dtype=np.float64))
     typical = brightness.mean()
     return np.square(typical / (brightness + typical)) if typical > 0 else np.ones_like(brightness)
 
 
 def _pattern(predicted: Estimate, verified: Estimate, squares: Floats, magnitude: Floats) -> float:
-    """Return Σ_blocks d_A d_B over its standard error, d_A and d_B the differences of the halves.
+    """Return Σ_blocks d_A d_B in standard errors, where d_A and d_B are the differences of the
+    halves.
 
-    The halves A and B of both images are independent, so noise of any distribution makes the sum 0
-    on average, and a true difference adds its square. Blocks count relative to their brightness.
-    squares: variance per pixel; magnitude: brightness.
+    The halves A and B of both images are independent, so with noise of any distribution the sum is
+    0 on average, and a true difference adds its square. Blocks are weighted relative to their
+    brightness. squares: variance per pixel. magnitude: brightness.
     """
     difference = predicted.image.astype(np.float64) - verified.image
     half = predicted.half_difference.astype(np.float64) - verified.half_difference
     weight = brightness_weights(magnitude)
     products = (block_sums(difference + half) * block_sums(difference - half)).sum(axis=-1)
-    # A half has twice the variance of the mean; the channels may all go together.
+    # A half has twice the variance of the mean, and the channels may be fully correlated.
     spread = 2 * block_sums(squares).sum(axis=-1)
     return float((weight * products).sum() / np.sqrt(np.square(weight * spread).sum()))
 
 
 def block_sums(image: Floats) -> Doubles:
-    """Return sums over whole blocks of BLOCK x BLOCK pixels, in float64; the ragged border joins
-    the last ones."""
+    """Return sums over blocks of BLOCK × BLOCK pixels in float64; remainders join the last
+    blocks.
+    """
     rows = np.arange(0, max(image.shape[0] - BLOCK + 1, 1), BLOCK)
     columns = np.arange(0, max(image.shape[1] - BLOCK + 1, 1), BLOCK)
     strips = np.add.reduceat(image, rows, axis=0, dtype=np.float64)

@@ -1,4 +1,4 @@
-"""The independent render of the relit scene, compared with the prediction."""
+"""Renders the relit scene independently, and compares it with the prediction."""
 
 from dataclasses import replace
 
@@ -22,15 +22,15 @@ def verify(
     stream: Stream = Stream.VERIFICATION,
     progress: Progress = silent,
 ) -> Verification:
-    """Render the relit scene with samples no basis ever uses, and compare.
+    """Render the relit scene with random numbers that no basis uses, and compare.
 
     Args:
-        predicted: Of the size of `relit`, or on a reduced film of it.
+        predicted: The prediction, of the size of `relit` or on a reduced film of it.
         relit: The result of `relight`.
-        spp: Samples per pixel of `relit` (the scene's own number by default).
+        spp: Samples per pixel of `relit` (by default the scene's own number).
         seed: Any number >= 0.
-        stream: Random numbers to draw; a repeated verification takes others than the first.
-        progress: Hears how far the work has come.
+        stream: Stream of random numbers; a repeated verification uses another one.
+        progress: Called with the progress of the work.
 
     Examples:
         >>> scene = lp.load_scene("room.xml")

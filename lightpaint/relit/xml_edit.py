@@ -1,7 +1,7 @@
-"""Edits of a few elements of an XML file that leave the rest unchanged.
+"""Edits single elements of an XML file, and leaves everything else unchanged.
 
-Positions are byte offsets into the UTF-8 form of the text (see scene/checks/tokens.py); the file's
-own encoding comes back when it is written.
+Positions are byte offsets into the UTF-8 form of the text (see scene/checks/tokens.py); the file is
+written in its own encoding.
 """
 
 import re
@@ -15,10 +15,10 @@ from lightpaint.scene.checks.tokens import attributes, decoded, encoding_of, lin
 
 @dataclass
 class Element:
-    """An element of the file: the places of its tags, and its children.
+    """An element of the file: positions of its tags, and its children.
 
-    name: of the property that it is, in snake_case also where an old scene writes camelCase;
-    start: of its `<`; inner: just behind its start tag; end: just behind the whole element.
+    name: the property's name, converted to snake_case if an old scene has camelCase. start: offset
+    of its `<`. inner: offset just after its start tag. end: offset just after the whole element.
     """
 
     tag: str
@@ -35,15 +35,15 @@ class Element:
         return self.end == self.inner
 
     def child_named(self, name: str) -> "Element | None":
-        """Return the child of that name, in snake_case."""
+        """Return the child with that name, in snake_case."""
         return next((c for c in self.children if c.name == name), None)
 
 
 class XmlFile:
     """The text of an XML file, and the edits to make in it.
 
-    Raises SceneError if the file is gone, or if a tag is unreadable, unclosed or closed by
-    another's end tag.
+    Raises SceneError if the file cannot be read, or if a tag is invalid, not closed, or closed by
+    another tag.
     """
 
     def __init__(self, path: Path) -> None:
@@ -53,7 +53,7 @@ class XmlFile:
             raise SceneError(f"cannot read {path}: {error.strerror or error}") from None
         self._encoding = encoding_of(raw)
         try:
-            # Like Mitsuba, read any other bytes as UTF-8.
+            # Like Mitsuba, treat any other bytes as UTF-8, unchanged.
             self.text = (
                 raw if self._encoding == "utf-8" else raw.decode(self._encoding).encode("utf-8")
             )
@@ -79,14 +79,14 @@ class XmlFile:
         return f"{self._path}, line {line_of(self.text, element.start)}"
 
     def replace(self, element: Element, text: str) -> None:
-        """Put `text` in the place of `element`."""
+        """Replace `element` by `text`."""
         self._edits.append((element.start, element.end, text.encode()))
 
     def insert_first(self, element: Element, lines: list[str]) -> None:
-        """Put `lines` before everything else in `element`, each on a line of its own."""
+        """Insert `lines` before everything else in `element`, each on a separate line."""
         indent = _indent_before(self.text, element.start)
         if element.is_empty_tag:
-            # <emitter …/> opens up to hold them.
+            # Split <emitter …/> into a start and an end tag.
             slash = self.text.rindex(b"/", element.start, element.end)
             body = "".join(f"{self._newline}{indent}    {line}" for line in lines)
             closing = f">{body}{self._newline}{indent}</{element.tag}>"
@@ -102,7 +102,7 @@ class XmlFile:
         self._edits.append((element.inner, element.inner, body.encode()))
 
     def insert_last(self, element: Element, lines: list[str]) -> None:
-        """Put `lines` behind everything else in `element`, each on a line of its own."""
+        """Insert `lines` after everything else in `element`, each on a separate line."""
         if element.is_empty_tag:
             self.insert_first(element, lines)
             return
@@ -119,20 +119,19 @@ class XmlFile:
         self._edits.append((place, place, body.encode()))
 
     def edited(self) -> bytes:
-        """Return the whole file with all edits made, in its own encoding."""
+        """Return the whole file with all edits applied, in its own encoding."""
         text = self.text
-        # From the back; replacements before insertions in front of them.
+        # From back to front; replacements before insertions at the same offset.
         for start, end, new in sorted(self._edits, key=lambda e: e[:2], reverse=True):
             text = text[:start] + new + text[end:]
         if self._encoding == "utf-8":
             return text
-        # Characters that the encoding lacks become character references, which XML allows.
+        # Characters missing in the encoding become character references, which XML allows.
         return text.decode("utf-8").encode(self._encoding, "xmlcharrefreplace")
 
 
 def _parse(text: bytes) -> tuple[Element, dict[int, Element]]:
-    """Return (root, all elements by offset). Text behind the root is ignored. What comes behind the
-    root is not looked at.
+    """Return (root, all elements by offset), ignoring text after the root.
 
     Raises ValueError, with the line, if the tags do not match.
     """
@@ -172,13 +171,15 @@ def _parse(text: bytes) -> tuple[Element, dict[int, Element]]:
 
 
 def _is_old(version: str) -> bool:
-    """Return whether Mitsuba turns camelCase names into snake_case in a file of that version."""
+    """Return whether Mitsuba converts camelCase names to snake_case in a file of this version."""
     major = re.match(r"\s*(\d+)", version)
     return major is not None and int(major[1]) < 2
 
 
 def _snake_case(name: str) -> str:
-    """Return a name by Mitsuba's rule: only capitals right behind a small letter begin a word."""
+    """Return a name in snake_case by Mitsuba's rule: capitals start a word only after a small
+    letter.
+    """
     return re.sub(r"([a-z])([A-Z]+)", lambda m: f"{m[1]}_{m[2].lower()}", name)
 
 

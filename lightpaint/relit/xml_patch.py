@@ -1,4 +1,4 @@
-"""A lighting as a patch of the scene's own XML, for `patch` and for readers."""
+"""A lighting as a patch of the scene's XML, for `patch` and for reading the changes."""
 
 import difflib
 import os
@@ -15,17 +15,16 @@ from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.properties.emission import Scaling
 from lightpaint.scene.scene import Scene
 
-#: A folder that does not exist, and stands for any place of the relit scene.
+#: A non-existing folder that stands for any location of the relit scene.
 ELSEWHERE = ".lightpaint-patch"
 
 
 def scene_patch(scene: Scene, lighting: Lighting) -> str:
-    """Return a unified diff of the scene's files, from its folder, in which only the lights change.
+    """Return a unified diff of the scene's files, relative to its folder, that changes only the
+    lights.
 
-    `patch -p1 < relit.patch` in the folder of the scene applies it.
-
-    Raises SceneError for scaled images, which no patch of text can contain; LightingError if the
-    two name different emitters.
+    `patch -p1 < relit.patch` in the folder of the scene applies it. Raises SceneError for scaled
+    images, which a text patch cannot contain, and LightingError if the two name different emitters.
     """
     scene = scene_of(scene, lighting)
     root = scene.files[0].resolve()
@@ -42,7 +41,7 @@ def scene_patch(scene: Scene, lighting: Lighting) -> str:
             old = (root.parent / name).read_text(encoding="utf-8")
         except OSError as error:
             raise OutputError(f"cannot read {name}: {error.strerror or error}") from error
-        # A file that stays in its folder finds its meshes as before.
+        # A file that stays in its folder needs no search path for its assets.
         origin = os.path.relpath((root.parent / name).parent, file.parent)
         path_line = r"\r?\n[ \t]*" + re.escape(tag("path", value=Path(origin).as_posix()))
         new = re.sub(path_line, "", content.decode("utf-8"), count=1)
@@ -53,7 +52,7 @@ def scene_patch(scene: Scene, lighting: Lighting) -> str:
 def emitters_of(scene: Scene, lighting: Lighting) -> list[tuple[str, str, RGB]]:
     """Return name, Mitsuba's parameter and emission of every adjusted emitter.
 
-    The parameter is "" if the emission is a multiple of the scene's, as for a sky.
+    The parameter is "" if the emission is a multiple of that in the scene, as for a sky.
     """
     tied = scene_of(scene, lighting)
     return [
@@ -68,7 +67,7 @@ def _quantity(emitter: Emitter) -> str:
 
 
 def _lines(text: str) -> list[str]:
-    """Return lines with their ends, the last one like the others."""
+    """Return lines with line ends, adding one to the last line if missing."""
     lines = text.splitlines(keepends=True)
     if lines and not lines[-1].endswith("\n"):
         lines[-1] += "\n"

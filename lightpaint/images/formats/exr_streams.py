@@ -131,7 +131,7 @@ def write_streamed(
     room: int,
     texts: Callable[[], Mapping[str, str]] = dict,
 ) -> None:
-    """Write a multi-part EXR, all of it or nothing.
+    """Write a multi-part EXR file atomically.
 
     Pixels are written as they arrive, after space reserved for the headers.
 

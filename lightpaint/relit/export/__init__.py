@@ -1,1 +1,1 @@
-"""The answer in the forms that other programs take."""
+"""Exports of the answer to other programs."""

@@ -1,4 +1,4 @@
-"""Own colours for exported lights whose colour the painting does not determine."""
+"""Restores the scene's colours for exported lights whose colour the painting does not determine."""
 
 from collections.abc import Mapping
 
@@ -9,7 +9,7 @@ from lightpaint.colour.color import luminance
 from lightpaint.lighting.answer.light_setting import LightSetting
 from lightpaint.lighting.answer.lighting import Lighting
 
-#: Width of a 95 % interval, relative to the brightest channel, from which a light is hardly known.
+#: Width of a 95 % interval, relative to the brightest channel, above which a light is hardly known.
 WIDE = 1.0
 
 
@@ -18,12 +18,12 @@ def with_own_colors(
 ) -> tuple[Lighting, tuple[str, ...]]:
     """Return the lighting for other programs, and the names of lights that differ from the answer.
 
-    The solve gives a hardly visible light an arbitrary colour, often a pure one. If an interval is
-    wider than the light is bright, and the light's colour in the scene lies within the intervals of
-    all channels at some brightness, it keeps that colour, at its solved brightness or the nearest
-    one that fits. Colours with a constraint stay.
+    The solve gives a hardly visible light an arbitrary colour, often a saturated one. If an
+    interval is wider than the light is bright, and the light's colour in the scene lies within the
+    intervals of all channels at some brightness, it keeps that colour, at its solved brightness or
+    at the nearest one that fits. Colours with a constraint are kept.
 
-    present: emission in the scene, by name, in the same units.
+    present: emission in the scene by light name, in the same units.
     """
     names = []
     for light in lighting.lights:
@@ -35,7 +35,7 @@ def with_own_colors(
 
 
 def _own_color(light: LightSetting, present: RGB) -> RGB | None:
-    """Return the emission in the light's own colour; None if the painting determines another."""
+    """Return the emission in the scene's colour; None if the painting determines another colour."""
     color, solved = np.array(present, np.float64), np.array(light.emission, np.float64)
     ends = light.interval
     if light.is_fixed or light.constraint or ends is None or not color.any() or not solved.any():
@@ -46,8 +46,8 @@ def _own_color(light: LightSetting, present: RGB) -> RGB | None:
     if np.allclose(
         solved * color.max(), color * solved.max(), rtol=0, atol=1e-6 * color.max() * solved.max()
     ):
-        return None  # it has its own colour already
-    # The range of factors for the present emission that fit all channels.
+        return None  # it has that colour already
+    # The range of factors for the present emission that fits all channels.
     least, most = 0.0, np.inf
     for (low, high), value in zip(ends_known, color, strict=True):
         if value == 0:

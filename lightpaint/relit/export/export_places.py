@@ -1,4 +1,4 @@
-"""Places of moved and new lights in the axes of another program, where lights shine along -z."""
+"""Places of moved and new lights in the axes of other programs, where lights shine along -z."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -9,26 +9,26 @@ from lightpaint.arrays import Doubles, Position
 from lightpaint.scene.properties.rotation import across, rotation_between
 from lightpaint.scene.properties.site import EmitterPlace
 
-#: Distance of places that count as one, relative to the farthest coordinate of a light.
+#: Distance up to which positions count as equal, relative to the largest coordinate of a light.
 SAME_PLACE = 1e-3
 
 _Y, _Z = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
 def old_position(place: EmitterPlace) -> Position | None:
-    """Return where a light is in the file of the scene; None for new ones, and at infinity."""
+    """Return the position of a light in the scene's file; None for new lights, and at infinity."""
     if place.new:
         return None
     return place.position if place.moved_from is None else place.moved_from.position
 
 
 def is_changed(place: EmitterPlace) -> bool:
-    """Return whether a light is new or elsewhere than in the file of the scene."""
+    """Return whether a light is new, or differs in place from the scene's file."""
     return bool(place.new) or place.moved_from is not None
 
 
 def has_new_cone(place: EmitterPlace) -> bool:
-    """Return whether the cone of a spot is another than in the file of the scene."""
+    """Return whether the cone of a spot differs from that in the scene's file."""
     if place.cutoff is None or place.moved_from is None:
         return bool(place.new) and place.cutoff is not None
     old = place.moved_from
@@ -36,10 +36,11 @@ def has_new_cone(place: EmitterPlace) -> bool:
 
 
 def axis_conversions(up: Position, program_up: Position) -> list[Doubles]:
-    """Return rotations from the scene's axes to a program's, (3, 3) each, the likeliest first.
+    """Return candidate rotations from the scene's axes to a program's, (3, 3) each, likeliest
+    first.
 
-    A camera that looks straight down or stands on its head tells the wrong axis. So behind the
-    rotation from `up` to `program_up` come the same axes, y up to z up, and z up to y up.
+    A camera that looks straight down, or is upside down, suggests a wrong up axis. So the rotation
+    from `up` to `program_up` is followed by the identity, y up to z up, and z up to y up.
     """
     return [
         rotation_between(up, program_up),
@@ -51,10 +52,11 @@ def axis_conversions(up: Position, program_up: Position) -> list[Doubles]:
 
 @dataclass(frozen=True)
 class Conversion:
-    """The way from a scene's places to a program's.
+    """The conversion of a scene's positions to a program's.
 
-    rotation: (3, 3), from the scene's axes to the program's. size: the scene's farthest coordinate
-    of a light. is_known: False if all lights that both have are elsewhere in the program.
+    rotation: (3, 3), from the scene's axes to the program's. size: the largest coordinate of a
+    light in the scene. is_known: False if none of the lights that both have is at the same
+    position.
     """
 
     rotation: Doubles
@@ -62,18 +64,18 @@ class Conversion:
     is_known: bool = True
 
     def point(self, position: Position) -> Doubles:
-        """Return a point of the scene in the program."""
+        """Return a point of the scene in the program's axes."""
         return np.asarray(self.rotation @ np.array(position))
 
     def is_at(self, position: Position, point: Doubles) -> bool:
-        """Return whether `point` of the program is `position`, but for rounding."""
+        """Return whether `point` in the program equals `position` in the scene, up to rounding."""
         distance = np.linalg.norm(self.point(position) - point)
         return bool(distance <= SAME_PLACE * self.size)
 
     def frame(self, place: EmitterPlace, old_axes: Doubles | None = None) -> Doubles:
-        """Return the axes x, y and z of a light in the program, as the rows of (3, 3).
+        """Return the axes x, y and z of a light in the program, as rows of (3, 3).
 
-        old_axes: of the existing light, whose lengths and roll are kept; None for a new one.
+        old_axes: its present axes there, whose lengths and roll are kept; None for a new light.
         """
         if place.direction is None:
             return np.eye(3) if old_axes is None else old_axes
@@ -88,7 +90,7 @@ class Conversion:
 def conversion_of(
     places: Sequence[EmitterPlace], rotations: Sequence[Doubles], present: Mapping[str, Doubles]
 ) -> Conversion:
-    """Return the rotation by which most lights are where the scene has them, the first of equals.
+    """Return the conversion with the rotation that matches most lights; of equals the first.
 
     present: positions of the lights in the program, by name.
     """

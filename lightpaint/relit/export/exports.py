@@ -1,4 +1,4 @@
-"""The answer of light groups for other programs: table, Blender, Nuke, image."""
+"""Exports the answer for light groups: a table, Blender, Nuke, and an image."""
 
 import csv
 import io
@@ -19,14 +19,15 @@ from lightpaint.lighting.answer.light_setting import LightSetting
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.export.nuke import LAYERS, copied_part, needs_copy, nuke_script
 
-#: Everything that `write_exports` may write.
+#: All files that `write_exports` may write.
 EXPORTS = ("lights.csv", "set_lights.py", "relit.nk", LAYERS, "relit.exr")
 
-#: Renderers whose groups a Blender script may set; a pattern may be of Blender as well.
+#: Renderers whose groups a Blender script can set; a pattern may describe Blender's layers, too.
 BLENDER = ("Blender", "pattern")
 
-#: Positions where a spreadsheet may read text as a formula: at the beginning of a cell, in some
-#: countries also after a semicolon, before a sign that begins one, including full-width signs.
+#: Positions where a spreadsheet may interpret text as a formula: at the beginning of a cell, which
+#: in some countries is also after a semicolon, and before any formula prefix, including full-width
+#: signs.
 _FORMULA = re.compile(r"(\A|[;\t\r\n])(?=['=+\-@\t\r\n＝＋－＠])")
 
 #: The largest finite float16.
@@ -37,20 +38,20 @@ LARGEST_HALF = 65504.0
 def write_exports(folder: str | Path, groups: LightGroups, lighting: Lighting) -> list[Path]:
     """Write `lighting`, solved from `groups`, into `folder` for other programs.
 
-    lights.csv, a table of multipliers; set_lights.py for Blender's light groups, unless another
-    renderer made the file; relit.nk for Nuke, with relit_layers.exr where Nuke could not tell the
-    layers of the file apart; relit.exr, the sum with these multipliers.
+    The files are lights.csv, a table of multipliers; set_lights.py for Blender's light groups,
+    unless another renderer wrote the file; relit.nk for Nuke, with relit_layers.exr if Nuke could
+    not distinguish the layers of the file; and relit.exr, the sum with these multipliers.
 
     Args:
-        folder: Receives the files.
+        folder: Folder to write to.
         groups: The light groups of the solve.
         lighting: The answer.
 
     Returns:
-        The files.
+        The written files.
 
     Raises:
-        LightingError: If `lighting` is of other lights.
+        LightingError: If `lighting` has other lights.
         OutputError: If `folder` cannot be written.
 
     Examples:
@@ -75,8 +76,7 @@ def write_exports(folder: str | Path, groups: LightGroups, lighting: Lighting) -
 
 
 def lights_table(groups: LightGroups, lighting: Lighting) -> str:
-    """Return a CSV of names, layers and multipliers, with their effect on a white light's
-    luminance.
+    """Return a CSV of names, layers and multipliers, with the resulting luminance of a white light.
 
     Stops are `off` at 0, and `unknown` for lights that reach nothing painted.
     """
@@ -89,12 +89,12 @@ def lights_table(groups: LightGroups, lighting: Lighting) -> str:
     unreached = lighting.certificate.unreached if lighting.certificate is not None else ()
     for light in lighting.lights:
         y = float(luminance(np.array(light.weight)))
-        # Adding 0 turns −0 into 0.
+        # Adding 0 removes the sign of a negative zero.
         stops = f"{round(math.log2(y), 3) + 0.0:+.3f}" if y > 0 else "off"
         stops = "unknown" if light.name in unreached else stops
         numbers = [f"{v:.9g}" for v in (*light.weight, y)]
         fixed = "yes" if light.is_fixed else "no"
-        # Undetermined channels, whose multiplier stays as it was.
+        # Undetermined channels, whose multipliers are unchanged.
         untold = "".join(
             c for c, is_reached in zip("RGB", light.reached, strict=True) if not is_reached
         )
@@ -104,22 +104,23 @@ def lights_table(groups: LightGroups, lighting: Lighting) -> str:
 
 
 def plain_cell(text: str) -> str:
-    """Return `text` for a cell of a table, with a `'` before all that may look like a formula.
+    """Return `text` for a cell of a table, with a `'` before anything that may look like a formula.
 
-    A `'` in such a place gets another one, so that removing one in each place restores the text.
+    An existing `'` in such a position is doubled, so removing one in each position restores the
+    text.
     """
     return _FORMULA.sub(r"\1'", text)
 
 
 def _row(*cells: str) -> str:
-    # With both as line end, the writer quotes cells that contain either.
+    # With both characters as line end, the writer quotes cells that contain either.
     row = io.StringIO()
     csv.writer(row, lineterminator="\r\n").writerow(cells)
     return row.getvalue().removesuffix("\r\n") + "\n"
 
 
 def blender_script(groups: LightGroups, lighting: Lighting) -> str:
-    """Return Python for Blender that multiplies the lights in each light group."""
+    """Return a Python script for Blender that multiplies the lights in each light group."""
     rows = [f"    {light.name!r}: {_tuple(light)},\n" for light in _free(lighting)]
     template = resources.files("lightpaint.relit.export").joinpath("set_lights.py.in")
     return Template(template.read_text(encoding="utf-8")).substitute(
@@ -131,8 +132,8 @@ def blender_script(groups: LightGroups, lighting: Lighting) -> str:
 
 
 def relit_part(groups: LightGroups, lighting: Lighting) -> ExrPart:
-    """Return Σ multiplier × layer, with the rest and the alpha of the beauty, as precise as the
-    file.
+    """Return Σ multiplier × layer with the rest and the alpha of the beauty, in the file's
+    precision.
     """
     image = groups.basis.mix(lighting.weights_for(groups.basis))
     channels = rgb_channels(image)
@@ -155,5 +156,5 @@ def _tuple(light: LightSetting) -> str:
 
 
 def _in_docstring(text: str) -> str:
-    """Return a foreign name that cannot end the string around it."""
+    """Return a foreign name that cannot end the surrounding string literal."""
     return repr(text).replace('"', "'").replace("\\", "/")

@@ -1,9 +1,9 @@
 """A lighting as a list of fixtures: colour, kelvin, lumen, and DMX for each channel.
 
 The list is independent of programs and displays: emissions are linear Rec.709 in the scene's own
-unit. DMX values, 0 to 255, are for fixtures of linear response: the colour with its brightest
-channel at full, and a dimmer. The brightest channel of all fixtures of a unit has the dimmer at
-full.
+unit. DMX values, 0 to 255, are for fixtures with linear response: the colour with its brightest
+channel at full, and a dimmer. The fixture with the brightest channel among those with the same unit
+has its dimmer at full.
 """
 
 import csv
@@ -24,7 +24,7 @@ from lightpaint.version import __version__
 
 FORMAT: Literal["lightpaint-fixtures 1"] = "lightpaint-fixtures 1"
 
-#: Codes of a DMX channel, less one.
+#: Largest code of a DMX channel.
 FULL = 255
 
 
@@ -40,12 +40,12 @@ class Dmx:
 
 @dataclass(frozen=True)
 class FixturePlace:
-    """The place of a fixture, in units of the scene.
+    """The place of a fixture, in scene units.
 
-    x, y, z: where it hangs; None at infinity. target_x, target_y, target_z: a point it points at.
-    pan: degrees around the up axis, clockwise from above, from the scene's far side: −z if y is up,
-    y if z is up. tilt: degrees from straight down. cutoff, beam: degrees from the axis of a spot.
-    change: `moved`, `new` or "".
+    x, y, z: its position; None at infinity. target_x, target_y, target_z: a point it points at.
+    pan: degrees around the up axis, clockwise from above, starting at the scene's far side: −z if y
+    is up, y if z is up. tilt: degrees from straight down. cutoff, beam: degrees from the axis of a
+    spot. change: `moved`, `new` or "".
     """
 
     x: float | None = None
@@ -65,9 +65,10 @@ class FixturePlace:
 class Fixture:
     """A light with its setting.
 
-    red, green, blue: linear emission in `unit`. y: its luminance. lumen, luminous: None
-    unless the lighting has a scale. kelvin, duv, hex: None without such a colour. dmx: None for
-    kept lights. emitters: its emitters in the scene. place: of the only one, if it is known.
+    red, green, blue: linear emission in `unit`. y: its luminance. lumen, luminous: None unless the
+    lighting has an absolute scale. kelvin, duv, hex: None if undefined. dmx: None for kept lights.
+    emitters: its emitters in the scene. place: place of the emitter, if it has only one and the
+    place is known.
     """
 
     name: str
@@ -88,7 +89,7 @@ class Fixture:
 
 
 def fixtures_of(lighting: Lighting) -> list[Fixture]:
-    """Return a fixture for every light of `lighting`, in its order."""
+    """Return a fixture for every light of `lighting`, in the same order."""
     full: dict[str, float] = {}
     for light in lighting.lights:
         if not light.is_fixed:
@@ -139,12 +140,14 @@ def pan_and_tilt(direction: Position, up: Position) -> tuple[float, float]:
     sideways, along = float(way @ right), float(way @ ahead)
     if math.hypot(sideways, along) < 1e-6:
         return 0.0, tilt
-    # Adding 0 turns −0 into 0.
+    # Adding 0 removes the sign of a negative zero.
     return round(math.degrees(math.atan2(sideways, along)), 6) + 0.0, tilt
 
 
 def dmx_of(emission: RGB, full: float) -> Dmx:
-    """Return the codes of an emission. full: of the brightest channel at 255."""
+    """Return the DMX values for an emission. full: the brightest channel for which the dimmer is
+    255.
+    """
     brightest = max(emission)
     if brightest <= 0 or full <= 0:
         return Dmx(0, 0, 0, 0)
@@ -160,7 +163,7 @@ COLUMNS = (
 
 
 def fixtures_csv(lighting: Lighting) -> str:
-    """Return a line for each fixture; cells without a number are empty."""
+    """Return a table with a line for each fixture; undefined numbers are empty cells."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(COLUMNS)
@@ -175,7 +178,7 @@ def fixtures_csv(lighting: Lighting) -> str:
 
 
 def fixtures_json(lighting: Lighting) -> str:
-    """Return the fixtures as an object of JSON."""
+    """Return the fixtures as a JSON document."""
     document: dict[str, Any] = {
         "format": FORMAT,
         "lightpaint": __version__,

@@ -1,10 +1,9 @@
 """A Nuke script that multiplies the layers of the rendered file and adds them up.
 
-A `.nk` file is Tcl: each node takes its inputs from a stack, the top one first, and leaves itself
-there. Foreign names are quoted for that parser. Nuke evaluates some knobs once more: in names of
-files and labels it replaces Tcl in brackets, and in names of files also the frame number and the
-view. No documentation tells how to quote those, so the script contains nothing that they would
-replace.
+A `.nk` file is Tcl: each node takes its inputs from a stack, top one first, and pushes itself.
+Foreign names are quoted for that parser. Nuke evaluates some knobs once more: in file names and
+labels it substitutes Tcl in brackets, and in file names also the frame number and the view. How to
+quote these is not documented, so the script contains nothing that would be substituted.
 """
 
 import re
@@ -23,29 +22,30 @@ from lightpaint.files import one_line
 from lightpaint.images.formats.exr import ExrPart, rgb_channels
 from lightpaint.lighting.answer.lighting import Lighting
 
-#: Characters that need a backslash in a quoted word of Tcl within braces.
+#: Characters that need a backslash in a quoted Tcl word within braces.
 SPECIAL = re.compile(r'[\\"\[\]${}]')
 
-#: Characters that Nuke evaluates in the name of a file, for Tcl, frame numbers and views, or that
-#: no script can contain.
+#: Characters that Nuke evaluates in a file name, for Tcl, frame numbers and views, or that a script
+#: cannot contain.
 EVALUATED = re.compile(r"[\[\]$\\%#\x00-\x1f\x7f\ud800-\udfff]")
 
-#: The layers under names that Nuke tells apart, beside the script.
+#: Copy of the layers beside the script, under names that Nuke can distinguish.
 LAYERS = "relit_layers.exr"
 
 
 @dataclass(frozen=True)
 class _Source:
-    """The place of a picture for Nuke: the file, and Nuke's name of the layer."""
+    """The location of a picture for Nuke: the file, and Nuke's name of the layer."""
 
     file: Path
     layer: str
 
 
 def nuke_script(groups: LightGroups, lighting: Lighting, folder: Path) -> str:
-    """Return the text of relit.nk: Σ multiplier × layer, and the rest unchanged.
+    """Return the text of relit.nk: Σ multiplier × layer, plus the unchanged rest.
 
-    folder: its folder, which also has the copy (`copied_part`) of layers that Nuke would confuse.
+    folder: its folder, which also has the copy from `copied_part` of layers that Nuke would
+    confuse.
     """
     lights, beauty = _sources(groups, folder)
     sources = [*lights, *([beauty] if beauty is not None else [])]
@@ -59,7 +59,7 @@ def nuke_script(groups: LightGroups, lighting: Lighting, folder: Path) -> str:
         lines += [*_node("Read", inputs="0", **_file_knobs(file), raw="true", name=f"Read_{k}")]
         lines.append(f"set R{k} [stack 0]")
 
-    # Multipliers apply in Rec.709; the output has the primaries of the file again.
+    # Multipliers refer to Rec.709; the result is converted back to the primaries of the file.
     primaries = groups.layers[0].primaries
     matrix = None if primaries is None else to_rec709(primaries)
     to_light = None if needs_copy(groups) else matrix
@@ -97,14 +97,14 @@ def spoken_unreadable(groups: LightGroups, folder: Path) -> list[str]:
 
 
 def needs_copy(groups: LightGroups) -> bool:
-    """Return whether Nuke would read two layers of a file as one, or not as red, green and blue."""
+    """Return whether Nuke would merge two layers of a file, or misread the channels of one."""
     layers = [*dict.fromkeys((x.file, x.part, x.channels) for x in _read(groups))]
     sources = {(x.file, nuke_layer(x)) for x in _read(groups)}
     return len(sources) < len(layers) or any(x.channels[0].count(".") > 2 for x in _read(groups))
 
 
 def copied_part(groups: LightGroups) -> ExrPart:
-    """Return the layers in linear Rec.709 float32, under names that Nuke can tell apart."""
+    """Return the layers in linear Rec.709 float32, under names that Nuke can distinguish."""
     channels: dict[str, Floats] = {}
     *names, beauty = _copied_names(groups)
     for name, image in zip(names, groups.basis.planes, strict=False):
@@ -118,10 +118,12 @@ def copied_part(groups: LightGroups) -> ExrPart:
 
 
 def nuke_layer(layer: RenderLayer) -> str:
-    """Return Nuke's name of a layer of an EXR file; of plain R, G, B in a file of one part, `rgba`.
+    """Return Nuke's name for a layer of an EXR file; `rgba` for plain R, G, B in a file with one
+    part.
 
-    It takes digits from the front of each piece between dots, makes every byte that is no letter
-    or digit an underscore, and joins the pieces with underscores. Two names may become one.
+    Nuke strips digits from the front of each component between dots, replaces every byte other than
+    letters and digits by an underscore, and joins the components with underscores. Two names may
+    become equal.
     """
     prefix, _, _ = layer.channels[0].rpartition(".")
     name = _in_nuke(prefix or layer.part)
@@ -135,7 +137,7 @@ def _in_nuke(name: str) -> str:
 
 
 def _copied_names(groups: LightGroups) -> list[str]:
-    """Return names of the lights and the beauty in the copy, no two the same."""
+    """Return unique names for the lights and the beauty in the copy."""
     names: list[str] = []
     for light in (*(light.name for light in groups.basis.lights[: len(groups.layers)]), "beauty"):
         names.append(free_name(_in_nuke(light) or "light", names))
@@ -154,7 +156,7 @@ def _sources(groups: LightGroups, folder: Path) -> tuple[list[_Source], _Source 
 
 
 def _file_knobs(file: Path) -> dict[str, str]:
-    """Return the knobs of a file, or a request to choose it if Nuke would change its name."""
+    """Return the knobs for a file, or a request to choose it if Nuke would change its name."""
     if not _is_evaluated(file):
         return {"file": quoted(_path(file))}
     return {"file": '""', "label": quoted(f"choose by hand: {_plain(file.name)}")}
@@ -169,7 +171,7 @@ def _path(file: Path) -> str:
 
 
 def quoted(text: str) -> str:
-    """Return any text as one word of Tcl."""
+    """Return any text as one Tcl word."""
     escaped = SPECIAL.sub(lambda match: f"\\{match[0]}", text)
     return '"' + escaped.replace("\r", "").replace("\n", "\\n") + '"'
 
@@ -179,7 +181,9 @@ def _read(groups: LightGroups) -> list[RenderLayer]:
 
 
 def _sum(groups: LightGroups, lighting: Lighting, shuffled: Sequence[list[str]]) -> list[str]:
-    """Return nodes that multiply each light, as `shuffled` leaves it, and add it to the others."""
+    """Return nodes that multiply each light and add it to the others. shuffled: nodes that output
+    each light.
+    """
     lines: list[str] = []
     settings, labels = {light.name: light for light in lighting.lights}, list[str]()
     for k, (light, nodes) in enumerate(zip(groups.basis.lights, shuffled, strict=False)):
@@ -198,7 +202,7 @@ def _sum(groups: LightGroups, lighting: Lighting, shuffled: Sequence[list[str]])
 
 
 def _rest(lights: Sequence[_Source], beauty: _Source | None, files: Sequence[Path]) -> list[str]:
-    """Return nodes of the beauty less all groups."""
+    """Return nodes that subtract all groups from the beauty."""
     lines = _shuffle(beauty, files, "Beauty")
     for k, light in enumerate(lights):
         lines += _shuffle(light, files, f"Without_{k}")

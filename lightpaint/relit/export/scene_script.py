@@ -1,4 +1,4 @@
-"""A Python script for Blender that sets the lights of a scene by their names."""
+"""A Python script for Blender that sets the lights of a scene by name."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -26,10 +26,10 @@ KINDS = {
     "irradiance": "irradiance",
 }
 
-#: Blender's type of each kind of new light.
+#: Blender's type for each kind of new light.
 LAMPS = {"point": "POINT", "spot": "SPOT", "panel": "AREA"}
 
-#: Blender's axis that is up.
+#: Blender's up axis.
 UP = (0.0, 0.0, 1.0)
 
 
@@ -41,14 +41,14 @@ def scene_script(
     places: Sequence[EmitterPlace] = (),
     up: Position = (0.0, 1.0, 0.0),
 ) -> str:
-    """Return the script, which leaves emitters without a plain colour, like a sky, to the user.
+    """Return the script, which leaves emitters without a plain colour, such as a sky, to the user.
 
-    emitters: name, Mitsuba's parameter and emission of each that is adjusted. places: of all
+    emitters: name, Mitsuba's parameter and emission of each adjusted emitter. places: places of all
     emitters in the answer. up: the scene's up axis.
     """
     rows, left = [], []
     for name, parameter, emission in emitters:
-        if parameter not in KINDS:  # a multiple, which gives no absolute emission
+        if parameter not in KINDS:  # a multiple, which gives no absolute value
             left.append(name)
             continue
         numbers = ", ".join(f"{channel:.9g}" for channel in emission)
@@ -64,7 +64,7 @@ def scene_script(
 
 
 def _placed(places: Sequence[EmitterPlace], up: Position) -> dict[str, str]:
-    """Return the places as the script has them, in the scene's axes."""
+    """Return the places in the form of the script, in the scene's axes."""
     rotations = axis_conversions(up, UP)
     own = conversion_of(places, [np.eye(3)], {})
     present = {place.name: old for place in places if (old := old_position(place)) is not None}
@@ -98,5 +98,5 @@ def _table(rows: Mapping[str, Any]) -> str:
 
 
 def _in_docstring(text: str) -> str:
-    """Return a foreign name that cannot end the string around it."""
+    """Return a foreign name that cannot end the surrounding string literal."""
     return repr(text).replace('"', "'").replace("\\", "/")

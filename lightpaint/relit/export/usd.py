@@ -1,9 +1,9 @@
-"""A lighting as a USD layer that only overrides lights of a stage and adds new ones.
+"""A lighting as a USD layer that overrides lights of a stage and adds new ones, but nothing else.
 
-UsdLux's intensity is radiance; for lights that normalize it, the flux of their whole surface. So
-that neither radius nor size of a prim matter, panels and skies are written unnormalized, at their
-radiance, and suns and points normalized: a sun at its irradiance, a sphere, whose surface is four
-times its visible disk, at four times its intensity.
+UsdLux's intensity is a radiance or, for normalized lights, the flux of their whole surface. To be
+independent of a prim's radius or size, panels and skies are written unnormalized with their
+radiance, and suns and points normalized: a sun with its irradiance, and a sphere, whose surface is
+four times its visible disk, with four times its intensity.
 """
 
 import os
@@ -18,21 +18,22 @@ from lightpaint.files import one_line
 from lightpaint.relit.export.usd_places import UsdPlaces
 from lightpaint.scene.properties.site import EmitterPlace
 
-#: Whether the light is normalized, by Mitsuba's parameter.
+#: Whether a light is normalized, by Mitsuba's parameter.
 NORMALIZED = {"radiance": False, "irradiance": True, "intensity": True}
 
-#: Ratio of a prim's surface to its visible area along its axis, or from the side.
+#: Ratio of a prim's surface to its area visible along its axis, or from the side.
 SURFACE = {"SphereLight": 4.0, "CylinderLight": 3.141592653589793}
 
-#: The assumed place of lights without a stage.
+#: Path of lights if there is no stage.
 SCOPE = "/lights"
 
 
 @dataclass(frozen=True)
 class Overrides:
-    """The layer as text, and the names of lights that are not in it.
+    """The layer as text, and the names of lights that it lacks.
 
-    unplaced: names of lights whose brightness is in it, and whose new place is not.
+    left: names of lights that are not in it. unplaced: names of lights whose brightness is in it,
+    but not their new place.
     """
 
     text: str
@@ -41,7 +42,7 @@ class Overrides:
 
 
 def check_usd() -> None:
-    """Raise OutputError if the library is not installed."""
+    """Raise OutputError if the USD library is not installed."""
     try:
         import pxr.UsdLux  # noqa: F401
     except ImportError:
@@ -62,15 +63,15 @@ def usd_overrides(
     """Return the layer.
 
     Args:
-        emitters: Name, Mitsuba's parameter and emission of each adjusted one; "" for a multiple of
-            the present emission, which is left to the user.
-        stage: Any USD file with lights of these names: the layer lies over it. Without one they
+        emitters: Name, Mitsuba's parameter and emission of each adjusted emitter; the parameter is
+            "" for a multiple of the present emission, which is left to the user.
+        stage: A USD file with lights of these names, which becomes a sublayer. Without it, lights
             are prims below /lights.
         folder: The folder of the layer.
-        places: Of all emitters in the answer. Those that moved or are new are in the layer, in the
-            stage's axes and the scene's units.
+        places: Places of all emitters in the answer. Those that moved or are new are written to the
+            layer, in the stage's axes and the scene's units.
         up: The scene's up axis.
-        about: A description for its comment.
+        about: Text for the layer's comment.
 
     Raises OutputError if the library is not installed, or cannot read the stage.
     """
@@ -80,8 +81,8 @@ def usd_overrides(
     opened = None if stage is None else _opened(stage)
     layer = Sdf.Layer.CreateAnonymous(".usda")
     layer.comment = about
-    # The stage of the layer ends with this call: as soon as there are sublayers, an open one would
-    # look for them, from a layer that is nowhere yet.
+    # The layer's own stage is closed when this call returns: while open, it would look for
+    # sublayers as soon as there are any, starting from a layer without a path.
     left, unplaced = _write_lights(layer, opened, list(emitters), places, up)
     if stage is not None:
         layer.subLayerPaths.append(Path(os.path.relpath(stage, folder)).as_posix())
@@ -119,14 +120,14 @@ def _write_lights(
 
 
 def _assumed_prims(names: Iterable[str]) -> dict[str, tuple[str, str]]:
-    """Return path and type of lights without a stage."""
+    """Return path and type of lights if there is no stage."""
     from pxr import Tf
 
     return {name: (f"{SCOPE}/{Tf.MakeValidIdentifier(name)}", "SphereLight") for name in names}
 
 
 def _prims_of(opened: Any, names: Iterable[str]) -> dict[str, tuple[str, str]]:
-    """Return path and type of the lights that the stage has exactly once."""
+    """Return path and type of the lights that occur exactly once in the stage."""
     from pxr import Tf
 
     stage_lights, prims = _lights_of(opened), {}
@@ -138,14 +139,14 @@ def _prims_of(opened: Any, names: Iterable[str]) -> dict[str, tuple[str, str]]:
 
 
 def _scope(opened: Any) -> str:
-    """Return the path that new lights are below."""
+    """Return the path of the parent of new lights."""
     if opened is None or not (root := opened.GetDefaultPrim()):
         return SCOPE
     return f"{root.GetPath()}{SCOPE}"
 
 
 def _override(prim: Any, kind: str, parameter: str, emission: RGB) -> None:
-    """Set all properties of a light that its brightness and colour depend on."""
+    """Set all properties of a light that affect its brightness and colour."""
     from pxr import Gf, UsdLux
 
     brightest = max(emission)
@@ -160,7 +161,7 @@ def _override(prim: Any, kind: str, parameter: str, emission: RGB) -> None:
 
 
 def _opened(stage: Path) -> Any:
-    """Return the opened stage. Raises OutputError if it is none."""
+    """Open a stage. Raises OutputError if it is invalid."""
     from pxr import Tf, Usd
 
     if not stage.is_file():
@@ -173,7 +174,7 @@ def _opened(stage: Path) -> Any:
 
 
 def _lights_of(opened: Any) -> Mapping[str, dict[str, str]]:
-    """Return the path and the type of each light of a stage, by name."""
+    """Return path and type of each light of a stage, by name."""
     from pxr import UsdLux
 
     by_path: dict[str, dict[str, str]] = {}
@@ -186,7 +187,7 @@ def _lights_of(opened: Any) -> Mapping[str, dict[str, str]]:
 
 
 def _like(layer: Any, stage: Path) -> None:
-    """Copy axes, units and the default prim of the stage to the layer."""
+    """Copy the axes, units and default prim of the stage to the layer."""
     from pxr import Sdf
 
     root = Sdf.Layer.FindOrOpen(str(stage))

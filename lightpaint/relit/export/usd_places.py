@@ -1,4 +1,6 @@
-"""Places of moved and new lights in a layer of USD: transforms, cones, and prims of new lights."""
+"""Writes places of moved and new lights to a USD layer: transforms, cones, and prims of new
+lights.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -16,29 +18,29 @@ from lightpaint.relit.export.export_places import (
 )
 from lightpaint.scene.properties.site import EmitterPlace
 
-#: Directions that are up in stages, by their tokens.
+#: Up axes of stages, by token.
 UP_AXES = {"Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 
-#: Schema of each kind of new light. A spot is a sphere that is shaped.
+#: Schema for each kind of new light. A spot is a sphere with shaping.
 SCHEMAS = {"point": "SphereLight", "spot": "SphereLight", "panel": "RectLight"}
 
-#: Radius of new points, for renderers that do not know points, in units of the stage.
+#: Radius of new points in units of the stage, for renderers without point lights.
 RADIUS = 0.01
 
-#: Types of lights that shine along their -z.
+#: Types of lights that shine along their -z axis.
 AIMED = ("SphereLight", "RectLight", "DiskLight", "DistantLight")
 
 
 def axis_token(up: Position) -> str:
-    """Return the axis that a layer without a stage has upwards."""
+    """Return the token of the up axis for a layer without a stage."""
     return "Z" if abs(up[2]) > 0.5 else "Y"
 
 
 class UsdPlaces:
-    """Writes places into an override layer. Without a stage, lights hang in the scene's axes.
+    """Writes places to an override layer. Without a stage, it uses the scene's axes.
 
-    layer_stage: of the override layer. stage: the opened stage below it, or None.
-    prims: path and type of the one prim of each light that the stage has, by name.
+    layer_stage: stage of the override layer. stage: the opened stage below it, or None. prims: path
+    and type of the only prim of each light in the stage, by name.
     """
 
     def __init__(
@@ -63,9 +65,9 @@ class UsdPlaces:
             UsdGeom.SetStageUpAxis(layer_stage, token)
 
     def add_new(self, scope: str) -> dict[str, tuple[str, str]]:
-        """Define the new lights that the stage does not have; return path and type by name.
+        """Define the new lights that the stage lacks; return path and type by name.
 
-        scope: path of the prim that they are below.
+        scope: path of their parent prim.
         """
         from pxr import Tf, UsdLux
 
@@ -93,9 +95,9 @@ class UsdPlaces:
         return added
 
     def move(self) -> tuple[str, ...]:
-        """Set the places of lights that moved; return the names of those left unchanged.
+        """Set the places of lights that moved; return the names of those that were left unchanged.
 
-        These are meshes, and lights whose places differ between stage and scene.
+        These are lights at other positions in the stage than in the scene, and meshes.
         """
         left = []
         for place in self._changed:
@@ -111,7 +113,7 @@ class UsdPlaces:
         return tuple(left)
 
     def _defined(self, scope: str, path: str, schema: str) -> Any:
-        """Return a new prim below `scope`, which is defined with it if the stage has none."""
+        """Return a new prim below `scope`, defining the scope too if the stage has none."""
         from pxr import Sdf
 
         prim, layer = self._layer_stage.OverridePrim(path), self._layer_stage.GetRootLayer()
@@ -124,7 +126,7 @@ class UsdPlaces:
         return prim
 
     def _is_expected(self, path: str, place: EmitterPlace) -> bool:
-        """Return whether a prim is where the scene has the light, or will have it."""
+        """Return whether a prim is where the scene has, or will have, the light."""
         if not self._conversion.is_known:
             return False
         point = self._world(path)[3, :3]
@@ -145,7 +147,9 @@ class UsdPlaces:
             _write_cone(prim, place)
 
     def _local(self, path: str, world: Doubles) -> tuple[Doubles, bool]:
-        """Return the transform to the parent, and whether the prim ignores it."""
+        """Return the transform relative to the parent, and whether the prim resets the transform
+        stack.
+        """
         from pxr import Sdf, UsdGeom
 
         if self._stage is None:
@@ -157,12 +161,12 @@ class UsdPlaces:
         return np.asarray(world @ np.linalg.inv(self._world(parent))), False
 
     def _world(self, path: str) -> Doubles:
-        """Return the transform of a prim of the stage to the world, of row vectors, (4, 4)."""
+        """Return the transform of a stage's prim to the world, for row vectors, (4, 4)."""
         from pxr import Usd, UsdGeom
 
         prim = self._stage.GetPrimAtPath(path)
         while not prim and path.count("/") > 1:
-            # Parents that only the layer has move nothing.
+            # Parents that exist only in the layer have no transform.
             path = path.rpartition("/")[0]
             prim = self._stage.GetPrimAtPath(path)
         if not prim:
@@ -170,7 +174,7 @@ class UsdPlaces:
         return np.array(UsdGeom.XformCache(Usd.TimeCode.Default()).GetLocalToWorldTransform(prim))
 
     def _children(self, scope: str) -> set[str]:
-        """Return names of prims below `scope` in the stage."""
+        """Return the names of the prims below `scope` in the stage."""
         prim = None if self._stage is None else self._stage.GetPrimAtPath(scope)
         if not prim:
             return {path.rpartition("/")[2] for path, _ in self._prims.values()}
@@ -193,7 +197,7 @@ def _write_transform(prim: Any, matrix: Doubles, is_reset: bool) -> None:
 
 
 def _write_cone(prim: Any, place: EmitterPlace) -> None:
-    """Write the cone of a spot; its light falls off from `beam` to `cutoff`."""
+    """Write the cone of a spot, whose light falls off from `beam` to `cutoff`."""
     from pxr import UsdLux
 
     assert place.cutoff is not None
