@@ -120,6 +120,7 @@ def place(
                 [x.size for x in films],
                 [light.as_basis_light for light in lights],
                 constraints,
+                with_noise=films is large,
             )
             for films in (small, large)
         )

@@ -2,9 +2,13 @@
 
 The search is over places only: for each choice of places, the usual solve gives the best weights
 under the constraints. So a search has few unknowns, and no bad starts in weights.
+
+Noise of columns adds to what is missed, at one place more than at another, and would draw lights to
+where their columns are clean. So columns come with half the differences of two independent halves,
+whose squares are the variance of the columns, and the loss is less the part that is noise.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,8 +16,10 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight
+from lightpaint.basis.planes import Planes
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.lighting.algebra.optimum import minimise
+from lightpaint.lighting.analysis.noise.noise import denoised_matrix
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
@@ -26,7 +32,7 @@ LEAST_OWN = 1e-3
 
 @dataclass(frozen=True)
 class Fitted:
-    """The best weights for some columns. weights: (n, c). missed: Σ D r² and the pull."""
+    """The best weights for some columns. weights: (n, c). missed: the loss, and the pull."""
 
     columns: Floats
     weights: Doubles
@@ -48,20 +54,6 @@ class Ranking:
     residual: Floats
     others: Sequence[Floats]
     inverses: Sequence[Floats]
-
-    def gains(self, candidates: Floats) -> Doubles:
-        """Return about how much less would be missed with each candidate, (k,).
-
-        candidates: (k, p, 3). The lights that shine are taken to stay on.
-        """
-        gains = np.zeros(len(candidates))
-        for c in range(self.root.shape[1]):
-            weighted = candidates[:, :, c % 3] * self.root[:, c]
-            power = np.einsum("kp,kp->k", weighted, weighted)
-            gains += self.gain(
-                c, weighted @ self.residual[:, c], weighted @ self.others[c].T, power
-            )
-        return gains
 
     def gain(self, c: int, reached: Floats, cross: Floats, power: Floats) -> Floats:
         """Return the gain in a channel, (k,).
@@ -89,11 +81,14 @@ class Ranking:
 class PlacementFit:
     """Goals on a small film, and the columns of all lights at their present places.
 
+    The loss is Σ D (r² − n²), r being what the picture misses and n the mix of half differences.
+
     Looks that share places have separate weights, so they act as further channels: 3 for each look,
     which share the columns. So a search does not deal with looks. A look counts by its relative
     error, whether it is bright or dark.
 
-    columns: (n, p, 3) at unit emission. goals: of each look.
+    columns: (n, 2 p, 3) at unit emission, images and then half differences, or images alone,
+    (n, p, 3). goals: of each look.
     """
 
     def __init__(self, columns: Floats, goals: Sequence[LookGoal]) -> None:
@@ -108,8 +103,13 @@ class PlacementFit:
         """All channels of all looks; channel c is of the columns' channel c % 3."""
         return range(self._root.shape[1])
 
+    @property
+    def pixels(self) -> int:
+        """The number p of pixels."""
+        return len(self._root)
+
     def replaced(self, changed: Mapping[int, Floats]) -> Floats:
-        """Return the columns, those of some lights replaced by (p, 3)."""
+        """Return the columns, those of some lights replaced by (q, 3)."""
         return with_columns(self.columns, changed)
 
     def fitted(self, columns: Floats) -> Fitted:
@@ -128,24 +128,36 @@ class PlacementFit:
                 ).x
             weights = reduction.weights(x)
             all_weights.append(weights)
-            missed += float(equations.objective(weights).sum())
+            # As `NormalEquations.objective`, which has no loss below 0, and noise may bring one.
+            missed += equations.target_norm2.sum()
+            missed += float((weights.T * (equations.gradient(weights).T - equations.b)).sum())
         return Fitted(columns, np.concatenate(all_weights, axis=1), missed)
 
     def picture(self, columns: Floats, weights: Doubles) -> Doubles:
         """Return Σ w_i Φ_i in all channels, (p, c)."""
+        return self._mixed(columns[:, : self.pixels], weights)
+
+    def _noise(self, columns: Floats, weights: Doubles) -> Doubles:
+        """Return the mix of half differences, weighed, (p, c); without any, (0, c)."""
+        noise = self._mixed(columns[:, self.pixels :], weights)
+        return noise * self._root[: len(noise)]
+
+    def _mixed(self, columns: Floats, weights: Doubles) -> Doubles:
         looks = [weights[:, 3 * k : 3 * k + 3] for k in range(len(self._looks))]
         return np.concatenate([np.einsum("npc,nc->pc", columns, its) for its in looks], axis=1)
 
     def missed_map(self, columns: Floats, weights: Doubles) -> Doubles:
-        """Return D r² of each pixel, (p,), with weights that were found on other paths."""
-        return np.asarray(np.square(self._residual(columns, weights)).sum(axis=1))
+        """Return the loss of each pixel, (p,), with weights that were found on other paths."""
+        missed = np.square(self._residual(columns, weights)).sum(axis=1)
+        noise = np.square(self._noise(columns, weights)).sum(axis=1)
+        return np.asarray(missed - noise if len(noise) else missed)
 
     def ranking(self, fitted: Fitted) -> "Ranking":
         """Return the ranking of candidates for the place of a light that is not in `fitted`."""
         others, inverses, columns = [], [], fitted.columns
         for c in self.channels:
             free = self._free(fitted.weights, c)
-            weighted = (columns[free, :, c % 3] * self._root[:, c]).astype(np.float32)
+            weighted = (columns[free, : self.pixels, c % 3] * self._root[:, c]).astype(np.float32)
             power = (weighted @ weighted.T).astype(np.float64)
             others.append(weighted)
             inverses.append(np.linalg.pinv(power, rcond=1e-8, hermitian=True).astype(np.float32))
@@ -157,27 +169,31 @@ class PlacementFit:
     ) -> tuple[Doubles, Doubles]:
         """Return Gauss-Newton matrix (q, q) and gradient (q,), the weights eliminated.
 
-        slopes: (s, p, 3), of the columns `owners` by q numbers of poses: each by one of `numbers`,
-        which several columns may share.
+        slopes: of the columns `owners`, shaped like these, by q numbers of poses: each by one of
+        `numbers`, which several columns may share.
         """
         residual = self._residual(fitted.columns, fitted.weights)
-        count = max(numbers) + 1
+        # Half differences count like pixels, with what they mix to as what is missed there.
+        residual = np.concatenate([residual, self._noise(fitted.columns, fitted.weights)])
+        p, count = self.pixels, max(numbers) + 1
         matrix, gradient = np.zeros((count, count)), np.zeros(count)
         for c in self.channels:
-            root, weights = self._root[:, c], fitted.weights[:, c]
-            weighted_slopes = slopes[:, :, c % 3] * (root * 1.0) * weights[list(owners)][:, None]
-            jacobian = np.zeros((count, weighted_slopes.shape[1]))
+            root, weights = np.resize(self._root[:, c], len(residual)), fitted.weights[:, c]
+            weighted_slopes = slopes[:, :, c % 3] * root * weights[list(owners)][:, None]
+            jacobian = np.zeros((count, len(residual)))
             for number, row in zip(numbers, weighted_slopes, strict=True):
                 jacobian[number] += row
-            matrix += jacobian @ jacobian.T
             gradient += jacobian @ residual[:, c]
+            jacobian = jacobian[:, :p]
+            matrix += jacobian @ jacobian.T
             free = self._free(fitted.weights, c)
             active = (fitted.columns[free, :, c % 3] * root).astype(np.float64)
             if len(active):
+                reached, active = active @ residual[:, c], active[:, :p]
                 cross = jacobian @ active.T
                 inverse = np.linalg.pinv(active @ active.T, rcond=1e-9, hermitian=True)
                 matrix -= cross @ inverse @ cross.T
-                gradient -= cross @ (inverse @ (active @ residual[:, c]))
+                gradient -= cross @ (inverse @ reached)
         return matrix, gradient
 
     def _free(self, weights: Doubles, c: int) -> Bools:
@@ -193,15 +209,22 @@ class PlacementFit:
     def _equations(self, columns: Floats, k: int) -> NormalEquations:
         """Return the equations of look k."""
         root, goal = (its[:, 3 * k : 3 * k + 3] for its in (self._root, self._goal))
-        weighed, pull = columns * root, self._looks[k].pull
-        M = np.einsum("ipc,jpc->cij", weighed, weighed, optimize=True)
+        weighed, pull = columns[:, : self.pixels] * root, self._looks[k].pull
         b = np.einsum("ipc,pc->ci", weighed, goal)
-        equations = NormalEquations(M, b, np.square(goal).sum(axis=0))
+        equations = NormalEquations(_products(weighed), b, np.square(goal).sum(axis=0))
+        if (noise := columns[:, self.pixels :]).size:
+            denoised = denoised_matrix(equations, _products(noise * root))
+            equations = replace(equations, M=denoised)
         return equations if pull is None else equations + pull
 
 
+def _products(images: Floats | Doubles) -> Doubles:
+    """Return inner products of images (n, p, 3) in each channel, (3, n, n)."""
+    return np.asarray(np.einsum("ipc,jpc->cij", images, images, optimize=True))
+
+
 def with_columns(columns: Floats, changed: Mapping[int, Floats]) -> Floats:
-    """Return columns (n, p, 3), some of them replaced by (p, 3)."""
+    """Return columns (n, q, 3), some of them replaced by (q, 3)."""
     replaced = columns.copy()
     for k, column in changed.items():
         replaced[k] = column
@@ -214,19 +237,31 @@ def fit_of(
     sizes: Sequence[tuple[int, int]],
     new: Sequence[BasisLight] = (),
     constraints: Constraints | None = None,
+    *,
+    with_noise: bool = True,
 ) -> PlacementFit:
     """Return the fit of the last linear problem of each look on small films, one of each view.
 
     looks: solutions, and for each of their views its place among `bases`. new: lights whose
     columns, behind those of the basis, are black as yet. constraints: on these alone, besides
-    those of the solutions that are for all lights.
+    those of the solutions that are for all lights. with_noise: whether columns have half
+    differences.
     """
-    columns = []
-    for basis, size in zip(bases, sizes, strict=True):
-        factor = basis.size[0] // size[0]
-        planes = np.stack([block_mean(plane, factor) for plane in basis.planes])
-        columns.append(planes.reshape(len(planes), -1, 3))
-    present = np.concatenate(columns, axis=1)
+    present = np.concatenate(
+        [
+            on_film
+            for part in ("planes", "noise")[: 1 + with_noise]
+            for on_film in _on_films([getattr(basis, part) for basis in bases], sizes)
+        ],
+        axis=1,
+    )
     black = np.zeros((len(new), *present.shape[1:]), np.float32)
     goals = [goal_of(solution, views, sizes, new, constraints) for solution, views in looks]
     return PlacementFit(np.concatenate([present, black]), goals)
+
+
+def _on_films(planes: Sequence[Planes], sizes: Sequence[tuple[int, int]]) -> Iterator[Floats]:
+    """Yield the planes of each view on a small film, (n, p, 3)."""
+    for its, size in zip(planes, sizes, strict=True):
+        small = np.stack([block_mean(plane, its.size[0] // size[0]) for plane in its])
+        yield small.reshape(len(small), -1, 3)

@@ -55,12 +55,26 @@ def test_a_search_refines_on_a_larger_film_than_it_compares_on(room: Scene) -> N
         return [at.columns(sites(room)) for at in (paths.compare, paths.refine, paths.judge)]
 
     compared, refined, judged = room.while_loaded(columns)
-    assert refined.shape == judged.shape == (3, 20 * 24, 3)
+    assert refined.shape == judged.shape == (3, 2 * 20 * 24, 3)
     assert np.abs(refined - judged).max() > 0  # paths of their own
     for one, other in zip(compared, refined, strict=True):
-        reduced = block_mean(other.reshape(20, 24, 3), 2).reshape(one.shape)
-        assert one.mean() == pytest.approx(reduced.mean(), rel=0.1)  # noise
-        assert np.square(one - reduced).sum() < 0.2 * np.square(reduced).sum()  # noise
+        image = block_mean(other[: 20 * 24].reshape(20, 24, 3), 2).reshape(-1, 3)
+        assert one.mean() == pytest.approx(image.mean(), rel=0.1)  # noise
+        assert np.square(one - image).sum() < 0.2 * np.square(image).sum()  # noise
+
+
+def test_half_differences_have_the_power_of_the_noise(room: Scene) -> None:
+    """Means of other paths differ by the noise of both, half differences are of as much."""
+
+    def columns(loaded: Any) -> list[Floats]:
+        paths = SearchPaths([room.reduced("1/2")], [room], loaded, seed=4)
+        return [at.columns(sites(room)) for at in (paths.refine, paths.judge, paths.spread)]
+
+    sets = room.while_loaded(columns)
+    means, halves = np.split(np.array(sets, dtype=float), 2, axis=2)
+    power = np.square(means - means.mean(axis=0)).sum(axis=(0, 2, 3)) / (len(sets) - 1)
+    estimate = np.square(halves).sum(axis=(2, 3)).mean(axis=0)
+    assert estimate == pytest.approx(power, rel=0.35)  # noise of both, of few bright paths
 
 
 def test_direct_light_alone_is_that_of_the_direct_integrator(tmp_path: Path) -> None:

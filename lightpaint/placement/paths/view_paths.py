@@ -26,22 +26,42 @@ from lightpaint.scene.surfaces import loaded_features
 COARSE_SAMPLES = ((1, 0), (9, 2))
 
 #: First hits of all pixels of a larger film, about, to refine and judge candidates, and to ask how
-#: far places spread; how many by how many of a pixel that may be; and paths that go on for each.
-FINE_HITS, FINE_SIDES, GOING_ON = 2**18, (4, 6), 2 / 9
+#: far places spread, in each of two halves; how many by how many of a pixel that may be; and paths
+#: that go on for each.
+FINE_HITS, FINE_SIDES, GOING_ON = 2**17, (3, 6), 2 / 9
+
+#: Sets of paths of a view, each of random numbers of its own.
+SETS = 10
 
 
 class ViewPaths:
-    """Frozen paths of views, each on its small film."""
+    """Frozen paths of views, each on its small film.
 
-    def __init__(self, parts: Sequence[FrozenPaths]) -> None:
-        self.parts = tuple(parts)
+    other_half: as many paths of other random numbers, which tell the noise of both.
+    """
+
+    def __init__(
+        self, parts: Sequence[FrozenPaths], other_half: Sequence[FrozenPaths] = ()
+    ) -> None:
+        self.parts, self._other_half = tuple(parts), tuple(other_half)
 
     def columns(self, sites: Sequence[Site]) -> Floats:
-        """Return the images of lights at unit emission, (k, p, 3), p being all pixels."""
-        images = [part.columns(sites) for part in self.parts]
-        return np.concatenate(
-            [x.reshape(len(x), math.prod(x.shape[1:3]), 3) for x in images], axis=1
-        )
+        """Return the images of lights at unit emission, (k, p, 3), p being all pixels.
+
+        With two halves (k, 2 p, 3): behind their means stand half their differences.
+        """
+        halves = [
+            np.concatenate(
+                [part.columns(sites).reshape(len(sites), math.prod(part.size), 3) for part in half],
+                axis=1,
+            )
+            for half in (self.parts, self._other_half)
+            if half
+        ]
+        if len(halves) == 1:
+            return halves[0]
+        one, other = halves
+        return np.concatenate([(one + other) / 2, (one - other) / 2], axis=1)
 
     def indices(self) -> Indices:
         """Return the index among all pixels of the pixel of each first hit, (v,)."""
@@ -123,17 +143,18 @@ class SearchPaths:
             its.reduced(its.size[0] // view.size[0])
             for its, view in zip(self._features, self._small, strict=True)
         ]
-        return self._made(k, self._small, features, COARSE_SAMPLES[k])
+        return ViewPaths(self._made(k, self._small, features, COARSE_SAMPLES[k]))
 
     def _fine(self, k: int) -> ViewPaths:
         pixels = sum(math.prod(view.size) for view in self._large)
         side = round(float(np.clip(math.sqrt(FINE_HITS / pixels), *FINE_SIDES)))
-        samples = side**2, round(GOING_ON * side**2)
-        return self._made(k, self._large, self._features, samples)
+        samples = side**2, max(1, round(GOING_ON * side**2))
+        halves = [self._made(2 * k + j, self._large, self._features, samples) for j in range(2)]
+        return ViewPaths(*halves)
 
     def _made(
         self, k: int, views: Sequence[Scene], features: Sequence[Features], samples: tuple[int, int]
-    ) -> ViewPaths:
+    ) -> list[FrozenPaths]:
         view_paths = []
         for j, (view, its) in enumerate(zip(views, features, strict=True)):
             paths = FrozenPaths(
@@ -141,7 +162,7 @@ class SearchPaths:
                 self.loaded,
                 first_hits=samples[0],
                 bounces=samples[1],
-                seed=pass_seed(self._seed, Stream.FROZEN_PATHS, k + 5 * j),
+                seed=pass_seed(self._seed, Stream.FROZEN_PATHS, k + SETS * j),
             )
             view_paths.append(paths.filtered_along(its))
-        return ViewPaths(view_paths)
+        return view_paths

@@ -28,6 +28,10 @@ BY_CHANCE, USUAL_SHARE = 24, 0.9
 #: Share of ‖Ψ‖² that counts as nothing.
 NOTHING = 1e-4
 
+#: Ratio of Student's t with two degrees of freedom to a normal deviate, at one standard error: what
+#: a spread of three fits may be too short by.
+FEW_FITS = 1.3213
+
 #: Steps of a fit along other paths, and the share of the first differences that they begin with.
 REFIT_STEPS, REFIT_SHARE = 5, 0.5
 
@@ -225,12 +229,14 @@ def _error(sites: Sequence[Site], slides: bool) -> PoseError:
     place = turn = None
     if slides and sites[0].position is not None:
         places = np.array([site.position for site in sites], dtype=float)
-        place = float(np.sqrt(np.square(places - places.mean(axis=0)).sum() / (len(sites) - 1)))
+        squares = np.square(places - places.mean(axis=0)).sum() / (len(sites) - 1)
+        place = FEW_FITS * math.sqrt(float(squares))
     if sites[0].direction is not None:
         axes = np.array([site.direction for site in sites], dtype=float)
         mean = axes.mean(axis=0) / max(float(np.linalg.norm(axes.mean(axis=0))), 1e-12)
         angles = np.arccos(np.clip(axes @ mean, -1, 1))
-        turn = math.degrees(math.sqrt(float(np.square(angles).sum()) / (len(sites) - 1)))
+        squares = np.square(angles).sum() / (len(sites) - 1)
+        turn = FEW_FITS * math.degrees(math.sqrt(float(squares)))
     return PoseError(place, turn)
 
 

@@ -1,0 +1,58 @@
+"""The loss of a search is that of columns without their noise."""
+
+import numpy as np
+import pytest
+
+from lightpaint.arrays import Doubles, Floats
+from lightpaint.lighting.unknowns.knobs import Knob
+from lightpaint.lighting.unknowns.reduction import Reduction
+from lightpaint.placement.look_goals import LookGoal
+from lightpaint.placement.placement_fit import PlacementFit
+
+PIXELS = 20_000
+RNG = np.random.default_rng(3)
+TRUE = RNG.random((PIXELS, 3)) + 0.2
+
+
+def fit_to(goal: Doubles) -> PlacementFit:
+    """The fit of one light of any colour, black as yet."""
+    reduction = Reduction(np.zeros((1, 3)), ("",), (Knob.of_any_colour(0),))
+    look = LookGoal(goal, np.ones_like(goal), reduction, None)
+    return PlacementFit(np.zeros((1, 2 * PIXELS, 3), np.float32), [look])
+
+
+def column(image: Doubles, noise: float) -> Floats:
+    """A column of two halves of `image`, whose mean has noise of that deviation."""
+    halves = image + np.sqrt(2) * noise * RNG.normal(size=(2, *image.shape))
+    parts = halves.mean(axis=0), (halves[0] - halves[1]) / 2
+    return np.concatenate(parts).astype(np.float32)[None]
+
+
+def test_a_noisy_true_column_misses_less_than_a_clean_false_one() -> None:
+    fit = fit_to(2 * TRUE)
+    false = TRUE * (1 + 0.1 * RNG.normal(size=TRUE.shape))
+    clean, noisy = fit.fitted(column(false, 0.0)), fit.fitted(column(TRUE, 0.2))
+    assert noisy.missed < 0.5 * clean.missed
+    assert noisy.weights == pytest.approx(np.full((1, 3), 2.0), rel=0.02)  # noise: not too dim
+    # What the noise of the halves' product leaves is as often above 0 as below.
+    assert abs(noisy.missed) < 0.02 * fit.norm2
+
+
+def test_the_loss_of_pixels_sums_to_that_of_the_fit() -> None:
+    fit = fit_to(2 * TRUE)
+    fitted = fit.fitted(column(TRUE, 0.1))
+    total = fit.missed_map(fitted.columns, fitted.weights).sum()
+    assert total == pytest.approx(fitted.missed, abs=1e-6 * fit.norm2)  # float32 columns
+
+
+def test_the_gradient_of_the_loss_is_that_of_finite_differences() -> None:
+    """Of a column that a number changes linearly, noise included."""
+    fit = fit_to(2 * TRUE)
+    start, slope = column(TRUE, 0.1), column(RNG.random((PIXELS, 3)), 0.1)
+
+    def missed(step: float) -> float:
+        return fit.fitted(start + np.float32(step) * slope).missed
+
+    _, gradient = fit.newton(fit.fitted(start), slope, [0], [0])
+    step = 0.001
+    assert -2 * gradient[0] == pytest.approx((missed(step) - missed(-step)) / (2 * step), rel=1e-3)
