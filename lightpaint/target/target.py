@@ -64,7 +64,7 @@ class Target(Shown):
         >>> left = np.arange(16) < 8
         >>> lp.Target.of(image, np.tile(left, (16, 1)), name="left half")
         Target 'left half', 16x16
-          counts     50 % of the pixels
+          counts   50 % of the pixels
           light    0.5 to 0.5
     """
 

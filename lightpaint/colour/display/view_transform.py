@@ -3,10 +3,10 @@
 Every displayed picture, and every painting with 8 or 16 bits, goes through a `ViewTransform`, which
 is an exposure and one of these:
 
-    srgb    the display's own curve, IEC 61966-2-1; white at 1
-    linear  no curve: the numbers are light; white at 1
-    filmic  a shoulder up to 7.2, then the sRGB curve
-    agx     AgX's base: colours drawn together, 16.5 stops in one sigmoid; white at 16.3
+    srgb      the display's own curve, IEC 61966-2-1; white at 1
+    linear    no curve: the numbers are light; white at 1
+    filmic    a shoulder up to 7.2, then the sRGB curve
+    agx       AgX's base: colours drawn together, 16.5 stops in one sigmoid; white at 16.3
     ocio:DISPLAY/VIEW   from the OpenColorIO configuration (`lightpaint.colour.display.ocio`)
 
 Display values lie in [0, 1]. Encoding clips what the display cannot show: light brighter than
