@@ -644,3 +644,14 @@ def test_all_samples_are_traced_by_one_kernel(small_room: Scene) -> None:
     long = [its["hash"] for its in history if len(its["ir"].getvalue()) > 2**16]
     assert len(long) == 3 + 4 * 2
     assert len(set(long)) == 1
+
+
+@pytest.mark.parametrize("size", [(1, 1), (3, 9), (8, 12), (5, 4)])
+def test_tiles_hold_each_pixel_once_and_squares_together(size: tuple[int, int]) -> None:
+    from lightpaint.basis.render.tracer.one_pass import TILE, places_by_tile
+
+    rows, columns = size
+    places = places_by_tile(rows, columns)
+    assert sorted(places.tolist()) == list(range(rows * columns))
+    tiles = [(place // columns // TILE, place % columns // TILE) for place in places.tolist()]
+    assert tiles == sorted(tiles)

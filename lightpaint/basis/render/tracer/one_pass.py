@@ -41,6 +41,10 @@ from lightpaint.scene.scene_render import Stream, pass_seed
 FIRST_EMITTER_SAMPLES = 8
 LATER_EMITTER_SAMPLES = {32: 2, 128: 4, 2**32: 8}
 
+#: Side of the tiles of pixels that are traced one after the other. Rays that the processor traces
+#: together then start close together, which takes .92 to .98 of the time of pixels in rows.
+TILE = 4
+
 #: Indices of number streams; lower ones are the halves of the uniform samples.
 TRAINING_STREAM, FIRST_TOP_UP_STREAM = 2, 3
 
@@ -89,7 +93,7 @@ class Tracer:
         lights, is_split = len(self.scene.lights), has_indirect_planes(self.scene)
         nowhere = LightPlanes.nowhere(self.light_of, lights, is_split=is_split)
         with kernels():
-            self._trace(TRAINING_STREAM, nowhere, *self._of_rows(rows, first, spp))
+            self._trace_rows(TRAINING_STREAM, nowhere, rows, first, spp)
             self.guide.evaluate()
         self.guide.update()
 
@@ -126,7 +130,7 @@ class Tracer:
         first: number of earlier samples per pixel of that half.
         """
         with kernels():
-            self._trace(half, planes, *self._of_rows(rows, first, spp))
+            self._trace_rows(half, planes, rows, first, spp)
             planes.evaluate()
 
     def top_up(
@@ -139,27 +143,40 @@ class Tracer:
         first: (p,), number of samples in earlier calls. spp: (p,), number of samples to take.
         """
         with kernels():
-            self._trace(FIRST_TOP_UP_STREAM + half, planes, pixels, first, spp)
+            places = np.arange(pixels.size)
+            self._trace(FIRST_TOP_UP_STREAM + half, planes, places, pixels, first, spp)
             planes.evaluate()
 
     def close(self) -> None:
         """Release the scene and everything that refers to it."""
         del self.loaded, self.light_of, self.guide
 
-    def _of_rows(self, rows: range, first: int, spp: int) -> tuple[Indices, Indices, Indices]:
-        """Return the pixels of some rows, with first sample and number of samples for each."""
+    def _trace_rows(
+        self, stream: int, planes: LightPlanes, rows: range, first: int, spp: int
+    ) -> None:
+        """Trace the same samples of all pixels of some rows, tile by tile."""
         width = self.scene.size[1]
         pixels = (np.array(rows)[:, None] * width + np.arange(width)).ravel()
-        return pixels, np.full(pixels.size, first), np.full(pixels.size, spp)
+        places = places_by_tile(len(rows), width)
+        begin, count = np.full(pixels.size, first), np.full(pixels.size, spp)
+        self._trace(stream, planes, places, pixels[places], begin, count)
 
     def _trace(
-        self, stream: int, planes: LightPlanes, pixels: Indices, first: Indices, spp: Indices
+        self,
+        stream: int,
+        planes: LightPlanes,
+        places: Indices,
+        pixels: Indices,
+        first: Indices,
+        spp: Indices,
     ) -> None:
+        """Trace samples of pixels in the given order. places: of the pixels in `planes`."""
         view = view_of(self.scene, self.loaded)
-        place = dr.arange(mi.UInt32, pixels.size)
         # Values that differ between calls must not become constants of the kernel, which would be
         # recompiled.
-        pixel, begin, end = (mi.UInt32(aligned(x, np.uint32)) for x in (pixels, first, first + spp))
+        place, pixel, begin, end = (
+            mi.UInt32(aligned(x, np.uint32)) for x in (places, pixels, first, first + spp)
+        )
         numbers = SobolPairs(pixel, dr.opaque(mi.UInt32, self._streams[stream]))
         first_emitters, later = self._emitter_samples
         rules = rules_of(self.scene)._replace(
@@ -167,6 +184,14 @@ class Tracer:
             later_emitter_samples=dr.opaque(mi.UInt32, later),
         )
         trace_samples(view, numbers, self.guide, planes, rules, pixel, place, begin, end)
+
+
+def places_by_tile(rows: int, columns: int) -> Indices:
+    """Return the row-major indices of the pixels of a picture, in the order of its tiles."""
+    padded = np.full((-(-rows // TILE) * TILE, -(-columns // TILE) * TILE), -1)
+    padded[:rows, :columns] = np.arange(rows * columns).reshape(rows, columns)
+    tiles = padded.reshape(len(padded) // TILE, TILE, -1, TILE).swapaxes(1, 2).ravel()
+    return tiles[tiles >= 0]
 
 
 def later_emitter_samples(emitters: int) -> int:
