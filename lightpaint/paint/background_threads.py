@@ -23,7 +23,7 @@ RETRY_S = 2.0
 #: Niceness of all work but strokes, on Linux, where each thread has its own.
 NICENESS = 10
 
-#: Most seconds to wait for a pass of a render to end.
+#: Longest wait, in seconds, for a pass of a render to end.
 JOIN_TIMEOUT_S = 60.0
 
 
@@ -66,8 +66,9 @@ class ExactSolveLoop(_Loop):
     def run(self) -> None:
         """Solve after each change, until `stop`.
 
-        The loop gives way to strokes by abandoning its solve. A lower priority would not do: other
-        threads would wait for a lock, or the interpreter, that this one holds without processor.
+        The loop yields to strokes by abandoning its solve. A lower priority would not suffice:
+        other threads would wait for a lock, or the interpreter, held by this thread while it is not
+        scheduled.
         """
         while True:
             with self._condition:
@@ -158,7 +159,7 @@ class BackgroundThreads:
         self._threads: list[Thread] = []
 
     def start(self, work: Callable[[], None], name: str) -> None:
-        """Run `work` in a thread of its own."""
+        """Run `work` in a new thread."""
         thread = Thread(target=work, name=f"lightpaint-{name}", daemon=True)
         self._threads = [old for old in self._threads if old.is_alive()] + [thread]
         thread.start()
@@ -181,7 +182,7 @@ class BackgroundThreads:
         """Wait for all threads but the calling one, for at most `JOIN_TIMEOUT_S` seconds."""
         end_s = time.monotonic() + JOIN_TIMEOUT_S
         for thread in self._threads:
-            # A thread that has not started yet, as when Ctrl-C comes early, cannot be joined.
+            # A thread that has not started yet, after an early Ctrl-C, cannot be joined.
             if thread is not current_thread() and thread.is_alive():
                 thread.join(max(0.0, end_s - time.monotonic()))
 

@@ -23,10 +23,10 @@ from lightpaint.paint.protocol import REQUESTS, VERSION, AnyRequest
 from lightpaint.paint.protocol.base import DTYPES
 from lightpaint.storage.json_records import read_record, strict_json
 
-#: Longest frame that is read, in bytes, and longest JSON in it.
+#: Maximum size in bytes of a frame, and of the JSON in it.
 MAX_FRAME, MAX_TEXT = 2**28, 2**20
 
-#: Longest text in a message, in characters, and most values of a list or an object in it.
+#: Maximum length of a text in a message, in characters, and of a list or an object.
 MAX_CHARACTERS, MAX_VALUES = 1000, 4096
 
 

@@ -1,4 +1,4 @@
-"""The painter in a browser: it opens session file, studio and server, and closes them."""
+"""The painter in a browser: opens and closes session file, studio and server."""
 
 import gc
 import sys
@@ -39,8 +39,8 @@ def paint_in_browser(
     on_ready: called when the page can be opened. new: whether an earlier session is set aside.
     host, port: as in `listen`. say: receives remarks.
 
-    Raises PaintError where the session cannot be opened, OutputError where the last steps could not
-    be written.
+    Raises PaintError if the session cannot be opened, OutputError if the last steps could not be
+    written.
     """
     check_installed()
     folder = subjects[0].folder
@@ -101,8 +101,7 @@ def _serve_session(
 def low_latency() -> Iterator[None]:
     """Answer strokes with low latency, in a process that does nothing else.
 
-    The garbage collector skips all objects that exist by now, and a thread that holds the
-    interpreter for long releases it ten times as soon.
+    The garbage collector skips all objects that exist now, and threads switch ten times as often.
     """
     interval = sys.getswitchinterval()
     sys.setswitchinterval(interval / 10)

@@ -1,4 +1,4 @@
-"""A scene that is loaded when it is needed, and its facts from the cache until then."""
+"""A scene that is loaded on first use; until then the cache has its facts."""
 
 import time
 from collections.abc import Callable
@@ -43,7 +43,7 @@ class LazyScene:
 
     @property
     def _cache_fields(self) -> dict[str, Any]:
-        """Values that decide how the scene is loaded, and on which film."""
+        """Arguments of loading, and of the film."""
         file = {name: value for name, value in vars_of(self.file).items() if value is not None}
         names = {key: list(members) for key, members in (file.get("groups") or {}).items()}
         lights = {"lights": list(file["lights"])} if "lights" in file else {}
@@ -81,7 +81,7 @@ class LazyScene:
     def remember(self, basis: Basis) -> None:
         """Cache facts that let the next session begin without loading. basis: the cached one."""
         if abs(_clock_s() - self._clock_s) > scene_facts.COARSE_S / 2:
-            return  # the clock was set, so that file times do not tell the last change
+            return  # the clock was set, so file times are unreliable
         if self.record is None and self._scene is not None and self.settings.use_cache:
             scene_facts.remember_facts(
                 self._key, self._scene, basis, remarks=self.remarks, began_s=self._began_s

@@ -18,10 +18,9 @@ from lightpaint.screen import some_names
 def session_identity(
     subjects: Sequence[Subject], loaded: Mapping[int, Scene] | None = None
 ) -> Identity | None:
-    """Return the identity of a session; None as long as a scene has to be loaded for it.
+    """Return the identity of a session; None while a scene still has to be loaded for it.
 
-    loaded: scenes that have been loaded, by view. A scene has the identity that its basis will have
-    once it is rendered.
+    loaded: scenes that have been loaded, by view. A scene has the same identity as its later basis.
     """
     bases = [subject.basis for subject in subjects if subject.basis is not None]
     if bases:
@@ -84,7 +83,7 @@ class SessionFile:
         return self.store
 
     def _on_scene_loaded(self, k: int, lazy_scene: LazyScene, scene: Scene) -> None:
-        """Complete the identity with the scene of view k, of which nothing was cached."""
+        """Complete the identity with the scene of view k, which was not cached."""
         from lightpaint.pipeline.job.remarks import (
             remarks_of_film,
             remarks_of_memory,
@@ -98,7 +97,7 @@ class SessionFile:
         self._report_new((*lasting, *remarks_of_memory(scene)))
         from lightpaint.scene.runtime.variant import use_variant
 
-        # Remarks on this machine may not hold the next time.
+        # Remarks about this machine may not hold next time.
         lazy_scene.remarks = tuple(x for x in lasting if x != use_variant().note)
 
     def _open_with(self, identity: Identity) -> None:

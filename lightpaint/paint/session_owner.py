@@ -1,4 +1,4 @@
-"""The owner of a session: a single page at a time, however pages are connected."""
+"""The owner of a session: one page at a time, over any kind of connection."""
 
 from collections.abc import Callable
 from operator import eq
@@ -10,8 +10,8 @@ _Page = TypeVar("_Page")
 class Transfer(NamedTuple, Generic[_Page]):
     """A session that was given to a page.
 
-    is_back: whether the page had it before, and no other since. displaced: the connection that had
-    it until now and must be told; None if none had.
+    is_back: whether the page had it before, and no other since. displaced: the connection that lost
+    it and must be notified; None for none.
     """
 
     is_back: bool
@@ -19,9 +19,9 @@ class Transfer(NamedTuple, Generic[_Page]):
 
 
 class SessionOwner(Generic[_Page]):
-    """The page that has a session, if one has.
+    """The page that owns a session, if any.
 
-    is_same: whether two connections are of one page, which is back after it was cut off.
+    is_same: whether two connections belong to one page, which reconnected.
 
     Attributes:
         page: The connection that has the session.
@@ -44,7 +44,7 @@ class SessionOwner(Generic[_Page]):
         return Transfer(is_back, displaced)
 
     def release(self, page: _Page) -> bool:
-        """Take the session from `page`, which has gone; return whether it had it."""
+        """Take the session from `page`, which has left; return whether it had it."""
         has_had = self.page == page
         if has_had:
             self.page = None

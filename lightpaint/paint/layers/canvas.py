@@ -32,7 +32,7 @@ class Canvas:
     Attributes:
         basis: The planes of its lights.
         present: (h, w, 3) linear, the present look, denoised: it shows where nothing is painted.
-        painting: The target; `at_least` is None as long as none is marked so.
+        painting: The target; `at_least` is None while no pixel is marked.
         live: The sums that follow the target.
     """
 
@@ -110,7 +110,7 @@ class Canvas:
         return self._layers[number]
 
     def accent(self, number: int) -> float:
-        """Return the accent of a layer; 1 for one that does not show."""
+        """Return the accent of a layer; 1 for a hidden one."""
         return next((shown.accent for shown in self._shown if shown.layer.id == number), 1.0)
 
     def pixels(self, region: Region) -> Pixels:
@@ -118,10 +118,9 @@ class Canvas:
         return self.painting.part(region).copy()
 
     def target(self, name: str, transform: ViewTransform, *, is_sketch: bool) -> Target | None:
-        """Return a copy of the painting as a target; None where nothing is painted.
+        """Return a copy of the painting as a target; None if nothing is painted.
 
-        Solved elsewhere it has the same answer: a literal painting, which is no sketch, is light
-        over nothing.
+        Solved elsewhere it has the same answer: a literal painting is light, painted over nothing.
         """
         if not self.is_painted:
             return None
@@ -186,7 +185,7 @@ class Canvas:
         ]
 
     def _compose(self, region: Region) -> None:
-        """Compose the layers anew in a region."""
+        """Compose the layers again in a region."""
         if is_empty(region):
             return
         area = slices(region)
@@ -209,7 +208,7 @@ class Canvas:
         return region
 
     def stroke_patches(self) -> list[Patch]:
-        """Return the changes of the open strokes; none of one that changed nothing."""
+        """Return the changes of the open strokes; strokes that changed nothing have none."""
         patches = []
         for number, stroke in self._open_strokes.items():
             layer = self.layer(number)
@@ -233,7 +232,7 @@ class Canvas:
     ) -> Pixels:
         """Return the pixels that a page sent for a region of a layer. Raises PaintError if invalid.
 
-        Of a mask they have no colour, and their `importance` is its coverage.
+        Pixels of a mask have no colour, and their `importance` is its coverage.
         """
         top, bottom, left, right = region
         height, width = self.size

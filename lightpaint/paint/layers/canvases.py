@@ -22,8 +22,9 @@ from lightpaint.paint.store.steps import Patch, Step
 
 
 class Canvases:
-    """The canvases of all views, which have one stack of layers: a stroke goes to one of them, a
-    look to all.
+    """The canvases of all views, which share one stack of layers.
+
+    A stroke changes one view, a look all of them.
 
     Attributes:
         layers: The present layers.

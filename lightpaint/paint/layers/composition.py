@@ -1,9 +1,9 @@
 """Composition of layers into a target: light and importance of each pixel, lowest layer first.
 
 Everything is float32 arithmetic on single pixels, in NumPy, so that any partition of the picture
-into regions gives the same bits. A layer's accent alone depends on more than its pixel: where all
-of the picture is painted (a whole that was asked to be darker, say), a layer over a small part of
-it is to come about as it does over a picture whose rest is held, so it counts more than the rest.
+into regions gives the same bits. Only a layer's accent depends on more than its pixel. If the whole
+picture is painted (darkened as a whole, say), a layer over a small part counts more than the rest,
+so that it has the same effect as over a picture whose rest is held.
 """
 
 from collections.abc import Sequence
@@ -18,11 +18,11 @@ from lightpaint.paint.layers.layer import Layer
 from lightpaint.paint.layers.layer_pixels import MIN_COVERAGE, LayerPixels
 from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
 
-#: Importance of the rest of a fully painted picture beside that of one layer, and the largest
-#: accent: it makes up for a layer over a fortieth of the picture.
+#: Importance of the rest of a fully painted picture relative to one layer, and the largest accent,
+#: which compensates for a layer over a fortieth of the picture.
 REST_SHARE, MAX_ACCENT = 4.0, 10.0
 
-#: Importance that weighing leaves or reaches at most, however often.
+#: Lower and upper bound of importance under repeated weighing.
 MIN_WEIGHED, MAX_WEIGHED = 0.01, 1000.0
 
 #: Brightest light that a layer makes: the largest half float, so that both views can show it.
@@ -32,7 +32,7 @@ _Array = npt.NDArray[np.float32]
 
 
 class ShownLayer(NamedTuple):
-    """A layer that shows, with its pixels in one view, and its accent there."""
+    """A visible layer, with its pixels and accent in one view."""
 
     layer: Layer
     pixels: LayerPixels
@@ -61,7 +61,7 @@ def accents(layers: Sequence[tuple[Layer, LayerPixels]]) -> list[float]:
 def compose(layers: Sequence[ShownLayer], present: Floats, region: Region) -> Pixels:
     """Return the target in a region.
 
-    layers: those that show, the lowest first. present: (h, w, 3) linear, the present look.
+    layers: the visible ones, the lowest first. present: (h, w, 3) linear, the present look.
     """
     light = np.array(present[slices(region)], np.float32)
     result = Pixels(light, np.zeros(light.shape[:2], np.float32))
@@ -113,7 +113,7 @@ def _replace(layer: Layer, pixels: Pixels, below: Pixels, factor: np.float32) ->
 
 
 def adjusted(light: Floats, gain: float, tint: RGB) -> _Array:
-    """Return light (..., 3) whose luminance is `gain` times as much, and its colour tinted."""
+    """Return light (..., 3) with its luminance scaled by `gain` and its colour tinted."""
     tinted = np.asarray(light, np.float32) * np.asarray(tint, np.float32)
     before, after = _luminance(light), _luminance(tinted)
     lit = after > 0

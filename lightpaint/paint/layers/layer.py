@@ -10,7 +10,7 @@ from lightpaint.arrays import RGB
 #: The effect of a layer on the pixels below it.
 LayerKind = Literal["pixels", "paint", "adjust", "weigh", "group"]
 
-#: The layer of paint that names none; sessions from before there were layers consist of it.
+#: The layer of paint without a layer id; sessions from before layers existed have only this one.
 PAINTING_ID = 0
 
 #: Largest strength and importance of a layer, and characters of its name.
@@ -65,11 +65,11 @@ class Layer:
 
     @classmethod
     def of(cls, data: Mapping[str, Any]) -> "Layer":
-        """Return the layer that `as_json` wrote. Raises TypeError or ValueError for another."""
+        """Return the layer that `as_json` wrote. Raises TypeError or ValueError otherwise."""
         return cls(**{**data, "tint": tuple(data.get("tint", (1.0, 1.0, 1.0)))})
 
     def as_json(self) -> dict[str, Any]:
-        """Return plain values, without those that are the default."""
+        """Return plain values, without default ones."""
         default = asdict(Layer(self.id, self.kind))
         values = {k: v for k, v in asdict(self).items() if k in ("id", "kind") or v != default[k]}
         return {k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}

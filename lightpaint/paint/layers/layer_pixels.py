@@ -1,4 +1,4 @@
-"""The pixels of one layer in one view, in tiles, which exist only where it covers something."""
+"""The pixels of one layer in one view, in tiles that exist only where it has coverage."""
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -13,7 +13,7 @@ from lightpaint.paint.store.steps import Patch, replay
 #: Side of a tile, in pixels.
 TILE_SIDE = 64
 
-#: Coverage, or importance, that counts as none.
+#: Coverage, or importance, below which a pixel is uncovered.
 MIN_COVERAGE = 1e-3
 
 
@@ -29,8 +29,8 @@ class LayerPixels:
     """Colour and coverage of a layer. Updated in place.
 
     They are exchanged as `Pixels`: `image` is the colour, `importance` the coverage (of a layer
-    `pixels`, its importance). Where nothing is covered the colour is black, so that two layers
-    made in different ways are equal to the bit.
+    `pixels`, its importance). Uncovered pixels are black, so that equal layers made in different
+    ways agree to the bit.
 
     Attributes:
         revision: A number that grows with every change.
@@ -110,7 +110,7 @@ class LayerPixels:
             self._keep(key, Pixels(tile.image, tile.importance, marks))
 
     def copy(self) -> "LayerPixels":
-        """Return a copy, which shares no array that changes."""
+        """Return a copy that shares no mutable array."""
         copied = LayerPixels(self.size)
         copied._tiles = dict(self._tiles)  # tiles are replaced, and never written to
         return copied
@@ -130,7 +130,7 @@ class LayerPixels:
         """Return mean and least coverage of the view."""
         if self._summary is None:
             height, width = self.size
-            tiles = [self._tiles[key] for key in sorted(self._tiles)]  # one order, one sum
+            tiles = [self._tiles[key] for key in sorted(self._tiles)]  # sorted, for the same sum
             count = -(-height // TILE_SIDE) * -(-width // TILE_SIDE)
             least = min((tile.least for tile in tiles), default=0.0)
             mean = sum(tile.total for tile in tiles) / (height * width)

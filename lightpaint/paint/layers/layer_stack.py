@@ -8,7 +8,7 @@ from lightpaint.errors import PaintError
 from lightpaint.paint.layers.layer import MAX_FACTOR, MAX_STRENGTH, PAINTING, Layer
 from lightpaint.paint.store.steps import Step
 
-#: Layers of a session, at most.
+#: Maximum number of layers in a session.
 MAX_LAYERS = 1000
 
 #: The change of a stack, as JSON: `order`, ids before and after, if it changed; `layers`, by id,
@@ -26,7 +26,7 @@ class LayerStack:
     def of(cls, layers: Iterable[Layer]) -> "LayerStack":
         """Return a stack in which the layers of each group lie directly below it.
 
-        The painting that names no layer is always there, if need be below all others. Raises
+        It always has the layer of paint without an id, if need be below all others. Raises
         PaintError for two layers of one id, a group that does not exist, or too many.
         """
         listed = tuple(layers)
@@ -83,10 +83,10 @@ class LayerStack:
         return LayerStack.of(by_id[number] for number in (by_id if order is None else order))
 
     def shown(self) -> tuple[Layer, ...]:
-        """Return the layers that show, each with strength and importance of its group in its own.
+        """Return the visible layers, with the strength and importance of their groups included.
 
-        They have no names, so that equal ones come to the same. A layer of strength 0 is as one
-        that is hidden.
+        They have no names, so that layers with equal effect compare equal. Strength 0 hides a
+        layer.
         """
         shown, by_id = [], {layer.id: layer for layer in self.layers}
         for layer in self.layers:
@@ -116,7 +116,7 @@ class LayerStack:
         return {**change, "layers": changed} if changed else change
 
     def changed(self, change: StackChange, *, is_back: bool = False) -> "LayerStack":
-        """Return the stack after a change, or before it. Of a layer that is lost, nothing comes."""
+        """Return the stack after a change, or before it. A lost layer is ignored."""
         by_id = {layer.id: layer for layer in self.layers}
         for number, pair in change.get("layers", {}).items():
             by_id.pop(int(number), None)

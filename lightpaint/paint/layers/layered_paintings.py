@@ -35,7 +35,7 @@ class LayeredPaintings:
         return cls(views.layers, pixels)
 
     def patches(self, views: Canvases) -> tuple[LayerStack, tuple[Patch, ...]]:
-        """Return the layers under ids that `views` has not had, and the patches that make them."""
+        """Return the layers under new ids in `views`, and the patches that create them."""
         stack, ids = self.layers, {PAINTING_ID: PAINTING_ID}
         for layer in stack:
             ids.setdefault(layer.id, views.next_layer - 1 + len(ids))
@@ -48,7 +48,7 @@ class LayeredPaintings:
                 before = Pixels.unpainted(np.zeros((*pixels.importance.shape, 3), np.float32))
                 patches.append(Patch(region, before, pixels, view, ids[number]))
         for canvas in views:
-            # The painting that names no layer is there already, with other pixels.
+            # The layer of paint without an id exists already, with other pixels.
             painting, after = canvas.layer(PAINTING_ID), LayerPixels(canvas.size)
             if (canvas.view, PAINTING_ID) in self.pixels:
                 after.put(*self.pixels[canvas.view, PAINTING_ID])

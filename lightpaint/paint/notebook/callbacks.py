@@ -18,9 +18,7 @@ Assignable = TypeVar("Assignable")
 
 
 class LiveTrait(traitlets.Any, Generic[Readable, Assignable]):  # type: ignore[misc]
-    """A trait that the session updates with `set_trait`; a cell that assigns to it asks the
-    session.
-    """
+    """A trait that the session sets with `set_trait`; assignments in cells become requests."""
 
     if TYPE_CHECKING:
 

@@ -1,4 +1,4 @@
-"""The thread of a notebook's kernel, which the messages of other threads pass through."""
+"""The thread of a notebook's kernel, which sends the messages of all threads."""
 
 import asyncio
 import contextvars
@@ -6,14 +6,14 @@ from collections.abc import Callable
 
 
 class KernelThread:
-    """The event loop and context of the cell that made this; without a loop, any thread."""
+    """The event loop and context of the cell that created it; without a loop, any thread."""
 
     def __init__(self) -> None:
         self._loop = _running_loop()
         self._context = contextvars.copy_context()
 
     def call(self, act: Callable[[], None]) -> None:
-        """Call `act` soon in the loop, in its context; at once where there is none."""
+        """Call `act` soon in the loop, in its context; at once without a loop."""
         if self._loop is None:
             act()
         elif not self._loop.is_closed():

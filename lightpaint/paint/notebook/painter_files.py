@@ -17,10 +17,10 @@ from lightpaint.viewer.bundle import bundled, styles
 
 
 class Closable(Protocol):
-    """A painter, as those that share its file see it."""
+    """The interface of a painter to others that use its file."""
 
     def close(self) -> None:
-        """End it."""
+        """End the painter."""
 
 
 #: Painters of this process that keep their session in a file, by its path.
@@ -28,7 +28,7 @@ _PAINTERS_BY_FILE: WeakValueDictionary[Path, Closable] = WeakValueDictionary()
 
 
 def claim_file(path: Path, painter: Closable) -> None:
-    """Note that `painter` has the session at `path`, and close the painter that had it."""
+    """Register `painter` for the session at `path`, and close the painter that had it before."""
     if (earlier := _PAINTERS_BY_FILE.get(path.resolve())) is not None:
         earlier.close()  # the user has run its cell again
     _PAINTERS_BY_FILE[path.resolve()] = painter

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from typing import Any
 
-#: Most rounds in which callbacks react to values that callbacks have set.
+#: Maximum number of rounds in which callbacks react to values set by callbacks.
 MAX_CALLBACK_ROUNDS = 20
 
 

@@ -155,9 +155,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             raise
 
     def _begin(self, target: Target | Sequence[Target | None] | None) -> None:
-        """Start the studio, and wait for it where nothing is to be rendered. Raises
-        LightpaintError.
-        """
+        """Start the studio; wait for it if nothing has to be rendered. Raises LightpaintError."""
         self._studio.start()
         if self._studio.has_scenes:
             atexit.register(self.close)  # a render must end before the process does
@@ -198,8 +196,8 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
         view: index of the view, in the order in which the views were given.
 
-        Raises PaintError where nothing is painted yet, for another kind of file, and for a view
-        that does not exist.
+        Raises PaintError if nothing is painted yet, for another kind of file, and for an unknown
+        view.
         """
         save_answer(Path(path), self._studio.snapshot(), self._lighting, view=view)
 
@@ -310,7 +308,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
                     self.set_trait(name, value)
 
     def _lighting(self) -> Lighting:
-        """Return the exact answer, or the requested lighting where nothing is painted."""
+        """Return the exact answer, or the requested lighting if nothing is painted."""
         solution = self.solution
         return self._studio.snapshot_and_lighting()[1] if solution is None else solution.lighting
 
@@ -324,7 +322,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             self.send(content, buffers)
 
     def _on_studio_message(self, message: Message) -> None:
-        """Handle a message that the studio sends by itself, from a thread of its own."""
+        """Handle an unrequested message of the studio, from another thread."""
 
         def act() -> None:
             with self._lock:
@@ -349,7 +347,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
                 setattr(self, name, value)
 
 
-#: Arguments of a painter that are no settings.
+#: Arguments of a painter other than settings.
 ARGUMENT_NAMES = [
     name for name in signature(Painter).parameters if name not in ("self", "settings")
 ]

@@ -61,8 +61,8 @@ def load_target(session: Session, target: Any) -> LoadArguments:
 def _requests_for(requests: SessionRequests, targets: Sequence[Target | None]) -> SessionRequests:
     """Return `requests` that answer these paintings as `lp.solve` does.
 
-    A painting of light, over nothing, is taken literally. One that holds display values, and was
-    painted over nothing, holds nothing unpainted, unless somebody has set how firmly.
+    A painting of light, over nothing, is taken literally. One with display values, painted over
+    nothing, does not hold unpainted parts, unless the user has set a hold.
     """
     painted = [target for target in targets if target is not None]
     if not painted:

@@ -1,4 +1,4 @@
-"""The views of one painter in a notebook: which one has the session, and where messages go."""
+"""The views of one painter in a notebook: ownership of the session, and routing of messages."""
 
 from collections.abc import Callable
 from threading import RLock

@@ -1,4 +1,4 @@
-"""Lights that a session adds to its scene: their values, and where a click hangs them."""
+"""Lights that a session adds to its scene: their values, and their place by a click."""
 
 import math
 from collections.abc import Collection, Mapping
@@ -17,22 +17,22 @@ from lightpaint.scene.lights.new_emitter import PLUGIN_OF, NewEmitter
 from lightpaint.scene.properties.emission import PLUGINS
 from lightpaint.scene.properties.pose import Pose, Site
 
-#: Keys of a pose, and of lights that are added, besides.
+#: Keys of a pose, and further keys of added lights.
 POSE_KEYS, LIGHT_KEYS = ("position", "target", "cutoff", "beam"), ("kind", "size", "emission")
 
-#: Distance from the surface that a light is hung on, and side of a panel, relative to the diagonal
-#: of all that is seen; and the part of the way to the next surface that a light hangs at most.
+#: Distance of a light from its mounting surface, and side of a panel, relative to the diagonal of
+#: the visible scene; and the largest part of the way to the next surface.
 CLEARANCE, PANEL_SIDE, BEFORE_NEXT = 0.02, 0.08, 0.5
 
 #: Cone of a spot that is hung by hand, in degrees.
 CUTOFF, BEAM = 30.0, 20.0
 
-#: Luminance of a new light in the picture, as a share of that of the present look.
+#: Luminance of a new light in the picture, relative to the present look.
 FIRST_SHARE = 0.25
 
 
 def new_emitter(name: str, values: Mapping[str, Any]) -> NewEmitter:
-    """Return an added light where it hangs. Raises PaintError for values of none."""
+    """Return an added light at its place. Raises PaintError for invalid values."""
     if unknown := [key for key in values if key not in (*POSE_KEYS, *LIGHT_KEYS)]:
         raise PaintError(f"{name}: a new light has no {unknown[0]!r}")
     pose = {key: values[key] for key in POSE_KEYS if key in values}
@@ -54,7 +54,7 @@ def new_emitter(name: str, values: Mapping[str, Any]) -> NewEmitter:
 
 
 def values_of(emitter: NewEmitter) -> dict[str, Any]:
-    """Return a new light as the requests of a session have it."""
+    """Return a new light in the form of a session's requests."""
     site = emitter.site
     values: dict[str, Any] = {"kind": emitter.kind, "position": _listed(emitter.pose.position)}
     if emitter.pose.target is not None:
@@ -76,7 +76,7 @@ def site_of_new(emitter: NewEmitter) -> Site:
 
 
 def light_of_new(emitter: NewEmitter) -> BasisLight:
-    """Return a new light as a basis knows it."""
+    """Return a new light in the form of a basis."""
     parameter, unit = PLUGINS[PLUGIN_OF[emitter.kind]]
     x, y, z = emitter.pose.position or (0.0, 0.0, 0.0)
     form = f"at ({x:.2f}, {y:.2f}, {z:.2f})"
@@ -84,7 +84,7 @@ def light_of_new(emitter: NewEmitter) -> BasisLight:
 
 
 def free_name(kind: str, taken: Collection[str]) -> str:
-    """Return a name for a new light of a kind, like `spot_1`, which no other one has."""
+    """Return an unused name for a new light of a kind, like `spot_1`."""
     return next(x for k in range(1, len(taken) + 2) if (x := f"{kind}_{k}") not in taken)
 
 
@@ -93,7 +93,7 @@ def hung_before(
 ) -> NewEmitter:
     """Return a new light that hangs a little before a surface and points away from it.
 
-    extent: diagonal of all that is seen.
+    extent: diagonal of the visible scene.
     """
     nudge = 1e-4 * extent
     room = nudge + free_length(hit.point + nudge * hit.normal, hit.normal)
@@ -114,7 +114,7 @@ def hung_at(name: str, kind: str, place: Doubles, direction: Doubles, extent: fl
 
 
 def with_level(emitter: NewEmitter, alone: float, present: float) -> NewEmitter:
-    """Return a new light so bright that it is seen beside the others.
+    """Return a new light bright enough to be visible beside the others.
 
     alone: mean luminance of the picture with it alone at unit emission. present: the same of the
     present look.
@@ -126,5 +126,5 @@ def with_level(emitter: NewEmitter, alone: float, present: float) -> NewEmitter:
 
 
 def _listed(point: Doubles | Position | None) -> list[float]:
-    """Return a point as JSON has it, without the noise of single precision."""
+    """Return a point for JSON, rounded to single precision."""
     return [float(f"{x:.6g}") for x in np.asarray(point, dtype=float)]

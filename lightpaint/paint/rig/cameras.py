@@ -12,7 +12,8 @@ from lightpaint.paint.protocol import Camera, Place
 from lightpaint.scene.runtime.render_lock import tracing
 from lightpaint.scene.scene import Scene
 
-#: Part of a ray by which it may miss the rays of a pinhole, as through a fisheye lens.
+#: Largest deviation from the rays of a pinhole, as through a fisheye lens, relative to a ray's
+#: length.
 STRAIGHT = 1e-3
 
 
@@ -62,7 +63,7 @@ def camera_of(scene: Scene, loaded: Any) -> Camera | None:
 
 
 def _crossing(origin: Doubles, direction: Doubles) -> Doubles:
-    """Return the point that is nearest to all rays, which begin at a plane before the eye."""
+    """Return the point nearest to all rays, which begin at a plane before the eye."""
     beside = np.eye(3) - direction[:, :, None] * direction[:, None, :]
     crossing: Doubles = np.linalg.solve(
         beside.sum(axis=0), (beside @ origin[..., None]).sum(axis=0)
@@ -97,7 +98,7 @@ def _listed(vector: Doubles) -> Place:
 
 
 def up_axis(cameras: list[Camera | None]) -> int:
-    """Return the axis nearest to upwards in these views; y where no camera tells."""
+    """Return the axis nearest to upwards in these views; y without a camera."""
     ups = [-np.array(camera.down) for camera in cameras if camera is not None]
     total = (
         np.sum([up / max(np.linalg.norm(up), 1e-30) for up in ups], axis=0) if ups else [0, 1, 0]
@@ -121,7 +122,7 @@ def first_hit(scene: Scene, loaded: Any, at: tuple[float, float]) -> FirstHit | 
 
 
 def free_length(loaded: Any, start: Doubles, direction: Doubles) -> float:
-    """Return how far a ray goes before it meets a surface; inf for none."""
+    """Return the distance from a ray's origin to the first surface; inf without one."""
     import mitsuba as mi
 
     with tracing():

@@ -1,4 +1,4 @@
-"""The lights of the painted scene with their places, and their planes wherever they are moved."""
+"""The lights of the painted scene with their places, and their planes at any place."""
 
 import json
 from collections import OrderedDict
@@ -46,7 +46,7 @@ from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.surfaces import render_features
 
-#: Rendered planes that are kept, so that undo finds them: each of all views.
+#: Number of rendered planes, each of all views, that are cached for undo.
 MAX_RENDERED = 32
 
 #: A light and its pose, as text.
@@ -55,7 +55,7 @@ PoseKey = tuple[str, str]
 
 @dataclass(frozen=True)
 class RigView:
-    """A view of the loaded scene. quick: makes planes at any place; None where none can be."""
+    """A view of the loaded scene. quick: makes planes at any place; None if impossible."""
 
     scene: Scene
     loaded: Any
@@ -65,12 +65,12 @@ class RigView:
 class LampRig:
     """The rig of a session: the source of the planes of moved lights.
 
-    Scene and paths are loaded when somebody first asks for them. Bases are of all views, in which
-    every light is where the scene has it.
+    Scene and paths are loaded on first use. Bases are of all views, with every light at its place
+    in the scene.
 
     Attributes:
         views: The views of the loaded scene; None before it is loaded.
-        bounds: Corners of a box with all that is seen; None if that is not known.
+        bounds: Corners of a box around the visible scene; None if unknown.
     """
 
     def __init__(self, subjects: Sequence[Subject]) -> None:
@@ -83,7 +83,7 @@ class LampRig:
 
     @property
     def scene(self) -> Scene:
-        """The scene of the first view. Raises PaintError where there is none."""
+        """The scene of the first view. Raises PaintError without one."""
         if self._subjects[0].scene is None:
             raise PaintError("there is no scene to render: its lights cannot be moved")
         return self._subjects[0].loaded_scene
@@ -97,7 +97,7 @@ class LampRig:
 
     @cached_property
     def rigging(self) -> Rigging:
-        """The rigging that the lights file has."""
+        """The rigging of the lights file."""
         return rigging_of(self.scene.requests)
 
     @cached_property
@@ -107,7 +107,7 @@ class LampRig:
 
     @property
     def extent(self) -> float:
-        """Length of the diagonal of all that is seen; 1 before the rig is open."""
+        """Diagonal of the visible scene; 1 before the rig is open."""
         low, high = self.bounds or (np.zeros(3), np.ones(3) / 3**0.5)
         return float(np.linalg.norm(high - low))
 
@@ -145,12 +145,12 @@ class LampRig:
     # Poses
 
     def check(self, placed: Placed) -> None:
-        """Raise LightpaintError for places that these lights cannot have."""
+        """Raise LightpaintError for impossible places of lights."""
         for name, values in placed.items():
             self.site(name, values)
 
     def lights(self, lights: Lights, placed: Placed) -> Lights:
-        """Return the lights of the scene, and behind them those that were added."""
+        """Return the lights of the scene, followed by added ones."""
         added = [light_of_new(new_emitter(x, placed[x])) for x in added_names(placed)]
         return replace(lights, records=(*lights, *added))
 
@@ -235,7 +235,7 @@ class LampRig:
         return _key(name, values) in self._rendered
 
     def unrendered(self, placed: Placed) -> list[str]:
-        """Return the moved lights whose planes are quick ones so far."""
+        """Return the moved lights that have only quick planes."""
         return [name for name, values in placed.items() if not self._is_rendered(name, values)]
 
     def render(
@@ -284,9 +284,9 @@ class LampRig:
             return self._pointing(request, name, self.site(name, values))
 
     def hung(self, request: AddLight, name: str) -> NewEmitter:
-        """Return a new light where a request has it. Raises PaintError where none can hang.
+        """Return a new light at a requested place. Raises PaintError if none can hang there.
 
-        Its emission is yet to be found.
+        Its emission is set later.
         """
         if self.scene.has_media:
             raise PaintError("no light can be added to a scene with fog or the like")
@@ -335,7 +335,7 @@ class LampRig:
 
 
 def _pose(name: str, values: Mapping[str, Any]) -> Pose:
-    """Return the pose of a light that a client asks for. Raises PaintError for no pose."""
+    """Return the pose that a client requests. Raises PaintError for invalid ones."""
     if unknown := [key for key in values if key not in POSE_KEYS]:
         raise PaintError(
             f"{name}: a pose has no {unknown[0]!r}: expected {', '.join(sorted(POSE_KEYS))}"

@@ -1,4 +1,4 @@
-"""Lights that a session moves: their pictures at once, and their planes rendered behind."""
+"""Lights that a session moves: quick planes at once, and rendered ones in the background."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import AbstractContextManager
@@ -37,7 +37,7 @@ from lightpaint.paint.store.steps import name_in_view
 
 
 class MoverHost(Protocol):
-    """The studio, as lights that are moved see it."""
+    """The part of the studio that moved lights use."""
 
     pictures: PictureTable
 
@@ -46,16 +46,16 @@ class MoverHost(Protocol):
         """The session. Raises PaintError before there is a basis."""
 
     def changing(self) -> AbstractContextManager[Session]:
-        """Return a block in which nobody else changes the session."""
+        """Return a context in which no other thread changes the session."""
 
     def publish(self, message: Message | None) -> None:
         """Send a message to pages."""
 
     def denoised(self, bases: Sequence[Basis]) -> Sequence[DenoisedPlanes | None]:
-        """Return the denoised planes of bases without moved lights, of each view."""
+        """Return the denoised planes of the bases without moves, for each view."""
 
     def planes_rendered(self) -> None:
-        """Note that the session has rendered planes in the place of quick ones."""
+        """Note that rendered planes have replaced quick ones."""
 
 
 class LightMover:
@@ -68,12 +68,12 @@ class LightMover:
     def __init__(self, host: MoverHost, rig: LampRig, threads: BackgroundThreads) -> None:
         self.rig, self._host, self._threads = rig, host, threads
         self._shows_rig, self._shown = False, dict[str, Mapping[str, Any]]()
-        self._dragged = set[str]()  # lights that are
+        self._dragged = set[str]()  # lights being dragged
         self._work = LatestWork(self._render, host.publish)
         self._is_working, self._is_open = False, True
 
     def stop(self) -> None:
-        """End the work in the background."""
+        """End the background work."""
         self._is_open = False
         self._work.stop()
 
@@ -92,13 +92,13 @@ class LightMover:
             self._host.publish(message)
 
     def rig_messages(self) -> list[Message]:
-        """Return where lights are, for pages that have asked for it."""
+        """Return the places of lights, if pages have requested them."""
         if not (self._shows_rig and self.rig.is_open):
             return []
         return [rig_state(self.rig, self._host.session.requests.placed)]
 
     def move_of(self, request: PointLight) -> MoveLights:
-        """Return the move that a request to point a light comes to. Raises LightpaintError."""
+        """Return the move that a pointing request implies. Raises LightpaintError."""
         session = self._host.session
         self.rig.open(session.bases)
         name = (
@@ -122,9 +122,9 @@ class LightMover:
         return name, values_of(with_level(emitter, alone, present))
 
     def follow(self) -> bool:
-        """Show the planes of lights that were moved since, and render them once they rest.
+        """Show the planes of newly moved lights, and render them once they rest.
 
-        Returns whether lights have come or gone, of which pages have to be told at length.
+        Returns whether lights were added or removed, so that pages need the whole state.
         """
         session = self._host.session
         placed, shown = session.requests.placed, self._shown
@@ -135,13 +135,13 @@ class LightMover:
             return False
         self._shown, self._dragged = dict(placed), names if is_dragged else set()
         is_other = added_names(placed) != added_names(shown)
-        if is_other:  # The numbers of those behind them are others. Pictures of lights that are
-            # gone stay, for pages that are fetching them.
+        if is_other:  # The numbers of later lights have changed. Pictures of removed lights stay,
+            # for pages that are fetching them.
             names |= {*added_names(placed)}
         offered = self._offer(
             session, sorted(names & {*session.basis.names}), is_dragged=is_dragged
         )
-        if not is_other:  # of which the whole state tells
+        if not is_other:  # the whole state has these
             self._host.publish(offered)
             self._publish_rig()
         if not is_dragged:
@@ -150,7 +150,7 @@ class LightMover:
         return is_other
 
     def _warn_of_unlit(self, session: Session, names: Collection[str]) -> None:
-        """Say which of these lights light nothing that is seen, as in a wall or behind one."""
+        """Warn of lights that light nothing visible, such as those inside a wall or behind one."""
         for name in sorted(names):
             k = session.basis.names.index(name)
             if not any(view.basis.planes.plane(k).any() for view in session.views):
@@ -158,7 +158,7 @@ class LightMover:
                 self._host.publish(Notice(text=text, tone="warn"))
 
     def render_behind(self) -> None:
-        """Render the planes that are quick ones so far, in the background."""
+        """Replace quick planes by rendered ones, in the background."""
         placed = self._host.session.requests.placed
         if not placed:
             return
@@ -168,7 +168,7 @@ class LightMover:
         self._work.give(placed)
 
     def _render(self, placed: Placed) -> None:
-        """Render the quick planes of these lights, as long as they are those of the session."""
+        """Replace the quick planes of these lights by rendered ones, unless the lights move."""
         host = self._host
 
         def check() -> None:
@@ -186,7 +186,7 @@ class LightMover:
             host.publish(Notice(text=str(error), tone="warn"))
 
     def finish(self, placed: Placed, check: Callable[[], None]) -> None:
-        """Render the quick planes of these lights. check: raises to stop."""
+        """Replace the quick planes of these lights by rendered ones. check: raises to stop."""
         for name in self.rig.unrendered(placed):
             check()
             self.rig.render(self._host.session.bases, name, placed[name], check)
@@ -197,9 +197,9 @@ class LightMover:
             self._host.planes_rendered()
 
     def offer_all(self, session: Session) -> None:
-        """Offer the pictures of all moved lights, after those of bases without moves were.
+        """Offer the pictures of all moved lights, after those of the bases without moves.
 
-        It publishes nothing: the state of the session, which follows, has all pictures.
+        This publishes nothing, since the state that follows lists all pictures.
         """
         self._shown = dict(session.requests.placed)
         self._offer(session, list(session.requests.placed), is_dragged=False)

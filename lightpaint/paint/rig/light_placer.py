@@ -1,4 +1,4 @@
-"""A search for better places of the lights, or for new ones: in the background, and one step."""
+"""A background search for better places of lights, or for new lights; its result is one step."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -31,11 +31,11 @@ from lightpaint.progress import cancellable
 from lightpaint.scene.properties.pose import Pose, Site
 from lightpaint.scene.runtime.render_lock import MITSUBA
 
-#: Freedom of lights for which the lights file asks for none: how far they slide, relative to the
-#: size of the room, and by how many degrees they turn.
+#: Freedom of lights without one in the lights file: largest distance, relative to the size of the
+#: room, and largest turn in degrees.
 SLIDE, TURN = 0.15, 60.0
 
-#: The most lights that one search adds.
+#: Maximum number of lights that one search adds.
 MAX_NEW = 4
 
 #: Seconds between updates of the trial places that pages show during a search.
@@ -43,7 +43,7 @@ WATCH_S = 0.15
 
 
 class PlacerHost(Protocol):
-    """The studio, as a search for places sees it."""
+    """The part of the studio that a search for places uses."""
 
     subjects: tuple[Subject, ...]
 
@@ -58,7 +58,7 @@ class PlacerHost(Protocol):
 
     @property
     def unmoved_bases(self) -> tuple[Basis, ...]:
-        """Bases of all views, with every light where the scene has it."""
+        """Bases of all views, with every light at its place in the scene."""
 
     def publish(self, message: Message | None) -> None:
         """Send a message to pages."""
@@ -68,7 +68,7 @@ class PlacerHost(Protocol):
 
 
 class LightPlacer:
-    """Lets the painting place the lights of a session, and add others."""
+    """Places the lights of a session by its painting, and adds others."""
 
     def __init__(self, host: PlacerHost, rig: LampRig, threads: BackgroundThreads) -> None:
         self._host, self._rig, self._threads = host, rig, threads
@@ -94,9 +94,7 @@ class LightPlacer:
         return [TaskStarted(what="place")]
 
     def _freedoms(self, snapshot: SessionSnapshot) -> dict[str, Freedom]:
-        """Return the freedom of each light that may move: as the lights file has it, or near its
-        place.
-        """
+        """Return the freedom of each movable light: from the lights file, or near its place."""
         freedoms, placed = {}, snapshot.requests.placed
         for light in snapshot.bases[0].lights:
             is_held = any(key in snapshot.requests.lights.get(light.name, {}) for key in HOLD_KEYS)
@@ -139,7 +137,7 @@ class LightPlacer:
                 before, after = self._differences(snapshot, placed)
                 check()
         except StoppedError:
-            if self._request is None:  # else a page waits for the next one
+            if self._request is None:  # otherwise a page would wait for the next one
                 self._publish("Stopped: every light stays where it was.")
             return
         except LightpaintError as error:
@@ -165,7 +163,7 @@ class LightPlacer:
         self._publish(summary[0].upper() + summary[1:] + ".", tuple(placed))
 
     def _differences(self, snapshot: SessionSnapshot, placed: Placed) -> tuple[float, float]:
-        """Return the ΔE of the exact answer now, and with these lights moved and added."""
+        """Return the ΔE of the exact answer now, and of that with these lights moved and added."""
         if not placed:
             return 0.0, 0.0
         added = snapshot.requests.added
@@ -226,7 +224,7 @@ class LightPlacer:
 
 
 def _trial(sites: Mapping[str, Site]) -> TrialPlaces:
-    """Return the places on trial, as pages mark them."""
+    """Return the trial places, for pages to mark."""
     return TrialPlaces(
         positions={name: x.position for name, x in sites.items() if x.position is not None},
         directions={name: x.direction for name, x in sites.items() if x.direction is not None},
@@ -238,7 +236,7 @@ def _done(request: PlaceLights) -> str:
 
 
 def pose_values(move: Move, before: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the pose of a light after a move, as JSON has it. before: its pose until then."""
+    """Return the pose of a light after a move, for JSON. before: its earlier pose."""
     pose: Pose = move.pose
     values = dict(before)
     for key in ("position", "target", "cutoff", "beam"):

@@ -30,9 +30,8 @@ def one_light_basis(basis: Basis, light: BasisLight, plane: Floats) -> Basis:
 def with_planes_of(basis: Basis, moved: Mapping[int, Basis], *, in_memory: bool) -> Basis:
     """Return `basis` with the lights, planes and noise of bases of one light each, by number.
 
-    Numbers beyond its lights are those of lights that it does not have. Unpainted parts are still
-    held near the look of `basis`. in_memory: whether planes are copied, which saves time when all
-    of them are read many times.
+    Numbers beyond its lights belong to new lights. Unpainted parts are still held near the look of
+    `basis`. in_memory: whether to copy planes, which saves time if all of them are read many times.
     """
     count = max(len(basis.lights), 1 + max(moved))
     in_memory = in_memory and not is_large(count, basis.size)
@@ -65,7 +64,7 @@ def with_planes_of(basis: Basis, moved: Mapping[int, Basis], *, in_memory: bool)
         sums=None,
         origin=replace(basis.origin, is_composed=True),
     )
-    # A walk over all planes would give the same as one over each.
+    # A pass over all planes gives the same as a pass over each.
     power, totals = np.zeros((2, count, 3))
     power[: len(basis.lights)], totals[: len(basis.lights)] = basis.power, basis.totals
     for k, one_light in moved.items():

@@ -11,7 +11,7 @@ from lightpaint.paint.subject import Subject
 def of_moved_scenes(
     subjects: Sequence[Subject], snapshot: SessionSnapshot, rig: LampRig
 ) -> tuple[tuple[Subject, ...], SessionSnapshot]:
-    """Return subjects and snapshot of scenes whose lights hang where the session has them."""
+    """Return subjects and snapshot with scenes whose lights have their places in the session."""
     placed = snapshot.requests.placed
     if not placed:
         return tuple(subjects), snapshot

@@ -1,4 +1,4 @@
-"""Closed forms for the place of a light whose beam, highlight or shadow shall fall on a point."""
+"""Closed forms for the pose of a light whose beam, highlight or shadow should fall on a point."""
 
 from collections.abc import Callable
 from typing import Any
@@ -34,9 +34,9 @@ def aimed(name: str, site: Site, hit: FirstHit) -> Pose:
 
 
 def with_highlight(name: str, site: Site, hit: FirstHit, free_length: FreeLength) -> Pose:
-    """Return the change that lets a light's reflection be seen at `hit`: the eye's ray, mirrored.
+    """Return the change that puts a light's reflection at `hit`, on the mirrored ray of the eye.
 
-    The light keeps its distance from there as far as there is room.
+    The light keeps its distance from there, if there is room.
     """
     ahead = _unit(hit.point - hit.eye)
     mirrored = _unit(ahead - 2 * (ahead @ hit.normal) * hit.normal)
@@ -48,7 +48,7 @@ def with_highlight(name: str, site: Site, hit: FirstHit, free_length: FreeLength
 def with_shadow(
     name: str, site: Site, edge: FirstHit, hit: FirstHit, free_length: FreeLength
 ) -> Pose:
-    """Return the change that lets the shadow of `edge` end at `hit`: the line through both."""
+    """Return the change that puts the shadow of `edge` at `hit`, on the line through both."""
     between = edge.point - hit.point
     if not np.linalg.norm(between) > 0:
         raise PaintError("the shadow and what casts it are one place: choose two places")

@@ -1,8 +1,8 @@
 """Quick planes: an estimate of a light's plane at any place in a tenth of a second, for dragging.
 
-Direct light has edges: one frozen path for each pixel finds it. Indirect light is smooth: a small
-film has it, averaged along surfaces, and each pixel takes it from the four cells around it, by how
-alike their surfaces are to its own.
+Direct light has edges, and is computed by one frozen path per pixel. Indirect light is smooth, and
+is computed on a small film, averaged along surfaces. Each pixel interpolates it from the four cells
+around it, weighted by the similarity of their surfaces to its own.
 """
 
 from collections.abc import Sequence
@@ -20,24 +20,24 @@ from lightpaint.scene.properties.film import reduction_to
 from lightpaint.scene.properties.pose import Site
 from lightpaint.scene.scene import Scene
 
-#: First hits of the whole picture, about, if each pixel has one at least and this many at most.
+#: Approximate number of first hits in the picture, and the largest number per pixel.
 FIRST_HITS, MOST_PER_PIXEL = 2**19, 16
 
-#: Cells of the film of indirect light, about, and paths of the whole film.
+#: Approximate number of cells in the film of indirect light, and paths of the whole film.
 CELLS, PATHS = 2**13, 2**15
 
-#: Distance from a cell's tangent plane, relative to the distance of the cells, at which its weight
-#: is 1/e; and by how much its normal counts.
+#: Distance from a cell's tangent plane, relative to the spacing of cells, at which its weight is
+#: 1/e; and the strength of the dependence on its normal.
 NEAR_PLANE, NORMAL_POWER = 0.5, 16.0
 
-#: Least weight of a cell: where no surface is alike, all four count.
+#: Least weight of a cell: without a similar surface, all four count.
 LEAST_WEIGHT = 1e-4
 
 
 class QuickPlanes:
     """The planes of points, spots and suns on the film of a scene.
 
-    loaded: that scene, loaded, which has to stay. features: of each pixel, with positions.
+    loaded: that scene, which has to stay loaded. features: of each pixel, with positions.
     """
 
     def __init__(self, scene: Scene, loaded: Any, features: Features, *, seed: int = 0) -> None:
@@ -62,7 +62,7 @@ class QuickPlanes:
 
 
 def _sampled(features: Features, size: tuple[int, int]) -> Features:
-    """Return the features in the middles of cells, (height, width) of which make up the picture."""
+    """Return the features at the centres of cells; the picture has (height, width) of them."""
     assert features.position is not None
     where = np.ix_(
         *(
@@ -74,10 +74,10 @@ def _sampled(features: Features, size: tuple[int, int]) -> Features:
 
 
 class _Spreading:
-    """Light in cells spread over pixels: of the four cells around each, by how alike they are.
+    """Interpolation of light from cells to pixels, by similarity of the four cells around each.
 
     Attributes:
-        cells, weights: (4, pixels), of which cells, and how much of each.
+        cells, weights: (4, pixels), indices of cells, and their shares.
     """
 
     def __init__(self, features: Features, cells: Features) -> None:
@@ -118,6 +118,6 @@ def _between(count: int, cells: int) -> tuple[Sequence[npt.NDArray[np.intp]], Se
 
 
 def _spacing(position: Floats) -> float:
-    """Return the usual distance of surfaces in cells beside each other."""
+    """Return the typical distance between surfaces of neighbouring cells."""
     steps = np.linalg.norm(np.diff(position, axis=1), axis=-1)
     return float(max(np.median(steps), 1e-12)) if steps.size else 1.0

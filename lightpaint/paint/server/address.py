@@ -21,7 +21,7 @@ ADVICE = (
     "nobody but programs of this machine"
 )
 
-#: Seconds in which this machine connects to itself.
+#: Timeout in seconds of this machine's connection to itself.
 CONNECT_S = 2.0
 
 
@@ -59,7 +59,7 @@ class Address:
         return f"http://{self.local_name or self.name}:{self.port}/"
 
 
-#: A socket that listens, and where.
+#: A listening socket and its address.
 BoundSocket = tuple[socket.socket, Address]
 
 
@@ -67,9 +67,9 @@ def listen(host: str | None = None, port: int | None = None) -> BoundSocket:
     """Return a socket that listens, and its address, which has been tried.
 
     host: name or number of an address of this machine, None for the loopback. port: None for the
-    usual one, or any if that is taken.
+    default, or any if that is taken.
 
-    Raises PaintError where there is none.
+    Raises PaintError if none is free.
     """
     family, number, is_number = _resolve("127.0.0.1" if host is None else host)
     socket_ = _bind(host or number, family, number, port)
@@ -138,11 +138,12 @@ def _bind(host: str, family: socket.AddressFamily, number: str, port: int | None
 
 
 def _outward_name(port: int) -> str | None:
-    """Return this machine's name on its network, where the socket listens at all addresses; None
-    where it is in no network.
+    """Return this machine's name on its network, if the socket listens at all addresses.
+
+    None if it is in no network.
     """
     for family, remote in ((socket.AF_INET, "203.0.113.1"), (socket.AF_INET6, "2001:db8::1")):
-        # No packet is sent: it asks by which address one would go.
+        # This sends no packet; it only selects the address of a route.
         try:
             with socket.socket(family, socket.SOCK_DGRAM) as probe:
                 probe.connect((remote, 9))

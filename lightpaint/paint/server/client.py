@@ -28,11 +28,11 @@ from lightpaint.paint.protocol import (
 #: Largest number of queued messages of a page, and of their bytes, before its socket is read on.
 MAX_QUEUED, MAX_QUEUED_BYTES = 64, 2**27
 
-#: Messages that wait to be sent, and seconds that one may take: a slower client is cut off, and
-#: receives the whole state when it is back.
+#: Maximum number of messages that wait to be sent, and of seconds for one: a slower client is cut
+#: off, and receives the whole state when it reconnects.
 MAX_UNSENT, SEND_TIMEOUT_S = 512, 60.0
 
-#: Bytes that wait to be sent, beyond which the next request waits.
+#: Number of unsent bytes beyond which the next request waits.
 MAX_UNSENT_BYTES = 2**26
 
 
@@ -46,9 +46,9 @@ class Socket(Protocol):
 
 @dataclass
 class IncomingMessage:
-    """A message of a page, or the reason why it is none.
+    """A message of a page, or the reason why it is invalid.
 
-    replies: its number, and those of live paint that it has replaced. size: bytes.
+    replies: its number, and those of live paint that it has replaced. size: in bytes.
     """
 
     replies: list[int] = field(default_factory=list)
@@ -94,7 +94,7 @@ class Client:
         self.is_disconnected = self.is_observer = False
 
     async def receive_all(self) -> None:
-        """Queue the client's messages until it disconnects, as many as the queue takes."""
+        """Queue the client's messages until it disconnects, within the limit of the queue."""
         try:
             while not self._is_abandoned:
                 message = await self._socket.receive()
@@ -173,10 +173,10 @@ class Client:
             self.abandon()
 
     def withhold_events(self) -> None:
-        """Withhold events from now on, and drop those that are withheld already.
+        """Withhold events from now on, and drop those withheld already.
 
-        The state is made in another thread: an event of a later change may be here before it is,
-        and the client would take the older state for the newer one.
+        The state is made in another thread, so an event of a later change may arrive first, and the
+        client would take the older state for the newer one.
         """
         self._withheld = []
 
@@ -202,7 +202,7 @@ class Client:
             frame = to_frame(message.content(reply), message.buffers())
             try:
                 await asyncio.wait_for(self._socket.send_bytes(frame), SEND_TIMEOUT_S)
-            except Exception:  # whatever a socket says that has nobody at its end
+            except Exception:  # errors of a socket whose other end is gone
                 self.abandon()
         await self.close(1013)
 
@@ -224,12 +224,12 @@ class Client:
         self.abandon()
         try:
             await asyncio.wait_for(self._socket.close(code), 1.0)
-        except Exception:  # it is not
+        except Exception:  # it is closed already
             return
 
 
 def _parse_frame(frame: bytes | None) -> IncomingMessage:
-    """Return the message in a frame, or the reason why it holds none."""
+    """Return the message in a frame, or the reason why it is invalid."""
     content: dict[str, Any] = {}
     try:
         if frame is None:
@@ -259,7 +259,7 @@ def _is_within(inner: tuple[int, ...], outer: tuple[int, ...]) -> bool:
 def _append(
     queue: list[tuple[Message, int | None]], message: Message, reply: int | None = None
 ) -> None:
-    """Append a message to a queue, in place of an event there that it outdates."""
+    """Append a message to a queue, or replace an event there that it outdates."""
     if reply is None and (key := _replacement_key(message)) is not None:
         for k, (queued, reply_to) in enumerate(queue):
             if reply_to is None and _replacement_key(queued) == key:

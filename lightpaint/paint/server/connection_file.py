@@ -16,7 +16,7 @@ CONNECTION_FILE = "painter.json"
 class ConnectionFile:
     """The connection file of one painter, in the folder of its session.
 
-    about: its content, as JSON, with a `token` that is of this painter alone.
+    about: its content, as JSON, with a `token` unique to this painter.
     """
 
     def __init__(self, folder: Path, about: Mapping[str, Any]) -> None:
@@ -34,7 +34,7 @@ class ConnectionFile:
                 file.write(json.dumps(self._about) + "\n")
 
     def remove(self) -> None:
-        """Delete the file, unless it is another painter's by now."""
+        """Delete the file, unless another painter has replaced it."""
         with suppress(OSError, ValueError, AttributeError):
             record = json.loads(self.path.read_text(encoding="utf-8"))
             if record.get("token") == self._about["token"]:

@@ -1,14 +1,14 @@
 """Access to the painter's server, only for a page that came from this launch.
 
 Any page that is open in a browser can send requests to servers of the same machine, by whatever
-name it likes. So the guard looks at the name that a request calls this server by (a foreign name
-that leads here is an attack), and at what page the request comes from. And it requires a key.
+name it likes. So the guard checks the host name of a request (a foreign name that leads here is an
+attack) and its origin, the page that it comes from. And it requires a key.
 
-A browser attaches nothing by itself that opens anything: it sends a cookie to every port of a name,
-and so to every other server of the machine. The page has the launch token in the fragment of its
-address, which browsers send to nobody; it exchanges the token for the key, keeps that for its tab,
-and shows it in a header of what it fetches and in a subprotocol of its socket. What is loaded
-without a header is the page itself, which is the same for everybody.
+The key is no cookie, since a browser sends a cookie to every port of a host, and so to every other
+server of the machine. The page has the launch token in the fragment of its address, which browsers
+send to nobody; it exchanges the token for the key, keeps the key for its tab, and sends it in a
+header of its requests and in a subprotocol of its socket. Only the page itself is loaded without a
+header; it is the same for everybody.
 """
 
 import ipaddress
@@ -54,13 +54,13 @@ App = Callable[[Scope, Receive, Send], Any]
 class Guard:
     """Passes requests of this launch's pages on to `app`, and answers all others itself.
 
-    public: paths of the page's own files, which are for everybody who calls the server by its name.
-    address: where it listens. Where others are let in, the machine's own names and all its
-    addresses are valid names, too.
+    public: paths of the page's own files, open to every request with a valid host name. address:
+    where it listens. If other machines are let in, the machine's own names and all its addresses
+    are valid names, too.
 
     Attributes:
-        token: Opens pages for as long as the server runs, as often as somebody likes.
-        program_token: Lets programs in that are no browser, in a header; it opens no page.
+        token: Opens pages while the server runs, any number of times.
+        program_token: Admits programs other than browsers, in a header; it opens no page.
     """
 
     def __init__(self, app: App, *, address: Address, public: Container[str] = ()) -> None:
@@ -70,7 +70,7 @@ class Guard:
         self._one_time_tokens: dict[str, float] = {}
 
     def one_time_token(self) -> str:
-        """Return a token that is good once, and soon."""
+        """Return a token that works once, for a short time."""
         token = secrets.token_urlsafe(24)
         self._one_time_tokens[token] = time.monotonic() + ONE_TIME_TOKEN_S
         return token
@@ -112,9 +112,9 @@ class Guard:
     def is_program(self, scope: Scope) -> bool:
         """Return whether a request comes from an authorized program that is no browser.
 
-        Browsers name the origin of every socket, and give none a header of a script's; a page of
-        another origin is refused the header of what it fetches, since nothing here allows it. So a
-        request that names an origin is a page's, whatever else it shows.
+        Browsers send the origin with every socket, and scripts cannot add headers to sockets. Nor
+        can a page of another origin add a header to its requests, since no response here allows
+        that. So a request with an origin comes from a page, whatever else it has.
         """
         token_ = _bearer_token(scope)
         is_right = token_ is not None and _is_equal(token_, self.program_token)
@@ -125,7 +125,7 @@ class Guard:
         hosts, origins = _header(scope, b"host"), _header(scope, b"origin")
         if len(hosts) != 1 or not self._is_own_host(hosts[0]):
             return "this server is called otherwise"
-        # A port may be another one, through a tunnel; that of the page has to be the same.
+        # The port may differ through a tunnel, but has to equal that of the page.
         if (is_socket and not origins) or any(x != f"http://{hosts[0]}" for x in origins):
             return "this comes from a page of another server"
         return None
@@ -143,7 +143,7 @@ class Guard:
         return is_open and _is_address(name.removeprefix("[").removesuffix("]"))
 
     def _has_page_token(self, scope: Scope) -> bool:
-        """Return whether a page's token is right; a one-time token is used up by that."""
+        """Return whether a page's token is valid; this uses up a one-time token."""
         token_ = _bearer_token(scope)
         if token_ is None or scope["method"] != "GET":
             return False
@@ -169,7 +169,7 @@ def _header(scope: Scope, name: bytes) -> list[str]:
 
 
 def _bearer_token(scope: Scope) -> str | None:
-    """Return the key in a header, which a browser sends for nobody but the page's own script."""
+    """Return the key in a header, which a browser sends only for the page's own script."""
     token_ = [value.partition(" ") for value in _header(scope, b"authorization")]
     [(scheme, _, token)] = token_ if len(token_) == 1 else [("", "", "")]
     return token if scheme.lower() == "bearer" else None
@@ -186,7 +186,7 @@ def _subprotocol_key(scope: Scope) -> str | None:
 def _with_headers(send: Send, scope: Scope) -> Send:
     """Return `send` with the security headers of every response."""
     [host, *_] = _header(scope, b"host") or [""]
-    # Not all browsers take a socket of the same server for the same origin.
+    # Not all browsers treat a socket of the same server as the same origin.
     live = f" ws://{host}" if host.replace(".", "").replace(":", "").isalnum() else ""
     rules = {**CONTENT_POLICY, "connect-src": CONTENT_POLICY["connect-src"] + live}
     headers = [

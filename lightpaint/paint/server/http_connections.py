@@ -4,7 +4,7 @@ Any program that reaches the server can open connections and send nothing, or ha
 A connection is unauthenticated until it has shown the key. One that requests nothing is closed
 soon, and if there are too many, the oldest is closed, so that a page always gets through.
 
-Imported only where uvicorn is installed.
+Import it only if uvicorn is installed.
 """
 
 import asyncio
@@ -15,10 +15,10 @@ from typing import Any, ClassVar
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-#: Seconds in which a connection has to come with a whole request, at first and after each answer.
+#: Seconds for a connection to send a whole request, at first and after each answer.
 REQUEST_TIMEOUT_S = 10.0
 
-#: Connections that have not shown the key; a browser opens six at a time.
+#: Maximum number of connections without the key; a browser opens six at a time.
 MAX_UNAUTHENTICATED = 128
 
 
@@ -27,7 +27,7 @@ class BoundedHttp(H11Protocol):
 
     #: Whether a request shows the key.
     is_allowed: Callable[[Any], bool]
-    #: Those that have not shown it, the oldest first.
+    #: Connections without the key, the oldest first.
     unauthenticated: ClassVar[dict["BoundedHttp", None]]
 
     _deadline: asyncio.TimerHandle | None = None
@@ -78,7 +78,7 @@ class BoundedHttp(H11Protocol):
     def _on_deadline(self) -> None:
         is_answered = self.cycle is None or self.cycle.response_complete
         if not is_answered or self.transport.get_write_buffer_size():
-            self._start_deadline()  # the answer takes longest
+            self._start_deadline()  # the answer may take long
         else:
             self._abort()
 

@@ -24,7 +24,7 @@ PAGE_FOLDER = Path(__file__).parents[1] / "page"
 #: package; browsers ignore the `..` beyond the root.
 VIEWER_FOLDER = Path(__file__).parents[2] / "viewer"
 
-#: The module that begins it; a browser gets it with all that it imports.
+#: The page's main module; a browser loads it with all its imports.
 ENTRY_MODULE = "/main.js"
 
 ICON = "/icon.svg"
@@ -48,7 +48,7 @@ def page_files(folder: Path = PAGE_FOLDER) -> dict[str, PageFile]:
     if "/index.html" in table:
         table["/"] = table["/index.html"]
     if ICON in table:
-        # Some browsers ask for it whatever a page says.
+        # Some browsers request it from every page.
         table["/favicon.ico"] = table[ICON]
     if root == PAGE_FOLDER.resolve():
         table |= _files_below(VIEWER_FOLDER.resolve(), "/viewer/")

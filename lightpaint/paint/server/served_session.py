@@ -12,7 +12,7 @@ from lightpaint.paint.protocol import (
 
 
 class ServedSession(Protocol):
-    """A session, as the server sees it."""
+    """The part of a session that the server uses."""
 
     on_message: Callable[[Message], None] | None
 
@@ -20,10 +20,10 @@ class ServedSession(Protocol):
         """Return the answers; the first one replies to the request. Raises LightpaintError."""
 
     def greet(self, *, is_back: bool) -> Message:
-        """Return the state for a page. is_back: it had the session before, and nobody since."""
+        """Return the state for a page. is_back: it had the session before, and no other since."""
 
     def state(self) -> Message:
         """Return the state, and change nothing."""
 
     def resource(self, name: str) -> npt.NDArray[Any]:
-        """Return a picture. Raises PaintError if there is none of that name."""
+        """Return a picture. Raises PaintError for an unknown name."""

@@ -105,7 +105,7 @@ class Server:
     """The server of one session.
 
     host, port: as in `listen`; a host other than the loopback exposes the painter. listening: the
-    result of `listen`, which `close` closes. say: as in `Connections`. Raises PaintError where it
+    result of `listen`, which `close` closes. say: as in `Connections`. Raises PaintError if it
     cannot listen.
 
     Attributes:
@@ -151,7 +151,7 @@ class Server:
         return {"address": self.address.local_url, "token": token, **versions}
 
     def one_time_url(self) -> str:
-        """Return the URL for a browser that is started now; its token is good once."""
+        """Return the URL for a browser that is started now; its token works once."""
         self.expects_page = True
         return f"{self.address.local_url}#token={self._guard.one_time_token()}"
 
@@ -195,7 +195,7 @@ class Server:
             ws_ping_interval=10.0,
             ws_ping_timeout=20.0,
             log_config=None,
-            log_level="error",  # invalid requests of strangers do not belong in the terminal
+            log_level="error",  # keep invalid requests of strangers off the terminal
             access_log=False,
             proxy_headers=False,
             server_header=False,

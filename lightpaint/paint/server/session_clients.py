@@ -50,19 +50,19 @@ from lightpaint.paint.session_owner import SessionOwner
 from lightpaint.paint.store.store import Store
 from lightpaint.progress import cancellable
 
-#: Clients, at most.
+#: Maximum number of clients.
 MAX_PAGES = 16
 
-#: Clients that only observe, at most.
+#: Maximum number of observers.
 MAX_OBSERVERS = 8
 
-#: Seconds that a program's download waits for the brush to rest, at most.
+#: Longest wait, in seconds, of a program's download for the brush to rest.
 REST_S = 10.0
 
 #: Seconds for pages to receive the last messages.
 CLOSING_S = 1.0
 
-#: Requests that follow a hand, until one of them is done.
+#: Requests during a drag, until one with `done`.
 LIVE_REQUESTS = (Paint, Ask, MoveLights, PointLight)
 
 #: Events that observers receive.
@@ -119,7 +119,7 @@ class Connections:
         return self._owner.page is not None
 
     async def close(self) -> None:
-        """Answer the queued requests, tell the pages, and finish the session's work."""
+        """Answer the queued requests, notify the pages, and finish the session's work."""
         self._brush_up.set()
         await _wait_all([client.wait_answered() for client in self._clients])
         self._is_closed = True
@@ -148,7 +148,7 @@ class Connections:
             self._clients.discard(client)
             if self._owner.release(client):
                 self._brush_up.set()
-            client.abandon()  # a task may be at the end of a wait, which swallows the cancelling
+            client.abandon()  # a task at the end of a wait may swallow the cancellation
             for task in (sending, live_answer):
                 task.cancel()
             # Not gathered, since cancelling this wait would then report their end instead of its
@@ -156,7 +156,7 @@ class Connections:
             await asyncio.wait((sending, live_answer))
 
     async def resource(self, name: str) -> npt.NDArray[Any]:
-        """Return a picture of the session. Raises PaintError if there is none of that name."""
+        """Return a picture of the session. Raises PaintError for an unknown name."""
         return await self._run(self.session.resource, name)
 
     async def _run(self, work: Callable[..., _Result], *arguments: Any) -> _Result:
@@ -169,7 +169,7 @@ class Connections:
         )
 
     def _run_while_open(self, work: Callable[..., _Result], *arguments: Any) -> _Result:
-        """Run work that gives up once the connections are closed."""
+        """Run work that is abandoned once the connections are closed."""
         with cancellable(self._check_open):
             return work(*arguments)
 
@@ -190,7 +190,7 @@ class Connections:
                 client.send(first, seq)
             for message in further:
                 client.send(message)
-            client.release_events()  # those that a state had to precede
+            client.release_events()  # events that have to follow a state
 
     async def _handle(self, client: Client, incoming: IncomingMessage) -> list[Message]:
         """Return the answers to one message; every error becomes an answer."""
@@ -222,7 +222,7 @@ class Connections:
     async def _handle_observer(self, client: Client, request: AnyRequest | None) -> list[Message]:
         """Return the answers to an observer, once no brush is down.
 
-        Raises LightpaintError for what observers may not do.
+        Raises LightpaintError for requests that observers may not make.
         """
         if isinstance(request, Observe):
             if client is self._owner.page:
@@ -233,7 +233,7 @@ class Connections:
             client.is_observer = True
             client.withhold_events()
             await self._brush_up.wait()
-            client.withhold_events()  # the state has those until now
+            client.withhold_events()  # the state includes earlier ones
             return [await self._run(self.session.state)]
         is_export = isinstance(request, Export) and request.run
         if not (is_export or isinstance(request, Fetch | Propose)):
@@ -252,7 +252,7 @@ class Connections:
         return answers
 
     async def wait_for_rest(self) -> None:
-        """Wait until no brush is down, but not for ever: the waiting program may hold it."""
+        """Wait until no brush is down, but not forever: the waiting program may hold it."""
         with suppress(TimeoutError):
             await asyncio.wait_for(self._brush_up.wait(), REST_S)
 
@@ -271,14 +271,14 @@ class Connections:
             self._owner.release(page)
 
     def _hand_over(self, client: Client) -> bool:
-        """Give the session to `client`, and tell the client that had it.
+        """Give the session to `client`, and notify the client that had it.
 
-        Returns whether it is back: it had the session before, and nobody since.
+        Returns whether `client` had the session before, and no other since.
         """
         is_back, displaced = self._owner.give(client)
         self._brush_up.set()
         if displaced is not None and _is_same_page(displaced, client):
-            # It is at the other end of a lost connection.
+            # The connection to it is lost.
             self._leaving = asyncio.ensure_future(displaced.close(1001))
         elif displaced is not None:
             displaced.send(_taken_message("another tab has taken this session over"))
@@ -294,7 +294,7 @@ class Connections:
     def _update_generations(self, message: Message) -> None:
         """Store the generation numbers of the pictures in a message."""
         if isinstance(message, SessionState | PictureUpdate):
-            # A state may arrive after news of a picture that is newer than the state's.
+            # A state may arrive after a message about a newer picture.
             newest = self.generations | {
                 name: max(generation, self.generations.get(name, generation))
                 for name, generation in message.resources.items()
@@ -316,7 +316,7 @@ def _taken_message(text: str) -> Message:
 
 
 def _is_same_page(first: Client, second: Client) -> bool:
-    """Return whether two connections are of one page, back after the first was dropped."""
+    """Return whether two connections belong to one page, which reconnected."""
     return first is second or (first.page != "" and first.page == second.page)
 
 

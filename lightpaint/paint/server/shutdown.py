@@ -1,6 +1,6 @@
-"""The end of the painter's server: it tells the pages, and cuts off those that do not answer.
+"""The shutdown of the painter's server: it notifies the pages, and cuts off unresponsive ones.
 
-Imported only where uvicorn is installed.
+Import it only if uvicorn is installed.
 """
 
 import asyncio
@@ -27,14 +27,14 @@ class PageSocket(WebSocketsSansIOProtocol):
     def send_receive_event_to_app(self) -> None:
         """Pass a message on; text, which no page sends, becomes an empty message.
 
-        uvicorn would print to the terminal where it could not read the text.
+        uvicorn would print invalid text to the terminal.
         """
         if self.curr_msg_data_type == "text":
             self.curr_msg_data_type, self.frames = "bytes", [b""]
         super().send_receive_event_to_app()
 
     def shutdown(self) -> None:
-        """Close the socket, unless the page has: uvicorn then ends in an error of `websockets`."""
+        """Close the socket, unless the page has: that would cause an error of `websockets`."""
         if self.transport.is_closing():
             self.transport.abort()  # no client is left to receive the rest
         else:
@@ -42,7 +42,7 @@ class PageSocket(WebSocketsSansIOProtocol):
 
 
 class GracefulServer(uvicorn.Server):
-    """A server that tells its pages before it ends, and then ends in bounded time."""
+    """A server that notifies its pages before it ends, and then ends in bounded time."""
 
     def __init__(self, config: uvicorn.Config, connections: Connections) -> None:
         super().__init__(config)
@@ -57,8 +57,8 @@ class GracefulServer(uvicorn.Server):
             super().handle_exit(sig, frame)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Tell the pages, then end."""
-        await self._connections.close()  # while they can still be told
+        """Notify the pages, then end."""
+        await self._connections.close()  # while they can still be notified
         asyncio.get_running_loop().call_later(CUT_OFF_S, self._abort)
         await super().shutdown(sockets)
 

@@ -33,7 +33,7 @@ from lightpaint.report.verdict import headline, spoken_missing, spoken_reason
 WHITE, OFF = 0.02, 1e-4
 
 
-#: Phrases for the share of the painting that the answer meets, each from this share on.
+#: Phrases for the share of the painting that the answer achieves, with their least shares.
 PROGRESS_PHRASES = (
     (0.85, "Nearly there"),
     (0.6, "Most of the way"),
@@ -45,7 +45,7 @@ PROGRESS_PHRASES = (
 #: Phrase for an answer that is no closer to the paint than the present look.
 NO_CLOSER_TEXT = "No closer than the present lighting"
 
-#: Phrase for an answer that is farther from it.
+#: Phrase for an answer that is farther from the paint.
 WORSE_TEXT = "Farther from the paint than the present lighting, which undo brings back"
 
 #: Kinds of advice on what limits the answer; a page has a button for each.
@@ -57,7 +57,7 @@ ADVICE_TEXTS: dict[str, str] = {
 #: How to allow any colour: in the painter it is a setting, not an argument.
 ANY_COLOR_TEXT = "any colour"
 
-#: Reasons for a miss, for the painter; and where lights have constraints.
+#: Texts of reasons for an error, for the painter; and their variants with constraints.
 MISS_TEXTS = {
     "unreachable": "is out of reach of these lights",
     "forbidden": "would need a light darker than off",
@@ -128,8 +128,8 @@ def _light_answer(light: BasisLight, weight: Doubles, share: float) -> LightAnsw
 class Judgement:
     """The analysis of an answer, for the page.
 
-    worst: of the view that is missed most. of_views: of each view; None for one that is not
-    painted. lights: `error`, `held` and `unreached` of each, as in `LightAnswer`.
+    worst: of the view with the largest error. of_views: of each view; None for unpainted ones.
+    lights: `error`, `held` and `unreached` of each, as in `LightAnswer`.
     """
 
     worst: Closeness
@@ -158,10 +158,9 @@ class Judgement:
 
 
 def judge(analyses: Sequence[Analysis], painted: Sequence[int]) -> Judgement:
-    """Return the headline, the limiting constraints, and how sure each light is and whether it is
-    held.
+    """Return the headline, the limiting constraints, and the certainty and lock of each light.
 
-    painted: the view of each analysis. The headline is that of the view missed most.
+    painted: the view of each analysis. The headline is that of the view with the largest error.
     """
     solution = analyses[0].solution
     errors = spoken_errors(analyses[0].uncertainty, len(solution.basis.names))
@@ -215,10 +214,10 @@ def sketch_headline(appearance: Appearance) -> str:
 def _progress_phrase(appearance: Appearance) -> str:
     """Return `About half way (50 %), and changes the annex by ΔE 12`.
 
-    The phrase praises nothing where the rest has changed by more than the paint has come closer.
+    There is no praise if the rest has changed by more than the paint has come closer.
     """
     rest = appearance.unpainted_change if appearance.changes_unpainted else None
-    if appearance.share_met < 0.005:  # which would be said as 0 %
+    if appearance.share_met < 0.005:  # which would round to 0 %
         phrase = WORSE_TEXT if appearance.is_worse else NO_CLOSER_TEXT
     elif rest is not None and appearance.is_at_cost:
         cost = f"{spoken_part(rest)} (ΔE {spoken_amount(rest.worst)})"
@@ -251,7 +250,7 @@ def why_not_closer(analysis: Analysis) -> list[str]:
 
 
 def removable_reason(appearance: Appearance) -> Reason | None:
-    """Return the reason in `sketch_headline`, where a person can remove it."""
+    """Return the reason in `sketch_headline`, if the user can remove it."""
     if appearance.is_close or appearance.place is None or not appearance.causes:
         return None
     first = appearance.causes[0]

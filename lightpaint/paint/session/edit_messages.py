@@ -34,7 +34,7 @@ def edit_state(history: History, live_answer: LiveAnswer, views: Canvases) -> di
 
 
 def layer_info(layer: Layer, views: Canvases) -> LayerInfo:
-    """Return a layer for clients, with where its pixels are in each view."""
+    """Return a layer for clients, with the region of its pixels in each view."""
     pixels = [view.layer(layer.id) for view in views]
     return LayerInfo(
         **vars(layer),

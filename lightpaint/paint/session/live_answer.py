@@ -22,7 +22,7 @@ class LiveAnswer:
     """Requests, and the weights that come closest under them. Updated in place.
 
     settings, constraints: those before the session began. transform: the one to paint through.
-    lights_of: returns the lights that there are with some requests.
+    lights_of: returns the lights under given requests.
 
     Attributes:
         requests: In effect now, including those of a slider that still moves.
@@ -56,7 +56,7 @@ class LiveAnswer:
         self._live.prepare()
 
     def follow_planes(self) -> None:
-        """Note that the planes of some lights are others, of which the views know already."""
+        """Note that the planes of some lights have changed; the views have them already."""
         self._basis = self._live.follow_planes()
 
     @property
@@ -81,12 +81,12 @@ class LiveAnswer:
         return (requests or self.requests).settings(self._settings)
 
     def constraints(self, requests: SessionRequests | None = None) -> Constraints:
-        """Return the constraints of requests, beside those of the scene."""
+        """Return the constraints of requests, combined with those of the scene."""
         return self._base_constraints.and_then((requests or self.requests).constraints())
 
     @property
     def basis(self) -> Basis:
-        """Basis of the first view, whose lights are those of all views."""
+        """Basis of the first view; its lights are those of all views."""
         return self._basis
 
     def check(self, requests: SessionRequests) -> None:
@@ -111,7 +111,7 @@ class LiveAnswer:
         self._apply(requests)
 
     def reset_slider(self) -> bool:
-        """Restore the requests before an abandoned slider moved; return whether there was one."""
+        """Restore the requests from before an abandoned slider; return whether there was one."""
         if self.before_slider is None:
             return False
         self.set_requests(self.before_slider)

@@ -33,10 +33,10 @@ from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.steps import StoredLook, name_in_view
 from lightpaint.screen import some_names
 
-#: Characters of a look's name, at most.
+#: Maximum length of a look's name.
 MAX_NAME_LENGTH = 80
 
-#: Proposals of observers among the looks, at most: each keeps a painting of all views.
+#: Maximum number of observers' proposals among the looks: each stores a painting of all views.
 MAX_PROPOSALS = 16
 
 #: Name of the array of "at least" marks.
@@ -110,11 +110,11 @@ class LookLibrary:
         return self._session.load(paintings, requests, label, weights, names=names, layers=layers)
 
     def _names(self, look: StoredLook) -> tuple[str, ...]:
-        """Return the names of the lights that a look has weights of."""
+        """Return the names of the lights in a look."""
         return (*self._session.bases[0].names, *_requests(look).added)
 
     def _weights(self, look: StoredLook) -> Doubles:
-        """Return the weights of a look, (n, 3), of the lights that there are now.
+        """Return the weights of a look, (n, 3), for the present lights.
 
         Lights that it does not have are off.
         """
@@ -122,7 +122,7 @@ class LookLibrary:
         return self._in_order(np.asarray(look.arrays["weights"]), requests)
 
     def _in_order(self, weights: Doubles, requests: SessionRequests) -> Doubles:
-        """Return weights of the lights that there are now from those with some requests."""
+        """Return weights of the present lights from weights of the lights under other requests."""
         names = (*self._session.bases[0].names, *requests.added)
         there = dict(zip(names, weights, strict=True))
         return np.array([there.get(name, (0.0, 0.0, 0.0)) for name in self._session.basis.names])
@@ -182,7 +182,7 @@ class LookLibrary:
     def _lock_all(
         self, weights: npt.NDArray[Any], names: Sequence[str], requests: SessionRequests
     ) -> SessionRequests:
-        """Return requests that lock lights at a lighting, (n, 3), where `requests` hang them."""
+        """Return requests that lock lights at a lighting, (n, 3), at their places in `requests`."""
         lights = {light.name: light for light in self._session.bases[0].lights}
         locks = {
             name: {"lock": float(w[0]) if name in lights and lights[name].is_scalar else w.tolist()}
@@ -290,7 +290,7 @@ def _mix_pixels(pair: tuple[Pixels, Pixels], shares: tuple[float, float]) -> Pix
     image = np.zeros((*total.shape, 3), np.float32)
     for count, pixels in zip(counts, pair, strict=True):
         image += (count[..., None] / whole * pixels.image).astype(np.float32)
-    # Brighter than the mean is as good where it is of all that counts there.
+    # A pixel is marked "at least" if it is in all paintings that count there.
     unsure = np.zeros(image.shape, bool)
     for count, pixels in zip(counts, pair, strict=True):
         fixed = True if pixels.at_least is None else ~pixels.at_least
@@ -300,5 +300,5 @@ def _mix_pixels(pair: tuple[Pixels, Pixels], shares: tuple[float, float]) -> Pix
 
 
 def _requests(look: StoredLook) -> SessionRequests:
-    """Return the requests of a look; none where its file does not have them."""
+    """Return the requests of a look; empty if its file has none."""
     return SessionRequests.of(look.fields.get("wishes", {}))

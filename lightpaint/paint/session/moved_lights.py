@@ -16,7 +16,7 @@ Placed = Mapping[str, Mapping[str, Any]]
 
 
 def added_names(placed: Placed) -> list[str]:
-    """Return the names of the lights that the scene does not have, in their order."""
+    """Return the names of the added lights, in order."""
     return [name for name, values in placed.items() if "kind" in values]
 
 
@@ -53,9 +53,9 @@ class NoPlaneSource:
 
 
 class MovedLights:
-    """The places that the planes of a session's views are of. Updated in place.
+    """The places at which lights have their planes in a session's views. Updated in place.
 
-    source: makes the planes. bases: of all views, with every light where the scene has it.
+    source: makes the planes. bases: of all views, with every light at its place in the scene.
     """
 
     def __init__(self, source: PlaneSource, bases: Sequence[Basis]) -> None:
@@ -91,7 +91,7 @@ class MovedLights:
     def renew(
         self, names: Sequence[str], placed: Placed, views: Canvases, live_answer: LiveAnswer
     ) -> None:
-        """Give `views` the planes of `placed`, in which those of the named lights were replaced."""
+        """Give `views` the planes of `placed`, of which those of the named lights were replaced."""
         if not names:
             return
         bases = self._source.bases(self.bases, placed)
@@ -100,7 +100,7 @@ class MovedLights:
             (x.emitters_seen, view.basis.emitters_seen)
             for x, view in zip(bases, views, strict=True)
         ]
-        if not all(np.array_equal(*its) for its in seen):  # a panel has come into the picture
+        if not all(np.array_equal(*its) for its in seen):  # a panel has become visible
             views.replace_lights(bases)
             live_answer.set_views(views.live)
             return

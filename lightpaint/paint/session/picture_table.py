@@ -11,13 +11,13 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import PaintError
 from lightpaint.report.page.figures import resized, thumbnail
 
-#: Pixels of a thumbnail's longer side, about.
+#: Approximate pixels of a thumbnail's longer side.
 THUMBNAIL_SIDE = 192
 
-#: Points along each side of a lookup table, and the light, in stops, that its ends stand for.
+#: Points along each side of a lookup table, and the light at its ends, in stops.
 LUT_SIDE, LUT_LOW, LUT_HIGH = 64, -13.0, 7.0
 
-#: Built-in transforms that a page may show through.
+#: Built-in transforms for the display of a page.
 TRANSFORMS = ("srgb", "filmic", "agx", "linear")
 
 Picture = npt.NDArray[Any]
@@ -32,7 +32,7 @@ class PictureTable:
 
     def __init__(self) -> None:
         self.generations: dict[str, int] = {}
-        self._counts: dict[str, int] = {}  # also of those that are withdrawn: none comes twice
+        self._counts: dict[str, int] = {}  # includes withdrawn ones, so that no generation repeats
         self._made: dict[str, Picture] = {}
         self._makers: dict[str, Callable[[], Picture]] = {}
         self._families: dict[str, Callable[[str], Picture]] = {}

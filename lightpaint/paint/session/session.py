@@ -1,9 +1,9 @@
 """A painting in progress, and the lighting that answers it: all state of the painter.
 
-A session handles requests and returns events; it reads and writes no file but through its store,
-starts no thread, and renders nothing. Its history is a list of steps, each with the state before
-it; canvas, requests and answer follow from them alone, so that undoing, loading and painting in
-another order lead to the same bits.
+A session handles requests and returns events; it accesses files only through its store, starts no
+thread, and renders nothing. Its history is a list of steps, each with the state before it; canvas,
+requests and answer follow from them alone, so that undoing, loading and painting in another order
+lead to the same bits.
 
 One lighting answers the paintings of all its views. While a brush is down the answer is that of
 `LiveAnswer`; `accept_solution` takes the exact one, which is what `lightpaint solve` finds for the
@@ -54,11 +54,11 @@ class Session:
         bases: Planes of the lights in each view, which may get better (`improve`).
         presents: (h, w, 3) linear, the present look of each, denoised: the empty canvas.
         store: Keeps steps and looks.
-        settings: Defaults for those that are not set in the session.
+        settings: Defaults of settings that the session does not set.
         transform: View transform to paint through.
         constraints: On the lights, from before the session began.
         name: Of the painting.
-        plane_source: Makes the planes of lights that are moved; without one, none are.
+        plane_source: Makes the planes of moved lights; without one, no light can move.
 
     Attributes:
         views: Canvas of each view.
@@ -107,12 +107,12 @@ class Session:
 
     @property
     def basis(self) -> Basis:
-        """Basis of the first view, whose lights are those of all."""
+        """Basis of the first view; its lights are those of all views."""
         return self.views[0].basis
 
     @property
     def bases(self) -> tuple[Basis, ...]:
-        """Bases of all views, with every light where the scene has it."""
+        """Bases of all views, with every light at its place in the scene."""
         return self._moved_lights.bases
 
     @property
@@ -141,9 +141,9 @@ class Session:
         return self.live_answer.before_slider is not None or self.views.is_open
 
     def target(self, view: int = 0) -> Target | None:
-        """Return a copy of a painting as a target; None where nothing is painted.
+        """Return a copy of a painting as a target; None if nothing is painted.
 
-        Solved elsewhere it has the same answer: a literal painting is light, over nothing.
+        Solved elsewhere it has the same answer: a literal painting is light, painted over nothing.
         """
         name = self.name if len(self.views) == 1 else f"{self.name} {self.views[view].name}"
         is_sketch = not self.live_answer.fit.literal
@@ -162,7 +162,7 @@ class Session:
         return SessionSnapshot(self.version, bases, targets, effective, *options)
 
     def preview_requests(self, change: protocol.Preview) -> SessionRequests:
-        """Return the requests after a change. Raises LightpaintError where it cannot be made."""
+        """Return the requests after a change. Raises LightpaintError if it is impossible."""
         lights = self.basis.lights
         requests = self.requests.with_values(change.values)
         requests = constrain_lights(requests, lights, change.asked)
@@ -176,10 +176,9 @@ class Session:
     def handle(
         self, message: protocol.AnyRequest, arrays: Mapping[str, npt.NDArray[Any]]
     ) -> list[Message]:
-        """Handle a request. Raises LightpaintError, and has changed nothing then.
+        """Handle a request. Raises LightpaintError if refused; nothing has changed then.
 
-        A slider that still moves is reset before any other request, and where its last value is
-        refused.
+        A moving slider is reset before any other request, and if its last value is refused.
         """
         if not isinstance(message, protocol.Ask | protocol.MoveLights):
             self._reset_slider()
@@ -273,17 +272,17 @@ class Session:
         self._update_answer()
 
     def renew_planes(self, names: Sequence[str]) -> None:
-        """Take the planes of moved lights anew, which have been rendered meanwhile."""
+        """Take the planes of moved lights again after they have been rendered."""
         self._moved_lights.renew(names, self.requests.placed, self.views, self.live_answer)
         self._update_answer()
 
     def client_left(self, *, with_stroke: bool) -> None:
-        """Reset an abandoned slider, after the client has left or before it begins anew.
+        """Reset an abandoned slider, after the client has left or before it reconnects.
 
         with_stroke: whether an open stroke becomes a step.
         """
         is_stroke = with_stroke and self.views.is_open
-        if is_stroke:  # kept before anything is solved, which may be given up
+        if is_stroke:  # stored before the solve, which may be abandoned
             self._history.close_stroke("stroke")
         if self.live_answer.reset_slider() or is_stroke:
             self._update_answer()
@@ -393,7 +392,7 @@ class Session:
         name, requests = constrain_light(self.requests, self.basis.lights, message)
         if message.done:
             return self._append_requests(name, requests)
-        # While a slider moves nothing is kept.
+        # Nothing is stored while a slider moves.
         self.live_answer.move_slider(requests)
         self._update_answer()
         return self.answer_update()
@@ -403,7 +402,7 @@ class Session:
         self._moved_lights.check(requests.placed)
         if message.done:
             return self._append_requests(f"move {', '.join(message.poses)}", requests)
-        # While a light is dragged nothing is kept.
+        # Nothing is stored while a light is dragged.
         self.live_answer.move_slider(requests)
         self._update_answer()
         return self.answer_update(poses=dict(requests.poses))
@@ -411,7 +410,7 @@ class Session:
     def hang_lights(self, label: str, placed: Placed) -> list[Message]:
         """Move lights and add others, by name: one step. Raises LightpaintError if refused.
 
-        placed: poses of lights that are there; of others all about them, as in `added`.
+        placed: poses of existing lights; full descriptions of new ones, as in `added`.
         """
         self._reset_slider()
         there = {name: its for name, its in placed.items() if name in self.basis.names}
@@ -421,7 +420,7 @@ class Session:
         return [self._append_requests(label, requests)]
 
     def _append_requests(self, label: str, requests: SessionRequests) -> Message:
-        """Set requests from now on: a step."""
+        """Set requests, as a step."""
         self._history.append_requests(label, requests)
         self._update_answer()
         return self.answer_update(**self.edit_state)
@@ -434,9 +433,7 @@ class Session:
         self.live_answer.solve()
 
     def _patch_messages(self, *regions: tuple[int, Region]) -> list[Message]:
-        """Return the canvases' pixels there: a message for each view, or one for the first if
-        nowhere.
-        """
+        """Return the pixels of changed regions: a message per view, or one if there are none."""
         fields = {
             "version": self.version,
             "stroke": self._stroke,

@@ -32,7 +32,7 @@ class SessionSnapshot:
     """The state of a session at one time.
 
     version: of the session then. bases, targets: of each view; None where nothing was painted.
-    transform: the one that was painted through.
+    transform: the view transform of the painting.
     """
 
     version: int
@@ -45,7 +45,7 @@ class SessionSnapshot:
 
     @property
     def painted_views(self) -> tuple[int, ...]:
-        """Indices of the views that were painted: those that count."""
+        """Indices of the painted views; only these count."""
         return tuple(k for k, target in enumerate(self.targets) if target is not None)
 
     @property
@@ -55,7 +55,7 @@ class SessionSnapshot:
 
     @property
     def sensors(self) -> tuple[str, ...]:
-        """Names that tell pictures of all views apart; "" for the only view."""
+        """Distinct names for the pictures of all views; "" for the only view."""
         if len(self.bases) == 1:
             return ("",)
         return tuple(basis.origin.sensor for basis in self.bases)
@@ -68,7 +68,7 @@ class SessionSnapshot:
         return tuple(self.bases[k].origin.sensor for k in self.painted_views)
 
     def solution(self) -> Solution | None:
-        """Return the exact answer; None where nothing is painted. Raises LightpaintError."""
+        """Return the exact answer; None if nothing is painted. Raises LightpaintError."""
         if not self.painted_views:
             return None
         solution = solution_of(self._problem(constraints=self.constraints, fit=self.settings))

@@ -33,11 +33,10 @@ def offer_view(
     clean: DenoisedPlanes | None,
     small: DenoisedPlanes | None = None,
 ) -> None:
-    """Offer the pictures of a view; rough planes stand in for denoised ones that are not
-    made yet.
+    """Offer the pictures of a view; rough planes replace denoised ones until these are made.
 
-    basis: of the view, with every light where the scene has it. small: planes of blocks of pixels
-    that make rough ones better.
+    basis: of the view, with every light at its place in the scene. small: planes of pixel blocks,
+    which improve the rough ones.
     """
 
     def offer(name: str, make: Any) -> None:
