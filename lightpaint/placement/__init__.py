@@ -1,1 +1,1 @@
-"""Lights that are not there yet: their possible places, and their gains."""
+"""Better places of lights, and new lights: the search, and its results."""

@@ -1,7 +1,7 @@
-"""A light with its freedom: its pose as a few numbers, and the permitted poses.
+"""A light with its freedom: its pose as a few numbers, and the permitted range.
 
 These numbers are coordinates of its place on its rail or surface, of its direction across its axis,
-of its cone or its size. A search changes them and asks for the nearest permitted pose.
+of its cone or its size. A search changes these numbers and moves to the nearest permitted pose.
 """
 
 import math
@@ -27,8 +27,8 @@ from lightpaint.placement.space.permitted_places import (
 from lightpaint.scene.properties.rotation import across, rotation_between
 from lightpaint.scene.properties.site import Site
 
-#: Degrees that count like a metre of sliding, for one step of a search: of the axis, of the cone;
-#: and the steps of a beam's share of its cone, and of the logarithm of a side.
+#: Scale of a search step, equivalent to sliding by one unit: degrees of the axis, degrees of the
+#: cone, a beam's share of its cone, and the logarithm of a side.
 AIM_UNIT, CONE_UNIT, BEAM_UNIT, SIDE_UNIT = 20.0, 10.0, 0.3, 0.7
 
 #: Least share of a cone that its beam has, if the beam is free.
@@ -37,10 +37,10 @@ LEAST_BEAM = 0.05
 
 @dataclass(frozen=True)
 class FreeLight:
-    """A light, where it is now, and its freedom.
+    """A light with its present site and its freedom.
 
     places: where it may hang; those of `freedom` if that has no surfaces. sides: smallest and
-    largest side of a panel. has_free_beam: whether its beam changes by itself; else it keeps its
+    largest side of a panel. has_free_beam: whether its beam varies independently; else it keeps its
     share of the cone.
     """
 
@@ -123,7 +123,7 @@ class FreeLight:
         return np.concatenate([position, far_apart(many, count - 1, start=position)])
 
     def directions(self, apart: float) -> Floats:
-        """Return permitted directions, about `apart` degrees from each other, the present first."""
+        """Return permitted directions, about `apart` degrees apart, the present one first."""
         if self.site.direction is None or not self.freedom.turn:
             return np.array(self.site.direction or (0.0, 0.0, 1.0))[None]
         count = max(8, round(4 * math.pi / math.radians(apart) ** 2))
@@ -131,7 +131,7 @@ class FreeLight:
         z, turn = 1 - 2 * k / count, math.pi * (1 + math.sqrt(5)) * k
         flat = np.sqrt(1 - z**2)
         sphere = np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
-        # The spiral's pole is the present direction, so that few directions are well placed, too.
+        # The spiral's pole is the present direction, so that even a few directions are well placed.
         sphere = sphere @ rotation_between((0.0, 0.0, 1.0), self.site.direction).T
         near = sphere @ np.array(self.site.direction) >= math.cos(math.radians(self.freedom.turn))
         return np.concatenate([np.array(self.site.direction)[None], sphere[near]])
@@ -153,7 +153,7 @@ class FreeLight:
 
     @cached_property
     def _share(self) -> float:
-        """The share of its cone that its beam is wide now."""
+        """The present width of its beam, as a share of its cone."""
         return (self.site.beam or 0.0) / (self.site.cutoff or 1.0)
 
     def _opened(self, site: Site, cutoff: float, share: float) -> Site:

@@ -15,7 +15,7 @@ from lightpaint.scene.properties.pose import FARTHEST
 #: Least width of a beam's soft edge, in degrees.
 EDGE = 0.5
 
-#: The most rails, and the most surfaces, of one freedom.
+#: Maximum number of rails, and of surfaces, in one freedom.
 MAX_PARTS = 1000
 
 Segment = tuple[Position, Position]
@@ -30,7 +30,7 @@ class Freedom:
         within: Distance that it may move, in units of the scene.
         box: Two opposite corners of a box, parallel to the axes, that it may hang in.
         line: Two ends of a rail that it may slide along.
-        rails: Several such rails, any of which it may hang on.
+        rails: Several such rails; it may hang on any of them.
         surfaces: Ids of shapes that it may hang on; with `rails`, on either.
         clear: Distance that it keeps from these surfaces, in units of the scene; None for a small
             part of the room.
@@ -38,7 +38,7 @@ class Freedom:
         cone: Smallest and largest cutoff of a spot, in degrees.
 
     Raises:
-        SceneError: For values that mean nothing, or more than one kind of place.
+        SceneError: For invalid values, or more than one kind of place.
 
     Examples:
         >>> lp.Freedom(line=((-1.8, 3.5, 0.6), (-1.8, 3.5, 6.0)), aim=30).aim
@@ -99,7 +99,7 @@ class Freedom:
 
     @property
     def turn(self) -> float:
-        """The most degrees that it may turn."""
+        """Largest turn in degrees."""
         return (180.0 if self.aim else 0.0) if isinstance(self.aim, bool) else self.aim
 
 

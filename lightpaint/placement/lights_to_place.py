@@ -29,10 +29,10 @@ SEARCHED = ("point", "spot", "directional")
 #: Smallest and largest side of new panels, relative to the spread of visible points.
 SIDES = (0.06, 0.5)
 
-#: Share of the cone that the beam of a new spot has at first.
+#: Initial width of a new spot's beam, as a share of its cone.
 FIRST_BEAM = 0.7
 
-#: Random places of a freedom that are tested for being free at all.
+#: Number of random places of a freedom that are tested for free space.
 TESTED = 200
 
 
@@ -46,14 +46,14 @@ class NewLight:
 
     @property
     def as_basis_light(self) -> BasisLight:
-        """The light as constraints know it."""
+        """The light in the form that constraints use."""
         plugin = PLUGIN_OF[self.kind]
         parameter, unit = PLUGINS[plugin]
         return BasisLight(self.name, plugin, parameter, unit, (0.0, 0.0, 0.0))
 
 
 def new_lights_of(scene: Scene, groups: Sequence[NewLights]) -> list[NewLight]:
-    """Return the lights that may be added, with names that no light of the scene has."""
+    """Return the lights that may be added, with unused names."""
     used_names = {*(x.name for x in scene.emitters), *(x.name for x in scene.lights)}
     new_lights: list[NewLight] = []
     for group in groups:
@@ -98,7 +98,7 @@ def new_movables_of(
 ) -> list[Movable]:
     """Return the lights that may be added. first: the index of the first one's column.
 
-    Raises SceneError for those that no place of their freedom is free for.
+    Raises SceneError for lights whose freedom has no free place.
     """
     movables = []
     templates: dict[int, FreeLight] = {}
@@ -113,7 +113,7 @@ def new_movables_of(
 def free_light(scene: Scene, name: str, freedom: Freedom) -> FreeLight:
     """Return a light of `scene` with its freedom, its surfaces not resolved.
 
-    Raises SceneError for one that is not there, or cannot move so.
+    Raises SceneError for an unknown light, or one that cannot move like this.
     """
     return FreeLight(name, _site(scene, name), freedom)
 

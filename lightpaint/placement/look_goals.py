@@ -48,7 +48,7 @@ def goal_of(
     new: Sequence[BasisLight],
     constraints: Constraints | None,
 ) -> LookGoal:
-    """Return the goal of a look on the pixels of all views, with importance in its own alone.
+    """Return the goal of a look on the pixels of all views, with importance only in its own views.
 
     views: the place of each of the look's views among all. sizes: of the small films. new,
     constraints: see `fit_of`.
@@ -71,7 +71,7 @@ def goal_of(
 
 
 def balanced(goals: Sequence[LookGoal]) -> list[LookGoal]:
-    """Return goals that count the same: scaled to the mean ‖Ψ‖² of all."""
+    """Return goals with equal weight: scaled to the mean ‖Ψ‖² of all."""
     norms = [look.norm2 for look in goals]
     mean = sum(norms) / len(norms)
     return [
@@ -83,7 +83,7 @@ def balanced(goals: Sequence[LookGoal]) -> list[LookGoal]:
 def _with_new_lights(
     reduction: Reduction, new: Sequence[BasisLight], constraints: Constraints
 ) -> Reduction:
-    """Return `reduction` with the unknowns of new lights behind its own."""
+    """Return `reduction` with the unknowns of new lights after its own."""
     if not new:
         return reduction
     lights = [

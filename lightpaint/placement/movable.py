@@ -1,4 +1,4 @@
-"""Lights that a search moves, and where it has them at present."""
+"""Lights that a search moves, and their present poses."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -30,7 +30,7 @@ class Movable:
 
 @dataclass(frozen=True)
 class Arrangement:
-    """Movables, the pose of each, and the best lighting with these."""
+    """Movables with their poses, and the best lighting for these."""
 
     movables: tuple[Movable, ...]
     sites: tuple[Site, ...]
@@ -46,7 +46,7 @@ class Arrangement:
         return replace(self, sites=(*self.sites[:k], site, *self.sites[k + 1 :]), fitted=fitted)
 
     def with_movable(self, movable: Movable, site: Site, fitted: Fitted) -> "Arrangement":
-        """Return the arrangement with one movable more, the last."""
+        """Return the arrangement with another movable at the end."""
         return Arrangement((*self.movables, movable), (*self.sites, site), fitted)
 
     def without(self, k: int, fitted: Fitted) -> "Arrangement":

@@ -16,7 +16,7 @@ from lightpaint.scene.lights.new_emitter import NewKind
 from lightpaint.scene.properties.pose import FARTHEST, Site
 from lightpaint.validation import MAX_NAME
 
-#: The most lights that one search adds.
+#: Maximum number of lights that one search adds.
 MAX_COUNT = 32
 
 #: Cones of new spots without a freedom of their own, in degrees.
@@ -29,7 +29,7 @@ _MIRROR = re.compile(r"\s*([xyz])\s*=\s*([-+.\deE]+)\s*")
 @keywords()
 @dataclass(frozen=True)
 class NewLights:
-    """Lights that a search may add: as many of them as are worth it.
+    """Lights that a search may add, if they are worth it.
 
     Attributes:
         kind: `point`, `spot` or `panel`, a square that shines to its front.
@@ -43,7 +43,7 @@ class NewLights:
         size: Smallest and largest side of panels; None for sides that suit the room.
 
     Raises:
-        SceneError: For values that mean nothing.
+        SceneError: For invalid values.
 
     Examples:
         >>> lp.NewLights("spot", count=2, freedom=lp.Freedom(surfaces=("ceiling",))).count
@@ -82,7 +82,7 @@ class NewLights:
                 raise SceneError("aim of new lights is True or left out, unless they are like one")
 
     def check_kind(self, kind: NewKind) -> None:
-        """Raise SceneError for a freedom that lights of this kind do not have."""
+        """Raise SceneError for a freedom that this kind of light cannot have."""
         if self.freedom.cone is not None and kind != "spot":
             raise SceneError(f"a new {kind} has no cone: leave that freedom out")
         if self.freedom.aim and kind == "point":

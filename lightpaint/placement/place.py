@@ -1,4 +1,4 @@
-"""Lights that move to where the painting wants them, and new ones that it asks for."""
+"""The search for moves of lights, and for new ones, that bring the answer closer."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -38,15 +38,15 @@ from lightpaint.scene.properties.film import reduction_to
 from lightpaint.scene.properties.pose import Pose, Site
 from lightpaint.scene.scene import Scene
 
-#: Pixels of the films that places all over are compared on, and of those for the last steps, all
-#: together, if possible.
+#: Number of pixels of the small films, on which all places are compared, and of the larger films
+#: for the last steps; of all views together, if possible.
 PIXELS, FINE_PIXELS = 2**12, 2**14
 
 #: Steps of all lights together along many paths.
 STEPS = 12
 
-#: Errors of a place, relative to the spread of visible points, and of a direction, in degrees, from
-#: which on a picture hardly tells where a light is.
+#: Errors of a place, relative to the spread of visible points, and of a direction, in degrees,
+#: above which a picture says little about a light's pose.
 LONG_ERROR, WIDE_ERROR = 0.06, 6.0
 
 
@@ -145,7 +145,7 @@ class _Result:
     """The result of a search on small films, the first one of `size`.
 
     errors, seen: of each movable, and its place in the first picture. growth: the best lighting
-    with none, one … of the new lights, the one that gives most first.
+    with none, one … of the new lights, largest gain first.
     """
 
     found: Found
@@ -156,7 +156,7 @@ class _Result:
     size: tuple[int, int]
 
     def is_hardly_visible(self, k: int) -> bool:
-        """Return whether the picture hardly tells where movable `k` is."""
+        """Return whether the picture says little about the place of movable `k`."""
         its = self.errors[k]
         is_long = its.place is not None and its.place > LONG_ERROR * self.spread
         return is_long or (its.turn is not None and its.turn > WIDE_ERROR)
@@ -183,7 +183,7 @@ def _sites_by_name(arrangement: Arrangement, names: Sequence[str]) -> dict[str, 
 
 
 def _additions(found: Found) -> list[int]:
-    """Return the places of the new lights among the movables, the one that gives most first."""
+    """Return the indices of the new lights among the movables, largest gain first."""
     new = [k for k, movable in enumerate(found.arrangement.movables) if movable.group is not None]
     return sorted(new, key=lambda k: -found.gains[k])
 
@@ -246,7 +246,7 @@ def _placement(
 
 
 def _emitter(light: NewLight, site: Site, weight: Any) -> NewEmitter:
-    """Return a new light where it was found."""
+    """Return a new light at the place that was found."""
     place = np.array(site.position, dtype=float)
     target = None if site.direction is None else as_position(place + np.array(site.direction))
     pose = Pose(position=as_position(place), target=target, cutoff=site.cutoff, beam=site.beam)
@@ -257,7 +257,7 @@ def _emitter(light: NewLight, site: Site, weight: Any) -> NewEmitter:
 def _views(
     scenes: Scene | Sequence[Scene], bases: Basis | Sequence[Basis]
 ) -> list[tuple[Scene, Basis]]:
-    """Return the views, checked. Raises SceneError unless they are of one scene."""
+    """Return the checked views. Raises SceneError unless they are of one scene."""
     all_scenes = [scenes] if isinstance(scenes, Scene) else list(scenes)
     all_bases = [bases] if isinstance(bases, Basis) else list(bases)
     if not all_scenes or len(all_scenes) != len(all_bases):
@@ -309,5 +309,5 @@ def on_small_film(scene: Scene, basis: Basis, pixels: int) -> Scene:
 
 
 def reduced_film(scene: Scene, pixels: int) -> Scene:
-    """Return `scene` on a film of `pixels` or fewer, if possible without rest."""
+    """Return `scene` on a film of at most `pixels`, if possible without incomplete blocks."""
     return scene.reduced(f"1/{reduction_to(scene.film, pixels)}")

@@ -21,7 +21,7 @@ HARDLY_VISIBLE = "hardly visible from here: paint a second view"
 @keywords()
 @dataclass(frozen=True)
 class Move:
-    """A move of a light that is worth it.
+    """A worthwhile move of a light.
 
     Attributes:
         name: The light.
@@ -91,7 +91,7 @@ class Move:
 @keywords()
 @dataclass(frozen=True)
 class AddedLight:
-    """A new light that is worth it.
+    """A worthwhile new light.
 
     Attributes:
         emitter: The light: its name, kind, place and emission.
@@ -135,8 +135,8 @@ class AddedLight:
     def flux(self) -> RGB:
         """Watts that it radiates per channel, if a unit of the scene is a metre.
 
-        Of a panel it is surer than size and radiance: a small bright one far away looks much the
-        same.
+        For a panel it is more certain than size and radiance, since a small, bright, distant one
+        has nearly the same effect.
         """
         light, site = self.emitter, self.site
         if light.kind == "panel":
@@ -166,13 +166,13 @@ class Placement:
     """Better places of lights.
 
     Attributes:
-        scenes: The scene with these, through the sensor of each view, for bases and a solve of
-            their own.
-        moves: Those worth it, the one that gives most first; none if no move surely gives a
-            hundredth of what is missed.
-        additions: New lights worth it, the same way.
-        missed_before: The share of ‖Ψ‖² that the solve misses, estimated on paths that no place was
-            fitted to.
+        scenes: The scene with these, through the sensor of each view, for new bases and another
+            solve.
+        moves: The worthwhile ones, largest gain first; none if no move reliably removes 1 % of the
+            error.
+        additions: The worthwhile new lights, likewise.
+        missed_before: The error of the solve as a share of ‖Ψ‖², estimated on paths that no place
+            was fitted to.
         missed_after: The same with the moves and additions.
         looks: Names of the looks that share it; none for one alone.
 
@@ -204,7 +204,7 @@ class Placement:
 def hung(
     scenes: Sequence[Scene], moves: Sequence[Move], additions: Sequence[AddedLight]
 ) -> list[Scene]:
-    """Return `scenes` with these moves and new lights; themselves where there are none."""
+    """Return `scenes` with these moves and new lights, or unchanged without any."""
     if not moves and not additions:
         return list(scenes)
     poses, new = {move.name: move.pose for move in moves}, [light.emitter for light in additions]

@@ -3,9 +3,9 @@
 The search is over places only: for each choice of places, the usual solve gives the best weights
 under the constraints. So a search has few unknowns, and no bad starts in weights.
 
-Noise of columns adds to what is missed, at one place more than at another, and would draw lights to
-where their columns are clean. So columns come with half the differences of two independent halves,
-whose squares are the variance of the columns, and the loss is less the part that is noise.
+Noise of columns adds to the error, more at some places than at others, and would draw lights to
+places with clean columns. So columns come with half the differences of two independent halves,
+whose squares are the variance of the columns, and the loss subtracts this noise.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -69,7 +69,7 @@ class Ranking:
         return gain
 
     def at(self, pixels: Indices) -> "Ranking":
-        """Return the ranking of candidates that are known at some pixels, (v,), alone."""
+        """Return the ranking for candidates with columns at some pixels only, (v,)."""
         return replace(
             self,
             root=self.root[pixels],
@@ -109,7 +109,7 @@ class PlacementFit:
         return len(self._root)
 
     def replaced(self, changed: Mapping[int, Floats]) -> Floats:
-        """Return the columns, those of some lights replaced by (q, 3)."""
+        """Return the columns, with those of some lights replaced by (q, 3)."""
         return with_columns(self.columns, changed)
 
     def fitted(self, columns: Floats) -> Fitted:
@@ -128,7 +128,7 @@ class PlacementFit:
                 ).x
             weights = reduction.weights(x)
             all_weights.append(weights)
-            # As `NormalEquations.objective`, which has no loss below 0, and noise may bring one.
+            # As `NormalEquations.objective`, but the loss may be negative by noise.
             missed += equations.target_norm2.sum()
             missed += float((weights.T * (equations.gradient(weights).T - equations.b)).sum())
         return Fitted(columns, np.concatenate(all_weights, axis=1), missed)
@@ -173,7 +173,7 @@ class PlacementFit:
         `numbers`, which several columns may share.
         """
         residual = self._residual(fitted.columns, fitted.weights)
-        # Half differences count like pixels, with what they mix to as what is missed there.
+        # Half differences act like pixels, with their mix as the residual.
         residual = np.concatenate([residual, self._noise(fitted.columns, fitted.weights)])
         p, count = self.pixels, max(numbers) + 1
         matrix, gradient = np.zeros((count, count)), np.zeros(count)

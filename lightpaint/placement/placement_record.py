@@ -14,7 +14,7 @@ from lightpaint.storage.json_records import read_record, strict_json
 
 FORMAT: Literal["lightpaint-places 1"] = "lightpaint-places 1"
 
-#: Longest file that is read, in bytes.
+#: Maximum size in bytes of a file.
 MAX_BYTES = 2**22
 
 
@@ -34,9 +34,9 @@ class PlacementRecord:
     format: Literal["lightpaint-places 1"] = FORMAT
 
     def hung_in(self, scenes: Sequence[Scene]) -> Placement:
-        """Return the placement of the same lights in `scenes`, which differ in the sensor alone.
+        """Return the placement applied to `scenes`, which differ only in the sensor.
 
-        Raises SceneError for lights that these do not have, or that are there already.
+        Raises SceneError for moved lights that these lack, or new lights that exist already.
         """
         return Placement(
             tuple(hung(scenes, self.moves, self.additions)),
@@ -55,7 +55,7 @@ class PlacementRecord:
 def record_of(
     placement: Placement, *, looks: Sequence[str] = (), made_of: str = ""
 ) -> PlacementRecord:
-    """Return the record of a placement. looks: the names of those that share it."""
+    """Return the record of a placement. looks: the names of looks that share it."""
     return PlacementRecord(
         placement.moves,
         tuple(replace(x, without=None, with_it=None) for x in placement.additions),

@@ -1,1 +1,1 @@
-"""Paths of camera samples that are kept, and the picture of a light at any place along them."""
+"""Stored paths of camera samples, and the image of a light at any place along them."""

@@ -43,7 +43,7 @@ class Vertices:
 
 
 def longest_path(scene: Scene) -> int:
-    """Return the most vertices of a path that lights are asked at."""
+    """Return the largest number of vertices of a path at which lights contribute."""
     depth = scene.integrator.max_depth
     return MOST_VERTICES if depth < 0 else min(max(depth - 1, 0), MOST_VERTICES)
 
@@ -64,7 +64,7 @@ def later_vertices_of(
     longest: int,
     rng: np.random.Generator,
 ) -> Vertices | None:
-    """Return the vertices behind the first of paths, ordered by pixel."""
+    """Return the vertices of paths after the first ones, ordered by pixel."""
     import drjit as dr
     import mitsuba as mi
 
@@ -119,7 +119,7 @@ def _floats(rows: Iterable[Floats]) -> list[Any]:
 
 
 def _compressed(si: Any, weight: Any, pixels: npt.NDArray[np.int64]) -> Vertices:
-    """Return the interactions that are some, in their order."""
+    """Return the selected interactions, in order."""
     import drjit as dr
     import mitsuba as mi
 
@@ -133,7 +133,7 @@ def _compressed(si: Any, weight: Any, pixels: npt.NDArray[np.int64]) -> Vertices
 
 
 def _joined(parts: Sequence[Vertices]) -> Vertices | None:
-    """Return all vertices of several, ordered by pixel; None if there are none."""
+    """Return all vertices of several sets, ordered by pixel; None if there are none."""
     import drjit as dr
     import mitsuba as mi
 

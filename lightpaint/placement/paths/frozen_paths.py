@@ -38,7 +38,7 @@ from lightpaint.scene.scene_render import Stream, pass_seed
 #: Shadow rays of one launch; more would only take more memory.
 LANES = 2**20
 
-#: Values at the vertices that are kept for the next question, of as many origins as that makes.
+#: Number of cached values at vertices, which limits the number of cached origins.
 KEPT_VALUES = 2**24
 
 #: Shadow rays stop short of a light by this, relative to its distance, to miss its mounting
@@ -85,17 +85,17 @@ class _Origin:
 
 
 class FrozenPaths:
-    """Paths of the camera of a scene, on its film. They live no longer than the loaded scene.
+    """Paths of the camera of a scene, on its film. They are valid only while the scene is loaded.
 
     Args:
         scene: The scene, on a small film: columns are made for each of its pixels.
         loaded: That scene, loaded; see `Scene.while_loaded`.
         first_hits: First hits of a pixel, a square number.
-        bounces: Paths of a pixel that go on from other first hits; 0 for direct light alone.
+        bounces: Paths per pixel that continue from further first hits; 0 for direct light only.
         seed: Of the paths.
 
     Raises:
-        SceneError: For scenes with fog or the like, whose light is also scattered in between.
+        SceneError: For scenes with fog or other media that scatter light.
     """
 
     def __init__(
@@ -151,7 +151,7 @@ class FrozenPaths:
         return images
 
     def contributions(self, vertices: Vertices, site: Site) -> Floats:
-        """Return what `site` adds at each vertex, (v, 3); of a spot, as if it shone all around."""
+        """Return contributions of `site` at the vertices, (v, 3); for a spot, without its cone."""
         return self._shone(vertices, [_Origin.of(site)])[0].light.T
 
     def image_of(self, vertices: Vertices, contributions: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""Frozen paths of all views together: their pixels stand behind each other."""
+"""Frozen paths of all views together, with their pixels concatenated."""
 
 import math
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, pass_seed
 from lightpaint.scene.surfaces import loaded_features
 
-#: First hits of a pixel, and paths that go on: to rank and compare candidates, on small films.
+#: First hits per pixel, and continued paths, to rank and compare candidates on small films.
 COARSE_SAMPLES = ((1, 0), (9, 2))
 
 #: First hits of all pixels of a larger film, about, to refine and judge candidates, and to ask how
@@ -30,14 +30,14 @@ COARSE_SAMPLES = ((1, 0), (9, 2))
 #: that go on for each.
 FINE_HITS, FINE_SIDES, GOING_ON = 2**17, (3, 6), 2 / 9
 
-#: Sets of paths of a view, each of random numbers of its own.
+#: Number of independent sets of paths per view.
 SETS = 10
 
 
 class ViewPaths:
     """Frozen paths of views, each on its small film.
 
-    other_half: as many paths of other random numbers, which tell the noise of both.
+    other_half: as many independent paths, which give the noise of both.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class ViewPaths:
     def columns(self, sites: Sequence[Site]) -> Floats:
         """Return the images of lights at unit emission, (k, p, 3), p being all pixels.
 
-        With two halves (k, 2 p, 3): behind their means stand half their differences.
+        With two halves (k, 2 p, 3): their means, followed by half their differences.
         """
         halves = [
             np.concatenate(
@@ -82,7 +82,7 @@ class ViewPaths:
 
 
 class SearchPaths:
-    """All paths of a search, made when they are first asked for.
+    """All paths of a search, made on first use.
 
     It uses two films. Places all over the scene are compared on a small one. That loses highlights
     on metal and edges of shadows, so the last steps and the judgement use a larger one.
@@ -117,16 +117,16 @@ class SearchPaths:
 
     @cached_property
     def judge(self) -> ViewPaths:
-        """Paths as many, from other random numbers, to judge by."""
+        """As many independent paths, for the judgement."""
         return self._fine(3)
 
     @cached_property
     def spread(self) -> ViewPaths:
-        """Paths as many, from others again, to tell how far places spread."""
+        """As many further independent paths, for the spread of places."""
         return self._fine(4)
 
     def in_view(self, places: Floats) -> Bools:
-        """Return which of some places any camera sees, (k,)."""
+        """Return which places any camera sees, (k,)."""
         seen = [seen_by_camera(view, self.loaded, places) for view in self._large]
         return np.asarray(np.any(seen, axis=0))
 

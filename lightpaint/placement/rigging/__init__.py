@@ -1,1 +1,1 @@
-"""Rigging: lights that may move and lights to add, as a lights file and options name them."""
+"""Rigging: lights that may move and lights to add, by a lights file and options."""

@@ -26,7 +26,7 @@ from lightpaint.screen import some_names
 class RiggedLights:
     """The lights of a scene that may move, and those that may be added to it.
 
-    freedoms: by name. constraints: those on new lights, by the names that they get.
+    freedoms: by name. constraints: on new lights, by their generated names.
     """
 
     freedoms: Mapping[str, Freedom]
@@ -36,9 +36,9 @@ class RiggedLights:
 
 
 def rigged_lights(rigging: Rigging, scene: Scene) -> RiggedLights:
-    """Return what `rigging` asks of the lights of `scene`.
+    """Return `rigging` applied to the lights of `scene`.
 
-    Raises ConstraintError for names that nothing has, and for lights that cannot do it.
+    Raises ConstraintError for unknown names, and for lights that cannot move like this.
     """
     freedoms = freedoms_of(rigging, scene)
     pairs = [_pair(table, where, scene, freedoms) for table, where in rigging.pairs]
@@ -55,8 +55,8 @@ def rigged_lights(rigging: Rigging, scene: Scene) -> RiggedLights:
 def freedoms_of(rigging: Rigging, scene: Scene) -> dict[str, Freedom]:
     """Return the freedom of each light that may move, by name.
 
-    Each key of a pattern is for those of its lights that can do it. Raises ConstraintError for
-    names that nothing has, and for lights that cannot move.
+    Each key of a pattern applies to the matching lights that allow it. Raises ConstraintError for
+    unknown names, and for lights that cannot move.
     """
     tables: dict[str, dict[str, Any]] = {}
     places: dict[str, str] = {}
@@ -144,7 +144,7 @@ def _new_lights(table: Mapping[str, Any], where: str, scene: Scene, rigging: Rig
 def _pair(
     table: Mapping[str, Any], where: str, scene: Scene, freedoms: dict[str, Freedom]
 ) -> MirroredPair:
-    """Return a pair of which the first light has the freedom."""
+    """Return a mirrored pair; its first light has the freedom."""
     first, second = table["lights"]
     if first not in freedoms and second in freedoms:
         first, second = second, first
@@ -165,7 +165,7 @@ def surfaces_of(rigging: Rigging, scene: Scene) -> tuple[str, ...]:
 def freedom_on(names: Sequence[str], scene: Scene, rigging: Rigging) -> Freedom:
     """Return the freedom to hang on rails, surfaces and shapes of these names.
 
-    Raises ConstraintError for names that nothing has.
+    Raises ConstraintError for unknown names.
     """
     return Freedom(**_places_on(list(names), scene, rigging, "on"))
 

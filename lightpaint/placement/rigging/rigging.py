@@ -26,7 +26,7 @@ from lightpaint.validation import MAX_LISTED
 Table = tuple[Mapping[str, Any], str]
 NamedTable = tuple[str, Mapping[str, Any], str]
 
-#: Longest error, which quotes a value of any length.
+#: Maximum length of an error, which may quote a long value.
 MAX_MESSAGE_LENGTH = 1000
 
 
@@ -99,7 +99,7 @@ class Rigging:
         return cls(lights=tuple(lights), on=tuple(named), new=added, pairs=pairs)
 
     def and_then(self, others: "Rigging") -> "Rigging":
-        """Return this and `others`, whose rails, surfaces and keys of lights replace its own."""
+        """Return this rigging with `others`, whose rails, surfaces and keys take precedence."""
         return Rigging(
             lights=tuple(x for x in self.lights if x not in others.lights) + others.lights,
             on=tuple(x for x in self.on if x not in others.on) + others.on,

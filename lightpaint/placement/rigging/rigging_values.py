@@ -13,26 +13,26 @@ from lightpaint.scene.lights.lights_file import MOVES
 from lightpaint.scene.properties.pose import FARTHEST
 from lightpaint.validation import MAX_LISTED, MAX_NAME
 
-#: The ways to permit places; keys of a rail or surface.
+#: Keys of permitted places; keys of a rail or surface.
 PLACE_KEYS = ("within", "box", "along", "on")
 ON_KEYS = ("line", "shapes", "clear")
 
 #: Kinds of new lights.
 KINDS = ("point", "spot", "panel")
 
-#: Keys of a light to add that say where and how it hangs, and constraints that it may have.
+#: Keys of a light to add: for its place and pose, and for its constraints.
 NEW_KEYS = ("kind", "like", "name", "count", "on", "box", "aim", "cone", "size", "apart", "in_view")
 NEW_CONSTRAINTS = ("limits", "color", "kelvin", "duv", "primaries")
 
-#: Most lights that one table adds: a larger number is a typing error.
+#: Maximum number of lights that one table adds: a larger number is a typing error.
 MAX_COUNT = 100
 
-#: A plane across an axis, as `mirror` has it.
+#: Syntax of `mirror`: a plane across an axis.
 _PLANE = re.compile(r"\s*([xyz])\s*=\s*(\S+)\s*")
 
 
 def check_move(table: Mapping[str, Any], where: str) -> None:
-    """Raise ConstraintError unless these are good values of `move`, `aim` and `cone`."""
+    """Raise ConstraintError unless these are valid values of `move`, `aim` and `cone`."""
     check_keys(table, MOVES, where)
     if "move" in table:
         _check_places(table["move"], f"{where}.move")
@@ -97,7 +97,7 @@ def check_new(table: Mapping[str, Any], where: str) -> None:
 
 
 def constraint_of(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Return those keys of a light to add that are constraints."""
+    """Return the constraint keys of a light to add."""
     return {key: value for key, value in table.items() if key in NEW_CONSTRAINTS}
 
 
@@ -135,7 +135,7 @@ def names_of(value: Any, where: str) -> tuple[str, ...]:
 
 
 def _check_places(value: Any, where: str) -> None:
-    """Raise ConstraintError unless it says where a light may hang."""
+    """Raise ConstraintError unless it describes permitted places."""
     if _is_number(value):
         value = {"within": value}
     if not isinstance(value, Mapping):
@@ -158,7 +158,7 @@ def _check_places(value: Any, where: str) -> None:
 
 
 def _check_turns(table: Mapping[str, Any], where: str) -> None:
-    """Raise ConstraintError for values of `aim` and `cone` that mean nothing."""
+    """Raise ConstraintError for invalid values of `aim` and `cone`."""
     aim = table.get("aim", True)
     if not isinstance(aim, bool) and not (_is_number(aim) and 0 < aim <= 180):
         raise _wrong(f"{where}.aim", aim, "degrees from 0 to 180, or true for any direction")
@@ -196,7 +196,7 @@ def _is_list(value: Any, count: int) -> bool:
 
 
 def _is_number(value: Any) -> bool:
-    # bool is an int to Python, and no number to people.
+    # bool is an int in Python, but no valid number here.
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 

@@ -21,18 +21,18 @@ from lightpaint.scene.properties.pose import Site
 #: Least gain of a move or a new light, as a share of the error, and in standard errors.
 WORTH, SURE = 0.01, 3.0
 
-#: Pixels whose noise one light explains by chance, of many places that it is tried at; and the
-#: share of pixels whose miss is no more than the noise of a pixel where nothing else is missed.
+#: Number of pixels whose noise one light, tried at many places, can explain by chance; and the
+#: share of pixels whose error is pure noise if nothing else is missed.
 BY_CHANCE, USUAL_SHARE = 24, 0.9
 
-#: Share of ‖Ψ‖² that counts as nothing.
+#: Share of ‖Ψ‖² that is negligible.
 NOTHING = 1e-4
 
-#: Ratio of Student's t with two degrees of freedom to a normal deviate, at one standard error: what
-#: a spread of three fits may be too short by.
+#: Ratio of Student's t with two degrees of freedom to a normal deviate, at one standard error: the
+#: factor by which a spread of three fits may be too small.
 FEW_FITS = 1.3213
 
-#: Steps of a fit along other paths, and the share of the first differences that they begin with.
+#: Steps of a fit along other paths, and their initial differences, relative to those of a search.
 REFIT_STEPS, REFIT_SHARE = 5, 0.5
 
 
@@ -55,8 +55,8 @@ class Found:
 class Growth:
     """The best lighting with some of the new lights, and all moves.
 
-    missed: the share of ‖Ψ‖² that it misses, on paths that no pose was fitted to. picture: (p, 3)
-    linear, of the first look, all views.
+    missed: error as a share of ‖Ψ‖², on paths that no pose was fitted to. picture: (p, 3) linear,
+    of the first look, all views.
     """
 
     missed: float
@@ -67,7 +67,7 @@ class Growth:
 class PoseError:
     """Standard errors of a pose: of its place, in units of the scene, and of its direction.
 
-    Degrees; None for what has none, or does not change.
+    Degrees; None for a light without a direction, or one that does not change.
     """
 
     place: float | None
@@ -83,7 +83,7 @@ class PlacementJudge:
     def refined(
         self, best: Arrangement, steps: int, *, progress: Callable[[], None]
     ) -> Arrangement:
-        """Return the arrangement after the last steps, on the film that it is judged on."""
+        """Return the arrangement after the last steps, on the film of the judgement."""
         at = self._paths.refine
         start = self._steps.refitted(best, at)
         return self._steps.descend(start, at, steps, first_share=REFIT_SHARE, progress=progress)
@@ -138,7 +138,7 @@ class PlacementJudge:
         )
 
     def is_worth(self, before: Arrangement, after: Arrangement) -> bool:
-        """Return whether the last light gains enough on paths that nothing was fitted to."""
+        """Return whether the last light has enough gain on paths that nothing was fitted to."""
         if after.missed >= before.missed:
             return False
         maps = []
@@ -159,14 +159,14 @@ class PlacementJudge:
             SURE * standard_error(gain),
             NOTHING * self._fit.norm2,
         )
-        # Noise of painting and basis, which no other paths can tell, is that of single pixels: a
-        # search fits some of them by chance.
+        # Noise of painting and basis is the same for all paths. It is independent between pixels,
+        # and a search fits some of it by chance.
         usual = np.sort(maps[0][1])[: max(1, round(USUAL_SHARE * len(maps[0][1])))]
         least = max(least, BY_CHANCE * float(usual.mean()))
         return float(gain[1].sum() - gain[1].max()) >= least
 
     def errors(self, best: Arrangement) -> list[PoseError]:
-        """Return how far each pose differs between fits along independent paths."""
+        """Return the spread of each pose between fits along independent paths."""
         fits = [best.sites]
         for at in (self._paths.judge, self._paths.spread):
             start = self._steps.refitted(best, at)

@@ -1,8 +1,8 @@
 """The search for new lights: the best place for one more, then all of them moved together.
 
-This is the sliding Frank-Wolfe method (Denoyelle et al. 2019): weights are never searched for, the
-convex solve gives them. Each new light is judged on paths that it was not fitted to, for of many
-candidates some seem to help by their noise alone.
+This is the sliding Frank-Wolfe method (Denoyelle et al. 2019): the search is over places only, and
+the convex solve gives the weights. Each new light is judged on paths that it was not fitted to,
+since some of many candidates seem to help by noise alone.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,7 +19,7 @@ from lightpaint.scene.properties.pose import Site
 #: Least decrease of the error for which a new light moves once all are added.
 WORTH_AGAIN = 0.05
 
-#: Steps of all lights together, after each one that is added.
+#: Steps of all lights together, after each addition.
 STEPS = 6
 
 #: Weight, relative to the largest, below which a light is off.
@@ -28,7 +28,7 @@ OFF = 1e-6
 #: Largest increase of the error for which two nearby lights are merged.
 MERGED_RISE = 0.03
 
-#: Distance of lights that may be one, relative to the spread of visible points.
+#: Distance of lights that may be merged, relative to the spread of visible points.
 MERGED_DISTANCE = 0.5
 
 
@@ -38,7 +38,7 @@ class NewLightSearch:
     Args:
         search: Of poses.
         slots: New lights that may be added; those of one group are alike.
-        judge: Of what each gives.
+        judge: Judges the gain of each.
     """
 
     def __init__(self, search: PoseSearch, slots: Sequence[Movable], judge: PlacementJudge) -> None:
@@ -46,7 +46,7 @@ class NewLightSearch:
         self._fit, self._steps, self._paths = search.fit, search.steps, search.paths
 
     def run(self, start: Arrangement, progress: Callable[[], None]) -> Arrangement:
-        """Return an arrangement with the new lights that are worth it."""
+        """Return an arrangement with the worthwhile new lights."""
         arrangement = start
         while self._free and arrangement.missed > NOTHING * self._fit.norm2:
             more = self._with_one_more(arrangement)
@@ -60,7 +60,7 @@ class NewLightSearch:
         return self._merged(self._tried_again(arrangement))
 
     def _tried_again(self, arrangement: Arrangement) -> Arrangement:
-        """Return the arrangement after each new light was tried elsewhere, beside the others."""
+        """Return the arrangement after trying each new light at other places."""
         for k, movable in enumerate(arrangement.movables):
             if movable.group is None or arrangement.missed <= NOTHING * self._fit.norm2:
                 continue
@@ -72,7 +72,7 @@ class NewLightSearch:
         return arrangement
 
     def _with_one_more(self, arrangement: Arrangement) -> Arrangement | None:
-        """Return the arrangement with the best light added, the others where they are."""
+        """Return the arrangement with the best light added, and the others unchanged."""
         kinds: list[Movable] = []
         for slot in self._free:
             if all(slot.group is not kind.group for kind in kinds):
@@ -106,7 +106,7 @@ class NewLightSearch:
         return columns
 
     def _merged(self, arrangement: Arrangement) -> Arrangement:
-        """Return the arrangement with lights that stand for one light made one."""
+        """Return the arrangement with nearby lights of one group merged."""
         while (pair := self._nearest_pair(arrangement)) is not None:
             first, second = pair
             merged = self._one_for_two(arrangement, first, second)
@@ -132,7 +132,7 @@ class NewLightSearch:
         return self._steps.descend(joined, self._paths.compare, STEPS, first_share=0.5)
 
     def _nearest_pair(self, arrangement: Arrangement) -> tuple[int, int] | None:
-        """Return the nearest two new lights of one group that may be one, or None."""
+        """Return the nearest two new lights of one group that may be merged, or None."""
         best, nearest = None, MERGED_DISTANCE * self._search.spread
         for k, movable in enumerate(arrangement.movables):
             for j in range(k):
@@ -146,7 +146,7 @@ class NewLightSearch:
 
 
 def _between(first: Site, second: Site, share: float) -> Site:
-    """Return the pose between two. share: of the other."""
+    """Return the pose between two. share: weight of the other."""
 
     def mixed(a: tuple[float, ...], b: tuple[float, ...]) -> tuple[float, float, float]:
         x, y, z = ((1 - share) * p + share * q for p, q in zip(a, b, strict=True))

@@ -1,7 +1,7 @@
-"""Poses all over a light's freedom, ranked by the direct light that they give.
+"""Poses over a light's whole freedom, ranked by their direct light.
 
-The sums that a ranking needs are inner products over visible points, so one matrix product serves
-all directions and cones of a light at one place, whose shadow rays they share.
+A ranking needs inner products over visible points. So all directions and cones of a light at one
+place share their shadow rays and one matrix product.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Rules that poses keep to besides the freedom of each light: free space, distance, view."""
+"""Rules for poses besides the freedom of each light: free space, distance, view."""
 
 from collections.abc import Sequence
 
@@ -17,7 +17,7 @@ class PoseRules:
         self._paths = paths
 
     def permit(self, movables: Sequence[Movable], sites: Sequence[Site]) -> bool:
-        """Return whether new lights are clear of surfaces, apart, and out of view if asked."""
+        """Return whether new lights are clear of surfaces, apart, and out of view if required."""
         for k, (movable, site) in enumerate(zip(movables, sites, strict=True)):
             group = movable.group
             if group is None or site.position is None:
@@ -39,7 +39,7 @@ class PoseRules:
         return True
 
     def usable(self, movable: Movable, places: Floats) -> Bools:
-        """Return which places, (k,), are free, see the picture and are seen as the light may be."""
+        """Return which places, (k,), are free, see the picture, and are out of view if required."""
         clear = movable.light.freedom.clear
         # Lights on a surface keep the requested distance from it.
         is_usable = self._paths.usable(places, None if clear is None else 0.9 * clear)

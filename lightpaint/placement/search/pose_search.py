@@ -20,21 +20,22 @@ from lightpaint.placement.search.pose_rules import PoseRules
 from lightpaint.placement.search.pose_steps import PoseSteps
 from lightpaint.scene.properties.pose import Site
 
-#: Places that each light is tried at, if all of them are along lines, and if not; and new ones.
+#: Number of trial places of a light: if all lights are on lines, otherwise, and for new lights.
 PLACES_ON_LINES, PLACES, PLACES_OF_NEW = 24, 64, 112
 
-#: Places near which more are tried, and how many.
+#: Number of best places around which more are tried, and the number of these.
 BESIDE, AROUND = 6, 8
 
 #: Largest number of rounds over all lights, and the share by which a round has to lower the error
 #: for another one.
 TURNS, WORTH_A_TURN = 2, 0.15
 
-#: Candidates that all light is computed for; those of them that are refined, far from each other
-#: in place or direction; and the steps of that.
+#: Number of candidates for which all light is computed; number of those that are refined, far apart
+#: in place or direction; and the steps of the refinement.
 COMPARED, REFINED, SHORT_STEPS = 32, 3, 3
 
-#: Closest two refined candidates, relative to the spread of visible points, and in degrees.
+#: Least distance between refined candidates, relative to the spread of visible points, and in
+#: degrees.
 NEAREST, NARROWEST = 0.15, 25.0
 
 #: Least decrease of the error for which a trial is kept.
@@ -60,7 +61,7 @@ class PoseSearch:
         self._rng = np.random.default_rng(seed)
 
     def by_blocks(self, start: Arrangement, progress: Callable[[], None]) -> Arrangement:
-        """Return an arrangement in which each light was tried all over its freedom."""
+        """Return an arrangement after trying each light over its whole freedom."""
         best = start
         for _ in range(TURNS):
             before = best.missed
@@ -72,7 +73,7 @@ class PoseSearch:
         return best
 
     def tried(self, start: Arrangement, k: int) -> Arrangement:
-        """Return the arrangement with the best pose of movable `k`, the others where they are."""
+        """Return the arrangement with the best pose of movable `k`, and the others unchanged."""
         movable = start.movables[k]
         black = dict.fromkeys(movable.columns, 0 * start.fitted.columns[0])
         others = self.fit.fitted(with_columns(start.fitted.columns, black))
@@ -100,7 +101,7 @@ class PoseSearch:
             if len(places) > 1:
                 beside = self._places_beside(others, movable, places, ranked)
                 nearer = best_poses(direct.gains(movable.light, beside), COMPARED // 2)
-                # Some of both: direct light makes much of places that are close to one hit.
+                # Some from each ranking, since direct light overrates places close to a hit.
                 ranked = [*ranked[: COMPARED - len(nearer)], *nearer]
             poses += [(gain, site, j) for gain, site in ranked]
         poses = sorted(poses, key=lambda pose: -pose[0])[:COMPARED]
@@ -122,7 +123,7 @@ class PoseSearch:
         return self.fit.fitted(with_columns(others.fitted.columns, by_column([movable], columns)))
 
     def _places(self, others: Arrangement, movable: Movable) -> Floats:
-        """Return places to try a light at: those that are free, and where it hangs now."""
+        """Return trial places of a light: free ones, and its present one."""
         light = movable.light
         if light.site.position is None or not light.freedom.slides:
             return light.some_places(1, self._rng)
@@ -142,7 +143,7 @@ class PoseSearch:
         places: Floats,
         ranked: Sequence[tuple[float, Site]],
     ) -> Floats:
-        """Return more places around the best of those that were tried, nearer than the next."""
+        """Return more places around the best ones, nearer than their neighbours."""
         assert movable.light.places is not None
         best: list[Floats] = []
         for _, site in ranked:

@@ -11,15 +11,16 @@ from lightpaint.placement.paths.view_paths import ViewPaths
 from lightpaint.placement.placement_fit import Fitted, PlacementFit, with_columns
 from lightpaint.scene.properties.pose import Site
 
-#: Lengths of a step, in those of its differences, that no number exceeds at once.
+#: Largest step of a number, relative to its finite difference.
 TRUST = 6.0
 
-#: Ridge of the first step, relative to the diagonal; by how much it grows if a trial misses more,
-#: and shrinks after one that helped; the least of it; and the trials of a step.
+#: Ridge of the first step, relative to the diagonal; its growth after a trial that failed, and
+#: shrinkage after one that helped; its minimum; and the trials of a step.
 RIDGE, RIDGE_GROWTH, RIDGE_SHRINK, LEAST_RIDGE, TRIALS = 1e-2, 6.0, 4.0, 1e-5, 5
 
-#: Length of the first differences, relative to the spread of visible points; the share of it that
-#: the last have; and by how much they shorten after a step that helped, or one that hardly did.
+#: Length of the first finite differences, relative to the spread of visible points; the least
+#: length relative to that; and the factors after a step that helped, and after one without
+#: progress.
 FIRST_STEP, LAST_SHARE, SHORTER, MUCH_SHORTER = 0.04, 0.15, 0.6, 0.4
 
 #: Decrease, as a share of the error, below which a step counts as no progress.
@@ -30,7 +31,7 @@ class PoseSteps:
     """Steps of arrangements.
 
     Attributes:
-        watch: Hears of each arrangement that was tried.
+        watch: Receives each trial arrangement.
 
     Args:
         fit: The goal, and the columns of lights that stay.
@@ -51,7 +52,7 @@ class PoseSteps:
         self._unit = spread / 3
 
     def on(self, fit: PlacementFit) -> "PoseSteps":
-        """Return the same steps for another fit: on another film."""
+        """Return the same steps for a fit on another film."""
         steps = PoseSteps(fit, self._spread, self._permits)
         steps.watch = self.watch
         return steps
@@ -105,7 +106,7 @@ class PoseSteps:
         *,
         moving: Sequence[int] | None = None,
     ) -> tuple[Arrangement, float]:
-        """Return an arrangement that misses less, or itself, and the ridge of the next step.
+        """Return an arrangement with a smaller error, or itself, and the ridge of the next step.
 
         step: length of the differences. moving: movables that move; None for all.
         """
@@ -162,7 +163,7 @@ class PoseSteps:
             change[j] = step * scales[k][j]
             new_site, width = movable.light.stepped(site, change), step
             if new_site == site:
-                # It stands at a bound: look the other way.
+                # At a bound, use the opposite difference.
                 new_site, width = movable.light.stepped(site, -change), -step
             ahead += movable.sites(new_site)
             owners += movable.columns
@@ -174,6 +175,6 @@ class PoseSteps:
         return slopes, owners, places
 
     def _scales(self, light: FreeLight, site: Site) -> Doubles:
-        """Return how much of each number of a pose counts like a scene unit of sliding."""
+        """Return the amounts of a pose's numbers that are equivalent to sliding by one unit."""
         place, turn, cone = light.dimensions(site)
         return np.array([1.0] * place + [1 / self._unit] * (turn + cone))

@@ -34,9 +34,9 @@ ASKED, LEAST_SEEN = 64, 0.05
 class FreeSpace:
     """Places with a free view of visible points.
 
-    places: (k, 3), units of the scene. spread: median distance of visible points from their
-    middle, the unit of near and far. points, normals: (m, 3), some visible ones, and the sides that
-    are seen of them.
+    places: (k, 3), units of the scene. spread: median distance of visible points from their centre,
+    the unit of distances. points, normals: (m, 3), some visible ones, with the normals of their
+    visible sides.
     """
 
     places: Floats
@@ -75,7 +75,7 @@ class FreeSpace:
 
 
 def free_space(scene: Scene, loaded: Any, *, seed: int = 0) -> FreeSpace:
-    """Search for places in `loaded`, the loaded `scene`. None are there if it hits nothing."""
+    """Search for places in `loaded`, the loaded `scene`. There are none if rays hit nothing."""
     rng = np.random.default_rng(pass_seed(seed, Stream.CANDIDATES, 0))
     points, normals = _visible(scene, loaded, rng)
     if not len(points):
@@ -111,7 +111,7 @@ def far_apart(places: Floats, count: int, *, start: Floats | None = None) -> Flo
         return places
     chosen: list[int] = []
     if start is None or not len(start):
-        # The one nearest to the middle of all.
+        # Start with the one nearest to the centre.
         start = np.median(places, axis=0, keepdims=True)
         chosen = [int(np.argmin(np.linalg.norm(places - start, axis=1)))]
         start = places[chosen]
@@ -150,7 +150,7 @@ def pixels_of(scene: Scene, loaded: Any, places: Floats) -> list[tuple[float, fl
 
 
 def seen_by_camera(scene: Scene, loaded: Any, places: Floats) -> Bools:
-    """Return which of some places, (k,), the camera sees: in its picture, with nothing between."""
+    """Return which places, (k,), the camera sees: in its picture, and unoccluded."""
     import mitsuba as mi
 
     at = [k is not None for k in pixels_of(scene, loaded, places)]
@@ -200,9 +200,7 @@ def _distance(loaded: Any, origin: Floats, direction: Floats, normal: Floats) ->
 
 
 def is_clear(loaded: Any, places: Floats, distance: float) -> Bools:
-    """Return, (k,), whether nothing is nearer to a place than `distance`, in some directions
-    around.
-    """
+    """Return whether places have no surface within `distance`, in some directions, (k,)."""
     import mitsuba as mi
 
     # Points of a spiral on the sphere, which cover it evenly.
@@ -221,11 +219,11 @@ def is_clear(loaded: Any, places: Floats, distance: float) -> Bools:
 
 
 def _seen_share(loaded: Any, places: Floats, points: Floats, normals: Floats) -> Floats:
-    """Return the share of `points` (m, 3) whose fronts each place sees, (k,)."""
+    """Return the share of `points` (m, 3) whose front each place sees, (k,)."""
     import mitsuba as mi
 
     start = np.repeat(places, len(points), axis=0)
-    # Not quite to the surface, so that it does not hide itself.
+    # Stop short of the surface, so that it does not occlude itself.
     way = 0.999 * (np.tile(points, (len(places), 1)) - start)
     ray = mi.Ray3f(mi.Point3f(start.T.astype(np.float32)), mi.Vector3f(way.T.astype(np.float32)))
     ray.maxt = 1.0

@@ -1,7 +1,7 @@
 """The places that a light may hang at: a ball, a box, rails, surfaces, or all free space.
 
-A search asks three things: the nearest permitted place, the directions in which a light there can
-slide, and places all over.
+A search needs three things: the nearest permitted place, the directions in which a light there can
+slide, and random places.
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Indices
 
-#: Random places from which those far apart are chosen, for each place that is asked for.
+#: Number of random places, per requested place, from which distant ones are chosen.
 OVERSAMPLING = 20
 
 

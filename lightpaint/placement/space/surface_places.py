@@ -12,7 +12,7 @@ from lightpaint.placement.space.permitted_places import Triangles
 from lightpaint.scene.scene import Scene
 from lightpaint.screen import some_names
 
-#: Random places by which the free side of triangles is found.
+#: Number of random places that determine the free side of triangles.
 TESTED = 2000
 
 
@@ -29,7 +29,8 @@ def places_on(
 
     surfaces: their ids. clear: the distance; None for a small part of the room.
 
-    Raises SceneError for shapes that are not there or not flat, and for those without free places.
+    Raises SceneError for shapes that do not exist or are not flat, and for those without free
+    places.
     """
     corners = np.concatenate([_triangles(scene, loaded, name) for name in surfaces])
     distance = CLEARANCE * space.spread if clear is None else clear

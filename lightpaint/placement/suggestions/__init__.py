@@ -1,1 +1,1 @@
-"""Lights that are missing: where one more would help most."""
+"""Suggestions of additional lights where they would help most."""

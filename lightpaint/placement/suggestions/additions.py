@@ -1,9 +1,9 @@
 """The gain of each candidate light as an additional column of the basis.
 
 Each candidate joins the present lights, the problem is solved again under the same constraints, and
-the errors are compared. Of many candidates some seem to help by their noise alone. So weights are
-solved with one half of the samples and errors measured with the other, and the other way around:
-noise that was fitted does not repeat.
+the errors are compared. Some of many candidates seem to help by noise alone. So weights are solved
+with one half of the samples and errors measured with the other, and vice versa: fitted noise does
+not repeat.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -20,7 +20,7 @@ from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.reduced_problem import ReducedProblem, reduced_problems
 from lightpaint.placement.suggestions.candidates import Candidates
 
-#: Most promising candidates that the problem is solved again for.
+#: Number of most promising candidates for which the problem is solved again.
 SOLVED = 8
 
 #: Share of a column that others cannot replace, below which it counts as none.
@@ -35,7 +35,7 @@ SURE = 3.0
 class Addition:
     """A light to add, given those before it.
 
-    candidate: index of its image. gain: the fall of the objective with it, all channels together.
+    candidate: index of its image. gain: decrease of the objective with it, all channels together.
     weights: (n + k, 3), of the n lights of the basis and of the k additions so far, itself the
     last. without, with_it: (h, w, 3) linear, the picture solved before and with it.
     """
@@ -55,11 +55,11 @@ def find_additions(
     surely: bool = True,
     too_near: npt.NDArray[np.bool_] | None = None,
 ) -> list[Addition]:
-    """Find at most `count` lights to add, each the one that helps most beside those before it.
+    """Find at most `count` lights to add, each with the largest gain given those before it.
 
-    least: the smallest gain. surely: whether a gain has to stand out from noise, with all doubt in
-    favour of the present lights; if not, candidates that only seem to help are returned, too, for
-    a closer search. The search ends at the first failure.
+    least: the smallest gain. surely: whether a gain has to exceed the noise, with all doubt in
+    favour of the present lights; if not, candidates that only seem to help are returned, too, for a
+    closer search. The search ends at the first failure.
     too_near: (m, m), pairs of candidates that exclude each other.
     """
     folds = [_Fold(candidates, k) for k in range(2)]
@@ -127,7 +127,7 @@ class _Solver:
         return self.reduction.weights(x)
 
     def objective(self, chosen: Iterable[int]) -> float:
-        """Return the error at these weights, by the images they were solved with."""
+        """Return the error at these weights, on the images of their solve."""
         return float(self.equations.objective(self.weights(chosen)).sum())
 
     def estimated_gains(self, chosen: Iterable[int]) -> Doubles:
@@ -149,7 +149,8 @@ class _Solver:
 
     def _solved(self, chosen: Iterable[int]) -> Iterator[tuple[ReducedProblem, Indices, Doubles]]:
         """Yield each problem, the indices of its unknowns that are not off, and their best
-        values."""
+        values.
+        """
         off = set(range(self.first, len(self.reduction.knobs)))
         off -= {self.first + k for k in chosen}
         unknowns = {i for knob in off for i in self.reduction.places[knob]}
@@ -183,7 +184,7 @@ class _Fold:
         return self.known[key]
 
     def missed(self, chosen: Sequence[int]) -> float:
-        """Return Σ D r² less the noise of the measuring half, which is no error."""
+        """Return Σ D r² minus the noise of the measuring half."""
         w, e = self.weights(chosen), self.equations
         value = e.target_norm2 - 2 * np.einsum("ci,ic->c", e.b, w)
         value += np.einsum("ic,cij,jc->c", w, e.M - self.noise, w)

@@ -1,9 +1,8 @@
-"""The search for missing lights: point lights all over the scene are tested, and the best
-suggested.
+"""The search for missing lights: it tests point lights all over the scene, and suggests the best.
 
 Candidates stand in free space and shine on visible surfaces. One pass renders the images of all of
-them, like a basis, on a small film; algebra then gives the gain of each (additions.py). Near the
-best ones further passes search closer.
+them, like a basis, on a small film; algebra then gives the gain of each (additions.py). Further
+passes search near the best ones.
 """
 
 from collections.abc import Sequence
@@ -39,18 +38,18 @@ from lightpaint.scene.scene_render import Stream, pass_seed
 #: The default number of suggestions.
 SUGGESTED = 3
 
-#: Positions to try in each pass: all over, near the best of these, nearer, and the best once more,
-#: with all samples for them; and the least number, on a film that cannot be made small.
+#: Number of trial positions in each pass: all over, near the best of these, nearer, and the best
+#: again with all samples; and the minimum, on a film that cannot be reduced.
 TRIED, FEWEST = (96, 48, 24, 0), 8
 
-#: Additional positions to search closer: the best of few is not near the best.
+#: Additional positions for a closer search, since the best of few is not near the optimum.
 BESIDE = 5
 
-#: Pixels of the candidates' film, if possible; most values of all their images; camera samples of a
-#: pass.
+#: Pixels of the candidates' film, if possible; maximum number of values in all their images; camera
+#: samples of a pass.
 PIXELS, VALUES, SAMPLES = 2**14, 2**24, 2**19
 
-#: RMS error below which the present lights make the painting.
+#: RMS error below which the present lights reproduce the painting.
 NOTHING_MISSED = 0.01
 
 #: Smallest gain, as a share of the error, that is worth a light.
@@ -61,7 +60,7 @@ APART = 0.25
 
 
 def check_suggestible(scene: Scene) -> None:
-    """Raise SceneError for a scene that no lights can be suggested for, before it renders."""
+    """Raise SceneError, before rendering, for a scene in which no lights can be suggested."""
     if reason := why_not_one_pass(scene):
         raise SceneError(
             f"suggesting lights renders many in one pass, and {reason}: leave it out, or use "
@@ -85,7 +84,7 @@ def suggest_lights(
         scene: The scene of `basis`, on the same film or a larger one.
         basis: The basis of the solution, of that one view.
         solution: The solution to improve.
-        count: The most suggestions; none if no light surely removes a hundredth of the error.
+        count: Maximum number of suggestions; none if no light reliably removes 1 % of the error.
         seed: Of the positions and their images.
         progress: Hears how far the work has come.
 
@@ -102,7 +101,7 @@ def suggest_lights(
     norm2 = float(solution.norm2.sum())
     if sum(solution.certificate.objective) <= NOTHING_MISSED**2 * norm2:
         return ()
-    # The gains are of the last linear problem, which may be on another scale.
+    # The gains belong to the last linear problem, which may have another scale.
     total = solution.energy
     small = on_small_film(scene, basis, PIXELS)
     space = small.while_loaded(lambda loaded: free_space(small, loaded, seed=seed))
@@ -120,7 +119,7 @@ def suggest_lights(
             Candidates.of(basis, solution, lit),
             count=count if is_last else count + BESIDE,
             least=SMALLEST_SHARE * total if is_last else 0.0,
-            # Few samples, and far from the best places: only the last pass can promise.
+            # With few samples far from the best places, only the last pass is reliable.
             surely=is_last,
             too_near=_too_near(places, space),
         )
@@ -139,7 +138,7 @@ def _most(small: Scene, tried: int) -> int:
 
 
 def _places(space: FreeSpace, best: Floats, radius: float, count: int) -> Floats:
-    """Return the best so far, and `count` positions more within `radius` of these, far apart."""
+    """Return the best so far, and `count` more positions within `radius` of these, far apart."""
     if not len(best):
         return far_apart(space.places, count)
     near = [best]
@@ -150,7 +149,7 @@ def _places(space: FreeSpace, best: Floats, radius: float, count: int) -> Floats
 
 
 def _spacing(places: Floats) -> float:
-    """Return the median distance from one to the next."""
+    """Return the median distance between neighbours."""
     between = np.linalg.norm(places[:, None] - places[None], axis=2)
     np.fill_diagonal(between, np.inf)
     return float(np.median(between.min(axis=1)))

@@ -17,7 +17,7 @@ class Suggestion:
     """A point light to add to the scene.
 
     Attributes:
-        name: A name that no light of the scene has.
+        name: An unused name.
         position: In units of the scene.
         emission: Intensity per channel, W/sr.
         gain_share: The share of the error (energy) that this light removes, given those before it.
@@ -78,5 +78,5 @@ class MoveSuggestion:
 
     @property
     def toml(self) -> str:
-        """The lines of a lights file that let it turn."""
+        """Lines for the lights file that let it turn."""
         return f"[light.{json.dumps(self.name, ensure_ascii=False)}]\naim = {self.aim}"
