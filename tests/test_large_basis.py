@@ -18,7 +18,7 @@ from lightpaint.report import clean_pictures
 
 #: Bytes of memory for each pixel that a solve and its report may take, beside the planes: as many
 #: as 4 GB are at 3840 x 2160.
-BYTES_A_PIXEL = 480
+BYTES_A_PIXEL = 420
 
 
 #: Noise of a light, relative to it, at which blocks of pixels are fitted.

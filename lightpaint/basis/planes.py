@@ -4,7 +4,7 @@ A basis has two sets of planes: the images, and half the differences of the two 
 Code outside this package uses the protocol below and never indexes an array of planes.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from itertools import pairwise
 from typing import Protocol
@@ -20,6 +20,11 @@ BLOCK_PIXELS = 2**13
 
 #: Number of lights up to which the product of a block is too small for BLAS to use threads.
 FEW_LIGHTS = 256
+
+
+#: A function from some pixels and their light, (n, p, 3), to weights, (p, 1) or (p, 3), and an
+#: image, (p, 3).
+SquaresOfLight = Callable[[slice | Indices, Floats], tuple[Floats, Floats]]
 
 
 class Planes(Protocol):
@@ -59,6 +64,14 @@ class Planes(Protocol):
 
         weight: (h, w), (h, w, 1) or, if it differs between channels, (h, w, 3), >= 0. image: Ψ, (h,
         w, 3).
+        """
+
+    def sums_of(
+        self, counted: Indices, squares: SquaresOfLight
+    ) -> tuple[Doubles, Doubles, Doubles]:
+        """Return the same sums over the counted pixels, one block at a time.
+
+        squares: computes weights and image of a block from the light in it.
         """
 
     def squares(self) -> Doubles:
@@ -109,20 +122,28 @@ class PlanesBase:
 
     def sums(self, weight: Floats, image: Floats) -> tuple[Doubles, Doubles, Doubles]:
         """Return M (3, n, n), b (3, n) and ‖Ψ‖² (3,), in one walk over the pixels with weight."""
-        n, (height, width) = self.count, self.size
+        height, width = self.size
         # Pixels without weight contribute nothing and need not be read.
         apart = weight.shape[2:] == (3,)
         weights = weight.reshape(height * width, 3 if apart else 1)
         counted = np.flatnonzero(weights.any(axis=1) if apart else weights)
         colours = image.reshape(-1, 3)
+        return self.sums_of(counted, lambda where, _: (weights[where], colours[where]))
+
+    def sums_of(
+        self, counted: Indices, squares: SquaresOfLight
+    ) -> tuple[Doubles, Doubles, Doubles]:
+        """Return M (3, n, n), b (3, n) and ‖Ψ‖² (3,) of squares computed one block at a time."""
+        n = self.count
         gram = np.zeros((3, n + 1, n + 1))
         room = np.empty((n + 1, min(BLOCK_PIXELS, counted.size)))
         with one_thread() if n <= FEW_LIGHTS else nullcontext():
             for start in range(0, counted.size, BLOCK_PIXELS):
                 where = as_slice(counted[start : start + BLOCK_PIXELS])
-                lit, painted = self.pixels(where), colours[where]
-                root = np.sqrt(weights[where].astype(np.float64))
-                # (n + 1, block): the target is the last row.
+                lit = self.pixels(where)
+                weights, painted = squares(where, lit)
+                root, apart = np.sqrt(weights.astype(np.float64)), weights.shape[1] == 3
+                # (n + 1, block): the target goes along as one more row.
                 block = room[:, : len(painted)]
                 for c in range(3):
                     channel_root = root[:, c * apart]

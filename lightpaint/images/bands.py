@@ -62,5 +62,9 @@ def in_turns(
 
     size: (height, width) of the pictures, of which each job holds several at a time.
     """
-    is_large = size[0] * size[1] >= LARGE_PICTURE
-    return [work(job) for job in jobs] if is_large else parallel_map(work, jobs)
+    return [work(job) for job in jobs] if is_large(size) else parallel_map(work, jobs)
+
+
+def is_large(size: tuple[int, ...]) -> bool:
+    """Return whether jobs on pictures of (height, width) pixels wait for each other."""
+    return size[0] * size[1] >= LARGE_PICTURE

@@ -202,6 +202,8 @@ class Problem(LinearProblem):
 
         is_constrained: (n,), lights whose weights stay.
         """
+        if self.basis.knows_noise:  # which is larger, and squares may have no image yet
+            return weights
         return remove_traces(self.basis, weights, self.squares.image, is_constrained=is_constrained)
 
     @property
@@ -239,8 +241,7 @@ class Problem(LinearProblem):
         """Return the loss of weights (n, 3), (3,)."""
         if self.is_linear:
             return self.equations.objective(weights)
-        lit = LitPixels.whole(self.basis, self.loss)
-        return lit.pixels.objective(lit.predicted(weights))
+        return LitPixels.whole(self.basis, self.loss).objective(weights)
 
     def view_problem(self, k: int) -> "Problem":
         """Return the problem of view k alone: its pixels of the same squares."""

@@ -16,8 +16,7 @@ from lightpaint.lighting.linear_solve import (
     solve_linear,
     solve_reduction,
 )
-from lightpaint.lighting.loss.lit_pixels import LitPixels
-from lightpaint.lighting.loss.loss import Squares, image_in_place
+from lightpaint.lighting.loss.lit_pixels import DeferredSquares, LitPixels
 from lightpaint.lighting.loss.pixel_bins import BinnedPixels, bin_pixels, block_side
 from lightpaint.lighting.loss.reweighting import Descent, WeightTerms, descend, total_loss
 from lightpaint.lighting.loss.warm_start import find_near_optimum
@@ -294,16 +293,11 @@ def _problem_of_blocks(problem: Problem, descent: Descent, blocks: BinnedPixels)
 
     Its corrected equations are those of the blocks with their prior: without most of the noise.
     """
-    weights, loss = descent.reweighting.at, problem.loss
-    x = LitPixels.whole(problem.basis, loss).predicted(weights)
-    image, weight = loss.pixels.squares(x, from_clipping=False)
-    parts = (image, weight, loss.pixels.shares(x, weight))
-    del x  # as large as the picture, while memory also has strips of planes
-    squares = Squares(*(image_in_place(part, problem.basis.size) for part in parts))
+    weights, lit = descent.reweighting.at, LitPixels.whole(problem.basis, problem.loss)
     return replace(
         problem,
-        squares=squares,
-        equations=NormalEquations.of(problem.basis, squares.image, squares.weight),
+        squares=DeferredSquares(lit, weights),
+        equations=lit.equations_at(weights),
         corrected=descent.equations + blocks.prior,
         noise_removed=1 - 1 / blocks.side**2,
         block_side=blocks.side,

@@ -71,6 +71,7 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
     solution = _reduce_noise(job, solution_of(problem), listen)
     del problem  # some of its arrays are as large as the pictures
     analyses = analyse(solution)
+    solution.problem.squares.release()
     lighting, scene = with_findings(solution, analyses).lighting, job.views[0].scene
     with new_answer(job.results, lighting, scene=scene, groups=job.groups) as answer:
         looks = [

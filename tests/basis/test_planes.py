@@ -2,7 +2,9 @@
 
 import ast
 import errno
+import gc
 import os
+import weakref
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -240,6 +242,39 @@ def test_a_fit_of_blocks_reads_strips_of_noisy_planes(
     for mine, expected in zip(*found, strict=True):
         np.testing.assert_allclose(mine, expected, rtol=1e-12)
     assert 0 < max(planes.largest for planes in counted) <= images[:, :16].nbytes
+
+
+def test_strips_of_rows_vanish_with_their_planes(images: np.ndarray) -> None:
+    planes = CountedPlanes(images)
+    gc.collect()
+    gc.disable()
+    try:
+        strip = weakref.ref(planes.pixels(slice(0, 3)).base)
+        assert strip() is not None
+        del planes
+        assert strip() is None
+    finally:
+        gc.enable()
+
+
+def test_sums_of_squares_made_block_by_block(
+    images: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lightpaint.basis.planes.BLOCK_PIXELS", 4)
+    rng = np.random.default_rng(8)
+    w, counted = rng.random((N, 3)), np.array([0, 1, 2, 5, 9, 10, 30])
+    light = np.einsum("nhwc,nc->hwc", images, w)
+    weight = np.zeros((*SIZE, 3))
+    weight.reshape(-1, 3)[counted] = 1 + np.square(light.reshape(-1, 3)[counted])
+
+    def squares(where: Any, lit: Any) -> tuple[Any, Any]:
+        x = np.einsum("npc,nc->pc", lit, w)
+        return 1 + np.square(x), 2 * x
+
+    for planes in (MemoryPlanes(images), CountedPlanes(images)):
+        sums = planes.sums_of(counted, squares), planes.sums(weight, 2 * light)
+        for mine, expected in zip(*sums, strict=True):
+            np.testing.assert_allclose(mine, expected, rtol=1e-12)
 
 
 def test_spooled_planes_are_made_once_and_those_in_memory_stay(images: np.ndarray) -> None:

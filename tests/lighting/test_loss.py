@@ -11,10 +11,14 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from lightpaint.arrays import Doubles, Floats
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit
+from lightpaint.lighting.loss import loss as loss_module
+from lightpaint.lighting.loss.lit_pixels import DeferredSquares, LitPixels
 from lightpaint.lighting.loss.loss import Cut, Loss, PixelLoss, planes_of
+from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solve import solution_of
 from lightpaint.target.target import Target
@@ -150,3 +154,42 @@ class _Unknown(Loss):
 
     def cut(self, part: Cut) -> "_Unknown":
         raise NotImplementedError
+
+
+@pytest.mark.parametrize("name", [None, "srgb", "agx"])
+@pytest.mark.parametrize("kept", [False, True])
+def test_squares_that_are_made_on_request(
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch, name: str | None, kept: bool
+) -> None:
+    """The arrays and sums of all pixels at once are the plain twin."""
+    size, rng = (96, 128), np.random.default_rng(5)  # more than a strip
+    basis = make_basis(images=rng.random((4, *size, 3), np.float32))
+    if not kept:
+        monkeypatch.setattr(loss_module, "MAX_KEPT_PIXELS", size[0])
+    target = Target.of(basis.present_look * np.float32(0.7), rng.random(size).round())
+    top = np.broadcast_to((rng.random(size) < 0.2)[..., None], (*size, 3))
+    target = replace(target, at_least=top)
+    transform = None if name is None else ViewTransform(name)
+    problem = Problem.of(basis, target, fit=Fit(transform=transform, unpainted=0.3, colors="free"))
+    assert not problem.is_linear
+    weights, lit = rng.random((4, 3)), LitPixels.whole(basis, problem.loss)
+    x = lit.predicted(weights)
+    image, weight = lit.pixels.squares(x, from_clipping=False)
+    expected = [
+        *(part.T.reshape(*size, 3) for part in (image, weight, lit.pixels.shares(x, weight)))
+    ]
+    squares = DeferredSquares(lit, weights)
+    for _ in range(2):
+        for mine, part in zip(
+            (squares.image, squares.weight, squares.share), expected, strict=True
+        ):
+            np.testing.assert_array_equal(mine, part)
+        assert squares.image is squares.image
+        squares.release()
+        assert "_arrays" not in vars(squares)
+    sums, plain = lit.equations_at(weights), NormalEquations.of(basis, expected[0], expected[1])
+    for field in ("M", "b", "target_norm2"):
+        np.testing.assert_allclose(getattr(sums, field), getattr(plain, field), rtol=1e-12)
+    np.testing.assert_allclose(lit.objective(weights), lit.pixels.objective(x), rtol=1e-12)
+    black = problem.loss.objective(np.zeros((*size, 3)))
+    np.testing.assert_allclose(problem.loss.norm2, black, rtol=1e-12)

@@ -46,9 +46,8 @@ class RowPlanes(PlanesBase):
         return max(step // self.chunk_rows, 1) * self.chunk_rows
 
     @cached_property
-    def _strips(self) -> "_Strips":
-        height, step = self.size[0], self.strip_rows
-        return _Strips(step, lambda k: self.rows(k * step, min((k + 1) * step, height)))
+    def _strips(self) -> "_StripCache":
+        return _StripCache()
 
     def pixels(self, where: slice | Indices) -> Floats:
         """Return some pixels of all planes, (n, p, 3)."""
@@ -72,7 +71,13 @@ class RowPlanes(PlanesBase):
 
     def _strip(self, k: int) -> Floats:
         """Return the pixels of a strip, (n, p, 3)."""
-        return self._strips[k].reshape(self.count, -1, 3)
+        strip = self._strips.get(k, self._read_strip)
+        return strip.reshape(self.count, -1, 3)
+
+    def _read_strip(self, k: int) -> Floats:
+        """Read a strip, (n, rows, w, 3)."""
+        step = self.strip_rows
+        return self.rows(k * step, min((k + 1) * step, self.size[0]))
 
     def picked(self, where: slice | Indices) -> Planes:
         """Return these pixels as planes with a single row, copied into memory if they are few."""
@@ -103,18 +108,18 @@ class RowPlanes(PlanesBase):
         return np.ascontiguousarray(self.rows(0, self.size[0]))
 
 
-class _Strips:
-    """The strips of rows that were read last. step: rows in a strip. read: function that reads
-    strip k.
+class _StripCache:
+    """The strips of rows that were read last.
+
+    It does not know the planes, so that both vanish with the last reference to these.
     """
 
-    def __init__(self, step: int, read: Callable[[int], Floats]) -> None:
-        self.step, self._read = step, read
+    def __init__(self) -> None:
         self._strips: OrderedDict[int, Future[Floats]] = OrderedDict()
         self._lock = Lock()
 
-    def __getitem__(self, k: int) -> Floats:
-        """Return strip k. If another thread is reading it, wait for the result."""
+    def get(self, k: int, read: Callable[[int], Floats]) -> Floats:
+        """Return the k-th strip, which `read(k)` reads; wait for a thread that is about it."""
         with self._lock:
             strip = self._strips.get(k)
             is_mine = strip is None
@@ -125,7 +130,7 @@ class _Strips:
                 self._strips.popitem(last=False)
         if is_mine:
             try:
-                strip.set_result(self._read(k))
+                strip.set_result(read(k))
             except BaseException as error:
                 with self._lock:
                     self._strips.pop(k, None)

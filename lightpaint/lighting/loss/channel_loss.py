@@ -8,7 +8,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.lighting.loss.loss import PixelLoss
+from lightpaint.lighting.loss.loss import PixelLoss, contiguous_rows
 
 
 @dataclass(frozen=True)
@@ -31,11 +31,11 @@ class PaintedPixels(PixelLoss):
         """Return some of the pixels."""
         return replace(
             self,
-            painted=self.painted[:, which],
+            painted=contiguous_rows(self.painted, which),
             importance=self.importance[which],
             share=self.share[which],
-            current=self.current[:, which],
-            at_least=None if self.at_least is None else self.at_least[:, which],
+            current=contiguous_rows(self.current, which),
+            at_least=None if self.at_least is None else contiguous_rows(self.at_least, which),
             encoded=None
             if self.encoded is None
             else (self.encoded[0][:, which], self.encoded[1][:, which]),
@@ -78,7 +78,11 @@ class PaintedPixels(PixelLoss):
 
     def objective(self, x: Doubles) -> Doubles:
         """Return F per channel, (3,), of x, (3, p)."""
-        return np.asarray(sum(self.map_strips(lambda strip, part: part._objective(x[:, strip]))))
+
+        def strip_objective(strip: slice, part: "PaintedPixels") -> Doubles:
+            return part._objective(np.ascontiguousarray(x[:, strip], np.float64))
+
+        return np.asarray(sum(self.map_strips(strip_objective)))
 
     def _objective(self, x: Doubles, shown: Doubles | None = None) -> Doubles:
         shown, q = self.encode(x) if shown is None else shown, self.share
@@ -99,7 +103,7 @@ class PaintedPixels(PixelLoss):
         image, weight = np.empty((2, *x.shape))
 
         def fill(strip: slice, part: "PaintedPixels") -> None:
-            lit = x[:, strip]
+            lit = np.ascontiguousarray(x[:, strip], np.float64)
             gradient, factor = part.gradient(lit, from_clipping=from_clipping)
             has_weight = factor > 0
             gradient /= factor if has_weight.all() else np.where(has_weight, factor, 1)

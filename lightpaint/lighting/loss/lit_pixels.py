@@ -1,13 +1,14 @@
 """The pixels that count, with each light's part of them: the data of a descent."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Indices
+from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.planes import Planes
-from lightpaint.lighting.loss.loss import Loss, PixelLoss
+from lightpaint.lighting.loss.loss import Loss, PixelLoss, Squares, image_in_place
 from lightpaint.lighting.normal_equations import NormalEquations
 
 #: Share of pixels without importance from which a copy of the others is worth its time.
@@ -43,13 +44,19 @@ class LitPixels:
         """Return Σ w_i Φ_i, (3, p), in float64: a float32's round-off would hide the last steps."""
         picture = np.empty((3, len(self.pixels)))
 
-        def mix(strip: slice, _: PixelLoss) -> None:
-            lit = self.planes.pixels(strip)
-            for c in range(3):
-                picture[c, strip] = weights[:, c] @ lit[..., c].astype(np.float64)
+        def fill(strip: slice, _: PixelLoss) -> None:
+            mix_channels(self.planes.pixels(strip), weights, picture[:, strip])
 
-        self.pixels.map_strips(mix)
+        self.pixels.map_strips(fill)
         return picture
+
+    def objective(self, weights: Doubles) -> Doubles:
+        """Return the loss of weights, (n, 3), per channel, (3,)."""
+
+        def strip_objective(strip: slice, pixels: PixelLoss) -> Doubles:
+            return pixels.objective(mix_channels(self.planes.pixels(strip), weights))
+
+        return np.asarray(sum(self.pixels.map_strips(strip_objective)))
 
     def objective_and_gradient(self, weights: Doubles) -> tuple[float, Doubles]:
         """Return the loss of weights, (n, 3), and half its gradient, (n, 3)."""
@@ -80,3 +87,71 @@ class LitPixels:
         shape = (*self.planes.size, 3)
         picture, weights = image.T.reshape(shape), weight.T.reshape(shape)
         return NormalEquations(*self.planes.sums(weights, picture))
+
+    def equations_at(self, weights: Doubles) -> NormalEquations:
+        """Return the linear problem of the squares at the picture of weights, (n, 3).
+
+        No more than a block of these squares is in memory.
+        """
+
+        def squares(where: slice | Indices, lit: Floats) -> tuple[Doubles, Doubles]:
+            x = mix_channels(lit, weights)
+            image, weight = self.pixels.subset(where).squares(x, from_clipping=False)
+            return weight.T, image.T
+
+        counted = np.flatnonzero(self.pixels.importance)
+        return NormalEquations(*self.planes.sums_of(counted, squares))
+
+
+class DeferredSquares(Squares):
+    """The squares of a loss at one picture, made when they are asked for, until they are released.
+
+    They are as large as several pictures, and most answers need only their sums.
+    """
+
+    def __init__(self, lit: LitPixels, weights: Doubles) -> None:
+        """Keep the source of the squares. lit: of all pixels. weights: (n, 3), of the picture."""
+        self._lit, self._weights = lit, weights
+
+    @cached_property
+    def _arrays(self) -> tuple[Doubles, Doubles, Doubles]:
+        x, pixels = self._lit.predicted(self._weights), self._lit.pixels
+        image, weight = pixels.squares(x, from_clipping=False)
+        size = self._lit.planes.size
+        shares = pixels.shares(x, weight)
+        return (
+            image_in_place(image, size),
+            image_in_place(weight, size),
+            image_in_place(shares, size),
+        )
+
+    @property
+    def image(self) -> Floats:
+        """(h, w, 3)."""
+        return self._arrays[0]
+
+    @property
+    def weight(self) -> Floats:
+        """(h, w, 3), >= 0."""
+        return self._arrays[1]
+
+    @property
+    def share(self) -> Floats:
+        """(h, w, 3), the share of the image that follows the current look."""
+        return self._arrays[2]
+
+    def release(self) -> None:
+        """Forget the arrays, which are made again when somebody asks for them."""
+        for name in ("_arrays", "importance", "pixels"):
+            self.__dict__.pop(name, None)
+
+
+def mix_channels(lit: Floats, weights: Doubles, into: Doubles | None = None) -> Doubles:
+    """Return Σ w_i Φ_i of pixels (n, p, 3), channel by channel, (3, p) float64.
+
+    weights: (n, 3). into: where to write it.
+    """
+    picture = np.empty((3, lit.shape[1])) if into is None else into
+    for c in range(3):
+        picture[c] = weights[:, c] @ lit[..., c].astype(np.float64)
+    return picture

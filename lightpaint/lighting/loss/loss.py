@@ -141,16 +141,16 @@ class Loss(ABC):
 
     def objective(self, x: Floats) -> Doubles:
         """Return the loss of a picture x, less the least loss of any picture, per channel, (3,)."""
-        return self.pixels.objective(planes_of(x))
+        return self.pixels.objective(_channels_of(x))
 
     @cached_property
     def norm2(self) -> Doubles:
         """The loss of a black picture, (3,)."""
-        return self.objective(np.zeros((*self.importance.shape, 3)))
+        return self.objective(np.broadcast_to(0.0, (*self.importance.shape, 3)))
 
     def goal(self, x: Floats) -> Floats:
         """Return the light that would be best at picture x, (h, w, 3)."""
-        image, _ = self.pixels.squares(planes_of(x), from_clipping=False)
+        image, _ = self.pixels.squares(_channels_of(x), from_clipping=False)
         return image_of(image, self.importance.shape)
 
     def residual(self, x: Floats) -> Doubles:
@@ -206,6 +206,9 @@ class Squares(Loss):
     def cut(self, part: Cut) -> "Squares":
         return Squares(part(self.image), part(self.weight), part(self.share))
 
+    def release(self) -> None:
+        """Forget arrays that can be made again: none of these."""
+
 
 @dataclass(frozen=True)
 class SquaredPixels(PixelLoss):
@@ -242,6 +245,20 @@ class SquaredPixels(PixelLoss):
 def planes_of(image: npt.NDArray[Any], kind: npt.DTypeLike = np.float64) -> npt.NDArray[Any]:
     """Return an image (h, w, 3) as planes (3, p)."""
     return np.ascontiguousarray(image.reshape(-1, 3).T, dtype=kind)
+
+
+def _channels_of(image: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return an image (h, w, 3) as planes (3, p) in the same memory."""
+    return image.reshape(-1, 3).T
+
+
+def contiguous_rows(planes: npt.NDArray[Any], which: slice | Indices) -> npt.NDArray[Any]:
+    """Return some pixels of planes (3, p), each channel contiguous: arithmetic on others is slow.
+
+    Planes may be an image (h, w, 3) as it lies in memory.
+    """
+    part = planes[:, which]
+    return part if part.strides[-1] == part.itemsize else np.ascontiguousarray(part)
 
 
 def image_in_place(planes: Doubles, size: tuple[int, ...]) -> Doubles:

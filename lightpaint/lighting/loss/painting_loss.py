@@ -10,10 +10,14 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.images.bands import by_bands
+from lightpaint.images.bands import BAND_PIXELS, by_bands
 from lightpaint.images.pixel_blocks import block_sums
 from lightpaint.lighting.loss.channel_loss import PaintedPixels
 from lightpaint.lighting.loss.loss import STRIP_PIXELS, Cut, Loss, image_of, planes_of
+from lightpaint.threads import parallel_map
+
+#: Fields of a loss that are pictures.
+PICTURES = ("painted", "importance", "share", "current", "at_least")
 
 
 @dataclass(frozen=True)
@@ -40,24 +44,23 @@ class PaintingLoss(Loss):
     transform: ViewTransform | None = None
 
     def cut(self, part: Cut) -> "PaintingLoss":
-        return replace(
-            self,
-            painted=part(self.painted),
-            importance=part(self.importance),
-            share=part(self.share),
-            current=part(self.current),
-            at_least=part(self.at_least),
-        )
+        pictures: dict[str, Any] = {name: part(getattr(self, name)) for name in PICTURES}
+        return replace(self, **pictures)
 
     @cached_property
     def pixels(self) -> PaintedPixels:
-        """All pixels, channel by channel."""
+        """All pixels, channel by channel: of many, in the memory of the pictures."""
+        is_long = self.importance.size > STRIP_PIXELS  # strips of them are copied
+
+        def planes(image: npt.NDArray[Any]) -> npt.NDArray[Any]:
+            return image.reshape(-1, 3).T if is_long else planes_of(image, image.dtype)
+
         return PaintedPixels(
-            planes_of(self.painted, self.painted.dtype),
+            planes(self.painted),
             np.asarray(self.importance, np.float64).ravel(),
             np.asarray(self.share, np.float64).ravel(),
-            planes_of(self.current, self.current.dtype),
-            planes_of(self.at_least, bool) if self._may_exceed else None,
+            planes(self.current),
+            planes(self.at_least) if self._may_exceed else None,
             self.transform,
         )
 
@@ -104,12 +107,28 @@ class PaintingLoss(Loss):
             arrays = [getattr(part, name) for part in averages]
             return np.concatenate([x.reshape(-1, *x.shape[2:]) for x in arrays])[None]
 
-        names = ("painted", "importance", "share", "current", "at_least")
-        rows: dict[str, Any] = {name: row(name) for name in names}
+        rows: dict[str, Any] = {name: row(name) for name in PICTURES}
         return replace(self, **rows)
 
     def _block_average(self, counts: Doubles, side: int) -> "PaintingLoss":
         """Return the loss of means over blocks of one view. counts: (h, w), the importance."""
+
+        def band_average(rows: slice) -> PaintingLoss:
+            part = self.cut(lambda image: image[rows])
+            return part._whole_block_average(counts[rows], side)
+
+        height, step = len(counts), side * max(1, BAND_PIXELS // (side * counts.shape[1]))
+        tops = range(0, height, step)
+        bands = parallel_map(lambda top: band_average(slice(top, top + step)), tops)
+
+        def joined(name: str) -> npt.NDArray[Any]:
+            return np.concatenate([getattr(band, name) for band in bands])
+
+        rows: dict[str, Any] = {name: joined(name) for name in PICTURES}
+        return replace(self, **rows)
+
+    def _whole_block_average(self, counts: Doubles, side: int) -> "PaintingLoss":
+        """Return the loss of means over blocks of one view, all at once."""
         total = block_sums(counts, side)
         painted_weight, current_weight = (1 - self.share) * counts, self.share * counts
 

@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 
 from lightpaint.arrays import Doubles
+from lightpaint.images.bands import is_large
 from lightpaint.lighting.analysis.appearance.constraint_kinds import (
     ConstraintKind,
 )
@@ -263,6 +264,8 @@ def released_weights(
     corrected if it was before.
     """
     problem = (solution.whole or solution).problem
+    if is_large(problem.basis.size):  # and no other analysis runs meanwhile
+        problem.squares.release()
     # All constraints, also those of the bases' scenes, are among those of the problem.
     bases = [basis.with_requests(type(basis.requests)()) for basis in problem.views.bases]
     released = Problem.of(
