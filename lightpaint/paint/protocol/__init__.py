@@ -1,4 +1,4 @@
-"""The messages between a session and its clients, both ways, each a frozen dataclass.
+"""The messages between a session and its clients, in both directions, each a frozen dataclass.
 
 `frames.py` says how they travel. Lights, views and objects are known by their place in what `state`
 lists. A region is rows and columns of a picture, `[top, bottom, left, right]`, the ends not

@@ -1,4 +1,4 @@
-"""The base of all messages: their fields as JSON has them, and their arrays as bytes."""
+"""The base of all messages: conversion of fields to JSON, and of arrays to bytes."""
 
 import math
 from collections.abc import Mapping
@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-#: Element types of arrays in messages, and how their bytes are written.
+#: Element types of arrays in messages, and their byte formats.
 DTYPES = {"float16": "<f2", "float32": "<f4", "float64": "<f8", "int16": "<i2", "uint8": "|u1"}
 
 
@@ -22,7 +22,7 @@ class Message:
 
     Attributes:
         kind: Names the message in its JSON.
-        request_buffers: Arrays that a client sends beside a message, and what each holds.
+        request_buffers: Arrays that a client sends beside a message, with their meanings.
     """
 
     kind: ClassVar[str] = ""
@@ -34,7 +34,7 @@ class Message:
 
     @property
     def fields(self) -> dict[str, Any]:
-        """The fields but for arrays, as plain values of JSON."""
+        """The fields other than arrays, as plain JSON values."""
         return {k: plain(v) for k, v in _sent_fields(self).items() if not isinstance(v, np.ndarray)}
 
     @property

@@ -1,4 +1,4 @@
-"""The tables of docs/protocol.md, made of the dataclasses.
+"""The tables of docs/protocol.md, generated from the dataclasses.
 
     python -m lightpaint.paint.protocol.document docs/protocol.md
 
@@ -30,7 +30,7 @@ def sections() -> dict[str, str]:
 
 
 def replace_sections(text: str) -> str:
-    """Return a document with its generated parts made anew."""
+    """Return a document with its generated parts replaced."""
     for name, section in sections().items():
         pattern = rf"<!-- {name} -->\n.*?<!-- end of {name} -->"
         before, after = re.split(pattern, text, flags=re.DOTALL)

@@ -30,8 +30,8 @@ from lightpaint.paint.store.canvas_pixels import Region
 class ProgressReport(Message, kind="progress"):
     """The progress of a long task. Unasked.
 
-    what: `export`, `basis`, `sampling` for samples that are added where the paint needs them, or
-    the renderer's name for it.
+    what: `export`, `basis`, `sampling` for samples added where the paint needs them, or the
+    renderer's name for the task.
     """
 
     what: str
@@ -72,12 +72,13 @@ class SessionState(EditState, Message, kind="state"):
     """The whole state: the answer to `hello`, `take_over` and `observe`, and unasked when the basis
     improves. All lists of lights are in the order of `lights`.
 
-    version: of this protocol. size: height and width of the first view, and `objects` its names.
+    version: of this protocol. size: height and width of the first view, and `objects` the names of
+    its objects.
     lut: the grid of the tables `lut/NAME` of all `transforms`. resources: pictures, with a number
     that grows when one is replaced. verified: the last verification of each view. first: whether
-    the session has no step yet. stroke: number of the last stroke that arrived. command: solves for
-    the exported paintings. is_back: the client had the session before, and nobody since; true for
-    whoever receives it unasked. weights: (lights, 3) float64, the last answer.
+    the session has no steps yet. stroke: number of the last stroke that arrived. command: solves
+    for the exported paintings. is_back: the client had the session before, and no other client
+    since; also true if unasked. weights: (lights, 3) float64, the last answer.
     """
 
     version: int
@@ -106,11 +107,12 @@ class SessionState(EditState, Message, kind="state"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class AnswerUpdate(EditState, Findings, Message, kind="answer"):
-    """The lights as they are now: the answer to paint and requests, and unasked once the exact
-    answer is found, and again with its analysis.
+    """The present lights: the answer to paint and requests, unasked once the exact answer is found,
+    and again with its analysis.
 
     version: grows with every change of the session. stroke: number of the last stroke that arrived.
-    exact: whether it is what `lightpaint solve` finds. mode: how it was found under the brush.
+    exact: whether it equals the answer of `lightpaint solve`. mode: space in which it was found
+    under the brush.
     weights: (lights, 3) float64.
     """
 
@@ -122,14 +124,14 @@ class AnswerUpdate(EditState, Findings, Message, kind="answer"):
 
     @property
     def findings(self) -> Findings:
-        """Findings of the answer, by themselves."""
+        """Findings of the answer, without the lights."""
         return Findings(**{name: getattr(self, name) for name in Findings.__dataclass_fields__})
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CanvasPatch(EditState, Message, kind="patch"):
-    """New pixels of a canvas, after undo and the like: one message for each view that has changed,
-    all of which `views` lists.
+    """New pixels of a canvas, after undo and the like: one message for each changed view; `views`
+    lists all of these.
 
     image: (rows, columns, 3) float32. importance: (rows, columns) float32. weights: (lights, 3)
     float64.
@@ -148,7 +150,7 @@ class CanvasPatch(EditState, Message, kind="patch"):
 
     @property
     def answer(self) -> AnswerUpdate:
-        """The same without pixels."""
+        """Return the same as an answer, without pixels."""
         standing = {name: getattr(self, name) for name in EditState.__dataclass_fields__}
         return AnswerUpdate(
             version=self.version,
@@ -203,9 +205,8 @@ class TaskStopped(Message, kind="stopped"):
 class ExportResult(Message, kind="exported"):
     """Files that were written. Unasked.
 
-    command: solves for the exported paintings; "" where there is none. is_stopped: whether the
-    export was stopped before its end. is_unpainted: whether files that need a painting were left
-    out.
+    command: solves for the exported paintings; "" for none. is_stopped: whether the export was
+    stopped before its end. is_unpainted: whether files that need a painting were left out.
     """
 
     files: tuple[str, ...]
@@ -242,11 +243,11 @@ class PreviewResult(Message, kind="previewed"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Rig(Message, kind="rig"):
-    """The places of all lights. Unasked after a move, once it was asked for.
+    """The places of all lights. Sent after every move, once requested.
 
     lights: in the order of the state. cameras: of each view; null for one that is no pinhole. up:
-    the axis that is nearest to upwards, 0, 1 or 2. low, high: corners of a box with all that is
-    seen, and all lights. surfaces: names of what new lights may hang on: rails, surfaces, shapes.
+    the axis nearest to upwards, 0, 1 or 2. low, high: corners of a box around the visible scene and
+    all lights. surfaces: names of rails, surfaces and shapes that new lights may hang on.
     """
 
     lights: tuple[LightPlace, ...]
@@ -259,9 +260,9 @@ class Rig(Message, kind="rig"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TrialPlaces(Message, kind="trial"):
-    """The places that a search tries at present. Unasked.
+    """The places that a search is trying. Unasked.
 
-    positions, directions: by name of light; of new ones, too.
+    positions, directions: by name of light, including new ones.
     """
 
     positions: Mapping[str, Place]
@@ -272,7 +273,7 @@ class TrialPlaces(Message, kind="trial"):
 class PlacingResult(Message, kind="placed"):
     """The result of a search for places of lights. Unasked.
 
-    text: what was moved or added, and what for; or why nothing was. names: of these lights.
+    text: the moves or additions and their gain, or why there are none. names: of these lights.
     """
 
     text: str
@@ -281,7 +282,7 @@ class PlacingResult(Message, kind="placed"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Notice(Message, kind="say"):
-    """A sentence for people. Unasked. what: the task that it ends."""
+    """A sentence for users. Unasked. what: the task that it ends."""
 
     text: str
     tone: Tone = "info"

@@ -14,8 +14,8 @@ from lightpaint.paint.store.canvas_pixels import Region
 class LightInfo:
     """The constant properties of a light.
 
-    present: its emission before anything was painted. parameter, plugin: where the scene defines
-    it. form: how the scene writes its emission. members: emitters of the group that it is. group:
+    present: its emission before anything was painted. parameter, plugin: its definition in the
+    scene. form: how the scene writes its emission. members: its emitters, if it is a group. group:
     name of that group; null for a single emitter. is_fixed: whether it is not adjusted. is_scalar:
     whether one number stands for all channels. scale: factor of its stored plane.
     """
@@ -40,13 +40,12 @@ Place = tuple[float, ...]
 
 @dataclass(frozen=True)
 class LightPlace:
-    """The place of a light, and what it points at.
+    """The place of a light, and its target.
 
-    position: null for one that is infinitely far away, or has no place. direction: of unit length,
-    that it points along; null for one that points nowhere. target: the point that it points at: the
-    one that was asked for, or else the surface that its axis meets. cutoff, beam: degrees from its
-    axis; null for all but spots. rail: both ends of what it slides along. why_not: why it cannot be
-    moved; "" if it can.
+    position: null for one at infinity, or without a place. direction: unit vector along its axis;
+    null for one without an axis. target: the requested point, or else the surface on its axis.
+    cutoff, beam: degrees from its axis; null for all but spots. rail: both ends of its rail.
+    why_not: why it cannot be moved; "" if it can.
     """
 
     position: Place | None
@@ -90,8 +89,8 @@ class ViewInfo:
 class LayerInfo(Layer):
     """A layer, and where its pixels are: the picture `layer/ID`, in each view.
 
-    regions: of that picture, by view; empty where it covers nothing. accents: by how much it counts
-    more there, since all of the picture is painted. revision: grows when its pixels change.
+    regions: of that picture, by view; empty without coverage. accents: factor of its importance
+    there, since the whole picture is painted. revision: grows when its pixels change.
     """
 
     regions: tuple[Region, ...]
@@ -109,7 +108,7 @@ class LayerList:
 
 @dataclass(frozen=True)
 class LookInfo:
-    """A kept look. stamp: when, in seconds since 1970. thumbnail: name of its picture."""
+    """A kept look. stamp: time in seconds since 1970. thumbnail: name of its picture."""
 
     id: int
     name: str
@@ -138,7 +137,7 @@ class TableInfo:
 
 @dataclass(frozen=True)
 class SampleCount:
-    """Samples per pixel that are rendered, and that are wanted."""
+    """Numbers of samples per pixel: rendered, and wanted."""
 
     spp: int
     wanted: int
@@ -156,7 +155,7 @@ class HistoryInfo:
 
 @dataclass(frozen=True)
 class ResolvedFit:
-    """The values in effect for settings that nobody has set, as in `lightpaint.Fit`."""
+    """The resolved values of all settings, as in `lightpaint.Fit`."""
 
     space: str | None
     hold: float | None
@@ -167,8 +166,8 @@ class ResolvedFit:
 class Advice:
     """A constraint that keeps the lights from the paint and can be loosened.
 
-    kind: of the constraint; `reach` where none does, but lights that move may. names: its lights.
-    closes: share of the miss that goes without it; null where it takes more than that. hold: the
+    kind: of the constraint; `reach` if there is none, but moving lights may help. names: its
+    lights. closes: share of the error that disappears without it; null if more is needed. hold: the
     weaker hold to set.
     """
 
@@ -193,9 +192,9 @@ class Closeness:
 class LightAnswer:
     """The answer for one light.
 
-    stops: against its present emission; null where it is, or was, off. kelvin: null for a colour
-    that is not white. share: of the light in the picture. error: how sure it is, in words. held:
-    whether a constraint holds it. unreached: whether no paint depends on it.
+    stops: relative to its present emission; null if it is, or was, off. kelvin: null for a colour
+    that is not white. share: of the light in the picture. error: its uncertainty, in words. held:
+    whether a constraint limits it. unreached: whether no paint depends on it.
     """
 
     emission: RGB
@@ -213,8 +212,8 @@ class LightAnswer:
 class Findings:
     """Properties of an answer; the sentences follow later than the lights.
 
-    lights: in the order of the state. shares: of each light, by view, where there are several.
-    of_views: closeness of each view; null for views that are not painted.
+    lights: in the order of the state. shares: of each light, by view, if there are several.
+    of_views: closeness of each view; null for unpainted views.
     """
 
     lights: tuple[LightAnswer, ...] | None = field(default=None, metadata=OPTIONAL)
@@ -232,9 +231,8 @@ class EditState:
     """The steps that can be undone, and the requests in effect.
 
     asked: constraints by name of light, keys and values as in a lights file. ties: names on one
-    dimmer. settings: set by somebody. resolved: the values in effect. poses: of lights that were
-    moved, by name. added: names of lights that the scene does not have. layers: what the painting
-    is made of.
+    dimmer. settings: those that were set. resolved: the values in effect. poses: of moved lights,
+    by name. added: names of lights that the scene does not have. layers: of the painting.
     """
 
     history: HistoryInfo | None = field(default=None, metadata=OPTIONAL)
@@ -247,5 +245,5 @@ class EditState:
     layers: LayerList | None = field(default=None, metadata=OPTIONAL)
 
 
-#: Tone of a message to a person.
+#: Tone of a message to the user.
 Tone = Literal["info", "warn"]

@@ -1,7 +1,7 @@
 """Requests: messages from clients to their session, with arrays beside them.
 
-Clients number their messages (`seq`), and every one of them is answered by one that gives the
-number back (`reply`), errors included: a page keeps one stroke in flight, and the newest wins.
+Clients number their messages (`seq`), and each is answered by one with that number (`reply`), even
+in case of an error. A page keeps one stroke in flight, and the newest wins.
 """
 
 from collections.abc import Mapping
@@ -32,11 +32,11 @@ class Paint(Message, kind="paint"):
     """Pixels under the brush; with arrays `image` (rows, columns, 3) float32 and `importance`
     (rows, columns) float32. Answered by `answer`.
 
-    stroke: number of the stroke, which the page counts. done: whether the brush has left the
-    picture with it: only then is the stroke kept. label: what undo calls it. view: of which picture
-    it is. layer: id of the layer whose pixels these are; `importance` is its coverage, 0 to 1, of
-    all but `pixels`, and masks need no `image`. properties: of the layer, from now on; with them a
-    new one lies on top.
+    stroke: number of the stroke, which the page counts. done: whether this ends the stroke; only
+    then it is kept. label: its name for undo. view: index of the painted view. layer: id of the
+    layer of these pixels. For all kinds but `pixels`, `importance` is the coverage, 0 to 1, and
+    masks need no `image`. properties: of the layer, from now on; with an unused id they add a layer
+    on top.
     """
 
     request_buffers: ClassVar[Mapping[str, str]] = {
@@ -53,18 +53,17 @@ class Paint(Message, kind="paint"):
     properties: Layer | None = None
 
     def __post_init__(self) -> None:
-        if self.stroke >= 2**53:  # beyond which a page cannot count
+        if self.stroke >= 2**53:  # largest exact integer of a page
             raise ValueError("stroke is a number below 2**53")
 
 
 @dataclass(frozen=True)
 class ChangeLayers(Message, kind="change_layers"):
-    """Other properties, another order or other layers from now on: one step. Answered by `answer`.
+    """A change of layers, their properties or their order: one step. Answered by `answer`.
 
-    layers: those that are new or changed; new ones lie on top. order: ids of all that stay, the
-    lowest first; null for the order as it is. copies: ids of layers by the id of each copy, which
-    is among `layers`. done: whether it becomes a step; false while a slider moves. label: what undo
-    calls it.
+    layers: new or changed ones; new ones lie on top. order: ids of all that stay, the lowest first;
+    null for the present order. copies: ids of the originals by the id of each copy, which is among
+    `layers`. done: whether it becomes a step; false while a slider moves. label: its name for undo.
     """
 
     layers: tuple[Layer, ...] = ()
@@ -76,24 +75,24 @@ class ChangeLayers(Message, kind="change_layers"):
 
 @dataclass(frozen=True)
 class Drop(Message, kind="drop"):
-    """Forget the stroke that is not done. Answered by `patch`."""
+    """Cancel the unfinished stroke. Answered by `patch`."""
 
     stroke: int
 
 
 @dataclass(frozen=True)
 class Undo(Message, kind="undo"):
-    """Take back the last step, of paint or of constraints and settings. Answered by `patch`."""
+    """Undo the last step, whether paint, constraints or settings. Answered by `patch`."""
 
 
 @dataclass(frozen=True)
 class Redo(Message, kind="redo"):
-    """Repeat a step that was taken back. Answered by `patch`."""
+    """Redo a step that was undone. Answered by `patch`."""
 
 
 @dataclass(frozen=True)
 class Ask(Message, kind="ask"):
-    """The constraints on one light from now on; an empty object frees it. Answered by `answer`.
+    """New constraints on one light; an empty object frees it. Answered by `answer`.
 
     asked: keys and values as in a lights file: lock, off, limits, color, kelvin, duv, primaries.
     done: whether it becomes a step; false while a slider moves.
@@ -106,7 +105,7 @@ class Ask(Message, kind="ask"):
 
 @dataclass(frozen=True)
 class AskAll(Message, kind="ask_all"):
-    """The constraints on several lights from now on, by name, as in `Ask`: one step. Answered by
+    """New constraints on several lights, by name, as in `Ask`: one step. Answered by
     `answer`.
     """
 
@@ -115,12 +114,11 @@ class AskAll(Message, kind="ask_all"):
 
 @dataclass(frozen=True)
 class MoveLights(Message, kind="move"):
-    """Places, targets and cones of lights from now on, by name. Answered by `answer`; `rig`
-    follows.
+    """New places, targets and cones of lights, by name. Answered by `answer`; `rig` follows.
 
-    poses: as of `lightpaint.Pose`: of position, target, cutoff and beam those that change; an empty
-    object puts a light back where the scene has it. done: whether it becomes a step; false while a
-    light is dragged.
+    poses: changed fields of `lightpaint.Pose`: position, target, cutoff and beam; an empty object
+    restores a light's place from the scene. done: whether it becomes a step; false while a light is
+    dragged.
     """
 
     poses: Mapping[str, Mapping[str, Any]]
@@ -129,12 +127,11 @@ class MoveLights(Message, kind="move"):
 
 @dataclass(frozen=True)
 class PointLight(Message, kind="point"):
-    """A move of a light that follows from a place in the picture. Answered by `answer`; `rig`
-    follows.
+    """A move of a light by a place in the picture. Answered by `answer`; `rig` follows.
 
-    how: `aim` points it there; `highlight` hangs it where its reflection is seen there; `shadow`
-    hangs it where the shadow of what is seen at `edge` ends there. at, edge: column and row in
-    pixels. view: whose picture it is. done: as of `move`.
+    how: `aim` points it there; `highlight` hangs it so that its reflection appears there; `shadow`
+    hangs it so that the shadow of the surface at `edge` ends there. at, edge: column and row in
+    pixels. view: index of the view. done: as in `move`.
     """
 
     light: int
@@ -147,11 +144,11 @@ class PointLight(Message, kind="point"):
 
 @dataclass(frozen=True)
 class AddLight(Message, kind="add_light"):
-    """A new light, which gets a name by itself: one step. Answered by `state`; `rig` follows.
+    """A new light, with a generated name: one step. Answered by `state`; `rig` follows.
 
     type: of the light. at: column and row in a picture; the light hangs a little before the surface
-    that is seen there, and points away from it. position: its place, instead; it points down. view:
-    whose picture it is.
+    there, and points away from it. position: its place, instead; it points down. view: index of the
+    view.
     """
 
     type: Literal["spot", "point", "panel"]
@@ -162,7 +159,7 @@ class AddLight(Message, kind="add_light"):
 
 @dataclass(frozen=True)
 class RemoveLight(Message, kind="remove_light"):
-    """A light that was added and is to go, by name: one step. Answered by `state`; `rig`
+    """A request to remove an added light, by name: one step. Answered by `state`; `rig`
     follows.
     """
 
@@ -171,7 +168,7 @@ class RemoveLight(Message, kind="remove_light"):
 
 @dataclass(frozen=True)
 class ShowRig(Message, kind="show_rig"):
-    """A request for where all lights hang, and of `rig` after every move from now on. Answered by
+    """A request for the places of all lights, and for `rig` after every later move. Answered by
     `started`, later by `rig`.
     """
 
@@ -179,11 +176,12 @@ class ShowRig(Message, kind="show_rig"):
 @dataclass(frozen=True)
 class PlaceLights(Message, kind="place"):
     """A request to find places, directions and cones of lights that come closest to the paintings,
-    or to stop that. Answered by `started`, then by `trial` and later by `placed`; what is found is
-    one step.
+    or to stop that. Answered by `started`, then by `trial` and later by `placed`; the result is one
+    step.
 
-    new: kind of lights to add, instead of moving those that there are; null for none. count: most
-    of them. on: names of rails, surfaces and shapes that they may hang on; none for anywhere free.
+    new: kind of lights to add, instead of moving existing ones; null for none. count: maximum
+    number of them. on: names of rails, surfaces and shapes that they may hang on; none for anywhere
+    free.
     """
 
     run: bool = True
@@ -212,12 +210,12 @@ class Set(Message, kind="set"):
 
 @dataclass(frozen=True)
 class Preview(Message, kind="preview"):
-    """A request to show what a change would do, before it is made. Answered by `started`, later by
+    """A request to show the effect of a change, before it is made. Answered by `started`, later by
     `previewed`, with small pictures of the answer now and after the change, `before` and `after`
     (h, w, 3) uint8.
 
     number: of the preview, which the page counts; `previewed` returns it. values, asked, ties: as
-    of `Set`, `AskAll` and `TieLights`; null for ties as they are. view: whose pictures they are.
+    in `Set`, `AskAll` and `TieLights`; null for unchanged ties. view: index of the view.
     """
 
     number: int
@@ -278,9 +276,9 @@ class DropLook(Message, kind="drop_look"):
 @dataclass(frozen=True)
 class Export(Message, kind="export"):
     """Write results to the folder of the session, or stop that. Answered by `started`, later by
-    `exported`, which names what was written; of one that was stopped, too.
+    `exported`, which names the files written, even if stopped.
 
-    what: target: a painting of each painted view; picture: the answer in each view, as it is seen.
+    what: target: a painting of each painted view; picture: the displayed answer in each view.
     """
 
     what: tuple[Literal["target", "picture", "lighting", "relit", "report"], ...]
@@ -290,7 +288,7 @@ class Export(Message, kind="export"):
 @dataclass(frozen=True)
 class Verify(Message, kind="verify"):
     """Render the answer in a view, or stop that. Answered by `started`, later by `verified`, or by
-    `stopped` once nothing is rendered any more.
+    `stopped` once the render has ended.
     """
 
     run: bool = True
@@ -313,7 +311,7 @@ class TakeOver(Message, kind="take_over"):
 
 @dataclass(frozen=True)
 class Fetch(Message, kind="fetch"):
-    """A request for a picture, where there is no HTTP. Answered by `fetched`, with the picture as
+    """A request for a picture, for clients without HTTP. Answered by `fetched`, with the picture as
     its array.
     """
 
@@ -332,10 +330,10 @@ class Observe(Message, kind="observe"):
 
 @dataclass(frozen=True)
 class Propose(Message, kind="propose"):
-    """Offer a lighting to who paints: it becomes a look, in which each light is held where it is
-    proposed, and takes the place of an earlier proposal of that name. Answered by `looks`.
+    """Propose a lighting to the painter: it becomes a look with each light locked at the proposed
+    level, and replaces an earlier proposal of that name. Answered by `looks`.
 
-    lights: emission by name of light; of others that of the answer now.
+    lights: emission by name of light; other lights keep that of the present answer.
     """
 
     name: str

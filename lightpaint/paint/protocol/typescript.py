@@ -1,8 +1,8 @@
-"""Types of the protocol's messages for TypeScript, as the page's scripts are checked with them.
+"""TypeScript types of the protocol's messages, with which the page's scripts are checked.
 
     python -m lightpaint.paint.protocol.typescript
 
-writes `page/engine/messages.d.ts` anew after a change of the dataclasses.
+writes `page/engine/messages.d.ts` again after a change of the dataclasses.
 """
 
 import inspect
@@ -19,7 +19,7 @@ from lightpaint.paint.layers.layer import Layer
 from lightpaint.paint.protocol import events, message_parts, requests
 from lightpaint.paint.store.canvas_pixels import Region
 
-#: Where the types lie, beside the scripts that use them.
+#: The file of types, beside the scripts that use them.
 FILE = Path(__file__).parents[1] / "page" / "engine" / "messages.d.ts"
 
 HEADER = """// Made by `python -m lightpaint.paint.protocol.typescript` of the dataclasses.
@@ -78,9 +78,9 @@ def _interface(record: type[Any], *, is_request: bool) -> str:
 
 
 def field_types(record: type[Any], *, is_request: bool = True) -> list[tuple[str, str]]:
-    """Return name and type of each field that is no array; `name?` for one that may be left out.
+    """Return name and type of each field that is no array; `name?` for an optional one.
 
-    is_request: whether those with a default may.
+    is_request: whether fields with a default are optional.
     """
     hints, types = get_type_hints(record), []
     for entry in fields(record):
@@ -88,7 +88,7 @@ def field_types(record: type[Any], *, is_request: bool = True) -> list[tuple[str
             continue
         is_event = record in events.EVENTS.values() or not is_request
         is_optional = _is_optional(entry) or (not is_event and _has_default(entry))
-        # Left out where it is None; a request may give null all the same.
+        # Omitted if None; a request may give null nevertheless.
         hint = _without_none(hints[entry.name]) if _is_optional(entry) else hints[entry.name]
         types.append((f"{entry.name}?" if is_optional else entry.name, typescript_type(hint)))
     return types
@@ -103,7 +103,7 @@ def typescript_type(hint: Any) -> str:
         return PRIMITIVES[hint]
     if outer is Literal:
         return " | ".join(f"'{value}'" for value in inner)
-    if outer in (UnionType, Union):  # of which the latter has a literal
+    if outer in (UnionType, Union):  # the latter has a literal
         return " | ".join(map(typescript_type, inner))
     if outer is tuple and inner[-1] is ...:
         item = typescript_type(inner[0])
@@ -112,7 +112,7 @@ def typescript_type(hint: Any) -> str:
         return f"[{', '.join(map(typescript_type, inner))}]"
     if outer is Mapping:
         return f"Record<{typescript_type(inner[0])}, {typescript_type(inner[1])}>"
-    if hint in events.EVENTS.values():  # within another message it has no kind of its own
+    if hint in events.EVENTS.values():  # nested messages have no kind
         return f"Omit<{hint.__name__}, 'kind' | 'arrays'>"
     return "any" if hint is Any else str(hint.__name__)
 

@@ -12,11 +12,11 @@ export type Region = [top: number, bottom: number, left: number, right: number];
 /**
  * A layer of a painting, without its pixels. Ids are never used twice in a session.
  *
- * kind: `pixels` replaces what is below by light that counts as much as its importance; `paint`
- * mixes a colour over it by its coverage; `adjust` scales its luminance by `gain` and its colour
- * by `tint`, and `weigh` its importance by `times`, where the layer's mask covers; `group` has no
- * pixels, and holds the layers whose `group` is its id. strength: 0 to 2; `adjust` and `weigh`
- * take it as a power, so that 2 is twice the stops. importance: factor of how much it counts.
+ * kind: `pixels` replaces the light below, with its own importance; `paint` mixes a colour over it
+ * by its coverage; `adjust` scales its luminance by `gain` and its colour by `tint`, and `weigh`
+ * its importance by `times`, where the layer's mask covers; `group` has no pixels, and holds the
+ * layers whose `group` is its id. strength: 0 to 2; `adjust` and `weigh` take it as a power, so
+ * that 2 is twice the stops. importance: factor of its importance.
  */
 export interface Layer {
   id: number;
@@ -34,8 +34,8 @@ export interface Layer {
 /**
  * The constant properties of a light.
  *
- * present: its emission before anything was painted. parameter, plugin: where the scene defines
- * it. form: how the scene writes its emission. members: emitters of the group that it is. group:
+ * present: its emission before anything was painted. parameter, plugin: its definition in the
+ * scene. form: how the scene writes its emission. members: its emitters, if it is a group. group:
  * name of that group; null for a single emitter. is_fixed: whether it is not adjusted. is_scalar:
  * whether one number stands for all channels. scale: factor of its stored plane.
  */
@@ -55,13 +55,12 @@ export interface LightInfo {
 }
 
 /**
- * The place of a light, and what it points at.
+ * The place of a light, and its target.
  *
- * position: null for one that is infinitely far away, or has no place. direction: of unit length,
- * that it points along; null for one that points nowhere. target: the point that it points at: the
- * one that was asked for, or else the surface that its axis meets. cutoff, beam: degrees from its
- * axis; null for all but spots. rail: both ends of what it slides along. why_not: why it cannot be
- * moved; "" if it can.
+ * position: null for one at infinity, or without a place. direction: unit vector along its axis;
+ * null for one without an axis. target: the requested point, or else the surface on its axis.
+ * cutoff, beam: degrees from its axis; null for all but spots. rail: both ends of its rail.
+ * why_not: why it cannot be moved; "" if it can.
  */
 export interface LightPlace {
   position: number[] | null;
@@ -102,8 +101,8 @@ export interface ViewInfo {
 /**
  * A layer, and where its pixels are: the picture `layer/ID`, in each view.
  *
- * regions: of that picture, by view; empty where it covers nothing. accents: by how much it counts
- * more there, since all of the picture is painted. revision: grows when its pixels change.
+ * regions: of that picture, by view; empty without coverage. accents: factor of its importance
+ * there, since the whole picture is painted. revision: grows when its pixels change.
  */
 export interface LayerInfo {
   id: number;
@@ -130,7 +129,7 @@ export interface LayerList {
 }
 
 /**
- * A kept look. stamp: when, in seconds since 1970. thumbnail: name of its picture.
+ * A kept look. stamp: time in seconds since 1970. thumbnail: name of its picture.
  */
 export interface LookInfo {
   id: number;
@@ -159,7 +158,7 @@ export interface TableInfo {
 }
 
 /**
- * Samples per pixel that are rendered, and that are wanted.
+ * Numbers of samples per pixel: rendered, and wanted.
  */
 export interface SampleCount {
   spp: number;
@@ -177,7 +176,7 @@ export interface HistoryInfo {
 }
 
 /**
- * The values in effect for settings that nobody has set, as in `lightpaint.Fit`.
+ * The resolved values of all settings, as in `lightpaint.Fit`.
  */
 export interface ResolvedFit {
   space: string | null;
@@ -188,8 +187,8 @@ export interface ResolvedFit {
 /**
  * A constraint that keeps the lights from the paint and can be loosened.
  *
- * kind: of the constraint; `reach` where none does, but lights that move may. names: its lights.
- * closes: share of the miss that goes without it; null where it takes more than that. hold: the
+ * kind: of the constraint; `reach` if there is none, but moving lights may help. names: its
+ * lights. closes: share of the error that disappears without it; null if more is needed. hold: the
  * weaker hold to set.
  */
 export interface Advice {
@@ -213,9 +212,9 @@ export interface Closeness {
 /**
  * The answer for one light.
  *
- * stops: against its present emission; null where it is, or was, off. kelvin: null for a colour
- * that is not white. share: of the light in the picture. error: how sure it is, in words. held:
- * whether a constraint holds it. unreached: whether no paint depends on it.
+ * stops: relative to its present emission; null if it is, or was, off. kelvin: null for a colour
+ * that is not white. share: of the light in the picture. error: its uncertainty, in words. held:
+ * whether a constraint limits it. unreached: whether no paint depends on it.
  */
 export interface LightAnswer {
   emission: RGB;
@@ -232,8 +231,8 @@ export interface LightAnswer {
 /**
  * Properties of an answer; the sentences follow later than the lights.
  *
- * lights: in the order of the state. shares: of each light, by view, where there are several.
- * of_views: closeness of each view; null for views that are not painted.
+ * lights: in the order of the state. shares: of each light, by view, if there are several.
+ * of_views: closeness of each view; null for unpainted views.
  */
 export interface Findings {
   lights?: LightAnswer[];
@@ -250,9 +249,8 @@ export interface Findings {
  * The steps that can be undone, and the requests in effect.
  *
  * asked: constraints by name of light, keys and values as in a lights file. ties: names on one
- * dimmer. settings: set by somebody. resolved: the values in effect. poses: of lights that were
- * moved, by name. added: names of lights that the scene does not have. layers: what the painting
- * is made of.
+ * dimmer. settings: those that were set. resolved: the values in effect. poses: of moved lights,
+ * by name. added: names of lights that the scene does not have. layers: of the painting.
  */
 export interface EditState {
   history?: HistoryInfo;
@@ -269,12 +267,13 @@ export interface EditState {
  * The whole state: the answer to `hello`, `take_over` and `observe`, and unasked when the basis
  * improves. All lists of lights are in the order of `lights`.
  *
- * version: of this protocol. size: height and width of the first view, and `objects` its names.
+ * version: of this protocol. size: height and width of the first view, and `objects` the names of
+ * its objects.
  * lut: the grid of the tables `lut/NAME` of all `transforms`. resources: pictures, with a number
  * that grows when one is replaced. verified: the last verification of each view. first: whether
- * the session has no step yet. stroke: number of the last stroke that arrived. command: solves for
- * the exported paintings. is_back: the client had the session before, and nobody since; true for
- * whoever receives it unasked. weights: (lights, 3) float64, the last answer.
+ * the session has no steps yet. stroke: number of the last stroke that arrived. command: solves
+ * for the exported paintings. is_back: the client had the session before, and no other client
+ * since; also true if unasked. weights: (lights, 3) float64, the last answer.
  */
 export interface SessionState {
   kind: 'state';
@@ -329,11 +328,12 @@ export interface SessionPending {
 }
 
 /**
- * The lights as they are now: the answer to paint and requests, and unasked once the exact
- * answer is found, and again with its analysis.
+ * The present lights: the answer to paint and requests, unasked once the exact answer is found,
+ * and again with its analysis.
  *
  * version: grows with every change of the session. stroke: number of the last stroke that arrived.
- * exact: whether it is what `lightpaint solve` finds. mode: how it was found under the brush.
+ * exact: whether it equals the answer of `lightpaint solve`. mode: space in which it was found
+ * under the brush.
  * weights: (lights, 3) float64.
  */
 export interface AnswerUpdate {
@@ -363,8 +363,8 @@ export interface AnswerUpdate {
 }
 
 /**
- * New pixels of a canvas, after undo and the like: one message for each view that has changed,
- * all of which `views` lists.
+ * New pixels of a canvas, after undo and the like: one message for each changed view; `views`
+ * lists all of these.
  *
  * image: (rows, columns, 3) float32. importance: (rows, columns) float32. weights: (lights, 3)
  * float64.
@@ -425,8 +425,8 @@ export interface LookList {
 /**
  * The progress of a long task. Unasked.
  *
- * what: `export`, `basis`, `sampling` for samples that are added where the paint needs them, or
- * the renderer's name for it.
+ * what: `export`, `basis`, `sampling` for samples added where the paint needs them, or the
+ * renderer's name for the task.
  */
 export interface ProgressReport {
   kind: 'progress';
@@ -461,9 +461,8 @@ export interface TaskStopped {
 /**
  * Files that were written. Unasked.
  *
- * command: solves for the exported paintings; "" where there is none. is_stopped: whether the
- * export was stopped before its end. is_unpainted: whether files that need a painting were left
- * out.
+ * command: solves for the exported paintings; "" for none. is_stopped: whether the export was
+ * stopped before its end. is_unpainted: whether files that need a painting were left out.
  */
 export interface ExportResult {
   kind: 'exported';
@@ -519,11 +518,11 @@ export interface PreviewResult {
 }
 
 /**
- * The places of all lights. Unasked after a move, once it was asked for.
+ * The places of all lights. Sent after every move, once requested.
  *
  * lights: in the order of the state. cameras: of each view; null for one that is no pinhole. up:
- * the axis that is nearest to upwards, 0, 1 or 2. low, high: corners of a box with all that is
- * seen, and all lights. surfaces: names of what new lights may hang on: rails, surfaces, shapes.
+ * the axis nearest to upwards, 0, 1 or 2. low, high: corners of a box around the visible scene and
+ * all lights. surfaces: names of rails, surfaces and shapes that new lights may hang on.
  */
 export interface Rig {
   kind: 'rig';
@@ -538,9 +537,9 @@ export interface Rig {
 }
 
 /**
- * The places that a search tries at present. Unasked.
+ * The places that a search is trying. Unasked.
  *
- * positions, directions: by name of light; of new ones, too.
+ * positions, directions: by name of light, including new ones.
  */
 export interface TrialPlaces {
   kind: 'trial';
@@ -553,7 +552,7 @@ export interface TrialPlaces {
 /**
  * The result of a search for places of lights. Unasked.
  *
- * text: what was moved or added, and what for; or why nothing was. names: of these lights.
+ * text: the moves or additions and their gain, or why there are none. names: of these lights.
  */
 export interface PlacingResult {
   kind: 'placed';
@@ -564,7 +563,7 @@ export interface PlacingResult {
 }
 
 /**
- * A sentence for people. Unasked. what: the task that it ends.
+ * A sentence for users. Unasked. what: the task that it ends.
  */
 export interface Notice {
   kind: 'say';
@@ -619,11 +618,11 @@ export interface Hello {
  * Pixels under the brush; with arrays `image` (rows, columns, 3) float32 and `importance`
  * (rows, columns) float32. Answered by `answer`.
  *
- * stroke: number of the stroke, which the page counts. done: whether the brush has left the
- * picture with it: only then is the stroke kept. label: what undo calls it. view: of which picture
- * it is. layer: id of the layer whose pixels these are; `importance` is its coverage, 0 to 1, of
- * all but `pixels`, and masks need no `image`. properties: of the layer, from now on; with them a
- * new one lies on top.
+ * stroke: number of the stroke, which the page counts. done: whether this ends the stroke; only
+ * then it is kept. label: its name for undo. view: index of the painted view. layer: id of the
+ * layer of these pixels. For all kinds but `pixels`, `importance` is the coverage, 0 to 1, and
+ * masks need no `image`. properties: of the layer, from now on; with an unused id they add a layer
+ * on top.
  */
 export interface Paint {
   stroke: number;
@@ -636,12 +635,11 @@ export interface Paint {
 }
 
 /**
- * Other properties, another order or other layers from now on: one step. Answered by `answer`.
+ * A change of layers, their properties or their order: one step. Answered by `answer`.
  *
- * layers: those that are new or changed; new ones lie on top. order: ids of all that stay, the
- * lowest first; null for the order as it is. copies: ids of layers by the id of each copy, which
- * is among `layers`. done: whether it becomes a step; false while a slider moves. label: what undo
- * calls it.
+ * layers: new or changed ones; new ones lie on top. order: ids of all that stay, the lowest first;
+ * null for the present order. copies: ids of the originals by the id of each copy, which is among
+ * `layers`. done: whether it becomes a step; false while a slider moves. label: its name for undo.
  */
 export interface ChangeLayers {
   layers?: Layer[];
@@ -652,26 +650,26 @@ export interface ChangeLayers {
 }
 
 /**
- * Forget the stroke that is not done. Answered by `patch`.
+ * Cancel the unfinished stroke. Answered by `patch`.
  */
 export interface Drop {
   stroke: number;
 }
 
 /**
- * Take back the last step, of paint or of constraints and settings. Answered by `patch`.
+ * Undo the last step, whether paint, constraints or settings. Answered by `patch`.
  */
 export interface Undo {
 }
 
 /**
- * Repeat a step that was taken back. Answered by `patch`.
+ * Redo a step that was undone. Answered by `patch`.
  */
 export interface Redo {
 }
 
 /**
- * The constraints on one light from now on; an empty object frees it. Answered by `answer`.
+ * New constraints on one light; an empty object frees it. Answered by `answer`.
  *
  * asked: keys and values as in a lights file: lock, off, limits, color, kelvin, duv, primaries.
  * done: whether it becomes a step; false while a slider moves.
@@ -683,7 +681,7 @@ export interface Ask {
 }
 
 /**
- * The constraints on several lights from now on, by name, as in `Ask`: one step. Answered by
+ * New constraints on several lights, by name, as in `Ask`: one step. Answered by
  * `answer`.
  */
 export interface AskAll {
@@ -691,12 +689,11 @@ export interface AskAll {
 }
 
 /**
- * Places, targets and cones of lights from now on, by name. Answered by `answer`; `rig`
- * follows.
+ * New places, targets and cones of lights, by name. Answered by `answer`; `rig` follows.
  *
- * poses: as of `lightpaint.Pose`: of position, target, cutoff and beam those that change; an empty
- * object puts a light back where the scene has it. done: whether it becomes a step; false while a
- * light is dragged.
+ * poses: changed fields of `lightpaint.Pose`: position, target, cutoff and beam; an empty object
+ * restores a light's place from the scene. done: whether it becomes a step; false while a light is
+ * dragged.
  */
 export interface MoveLights {
   poses: Record<string, Record<string, any>>;
@@ -704,12 +701,11 @@ export interface MoveLights {
 }
 
 /**
- * A move of a light that follows from a place in the picture. Answered by `answer`; `rig`
- * follows.
+ * A move of a light by a place in the picture. Answered by `answer`; `rig` follows.
  *
- * how: `aim` points it there; `highlight` hangs it where its reflection is seen there; `shadow`
- * hangs it where the shadow of what is seen at `edge` ends there. at, edge: column and row in
- * pixels. view: whose picture it is. done: as of `move`.
+ * how: `aim` points it there; `highlight` hangs it so that its reflection appears there; `shadow`
+ * hangs it so that the shadow of the surface at `edge` ends there. at, edge: column and row in
+ * pixels. view: index of the view. done: as in `move`.
  */
 export interface PointLight {
   light: number;
@@ -721,11 +717,11 @@ export interface PointLight {
 }
 
 /**
- * A new light, which gets a name by itself: one step. Answered by `state`; `rig` follows.
+ * A new light, with a generated name: one step. Answered by `state`; `rig` follows.
  *
  * type: of the light. at: column and row in a picture; the light hangs a little before the surface
- * that is seen there, and points away from it. position: its place, instead; it points down. view:
- * whose picture it is.
+ * there, and points away from it. position: its place, instead; it points down. view: index of the
+ * view.
  */
 export interface AddLight {
   type: 'spot' | 'point' | 'panel';
@@ -735,7 +731,7 @@ export interface AddLight {
 }
 
 /**
- * A light that was added and is to go, by name: one step. Answered by `state`; `rig`
+ * A request to remove an added light, by name: one step. Answered by `state`; `rig`
  * follows.
  */
 export interface RemoveLight {
@@ -744,11 +740,12 @@ export interface RemoveLight {
 
 /**
  * A request to find places, directions and cones of lights that come closest to the paintings,
- * or to stop that. Answered by `started`, then by `trial` and later by `placed`; what is found is
- * one step.
+ * or to stop that. Answered by `started`, then by `trial` and later by `placed`; the result is one
+ * step.
  *
- * new: kind of lights to add, instead of moving those that there are; null for none. count: most
- * of them. on: names of rails, surfaces and shapes that they may hang on; none for anywhere free.
+ * new: kind of lights to add, instead of moving existing ones; null for none. count: maximum
+ * number of them. on: names of rails, surfaces and shapes that they may hang on; none for anywhere
+ * free.
  */
 export interface PlaceLights {
   run?: boolean;
@@ -758,7 +755,7 @@ export interface PlaceLights {
 }
 
 /**
- * A request for where all lights hang, and of `rig` after every move from now on. Answered by
+ * A request for the places of all lights, and for `rig` after every later move. Answered by
  * `started`, later by `rig`.
  */
 export interface ShowRig {
@@ -782,12 +779,12 @@ export interface Set {
 }
 
 /**
- * A request to show what a change would do, before it is made. Answered by `started`, later by
+ * A request to show the effect of a change, before it is made. Answered by `started`, later by
  * `previewed`, with small pictures of the answer now and after the change, `before` and `after`
  * (h, w, 3) uint8.
  *
  * number: of the preview, which the page counts; `previewed` returns it. values, asked, ties: as
- * of `Set`, `AskAll` and `TieLights`; null for ties as they are. view: whose pictures they are.
+ * in `Set`, `AskAll` and `TieLights`; null for unchanged ties. view: index of the view.
  */
 export interface Preview {
   number: number;
@@ -846,9 +843,9 @@ export interface DropLook {
 
 /**
  * Write results to the folder of the session, or stop that. Answered by `started`, later by
- * `exported`, which names what was written; of one that was stopped, too.
+ * `exported`, which names the files written, even if stopped.
  *
- * what: target: a painting of each painted view; picture: the answer in each view, as it is seen.
+ * what: target: a painting of each painted view; picture: the displayed answer in each view.
  */
 export interface Export {
   what: ('target' | 'picture' | 'lighting' | 'relit' | 'report')[];
@@ -857,7 +854,7 @@ export interface Export {
 
 /**
  * Render the answer in a view, or stop that. Answered by `started`, later by `verified`, or by
- * `stopped` once nothing is rendered any more.
+ * `stopped` once the render has ended.
  */
 export interface Verify {
   run?: boolean;
@@ -879,7 +876,7 @@ export interface TakeOver {
 }
 
 /**
- * A request for a picture, where there is no HTTP. Answered by `fetched`, with the picture as
+ * A request for a picture, for clients without HTTP. Answered by `fetched`, with the picture as
  * its array.
  */
 export interface Fetch {
@@ -896,10 +893,10 @@ export interface Observe {
 }
 
 /**
- * Offer a lighting to who paints: it becomes a look, in which each light is held where it is
- * proposed, and takes the place of an earlier proposal of that name. Answered by `looks`.
+ * Propose a lighting to the painter: it becomes a look with each light locked at the proposed
+ * level, and replaces an earlier proposal of that name. Answered by `looks`.
  *
- * lights: emission by name of light; of others that of the answer now.
+ * lights: emission by name of light; other lights keep that of the present answer.
  */
 export interface Propose {
   name: string;
