@@ -65,7 +65,7 @@ class Origin:
         text = f"{self.spp} samples per pixel"
         if not self.extra_spp:
             return text
-        return f"{text} and, in the mean, {self.extra_spp:.3g} more where a painting needed them"
+        return f"{text} and, on average, {self.extra_spp:.3g} more where a painting needed them"
 
     @property
     def is_light_groups(self) -> bool:

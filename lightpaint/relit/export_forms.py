@@ -64,7 +64,7 @@ def names_of_forms(forms: Iterable[str], source: Source) -> dict[str, str]:
             raise LightpaintError(
                 "nuke multiplies the layers of light groups: give them with light_groups=..."
                 if form == "nuke"
-                else f"{form} is of a scene: give it with scene=..., and leave light_groups=... out"
+                else f"{form} needs a scene: give it with scene=..., and leave light_groups=... out"
             )
         if source.light_groups is None and source.scene is None and form not in ("csv", "json"):
             raise LightpaintError(f"{form} needs the scene: give it with scene=...")
@@ -72,7 +72,7 @@ def names_of_forms(forms: Iterable[str], source: Source) -> dict[str, str]:
             check_usd()
         names[form] = name
     if source.stage is not None and "usd" not in names:
-        raise LightpaintError("stage=... is of the form usd: leave it out, or add that")
+        raise LightpaintError("stage=... belongs to the form usd: leave it out, or add that")
     return names
 
 
@@ -146,7 +146,8 @@ def _writer_of(
         stage_name = source.stage or "USD"
         if overridden.left:
             listen.say(
-                f"no one light of {stage_name} takes {some_names(overridden.left)}: set it by hand"
+                f"{stage_name} has no single light for {some_names(overridden.left)}: set it "
+                "by hand"
             )
         if overridden.unplaced:
             listen.say(

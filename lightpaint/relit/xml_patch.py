@@ -33,8 +33,8 @@ def scene_patch(scene: Scene, lighting: Lighting) -> str:
     for file, content in relit_files(scene, lighting.emission, place).items():
         if not isinstance(content, bytes):
             raise SceneError(
-                f"{file.name} is an image that this lighting scales, and no patch of text holds "
-                "it: use lightpaint relight"
+                f"{file.name} is an image that this lighting scales, which a text patch cannot "
+                "contain: use lightpaint relight"
             )
         name = file.relative_to(place.parent).as_posix()
         try:

@@ -25,7 +25,7 @@ def explain_mismatch(picture: Floats, template: Floats) -> str:
     """
     if _is_function(picture, template):
         return (
-            "all of it by one change of colours: unless you graded it, it was saved "
+            "a single change of colours explains all of it: unless you graded it, it was saved "
             "through another view or profile (transform=..., mask=...)"
         )
     for turn, turned in _turned(template):

@@ -48,8 +48,8 @@ def painted_where(path: Path, picture: Picture, template: Template) -> npt.NDArr
     if picture.size != template.size:
         raise SizeError(
             f"the painting is {picture.size[1]}x{picture.size[0]} but its template is "
-            f"{template.size[1]}x{template.size[0]}: export it at that size, or say by alpha or "
-            "mask=... what was painted"
+            f"{template.size[1]}x{template.size[0]}: export it at that size, or mark what "
+            "was painted by alpha or mask=..."
         )
     difference, tolerance = _difference(path, picture, template)
     # The slope is smooth at both ends, so that no pixel is decided by a hair's breadth.

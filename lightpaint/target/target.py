@@ -272,8 +272,8 @@ class Target(Shown):
         (height, width), (mine_h, mine_w) = size, self.size
         if abs(width * mine_h / (height * mine_w) - 1) > 0.02:
             raise SizeError(
-                f"{titled(self.name)} is {mine_w}x{mine_h}, of another shape than the basis with "
-                f"{width}x{height}: crop it to that shape, since resize=True does not stretch"
+                f"{titled(self.name)} is {mine_w}x{mine_h}, but the basis is {width}x{height}, "
+                "of another aspect ratio: crop it to that ratio, since resize=True does not stretch"
             )
         return self.resized(size)
 

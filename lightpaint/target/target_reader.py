@@ -230,7 +230,7 @@ def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | No
     if share == 0:
         folder = Path(reading.painted_on).parent
         if path.resolve() in [(folder / name).resolve() for name in (LIGHT, SHOWN, CLEAN)]:
-            raise TargetError(f"{path} is the template itself: give what was painted over it")
+            raise TargetError(f"{path} is the template itself: give the painting made over it")
         raise TargetError(
             f"nothing in {path} differs from {reading.painted_on}: paint over it, or pass "
             "find=False if all of it counts"
@@ -256,8 +256,8 @@ def _lit(reading: _Reading, counted: Floats) -> tuple[Floats, Floats, list[str]]
     """
     if reading.template is None or reading.template.albedo is None:
         raise TargetError(
-            f"to read {reading.path} as light its template is needed, which knows what surfaces "
-            "reflect: give the folder that lightpaint template wrote as template=..."
+            f"reading {reading.path} as light needs its template, which has the albedo of "
+            "surfaces: give the folder that lightpaint template wrote as template=..."
         )
     albedo = reading.template.albedo
     # Metals, glass and the background reflect no diffuse light, so paint on them says nothing.
@@ -291,7 +291,7 @@ def _beyond(reading: _Reading, counted: Floats) -> list[str]:
     if share <= FEW:
         return []
     return [
-        f"{100 * share:.0f} % of the paint asks surfaces for a colour that they hardly reflect, so "
-        f"for more than {BEYOND:g} times the light of the template's brightest parts: "
+        f"{100 * share:.0f} % of the paint needs a colour that the surface hardly reflects, and so "
+        f"more than {BEYOND:g} times the light of the template's brightest parts: "
         'paint="light" paints the light instead'
     ]

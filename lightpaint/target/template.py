@@ -230,7 +230,7 @@ def read_template(folder: Path) -> Template:
         # Errors name its files relative to the folder.
         message = (str(error) or type(error).__name__).replace(f"{folder}{os.sep}", "")
         raise TargetError(
-            f"{folder} is no template: {one_line(message)}; make one with lightpaint template"
+            f"{folder} is not a template: {one_line(message)}; make one with lightpaint template"
         ) from None
     return Template(image, transform, record.scene, record.content, record.sensor, albedo, clean)
 

@@ -274,7 +274,7 @@ def test_scales_that_are_none(tmp_path: Path, basis: lp.Basis, text: str) -> Non
     parts = read_parts(path)
     parts[1].attributes[SCALE_KEY] = text  # type: ignore[index]
     write_parts(path, parts)
-    with pytest.raises(BasisError, match=r"a\.basis\.exr is damaged as a basis"):
+    with pytest.raises(BasisError, match=r"a\.basis\.exr is a damaged basis"):
         read_basis(path)
 
 

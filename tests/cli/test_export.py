@@ -132,18 +132,18 @@ def test_a_layer_of_usd_relights_a_stage(here: Path, tmp_path: Path) -> None:
     given = ("look/lighting.json", "--to", "usd", "--scene", "room.xml")
     done = run(here, "export", *given, "--stage", tmp_path / "hall.usda", "-o", tmp_path / "out")
     assert done.returncode == 0, done.stderr
-    assert "hall.usda takes sun: set it by hand" in done.stderr
+    assert "hall.usda has no single light for sun: set it by hand" in done.stderr
     wanted = elsewhere(here)
     relit = pxr.Stage.Open(str(tmp_path / "out" / "lights.usda"))
     for name, factor in (("panel", 1.0), ("bulb", 4.0)):
         light = UsdLux.LightAPI(relit.GetPrimAtPath(f"/hall/{name}"))
         found = light.GetIntensityAttr().Get() * np.array(light.GetColorAttr().Get())
         np.testing.assert_allclose(found / factor, wanted[name], rtol=FLOAT32)
-    assert "--stage is of the form usd" in refused(
+    assert "--stage belongs to the form usd" in refused(
         here, "export", *given[:1], "--to", "csv", "--stage", "hall.usda"
     )
     (tmp_path / "torn.usda").write_text("#usda 1.0\n(", encoding="utf-8")
-    for name, said in (("gone.usda", "no such stage"), ("torn.usda", "is no stage of USD")):
+    for name, said in (("gone.usda", "no such stage"), ("torn.usda", "is not a USD stage")):
         line = refused(here, "export", *given, "--stage", tmp_path / name, "-o", "none")
         assert said in line
 

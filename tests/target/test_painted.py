@@ -344,7 +344,7 @@ def test_a_template_that_was_moved_is_told(tmp_path: Path, change: object, words
 def test_the_template_itself_is_no_painting(tmp_path: Path) -> None:
     write(tmp_path, template_of())
     for name in ("template.png", "template.exr"):
-        with pytest.raises(TargetError, match=rf"{name} is the template itself: give what was"):
+        with pytest.raises(TargetError, match=rf"{name} is the template itself: give the painting"):
             read_target(tmp_path / name)
 
 
@@ -382,7 +382,7 @@ def test_where_nothing_reflects_light_cannot_be_painted(tmp_path: Path) -> None:
 
 def test_light_needs_a_template(tmp_path: Path) -> None:
     write_rgb(tmp_path / "p.exr", np.ones((4, 4, 3)))
-    with pytest.raises(TargetError, match="its template is needed"):
+    with pytest.raises(TargetError, match="as light needs its template"):
         read_target(tmp_path / "p.exr", paint="light")
 
 
@@ -406,8 +406,8 @@ def test_what_is_no_template_is_refused(tmp_path: Path) -> None:
     about = tmp_path / "template.json"
     good = about.read_text(encoding="utf-8")
     for bad, words in (
-        ("{", "no template"),
-        ("[]", "no template"),
+        ("{", "not a template"),
+        ("[]", "not a template"),
         (good.replace("template 1", "template 9"), "format is 'lightpaint-template 1', not"),
         (good.replace('"srgb"', '"srgbb"'), "no view transform"),
         (good.replace('"stops": 0.0', '"stops": 1e99'), "out of range"),

@@ -249,5 +249,6 @@ def check_same_view(scene: Scene, basis: Basis) -> None:
     if whole_factor(scene.size, basis.size) is None:
         raise BasisError(
             f"the basis is {basis.size[1]}x{basis.size[0]} but {scene.path} renders "
-            f"{scene.size[1]}x{scene.size[0]}, of which no square blocks are as many: make it again"
+            f"{scene.size[1]}x{scene.size[0]}, which does not "
+            "divide into as many square blocks: make it again"
         )

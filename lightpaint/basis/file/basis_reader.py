@@ -79,9 +79,9 @@ def read_basis(path: str | Path) -> Basis:
     except BasisError as error:
         raise BasisError(f"{path} {error}") from error
     except _HEADER_ERRORS as error:
-        raise BasisError(f"{path} is damaged as a basis: {one_line(str(error))}") from error
+        raise BasisError(f"{path} is a damaged basis: {one_line(str(error))}") from error
     except MemoryError:
-        raise ImageError(f"{path} takes more memory than there is") from None
+        raise ImageError(f"{path} needs more memory than there is") from None
 
 
 def leave_indirect(basis: Basis, path: Path) -> Basis:
@@ -214,7 +214,7 @@ def _checked_basis(
         if CHECKSUMS_KEY in head:
             checksums = Checksums.of_text(head[CHECKSUMS_KEY])
     except (BasisError, ImageError) as error:
-        raise BasisError(f"is damaged as a basis: {one_line(str(error))}") from error
+        raise BasisError(f"is a damaged basis: {one_line(str(error))}") from error
     order = list(range(len(texts)))
     if checksums is not None:
         order = checksums.in_order([light.name for light in lights])
@@ -231,7 +231,7 @@ def _checked_basis(
             **fields_of_others(others, checksums, images.size),
         )
     except (BasisError, ImageError) as error:
-        raise BasisError(f"is damaged as a basis: {one_line(str(error))}") from error
+        raise BasisError(f"is a damaged basis: {one_line(str(error))}") from error
     for light, attributes, read in zip(lights, texts, stored, strict=True):
         channels = read()  # one light at a time, since together they may exceed memory
         names = LIGHT_CHANNELS | INDIRECT_CHANNELS if has_indirect else LIGHT_CHANNELS
@@ -262,4 +262,4 @@ def read_origin(path: Path) -> tuple[Origin, tuple[int, int], tuple[str, ...]]:
         return read_record(Origin, strict_json(text)), size, identities
     except (*_HEADER_ERRORS, BasisError, StopIteration) as error:
         reason = one_line(str(error)) or "it does not say where it comes from"
-        raise BasisError(f"{path} is no basis this version can read: {reason}") from error
+        raise BasisError(f"{path} is not a basis this version can read: {reason}") from error

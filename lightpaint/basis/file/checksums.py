@@ -53,12 +53,12 @@ class Checksums:
             raise BasisError(f"has lost the light {one_line(missing[0])!r}: make it again")
         if new := [name for name in names if name not in self.lights]:
             raise BasisError(
-                f"has the light {one_line(new[0])!r}, which was not written with the others: take "
-                "it out"
+                f"has the light {one_line(new[0])!r}, which was not written with the others: "
+                "remove it"
             )
         if len(names) > len(self.lights):
             twice = next(name for name in names if names.count(name) > 1)
-            raise BasisError(f"has the light {one_line(twice)!r} more than once: take one out")
+            raise BasisError(f"has the light {one_line(twice)!r} more than once: remove one")
         return [list(names).index(name) for name in self.lights]
 
 
@@ -79,6 +79,6 @@ def check(expected: str, part: str, text: str, channels: Channels) -> None:
     if checksum(text, channels) == expected:
         return
     raise BasisError(
-        f"has a changed {part}: it is not as it was written, so another program has edited or "
-        "converted the file; take the original, or make it again with lightpaint basis"
+        f"has a changed {part}: another program has edited or converted the "
+        "file; use the original, or make it again with lightpaint basis"
     )

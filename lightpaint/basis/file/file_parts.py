@@ -105,7 +105,7 @@ def scales_of(texts: Mapping[str, str]) -> tuple[float, ...]:
     scales = strict_json(texts.get(SCALE_KEY, "[1, 1, 1, 1]"))
     if isinstance(scales, list) and len(scales) in (2, 4) and all(map(_is_scale, scales)):
         return (*map(float, scales), 1.0, 1.0)[:4]
-    raise BasisError(f"is damaged as a basis: {SCALE_KEY} is {one_line(repr(scales))}")
+    raise BasisError(f"is a damaged basis: {SCALE_KEY} is {one_line(repr(scales))}")
 
 
 def _is_scale(scale: object) -> bool:

@@ -47,13 +47,13 @@ def describe_sum(
         return f"the groups add up to the beauty (to {deviation:.1g} of its light)", False
     text = (
         f"the groups lack {share_text(missing)} of the light of the beauty: "
-        f"that is kept as it is, as the light {name}"
+        f"the missing part is kept as it is, as the light {name}"
     )
     if truly_exceeding > WARNING_EXCESS:
         warning = (
             f"WARNING: in places the groups exceed the beauty, by {share_text(exceeding)} of its "
-            f"light in all, which the light {name} takes away: is the beauty denoised or clamped, "
-            "a light in two groups, or one of them no light?"
+            f"light in all, which the light {name} subtracts: is the beauty denoised or clamped, "
+            "is a light in two groups, or is one of them not a light?"
         )
         text = (
             f"{warning} {text[0].upper()}{text[1:]}"

@@ -194,8 +194,8 @@ def _check_not_stereo(names: Sequence[str], file_name: str) -> None:
     if in_both := sorted(left & right):
         head = in_both[0].rpartition("_")[0]
         raise BasisError(
-            f"{file_name} holds the views left and right, and a solve is of one: say which, like "
-            f"pattern='{head}_{NAME_FIELD}.left'"
+            f"{file_name} holds the views left and right, but a solve uses one view: say which, "
+            f"like pattern='{head}_{NAME_FIELD}.left'"
         )
 
 

@@ -168,8 +168,8 @@ def _light_groups(
     remarks += _remarks_on_black(roles.lights, missing.share)
     if lights[0].primaries is not None:
         remarks.append(
-            "the file has other primaries than Rec.709: multipliers are of its channels in linear "
-            "Rec.709, which a renderer that works in other primaries meets nearly, not quite"
+            "the file has other primaries than Rec.709: multipliers are for linear Rec.709, so a "
+            "renderer that works in other primaries reproduces them only approximately"
         )
     if holes.any():
         remarks.append(f"{int(holes.sum())} pixels hold NaN or Inf in a layer and count nothing")
@@ -207,9 +207,9 @@ class _Missing:
 def _missing_light(roles: Roles, holes: npt.NDArray[np.bool_]) -> _Missing:
     lights, beauty = list(roles.lights.values()), roles.beauty
     if beauty is None:
-        text = "no beauty among the layers, so that nothing tells whether the groups are all of it"
+        text = "no beauty among the layers, so it is unknown whether the groups add up to all of it"
         if roles.renderer == ONE_FILE_PER_LIGHT:
-            text += ", and each of them a light"
+            text += ", and whether each of them is a light"
         return _Missing(None, None, None, text)
     whole = _without_holes(beauty.image, holes).astype(np.float64)
     rest = whole - sum(_without_holes(layer.image, holes).astype(np.float64) for layer in lights)

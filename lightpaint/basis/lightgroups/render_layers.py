@@ -94,12 +94,12 @@ def read_layers(
         if layer.image.shape != first.image.shape:
             raise BasisError(
                 f"{layer.place} is {_size(layer)} but {first.place} is {_size(first)}: light "
-                "groups need one size"
+                "groups must have the same size"
             )
         if not are_same(layer.primaries, first.primaries):
             raise BasisError(
-                f"{layer.place} and {first.place} declare different primaries: light groups need "
-                "one colour space"
+                f"{layer.place} and {first.place} declare different primaries: light groups must "
+                "have the same colour space"
             )
     names = [layer.name for layer in colours]
     if twice := sorted({name for name in names if names.count(name) > 1}):

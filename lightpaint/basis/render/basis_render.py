@@ -85,7 +85,7 @@ def render_basis(
         )
     check_memory(scene, in_bands=renders_in_bands(scene, start))
     if start is not None and not is_of(scene, start, seed):
-        raise BasisError("the basis to go on from was made of another scene, sensor, film or seed")
+        raise BasisError("the basis to continue was made from another scene, sensor, film or seed")
     if start is not None and budget.met_by(start.origin.spp):
         return with_first_hits(start.with_requests(scene.requests), scene, seed)
     method = method_of(scene)
@@ -94,8 +94,8 @@ def render_basis(
         start, keep = None, None
     if start is not None and method == ONE_PASS and start.origin.each_light:
         raise BasisError(
-            "the lights of the basis to go on from have unequal numbers of samples, and one pass "
-            "adds as many to each: render the others first, with scene.only([...])"
+            "the lights of the basis to continue have unequal numbers of samples, and one pass "
+            "adds the same number to each: render the others first, with scene.only([...])"
         )
     has_first_hits = start is not None and not (start.features is None or start.objects is None)
     arguments = scene, budget, seed, start, Keeper(keep), progress

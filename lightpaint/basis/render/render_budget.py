@@ -34,7 +34,7 @@ class Budget:
 
     def __post_init__(self) -> None:
         if self.time_s is not None and not 0 < self.time_s < math.inf:
-            raise SceneError(f"{self.time_s} seconds are no time to render: ask for more than 0")
+            raise SceneError(f"cannot render for {self.time_s} seconds: ask for more than 0")
 
     def met_by(self, spp: int) -> bool:
         """Return True if this many samples per pixel are enough; never for a time budget."""

@@ -92,7 +92,7 @@ def spoken_unreadable(groups: LightGroups, folder: Path) -> list[str]:
     characters = "".join(sorted({c for file in bad for c in EVALUATED.findall(_path(file))}))
     return [
         f"Nuke would evaluate {one_line(characters)} in the path {listed}: relit.nk leaves it "
-        "out, to be chosen by hand in its Read nodes; or rename it"
+        "out: choose it by hand in the Read nodes, or rename it"
     ]
 
 

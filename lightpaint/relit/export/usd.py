@@ -170,7 +170,7 @@ def _opened(stage: Path) -> Any:
         return Usd.Stage.Open(str(stage))
     except Tf.ErrorException as error:
         message = one_line(str(error), limit=200)
-        raise OutputError(f"{stage} is no stage of USD: {message}") from None
+        raise OutputError(f"{stage} is not a USD stage: {message}") from None
 
 
 def _lights_of(opened: Any) -> Mapping[str, dict[str, str]]:

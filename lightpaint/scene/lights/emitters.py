@@ -108,7 +108,7 @@ def find_emitters(parsed: ParsedScene, loaded: Any, hasher: SceneHasher) -> tupl
         name = emitter.id()
         if name not in node_of:
             raise SceneError(
-                f"emitter {name!r} is not an element of its own in {parsed.path}: give it one"
+                f"emitter {name!r} is not a separate element in {parsed.path}: make it one"
             )
         node = parsed.state.nodes[node_of[name]]
         plugin = node.props.plugin_name()

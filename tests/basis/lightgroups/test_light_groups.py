@@ -157,7 +157,7 @@ def test_messages_call_the_rest_by_its_name(tmp_path: Path):
     assert any("kept as it is, as the light rest_" in x for x in groups.remarks)
     layers = {"RGBA_rest": 2 * image, "RGBA": image}
     groups = read_light_groups(interleaved(tmp_path / "a.exr", layers))
-    assert any("which the light rest_ takes away" in x for x in groups.remarks)
+    assert any("which the light rest_ subtracts" in x for x in groups.remarks)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.6])
