@@ -117,12 +117,12 @@ class SearchPaths:
 
     @cached_property
     def judge(self) -> ViewPaths:
-        """As many independent paths, for the judgement."""
+        """Independent paths in equal number, for the judgement."""
         return self._fine(3)
 
     @cached_property
     def spread(self) -> ViewPaths:
-        """As many further independent paths, for the spread of places."""
+        """Further independent paths in equal number, for the spread of places."""
         return self._fine(4)
 
     def in_view(self, places: Floats) -> Bools:
