@@ -34,18 +34,17 @@ Emitters = Literal["auto", "count", "skip"]
 class Fit:
     """Options of a fit: the measure of closeness, and the method that finds the closest lighting.
 
-    None is resolved by the way the target was painted. Over the current look: the fit holds the
-    rest to it, and lamps keep their colour. Through a view of a display: lamps keep their colour,
-    and the fit compares display values. A float EXR with a mask of its own and nothing under it is
-    fitted literally: as light, each channel by itself.
+    None is resolved by how the target was painted. Over the current look: the fit holds the rest to
+    it, and lamps keep their colour. Through a view of a display: lamps keep their colour, and the
+    fit compares display values. A float EXR with its own mask and nothing under it is fitted
+    literally: as light, each channel separately.
 
     Attributes:
-        space: `linear`, or `display` to come closest in what a display shows.
-        hold: Weight of all unpainted pixels, which it holds to the current look, relative to that
-            of all painted ones. 0 releases them.
-        colors: `free`; `gentle`, to leave a lamp's present colour only as far as the fit gains by
-            it, and only for whites and painted colours; `white`, on Planck's locus
-            between 2200 and 9000 K.
+        space: `linear`, or `display` to come closest in display values.
+        hold: Total weight of unpainted pixels, which are held to the current look, relative to that
+            of painted ones. 0 releases them.
+        colors: `free`; `gentle`, to change a lamp's colour only if the fit gains by it, and only to
+            whites and painted colours; `white`, on Planck's locus between 2200 and 9000 K.
         unpainted: Instead of `hold`, the weight of each unpainted pixel.
         literal: Whether every target is fitted literally, except for options set here.
         method: `polished`, to a certified optimum, or `gauss-seidel`, the paper's iteration alone,

@@ -61,19 +61,19 @@ class Refinement:
 @keywords()
 @dataclass(frozen=True)
 class Problem(LinearProblem):
-    """A loss over the pictures that a basis can make, and the freedom of the lights.
+    """The loss of pictures from a basis, and the freedom of the lights.
 
     Attributes:
         basis: The basis of all views together.
         views: Basis and target of each view (views.py).
         loss: The loss of a picture.
-        squares: The linear problem that stands for the loss, or the loss itself if it is linear;
+        squares: The linear problem that approximates the loss, or the loss itself if it is linear;
             before a solve, the literal squares of the painting.
         equations: M and b of these squares, without correction for noise.
         constraints: Constraints on the lights, besides the colours that `fit` allows.
         reduction: The unknowns that both leave.
-        full: The same with the lights that `sparse` has not chosen.
-        start: (n, 3), the weights to begin with: lights that reach nothing keep them.
+        full: The same, including lights that `sparse` has not chosen.
+        start: (n, 3), the initial weights; lights that reach nothing keep them.
         fit: Options of the fit.
         corrected: The equations without that share of the noise; None if none was removed.
         noise_removed: The share of the noise in `equations` that `corrected` lacks.
@@ -276,7 +276,8 @@ def gamuts_for(basis: Basis, views: Views, fit: Fit) -> Gamuts | None:
 
 def _color_importance(target: Target) -> Floats:
     """Return the importance (h, w) of pixels whose colour counts: not those that mean "at
-    least"."""
+    least".
+    """
     if target.at_least is None:
         return target.importance
     return np.where(target.at_least.any(axis=-1), np.float32(0), target.importance)

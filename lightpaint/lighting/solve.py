@@ -51,16 +51,16 @@ def solve(
     Fixed lights have weight 1; the others make up the rest of the target.
 
     Args:
-        basis: Of one view; or of several, for the one lighting that comes closest to all: pixels
-            of all views count the same, and `views` of the solution has the answer to each.
+        basis: Of one view; or of several, for one lighting closest to all: pixels of all views
+            count the same, and `views` of the solution has the answer to each.
         target: Of one view; or of several, in the same order.
-        constraints: Constraints on the lights; they win over those of the scene's lights file,
-            which a basis that was rendered here knows.
+        constraints: Constraints on the lights; they override those of the scene's lights file,
+            which a rendered basis includes.
         start: Lighting to begin with (the present one by default). A good guess saves sweeps; the
             answer is the same, except for lights that reach no painted pixel, which keep the start.
         resize: Whether to resample a target of the same shape as the basis, but of another size.
         **fit: Any option of `Fit`, by name: `unpainted=0.1` also holds unpainted pixels to the
-            current look, `transform=lp.ViewTransform("agx")` compares what that shows instead of
+            current look, `transform=lp.ViewTransform("agx")` compares display values instead of
             linear light.
 
     Returns:

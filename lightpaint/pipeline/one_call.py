@@ -67,7 +67,8 @@ def paint_with_light(
         basis: An existing basis, or another renderer's light groups; taken from the cache or
             rendered if not given. For several views a list, which is emptied to save memory.
         constraints: Constraints on the lights; they override those of the scene's lights file.
-        rigging: What may move, and lights to add; it overrides that of the scene's lights file.
+        rigging: Lights that may move, and lights to add; it overrides that of the scene's lights
+            file.
         mask: Picture of the importance of pixels, if `target` is a path. The next two are also
             those of `read_target`.
         layer: Layer of an EXR.

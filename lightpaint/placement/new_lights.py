@@ -32,14 +32,14 @@ class NewLights:
     """Lights that a search may add, if they are worth it.
 
     Attributes:
-        kind: `point`, `spot` or `panel`, a square that shines to its front.
-        like: A light of the scene whose kind and cone or size they have, instead of `kind`.
-        count: The most that are added.
+        kind: `point`, `spot` or `panel`, a square that emits from its front.
+        like: A light of the scene whose kind and cone or size they copy, instead of `kind`.
+        count: Their maximum number.
         freedom: Where they may hang; without a place, in all free space. Spots and panels point
             anywhere unless `aim` says otherwise, as degrees from straight ahead of `like`.
         apart: Least distance from each other, in units of the scene.
         in_view: False for places that the camera does not see.
-        name: Their name; several of them are numbered, as in new_1.
+        name: Their name, numbered if there are several, as in new_1.
         size: Smallest and largest side of panels; None for sides that suit the room.
 
     Raises:
@@ -146,7 +146,7 @@ class MirroredPair:
         mirror: The plane, like "x = 0".
 
     Raises:
-        SceneError: For values that mean nothing.
+        SceneError: For invalid values.
 
     Examples:
         >>> lp.MirroredPair(("left", "right"), "x = 0").mirror

@@ -64,31 +64,31 @@ def place(
     progress: Progress = silent,
     watch: Callable[[Mapping[str, Site]], None] | None = None,
 ) -> Placement:
-    """Find places, directions and cones of lights that bring `solution` closest to its painting.
+    """Search for the poses of lights that bring `solution` closest to its painting.
 
-    Light along frozen paths decides (paths/frozen_paths.py); render bases of the scenes that
-    are returned and solve again for exact images and weights. Constraints of the solution hold
+    The search uses light along frozen paths (paths/frozen_paths.py). For exact images and weights,
+    render bases of the returned scenes and solve again. Constraints of the solution hold
     throughout.
 
     Args:
         scenes: The scene of `bases`, on the same film or a larger one; through the sensor of each
             view if there are several.
         bases: The basis of each view of the solution.
-        solution: The solution to improve. Several looks may share places: give the solution of
-            each, which keeps its own weights. A look counts by the share that it misses; `bases`
-            are of the views of all.
+        solution: The solution to improve. For several looks that share places, give the solution of
+            each; each keeps its own weights. A look counts by its relative error; `bases` are of
+            the views of all.
         freedoms: Freedom of lights by name: points, spots and suns of one emitter each.
         new: Lights that may be added.
         pairs: Lights that stay mirror images of each other.
-        constraints: Constraints on the new lights, by the names that they get; those of the
-            solution hold for the others.
-        seed: Of the paths and the places that are tried.
-        progress: Hears how far the work has come.
-        watch: Hears the poses on trial, by the names of their lights.
+        constraints: Constraints on the new lights, by their generated names; those of the solution
+            hold for the others.
+        seed: Of the paths and the trial places.
+        progress: Receives progress.
+        watch: Receives the trial poses, by the names of their lights.
 
     Raises:
-        SceneError: For lights that are not there or cannot move so, freedoms without a free place,
-            and scenes with fog.
+        SceneError: For lights that do not exist or cannot move like this, freedoms without a free
+            place, and scenes with fog.
 
     Examples:
         >>> solution, scene = lp.solve(basis, target), lp.load_scene("room.xml")

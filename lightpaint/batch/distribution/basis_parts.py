@@ -52,8 +52,8 @@ class PartwiseRender:
         if start is not None and start.origin.method != method_of(scene):
             start = None
         if start is not None and start.sums is not None and method_of(scene) == ONE_PASS:
-            # Parts are added to sums, but samples to the sum before them: only a finished basis,
-            # which was rounded anyway, is worth other last bits.
+            # Adding whole parts to earlier sums changes the last bits, compared with one render.
+            # That is acceptable only for a finished basis, which was rounded anyway.
             start = None
         check_memory(scene)
         parts = plan_parts(scene, spp, start=start)

@@ -58,22 +58,22 @@ class Diagnosis:
     """The residual's energy Σ D (Ψ − ΣwΦ)², all channels together, and its parts.
 
     Attributes:
-        total: The whole of it, the sum of the five parts.
+        total: The sum of the five parts.
         unreachable: The part that no weights of any sign can reach.
         forbidden: The part that w >= 0 forbids.
-        noise: The part of the basis's own noise.
+        noise: The part due to noise of the basis.
         ignored: Σ max(1 − D, 0)(Ψ − ΣwΦ)², the error that has no weight; in no other part.
         missed: The error relative to the painting, root mean square, in the space of the fit.
         unreachable_map: (h, w, 3), signed: the error for that reason.
-        forbidden_map: (h, w, 3), the same of what is forbidden. The sum of both is Ψ − ΣwΦ.
+        forbidden_map: (h, w, 3), the same for the forbidden part. The sum of both is Ψ − ΣwΦ.
         ignored_map: (h, w), of luminance, weighted.
         bounds: Bounds that hold single lights, the largest gain first.
         place: The worst place; None if nothing is out of reach.
-        is_constrained: Whether there are constraints, which forbid, too.
+        is_constrained: Whether there are constraints; their effect is part of `forbidden`.
         bounds_left_out: The number of other bounds, with smaller estimates.
         compromise: The part that the best lighting for this view alone would avoid; 0 for one
             view.
-        painting_noise: The part of the painting's noise, if it is a render or a photograph.
+        painting_noise: The part due to noise of the painting, if it is a render or a photograph.
         lighting_total: `total` of all views that the lighting answers, as a scale for gains.
 
     Examples:

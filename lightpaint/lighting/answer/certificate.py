@@ -15,13 +15,13 @@ from lightpaint.screen import short_repr
 @keywords()
 @dataclass(frozen=True)
 class Certificate:
-    """The proof of how good a solve is, per colour channel (R, G, B).
+    """The certificate of a solve's optimality, per colour channel (R, G, B).
 
     Attributes:
         kkt_residual: Optimality measure of the solver (see solver.kkt_residual).
         objective: ‖Ψ − Σ w_i Φ_i‖² under the importance.
-        relative_objective: Over ‖Ψ‖².
-        sweeps: Gauss–Seidel sweeps per channel; 0 where Newton steps did it.
+        relative_objective: The objective divided by ‖Ψ‖².
+        sweeps: Gauss–Seidel sweeps per channel; 0 if Newton steps sufficed.
         converged: Whether the KKT residual is within the tolerance.
         unreached: Lights that reach no weighted pixel. They keep the start of the solve, or the
             nearest emission under their constraints: the present one, if no start was given.

@@ -118,15 +118,15 @@ class Tie:
 @keywords()
 @dataclass(frozen=True)
 class Constraints:
-    """Constraints on the lights: what a solution has to keep to besides the painting.
+    """Constraints on the lights of a solution.
 
     Attributes:
         lights: Name or pattern, its keys and values, and the name of their source in errors. Later
-            entries replace what they contradict; `of` puts patterns before names.
+            entries replace contradictory ones; `of` puts patterns before names.
         ties: Lights on one dimmer.
-        prefer_current: Strength of the pull towards the present lighting. At 1 a light that changes
-            costs as much as an error of the whole picture it makes, painted or not.
-        sparse: The most lights that may be on.
+        prefer_current: Strength of the pull towards the present lighting. At 1 a change of a light
+            costs as much as its effect on the whole picture, painted or not.
+        sparse: Maximum number of lights that may be on.
 
     Examples:
         >>> constraints = lp.Constraints.of({"panel": {"lock": True}})

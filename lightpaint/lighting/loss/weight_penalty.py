@@ -1,4 +1,4 @@
-"""Penalties on the weights themselves: for leaving the present, or the present colours.
+"""Penalties on the weights: for changes of emission, or of colour alone.
 
 Both are quadratics in w, scaled by the pictures of the lights over the whole picture, so that they
 are alike for all lights. Pixels in which an emitter is visible do not count.
@@ -11,8 +11,8 @@ from lightpaint.colour.color import LUMINANCE, luminance
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.normal_equations import NormalEquations
 
-#: Strength of the pull to the present colours: the share of a picture's change by another hue that
-#: counts as an error, in proportion to the painted pixels.
+#: Strength of the pull to the present colours: the share of a hue's effect on the picture that
+#: counts as an error, scaled by the share of painted pixels.
 COLOR_PULL = 1.5
 
 #: Largest factor of dimming that strengthens the pull to a light's colour.
@@ -31,9 +31,10 @@ def weight_pull(
 ) -> NormalEquations | None:
     """Return the sum of all pulls on the weights; None without any.
 
-    power, present: (n, 3), ‖Φᵢ‖² of the lights' pictures, and their weights now. prefer_current:
-    see `Constraints`. painted_share: total importance relative to the number of pixels, which
-    scales the pull to the present colours. keeps_color: (n,), the lights that it applies to.
+    power, present: (n, 3), ‖Φᵢ‖² of the lights' pictures, and their present weights.
+    prefer_current: see `Constraints`. painted_share: total importance relative to the number of
+    pixels, which scales the pull to the present colours. keeps_color: (n,), lights to which that
+    pull applies.
     dimming: (n,), see `dimming_factors`; None if no light is known to be dim.
     """
     gentle = COLOR_PULL * fit.brightness * painted_share if fit.colors == "gentle" else 0.0
@@ -52,8 +53,8 @@ def dimming_factors(present: Doubles, weights: Doubles) -> Doubles:
     """Return the factor (n,) by which weights (n, 3) are dimmer than the present; 1 where they are
     not.
 
-    The pull to a light's colour goes with light squared, and would vanish with the light.
-    Multiplied by this factor it goes with the light itself.
+    The pull to a light's colour is quadratic in its light, and would vanish for a dim light. This
+    factor makes it linear.
     """
     now, after = (np.asarray(luminance(x), np.float64) for x in (present, weights))
     least = np.where(now > 0, now / MAX_DIMMING, 1)

@@ -61,33 +61,32 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
     """A painter in a notebook: paint light, and see the answer while the brush moves.
 
     Args:
-        scene: What is painted: a basis, a scene (its basis is rendered meanwhile), light groups,
-            or the path of a scene. Of several views a list of bases or of scenes, for one lighting.
-        target: To begin with; of several views a list of them.
-        constraints: What is asked of the lights, beside what is asked in the painter.
-        transform: To paint through; that of the target, if it was seen through one, by default.
-            What is open of it follows from the scene.
-        store: A file to keep the session in, which is gone on with if it is there; a painter of
-            this kernel that has it is closed. Without one what was painted lives as long as the
-            kernel.
-        folder: Receives what is exported.
-        height: Of the painter, in pixels of the screen, at least 240.
-        layout: As for every widget: the room that it takes beside others.
+        scene: A basis, a scene (its basis is rendered in the background), light groups, or the path
+            of a scene. For several views under one lighting, a list of bases or of scenes.
+        target: The initial painting; for several views a list.
+        constraints: Constraints on the lights, in addition to those set in the painter.
+        transform: The view transform to paint through; by default that of the target, if it has
+            one. The scene determines open parts.
+        store: The file of the session; an existing session continues. A painter of this kernel that
+            has the file open is closed. Without a file the session ends with the kernel.
+        folder: Receives exports.
+        height: Height of the painter in screen pixels, at least 240.
+        layout: The layout of the widget, as for every ipywidget.
         settings: Fields of `lp.Settings`, by name.
 
     Attributes:
-        target: The painting, a `Target`; None where nothing is painted. Of several views, the first
-            one's.
+        target: The painting, a `Target`; None if nothing is painted. With several views, that of
+            the first.
         targets: The paintings of all views, in order.
-        lighting: The `Lighting` that answers it. Setting it holds every light there.
-        constraints: The `Constraints` that were asked in the painter. Like `lighting` None as long
-            as nothing of a scene is rendered.
+        lighting: The `Lighting` that answers it. Setting it locks every light there.
+        constraints: The `Constraints` set in the painter. Like `lighting`, None until the first
+            render of a scene.
 
-    What is painted changes these, and `observe` tells of it; setting them shows in the painter, as
-    a step that can be undone.
+    Painting changes these attributes and notifies observers (`observe`). Setting one changes the
+    painter, as a step that can be undone.
 
     Raises:
-        PaintError: For what cannot be painted, or set; without `lightpaint[notebook]`.
+        PaintError: For a scene or value that cannot be used; without `lightpaint[notebook]`.
 
     Examples:
         >>> painter = lp.Painter(basis, target=target)

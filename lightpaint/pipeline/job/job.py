@@ -85,8 +85,8 @@ class Job:
         constraints: Constraints on the lights; they override those of the scene's lights file.
         settings: Settings of the solve.
         by_sensor: True to write the pictures to a folder for each sensor, as with several views.
-        rigging: What may move, and lights to add; needs a scene. It overrides that of the scene's
-            lights file.
+        rigging: Lights that may move, and lights to add; needs a scene. It overrides that of the
+            scene's lights file.
         placement: Places found earlier for several looks; nothing is searched for then.
         views: Set on creation: the views, each with what it needs.
         all_constraints: Set on creation: all constraints, the lights file's first.

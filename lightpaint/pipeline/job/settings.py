@@ -43,8 +43,8 @@ class Settings(Fit):
         resize: Whether to resample a target of another size.
         spp: Samples per pixel of the basis, and upper limit for the verification.
         time_s: Seconds to render the bases of all views, instead of spp.
-        error: Largest error of any light that shows, as a share of its luminance, at 95 %: samples
-            are added where the painting needs them until it is met, instead of spp; with time_s for
+        error: Largest error of any visible light, as a share of its luminance, at 95 %: samples are
+            added where the painting needs them until it is met, instead of spp; with time_s for
             that many seconds at most.
         seed: Seed of the basis; the verification derives its own from it.
         resolution: `1/4` or `320x180`: size of the film for the basis. The verification uses the
@@ -57,7 +57,7 @@ class Settings(Fit):
             equations; None if the noise is known, unless `literal`.
         refine: Rounds of rendering the solved scene, with as many samples as the basis, and
             improving the answer; needs a scene.
-        suggest: Most point lights to suggest; needs a scene, and a single view.
+        suggest: Maximum number of point lights to suggest; needs a scene and a single view.
         move_lights: Whether to move the lights that may move.
         cd_per_unit: cd/m² that a radiance of 1 stands for, for luminous quantities in the results.
         verify: Whether to render the relit scene and compare it with the prediction, with at most

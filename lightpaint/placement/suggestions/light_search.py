@@ -86,7 +86,7 @@ def suggest_lights(
         solution: The solution to improve.
         count: Maximum number of suggestions; none if no light reliably removes 1 % of the error.
         seed: Of the positions and their images.
-        progress: Hears how far the work has come.
+        progress: Receives progress.
 
     Raises:
         SceneError: For scenes that one pass cannot serve.
