@@ -450,7 +450,7 @@ class Here:
     def run(self, items: Sequence[Any]) -> Iterator[ItemResult]:
         memory = WorkerCache()
         for item in items:
-            self.lights.add(item.film.only)
+            self.lights.add(item.film.light_names)
             yield run_item(item, memory, listener(silent))
 
 
