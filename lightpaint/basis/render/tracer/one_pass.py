@@ -212,8 +212,9 @@ def rules_of(scene: Scene) -> Rules:
     return Rules(
         hide_emitters=integrator.hide_emitters,
         must_bounce=needs_a_bounce(scene),
-        max_depth=mi.UInt32(depth_limit(integrator)),
-        rr_depth=mi.UInt32(integrator.rr_depth),
+        # These are no constants of the kernel, which serves paths of any length.
+        max_depth=dr.opaque(mi.UInt32, depth_limit(integrator)),
+        rr_depth=dr.opaque(mi.UInt32, integrator.rr_depth),
     )
 
 
