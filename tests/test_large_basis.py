@@ -28,8 +28,9 @@ NOISY = 1.0
 def stay_in_the_file(patch: pytest.MonkeyPatch, large: int) -> None:
     """Let planes stay in their file, and pictures of so many pixels be large."""
     patch.setattr(basis_file, "IN_MEMORY_MAX_BYTES", 0)
-    patch.setattr(file_planes, "STRIP_CACHE_BYTES", large)
-    patch.setattr(file_planes, "PICKED_MAX_BYTES", large)
+    # A few rows: a walk along single ones would take most of the time.
+    patch.setattr(file_planes, "STRIP_CACHE_BYTES", 16 * large)
+    patch.setattr(file_planes, "PICKED_MAX_BYTES", 16 * large)
     patch.setattr(bands, "BAND_PIXELS", large // 8)
     patch.setattr(loss, "MAX_KEPT_PIXELS", large)
     patch.setattr(loss, "STRIP_PIXELS", min(loss.STRIP_PIXELS, large // 4))
