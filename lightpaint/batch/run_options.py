@@ -9,9 +9,10 @@ from lightpaint.batch.gallery.summary import SummaryRow
 class RunOptions:
     """Options of a run.
 
-    workers: processes; 1 for this process alone. keep_going: whether the other looks go on after a
-    failure. retry: how often a failed step is tried again. shares_folder: whether other processes
-    do other looks of the plan at the same time in the same folder; the last one writes the gallery.
+    workers: processes; 1 for this process alone. keep_going: whether to continue with the other
+    looks after a failure. retry: how often a failed step is tried again. shares_folder: whether
+    other processes do other looks of the plan at the same time in the same folder; the last one
+    writes the gallery.
     cluster: address of a Dask scheduler whose workers do the work. shared_fs: whether they see the
     same files under the same paths. task_limit_s: seconds after which a worker counts as hung.
     """

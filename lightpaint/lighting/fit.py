@@ -24,7 +24,7 @@ DEFAULT_HOLD = 4.0
 
 F = TypeVar("F", bound="Fit")
 
-#: Whether pixels with a visible emitter count: if alpha, mask or template say what is painted,
+#: Whether pixels with a visible emitter count: if alpha, mask or template mark them as painted,
 #: wherever they are painted, or never.
 Emitters = Literal["auto", "count", "skip"]
 
@@ -53,7 +53,7 @@ class Fit:
         transform: The view transform of a comparison in `display`; None for that of the painting
             or, if it holds light, sRGB at a fitting exposure.
         emitters: Whether pixels with a visible emitter count: `auto`, if alpha, mask or template
-            say what is painted; `count`, always, which holds the emitters themselves to their
+            mark them as painted; `count`, always, which holds the emitters themselves to their
             painted brightness; `skip`, never.
 
     Raises:

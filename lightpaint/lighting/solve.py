@@ -31,8 +31,8 @@ from lightpaint.lighting.unknowns.reduced_problem import (
 from lightpaint.lighting.unknowns.white_neighbours import next_whites
 from lightpaint.target.target import Target
 
-#: Most steps of lights to other whites, for a loss that is not linear, and the share of the loss
-#: that a step has to gain.
+#: Maximum number of steps of lights to other whites, for a loss that is not linear, and the share
+#: of the loss that a step has to gain.
 MAX_WHITE_STEPS, MIN_GAIN = 20, 1e-7
 
 

@@ -30,7 +30,7 @@ from lightpaint.pipeline.job.sources import (
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
 
-#: Most bytes of half floats that a page can hold, for all planes of a view.
+#: Maximum number of bytes of half floats that a page can hold, for all planes of a view.
 MAX_PAGE_BYTES = 2**31
 
 #: Types that can be painted: files, which are read when they are needed, and loaded objects.

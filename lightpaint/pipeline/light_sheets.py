@@ -20,8 +20,9 @@ from lightpaint.scene.scene import Scene
 #: depend on whether somebody has looked at the lights.
 SHEET, SHEET_SEED = Preset(16, 2**15), 2**31 - 1
 
-#: Most pixels of all lights together that are rendered for a sheet, and fewest of each light; most
-#: bytes of a cached basis that is read for it; most lights if each needs a render of its own.
+#: Maximum number of pixels of all lights together that are rendered for a sheet, and fewest of each
+#: light; most bytes of a cached basis that is read for it; most lights if each needs a render of
+#: its own.
 SHEET_MAX_PIXELS, LIGHT_MIN_PIXELS, MAX_BASIS_BYTES, MAX_RENDERS = 2**20, 2**12, 2**27, 6
 
 #: Key of the text in a PNG that marks it as a light sheet.

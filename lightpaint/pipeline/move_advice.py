@@ -23,7 +23,7 @@ from lightpaint.scene.scene import Scene
 #: Largest turn that is tried, in degrees, and the margin that the suggested option adds to it.
 TURN, MARGIN = 45.0, 10.0
 
-#: Most pixels of the preview, camera samples of all of them, and most of one.
+#: Maximum number of pixels of the preview, camera samples of all of them, and most of one.
 PIXELS, SAMPLES, MAX_SPP = 2**14, 2**19, 512
 
 #: Relative error below which nothing is suggested.

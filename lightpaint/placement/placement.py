@@ -27,7 +27,7 @@ class Move:
         name: The light.
         old: Its place, direction and cone before.
         new: The same after the move.
-        gain_share: The share of what was missed that it gives, beside the other changes.
+        gain_share: The share of the error that it removes, given the other changes.
         place_error: Standard error of its place, in units of the scene; None if it did not slide.
         turn_error: The same of its direction, in degrees; None if it has none.
         is_hardly_visible: Whether the picture hardly tells where it is.
@@ -95,7 +95,7 @@ class AddedLight:
 
     Attributes:
         emitter: The light: its name, kind, place and emission.
-        gain_share: The share of what was missed that it gives, beside the other changes.
+        gain_share: The share of the error that it removes, given the other changes.
         place_error: Standard error of its place, in units of the scene.
         turn_error: The same of its direction, in degrees; None if it has none.
         is_hardly_visible: Whether the picture hardly tells where it is.
@@ -174,7 +174,7 @@ class Placement:
         missed_before: The error of the solve as a share of ‖Ψ‖², estimated on paths that no place
             was fitted to.
         missed_after: The same with the moves and additions.
-        looks: Names of the looks that share it; none for one alone.
+        looks: Names of the looks that share it; empty for a single look.
 
     Examples:
         >>> solution, scene = lp.solve(basis, target), lp.load_scene("room.xml")

@@ -81,7 +81,7 @@ class Ranking:
 class PlacementFit:
     """Goals on a small film, and the columns of all lights at their present places.
 
-    The loss is Σ D (r² − n²), r being what the picture misses and n the mix of half differences.
+    The loss is Σ D (r² − n²), where r is the residual and n the mix of half differences.
 
     Looks that share places have separate weights, so they act as further channels: 3 for each look,
     which share the columns. So a search does not deal with looks. A look counts by its relative

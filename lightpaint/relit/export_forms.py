@@ -81,9 +81,9 @@ def writers_of(
 ) -> tuple[dict[str, Callable[[], str]], str]:
     """Return a function that makes the text of each file, by file name, and a remark or "".
 
-    names: file names by format, from `names_of_forms`. folder: folder of the files. listen: is told
-    what a format leaves out. Mitsuba gets the lighting itself, other programs the result of
-    `_exported`. Raises LightpaintError if the lighting belongs to another source.
+    names: file names by format, from `names_of_forms`. folder: folder of the files. listen:
+    receives remarks on what a format leaves out. Mitsuba gets the lighting itself, other programs
+    the result of `_exported`. Raises LightpaintError if the lighting belongs to another source.
     """
     elsewhere, remark = lighting, ""
     if set(names) != {"mitsuba"}:

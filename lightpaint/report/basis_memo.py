@@ -22,7 +22,7 @@ Result = TypeVar("Result")
 #: folded.
 ROWS_SHOWN, SPARE_ROWS = 10, 3
 
-#: Pixels of a plane in a page from left to right, and of all planes together, at most.
+#: Maximum width of a plane in a page, in pixels, and maximum number of pixels in all planes.
 MAX_WIDTH, MAX_PIXELS = 480, 1_000_000
 
 _lock = Lock()

@@ -111,7 +111,7 @@ JOINT_RELEASE_CLAUSES = {
 
 
 def spoken_cause(reason: Reason, *, weaker: str = "a hold of", any_color: str = ANY_COLOR) -> str:
-    """Name what keeps the lights from the paint, and the gain of releasing it; "" for views.
+    """Name a cause that limits the answer, and the gain of releasing it; "" for views.
 
     weaker: the words before the strength of a weaker hold. any_color: as in `bound_sentences`.
     """

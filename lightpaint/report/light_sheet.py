@@ -21,7 +21,7 @@ from lightpaint.report.rig.hung_lights import HungLight
 from lightpaint.report.rig.rig_drawing import rig_drawing
 from lightpaint.screen import visible
 
-#: The most lights shown; the others, with the smallest shares, are counted.
+#: Maximum number of lights shown; the others, with the smallest shares, are counted.
 MAX_LIGHTS = 64
 
 #: Widths of a picture by the largest number of lights; height over width of the sheet to aim at.
@@ -37,7 +37,8 @@ GROUND, TEXT, FAINT, EDGE = (24, 24, 26), (226, 226, 226), (142, 142, 146), (44,
 @dataclass(frozen=True)
 class _Cell:
     """The cell of a light: its picture, (h, w, 3) in display values, or None if it shows
-    nothing."""
+    nothing.
+    """
 
     name: str
     share: str
@@ -47,7 +48,8 @@ class _Cell:
 @dataclass(frozen=True)
 class _Grid:
     """The layout in pixels: width and height of a picture, gaps, and height of the words below
-    it."""
+    it.
+    """
 
     width: int
     height: int

@@ -130,8 +130,7 @@ def _painting(target: Target, solution: Solution) -> dict[str, Any]:
 
 
 def _appearance(appearance: Appearance) -> dict[str, Any]:
-    """Return the mean CIEDE2000 over the paint, and the share of the request that has come
-    about."""
+    """Return the mean CIEDE2000 over the paint, and the achieved share of the request."""
     place = appearance.place
     return {
         "delta_e": appearance.delta_e,

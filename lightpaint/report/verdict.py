@@ -18,7 +18,7 @@ from lightpaint.report.phrases import (
 )
 from lightpaint.screen import some_names
 
-#: The most barely visible lights that a sentence names.
+#: Maximum number of barely visible lights that a sentence names.
 MAX_UNSEEN_NAMES = 2
 
 #: Clauses on reasons that hold the lights back: for one light, and for several.
@@ -35,7 +35,7 @@ REASON_CLAUSES: dict[str, tuple[str, str]] = {
     "views": ("view {} asks for different light", "views {} ask for different light"),
 }
 
-#: The most names in one clause; of more it tells the number.
+#: Maximum number of names in one clause; of more it tells the number.
 MAX_NAMES = 3
 
 #: The clause if no cause has a third of the error.

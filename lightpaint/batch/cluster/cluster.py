@@ -125,7 +125,7 @@ class Cluster:
         self._assignments = []
 
     def _assign(self, queue: deque[WorkItem], common_files: set[str]) -> Iterator[ItemResult]:
-        """Give every worker an item, and a second one where there are enough for all."""
+        """Give every worker an item, and a second one if there are enough for all."""
         load_counts = Counter(assignment.worker for assignment in self._assignments)
         for depth in range(1, ITEMS_PER_WORKER + 1):
             for worker in self._workers.addresses:

@@ -14,7 +14,8 @@ from lightpaint.errors import LightpaintError
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.report.page.mixer import kelvin_colors, lighting_data, transform_data
 
-#: Most mixers of a page (each may take two megabytes), and most lights of a mixer with sliders.
+#: Maximum number of mixers of a page (each may take two megabytes), and most lights of a mixer with
+#: sliders.
 MAX_MIXERS, MAX_LIGHTS = 8, 40
 
 

@@ -36,7 +36,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, Painting, SceneFile
 
-#: Looks of one batch, at most.
+#: Maximum number of looks of one batch.
 MAX_LOOKS = 10_000
 
 

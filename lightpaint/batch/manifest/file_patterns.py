@@ -13,7 +13,7 @@ from re import Pattern, compile
 
 from lightpaint.errors import BatchError
 
-#: Most files and folders that one pattern may visit, and the greatest depth of `**`.
+#: Maximum number of files and folders that one pattern may visit, and the greatest depth of `**`.
 MAX_VISITED, MAX_DEPTH = 20_000, 32
 
 

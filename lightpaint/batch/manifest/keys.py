@@ -27,7 +27,7 @@ Share = Literal["places"]
 #: Scale in which a sequence has even steps: stops of brightness, or perceived colour.
 Space = Literal["log", "oklab"]
 
-#: Frames of one sequence, at most.
+#: Maximum number of frames of one sequence.
 MAX_FRAMES = 10_000
 
 

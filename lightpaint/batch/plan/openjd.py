@@ -18,7 +18,7 @@ from lightpaint.files import check_writable, write_text
 #: Name of the template in the folder of the job.
 TEMPLATE = "template.json"
 
-#: Most values of one parameter of a step, and most characters of a value.
+#: Maximum number of values of one parameter of a step, and most characters of a value.
 MAX_VALUES, MAX_VALUE_LENGTH = 1024, 1024
 
 

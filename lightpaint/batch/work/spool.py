@@ -30,7 +30,7 @@ _NAME = re.compile("[0-9a-f]{32}")
 
 
 class Spool:
-    """Rendered parts of one basis. If the disk cannot store them, the render goes on."""
+    """Rendered parts of one basis. If the disk cannot store them, the render continues."""
 
     def __init__(
         self, scene: Scene, parts: Sequence[Part], *, seed: int, start: Basis | None

@@ -23,7 +23,7 @@ from lightpaint.errors import BatchError, OutputError
 from lightpaint.files import scene_name
 from lightpaint.screen import some_of, visible
 
-#: Most looks that are listed at the end; of more only unfinished ones.
+#: Maximum number of looks that are listed at the end; of more only unfinished ones.
 MAX_LISTED = 40
 
 

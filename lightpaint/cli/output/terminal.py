@@ -127,7 +127,7 @@ def _timed(text: str) -> str:
     return f"{text} [{lap:.2f} s, {total:.2f} s in all]"
 
 
-#: Most workers with a line each; of more, only their number is shown.
+#: Maximum number of workers with a line each; of more, only their number is shown.
 MAX_WORKER_LINES = 8
 
 

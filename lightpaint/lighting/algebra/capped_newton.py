@@ -44,7 +44,7 @@ def capped_newton(q: Quadratic, x: Doubles, *, tolerance: float) -> tuple[Double
         x = np.clip(x + move, q.lower, q.upper)
         multipliers = np.zeros(len(q.groups))
         multipliers[held_caps] = pushes
-        # A cap goes on holding only if it pushes inwards; one that is exceeded begins to hold.
+        # A cap stays active only if it pushes inwards; one that is exceeded becomes active.
         at_lower, at_upper = at_lower & (multipliers > 0), at_upper & (multipliers < 0)
         value, room = q.A @ x, 64 * EPSILON * (q.A @ np.abs(x))
         at_lower |= value < q.cap_lower - room

@@ -35,7 +35,7 @@ class Optimum:
     """The best x, with the multipliers that prove it.
 
     x: (n,), at a bound exactly where it is held there.
-    multipliers: (n,), gradient M x − b of each unknown less what caps take of it: 0 between
+    multipliers: (n,), gradient M x − b of each unknown minus the contribution of caps: 0 between
     the bounds, >= 0 where the lower bound holds x, <= 0 where the upper one does.
     cap_multipliers: (k,), the change of the objective if the limit of a cap rose by one. <= 0 at
     the upper, >= 0 at the lower limit.

@@ -35,7 +35,7 @@ class Quadratic:
     M: (n, n) with rows of 0 where an unknown changes nothing; b, lower, upper, scale: (n,).
     A: (k, n), a row for each cap; cap_lower, cap_upper, cap_scale: (k,).
     groups: the unknowns of each cap. An unknown itself is scale times the scaled one.
-    size: what the KKT residual is relative to.
+    size: scale of the KKT residual.
     """
 
     M: Doubles

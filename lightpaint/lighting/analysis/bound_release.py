@@ -22,8 +22,8 @@ from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.lighting.unknowns.white_neighbours import move_to_best_white, next_whites
 
-#: The most bounds to release; for large problems, about MAX_UNKNOWNS unknowns in all; the fewest
-#: bounds.
+#: Maximum number of bounds to release; for large problems, about MAX_UNKNOWNS unknowns in all; the
+#: fewest bounds.
 MAX_RELEASED, MAX_UNKNOWNS, MIN_RELEASED = 32, 2048, 4
 
 #: Visible difference of a light from its whites to green or pink, in Duv.
@@ -98,7 +98,8 @@ def _bounded_answer(solution: Solution, equations: NormalEquations) -> BoundedAn
 
 def _tint(answer: BoundedAnswer, bound: ActiveBound, freed: Doubles) -> Tint:
     """Return the side of its range of white to which a light goes in weights (n, 3) after
-    release."""
+    release.
+    """
     white_ranges = [knob.whites for knob in answer.full.knobs if knob.lights == bound.lights]
     if bound.kind != "colour" or not white_ranges or (whites := white_ranges[0]) is None:
         return ""

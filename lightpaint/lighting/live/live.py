@@ -45,7 +45,7 @@ from lightpaint.lighting.unknowns.white_neighbours import (
     snap_to_whites,
 )
 
-#: Most steps between whites for one answer; the next answer continues.
+#: Maximum number of steps between whites for one answer; the next answer continues.
 WHITE_STEPS = 2
 
 #: Width, in pieces of a range of white, of the window in which a light first finds its white.

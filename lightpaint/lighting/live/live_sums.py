@@ -17,7 +17,7 @@ from lightpaint.lighting.loss.reweighting import interpolate
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.threads import one_thread
 
-#: Most pixels of an averaged picture in display space: those of one strip.
+#: Maximum number of pixels of an averaged picture in display space: those of one strip.
 MAX_FILM_PIXELS = STRIP_PIXELS
 
 #: Round-off, in float32, of an importance and its complement, whose sum is 1.

@@ -22,13 +22,13 @@ from lightpaint.threads import one_thread, parallel_map
 #: Pixels along the side of a tile. Smaller tiles fit a brush better, but there are more to add.
 TILE_SIDE = 16
 
-#: Most bytes for the sums of all tiles; tiles are larger if they would take more.
+#: Maximum number of bytes for the sums of all tiles; tiles are larger if they would take more.
 MAX_SUM_BYTES = 2**29
 
 #: Bytes of pixels, in float64, that are summed together: they stay in the processor's cache.
 CHUNK_BYTES = 2**21
 
-#: Most lights for which calls, not arithmetic, determine the time of a tile.
+#: Maximum number of lights for which calls, not arithmetic, determine the time of a tile.
 MAX_CHEAP_LIGHTS = 32
 
 

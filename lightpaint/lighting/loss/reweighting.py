@@ -18,14 +18,15 @@ from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.loss import Loss, PixelLoss, Squares, image_in_place
 from lightpaint.lighting.normal_equations import NormalEquations
 
-#: Rounds at most.
+#: Maximum number of rounds.
 MAX_ROUNDS = 100
 
-#: Rounds end at this change of a light's picture, relative to the brightest light's, or at this
-#: share of the loss that a whole step promises. Problems that become exact go on until they are.
+#: Rounds end at this change of a light's picture, relative to the brightest light's, or when the
+#: predicted decrease of a whole step is this share of the loss. Problems that become exact continue
+#: until they are.
 MIN_STEP, MIN_FALL = 1e-6, 1e-11
 
-#: Share of the gradient's promise that a step has to keep, and the shortest step.
+#: Least decrease of a step, relative to that predicted by the gradient, and the shortest step.
 KEPT_PROMISE, SHORTEST_STEP = 1e-4, 2.0**-20
 
 #: Share of the loss that is round-off of its sums.
@@ -38,7 +39,7 @@ FLAT_FALL = 1e-5
 
 @dataclass(frozen=True)
 class Reweighting:
-    """The history of the linear problem that a solution solves.
+    """The history of a solution's last linear problem.
 
     at: (n, 3), the weights at which its squares were made. rounds: linear problems solved before.
     step: the change of a light's picture in the last one, relative to the brightest light's.
@@ -174,7 +175,7 @@ def run_rounds(
         step = relative_change(equations, w, best)
         fall = 2 * lit.slope(image, weight, x, ahead) + terms.fall(w, best)
         if pixels.has_pieces:
-            # A problem that is exact all the way has its optimum where the true one has it.
+            # A problem that is exact along the whole step has the same optimum as the true one.
             done = pixels.has_same_squares(x, ahead)
         else:
             done = step <= until or fall <= MIN_FALL * value
@@ -196,12 +197,13 @@ def run_rounds(
                 weights, w, x, from_clipping, image, weight, equations, count, step, small
             )
         w, x, value = interpolate(w, best, part), interpolate(x, ahead, part), reached
-        del image, weight, ahead  # as large as pictures, and the next ones are made first
+        del image, weight, ahead  # else they would coexist with the next ones
 
 
 def relative_change(equations: NormalEquations, w: Doubles, best: Doubles) -> float:
     """Return the largest change of a light's picture, relative to the brightest one of its
-    channel."""
+    channel.
+    """
     size = np.sqrt(np.einsum("cii->ic", equations.M))
     largest = (size * np.maximum(w, best)).max(axis=0, initial=0)
     change = (size * np.abs(best - w)).max(axis=0, initial=0)

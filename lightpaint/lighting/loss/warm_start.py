@@ -38,7 +38,8 @@ FIRST_STEP, STEP_RATIO = 1e-4, 1e-3
 #: Relative fall of the loss in the last correction below which exact rounds are as good.
 MIN_GAIN = 1e-9
 
-#: Most corrections, and the largest ratio of one to the last at which another is worth its time.
+#: Maximum number of corrections, and the largest ratio of one to the last at which another is worth
+#: its time.
 MAX_CORRECTIONS, MAX_STEP_RATIO = 8, 0.7
 
 

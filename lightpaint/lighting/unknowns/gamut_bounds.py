@@ -15,7 +15,7 @@ from lightpaint.lighting.unknowns.reduced_problem import ReducedOptimum, solve_r
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.lighting.unknowns.white_neighbours import knobs_outside_gamuts
 
-#: Times that lights move to other sides for one answer, at most.
+#: Maximum number of times that lights move to other sides for one answer.
 MAX_TURNS = 3
 
 

@@ -36,9 +36,9 @@ class Unknown:
 
 @dataclass(frozen=True)
 class Knob:
-    """A part of the lighting that turns by itself: a light, or several on one dimmer.
+    """An independent control of the lighting: a light, or several on one dimmer.
 
-    limit: coefficients, least and most of a limited sum over its unknowns.
+    limit: coefficients, minimum and maximum of a limited sum over its unknowns.
     whites: the range of white of a light that keeps to one. window: the two of these
     that its two unknowns mix at present (white_neighbours.py).
     gamut: the gamut that confines the light, if it would leave it otherwise: all of it, or the part
@@ -103,7 +103,7 @@ class Knob:
 
 
 def mixing_knob(k: int, light: BasisLight, constraint: LightConstraint) -> Knob:
-    """Make the knob of a light of several primaries, each of which dims by itself."""
+    """Make the knob of a light of several primaries with independent dimmers."""
     colours = np.eye(3) if constraint.primaries is None else np.array(constraint.primaries)
     lower, upper, least, most = mix_limits(constraint, light, len(colours))
     unknowns = [

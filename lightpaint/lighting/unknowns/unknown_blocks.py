@@ -129,7 +129,7 @@ class KnobGroup:
 
     @cached_property
     def is_orthogonal(self) -> bool:
-        """True if the unknowns of a knob share no channel, so that each is nearest by itself."""
+        """True if the unknowns of a knob share no channel, so that each projects separately."""
         return bool((((self.columns != 0).sum(axis=1)) <= 1).all())
 
     @classmethod

@@ -25,7 +25,7 @@ from lightpaint.lighting.unknowns.reduction import Reduction
 #: Widths of windows, in pieces of the range, before they are of one piece.
 WINDOW_WIDTHS = (8, 2)
 
-#: Steps between neighbours, at most.
+#: Maximum number of steps between neighbours.
 MAX_STEPS = 200
 
 #: Share of the largest slope, and of the objective, that is round-off.
@@ -62,7 +62,7 @@ def solve_on_locus(
     Return the reduction with the whites that lights came to, and its optimum.
 
     start: (n, 3). A reduction whose lights still mix the ends of their ranges is solved like that
-    first; another one goes on from the whites nearest to the start. steps: the most steps between
+    first; another one continues from the whites nearest to the start. steps: the most steps between
     neighbours. options: of `solve_reduced`.
     """
     if not reduction.white_knobs:
@@ -87,7 +87,7 @@ def next_whites(
     only: Collection[int] | None = None,
     **options: Any,
 ) -> tuple[Reduction, ReducedOptimum]:
-    """Solve for two whites of each light, and go on from there to their neighbours.
+    """Solve for two whites of each light, and continue to their neighbours.
 
     only: the knobs that move, if not all do. For the other arguments and the result see
     `solve_on_locus`.
@@ -223,7 +223,7 @@ def _better_windows(
 def _next_window(
     slopes: Doubles, window: tuple[int, int], x: Doubles, tolerance: float
 ) -> tuple[int, int]:
-    """Return the window that a light of mix x, (2,), goes on to. slopes: (k,), of all whites."""
+    """Return the next window of a light with mix x, (2,). slopes: (k,), of all whites."""
     first, last = window
     if not x.any():
         best = int(np.argmin(slopes))

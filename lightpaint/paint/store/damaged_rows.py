@@ -6,7 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
-#: Rows of a damaged table that are tried one by one, at most.
+#: Maximum number of rows of a damaged table that are tried one by one.
 MAX_ROWS = 1_000_000
 
 Row = Sequence[Any]
@@ -83,7 +83,7 @@ def readable_rows(old: sqlite3.Connection, query: str, *values: object) -> Itera
 
 
 def read_row(old: sqlite3.Connection, query: str, *values: object) -> Row | None:
-    """Return one row; None where there is none, or it cannot be read."""
+    """Return one row; None if it does not exist or cannot be read."""
     with suppress(sqlite3.Error):
         row: Row | None = old.execute(query, values).fetchone()
         return row

@@ -243,9 +243,9 @@ def check_pages(database: sqlite3.Connection) -> None:
 
 
 def set_aside(path: Path) -> Path | None:
-    """Give the session at `path` another name. Returns it; None where there is no session.
+    """Give the session at `path` another name. Returns the name; None if there is no session.
 
-    Raises PaintError where another process has it, OutputError where it cannot be renamed.
+    Raises PaintError if another process has it open, OutputError if it cannot be renamed.
     """
     if not path.exists():
         return None

@@ -87,7 +87,7 @@ class Job:
         by_sensor: True to write the pictures to a folder for each sensor, as with several views.
         rigging: Lights that may move, and lights to add; needs a scene. It overrides that of the
             scene's lights file.
-        placement: Places found earlier for several looks; nothing is searched for then.
+        placement: Places found earlier for several looks; then there is no search.
         views: Set on creation: the views, each with what it needs.
         all_constraints: Set on creation: all constraints, the lights file's first.
         all_rigging: Set on creation: all rigging, the lights file's first.

@@ -12,9 +12,9 @@ from lightpaint.scene.properties.film import MAX_SPP, check_resolution
 from lightpaint.scene.quality_presets import Quality, samples
 from lightpaint.validation import SWITCH, Check, a, between, number, one_of, whole
 
-#: Most rounds of rendering and solving again: a larger number is a typing error.
+#: Maximum number of rounds of rendering and solving again: a larger number is a typing error.
 MAX_REFINE = 100
-#: Most suggested lights: a larger number is a typing error.
+#: Maximum number of suggested lights: a larger number is a typing error.
 MAX_SUGGEST = 100
 #: Least error that may be asked for: a smaller one is a typing error.
 MIN_ERROR = 1e-4

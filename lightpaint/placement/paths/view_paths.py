@@ -25,9 +25,9 @@ from lightpaint.scene.surfaces import loaded_features
 #: First hits per pixel, and continued paths, to rank and compare candidates on small films.
 COARSE_SAMPLES = ((1, 0), (9, 2))
 
-#: First hits of all pixels of a larger film, about, to refine and judge candidates, and to ask how
-#: far places spread, in each of two halves; how many by how many of a pixel that may be; and paths
-#: that go on for each.
+#: Approximate number of first hits on a larger film, in each of two halves, to refine and judge
+#: candidates and to measure the spread of places; the largest grid of them per pixel; and continued
+#: paths for each.
 FINE_HITS, FINE_SIDES, GOING_ON = 2**17, (3, 6), 2 / 9
 
 #: Number of independent sets of paths per view.

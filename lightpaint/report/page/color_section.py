@@ -63,7 +63,7 @@ def closer_choice(choices: Choices) -> str:
 
 
 def colors_section(choices: Choices) -> str:
-    """Return the section on the choices; empty if there are none. Empty where there is none."""
+    """Return the section on the choices; empty if there are none."""
     chosen = next((choice for choice in choices if choice.is_chosen), None)
     if chosen is None:
         return ""

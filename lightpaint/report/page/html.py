@@ -17,7 +17,7 @@ def table(
 ) -> str:
     """Return a table under its headings, the most important rows first; the rest of many is folded.
 
-    kind: its class. It scrolls by itself where it is wider than the page.
+    kind: its class. It scrolls if it is wider than the page.
     """
     heads = "".join(f'<th scope="col">{heading}</th>' for heading in headings)
 

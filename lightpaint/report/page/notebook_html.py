@@ -36,7 +36,7 @@ from lightpaint.report.verdict import agreement, verdict
 from lightpaint.scene.scene import Scene
 from lightpaint.target.target import Target
 
-#: The most lights in a table; the most pictures of a contact sheet, and in a row.
+#: Maximum number of lights in a table; the most pictures of a contact sheet, and in a row.
 MAX_LIGHTS, MAX_PICTURES, MAX_COLUMNS = 10, 12, 4
 #: Pixels of a picture in a page, and width of one that stands alone.
 PIXELS, WIDTH = 2**16, 480
@@ -97,7 +97,8 @@ def lighting_html(lighting: Lighting) -> str:
 @html_of.register
 def solution_html(solution: Solution) -> str:
     """Return the change of each light, for those that change the picture most, and the
-    certificate."""
+    certificate.
+    """
     basis, lighting = solution.basis, solution.lighting
 
     def row(k: int) -> Sequence[str]:
@@ -244,7 +245,8 @@ def _transform(image: Floats) -> ViewTransform:
 
 def _on_grey(image: Floats, importance: Floats) -> Floats:
     """Return an image (h, w, 3), linear, with unpainted parts in a dim grey of their own
-    luminance."""
+    luminance.
+    """
     share = coverage(importance)[..., None]
     return np.asarray(share * image + (1 - share) * 0.2 * luminance(image)[..., None])
 

@@ -19,7 +19,7 @@ FINER = 2
 #: Margin around the visible points, and the distance up to which lights are drawn, as shares.
 MARGIN, FAR = 0.08, 1.5
 
-#: Most height of both drawings, relative to their width.
+#: Maximum height of both drawings, relative to their width.
 TALLEST = 1.3
 
 

@@ -28,7 +28,7 @@ ROOM, LARGEST = 0.45, 40
 #: Length of a beam that meets no visible point, as a share of the panel.
 BEAM = 0.3
 
-#: Most lights that are all named; of more, only those that changed are.
+#: Maximum number of lights that are all named; of more, only those that changed are.
 MOST_NAMES = 24
 
 

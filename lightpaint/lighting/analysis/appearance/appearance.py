@@ -49,7 +49,7 @@ from lightpaint.screen import short_repr
 #: picture.
 CLOSE, FAR = 3.0, 10.0
 
-#: ΔE that is invisible, and the least share of the requested change that has to come about.
+#: ΔE that is invisible, and the least share of the requested change to achieve.
 INVISIBLE, MIN_CHANGE = 1.0, 0.3
 
 #: Largest share of a great change that may be missing before the answer counts as far.
@@ -105,7 +105,8 @@ class Appearance:
     @property
     def causes(self) -> tuple[Reason, ...]:
         """The reasons that a headline may name: without one of them a third of the error
-        vanishes."""
+        vanishes.
+        """
         return tuple(reason for reason in self.reasons if reason.share >= HEADLINE_SHARE)
 
     @property
@@ -164,8 +165,7 @@ class Appearance:
 
     @property
     def share_met(self) -> float:
-        """Share of the requested change that has come about: 1 − `delta_e` / `asked`, at least
-        0."""
+        """Achieved share of the requested change: 1 − `delta_e` / `asked`, at least 0."""
         if self.requested_change > 0:
             return max(1 - self.delta_e / self.requested_change, 0.0)
         return float(self.delta_e == 0)
@@ -177,14 +177,14 @@ class Appearance:
 
     @property
     def is_close(self) -> bool:
-        """True if the two look alike; not if little was asked and less has come about."""
+        """True if the two look alike; not if little was requested and even less achieved."""
         return self.error <= CLOSE and not self.is_in_vain
 
     @property
     def is_far(self) -> bool:
         """True if it looks like another picture, or still like the present one.
 
-        Not if more than half of the requested change has come about.
+        Not if more than half of the requested change is achieved.
         """
         is_another = self.error > FAR and self.error > FAR_SHARE * self.requested_change
         return is_another or self.is_in_vain

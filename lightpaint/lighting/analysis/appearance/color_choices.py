@@ -40,7 +40,7 @@ MIN_SAMPLE, PIXELS_PER_LIGHT, COMPARED_PIXELS = 2**12, 2**6, 2**12
 #: Change of a light's picture, relative to the brightest light's, that ends the rounds.
 LAST_STEP = 1e-3
 
-#: Most steps of lights to other whites, or into their gamuts.
+#: Maximum number of steps of lights to other whites, or into their gamuts.
 MAX_WHITE_STEPS = 5
 
 #: Share of all light that a change of hue has to affect to be mentioned.
@@ -201,7 +201,8 @@ def _view_choices(view: Solution, delta_e: float, answers: Mapping[Colors, Doubl
 
 def _largest_hue_change(view: Solution, hue: Doubles, weights: Doubles) -> tuple[str, RGB, RGB]:
     """Return the light whose change of hue changes the picture most, and its colours; "" for
-    none."""
+    none.
+    """
     # A light that was off gets its present hue, or white.
     for other in (view.basis.present_weights, np.ones_like(hue)):
         hue = np.where(luminance(hue)[:, None] > 0, hue, other)

@@ -25,7 +25,7 @@ MAX_NOISE_SHARE = 0.5
 #: Parts of the pixels that are summed in parallel.
 PARTS = 4
 
-#: Most rows of a matrix for which several threads only wait for each other.
+#: Maximum number of rows of a matrix for which several threads only wait for each other.
 SMALL_MATRIX = 256
 
 #: Eigenvalues of M, scaled to a unit diagonal, below which a direction changes no pixel.

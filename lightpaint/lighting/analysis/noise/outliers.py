@@ -80,7 +80,8 @@ def _least_power(image: Floats, half: Floats, D: Floats) -> tuple[float, float]:
 
 
 def _poisson_lower_limit(paths: float) -> float:
-    """Return the least ratio of the true to a measured sum of so many paths (Wilson and Hilferty's
-    Poisson limit).
+    """Return the least ratio of the true to a measured sum of a number of paths.
+
+    It is Wilson and Hilferty's Poisson limit.
     """
     return max(1 - 1 / (9 * paths) - 1.96 / (3 * math.sqrt(paths)), 0.1) ** 3

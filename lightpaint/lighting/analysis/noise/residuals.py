@@ -12,7 +12,7 @@ from lightpaint.lighting.solution import Solution
 class Residuals:
     """The residual of an answer, and the noise of its prediction, for any pixels.
 
-    The noise is Σ w_i h_i less what Ψ shares where it is the current look.
+    The noise is Σ w_i h_i minus the part that Ψ shares where it equals the current look.
 
     image: (p, 3), Ψ. predicted: (p, 3), Σ w_i Φ_i. half: (p, 3), Σ w_i h_i. present: (p, 3), noise
     of the current look; None where nothing follows it. share: (p, 1) or (p, 3), as far as it does;

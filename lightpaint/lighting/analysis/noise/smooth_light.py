@@ -34,7 +34,7 @@ FILTER_RADIUS = 2
 #: Pixels on either side over which noise and change are compared.
 WINDOW_RADIUS = 3
 
-#: Bytes of the averaged planes and of their noise, at most.
+#: Maximum number of bytes of the averaged planes and of their noise.
 MAX_BYTES = 2**29
 
 

@@ -35,8 +35,8 @@ def weight_spread(
 ) -> tuple[Doubles, list[Doubles], Doubles]:
     """Return standard deviations of the weights within bounds, and their excess beyond, (3 n,).
 
-    The second is what they may do beyond, below and above, when they leave a bound or cap, in
-    standard deviations as well; (n, 3) each.
+    The second is their spread below and above when they leave a bound or cap, also in standard
+    deviations; (n, 3) each.
 
     scatters: the equations by which the noise of the gradient moves the weights. unbiased,
     weights: the equations and weights, (n, 3), whose gradient tells how firmly bounds hold.
