@@ -78,7 +78,7 @@ WATCH = """() => {
   host.send = async (kind, fields, arrays) => {
     const at = moved;
     const reply = await send(kind, fields, arrays);
-    if (kind === 'paint' && !fields.done) answered = at;
+    if (kind === 'paint' && !fields.is_final) answered = at;
     return reply;
   };
   screen.now = () => {
@@ -401,7 +401,7 @@ def print_moves(path: str, moves: int = 30) -> None:
             for step in range(moves):
                 began = time.process_time(), time.perf_counter()
                 pose = {"position": (place + np.array([0.01 * step, 0, 0])).tolist()}
-                studio.handle(protocol.MoveLights({name: pose}, done=False), {})
+                studio.handle(protocol.MoveLights({name: pose}, is_final=False), {})
                 studio.resource(f"clean/{k}").tobytes()
                 ended = time.process_time(), time.perf_counter()
                 parts.append([b - a for a, b in zip(began, ended, strict=True)])

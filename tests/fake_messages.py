@@ -24,8 +24,8 @@ def fake_answer(**fields: Any) -> AnswerUpdate:
     return AnswerUpdate(**{**made, **fields})
 
 
-def fake_progress(what: str, done: int) -> ProgressReport:
-    return ProgressReport(what=what, done=done, total=1000, unit="passes")
+def fake_progress(task: str, done: int) -> ProgressReport:
+    return ProgressReport(task=task, done=done, total=1000, unit="passes")
 
 
 def fake_pending() -> SessionPending:
@@ -50,8 +50,8 @@ def fake_state(resources: dict[str, int], **fields: Any) -> SessionState:
         "resources": resources,
         "looks": (),
         "basis": SampleCount(1, 1, True),
-        "verified": (),
-        "first": True,
+        "verifications": (),
+        "is_new": True,
         "stroke": -1,
         "command": "",
         "answer": Findings(),

@@ -87,8 +87,8 @@ class Hand:
         elif what == "paint":
             self.paint(self.session.views.layers[number])
         elif what == "drop":
-            self.paint(self.session.views.layers[number], done=False)
-            self.session.handle(protocol.Drop(self.strokes), {})
+            self.paint(self.session.views.layers[number], is_final=False)
+            self.session.handle(protocol.DropStroke(self.strokes), {})
         elif what == "undo":
             self.session.handle(protocol.Undo(), {})
         else:
@@ -114,7 +114,7 @@ class Hand:
             changed = Layer(**{**vars(layer), **values})
             if what == "drag":
                 half = Layer(**{**vars(layer), "strength": 0.5})
-                self.change(layers=(half,), done=False)
+                self.change(layers=(half,), is_final=False)
             self.change(layers=(changed,))
         elif what == "delete":
             self.change(order=tuple(k for k in layers.ids if k != number))
@@ -149,11 +149,11 @@ class Hand:
             times=3.0,
         )
         if self.rng.random() < 0.5:
-            self.paint(properties, done=False)
+            self.paint(properties, is_final=False)
             self.strokes -= 1
         self.paint(properties)
 
-    def paint(self, layer: Layer, *, done: bool = True) -> None:
+    def paint(self, layer: Layer, *, is_final: bool = True) -> None:
         """Paint into a layer, in some view."""
         if layer.kind == "group":
             return
@@ -172,10 +172,10 @@ class Hand:
         request = protocol.Paint(
             self.strokes,
             (top, height, left, width),
-            done,
+            is_final,
             view=view,
             layer=layer.id,
-            properties=layer if is_new or done else None,
+            properties=layer if is_new or is_final else None,
         )
         self.session.handle(request, arrays)
 

@@ -111,10 +111,10 @@ def test_names_of_lights_have_an_end(make_basis: Any) -> None:
     [
         {"kind": "paint", "stroke": 1, "region": [0, 1, 0, 1], "label": "x" * 10**6},
         {"kind": "save_look", "name": "x" * 10**6},
-        {"kind": "ask", "light": 0, "asked": {"lock": " " * 10**6 + "1"}},
+        {"kind": "constrain_light", "light": 0, "constraints": {"lock": " " * 10**6 + "1"}},
         {"kind": "tie", "ties": [["a", "b"]] * 5000},
-        {"kind": "ask_all", "asked": {"a": {"primaries": MANY * 2}}},
-        {"kind": "set", "values": {"x" * 10**6: 1}},
+        {"kind": "constrain_lights", "constraints": {"a": {"primaries": MANY * 2}}},
+        {"kind": "change_settings", "settings": {"x" * 10**6: 1}},
     ],
 )
 def test_a_message_has_no_more_than_a_page_has_use_for(content: dict[str, Any]) -> None:

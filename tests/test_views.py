@@ -25,7 +25,7 @@ from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solve import solve
 from lightpaint.lighting.views import joint_basis
-from lightpaint.paint.protocol import Ask, Export, Message, Paint
+from lightpaint.paint.protocol import ConstrainLight, Export, Message, Paint
 from lightpaint.paint.session_file import session_identity
 from lightpaint.paint.store.steps import ViewIdentity
 from lightpaint.paint.store.store import MemoryStore
@@ -83,7 +83,7 @@ def test_what_is_painted_in_two_views_is_solved_alike(room: Path, tmp_path: Path
 
     def hear(message: Message) -> None:
         told.append(message)
-        if message.kind in ("exported", "say"):
+        if message.kind in ("exported", "notice"):
             exported.set()
 
     studio = Studio(subjects, MemoryStore)
@@ -92,8 +92,8 @@ def test_what_is_painted_in_two_views_is_solved_alike(room: Path, tmp_path: Path
     for k, light in enumerate((0.9, 0.1)):
         arrays = {"image": np.full((3, 4, 3), light), "importance": np.ones((3, 4))}
         floats = {key: value.astype(np.float32) for key, value in arrays.items()}
-        studio.handle(Paint(k, (1, 4, 2, 6), done=True, view=k), floats)
-    studio.handle(Ask(1, {"lock": True}), {})
+        studio.handle(Paint(k, (1, 4, 2, 6), is_final=True, view=k), floats)
+    studio.handle(ConstrainLight(1, {"lock": True}), {})
     studio.handle(Export(("target", "lighting", "relit", "report")), {})
     assert exported.wait(60)
     assert told[-1].kind == "exported", told[-1].fields

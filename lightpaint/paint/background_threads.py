@@ -174,7 +174,7 @@ class BackgroundThreads:
             except StoppedError:
                 pass
             except Exception as error:
-                self._report(Notice(text=error_text(error), tone="warn", what=name))
+                self._report(Notice(text=error_text(error), tone="warn", task=name))
 
         self.start(run, name)
 

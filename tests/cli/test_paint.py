@@ -326,7 +326,7 @@ def test_who_is_being_started_is_not_waited_for(monkeypatch: pytest.MonkeyPatch)
 
 def test_what_was_answered_is_there_after_a_kill(here: Path) -> None:
     pixels = {"image": np.ones((2, 3, 3), np.float32), "importance": np.ones((2, 3), np.float32)}
-    stroke = {"stroke": 1, "region": [0, 2, 0, 3], "done": True, "label": "mine"}
+    stroke = {"stroke": 1, "region": [0, 2, 0, 3], "is_final": True, "label": "mine"}
     with painting(here, "room.basis.exr") as (process, url), live(url) as socket:
         assert greeted(socket)["history"]["undo"] == []
         assert said(socket, 1, "paint", **stroke, **pixels)["kind"] == "answer"

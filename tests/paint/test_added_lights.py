@@ -36,7 +36,7 @@ def test_an_added_light_has_the_plane_of_its_place(moving: Moving, kind: Any) ->
     state = added(moving, protocol.AddLight(kind, position=AIR))
     name = f"{kind}_1"
     assert [light.name for light in state.lights] == [*before, name]
-    assert state.added == (name,)
+    assert state.added_lights == (name,)
     assert len(state.weights) == len(state.answer.lights) == len(state.views[0].scales) == 6
     quick = moving.plane(name)
     moving.rendered()
@@ -63,7 +63,7 @@ def test_the_painting_finds_a_light_that_is_missing(moving: Moving) -> None:
     moving.send(
         protocol.Paint(0, whole, True), image=look, importance=np.ones(look.shape[:2], np.float32)
     )
-    moving.send(protocol.PlaceLights(new="point"))
+    moving.send(protocol.PlaceLights(new_type="point"))
     result = placed(moving)
     assert result["names"] == ["point_1"], result
     assert any("point_1" in m.positions for m in moving.messages if m.kind == "trial")
@@ -77,7 +77,7 @@ def test_the_painting_finds_a_light_that_is_missing(moving: Moving) -> None:
 
 def test_a_click_hangs_a_light_before_the_surface(moving: Moving) -> None:
     opened_rig(moving)
-    added(moving, protocol.AddLight("spot", at=pixel_of(moving, FLOOR)))
+    added(moving, protocol.AddLight("spot", pixel=pixel_of(moving, FLOOR)))
     place = moving.studio.session.requests.added["spot_1"]
     x, y, z = place["position"]
     assert (x, z) == pytest.approx((FLOOR[0], FLOOR[2]), abs=2e-3)
@@ -91,7 +91,7 @@ def test_undo_looks_and_the_file_keep_added_lights(moving: Moving) -> None:
     moving.rendered()
     plane = moving.plane("point_1")
     light = len(before)
-    moving.send(protocol.Ask(light, {"lock": [0.3, 0.2, 0.1]}))
+    moving.send(protocol.ConstrainLight(light, {"lock": [0.3, 0.2, 0.1]}))
     moving.send(protocol.SaveLook("with"))
     for _ in range(2):
         [state, *_] = moving.send(protocol.Undo())
@@ -160,9 +160,9 @@ def test_added_lights_are_solved_for_exported_and_verified(moving: Moving) -> No
         (protocol.AddLight("spot"), "a new light needs a place"),
         (protocol.AddLight("spot", position=(math.nan, 0, 0)), "position is (nan"),
         (protocol.AddLight("spot", position=(1.0, 2.0)), "expected three numbers"),
-        (protocol.AddLight("spot", at=(0.5, 0.5)), "nothing is seen there"),
-        (protocol.AddLight("spot", at=(math.nan, 0.5)), "outside the picture"),
-        (protocol.AddLight("spot", at=(5.0, 5.0), view=3), "no view 3"),
+        (protocol.AddLight("spot", pixel=(0.5, 0.5)), "nothing is seen there"),
+        (protocol.AddLight("spot", pixel=(math.nan, 0.5)), "outside the picture"),
+        (protocol.AddLight("spot", pixel=(5.0, 5.0), view=3), "no view 3"),
         (protocol.RemoveLight("bulb"), "a light of the scene: turn it off"),
         (protocol.RemoveLight("ghost"), "no light is called 'ghost'"),
     ],
@@ -181,8 +181,8 @@ def test_a_drag_is_answered_while_a_search_runs_which_then_moves_nothing(moving:
     opened_rig(moving)
     moving.send(protocol.PlaceLights())
     moving.wait(lambda: [m for m in moving.messages if m.kind == "trial"])
-    for done in (False, False, True):
-        moving.send(protocol.MoveLights({"bulb": {"position": [0.4, 1.2, 0.1]}}, done=done))
+    for is_final in (False, False, True):
+        moving.send(protocol.MoveLights({"bulb": {"position": [0.4, 1.2, 0.1]}}, is_final=is_final))
     assert not [m for m in moving.messages if m.kind == "placed"]
     assert "somebody moved lights meanwhile" in placed(moving)["text"]
     assert set(moving.studio.session.requests.placed) == {"bulb"}
@@ -200,15 +200,18 @@ def test_undo_and_removal_while_a_plane_renders(moving: Moving) -> None:
     moving.send(protocol.Undo())
     assert names(moving) == before
     assert moving.studio.session.requests.placed == {}
-    assert not [m for m in moving.messages if m.kind == "say" and "inside" in m.fields["text"]]
+    assert not [m for m in moving.messages if m.kind == "notice" and "inside" in m.fields["text"]]
 
 
 @pytest.mark.parametrize(
     ("request_", "text"),
     [
-        (protocol.PlaceLights(new="spot", count=0), "count is 0"),
-        (protocol.PlaceLights(new="spot", count=99), "count is 99"),
-        (protocol.PlaceLights(new="spot", on=("nowhere",)), "no rail, surface or shape 'nowhere'"),
+        (protocol.PlaceLights(new_type="spot", max_count=0), "max_count is 0"),
+        (protocol.PlaceLights(new_type="spot", max_count=99), "max_count is 99"),
+        (
+            protocol.PlaceLights(new_type="spot", surfaces=("nowhere",)),
+            "no rail, surface or shape 'nowhere'",
+        ),
     ],
 )
 def test_searches_for_impossible_lights(moving: Moving, request_: Any, text: str) -> None:

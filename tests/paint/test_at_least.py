@@ -73,12 +73,14 @@ def _set(session: Session, target: lp.Target) -> None:
     session.load(*widget_arguments.load_target(session, target))
 
 
-def _paint(session: Session, stroke: int, region: Any, change: Any, *, done: bool = True) -> None:
+def _paint(
+    session: Session, stroke: int, region: Any, change: Any, *, is_final: bool = True
+) -> None:
     """Send a region, as a page that paints in it."""
     image, importance, _ = session.views[0].pixels(region)
     change(image, importance)
     arrays = {"image": image, "importance": importance}
-    session.handle(protocol.Paint(stroke, region, done), arrays)
+    session.handle(protocol.Paint(stroke, region, is_final), arrays)
 
 
 def _corner(image: Any, importance: Any) -> None:
@@ -138,7 +140,7 @@ def test_a_stroke_may_change_its_mind(basis: lp.Basis):
         image[...], importance[...] = before.image, before.importance
         image[-1], importance[-1] = 0.25, 1
 
-    _paint(session, 1, BRUSH, _corner, done=False)
+    _paint(session, 1, BRUSH, _corner, is_final=False)
     assert not _marks(session)[2:4, 3:12].any()
     session.improve([basis], [basis.present_look])  # more samples come meanwhile
     assert not _marks(session)[2:4, 3:12].any()
@@ -146,8 +148,8 @@ def test_a_stroke_may_change_its_mind(basis: lp.Basis):
     expected = target.at_least.copy()
     expected[8, 3:12] = False
     np.testing.assert_array_equal(_marks(session), expected)
-    _paint(session, 2, BRUSH, _corner, done=False)
-    session.handle(protocol.Drop(2), {})
+    _paint(session, 2, BRUSH, _corner, is_final=False)
+    session.handle(protocol.DropStroke(2), {})
     np.testing.assert_array_equal(_marks(session), expected)
 
 
@@ -173,23 +175,23 @@ def test_any_sequence_is_a_rebuild_and_never_says_it_of_paint(done: Any):
         try:
             match what:
                 case "paint":
-                    _paint(session, stroke, region, _corner, done=is_done)
+                    _paint(session, stroke, region, _corner, is_final=is_done)
                 case "erase":
                     erase = lambda _, importance: importance.__imul__(0)  # noqa: E731
-                    _paint(session, stroke, region, erase, done=is_done)
+                    _paint(session, stroke, region, erase, is_final=is_done)
                 case "undo":
                     session.handle(protocol.Undo(), {})
                 case "redo":
                     session.handle(protocol.Redo(), {})
                 case "drop":
-                    session.handle(protocol.Drop(stroke), {})
+                    session.handle(protocol.DropStroke(stroke), {})
                 case "improve":
                     session.improve([basis], [basis.present_look])
                 case "set":
                     _set(session, target)
         except lp.LightpaintError:
             pass
-    session.handle(protocol.Drop(0), {})
+    session.handle(protocol.DropStroke(0), {})
     canvas, again = session.views[0], _session(basis, store).views[0]
     assert canvas.pixels(canvas.full_region).equals(again.pixels(again.full_region))
     _, importance, at_least = canvas.pixels(canvas.full_region)

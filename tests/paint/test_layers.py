@@ -234,7 +234,7 @@ def test_a_session_from_before_there_were_layers_is_one_layer(tmp_path: Path) ->
     session = session_on(MemoryStore(identity_of()))
     image = np.full((4, 6, 3), 0.7, np.float32)
     arrays = {"image": image, "importance": np.full((4, 6), 2, np.float32)}
-    session.handle(protocol.Paint(1, (2, 6, 3, 9), done=True), arrays)
+    session.handle(protocol.Paint(1, (2, 6, 3, 9), is_final=True), arrays)
     [step] = session.store.steps
     path = tmp_path / "session.db"
     with Store.open(path, identity_of()) as store:

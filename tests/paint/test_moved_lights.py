@@ -29,7 +29,7 @@ def test_a_moved_light_has_the_plane_of_its_place(moving: Moving) -> None:
     session = moving.studio.session
     before = {name: moving.plane(name) for name in session.basis.names}
     look = session.basis.present_look.copy()
-    moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}, done=False))
+    moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}, is_final=False))
     quick = moving.plane("bulb")
     moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}))
     moving.rendered()
@@ -73,7 +73,7 @@ def test_undo_looks_and_the_file_know_places(moving: Moving) -> None:
 
 def test_a_drag_that_is_given_up_moves_nothing(moving: Moving) -> None:
     before = moving.plane("bulb")
-    moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}, done=False))
+    moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}, is_final=False))
     assert not np.array_equal(moving.plane("bulb"), before)
     stroke(moving)
     assert np.array_equal(moving.plane("bulb"), before)
@@ -121,8 +121,8 @@ def test_the_rig_says_where_lights_hang_and_what_cannot_move(moving: Moving) -> 
     places = dict(zip(moving.studio.session.basis.names, rig.lights, strict=True))
     assert places["bulb"].position == pytest.approx((-0.5, 1, 0.5))
     assert math.dist(places["beam"].target, BALL) == pytest.approx(0.3, abs=0.01)
-    assert places["sky"].why_not
-    assert places["panel"].why_not
+    assert places["sky"].immovable_reason
+    assert places["panel"].immovable_reason
     assert rig.up == 1
     moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}))
     last = moving.wait(lambda: [m for m in moving.messages if m.kind == "rig"][1:])[-1]
@@ -132,7 +132,7 @@ def test_the_rig_says_where_lights_hang_and_what_cannot_move(moving: Moving) -> 
 def test_a_light_in_a_wall_is_told_of(moving: Moving) -> None:
     """It may be meant, as on the way through one; undo brings it back."""
     moving.send(protocol.MoveLights({"bulb": {"position": [0, 1, -1.5]}}))
-    warned = moving.wait(lambda: [m for m in moving.messages if m.kind == "say"])
+    warned = moving.wait(lambda: [m for m in moving.messages if m.kind == "notice"])
     assert warned[0].fields["text"].startswith("bulb lights nothing that is seen from there")
 
 
@@ -146,7 +146,7 @@ def pointed(moving: Moving, name: str, how: Any, at: Any, **more: Any) -> Any:
 
 def test_pages_see_points_where_the_camera_does(moving: Moving) -> None:
     [camera] = opened_rig(moving).cameras
-    axes = np.stack([camera.across, camera.down, camera.ahead], axis=1)
+    axes = np.stack([camera.x_axis, camera.y_axis, camera.forward], axis=1)
     for point in ((0.3, 0.3, 0.2), (-0.5, 1, 0.5), (0.1, 1.2, -0.9)):
         x, y, s = np.linalg.solve(axes, np.array(point) - camera.origin)
         assert s > 0
@@ -246,7 +246,7 @@ def test_what_cannot_be_placed_is_said(moving: Moving) -> None:
         moving.send(protocol.PlaceLights())
     stroke(moving)
     held = {name: {"lock": True} for name in ("bulb", "beam", "sun")}
-    moving.send(protocol.AskAll(held))
+    moving.send(protocol.ConstrainLights(held))
     with pytest.raises(LightpaintError, match="no light is free to move"):
         moving.send(protocol.PlaceLights())
 

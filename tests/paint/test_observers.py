@@ -91,9 +91,9 @@ def hear(socket: WebSocketTestSession) -> dict[str, Any]:
     return from_frame(socket.receive_bytes())[0]
 
 
-def paint(socket: WebSocketTestSession, seq: int, *, done: bool) -> None:
+def paint(socket: WebSocketTestSession, seq: int, *, is_final: bool) -> None:
     pixel = {"image": np.ones((1, 1, 3), np.float32), "importance": np.ones((1, 1), np.float32)}
-    say(socket, "paint", seq, stroke=1, region=[0, 1, 0, 1], done=done, **pixel)
+    say(socket, "paint", seq, stroke=1, region=[0, 1, 0, 1], is_final=is_final, **pixel)
 
 
 # Who is let in
@@ -162,7 +162,7 @@ def test_observers_hear_what_comes_of_painting_and_the_painter_keeps_the_session
         for program in (one, other):
             say(program, "observe", version=VERSION)
             assert hear(program)["kind"] == "state"
-        paint(page, 2, done=True)
+        paint(page, 2, is_final=True)
         assert hear(page)["reply"] == 2
         for program in (one, other):
             told = hear(program)
@@ -170,7 +170,7 @@ def test_observers_hear_what_comes_of_painting_and_the_painter_keeps_the_session
             assert "reply" not in told
         served.session.on_message(fake_progress("basis", 3))  # type: ignore[misc]
         assert [hear(x)["kind"] for x in (page, one, other)] == ["progress"] * 3
-        paint(page, 3, done=True)
+        paint(page, 3, is_final=True)
         assert hear(page)["reply"] == 3
 
 
@@ -180,13 +180,13 @@ def test_observers_hear_what_comes_of_painting_and_the_painter_keeps_the_session
         ("hello", {"version": VERSION}),
         ("take_over", {}),
         ("undo", {}),
-        ("ask", {"light": 0, "asked": {"off": True}}),
-        ("set", {"values": {"hold": 0}}),
+        ("constrain_light", {"light": 0, "constraints": {"off": True}}),
+        ("change_settings", {"settings": {"hold": 0}}),
         ("save_look", {"name": "mine"}),
         ("load_look", {"look": 1}),
         ("drop_look", {"look": 1}),
         ("verify", {}),
-        ("export", {"what": [], "run": False}),
+        ("export", {"outputs": [], "run": False}),
     ],
 )
 def test_an_observer_neither_paints_nor_takes_the_session(
@@ -201,10 +201,10 @@ def test_an_observer_neither_paints_nor_takes_the_session(
         told = hear(program)
         assert (told["kind"], told["reply"]) == ("failed", 5)
         assert told["text"].startswith("an observer may fetch, export and propose")
-        paint(program, 6, done=True)
+        paint(program, 6, is_final=True)
         assert hear(program)["kind"] == "failed"
         assert served.session.heard == []
-        paint(page, 2, done=True)
+        paint(page, 2, is_final=True)
         assert hear(page)["kind"] == "answer"
 
 
@@ -226,7 +226,7 @@ def messages_to_who_paints(served: Served, observers: int) -> list[tuple[str, An
                     say(program, kind, 10 + k, **fields.get(kind, {}))
 
         for seq in range(2, 10):
-            paint(page, seq, done=seq % 4 == 1)
+            paint(page, seq, is_final=seq % 4 == 1)
             received.append(hear(page))
             ask()
             served.session.on_message(fake_progress("basis", seq))  # type: ignore[misc]
@@ -289,7 +289,7 @@ def test_who_has_the_session_does_not_become_an_observer(served: Served) -> None
         hear(page)
         say(page, "observe", 2, version=VERSION)
         assert hear(page)["kind"] == "failed"
-        paint(page, 3, done=True)
+        paint(page, 3, is_final=True)
         assert hear(page)["kind"] == "answer"
 
 
@@ -312,11 +312,11 @@ def test_what_observers_ask_for_waits_while_a_brush_is_down(served: Served) -> N
         hear(page)
         say(program, "observe", version=VERSION)
         hear(program)
-        paint(page, 2, done=False)
+        paint(page, 2, is_final=False)
         hear(page)
         assert hear(program)["kind"] == "answer"
-        say(program, "export", 7, what=["lighting"])
-        paint(page, 3, done=True)
+        say(program, "export", 7, outputs=["lighting"])
+        paint(page, 3, is_final=True)
         assert hear(page)["reply"] == 3
         assert [hear(program).get("reply") for _ in range(2)] == [None, 7]
     kinds = [said.kind for said in served.session.heard]
@@ -328,7 +328,7 @@ def test_the_brush_of_who_leaves_is_down_no_more(served: Served) -> None:
         with served.page() as page:
             say(page, "hello", version=VERSION)
             hear(page)
-            paint(page, 2, done=False)
+            paint(page, 2, is_final=False)
             hear(page)
         say(program, "observe", version=VERSION)
         assert hear(program)["kind"] == "state"
@@ -368,7 +368,9 @@ def test_what_waits_for_a_slow_observer_is_replaced_and_nothing_asked_is_lost() 
     slow.is_observer = True
     line._clients.add(slow)
     history = HistoryInfo(("stroke",), (), 1)
-    line._send_to_observers(fake_answer(version=0, history=history, asked={"lamp": {"off": True}}))
+    line._send_to_observers(
+        fake_answer(version=0, history=history, constraints={"lamp": {"off": True}})
+    )
     for k in range(1, 2000):
         line._send_to_observers(fake_answer(version=k))
         line._send_to_observers(fake_progress("basis", k))
@@ -377,7 +379,7 @@ def test_what_waits_for_a_slow_observer_is_replaced_and_nothing_asked_is_lost() 
     unsent = [message.fields for message, _ in slow._unsent]
     assert [one.get("version") for one in unsent] == [1999, None, VERSION, None]
     assert unsent[0]["history"]["count"] == 1
-    assert unsent[0]["asked"] == {"lamp": {"off": True}}
+    assert unsent[0]["constraints"] == {"lamp": {"off": True}}
 
 
 def test_of_what_a_canvas_holds_observers_get_the_lighting() -> None:

@@ -21,10 +21,10 @@ from lightpaint.paint.protocol import (
     EVENTS,
     REQUESTS,
     VERSION,
+    ChangeSettings,
     Findings,
     LightAnswer,
     Paint,
-    Set,
     TakeOver,
     TieLights,
     document,
@@ -55,10 +55,10 @@ FINITE = arrays.arrays(
 
 @given(FIELDS, ARRAYS, st.none() | st.integers(0, 2**53))
 def test_what_a_session_says_arrives(fields: Any, given_arrays: Any, reply: int | None) -> None:
-    message = RawMessage("say", fields, given_arrays)
+    message = RawMessage("notice", fields, given_arrays)
     frame = to_frame(message.content(reply), message.buffers())
     content, buffers = from_frame(frame)
-    assert content.pop("kind") == "say"
+    assert content.pop("kind") == "notice"
     assert content.pop("reply", None) == reply
     described = content.pop("buffers")
     assert content == json.loads(json.dumps(_finite(fields)))
@@ -80,12 +80,12 @@ def _finite(value: Any) -> Any:
 
 
 @given(st.integers(0, 2**53 - 1), FINITE, st.integers(0, 100), st.booleans())
-def test_paint_arrives_to_the_last_bit(seq: int, image: Any, stroke: int, done: bool) -> None:
-    fields = {"seq": seq, "stroke": stroke, "region": [1, 3, 0, 3], "done": done}
+def test_paint_arrives_to_the_last_bit(seq: int, image: Any, stroke: int, is_final: bool) -> None:
+    fields = {"seq": seq, "stroke": stroke, "region": [1, 3, 0, 3], "is_final": is_final}
     message = RawMessage("paint", fields, {"image": image, "importance": image[..., 0]})
     number, said, got = parse_request(*from_frame(to_frame(message.content(), message.buffers())))
     assert number == seq
-    assert said == Paint(stroke, (1, 3, 0, 3), done)
+    assert said == Paint(stroke, (1, 3, 0, 3), is_final)
     assert got["image"].tobytes() == image.tobytes()
     assert not got["importance"].flags.writeable
 
@@ -95,9 +95,9 @@ def test_what_is_said_is_read_as_it_is_meant() -> None:
         ("take_over", {}, TakeOver()),
         ("tie", {"ties": [["a", "b"], []]}, TieLights((("a", "b"), ()))),
         (
-            "set",
-            {"values": {"hold": None, "space": "display"}},
-            Set({"hold": None, "space": "display"}),
+            "change_settings",
+            {"settings": {"hold": None, "space": "display"}},
+            ChangeSettings({"hold": None, "space": "display"}),
         ),
     ):
         assert parse_request({"kind": kind, "seq": 0, **fields}, [])[1] == meant
@@ -140,9 +140,9 @@ def test_any_json_is_refused_or_read(content: Any) -> None:
             "stroke": PLAIN,
             "region": st.lists(st.integers(-1, 5), max_size=5) | PLAIN,
             "version": PLAIN,
-            "values": PLAIN,
+            "settings": PLAIN,
             "ties": PLAIN,
-            "what": PLAIN,
+            "outputs": PLAIN,
         },
     ),
     st.binary(max_size=64),

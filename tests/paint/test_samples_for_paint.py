@@ -77,7 +77,7 @@ def test_paint_is_answered_as_surely_as_was_asked_for(subject: Subject):
         # Pages hear of it, and of its end.
         def shares() -> list[float]:
             reports = [x for x in heard if isinstance(x, protocol.ProgressReport)]
-            return [x.done / x.total for x in reports if x.what == SAMPLING]
+            return [x.done / x.total for x in reports if x.task == SAMPLING]
 
         assert 0 < shares()[0] < 1
         wait(lambda: shares()[-1] == 1)

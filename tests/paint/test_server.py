@@ -362,7 +362,7 @@ def test_each_message_is_answered_by_its_number(served: Served) -> None:
         np.testing.assert_array_equal(np.frombuffer(weights, "<f8"), np.full(6, 3.0))
         socket.send_bytes(frame("undo", 9))
         assert heard(socket) == {"kind": "done", "reply": 9, "buffers": []}
-        assert heard(socket) == {"kind": "say", "text": "said", "tone": "info", "buffers": []}
+        assert heard(socket) == {"kind": "notice", "text": "said", "tone": "info", "buffers": []}
         socket.send_bytes(paint(10, label="nothing"))
         assert heard(socket)["reply"] == 10
     assert len(served.session.threads) == 1
@@ -405,7 +405,7 @@ SHORT = to_frame(
         (frame("undo", -1), None),
         (frame("paint", 5, NAN, stroke=1, region=[0, 1, 0, 1]), 5),
         (frame("paint", 5, stroke=1, region=[0, 1]), 5),
-        (frame("ask", 5, light="0", asked={}), 5),
+        (frame("constrain_light", 5, light="0", constraints={}), 5),
         (paint(5, stroke=2**53), 5),  # from which on a page cannot count
         (SHORT, None),
     ],
@@ -452,7 +452,7 @@ def test_live_paint_that_newer_covers_is_answered_and_not_done(served: Served) -
             paint(2, region=(0, 2, 0, 2)),
             paint(3, region=(0, 1, 0, 1)),  # does not cover the one before
             paint(4, region=(0, 2, 0, 2)),
-            paint(5, region=(0, 2, 0, 2), done=True),
+            paint(5, region=(0, 2, 0, 2), is_final=True),
             paint(6, region=(0, 2, 0, 2)),  # the one before is done
             paint(7, stroke=2, region=(0, 2, 0, 2)),
         ):
@@ -465,7 +465,7 @@ def test_live_paint_that_newer_covers_is_answered_and_not_done(served: Served) -
     strokes = [said.stroke for said in served.session.heard]
     assert strokes[0] == 1
     assert strokes[-1] == 2
-    assert sum(said.done for said in served.session.heard) == 1
+    assert sum(said.is_final for said in served.session.heard) == 1
     assert len(strokes) <= 7
 
 
@@ -567,10 +567,10 @@ def test_what_a_page_says_last_is_done_though_it_has_gone() -> None:
     async def trial() -> None:
         its = Connections(session, None)
         its.attach()
-        strokes = [paint(k, stroke=k, done=True) for k in (1, 2, 3)]
+        strokes = [paint(k, stroke=k, is_final=True) for k in (1, 2, 3)]
         page = asyncio.ensure_future(its.serve(client.Client(Scripted(HELLO, *strokes), "a")))
         await asyncio.sleep(0.03)  # it has left, and is not done with
-        after = Scripted(HELLO, paint(4, stroke=4, done=True), leaves=False)
+        after = Scripted(HELLO, paint(4, stroke=4, is_final=True), leaves=False)
         other = asyncio.ensure_future(its.serve(client.Client(after, "b")))
         await page
         while len(after.sent) < 2:  # what is done may not have been sent yet
@@ -603,7 +603,9 @@ def test_what_was_said_before_the_end_is_done() -> None:
     async def trial() -> None:
         its = Connections(session, None)
         its.attach()
-        socket = Scripted(HELLO, *(paint(k, stroke=k, done=True) for k in (1, 2, 3)), leaves=False)
+        socket = Scripted(
+            HELLO, *(paint(k, stroke=k, is_final=True) for k in (1, 2, 3)), leaves=False
+        )
         serving = asyncio.ensure_future(its.serve(client.Client(socket, "a")))
         while not strokes_of(session):
             await asyncio.sleep(0.001)
@@ -721,7 +723,7 @@ def test_a_page_that_asks_and_does_not_listen_is_answered_no_further(
 def test_what_a_page_has_said_at_length_is_answered_before_it_says_more(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    frames = [paint(k, stroke=k, done=True) for k in range(1, 20)]
+    frames = [paint(k, stroke=k, is_final=True) for k in range(1, 20)]
     monkeypatch.setattr(client, "MAX_QUEUED_BYTES", 3 * len(frames[0]))
 
     async def trial() -> None:
@@ -747,14 +749,14 @@ def test_two_pages_that_fight_over_the_session_harm_nobody(served: Served) -> No
         for turn in range(40):
             page, loser = pages[turn % 2], pages[1 - turn % 2]
             page.send_bytes(frame("take_over", 2 * turn))
-            page.send_bytes(paint(2 * turn + 1, stroke=turn, done=True))
+            page.send_bytes(paint(2 * turn + 1, stroke=turn, is_final=True))
             kinds = list[str]()
             while kinds[-1:] != ["answer"]:
                 told = heard(page)
                 kinds.append(told["kind"])
                 assert told["kind"] in ("state", "answer", "closed")
                 assert told["kind"] != "closed" or "reply" not in told
-            loser.send_bytes(paint(10_000 + turn, stroke=turn, done=True))
+            loser.send_bytes(paint(10_000 + turn, stroke=turn, is_final=True))
             while (told := heard(loser)).get("reply") != 10_000 + turn:
                 assert told["kind"] == "closed"
             assert told["reason"] == "taken"
@@ -780,5 +782,5 @@ def test_without_its_libraries_the_line_to_run_is_said(monkeypatch: pytest.Monke
 
 def test_names_from_files_are_text() -> None:
     name = "</script><b>\u202e\ud800"
-    text = to_frame({"kind": "say", "text": name}, [])
+    text = to_frame({"kind": "notice", "text": name}, [])
     assert json.loads(text[4:].rstrip(b"\0"))["text"].startswith("</script><b>")

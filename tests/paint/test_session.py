@@ -94,14 +94,14 @@ def paint(
     region: tuple[int, int, int, int],
     light: float,
     *,
-    done: bool = True,
+    is_final: bool = True,
     view: int = 0,
 ) -> tuple[protocol.Paint, dict[str, Any]]:
     """A message as the page sends it."""
     top, bottom, left, right = region
     shape = bottom - top, right - left
     image = np.full((*shape, 3), light, np.float32)
-    return protocol.Paint(stroke, region, done, view=view), {
+    return protocol.Paint(stroke, region, is_final, view=view), {
         "image": image,
         "importance": np.ones(shape, np.float32),
     }
@@ -110,7 +110,7 @@ def paint(
 def test_an_answer_is_that_of_solve(basis: lp.Basis):
     session = session_of(basis)
     session.handle(*paint(1, (2, 9, 3, 12), 0.9))
-    session.handle(protocol.Ask(2, {"lock": "80%"}), {})
+    session.handle(protocol.ConstrainLight(2, {"lock": "80%"}), {})
     snapshot = session.snapshot()
     solution = snapshot.solution()
     assert solution is not None
@@ -132,7 +132,7 @@ def test_under_the_brush_it_is_near_the_exact_answer(basis: lp.Basis, space: Any
     session = session_of(basis, space=space)
     answer = None
     for k in range(6):
-        [answer] = session.handle(*paint(1, (2, 9, 3, 4 + 2 * k), 0.7, done=k == 5))
+        [answer] = session.handle(*paint(1, (2, 9, 3, 4 + 2 * k), 0.7, is_final=k == 5))
     assert answer is not None
     assert not answer.fields["exact"]
     solution = session.snapshot().solution()
@@ -153,17 +153,17 @@ def test_what_is_asked_is_kept_to_at_once(basis: lp.Basis, space: Any):
     for share in rng.uniform(0, 0.9, 8):
         # A slider that moves, and two lights that the painting wants brighter.
         before = session.weights[:, 1]
-        session.handle(protocol.Ask(0, {"lock": [share] * 3}, done=False), {})
+        session.handle(protocol.ConstrainLight(0, {"lock": [share] * 3}, is_final=False), {})
         np.testing.assert_array_equal(session.weights[0], share)
-        session.handle(protocol.Ask(1, {"limits": {"max": share * before[1]}}), {})
+        session.handle(protocol.ConstrainLight(1, {"limits": {"max": share * before[1]}}), {})
         assert session.weights[1] @ LUMINANCE <= share * before[1] * (1 + 1e-12)
-        session.handle(protocol.Ask(2, {"color": "3200K"}), {})
+        session.handle(protocol.ConstrainLight(2, {"color": "3200K"}), {})
         colour = session.weights[2] / (session.weights[2] @ LUMINANCE)
         np.testing.assert_allclose(colour, kelvin_to_rgb(3200), rtol=1e-9)
-        session.handle(protocol.Ask(2, {"off": True}), {})
+        session.handle(protocol.ConstrainLight(2, {"off": True}), {})
         assert not session.weights[2].any()
         for light in (1, 2):
-            session.handle(protocol.Ask(light, {}), {})
+            session.handle(protocol.ConstrainLight(light, {}), {})
 
 
 @pytest.mark.parametrize("space", ["linear", "display"])
@@ -180,7 +180,7 @@ def test_several_views_have_one_answer_that_of_solve(space: Any):
     np.testing.assert_array_equal(alone.weights, expected.weights)
     answer = None
     for k in range(4):
-        [answer] = session.handle(*paint(2, (1, 6, 2, 4 + 2 * k), 0.3, done=k == 3, view=1))
+        [answer] = session.handle(*paint(2, (1, 6, 2, 4 + 2 * k), 0.3, is_final=k == 3, view=1))
     assert answer is not None
     snapshot = session.snapshot()
     solution = snapshot.solution()
@@ -224,7 +224,7 @@ def test_undo_goes_through_views_in_order():
 def test_nothing_painted_leaves_lights_as_they_are(basis: lp.Basis):
     session = session_of(basis)
     np.testing.assert_allclose(session.weights, basis.present_weights)
-    [answer] = session.handle(protocol.Ask(0, {"lock": 2.0}), {})
+    [answer] = session.handle(protocol.ConstrainLight(0, {"lock": 2.0}), {})
     weights = answer.arrays["weights"]
     np.testing.assert_allclose(weights[0], [2.0, 2.0, 2.0])
     np.testing.assert_allclose(weights[1:], basis.present_weights[1:])
@@ -262,12 +262,14 @@ def test_any_sequence_equals_a_rebuild(actions: list[Any]):
             match what:
                 case "paint":
                     stroke += 1
-                    message, arrays = paint(stroke, its[0], its[1], done=its[2], view=its[3])
+                    message, arrays = paint(stroke, its[0], its[1], is_final=its[2], view=its[3])
                     session.handle(message, arrays)
                 case "ask":
-                    session.handle(protocol.Ask(its[0], its[1]), {})
+                    session.handle(protocol.ConstrainLight(its[0], its[1]), {})
                 case "slide":
-                    session.handle(protocol.Ask(its[0], {"lock": its[1]}, done=its[2]), {})
+                    session.handle(
+                        protocol.ConstrainLight(its[0], {"lock": its[1]}, is_final=its[2]), {}
+                    )
                 case "load":
                     pixels = Pixels(np.full((*SIZE, 3), its[0]), np.ones(SIZE))
                     session.load(
@@ -276,16 +278,16 @@ def test_any_sequence_equals_a_rebuild(actions: list[Any]):
                 case "leave":
                     session.client_left(with_stroke=its[0])
                 case "set":
-                    session.handle(protocol.Set({"colors": its[0]}), {})
+                    session.handle(protocol.ChangeSettings({"colors": its[0]}), {})
                 case "undo":
                     session.handle(protocol.Undo(), {})
                 case "redo":
                     session.handle(protocol.Redo(), {})
                 case "drop":
-                    session.handle(protocol.Drop(stroke), {})
+                    session.handle(protocol.DropStroke(stroke), {})
         except lp.LightpaintError:
             pass
-    session.handle(protocol.Drop(stroke), {})
+    session.handle(protocol.DropStroke(stroke), {})
     again = several(bases, store)
     for one, other, basis in zip(session.views, again.views, bases, strict=True):
         np.testing.assert_array_equal(one.image, other.image)
@@ -313,12 +315,12 @@ def test_any_sequence_equals_a_rebuild(actions: list[Any]):
         (paint(1, (0, 9, 0, 4), 1)[0], paint(1, (0, 9, 0, 5), 1)[1], "paint of"),
         (*paint(1, (0, 9, 0, 4), -1), "light beyond"),
         (*paint(1, (0, 9, 0, 4), float("nan")), "NaN"),
-        (protocol.Ask(7, {}), {}, "no light 7"),
-        (protocol.Ask(0, {"lok": True}), {}, "lok"),
-        (protocol.Ask(0, {"limits": {"min": 3, "max": 1}}), {}, "above its max"),
+        (protocol.ConstrainLight(7, {}), {}, "no light 7"),
+        (protocol.ConstrainLight(0, {"lok": True}), {}, "lok"),
+        (protocol.ConstrainLight(0, {"limits": {"min": 3, "max": 1}}), {}, "above its max"),
         (protocol.TieLights((("lamp 0", "nobody"),)), {}, "nobody"),
-        (protocol.Set({"hold": "much"}), {}, "hold"),
-        (protocol.Set({"fast": True}), {}, "fast"),
+        (protocol.ChangeSettings({"hold": "much"}), {}, "hold"),
+        (protocol.ChangeSettings({"fast": True}), {}, "fast"),
         (protocol.Undo(), {}, "nothing to undo"),
     ],
 )
@@ -334,15 +336,15 @@ def test_what_cannot_be_is_said_and_changes_nothing(
     session.handle(*paint(1, (2, 9, 3, 12), 0.9))
 
 
-SLIDING = protocol.Ask(0, {"lock": [2.0, 2.0, 2.0]}, done=False)
+SLIDING = protocol.ConstrainLight(0, {"lock": [2.0, 2.0, 2.0]}, is_final=False)
 OTHERS: list[tuple[str, Callable[[Session], object]]] = [
-    ("set", lambda session: session.handle(protocol.Set({"colors": "free"}), {})),
+    ("set", lambda session: session.handle(protocol.ChangeSettings({"colors": "free"}), {})),
     ("tie", lambda session: session.handle(protocol.TieLights((("lamp 0", "lamp 1"),)), {})),
     ("load", lambda session: session.load({}, SessionRequests({"lamp 1": {"off": True}}), "look")),
     ("undo", lambda session: session.handle(protocol.Undo(), {})),
     (
         "refused",
-        lambda session: session.handle(protocol.Ask(0, {"limits": {"min": -1}}), {}),
+        lambda session: session.handle(protocol.ConstrainLight(0, {"limits": {"min": -1}}), {}),
     ),
     ("paint", lambda session: session.handle(*paint(1, (2, 9, 3, 12), 0.8))),
 ]
@@ -371,14 +373,16 @@ def test_a_slider_that_is_being_moved_is_in_nothing_else(
 def test_several_lights_are_asked_in_one_step(basis: lp.Basis):
     session = session_of(basis)
     for light in (0, 1):
-        session.handle(protocol.Ask(light, {"lock": True}), {})
+        session.handle(protocol.ConstrainLight(light, {"lock": True}), {})
     held = session.requests
-    session.handle(protocol.AskAll({"lamp 0": {}, "lamp 1": {"limits": {"max": "150%"}}}), {})
+    session.handle(
+        protocol.ConstrainLights({"lamp 0": {}, "lamp 1": {"limits": {"max": "150%"}}}), {}
+    )
     assert session.requests.lights == {"lamp 1": {"limits": {"max": "150%"}}}
     session.handle(protocol.Undo(), {})
     assert session.requests == held
     with pytest.raises(lp.LightpaintError, match="nobody"):
-        session.handle(protocol.AskAll({"nobody": {}}), {})
+        session.handle(protocol.ConstrainLights({"nobody": {}}), {})
     assert session.requests == held
 
 
@@ -388,12 +392,12 @@ def test_a_hand_on_one_of_tied_lights_moves_all_of_them(basis: lp.Basis, space: 
     session = session_of(basis, space=space)
     zero, one = (np.array(light.emission) for light in basis.lights[:2])
     session.handle(*paint(1, (2, 9, 3, 12), 0.9))
-    ask, tie = protocol.Ask, protocol.TieLights((("lamp 0", "lamp 1"),))
+    ask, tie = protocol.ConstrainLight, protocol.TieLights((("lamp 0", "lamp 1"),))
     session.handle(ask(1, {"lock": (3 * one).tolist()}), {})
     session.handle(ask(0, {"off": True}), {})
     session.handle(tie, {})  # of both the first stands
     assert not session.weights[:2].any()
-    session.handle(ask(0, {"lock": (2 * zero).tolist()}, done=False), {})
+    session.handle(ask(0, {"lock": (2 * zero).tolist()}, is_final=False), {})
     np.testing.assert_allclose(session.weights[:2], [2 * zero, 2 * one], rtol=1e-9)
     session.handle(ask(0, {"lock": (2 * zero).tolist()}), {})
     session.handle(ask(1, {"lock": (4 * one).tolist()}), {})
@@ -409,14 +413,14 @@ def test_a_hand_on_one_of_tied_lights_moves_all_of_them(basis: lp.Basis, space: 
 
 def test_what_is_held_is_let_go_of_by_zero(basis: lp.Basis):
     session = session_of(basis)
-    usual = session.edit_state["resolved"].hold
+    usual = session.edit_state["effective_settings"].hold
     assert usual > 0
-    session.handle(protocol.Set({"hold": 0}), {})
-    assert session.edit_state["resolved"].hold == session.snapshot().settings.hold == 0
+    session.handle(protocol.ChangeSettings({"hold": 0}), {})
+    assert session.edit_state["effective_settings"].hold == session.snapshot().settings.hold == 0
     assert options_of(session.requests) == ["--hold 0"]
     assert session.edit_state["history"].undo == ("Unpainted parts",)
-    session.handle(protocol.Set({"hold": None}), {})
-    assert session.edit_state["resolved"].hold == usual
+    session.handle(protocol.ChangeSettings({"hold": None}), {})
+    assert session.edit_state["effective_settings"].hold == usual
     session.handle(protocol.Undo(), {})
     assert session.edit_state["settings"] == {"hold": 0}
 
@@ -430,13 +434,13 @@ def test_a_setting_is_undone_by_the_name_that_the_page_has_for_it():
 
 def test_who_leaves_in_the_middle_leaves_a_stroke_and_no_slider(basis: lp.Basis):
     session = session_of(basis)
-    session.handle(*paint(1, (2, 9, 3, 12), 0.8, done=False))
+    session.handle(*paint(1, (2, 9, 3, 12), 0.8, is_final=False))
     session.client_left(with_stroke=False)  # the same page will send it again
     assert session.is_open
     session.handle(*paint(1, (2, 9, 3, 12), 0.8))
     assert len(session.store.steps) == 1
-    session.handle(protocol.Ask(0, {"lock": True}, done=False), {})
-    session.handle(*paint(2, (9, 12, 3, 12), 0.8, done=False))
+    session.handle(protocol.ConstrainLight(0, {"lock": True}, is_final=False), {})
+    session.handle(*paint(2, (9, 12, 3, 12), 0.8, is_final=False))
     session.client_left(with_stroke=True)
     assert not session.is_open
     assert not session.requests.lights

@@ -673,8 +673,8 @@ def test_room_of_what_was_cut_off_is_used_again(tmp_path: Path) -> None:
 def test_what_nobody_should_keep_is_refused_before_anything_changes() -> None:
     with MemoryStore(IDENTITY) as store:
         for wrong in (
-            Step("asked", "", {"x": float("nan")}),
-            Step("asked", "", {"x": object()}),
+            Step("requests", "", {"x": float("nan")}),
+            Step("requests", "", {"x": object()}),
             Step(
                 "stroke", "", {}, (replace(patch(np.random.default_rng(0)), region=(0, 1, 0, 1)),)
             ),

@@ -110,8 +110,8 @@ def heard(basis: lp.Basis, tmp_path: Path) -> Iterator[IncomingMessage]:
 
 def test_what_is_exported_is_solved_alike(heard: IncomingMessage, basis: lp.Basis, tmp_path: Path):
     heard.paint(1, 0.8)
-    heard.studio.handle(protocol.Ask(1, {"limits": {"min": 0.1, "max": 0.45}}), {})
-    heard.studio.handle(protocol.Set({"colors": "free"}), {})
+    heard.studio.handle(protocol.ConstrainLight(1, {"limits": {"min": 0.1, "max": 0.45}}), {})
+    heard.studio.handle(protocol.ChangeSettings({"colors": "free"}), {})
     exact = heard.exact()
     heard.studio.handle(protocol.Export(("target", "picture", "lighting")), {})
     exported = heard.wait(lambda m: m.kind == "exported")
@@ -148,8 +148,8 @@ def test_what_is_not_of_a_painting_is_exported_without_one(heard: IncomingMessag
     files = [str(tmp_path / "answer.png"), str(tmp_path / "lighting.json")]
     assert exported == {"files": files, "command": "", "is_unpainted": True}
     heard.studio.handle(protocol.Export(("target",)), {})
-    said = heard.wait(lambda m: m.kind == "say" and "nothing is painted" in m.fields["text"])
-    assert said.fields["what"] == "export"
+    said = heard.wait(lambda m: m.kind == "notice" and "nothing is painted" in m.fields["text"])
+    assert said.fields["task"] == "export"
 
 
 def test_a_stroke_whose_end_was_never_heard_is_kept_at_the_end(
@@ -438,7 +438,7 @@ def test_what_lies_between_two_looks_is_kept(heard: IncomingMessage):
 def test_what_was_done_is_there_again(heard: IncomingMessage, basis: lp.Basis, tmp_path: Path):
     heard.paint(1, 0.8)
     heard.paint(2, 0.3, (0, 6, 10, 30))
-    heard.studio.handle(protocol.Ask(0, {"lock": True}), {})
+    heard.studio.handle(protocol.ConstrainLight(0, {"lock": True}), {})
     heard.studio.handle(protocol.SaveLook("a"), {})
     session = heard.studio.session
     heard.studio.close()
@@ -463,7 +463,7 @@ def test_a_full_disk_is_said_to_pages_and_to_the_terminal(
         yield
 
     def said(message: Message) -> bool:
-        return message.kind == "say"
+        return message.kind == "notice"
 
     at_terminal: list[str] = []
     heard.studio.on_unsaved = at_terminal.append
@@ -525,7 +525,7 @@ def test_a_preview_shows_what_the_change_does_then(
         np.testing.assert_array_equal(studio.session.weights, before)
         assert not seen.fields["is_old"]
         assert "of the difference" in seen.fields["text"] or "no closer" in seen.fields["text"]
-        studio.handle(protocol.Set(values), {})
+        studio.handle(protocol.ChangeSettings(values), {})
         heard.exact()
         mixed = studio.session.views[0].basis.mix(studio.session.weights)
         shown = picture_table.display_thumbnail(mixed, studio.session.transform)
@@ -549,13 +549,13 @@ def test_letting_go_gradually_is_judged_on_the_whole_picture(heard: IncomingMess
         heard.wait(lambda m: m.kind == "previewed" and m.fields["number"] == 1)
         for _ in heard.studio.handle(protocol.Preview(1, {"hold": advised["hold"]}), {})
     ]
-    share = round(100 * advised["closes"])
+    share = round(100 * advised["gain"])
     told = re.match(r"Removes (\d+) % of the difference", found.fields["text"])
     assert told is not None
     assert int(told[1]) == share
     changed = []
     for hold in (advised["hold"], 0.0):
-        heard.studio.handle(protocol.Set({"hold": hold}), {})
+        heard.studio.handle(protocol.ChangeSettings({"hold": hold}), {})
         heard.exact()
         session = heard.studio.session
         view = session.views[0]
@@ -608,15 +608,15 @@ def with_scenes(
 
 def is_stopped(message: Message) -> bool:
     """Whether it says that a render has been stopped."""
-    return message.kind == "stopped" and message.fields["what"] == "verify"
+    return message.kind == "stopped" and message.fields["task"] == "verify"
 
 
 def test_a_verifying_render_can_be_stopped(with_scenes: tuple[IncomingMessage, Renders]):
     heard, renders = with_scenes
     heard.studio.handle(protocol.Verify(), {})
-    heard.wait(lambda m: m.kind == "progress" and m.fields["what"] == "verify")
+    heard.wait(lambda m: m.kind == "progress" and m.fields["task"] == "verify")
     [told] = heard.studio.handle(protocol.Verify(run=False), {})
-    assert (told.kind, told.fields["what"]) == ("started", "stop")
+    assert (told.kind, told.fields["task"]) == ("started", "stop")
     heard.wait(is_stopped)
     assert renders.at_work == 0
     # And there can be another.
@@ -626,9 +626,9 @@ def test_a_verifying_render_can_be_stopped(with_scenes: tuple[IncomingMessage, R
     assert heard.studio.resource("verified@1").shape == (*SIZE, 3)
     # A page that begins anew is told of it, and whether the answer is another one since.
     about = {"agrees": True, "text": "A render confirms it.", "view": 1}
-    assert heard.studio.state().fields["verified"] == [about | {"is_old": False}]
+    assert heard.studio.state().fields["verifications"] == [about | {"is_old": False}]
     heard.paint(1, 0.8)
-    assert heard.studio.state().fields["verified"] == [about | {"is_old": True}]
+    assert heard.studio.state().fields["verifications"] == [about | {"is_old": True}]
 
 
 def test_a_render_that_is_stopped_before_it_begins_does_not_begin(
@@ -717,11 +717,11 @@ def test_several_views_are_painted_kept_and_exported(both: list[lp.Basis], tmp_p
     assert [view["size"] for view in state["views"]] == [list(basis.size) for basis in both]
     assert studio.resource("plane/2@1").shape == (10, 16, 3)
     heard.paint(1, 0.8)
-    assert heard.exact().fields["of_views"][0]["delta_e"] >= 0
+    assert heard.exact().fields["closeness"][0]["delta_e"] >= 0
     heard.paint(2, 0.1, (1, 6, 2, 9), view=1)
     exact = heard.exact()
-    assert [one["delta_e"] >= 0 for one in exact.fields["of_views"]] == [True, True]
-    assert exact.fields["delta_e"] == max(one["delta_e"] for one in exact.fields["of_views"])
+    assert [one["delta_e"] >= 0 for one in exact.fields["closeness"]] == [True, True]
+    assert exact.fields["delta_e"] == max(one["delta_e"] for one in exact.fields["closeness"])
     for shares in exact.fields["shares"]:
         assert sum(shares) == pytest.approx(1)
     [looks] = studio.handle(protocol.SaveLook("two"), {})
@@ -746,8 +746,8 @@ def test_several_views_are_painted_kept_and_exported(both: list[lp.Basis], tmp_p
     solution = correct_noise(lp.solve(both, [lp.read_target(file) for file in files]))
     np.testing.assert_allclose(solution.weights, exact.arrays["weights"], rtol=1e-9)
     studio.handle(protocol.Export(("report",)), {})
-    said = heard.wait(lambda m: m.kind == "say" and "needs their scene" in m.fields["text"])
-    assert said.fields["what"] == "export"
+    said = heard.wait(lambda m: m.kind == "notice" and "needs their scene" in m.fields["text"])
+    assert said.fields["task"] == "export"
     with pytest.raises(lp.LightpaintError, match="no view 2"):
         studio.handle(protocol.Explain(2), {})
     studio.close()
@@ -801,9 +801,9 @@ def test_a_render_that_comes_after_another_stroke_is_of_an_earlier_answer(
     heard.paint(1, 0.8)
     heard.exact()
     heard.studio.handle(protocol.Verify(), {})
-    heard.wait(lambda m: m.kind == "progress" and m.fields["what"] == "verify")
+    heard.wait(lambda m: m.kind == "progress" and m.fields["task"] == "verify")
     heard.paint(2, 0.3)
     renders.is_enough.set()
     assert heard.wait(lambda m: m.kind == "verified").fields["is_old"] is True
-    [said] = heard.studio.state().fields["verified"]
+    [said] = heard.studio.state().fields["verifications"]
     assert said["is_old"] is True

@@ -109,11 +109,11 @@ def test_what_a_sentence_advises_is_said_as_data(about: Any, helps: str | None):
 def test_a_button_says_what_it_lets_go_and_what_that_brings():
     appearance = replace(Appearance(10.0, 0.0, 20.0, PLACE), reasons=(OFF, HOLD))
     assert ": annex_window is switched off." in sketch_headline(appearance)
-    fields = Advice("off", ("annex_window",), closes=0.57, hold=None)
+    fields = Advice("off", ("annex_window",), gain=0.57, hold=None)
     assert advice(appearance) == fields
     weaker = Loosening(0.8, 0.35, UnpaintedChange(2.0, 12.0, "annex"))
     held = replace(appearance, reasons=(replace(HOLD, loosening=weaker),))
-    assert advice(held) == Advice("hold", (), closes=0.35, hold=0.8)
+    assert advice(held) == Advice("hold", (), gain=0.35, hold=0.8)
     assert spoken_cause(held.reasons[0]) == (
         "A weaker hold on unpainted parts (a hold of 0.8) would remove 35 % of the difference, and "
         "change the annex by ΔE 12."
@@ -122,7 +122,7 @@ def test_a_button_says_what_it_lets_go_and_what_that_brings():
     joint = replace(appearance, reasons=(replace(OFF, is_joint=True), replace(HOLD, is_joint=True)))
     told = advice(joint)
     assert told is not None
-    assert told.closes is None
+    assert told.gain is None
 
 
 def test_a_preview_says_what_it_brings_and_what_it_costs():

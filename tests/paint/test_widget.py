@@ -119,7 +119,7 @@ class Page:
         """Over everything."""
         arrays = {"image": np.float32(image), "importance": np.ones(SIZE, np.float32)}
         region = [0, SIZE[0], 0, SIZE[1]]
-        return self.say("paint", arrays, stroke=stroke, region=region, done=True)
+        return self.say("paint", arrays, stroke=stroke, region=region, is_final=True)
 
 
 def _arrays(content: Any, buffers: Any) -> dict[str, Any]:
@@ -191,7 +191,7 @@ def test_what_is_set_from_a_cell_shows(basis: lp.Basis, open_: Any, tmp_path: Pa
     assert painter.lighting.emission == held.emission
     assert painter.solution.lighting.emission == held.emission
     state = page.say("hello", version=protocol.VERSION)
-    assert state["asked"]["fill"] == {"lock": [0.25, 0.25, 0.25]}
+    assert state["constraints"]["fill"] == {"lock": [0.25, 0.25, 0.25]}
     painter.save(tmp_path / "evening.json")
     assert lp.read_lighting(tmp_path / "evening.json").emission == held.emission
     painter.save(tmp_path / "evening.exr")
@@ -543,7 +543,7 @@ def test_what_cannot_be_set_later_ends_no_render(
     text = "painter.target was not set: no room for it"
     assert "PaintError: no room for it" in capsys.readouterr().err
     assert text in wait_for(
-        lambda: [x["text"] for x, _ in painter.comm.messages if x["kind"] == "say"]
+        lambda: [x["text"] for x, _ in painter.comm.messages if x["kind"] == "notice"]
     )
     assert painter.target is None
     painter.target = whole
@@ -568,7 +568,7 @@ def test_a_callback_that_fails_is_shown(basis: lp.Basis, open_: Any, capsys: Any
     page.say("hello", version=protocol.VERSION)
     painter.observe(lambda _: 1 / 0, "target")
     assert page.paint(basis.images[0])["kind"] == "answer"
-    said = wait_for(lambda: [x["text"] for x, _ in page.heard() if x["kind"] == "say"])
+    said = wait_for(lambda: [x["text"] for x, _ in page.heard() if x["kind"] == "notice"])
     assert "callback of painter.target failed: ZeroDivisionError" in said[0]
     assert "ZeroDivisionError" in capsys.readouterr().err
     # And it goes on.
@@ -621,7 +621,7 @@ def test_what_a_callback_cannot_set_is_shown(basis: lp.Basis, open_: Any, capsys
     painter.observe(lambda _: setattr(painter, "constraints", fill), "targets")
     painter.observe(lambda _: setattr(painter, "constraints", key), "lighting")
     painter.target = lp.Target.of(basis.images[0])
-    said = [x["text"] for x, _ in page.heard() if x["kind"] == "say"]
+    said = [x["text"] for x, _ in page.heard() if x["kind"] == "notice"]
     assert any("painter.constraints is a lp.Constraints or None, not int" in x for x in said)
     assert any("no light 'lamp'" in x for x in said)
     assert "no light 'lamp'" in capsys.readouterr().err
@@ -639,7 +639,7 @@ def test_callbacks_that_never_come_to_an_end_are_stopped(basis: lp.Basis, open_:
 
     painter.observe(again, "lighting")
     painter.target = lp.Target.of(basis.images[0])
-    said = [x["text"] for x, _ in page.heard() if x["kind"] == "say"]
+    said = [x["text"] for x, _ in page.heard() if x["kind"] == "notice"]
     assert "callbacks of the painter set something again" in said[0]
 
 
@@ -732,7 +732,7 @@ def test_a_full_disk_is_said_and_tried_again(
         yield
 
     def said(tone: str) -> Any:
-        return [x["text"] for x, _ in page.heard() if x["kind"] == "say" and x["tone"] == tone]
+        return [x["text"] for x, _ in page.heard() if x["kind"] == "notice" and x["tone"] == tone]
 
     monkeypatch.setattr(background_threads, "RETRY_S", 0.01)
     painter = open_(store=tmp_path / "evening.db")
@@ -827,7 +827,7 @@ def test_a_cell_that_is_put_right_finds_its_file(
         open_(store=path, target=small)
     # It is anybody's, not only the next painter's of this kernel.
     with Store.open(path, Identity.of([basis])) as store:
-        assert [step.kind for step in store.steps] == ["asked"]
+        assert [step.kind for step in store.steps] == ["requests"]
     del kept, also_kept
 
 

@@ -30,11 +30,11 @@ from lightpaint.paint.store.canvas_pixels import Region
 class ProgressReport(Message, kind="progress"):
     """The progress of a long task. Unasked.
 
-    what: `export`, `basis`, `sampling` for samples added where the paint needs them, or the
+    task: `export`, `basis`, `sampling` for samples added where the paint needs them, or the
     renderer's name for the task.
     """
 
-    what: str
+    task: str
     done: int
     total: int
     unit: str
@@ -75,7 +75,7 @@ class SessionState(EditState, Message, kind="state"):
     version: of this protocol. size: height and width of the first view, and `objects` the names of
     its objects.
     lut: the grid of the tables `lut/NAME` of all `transforms`. resources: pictures, with a number
-    that grows when one is replaced. verified: the last verification of each view. first: whether
+    that grows when one is replaced. verifications: the last one of each view. is_new: whether
     the session has no steps yet. stroke: number of the last stroke that arrived. command: solves
     for the exported paintings. is_back: the client had the session before, and no other client
     since; also true if unasked. weights: (lights, 3) float64, the last answer.
@@ -96,8 +96,8 @@ class SessionState(EditState, Message, kind="state"):
     resources: Mapping[str, int]
     looks: tuple[LookInfo, ...]
     basis: SampleCount
-    verified: tuple[VerificationResult, ...]
-    first: bool
+    verifications: tuple[VerificationResult, ...]
+    is_new: bool
     stroke: int
     command: str
     answer: Findings
@@ -189,16 +189,16 @@ class LookList(Message, kind="looks"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TaskStarted(Message, kind="started"):
-    """Notice that a long task has started. what: the request, or `stop`."""
+    """Notice that a long task has started. task: the request, or `stop`."""
 
-    what: Literal["export", "verify", "explain", "preview", "rig", "place", "stop"]
+    task: Literal["export", "verify", "explain", "preview", "rig", "place", "stop"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TaskStopped(Message, kind="stopped"):
     """Notice that a stopped task has ended. Unasked."""
 
-    what: Literal["verify"]
+    task: Literal["verify"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -281,12 +281,12 @@ class PlacingResult(Message, kind="placed"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Notice(Message, kind="say"):
-    """A sentence for users. Unasked. what: the task that it ends."""
+class Notice(Message, kind="notice"):
+    """A sentence for users. Unasked. task: the one that it ends."""
 
     text: str
     tone: Tone = "info"
-    what: str | None = field(default=None, metadata=OPTIONAL)
+    task: str | None = field(default=None, metadata=OPTIONAL)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -45,7 +45,7 @@ class LightPlace:
     position: null for one at infinity, or without a place. direction: unit vector along its axis;
     null for one without an axis. target: the requested point, or else the surface on its axis.
     cutoff, beam: degrees from its axis; null for all but spots. rail: both ends of its rail.
-    why_not: why it cannot be moved; "" if it can.
+    immovable_reason: why it cannot be moved; "" if it can.
     """
 
     position: Place | None
@@ -54,20 +54,21 @@ class LightPlace:
     cutoff: float | None
     beam: float | None
     rail: tuple[Place, Place] | None
-    why_not: str
+    immovable_reason: str
 
 
 @dataclass(frozen=True)
 class Camera:
-    """A camera without a lens. A pixel (x, y) sees origin + s · (x · across + y · down + ahead).
+    """A camera without a lens. Pixel (x, y) sees origin + s · (x · x_axis + y · y_axis + forward).
 
-    is_parallel: all rays have the direction `ahead`, and begin at origin + x · across + y · down.
+    is_parallel: all rays have the direction `forward` and begin at
+    origin + x · x_axis + y · y_axis.
     """
 
     origin: Place
-    across: Place
-    down: Place
-    ahead: Place
+    x_axis: Place
+    y_axis: Place
+    forward: Place
     is_parallel: bool
 
 
@@ -137,11 +138,11 @@ class TableInfo:
 
 @dataclass(frozen=True)
 class SampleCount:
-    """Numbers of samples per pixel: rendered, and wanted."""
+    """Samples per pixel: of the present basis, and of the final one."""
 
     spp: int
-    wanted: int
-    done: bool
+    target_spp: int
+    is_complete: bool
 
 
 @dataclass(frozen=True)
@@ -167,24 +168,24 @@ class Advice:
     """A constraint that keeps the lights from the paint and can be loosened.
 
     kind: of the constraint; `reach` if there is none, but moving lights may help. names: its
-    lights. closes: share of the error that disappears without it; null if more is needed. hold: the
+    lights. gain: share of the error that disappears without it; null if more is needed. hold: the
     weaker hold to set.
     """
 
     kind: str
     names: tuple[str, ...]
-    closes: float | None
+    gain: float | None
     hold: float | None
 
 
 @dataclass(frozen=True)
 class Closeness:
-    """Closeness of an answer in one view. delta_e_asked: ΔE of the present look."""
+    """Closeness of an answer in one view. delta_e_present: ΔE of the present look."""
 
     headline: str
     help: Advice | None
     delta_e: float
-    delta_e_asked: float
+    delta_e_present: float
     sentences: tuple[str, ...]
 
 
@@ -193,8 +194,8 @@ class LightAnswer:
     """The answer for one light.
 
     stops: relative to its present emission; null if it is, or was, off. kelvin: null for a colour
-    that is not white. share: of the light in the picture. error: its uncertainty, in words. held:
-    whether a constraint limits it. unreached: whether no paint depends on it.
+    that is not white. share: of the light in the picture. error: its uncertainty, in words.
+    is_constrained: whether a constraint limits it. is_unreached: whether no paint depends on it.
     """
 
     emission: RGB
@@ -204,8 +205,8 @@ class LightAnswer:
     is_on: bool
     share: float
     error: str | None = field(default=None, metadata=OPTIONAL)
-    held: bool | None = field(default=None, metadata=OPTIONAL)
-    unreached: bool | None = field(default=None, metadata=OPTIONAL)
+    is_constrained: bool | None = field(default=None, metadata=OPTIONAL)
+    is_unreached: bool | None = field(default=None, metadata=OPTIONAL)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -213,7 +214,7 @@ class Findings:
     """Properties of an answer; the sentences follow later than the lights.
 
     lights: in the order of the state. shares: of each light, by view, if there are several.
-    of_views: closeness of each view; null for unpainted views.
+    closeness: of each view; null for unpainted views.
     """
 
     lights: tuple[LightAnswer, ...] | None = field(default=None, metadata=OPTIONAL)
@@ -221,27 +222,27 @@ class Findings:
     headline: str | None = field(default=None, metadata=OPTIONAL)
     help: Advice | None = field(default=None, metadata=OPTIONAL)
     delta_e: float | None = field(default=None, metadata=OPTIONAL)
-    delta_e_asked: float | None = field(default=None, metadata=OPTIONAL)
+    delta_e_present: float | None = field(default=None, metadata=OPTIONAL)
     sentences: tuple[str, ...] | None = field(default=None, metadata=OPTIONAL)
-    of_views: tuple[Closeness | None, ...] | None = field(default=None, metadata=OPTIONAL)
+    closeness: tuple[Closeness | None, ...] | None = field(default=None, metadata=OPTIONAL)
 
 
 @dataclass(frozen=True, kw_only=True)
 class EditState:
     """The steps that can be undone, and the requests in effect.
 
-    asked: constraints by name of light, keys and values as in a lights file. ties: names on one
-    dimmer. settings: those that were set. resolved: the values in effect. poses: of moved lights,
-    by name. added: names of lights that the scene does not have. layers: of the painting.
+    constraints: by name of light, keys and values as in a lights file. ties: names on one dimmer.
+    settings: those that were set. effective_settings: those in effect. poses: of moved lights, by
+    name. added_lights: names of lights that the scene does not have. layers: of the painting.
     """
 
     history: HistoryInfo | None = field(default=None, metadata=OPTIONAL)
-    asked: Mapping[str, Mapping[str, Any]] | None = field(default=None, metadata=OPTIONAL)
+    constraints: Mapping[str, Mapping[str, Any]] | None = field(default=None, metadata=OPTIONAL)
     ties: tuple[tuple[str, ...], ...] | None = field(default=None, metadata=OPTIONAL)
     settings: Mapping[str, Any] | None = field(default=None, metadata=OPTIONAL)
     poses: Mapping[str, Mapping[str, Any]] | None = field(default=None, metadata=OPTIONAL)
-    added: tuple[str, ...] | None = field(default=None, metadata=OPTIONAL)
-    resolved: ResolvedFit | None = field(default=None, metadata=OPTIONAL)
+    added_lights: tuple[str, ...] | None = field(default=None, metadata=OPTIONAL)
+    effective_settings: ResolvedFit | None = field(default=None, metadata=OPTIONAL)
     layers: LayerList | None = field(default=None, metadata=OPTIONAL)
 
 

@@ -15,7 +15,7 @@ from lightpaint.paint.protocol.message_parts import Place
 from lightpaint.paint.store.canvas_pixels import Region
 
 #: Version of this protocol; a page of another version is told to reload.
-VERSION = 2
+VERSION = 3
 
 
 @dataclass(frozen=True)
@@ -32,9 +32,9 @@ class Paint(Message, kind="paint"):
     """Pixels under the brush; with arrays `image` (rows, columns, 3) float32 and `importance`
     (rows, columns) float32. Answered by `answer`.
 
-    stroke: number of the stroke, which the page counts. done: whether this ends the stroke; only
-    then it is kept. label: its name for undo. view: index of the painted view. layer: id of the
-    layer of these pixels. For all kinds but `pixels`, `importance` is the coverage, 0 to 1, and
+    stroke: number of the stroke, which the page counts. is_final: whether this ends the stroke;
+    only then it is kept. label: its name for undo. view: index of the painted view. layer: id of
+    the layer of these pixels. For all kinds but `pixels`, `importance` is the coverage, 0 to 1, and
     masks need no `image`. properties: of the layer, from now on; with an unused id they add a layer
     on top.
     """
@@ -46,7 +46,7 @@ class Paint(Message, kind="paint"):
 
     stroke: int
     region: Region
-    done: bool = False
+    is_final: bool = False
     label: str = "stroke"
     view: int = 0
     layer: int = PAINTING_ID
@@ -63,18 +63,19 @@ class ChangeLayers(Message, kind="change_layers"):
 
     layers: new or changed ones; new ones lie on top. order: ids of all that stay, the lowest first;
     null for the present order. copies: ids of the originals by the id of each copy, which is among
-    `layers`. done: whether it becomes a step; false while a slider moves. label: its name for undo.
+    `layers`. is_final: whether it becomes a step; false while a slider moves. label: its name for
+    undo.
     """
 
     layers: tuple[Layer, ...] = ()
     order: tuple[int, ...] | None = None
     copies: Mapping[str, int] = field(default_factory=dict)
-    done: bool = True
+    is_final: bool = True
     label: str = "layers"
 
 
 @dataclass(frozen=True)
-class Drop(Message, kind="drop"):
+class DropStroke(Message, kind="drop_stroke"):
     """Cancel the unfinished stroke. Answered by `patch`."""
 
     stroke: int
@@ -91,25 +92,26 @@ class Redo(Message, kind="redo"):
 
 
 @dataclass(frozen=True)
-class Ask(Message, kind="ask"):
+class ConstrainLight(Message, kind="constrain_light"):
     """New constraints on one light; an empty object frees it. Answered by `answer`.
 
-    asked: keys and values as in a lights file: lock, off, limits, color, kelvin, duv, primaries.
-    done: whether it becomes a step; false while a slider moves.
+    constraints: keys and values as in a lights file: lock, off, limits, color, kelvin, duv,
+    primaries.
+    is_final: whether it becomes a step; false while a slider moves.
     """
 
     light: int
-    asked: Mapping[str, Any]
-    done: bool = True
+    constraints: Mapping[str, Any]
+    is_final: bool = True
 
 
 @dataclass(frozen=True)
-class AskAll(Message, kind="ask_all"):
-    """New constraints on several lights, by name, as in `Ask`: one step. Answered by
+class ConstrainLights(Message, kind="constrain_lights"):
+    """New constraints on several lights, by name, as in `constrain_light`: one step. Answered by
     `answer`.
     """
 
-    asked: Mapping[str, Mapping[str, Any]]
+    constraints: Mapping[str, Mapping[str, Any]]
 
 
 @dataclass(frozen=True)
@@ -117,42 +119,42 @@ class MoveLights(Message, kind="move"):
     """New places, targets and cones of lights, by name. Answered by `answer`; `rig` follows.
 
     poses: changed fields of `lightpaint.Pose`: position, target, cutoff and beam; an empty object
-    restores a light's place from the scene. done: whether it becomes a step; false while a light is
-    dragged.
+    restores a light's place from the scene. is_final: whether it becomes a step; false while a
+    light is dragged.
     """
 
     poses: Mapping[str, Mapping[str, Any]]
-    done: bool = True
+    is_final: bool = True
 
 
 @dataclass(frozen=True)
 class PointLight(Message, kind="point"):
     """A move of a light by a place in the picture. Answered by `answer`; `rig` follows.
 
-    how: `aim` points it there; `highlight` hangs it so that its reflection appears there; `shadow`
-    hangs it so that the shadow of the surface at `edge` ends there. at, edge: column and row in
-    pixels. view: index of the view. done: as in `move`.
+    mode: `aim` points it there; `highlight` hangs it so that its reflection appears there; `shadow`
+    hangs it so that the shadow of the surface at `edge` ends there. pixel, edge: column and row in
+    pixels. view: index of the view. is_final: as in `move`.
     """
 
     light: int
-    how: Literal["aim", "highlight", "shadow"]
-    at: tuple[float, float]
+    mode: Literal["aim", "highlight", "shadow"]
+    pixel: tuple[float, float]
     edge: tuple[float, float] | None = None
     view: int = 0
-    done: bool = True
+    is_final: bool = True
 
 
 @dataclass(frozen=True)
 class AddLight(Message, kind="add_light"):
     """A new light, with a generated name: one step. Answered by `state`; `rig` follows.
 
-    type: of the light. at: column and row in a picture; the light hangs a little before the surface
-    there, and points away from it. position: its place, instead; it points down. view: index of the
-    view.
+    type: of the light. pixel: column and row in a picture; the light hangs a little before the
+    surface there, and points away from it. position: its place, instead; it points down. view:
+    index of the view.
     """
 
     type: Literal["spot", "point", "panel"]
-    at: tuple[float, float] | None = None
+    pixel: tuple[float, float] | None = None
     position: Place | None = None
     view: int = 0
 
@@ -179,15 +181,15 @@ class PlaceLights(Message, kind="place"):
     or to stop that. Answered by `started`, then by `trial` and later by `placed`; the result is one
     step.
 
-    new: kind of lights to add, instead of moving existing ones; null for none. count: maximum
-    number of them. on: names of rails, surfaces and shapes that they may hang on; none for anywhere
-    free.
+    new_type: type of lights to add, instead of moving existing ones; null for none. max_count:
+    maximum number of them. surfaces: names of rails, surfaces and shapes that they may hang on;
+    none for anywhere free.
     """
 
     run: bool = True
-    new: Literal["spot", "point", "panel"] | None = None
-    count: int = 1
-    on: tuple[str, ...] = ()
+    new_type: Literal["spot", "point", "panel"] | None = None
+    max_count: int = 1
+    surfaces: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -198,14 +200,14 @@ class TieLights(Message, kind="tie"):
 
 
 @dataclass(frozen=True)
-class Set(Message, kind="set"):
+class ChangeSettings(Message, kind="change_settings"):
     """Settings of the answer, as in `Fit`. Answered by `answer`.
 
-    values: of hold, space, colors, literal, prefer_current, sparse; null for the default that
+    settings: of hold, space, colors, literal, prefer_current, sparse; null for the default that
     follows from the painting.
     """
 
-    values: Mapping[str, Any]
+    settings: Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -214,13 +216,14 @@ class Preview(Message, kind="preview"):
     `previewed`, with small pictures of the answer now and after the change, `before` and `after`
     (h, w, 3) uint8.
 
-    number: of the preview, which the page counts; `previewed` returns it. values, asked, ties: as
-    in `Set`, `AskAll` and `TieLights`; null for unchanged ties. view: index of the view.
+    number: of the preview, which the page counts; `previewed` returns it. settings, constraints,
+    ties: as in `change_settings`, `constrain_lights` and `tie`; null for unchanged ties. view:
+    index of the view.
     """
 
     number: int
-    values: Mapping[str, Any] = field(default_factory=dict)
-    asked: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    constraints: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     ties: tuple[tuple[str, ...], ...] | None = None
     view: int = 0
 
@@ -278,10 +281,11 @@ class Export(Message, kind="export"):
     """Write results to the folder of the session, or stop that. Answered by `started`, later by
     `exported`, which names the files written, even if stopped.
 
-    what: target: a painting of each painted view; picture: the displayed answer in each view.
+    outputs: `target`: a painting of each painted view; `picture`: the displayed answer in each
+    view.
     """
 
-    what: tuple[Literal["target", "picture", "lighting", "relit", "report"], ...]
+    outputs: tuple[Literal["target", "picture", "lighting", "relit", "report"], ...]
     run: bool = True
 
 
@@ -345,11 +349,11 @@ AnyRequest = (
     Hello
     | Paint
     | ChangeLayers
-    | Drop
+    | DropStroke
     | Undo
     | Redo
-    | Ask
-    | AskAll
+    | ConstrainLight
+    | ConstrainLights
     | MoveLights
     | PointLight
     | AddLight
@@ -357,7 +361,7 @@ AnyRequest = (
     | PlaceLights
     | ShowRig
     | TieLights
-    | Set
+    | ChangeSettings
     | Preview
     | SaveLook
     | LoadLook

@@ -45,10 +45,10 @@ def camera_of(scene: Scene, loaded: Any) -> Camera | None:
     corners = np.array([(0, 0), (1, 0), (0, 1), (0.7, 0.6)])
     origin, direction = _rays(scene, loaded, corners)
     if np.allclose(direction, direction[0], atol=1e-5):
-        across, down, ahead = origin[1] - origin[0], origin[2] - origin[0], direction[0]
-        expected = origin[0] + 0.7 * across + 0.6 * down
-        is_straight = np.linalg.norm(expected - origin[3]) <= STRAIGHT * np.linalg.norm(across)
-        return _camera(scene, origin[0], across, down, ahead, is_parallel=True, ok=is_straight)
+        x_axis, y_axis, forward = origin[1] - origin[0], origin[2] - origin[0], direction[0]
+        expected = origin[0] + 0.7 * x_axis + 0.6 * y_axis
+        is_straight = np.linalg.norm(expected - origin[3]) <= STRAIGHT * np.linalg.norm(x_axis)
+        return _camera(scene, origin[0], x_axis, y_axis, forward, is_parallel=True, ok=is_straight)
     eye = _crossing(origin, direction)
     off = np.linalg.norm(np.cross(origin - eye, direction), axis=1)
     if (off > STRAIGHT * max(float(np.linalg.norm(origin - eye, axis=1).max()), STRAIGHT)).any():
@@ -56,10 +56,10 @@ def camera_of(scene: Scene, loaded: Any) -> Camera | None:
     # All rays end in one plane before the eye, which the first ray meets after a length of 1.
     middle = _rays(scene, loaded, np.array([(0.5, 0.5)]))[1][0]
     ends = direction / (direction @ middle)[:, None]
-    across, down = ends[1] - ends[0], ends[2] - ends[0]
-    expected = ends[0] + 0.7 * across + 0.6 * down
+    x_axis, y_axis = ends[1] - ends[0], ends[2] - ends[0]
+    expected = ends[0] + 0.7 * x_axis + 0.6 * y_axis
     is_straight = np.linalg.norm(expected - ends[3]) <= STRAIGHT
-    return _camera(scene, eye, across, down, ends[0], is_parallel=False, ok=bool(is_straight))
+    return _camera(scene, eye, x_axis, y_axis, ends[0], is_parallel=False, ok=bool(is_straight))
 
 
 def _crossing(origin: Doubles, direction: Doubles) -> Doubles:
@@ -74,9 +74,9 @@ def _crossing(origin: Doubles, direction: Doubles) -> Doubles:
 def _camera(
     scene: Scene,
     origin: Doubles,
-    across: Doubles,
-    down: Doubles,
-    ahead: Doubles,
+    x_axis: Doubles,
+    y_axis: Doubles,
+    forward: Doubles,
     *,
     is_parallel: bool,
     ok: bool,
@@ -86,9 +86,9 @@ def _camera(
         return None
     return Camera(
         origin=_listed(origin),
-        across=_listed(across / width),
-        down=_listed(down / height),
-        ahead=_listed(ahead),
+        x_axis=_listed(x_axis / width),
+        y_axis=_listed(y_axis / height),
+        forward=_listed(forward),
         is_parallel=is_parallel,
     )
 
@@ -99,20 +99,20 @@ def _listed(vector: Doubles) -> Place:
 
 def up_axis(cameras: list[Camera | None]) -> int:
     """Return the axis nearest to upwards in these views; y without a camera."""
-    ups = [-np.array(camera.down) for camera in cameras if camera is not None]
+    ups = [-np.array(camera.y_axis) for camera in cameras if camera is not None]
     total = (
         np.sum([up / max(np.linalg.norm(up), 1e-30) for up in ups], axis=0) if ups else [0, 1, 0]
     )
     return int(np.argmax(np.abs(total)))
 
 
-def first_hit(scene: Scene, loaded: Any, at: tuple[float, float]) -> FirstHit | None:
+def first_hit(scene: Scene, loaded: Any, pixel: tuple[float, float]) -> FirstHit | None:
     """Return the first hit of the pixel (column, row) of `scene`; None if it sees nothing."""
     import mitsuba as mi
 
     height, width = scene.size
     with tracing():
-        rays = _mitsuba_rays(scene, loaded, np.array([(at[0] / width, at[1] / height)]))
+        rays = _mitsuba_rays(scene, loaded, np.array([(pixel[0] / width, pixel[1] / height)]))
         si = loaded.ray_intersect(rays)
         if not bool(np.array(si.is_valid()).all()):
             return None

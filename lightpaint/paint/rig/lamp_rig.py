@@ -299,19 +299,19 @@ class LampRig:
             except SceneError as error:
                 raise PaintError(f"{name}: {error}") from None
             return hung_at(name, request.type, np.array(place), down, extent)
-        if request.at is None:
+        if request.pixel is None:
             raise PaintError("a new light needs a place: click on a surface, or in the plan")
         with in_this_thread():
-            hit = self._hit(view, request.at)
+            hit = self._hit(view, request.pixel)
             return hung_before(name, request.type, hit, extent, partial(free_length, view.loaded))
 
     def _pointing(self, request: PointLight, name: str, site: Site) -> dict[str, Any]:
         view = self.view(request.view)
-        hit = self._hit(view, request.at)
+        hit = self._hit(view, request.pixel)
         length = partial(free_length, view.loaded)
-        if request.how == "aim":
+        if request.mode == "aim":
             return aimed(name, site, hit)
-        if request.how == "highlight":
+        if request.mode == "highlight":
             return with_highlight(name, site, hit, length)
         if request.edge is None:
             raise PaintError("a shadow needs two places: the edge that casts it, and where it ends")
@@ -324,11 +324,11 @@ class LampRig:
             raise PaintError(f"no view {number}: there are {len(self.views)}")
         return self.views[number]
 
-    def _hit(self, view: RigView, at: tuple[float, float]) -> FirstHit:
+    def _hit(self, view: RigView, pixel: tuple[float, float]) -> FirstHit:
         height, width = view.scene.size
-        if not (0 <= at[0] < width and 0 <= at[1] < height):
-            raise PaintError(f"the place {list(at)} is outside the picture, {width}x{height}")
-        hit = first_hit(view.scene, view.loaded, at)
+        if not (0 <= pixel[0] < width and 0 <= pixel[1] < height):
+            raise PaintError(f"the place {list(pixel)} is outside the picture, {width}x{height}")
+        hit = first_hit(view.scene, view.loaded, pixel)
         if hit is None:
             raise PaintError("nothing is seen there: click on a surface")
         return hit

@@ -81,7 +81,7 @@ class LightMover:
         """Load the rig in the background, and publish it now and after every move."""
         self._shows_rig = True
         self._threads.start_low_priority(self._open_rig, "rig")
-        return [TaskStarted(what="rig")]
+        return [TaskStarted(task="rig")]
 
     def _open_rig(self) -> None:
         self.rig.open(self._host.session.bases)
@@ -105,7 +105,7 @@ class LightMover:
             session.basis.names[request.light] if request.light < len(session.basis.names) else ""
         )
         pose = self.rig.pointed(request, name, session.requests.placed.get(name, {}))
-        return MoveLights({name: pose}, request.done)
+        return MoveLights({name: pose}, request.is_final)
 
     def hang(self, request: AddLight) -> tuple[str, dict[str, Any]]:
         """Return name and values of the light that a request adds. Raises PaintError."""

@@ -81,17 +81,17 @@ class LightPlacer:
         """
         if not request.run:
             self._request = None
-            return [TaskStarted(what="stop")]
+            return [TaskStarted(task="stop")]
         snapshot = self._host.snapshot()
         if not snapshot.painted_views:
             raise PaintError("nothing is painted yet: paint first, then let lights move")
-        if request.new is not None:
+        if request.new_type is not None:
             self._new_lights(request, snapshot)
         elif not self._freedoms(snapshot):
             raise PaintError("no light is free to move: unlock a point, a spot or a sun")
         self._request = request
         self._threads.start_low_priority(lambda: self._run(request), "place")
-        return [TaskStarted(what="place")]
+        return [TaskStarted(task="place")]
 
     def _freedoms(self, snapshot: SessionSnapshot) -> dict[str, Freedom]:
         """Return the freedom of each movable light: from the lights file, or near its place."""
@@ -110,15 +110,18 @@ class LightPlacer:
 
     def _new_lights(self, request: PlaceLights, snapshot: SessionSnapshot) -> NewLights:
         """Return the lights that a request may add. Raises LightpaintError for impossible ones."""
-        assert request.new is not None
-        scene, kind = self._rig.scene, request.new
-        freedom = freedom_on(request.on, scene, self._rig.rigging) if request.on else Freedom()
-        if not 1 <= request.count <= MAX_NEW:
-            raise PaintError(f"count is {request.count}: expected 1 to {MAX_NEW} new lights")
+        assert request.new_type is not None
+        scene, kind = self._rig.scene, request.new_type
+        surfaces, rigging = request.surfaces, self._rig.rigging
+        freedom = freedom_on(surfaces, scene, rigging) if surfaces else Freedom()
+        if not 1 <= request.max_count <= MAX_NEW:
+            raise PaintError(
+                f"max_count is {request.max_count}: expected 1 to {MAX_NEW} new lights"
+            )
         taken = {*snapshot.bases[0].names, *(x.name for x in scene.emitters)}
         # A free name is kept if one light is added; otherwise names are numbered.
-        name = free_name(kind, taken) if request.count == 1 else kind
-        return NewLights(kind, count=request.count, freedom=freedom, name=name)
+        name = free_name(kind, taken) if request.max_count == 1 else kind
+        return NewLights(kind, count=request.max_count, freedom=freedom, name=name)
 
     def _run(self, request: PlaceLights) -> None:
         def check() -> None:
@@ -155,7 +158,7 @@ class LightPlacer:
             )
             self._publish(f"No light was {_done(request)}: {reason}.")
             return
-        label = f"{'move' if request.new is None else 'add'} {', '.join(placed)}"
+        label = f"{'move' if request.new_type is None else 'add'} {', '.join(placed)}"
         if not self._host.hang_lights(label, placed, before=snapshot.requests.placed):
             self._publish(f"No light was {_done(request)}: somebody moved lights meanwhile.")
             return
@@ -202,7 +205,7 @@ class LightPlacer:
 
         snapshot = self._host.snapshot()
         self._rig.open(snapshot.bases)
-        if request.new is None:
+        if request.new_type is None:
             freedoms, new = self._freedoms(snapshot), []
         else:
             freedoms, new = {}, [self._new_lights(request, snapshot)]
@@ -232,7 +235,7 @@ def _trial(sites: Mapping[str, Site]) -> TrialPlaces:
 
 
 def _done(request: PlaceLights) -> str:
-    return "moved" if request.new is None else "added"
+    return "moved" if request.new_type is None else "added"
 
 
 def pose_values(move: Move, before: Mapping[str, Any]) -> dict[str, Any]:

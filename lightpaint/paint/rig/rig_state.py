@@ -49,7 +49,7 @@ def _place(rig: LampRig, name: str, values: Mapping[str, Any]) -> LightPlace:
         cutoff=site.cutoff,
         beam=site.beam,
         rail=_rail(rig, name, site),
-        why_not=reason,
+        immovable_reason=reason,
     )
 
 

@@ -151,7 +151,7 @@ class Client:
         old, new = last.request, incoming.request
         if not (isinstance(old, Paint) and isinstance(new, Paint)):
             return False
-        if old.done or (old.stroke, old.view) != (new.stroke, new.view):
+        if old.is_final or (old.stroke, old.view) != (new.stroke, new.view):
             return False
         if not _is_within(old.region, new.region):
             return False
@@ -272,7 +272,7 @@ def _append(
 def _replacement_key(message: Message) -> tuple[Any, ...] | None:
     """Return a key for events of which only the newest counts; None for others."""
     if isinstance(message, ProgressReport):
-        return "progress", message.what
+        return "progress", message.task
     is_newest = isinstance(message, AnswerUpdate | PictureUpdate | LookList | SessionState)
     return (message.kind,) if is_newest else None
 

@@ -23,9 +23,9 @@ from lightpaint.paint.protocol import (
     Acknowledgement,
     AnswerUpdate,
     AnyRequest,
-    Ask,
     CanvasPatch,
     Closing,
+    ConstrainLight,
     Export,
     ExportResult,
     Failure,
@@ -62,8 +62,8 @@ REST_S = 10.0
 #: Seconds for pages to receive the last messages.
 CLOSING_S = 1.0
 
-#: Requests during a drag, until one with `done`.
-LIVE_REQUESTS = (Paint, Ask, MoveLights, PointLight)
+#: Requests during a drag, until one with `is_final`.
+LIVE_REQUESTS = (Paint, ConstrainLight, MoveLights, PointLight)
 
 #: Events that observers receive.
 OBSERVED_EVENTS = (
@@ -209,7 +209,7 @@ class Connections:
             if self._owner.page is not client:
                 return [_taken_message("this tab does not have the session")]
             assert incoming.request is not None
-            is_live = isinstance(incoming.request, LIVE_REQUESTS) and not incoming.request.done
+            is_live = isinstance(incoming.request, LIVE_REQUESTS) and not incoming.request.is_final
             (self._brush_up.clear if is_live else self._brush_up.set)()
             return await self._run(self.session.handle, incoming.request, incoming.arrays)
         except LightpaintError as error:

@@ -128,18 +128,18 @@ def _light_answer(light: BasisLight, weight: Doubles, share: float) -> LightAnsw
 class Judgement:
     """The analysis of an answer, for the page.
 
-    worst: of the view with the largest error. of_views: of each view; None for unpainted ones.
-    lights: `error`, `held` and `unreached` of each, as in `LightAnswer`.
+    worst: of the view with the largest error. closeness: of each view; None for unpainted ones.
+    lights: `error`, `is_constrained` and `is_unreached` of each, as in `LightAnswer`.
     """
 
     worst: Closeness
-    of_views: tuple[Closeness | None, ...]
+    closeness: tuple[Closeness | None, ...]
     lights: tuple[tuple[str | None, bool, bool], ...]
 
     def complete(self, findings: Findings) -> Findings:
         """Return immediate findings with the results of the analysis."""
         lights = tuple(
-            replace(light, error=error, held=is_held, unreached=is_unreached)
+            replace(light, error=error, is_constrained=is_held, is_unreached=is_unreached)
             for light, (error, is_held, is_unreached) in zip(
                 findings.lights or (), self.lights, strict=True
             )
@@ -151,9 +151,9 @@ class Judgement:
             headline=worst.headline,
             help=worst.help,
             delta_e=worst.delta_e,
-            delta_e_asked=worst.delta_e_asked,
+            delta_e_present=worst.delta_e_present,
             sentences=worst.sentences,
-            of_views=self.of_views,
+            closeness=self.closeness,
         )
 
 
@@ -165,10 +165,10 @@ def judge(analyses: Sequence[Analysis], painted: Sequence[int]) -> Judgement:
     solution = analyses[0].solution
     errors = spoken_errors(analyses[0].uncertainty, len(solution.basis.names))
     settings = solution.lighting.lights
-    of_views = {view: _closeness(entry) for view, entry in zip(painted, analyses, strict=True)}
+    by_view = {view: _closeness(entry) for view, entry in zip(painted, analyses, strict=True)}
     return Judgement(
-        worst=max(of_views.values(), key=lambda entry: entry.delta_e),
-        of_views=tuple(of_views.get(k) for k in range(max(painted) + 1)),
+        worst=max(by_view.values(), key=lambda entry: entry.delta_e),
+        closeness=tuple(by_view.get(k) for k in range(max(painted) + 1)),
         lights=tuple(
             (error, entry.is_active, not any(entry.reached))
             for error, entry in zip(errors, settings, strict=True)
@@ -278,7 +278,7 @@ def _closeness(analysis: Analysis) -> Closeness:
         headline=sketch_headline(appearance),
         help=advice(appearance),
         delta_e=appearance.delta_e,
-        delta_e_asked=appearance.requested_change,
+        delta_e_present=appearance.requested_change,
         sentences=()
         if appearance.is_close
         else tuple(bound_sentences(analysis.diagnosis, appearance, any_color=ANY_COLOR_TEXT)),

@@ -21,12 +21,12 @@ def edit_state(history: History, live_answer: LiveAnswer, views: Canvases) -> di
     requests, fit = live_answer.requests, live_answer.fit
     return {
         "history": history.info(),
-        "asked": {name: dict(constraints) for name, constraints in requests.lights.items()},
+        "constraints": {name: dict(constraints) for name, constraints in requests.lights.items()},
         "ties": requests.ties,
         "settings": dict(requests.values),
         "poses": dict(requests.poses),
-        "added": tuple(requests.added),
-        "resolved": ResolvedFit(fit.space, fit.hold, fit.colors),
+        "added_lights": tuple(requests.added),
+        "effective_settings": ResolvedFit(fit.space, fit.hold, fit.colors),
         "layers": LayerList(
             tuple(layer_info(layer, views) for layer in views.layers), views.next_layer
         ),

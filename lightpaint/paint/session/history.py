@@ -47,7 +47,7 @@ class History:
         self.close_stroke("stroke")
         before = self._live_answer.requests_at_rest
         fields = {"before": before.as_json(), "after": requests.as_json()}
-        self._store.append(Step("asked", label, fields))
+        self._store.append(Step("requests", label, fields))
         self._live_answer.set_requests(requests)
 
     def replace_all(

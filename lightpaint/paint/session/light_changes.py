@@ -10,13 +10,13 @@ from lightpaint.paint.store.session_requests import SessionRequests
 
 
 def constrain_light(
-    requests: SessionRequests, lights: Lights, message: protocol.Ask
+    requests: SessionRequests, lights: Lights, message: protocol.ConstrainLight
 ) -> tuple[str, SessionRequests]:
     """Return the name of a light by its place, and the requests with those on it replaced."""
     if message.light >= len(lights):
         raise PaintError(f"no light {message.light}: there are {len(lights)}")
     name = lights.names[message.light]
-    return name, constrain_lights(requests, lights, {name: message.asked})
+    return name, constrain_lights(requests, lights, {name: message.constraints})
 
 
 def constrain_lights(

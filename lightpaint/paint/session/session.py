@@ -164,8 +164,8 @@ class Session:
     def preview_requests(self, change: protocol.Preview) -> SessionRequests:
         """Return the requests after a change. Raises LightpaintError if it is impossible."""
         lights = self.basis.lights
-        requests = self.requests.with_values(change.values)
-        requests = constrain_lights(requests, lights, change.asked)
+        requests = self.requests.with_values(change.settings)
+        requests = constrain_lights(requests, lights, change.constraints)
         if change.ties is not None:
             requests = tie_lights(requests, lights, change.ties)
         self.live_answer.check(requests)
@@ -180,7 +180,7 @@ class Session:
 
         A moving slider is reset before any other request, and if its last value is refused.
         """
-        if not isinstance(message, protocol.Ask | protocol.MoveLights):
+        if not isinstance(message, protocol.ConstrainLight | protocol.MoveLights):
             self._reset_slider()
         try:
             return self._dispatch(message, arrays)
@@ -196,28 +196,28 @@ class Session:
                 return [self._paint(message, arrays)]
             case protocol.ChangeLayers():
                 return [self._change_layers(message)]
-            case protocol.Drop():
+            case protocol.DropStroke():
                 return self._patch_messages(*self._drop_stroke())
             case protocol.Undo():
                 return self._move_step(-1)
             case protocol.Redo():
                 return self._move_step(+1)
-            case protocol.Ask():
+            case protocol.ConstrainLight():
                 return [self._constrain_light(message)]
             case protocol.MoveLights():
                 return [self._move_lights(message)]
             case protocol.RemoveLight():
                 requests = remove_light(self.requests, self.basis.lights, message.name)
                 return [self._append_requests(f"remove {message.name}", requests)]
-            case protocol.AskAll():
-                requests = constrain_lights(self.requests, self.basis.lights, message.asked)
-                return [self._append_requests(", ".join(message.asked), requests)]
+            case protocol.ConstrainLights():
+                requests = constrain_lights(self.requests, self.basis.lights, message.constraints)
+                return [self._append_requests(", ".join(message.constraints), requests)]
             case protocol.TieLights():
                 requests = tie_lights(self.requests, self.basis.lights, message.ties)
                 return [self._append_requests("tie", requests)]
-            case protocol.Set():
-                requests = self.requests.with_values(message.values)
-                label = ", ".join(TITLES[key] for key in message.values)
+            case protocol.ChangeSettings():
+                requests = self.requests.with_values(message.settings)
+                label = ", ".join(TITLES[key] for key in message.settings)
                 return [self._append_requests(label, requests)]
         raise PaintError(f"a session has no answer to {type(message).__name__}")
 
@@ -341,14 +341,14 @@ class Session:
             self._stroke = request.stroke
         self.views.open_layers(layers)
         self.views.paint(request.view, layer.id, request.region, pixels)
-        if request.done:
+        if request.is_final:
             try:
                 self._history.close_stroke(request.label)
             except LightpaintError:
                 self._drop_stroke()
                 raise
         self._update_answer()
-        return self.answer_update(**(self.edit_state if request.done else {}))
+        return self.answer_update(**(self.edit_state if request.is_final else {}))
 
     def _change_layers(self, request: protocol.ChangeLayers) -> Message:
         """Change layers, their order, or both. An unfinished change is open, like a stroke."""
@@ -366,10 +366,10 @@ class Session:
             self.views.copy_layer(source, number)
         if request.order is not None and PAINTING_ID not in request.order:
             self.views.clear_painting()
-        if request.done:
+        if request.is_final:
             self._history.close_stroke(request.label)
         self._update_answer()
-        return self.answer_update(**(self.edit_state if request.done else {}))
+        return self.answer_update(**(self.edit_state if request.is_final else {}))
 
     def _drop_stroke(self) -> list[tuple[int, Region]]:
         """Drop the open stroke; return its views and regions."""
@@ -388,9 +388,9 @@ class Session:
         self._update_answer()
         return self._patch_messages(*changes)
 
-    def _constrain_light(self, message: protocol.Ask) -> Message:
+    def _constrain_light(self, message: protocol.ConstrainLight) -> Message:
         name, requests = constrain_light(self.requests, self.basis.lights, message)
-        if message.done:
+        if message.is_final:
             return self._append_requests(name, requests)
         # Nothing is stored while a slider moves.
         self.live_answer.move_slider(requests)
@@ -400,7 +400,7 @@ class Session:
     def _move_lights(self, message: protocol.MoveLights) -> Message:
         requests = move_lights(self.requests, self.basis.lights, message.poses)
         self._moved_lights.check(requests.placed)
-        if message.done:
+        if message.is_final:
             return self._append_requests(f"move {', '.join(message.poses)}", requests)
         # Nothing is stored while a light is dragged.
         self.live_answer.move_slider(requests)

@@ -33,10 +33,10 @@ def state_fields(
         "looks": looks.infos(),
         "basis": SampleCount(
             spp=basis.origin.spp,
-            wanted=target_spp or basis.origin.spp,
-            done=target_spp is None or basis.origin.spp >= target_spp,
+            target_spp=target_spp or basis.origin.spp,
+            is_complete=target_spp is None or basis.origin.spp >= target_spp,
         ),
-        "first": not session.store.steps,
+        "is_new": not session.store.steps,
         "stroke": session.stroke,
     }
 

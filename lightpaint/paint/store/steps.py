@@ -36,9 +36,9 @@ class Patch:
 class Step:
     """A change that can be undone.
 
-    kind: "stroke", "layers", "asked" (of lights, ties, settings) or "look_loaded". label: shown by
-    undo. fields: plain JSON: requests `before` and `after`, and the change of the layers, `stack`.
-    patches: the changed pixels, of one view or several.
+    kind: "stroke", "layers", "requests" (of lights, ties, settings) or "look_loaded". label: shown
+    by undo. fields: plain JSON: requests `before` and `after`, and the change of the layers,
+    `stack`. patches: the changed pixels, of one view or several.
     """
 
     kind: str

@@ -110,7 +110,7 @@ class BackgroundJobs:
         if isinstance(message, protocol.Verify):
             if not message.run:
                 self._verify_request = None
-                return [TaskStarted(what="stop")]
+                return [TaskStarted(task="stop")]
             if self._subject(message.view).scene is None:
                 raise PaintError("there is no scene to render: it was opened from a saved basis")
             # Set here, not in its thread: the next message may stop it.
@@ -119,10 +119,10 @@ class BackgroundJobs:
             self._subject(message.view)
         elif not message.run:
             self._stop_count += 1
-            return [TaskStarted(what="stop")]
+            return [TaskStarted(task="stop")]
         task_name, work = starters[type(message)]
         self._threads.start_low_priority(lambda: work(message), task_name)
-        return [TaskStarted(what=task_name)]
+        return [TaskStarted(task=task_name)]
 
     def start_preview(self, message: protocol.Preview, requests: SessionRequests) -> list[Message]:
         """Start to compute the effect of a change. Raises PaintError for an unknown view.
@@ -132,7 +132,7 @@ class BackgroundJobs:
         self._subject(message.view)
         self._preview_number = message.number
         self._threads.start_low_priority(lambda: self._run_preview(message, requests), "preview")
-        return [TaskStarted(what="preview")]
+        return [TaskStarted(task="preview")]
 
     def solve_command(self, sensors: Sequence[str], requests: SessionRequests) -> str:
         """Return the command that solves exported paintings to the same answer; "" if none."""
@@ -199,7 +199,7 @@ class BackgroundJobs:
                 subjects, snapshot, lighting = self._exact_answer(check)
                 with self._write_lock:
                     check()
-                    for file in export(subjects, snapshot, lighting, message.what, report):
+                    for file in export(subjects, snapshot, lighting, message.outputs, report):
                         files.append(file)  # one by one: a stop keeps those already written
         except StoppedError:
             if self._stop_count != stop_count:
@@ -208,7 +208,7 @@ class BackgroundJobs:
             return
         # The command names only paintings that this export wrote: older files may differ.
         needs_painting, is_painted = (
-            bool(NEEDS_PAINTING & set(message.what)),
+            bool(NEEDS_PAINTING & set(message.outputs)),
             bool(snapshot.painted_views),
         )
         sensors = snapshot.painted_sensors if needs_painting and is_painted else ()
@@ -231,7 +231,7 @@ class BackgroundJobs:
                 self._render_and_compare(request.view, check)
         except StoppedError:
             if self._verify_request is None:  # else a page waits for the next one
-                self._host.publish(TaskStopped(what="verify"))
+                self._host.publish(TaskStopped(task="verify"))
 
     def _render_and_compare(self, view: int, check: Callable[[], None]) -> None:
         """Render the answer in a view and compare. check: raises StoppedError after a stop."""

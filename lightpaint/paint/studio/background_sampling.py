@@ -88,7 +88,7 @@ class BackgroundSampling:
         # After a round the next exact answer says whether another one follows.
         if self._is_reported and (bases is None or is_outdated()):
             self._is_reported = False
-            self._host.publish(ProgressReport(what=SAMPLING, done=1, total=1, unit=""))
+            self._host.publish(ProgressReport(task=SAMPLING, done=1, total=1, unit=""))
         if bases is not None:
             self._host.use_bases(bases)
         elif not (is_outdated() or snapshot.requests.placed):

@@ -41,7 +41,7 @@ def export(
     subjects: Sequence[Subject],
     snapshot: SessionSnapshot,
     lighting: Lighting,
-    what: Sequence[str],
+    outputs: Sequence[str],
     progress: Progress,
 ) -> Iterator[Path]:
     """Write the requested files into the folder of the session; yield each one once it exists.
@@ -51,33 +51,33 @@ def export(
     written.
     """
     if not snapshot.painted_views:
-        what = [name for name in what if name not in NEEDS_PAINTING]
-        if not what:
+        outputs = [name for name in outputs if name not in NEEDS_PAINTING]
+        if not outputs:
             raise PaintError("nothing is painted yet: there is no painting to write")
     first, folder = subjects[0], subjects[0].folder
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"cannot make {folder}: {error.strerror}") from None
-    if set(what) & NEEDS_PAINTING:
+    if set(outputs) & NEEDS_PAINTING:
         for sensor, target in zip(snapshot.painted_sensors, snapshot.painted_targets, strict=True):
             write_painting(painting_path(folder, sensor), target)
             yield painting_path(folder, sensor)
-    if "picture" in what:
+    if "picture" in outputs:
         for sensor, basis in zip(snapshot.sensors, snapshot.bases, strict=True):
             write_bytes(
                 picture_path(folder, sensor), answer_png(basis, lighting, snapshot.transform)
             )
             yield picture_path(folder, sensor)
-    if "lighting" in what:
+    if "lighting" in outputs:
         write_answer(folder, lighting)
         yield folder / LIGHTING
-    if "relit" in what:
+    if "relit" in outputs:
         if first.scene is None:
             raise PaintError("there is no scene to relight: it was opened from a saved basis")
         write_answer(folder, lighting, scene=first.loaded_scene, has_lighting=True)
         yield folder / RELIT
-    if "report" in what:
+    if "report" in outputs:
         yield from _write_report(subjects, snapshot, progress)
 
 

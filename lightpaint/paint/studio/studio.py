@@ -332,7 +332,7 @@ class Studio:
         """Report how far a task is. Raises StoppedError once the studio is closed."""
         if not self.is_open:
             raise StoppedError
-        report = ProgressReport(what=label, done=done, total=total, unit=unit)
+        report = ProgressReport(task=label, done=done, total=total, unit=unit)
         if self._session is None:
             self._progress = report
         with MITSUBA.aside():  # the receiver may wait for a render of its own
@@ -351,7 +351,7 @@ class Studio:
                 for bases in obtain_bases(self.subjects, self.report_progress):
                     self.use_bases(bases)
                     self._denoiser.denoise(self.session)
-            self.publish(ProgressReport(what="basis", done=1, total=1, unit=""))
+            self.publish(ProgressReport(task="basis", done=1, total=1, unit=""))
             self._denoiser.write_cache()
             self._sampling.run()
         except StoppedError:
@@ -426,7 +426,7 @@ class Studio:
             **state_fields(
                 session, self.pictures, self._looks, target_spp=self.subjects[0].target_spp
             ),
-            "verified": self._jobs.verifications(session.version),
+            "verifications": self._jobs.verifications(session.version),
             "command": self._jobs.solve_command(sensors, session.requests),
         }
 

@@ -32,22 +32,24 @@ def test_names_from_files_are_text(painter: Painter) -> None:
     painter.page.keyboard.press("a")
     painter.button("By numbers", exact=True).click()
     assert "blue <b>ball</b>" in painter.page.get_by_role("combobox", name="Area").inner_text()
-    painter.tell(kind="say", text="<img src=x>", tone="info")
+    painter.tell(kind="notice", text="<img src=x>", tone="info")
     assert painter.page.get_by_text("<img src=x>").is_visible()
     assert painter.page.locator(".toasts img").count() == 0
 
 
 def test_an_answer_to_what_was_undone_says_nothing(painter: Painter) -> None:
     asked, history = {"key": {"lock": 1}}, {"undo": ["brush"], "redo": []}
-    painter.tell(kind="answer", version=6, asked=asked, history=history)
-    assert (painter.ui("asked"), painter.ui("history")) == (asked, history)
+    painter.tell(kind="answer", version=6, constraints=asked, history=history)
+    assert (painter.ui("constraints"), painter.ui("history")) == (asked, history)
     undone = {"undo": [], "redo": ["brush"]}
-    painter.tell(kind="patch", version=7, asked={}, history=undone)
-    painter.tell(kind="answer", version=6, exact=True, asked=asked, history=history, headline="Old")
-    assert (painter.ui("asked"), painter.ui("history")) == ({}, undone)
+    painter.tell(kind="patch", version=7, constraints={}, history=undone)
+    painter.tell(
+        kind="answer", version=6, exact=True, constraints=asked, history=history, headline="Old"
+    )
+    assert (painter.ui("constraints"), painter.ui("history")) == ({}, undone)
     painter.page.evaluate("() => host.tell({ ...host.state(), headline: '' })")  # counts anew
-    painter.tell(kind="answer", version=1, asked=asked, history=history)
-    assert (painter.ui("asked"), painter.ui("history")) == (asked, history)
+    painter.tell(kind="answer", version=1, constraints=asked, history=history)
+    assert (painter.ui("constraints"), painter.ui("history")) == (asked, history)
 
 
 def test_overlays_by_their_key_say_what_their_colours_mean(painter: Painter) -> None:
@@ -118,13 +120,13 @@ def test_truth(painter: Painter) -> None:
     painter.button("Verify").click()
     assert painter.said("verify")[-1]["run"] is True
     bar = painter.page.get_by_role("progressbar", name="Verifying")
-    painter.tell(kind="progress", what="verify", done=5, total=16, unit="passes")
+    painter.tell(kind="progress", task="verify", done=5, total=16, unit="passes")
     assert bar.get_attribute("aria-valuenow") == "5"
     painter.button("Stop", exact=True).click()
     assert painter.said("verify")[-1]["run"] is False
     painter.button("Verify").click()
-    painter.tell(kind="progress", what="lights", done=5, total=16, unit="passes")
-    painter.tell(kind="stopped", what="verify")
+    painter.tell(kind="progress", task="lights", done=5, total=16, unit="passes")
+    painter.tell(kind="stopped", task="verify")
     assert painter.button("Verify").is_visible()
     assert painter.page.locator(".working").is_visible()  # what else is under way goes on
     painter.tell(kind="verified", agrees=True, text="The render agrees.")
@@ -143,7 +145,7 @@ def test_how_pictures_are_shown(painter: Painter) -> None:
     show = painter.page.evaluate("() => window.engine.shown")
     assert (show["left"], show["transform"], show["stops"]) == ("present", "agx", 1.5)
     assert show["clean"] is False
-    assert not painter.said("set")  # for the eye only
+    assert not painter.said("change_settings")  # for the eye only
 
 
 def test_looks(painter: Painter) -> None:
@@ -250,7 +252,7 @@ def test_a_render_of_before_is_offered_again(painter: Painter) -> None:
     render = painter.button("Answer | Render")
     painter.button("Analysis").click()
     assert render.count() == 0
-    begin = "(is_old) => host.tell({ ...host.state(), verified: [{ agrees: true, view: 0,"
+    begin = "(is_old) => host.tell({ ...host.state(), verifications: [{ agrees: true, view: 0,"
     begin += " text: 'The render agrees.', is_old }] })"
     painter.page.evaluate(begin, False)
     assert "The render agrees." in painter.page.locator(".verified").inner_text()
@@ -352,7 +354,7 @@ def test_the_look_that_is_seen_is_marked(painter: Painter) -> None:
     # Where all lights are held, they stay as they are while somebody paints.
     painter.page.evaluate("() => painter.session.send('drop_look', { look: 1 })")
     painter.page.evaluate(
-        "() => { host.asked = Object.fromEntries(host.room.lights.map(({ name }) =>"
+        "() => { host.constraints = Object.fromEntries(host.room.lights.map(({ name }) =>"
         " [name, { lock: true }])); }"
     )
     weights = painter.ui("weights")
@@ -379,7 +381,7 @@ def test_files_are_written_and_their_command_shown(painter: Painter) -> None:
     painter.button("Export").click()
     painter.page.get_by_label("Report").uncheck()
     painter.page.get_by_role("dialog").get_by_role("button", name="Export", exact=True).click()
-    assert painter.said("export")[-1]["what"] == ["target", "picture", "lighting", "relit"]
+    assert painter.said("export")[-1]["outputs"] == ["target", "picture", "lighting", "relit"]
     window = painter.page.get_by_role("dialog")
     assert window.locator(".exported li").all_inner_texts() == [
         "target", "picture", "lighting", "relit",
@@ -400,7 +402,7 @@ def test_files_are_written_and_their_command_shown(painter: Painter) -> None:
 def test_settings(painter: Painter) -> None:
     painter.button("Solve settings").click()
     painter.button("Ignore").click()
-    assert painter.said("set")[-1]["values"]["hold"] == 0
+    assert painter.said("change_settings")[-1]["settings"]["hold"] == 0
     painter.button("Hold", exact=True).click()
     painter.type("Strength", "2.5")
     painter.button("Linear").click()
@@ -410,16 +412,16 @@ def test_settings(painter: Painter) -> None:
     painter.button("Stay", exact=True).click()
     painter.type("Pull", "0.02")
     asked: dict[str, Any] = {}
-    for said in painter.said("set"):
-        asked |= said["values"]
+    for said in painter.said("change_settings"):
+        asked |= said["settings"]
     assert asked == {
         "hold": 2.5, "space": "linear", "colors": "white", "literal": True,
         "prefer_current": 0.02, "sparse": 3,
     }  # fmt: skip
     painter.type("At most", "")
-    assert painter.said("set")[-1]["values"]["sparse"] is None
+    assert painter.said("change_settings")[-1]["settings"]["sparse"] is None
     painter.button("May change").click()
-    assert painter.said("set")[-1]["values"]["prefer_current"] is None
+    assert painter.said("change_settings")[-1]["settings"]["prefer_current"] is None
 
 
 def test_settings_leave_the_pictures_seen_and_the_keys_alone(painter: Painter) -> None:
@@ -461,29 +463,34 @@ def test_settings_typed_into_are_closed_by_escape(painter: Painter) -> None:
 def test_escape_gives_up_the_stroke_before_it_closes_anything(painter: Painter) -> None:
     painter.button("Solve settings").click()
     painter.give_up()
-    assert painter.said("drop")
+    assert painter.said("drop_stroke")
     assert painter.page.locator(".settings").is_visible()
 
 
 #: What the sentence advises, what its button is called, and the message that it comes to.
 HELPS: list[tuple[dict[str, Any], str, str, dict[str, Any]]] = [
     (
-        {"kind": "hold", "hold": 0.8, "closes": 0.35},
+        {"kind": "hold", "hold": 0.8, "gain": 0.35},
         "Loosen: 35 % closer",
-        "set",
+        "change_settings",
         {"hold": 0.8},
     ),
-    ({"kind": "colors", "closes": 0.6}, "Any colour: 60 % closer", "set", {"colors": "free"}),
     (
-        {"kind": "off", "names": ["key"], "closes": 0.57},
+        {"kind": "colors", "gain": 0.6},
+        "Any colour: 60 % closer",
+        "change_settings",
+        {"colors": "free"},
+    ),
+    (
+        {"kind": "off", "names": ["key"], "gain": 0.57},
         "Turn on key: 57 % closer",
-        "ask_all",
+        "constrain_lights",
         {"key": {}},
     ),
     (
-        {"kind": "colour", "names": ["cove"], "closes": None},
+        {"kind": "colour", "names": ["cove"], "gain": None},
         "Any colour for cove",
-        "ask_all",
+        "constrain_lights",
         {"cove": {"limits": {"max": 2}}},
     ),
 ]
@@ -494,7 +501,7 @@ def test_what_is_advised_is_seen_before_it_is_done(
     painter: Painter, help_: dict[str, Any], label: str, kind: str, change: dict[str, Any]
 ) -> None:
     asked = {"key": {"off": True}, "cove": {"kelvin": 2700, "limits": {"max": 2}}}
-    said = {"kind": "answer", "exact": True, "lights": [], "delta_e": 11.2, "asked": asked}
+    said = {"kind": "answer", "exact": True, "lights": [], "delta_e": 11.2, "constraints": asked}
     how = painter.button("Analysis").bounding_box()
     help_ = {"names": [], "hold": None, **help_}
     painter.tell(**said, version=2, headline="A first step, 10 %.", help=help_)
@@ -505,7 +512,7 @@ def test_what_is_advised_is_seen_before_it_is_done(
     dialog = painter.page.get_by_role("dialog")
     dialog.get_by_text("changes the annex by ΔE 49").wait_for()
     assert [dialog.locator("canvas").nth(k).get_attribute("width") for k in (0, 1)] == ["16"] * 2
-    field = {"set": "values", "ask_all": "asked"}[kind]
+    field = {"change_settings": "settings", "constrain_lights": "constraints"}[kind]
     assert painter.said("preview")[-1][field] == change
     assert not painter.said(kind)  # nothing is done yet
     painter.page.keyboard.press("Escape")
@@ -519,7 +526,7 @@ def test_what_is_advised_is_seen_before_it_is_done(
 
 def test_a_preview_of_before_is_none(painter: Painter) -> None:
     said = {"kind": "answer", "exact": True, "lights": [], "delta_e": 11.2, "version": 2}
-    help_ = {"kind": "hold", "names": [], "hold": 0.8, "closes": 0.35}
+    help_ = {"kind": "hold", "names": [], "hold": 0.8, "gain": 0.35}
     painter.tell(**said, headline="A first step, 10 %.", help=help_)
     painter.page.evaluate("() => { window.host.preview = () => ({ kind: 'started' }); }")
     painter.button("Loosen").click()
@@ -527,17 +534,17 @@ def test_a_preview_of_before_is_none(painter: Painter) -> None:
     painter.tell(kind="previewed", number=number - 1, text="Old.", arrays={})
     assert painter.page.get_by_text("Computing the preview").is_visible()
     assert painter.button("Apply").is_disabled()
-    painter.tell(kind="say", text="That could not be found.", tone="warn", what="preview")
+    painter.tell(kind="notice", text="That could not be found.", tone="warn", task="preview")
     painter.page.get_by_role("dialog").wait_for(state="detached")
 
 
 @pytest.mark.parametrize(
     "help_",
     [
-        {"kind": "off", "names": ["key"], "closes": 0.5},  # asked before the session began
-        {"kind": "hold", "names": [], "hold": 3, "closes": 0.5},  # is so already
-        {"kind": "tie", "names": ["key", "cove"], "closes": 0.5},
-        {"kind": "sparse", "names": [], "closes": 0.5},
+        {"kind": "off", "names": ["key"], "gain": 0.5},  # asked before the session began
+        {"kind": "hold", "names": [], "hold": 3, "gain": 0.5},  # is so already
+        {"kind": "tie", "names": ["key", "cove"], "gain": 0.5},
+        {"kind": "sparse", "names": [], "gain": 0.5},
     ],
 )
 def test_what_cannot_be_let_go_here_has_no_button(painter: Painter, help_: dict[str, Any]) -> None:
@@ -586,7 +593,7 @@ def test_looks_that_are_kept_at_once_have_names_of_their_own(painter: Painter) -
         )
     assert [one["name"] for one in painter.said("save_look")] == ["Look 1", "Look 2"]
     kinds = [one["kind"] for one in painter.page.evaluate("() => host.said")]
-    assert kinds.index("ask") < kinds.index("save_look")
+    assert kinds.index("constrain_light") < kinds.index("save_look")
 
 
 def test_what_is_half_typed_is_given_up_by_escape(painter: Painter) -> None:
@@ -599,7 +606,7 @@ def test_what_is_half_typed_is_given_up_by_escape(painter: Painter) -> None:
     level.fill("-1")
     level.press("Escape")
     level.blur()
-    assert painter.said("set") == painter.said("ask") == []
+    assert painter.said("change_settings") == painter.said("constrain_light") == []
 
 
 def test_where_a_page_may_not_copy_it_says_so(opened: Any) -> None:

@@ -10,12 +10,12 @@ from lightpaint.storage.json_records import read_record
 
 #: One request of each kind that the page sends.
 ASKED = {
-    "paint": {"stroke": 1, "region": [0, 1, 0, 1], "done": True, "label": "brush"},
-    "drop": {"stroke": 2},
-    "ask": {"light": 0, "asked": {"off": True}, "done": True},
-    "ask_all": {"asked": {}},
+    "paint": {"stroke": 1, "region": [0, 1, 0, 1], "is_final": True, "label": "brush"},
+    "drop_stroke": {"stroke": 2},
+    "constrain_light": {"light": 0, "constraints": {"off": True}, "is_final": True},
+    "constrain_lights": {"constraints": {}},
     "tie": {"ties": []},
-    "set": {"values": {"hold": 1}},
+    "change_settings": {"settings": {"hold": 1}},
     "preview": {"number": 1, "view": 0},
     "save_look": {"name": "one"},
     "copy_look": {"look": 1},
@@ -25,7 +25,7 @@ ASKED = {
     "drop_look": {"look": 3},
     "undo": {},
     "redo": {},
-    "export": {"what": ["target", "lighting"]},
+    "export": {"outputs": ["target", "lighting"]},
     "verify": {"run": True},
     "explain": {"view": 0},
     "take_over": {},

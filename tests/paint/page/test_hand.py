@@ -14,7 +14,7 @@ def test_a_stroke_goes_to_the_engine_and_the_hint_goes_away(opened: Any) -> None
     painter.stroke()
     assert [call[1] for call in painter.calls("begin")] == ["brush"]
     assert painter.calls("end")
-    assert painter.said("paint")[-1]["done"] is True
+    assert painter.said("paint")[-1]["is_final"] is True
     assert not painter.page.get_by_text("Paint how it should look").is_visible()
     assert painter.page.get_by_text("Close to what was painted").is_visible()
 
@@ -95,7 +95,7 @@ def test_escape_leaves_a_stroke(painter: Painter) -> None:
     painter.give_up()
     assert painter.calls("cancel")
     assert not painter.calls("end")
-    assert painter.said("drop")
+    assert painter.said("drop_stroke")
 
 
 def test_one_finger_paints_and_two_move_and_zoom(opened: Any) -> None:
@@ -715,7 +715,7 @@ def test_zoom_is_said_in_pixels_of_the_picture(painter: Painter) -> None:
 @pytest.mark.parametrize("width", [1600, 1280, 1024])
 def test_what_is_under_the_pointer_has_room_beside_what_goes_on(opened: Any, width: int) -> None:
     painter = opened("first&lights=12", viewport={"width": width, "height": 720})
-    painter.tell(kind="progress", what="basis", done=128, total=1024, unit="samples")
+    painter.tell(kind="progress", task="basis", done=128, total=1024, unit="samples")
     painter.page.mouse.move(*painter.place())
     here, working = painter.page.locator(".here"), painter.page.locator(".working")
     here.locator(".light-here").wait_for()

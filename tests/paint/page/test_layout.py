@@ -151,7 +151,7 @@ def test_a_look_is_kept_from_anywhere(opened: Any, query: str) -> None:
     level.fill("-1")
     assert press("Control+s") == "strue"
     said = [one["kind"] for one in painter.page.evaluate("() => window.host.said")]
-    assert said[-2:] == ["ask", "save_look"]
+    assert said[-2:] == ["constrain_light", "save_look"]
     assert level.input_value() == "\u22121.0 st"
     assert level.evaluate("(one) => one.getRootNode().activeElement === one")
     assert press("Control+a") == "afalse"  # marks what is in the field
@@ -252,7 +252,7 @@ SENTENCE = (
 )
 
 
-HELP = {"kind": "colors", "names": [], "closes": 0.57, "hold": None}
+HELP = {"kind": "colors", "names": [], "gain": 0.57, "hold": None}
 
 
 def cut_off(painter: Painter) -> list[str]:
@@ -269,7 +269,7 @@ def cut_off(painter: Painter) -> list[str]:
 @pytest.mark.parametrize("size", SIZES + COLUMNS + LOW)
 def test_nothing_is_cut_off(opened: Any, size: tuple[int, int]) -> None:
     painter = opened("lights=12", viewport={"width": size[0], "height": size[1]})
-    about = {"headline": SENTENCE, "help": HELP, "delta_e": 11.2, "delta_e_asked": 20.5}
+    about = {"headline": SENTENCE, "help": HELP, "delta_e": 11.2, "delta_e_present": 20.5}
     painter.tell(kind="answer", version=2, exact=True, lights=[], **about)
     painter.page.keyboard.press("Control+s")
     for key in "bwa":
@@ -362,7 +362,7 @@ def test_axe_finds_nothing(opened: Any, axe: str, state: str) -> None:
         painter.button("Solo: show pendant").click()
         painter.page.keyboard.press("v")
         painter.tell(kind="closed", reason="taken", text="It is open on another page.")
-        painter.tell(kind="say", text="Something is so.", tone="warn")
+        painter.tell(kind="notice", text="Something is so.", tone="warn")
         painter.page.get_by_text("Something is so.").wait_for()
     elif state == "settings":
         painter.button("Solve settings").click()

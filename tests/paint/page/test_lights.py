@@ -7,25 +7,30 @@ import pytest
 from painter_page import Finger, Painter
 
 
+def newest(painter: Painter) -> Any:
+    """Return the constraints of the last request on one light."""
+    return painter.said("constrain_light")[-1]["constraints"]
+
+
 def test_a_light_is_moved_by_hand_and_freed(painter: Painter) -> None:
     painter.slide("key, stops from now", "ArrowRight", 20)
-    asked = painter.said("ask")
+    asked = painter.said("constrain_light")
     assert asked[-1]["light"] == 0
-    assert asked[-1]["done"] is True
+    assert asked[-1]["is_final"] is True
     present = painter.page.evaluate("() => window.painter.store.value.lights[0].present")
-    lock = asked[-1]["asked"]["lock"]
+    lock = asked[-1]["constraints"]["lock"]
     assert lock == pytest.approx([x * 2 for x in present], rel=1e-6)  # 20 steps of a twentieth
     painter.button("Unlock key").click()
-    assert painter.said("ask")[-1]["asked"] == {}
+    assert newest(painter) == {}
     painter.slide("key, stops from now", "Home")
-    assert painter.said("ask")[-1]["asked"] == {"lock": [0, 0, 0]}
+    assert newest(painter) == {"lock": [0, 0, 0]}
 
 
 def test_a_level_is_typed_in_stops_or_percent(painter: Painter) -> None:
     present = painter.page.evaluate("() => window.painter.store.value.lights[0].present")
 
     def lock() -> Any:
-        return painter.said("ask")[-1]["asked"]["lock"]
+        return newest(painter)["lock"]
 
     for text, factor in (
         ("+1.5", 2**1.5),
@@ -40,7 +45,7 @@ def test_a_level_is_typed_in_stops_or_percent(painter: Painter) -> None:
     ):
         painter.type("key, level", text)
         assert lock() == pytest.approx([factor * x for x in present], rel=1e-6)
-    count = len(painter.said("ask"))
+    count = len(painter.said("constrain_light"))
     for text in ("bright", "-3 %", "21 st", "12", "80", "-200"):
         painter.type("key, level", text)
         painter.page.get_by_role("textbox", name="key, level").blur()
@@ -51,15 +56,15 @@ def test_a_level_is_typed_in_stops_or_percent(painter: Painter) -> None:
     said = len(painter.ui("toasts"))
     painter.type("key, level", " ")
     assert len(painter.ui("toasts")) == said
-    assert len(painter.said("ask")) == count
+    assert len(painter.said("constrain_light")) == count
     level = painter.page.get_by_role("textbox", name="key, level")
     assert level.input_value() == "\u22129.0 st"
     level.press("ArrowUp")
     assert lock() == pytest.approx([2**-8.9 * x for x in present], rel=1e-6)
     painter.type("key, level", "off")
-    count = len(painter.said("ask"))
+    count = len(painter.said("constrain_light"))
     level.press("ArrowDown")  # there is nothing below it
-    assert len(painter.said("ask")) == count
+    assert len(painter.said("constrain_light")) == count
     assert level.input_value() == "off"
     level.press("ArrowUp")
     assert level.input_value() == "\u22127.9 st"
@@ -80,22 +85,22 @@ def test_a_light_is_held_at_what_is_typed_in_any_unit(painter: Painter) -> None:
     ):
         painter.choose("Unit", unit)
         painter.type("Locked at", text)
-        lock = painter.said("ask")[-1]["asked"]["lock"]
+        lock = newest(painter)["lock"]
         assert lock == pytest.approx([factor * x for x in present], rel=1e-6)
 
 
 def test_of_a_light_that_is_off_there_are_no_percent(painter: Painter) -> None:
     painter.type("cove, level", "80 %")
     assert "cove is off now" in painter.ui("toasts")[-1]["text"]
-    assert painter.said("ask") == []
+    assert painter.said("constrain_light") == []
     painter.type("cove, level", "as now")
-    assert painter.said("ask")[-1]["asked"] == {"lock": [0, 0, 0]}
+    assert newest(painter) == {"lock": [0, 0, 0]}
 
 
 def test_limits_that_leave_nothing_are_not_sent(painter: Painter) -> None:
     painter.page.get_by_role("button", name="key", exact=True).click()
     painter.type("Max", "150")
-    count = len(painter.said("ask"))
+    count = len(painter.said("constrain_light"))
     for label, before, text, words in (
         ("Min", "", "200", "The minimum (200 %) is above the maximum (150 %)"),
         ("Min", "", "150", ""),
@@ -108,7 +113,7 @@ def test_limits_that_leave_nothing_are_not_sent(painter: Painter) -> None:
             assert field.input_value() == before
         else:
             count += 1
-        assert len(painter.said("ask")) == count
+        assert len(painter.said("constrain_light")) == count
 
 
 @pytest.mark.parametrize("size", [(1280, 720), (1920, 1080), (690, 560), (480, 640)])
@@ -170,39 +175,39 @@ def test_what_was_asked_of_a_light_is_known_until_it_is_free(painter: Painter, w
           await session.constrainLight(0, limits);
           const asked =
             way === 'off' ? session.switchLight(0, true) : session.lockLight(0, [1, 1, 1], true);
-          host.tell({ kind: 'answer', exact: true, asked: { key: limits }, arrays: {} });
+          host.tell({ kind: 'answer', exact: true, constraints: { key: limits }, arrays: {} });
           await asked;
         }""",
         [limits, way],
     )
     painter.still()
     painter.page.evaluate("() => painter.session.unlockLight(0)")
-    assert painter.said("ask")[-1]["asked"] == limits
+    assert newest(painter) == limits
 
 
 def test_what_a_light_may_do(painter: Painter) -> None:
     page = painter.page
     page.get_by_role("button", name="key", exact=True).click()
     painter.type("Max", "150")
-    assert painter.said("ask")[-1]["asked"] == {"limits": {"max": "150%"}}
+    assert newest(painter) == {"limits": {"max": "150%"}}
     painter.type("Min", "20")
-    assert painter.said("ask")[-1]["asked"] == {"limits": {"min": "20%", "max": "150%"}}
+    assert newest(painter) == {"limits": {"min": "20%", "max": "150%"}}
     painter.choose("Colour", "kelvin")
     painter.type("From", "3000")
-    asked = painter.said("ask")[-1]["asked"]
+    asked = newest(painter)
     assert asked == {"limits": {"min": "20%", "max": "150%"}, "kelvin": [3000, 6500]}
     panel = page.get_by_role("group", name="Constraints on key")
     panel.get_by_role("button", name="Off", exact=True).click()
-    assert painter.said("ask")[-1]["asked"] == {"off": True}
+    assert newest(painter) == {"off": True}
     panel.get_by_role("button", name="Free", exact=True).click()
-    assert painter.said("ask")[-1]["asked"] == asked  # as it was before it was off
+    assert newest(painter) == asked  # as it was before it was off
     painter.choose("Colour", "color")
     painter.type("Hex or kelvin", "3200K")
-    assert painter.said("ask")[-1]["asked"]["color"] == "3200K"
+    assert newest(painter)["color"] == "3200K"
     painter.choose("Colour", "primaries")
-    assert len(painter.said("ask")[-1]["asked"]["primaries"]) == 3
+    assert len(newest(painter)["primaries"]) == 3
     panel.get_by_role("button", name="As now", exact=True).click()
-    assert painter.said("ask")[-1]["asked"] == {"lock": True}
+    assert newest(painter) == {"lock": True}
     painter.choose("Tie to", "cove")
     assert painter.said("tie")[-1]["ties"] == [["key", "cove"]]
     group = painter.page.get_by_role("group", name="key and cove, tied")
@@ -230,15 +235,19 @@ def test_who_holds_a_light_holds_its_dimmer(painter: Painter) -> None:
     free.wait_for()
     assert cove.locator(".dimmer.is-held").count() == 1
     free.click()
-    assert painter.said("ask")[-1]["asked"] == {}
-    assert painter.said("ask")[-1]["light"] == painter.said("ask")[0]["light"]  # key holds both
+    assert newest(painter) == {}
+    assert (
+        painter.said("constrain_light")[-1]["light"] == painter.said("constrain_light")[0]["light"]
+    )  # key holds both
     key.get_by_role("button", name="Lock key as it is").wait_for()
 
 
 def test_a_light_is_said_to_be_held_back_by_what_is_asked_of_it_alone(painter: Painter) -> None:
     badge = painter.page.locator(".badge")
-    held = "(asked) => host.tell({ kind: 'answer', exact: true, asked, arrays: {}, lights:"
-    held += " painter.store.value.lights.map(() => ({ share: 0.1, held: true })) })"
+    held = (
+        "(constraints) => host.tell({ kind: 'answer', exact: true, constraints, arrays: {}, lights:"
+    )
+    held += " painter.store.value.lights.map(() => ({ share: 0.1, is_constrained: true })) })"
     painter.page.evaluate(held, {})
     assert badge.count() == 0
     painter.page.evaluate(held, {"key": {"limits": {"max": "150%"}, "kelvin": [2700, 3000]}})
@@ -294,10 +303,10 @@ def test_a_light_that_hardly_shines_is_turned_up_in_its_own_colour(painter: Pain
     dark = "(rgb) => painter.store.set(({ weights }) => ({ weights: [rgb, ...weights.slice(1)] }))"
     painter.page.evaluate(dark, [0, 0, present[2] / 100])
     painter.type("key, level", "-1")
-    assert painter.said("ask")[-1]["asked"]["lock"] == pytest.approx([x / 2 for x in present])
+    assert newest(painter)["lock"] == pytest.approx([x / 2 for x in present])
     painter.page.evaluate(dark, [0, 0, 5 * present[2]])  # this one everybody has
     painter.type("key, level", "-1")
-    red, green, blue = painter.said("ask")[-1]["asked"]["lock"]
+    red, green, blue = newest(painter)["lock"]
     assert (red, green) == (0, 0)
     assert blue > present[2]
 
@@ -318,18 +327,18 @@ def test_on_its_way_through_the_dark_a_light_keeps_its_colour(painter: Painter) 
           }
         }"""
     )
-    red, green, blue = painter.said("ask")[-1]["asked"]["lock"]
+    red, green, blue = newest(painter)["lock"]
     assert [green / red, blue / red] == pytest.approx([0.5, 0.25])
 
 
 def test_a_light_is_held_at_a_white(painter: Painter) -> None:
     painter.button("key", exact=True).click()
     painter.button("Locked", exact=True).click()
-    before = painter.said("ask")[-1]["asked"]["lock"]
+    before = newest(painter)["lock"]
     kelvin = painter.page.locator(".held-colour").get_by_role("textbox", name="CCT")
     kelvin.fill("2700")
     kelvin.press("Enter")
-    lock = np.array(painter.said("ask")[-1]["asked"]["lock"])
+    lock = np.array(newest(painter)["lock"])
     luminance = [0.2126, 0.7152, 0.0722]
     assert lock @ luminance == pytest.approx(np.array(before) @ luminance)
     white = painter.page.evaluate(
@@ -354,7 +363,7 @@ def test_solo_and_mute_ask_nothing_of_the_solve(painter: Painter) -> None:
     assert not painter.calls("begin")
     painter.button("Mute: show the picture without key").click()
     assert painter.page.evaluate("() => window.engine.shown.gains") == [k != 0 for k in range(7)]
-    assert not painter.said("ask")
+    assert not painter.said("constrain_light")
     painter.page.locator(".light-thumb").nth(1).hover()
     painter.still()
     shown = painter.page.evaluate("() => window.engine.shown")
@@ -401,7 +410,7 @@ def test_64_lights_are_found_sorted_and_folded(opened: Any) -> None:
 def test_a_number_is_taken_as_it_is_shown(painter: Painter) -> None:
     painter.button("Solve settings").click()
     painter.type("At most", "1.5")
-    assert painter.said("set")[-1]["values"] == {"sparse": 2}
+    assert painter.said("change_settings")[-1]["settings"] == {"sparse": 2}
     assert painter.page.get_by_role("textbox", name="At most").input_value() == "2"
 
 
@@ -428,22 +437,22 @@ def test_a_finger_scrolls_lights_and_moves_none(opened: Any) -> None:
     finger.goes(*((x, y - 12 * k) for k in range(8)), *[(x, y - 84)] * 8)
     assert painter.page.evaluate(scrolled) > before + 40
     painter.page.evaluate("() => document.activeElement.blur()")
-    assert painter.said("ask") == []
+    assert painter.said("constrain_light") == []
     assert slider.input_value() == value
     x, y, _ = place()
     finger.goes(*((x + 6 * k, y + k) for k in range(8)))
-    asked = painter.said("ask")
+    asked = painter.said("constrain_light")
     assert {one["light"] for one in asked} == {4}
-    assert [one["done"] for one in asked][:: len(asked) - 1] == [False, True]
+    assert [one["is_final"] for one in asked][:: len(asked) - 1] == [False, True]
     assert mark(x + 42) == pytest.approx(0, abs=10)  # half of the mark, which stays on the track
     search = painter.page.get_by_role("searchbox", name="Search lights")
     search.focus()
     finger.goes((x, y))
     assert slider.evaluate("(one) => one === document.activeElement")
-    assert [one["done"] for one in painter.said("ask")[len(asked) :]] == [True]
+    assert [one["is_final"] for one in painter.said("constrain_light")[len(asked) :]] == [True]
     assert mark(x) == pytest.approx(0, abs=10)
     slider.press("ArrowRight")  # keys are heard as before
-    assert len(painter.said("ask")) > len(asked) + 1
+    assert len(painter.said("constrain_light")) > len(asked) + 1
     painter.page.mouse.click(x + 30, y)  # and so is a mouse
     assert mark(x + 30) == pytest.approx(0, abs=10)
 
@@ -461,9 +470,12 @@ def test_what_is_off_is_not_turned_up_by_turning_it_down(painter: Painter) -> No
     painter.still()
     level = panel.get_by_role("textbox", name="Locked at", exact=True)
     level.press("ArrowDown")
-    assert max(painter.said("ask")[-1]["asked"]["lock"]) == 0
+    assert max(newest(painter)["lock"]) == 0
     level.press("ArrowUp")
-    lock, present = painter.said("ask")[-1]["asked"]["lock"], painter.ui("lights")[0]["present"]
+    lock, present = (
+        newest(painter)["lock"],
+        painter.ui("lights")[0]["present"],
+    )
     assert lock == pytest.approx([x * 2**-7.9 for x in present], rel=1e-6)
 
 
@@ -472,7 +484,7 @@ def test_levels_far_below_one_are_not_off(painter: Painter) -> None:
     panel.get_by_role("button", name="Locked", exact=True).click()
     painter.choose("Unit", "value")
     painter.type("Locked at", "0.00004")
-    lock = painter.said("ask")[-1]["asked"]["lock"]
+    lock = newest(painter)["lock"]
     assert 0.2126 * lock[0] + 0.7152 * lock[1] + 0.0722 * lock[2] == pytest.approx(4e-5, rel=1e-3)
 
 
@@ -500,7 +512,7 @@ def test_limits_of_a_lights_file_are_shown_in_one_unit(
     assert float(fields[1].input_value()) == pytest.approx(most, rel=1e-3)
     unit, *ends = turned
     painter.choose("Unit", unit)
-    asked = painter.said("ask")[-1]["asked"]["limits"]
+    asked = newest(painter)["limits"]
     for key, end in zip(("min", "max"), ends, strict=True):
         if isinstance(end, str):
             assert float(asked[key].rstrip("%")) == pytest.approx(float(end.rstrip("%")), rel=1e-3)
@@ -524,8 +536,8 @@ def test_all_lights_are_let_go_of_in_one_step(painter: Painter) -> None:
     steps = painter.ui("history")["count"]
     free.click()
     free.wait_for(state="detached")
-    [said] = painter.said("ask_all")
-    assert said["asked"] == {"key": {"limits": {"max": "150%"}}, "cove": {}}
+    [said] = painter.said("constrain_lights")
+    assert said["constraints"] == {"key": {"limits": {"max": "150%"}}, "cove": {}}
     assert painter.ui("history")["count"] == steps + 1
     assert painter.page.locator(".dimmer.is-held").count() == 0
 

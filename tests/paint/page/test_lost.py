@@ -79,7 +79,7 @@ def test_what_is_refused_is_shown_no_longer(painter: Painter) -> None:
     """Nor does it go along with what is asked next."""
     painter.page.get_by_role("button", name="key", exact=True).click()
     painter.type("Min", "20")
-    before = {name: painter.ui(name) for name in ("asked", "ties", "settings", "weights")}
+    before = {name: painter.ui(name) for name in ("constraints", "ties", "settings", "weights")}
     at_most = painter.page.get_by_role("textbox", name="Max")
     refuse(painter)
     painter.type("Max", "1e308")
@@ -87,12 +87,12 @@ def test_what_is_refused_is_shown_no_longer(painter: Painter) -> None:
     assert at_most.input_value() == ""
     painter.choose("Colour", "kelvin")
     asked = {"limits": {"min": "20%"}, "kelvin": [2700, 6500]}
-    assert painter.said("ask")[-1]["asked"] == asked
+    assert painter.said("constrain_light")[-1]["constraints"] == asked
     refuse(painter)
     painter.choose("Colour", "any")
     painter.still()
-    assert painter.ui("asked") == {"key": asked}
-    before["asked"] = painter.ui("asked")
+    assert painter.ui("constraints") == {"key": asked}
+    before["constraints"] = painter.ui("constraints")
     for act in (
         lambda: painter.choose("Tie to", "cove"),
         lambda: painter.page.evaluate("() => void painter.session.changeSetting('sparse', 99)"),
@@ -114,7 +114,7 @@ def test_what_is_refused_leaves_what_is_on_its_way(painter: Painter) -> None:
         }"""
     )
     painter.still()
-    assert painter.ui("asked") == {"window left": {"off": True}}
+    assert painter.ui("constraints") == {"window left": {"off": True}}
 
 
 def alert(painter: Painter) -> str:
@@ -135,7 +135,7 @@ def test_a_kernel_that_does_not_answer_is_said_to_until_it_does(opened: Any) -> 
     painter.page.clock.resume()
     painter.page.evaluate("() => { model.isBusy = false; void model.work(); }")
     painter.page.wait_for_function("() => !document.querySelector('[role=alert]')")
-    assert painter.said("paint")[-1]["done"] is True
+    assert painter.said("paint")[-1]["is_final"] is True
     assert alert(painter) == ""
     painter.page.clock.fast_forward(60_000)  # nothing is waited for
     assert alert(painter) == ""
@@ -177,7 +177,7 @@ def ask_for_all(painter: Painter) -> None:
     """Ask for everything that takes long."""
     painter.page.evaluate(
         "() => { const { session, store } = painter; store.set({ isWriting: true });"
-        " session.send('export', { what: [] }); session.verify(); session.explain(); }"
+        " session.send('export', { outputs: [] }); session.verify(); session.explain(); }"
     )
     painter.still()
 
@@ -206,12 +206,12 @@ def test_what_fails_is_under_way_no_more_and_the_rest_is(painter: Painter) -> No
     painter.page.evaluate("() => { host.send = () => new Promise(() => {}); }")
     ask_for_all(painter)
     assert under_way(painter) == {"export", "verify", "explain"}
-    painter.tell(kind="say", text="The scene does not load.", tone="warn")
+    painter.tell(kind="notice", text="The scene does not load.", tone="warn")
     painter.tell(kind="failed", text="A stroke is too large.")
     assert under_way(painter) == {"export", "verify", "explain"}
     for what in ("verify", "explain", "export"):
         assert what in under_way(painter)
-        painter.tell(kind="say", text="It does not render.", tone="warn", what=what)
+        painter.tell(kind="notice", text="It does not render.", tone="warn", task=what)
         assert what not in under_way(painter)
 
 
@@ -223,7 +223,7 @@ def test_what_ended_while_the_connection_was_lost_is_not_waited_for(painter: Pai
     painter.tell(kind="connection", state="lost")
     painter.page.evaluate("() => host.tell(host.state())")
     assert under_way(painter) == set()
-    painter.tell(kind="progress", what="verification", done=5, total=16, unit="passes")
+    painter.tell(kind="progress", task="verification", done=5, total=16, unit="passes")
     assert under_way(painter) == {"verify"}  # which still goes on
     painter.tell(kind="closed", reason="taken", text="It is open on another page.")
     painter.page.evaluate("() => host.tell(host.state())")

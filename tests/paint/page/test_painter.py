@@ -101,7 +101,7 @@ def test_a_stroke_is_seen_and_said(run: Any, view: str):
     assert (before, after, beside) == (code(*[0.25] * 3), code(1, 0.5, 0.25), code(*[0.25] * 3))
     assert {kind for kind, _ in said} == {"paint"}
     assert {fields["stroke"] for _, fields in said} == {5}
-    assert [fields["done"] for _, fields in said][-1] is True
+    assert [fields["is_final"] for _, fields in said][-1] is True
     assert said[-1][1]["label"] == "brush"
 
 
@@ -141,7 +141,7 @@ def test_a_dropped_stroke_leaves_the_picture_as_it_was(run: Any):
         """
     )
     assert (during, after) == (code(1, 0.5, 0.25), code(*[0.25] * 3))
-    assert [kind for kind, _ in said] == ["paint", "drop"]
+    assert [kind for kind, _ in said] == ["paint", "drop_stroke"]
 
 
 def test_asking_by_drag_says_how_much(run: Any):
@@ -159,7 +159,7 @@ def test_asking_by_drag_says_how_much(run: Any):
     )
     assert asked == [{"stops": 1, "mired": 0}]
     np.testing.assert_allclose(colour, 0.5)
-    assert [fields.get("label") for _, fields in said if fields.get("done")] == ["adjust"]
+    assert [fields.get("label") for _, fields in said if fields.get("is_final")] == ["adjust"]
 
 
 def test_asking_by_numbers_line_fill_and_undo(run: Any):
@@ -179,7 +179,7 @@ def test_asking_by_numbers_line_fill_and_undo(run: Any):
     )
     assert (wall, floor, back) == (0.125, 0.25, 0.125)
     assert line == [1, 1, 0.125]
-    assert [f["label"] for _, f in said if f.get("done")] == ["adjust", "brush"]
+    assert [f["label"] for _, f in said if f.get("is_final")] == ["adjust", "brush"]
 
 
 def test_what_is_undone_while_the_painting_is_fetched_stays_undone(run: Any):

@@ -51,7 +51,7 @@ def test_one_message_is_in_flight_and_the_rest_is_merged(told: Any):
     )
     assert flights == [1, 1, 1, 1, 0]
     assert [one["region"] for one in said] == [[0, 2, 0, 3], [5, 11, 5, 12], [1, 2, 1, 2]]
-    assert [one["done"] for one in said] == [False, False, True]
+    assert [one["is_final"] for one in said] == [False, False, True]
     assert {one["stroke"] for one in said} == {1}
     assert said[1]["shapes"] == {"image": [6, 7, 3], "importance": [6, 7]}
     assert said[2]["label"] == "brush"
@@ -65,7 +65,7 @@ def test_a_stroke_that_is_sent_already_still_ends(told: Any):
         return host.told;
         """
     )
-    assert [(one["region"], one["done"]) for one in said] == [
+    assert [(one["region"], one["is_final"]) for one in said] == [
         ([3, 4, 5, 6], False),
         ([3, 3, 5, 5], True),
     ]
@@ -80,7 +80,7 @@ def test_what_is_done_is_sent_as_it_was_then(told: Any):
         strokes.end("b");
         for (let k = 0; k < 3; k++) await host.answer();
         return host.said.map(({ fields, arrays }) =>
-            [fields.stroke, fields.done, ...arrays.image.data.slice(0, 1)]);
+            [fields.stroke, fields.is_final, ...arrays.image.data.slice(0, 1)]);
         """
     )
     assert pixels == [[1, False, 1], [1, True], [2, True, 2]]
@@ -100,7 +100,7 @@ def test_a_lost_connection_loses_no_stroke(told: Any):
         return host.told;
         """
     )
-    assert [(one["stroke"], one["region"], one["done"]) for one in said] == [
+    assert [(one["stroke"], one["region"], one["is_final"]) for one in said] == [
         (1, [0, 6, 0, 6], True),  # whole, whatever was heard of it
         (2, [8, 9, 8, 9], True),
         (3, [1, 4, 1, 4], False),
@@ -124,7 +124,7 @@ def test_what_another_page_has_not_let_through_is_given_up(told: Any):
         """
     )
     assert said[0] == [2, False]
-    assert [(one["stroke"], one["region"], one["done"]) for one in said[1]] == [
+    assert [(one["stroke"], one["region"], one["is_final"]) for one in said[1]] == [
         (8, [1, 2, 1, 2], False),
         (8, [1, 1, 1, 1], True),
     ]
@@ -168,7 +168,7 @@ def test_a_dropped_stroke_is_said_to_be_dropped_if_anything_of_it_was_said(told:
         return host.told;
         """
     )
-    assert [(one["kind"], one["stroke"]) for one in said] == [("paint", 2), ("drop", 2)]
+    assert [(one["kind"], one["stroke"]) for one in said] == [("paint", 2), ("drop_stroke", 2)]
 
 
 def test_an_error_does_not_end_painting(told: Any):
@@ -212,7 +212,7 @@ def test_what_another_page_did_not_let_through_waits(told: Any):
         return [host.told, [pending, strokes.isPending]];
         """
     )
-    assert [one["done"] for one in said] == [False, True, True]
+    assert [one["is_final"] for one in said] == [False, True, True]
     assert said[-1]["region"] == [0, 2, 0, 2]  # whole
     assert pending == [True, False]
 
@@ -226,13 +226,13 @@ def test_frames_are_those_of_the_library(page: Any):
             const image = { data, shape: [2, 4, 3] };
             const importance = { data: new Float32Array(8).fill(1), shape: [2, 4] };
             const fields = { kind: "paint", seq: 7, stroke: 3, region: [1, 3, 2, 6],
-                done: true, label: "Pinsel – größer" };
+                is_final: true, label: "Pinsel – größer" };
             return Array.from(new Uint8Array(frame(fields, { image, importance })));
         }"""
     )
     content, buffers = from_frame(bytes(frame))
     seq, said, arrays = parse_request(content, buffers)
-    assert (seq, said.stroke, said.region, said.done) == (7, 3, (1, 3, 2, 6), True)
+    assert (seq, said.stroke, said.region, said.is_final) == (7, 3, (1, 3, 2, 6), True)
     assert said.label == "Pinsel – größer"
     np.testing.assert_array_equal(arrays["image"], image)
     np.testing.assert_array_equal(arrays["importance"], 1)

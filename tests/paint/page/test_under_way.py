@@ -10,7 +10,7 @@ from painter_page import Painter
 
 
 def progress(painter: Painter, what: str, done: int, total: int = 16) -> None:
-    painter.tell(kind="progress", what=what, done=done, total=total, unit="passes")
+    painter.tell(kind="progress", task=what, done=done, total=total, unit="passes")
 
 
 def test_files_that_are_written_are_seen_when_their_window_is_closed(painter: Painter) -> None:
@@ -27,7 +27,7 @@ def test_files_that_are_written_are_seen_when_their_window_is_closed(painter: Pa
     chip = page.locator(".working")
     chip.get_by_text("Exporting files: 25 %").wait_for()
     page.get_by_role("button", name="Stop: exporting files").click()
-    assert painter.said("export")[-1] == {"kind": "export", "what": [], "run": False}
+    assert painter.said("export")[-1] == {"kind": "export", "outputs": [], "run": False}
     painter.tell(
         kind="exported", files=["/shows/gallery-evening/lighting.json"], command="", is_stopped=True
     )
@@ -44,7 +44,7 @@ def test_files_that_are_written_are_seen_when_their_window_is_closed(painter: Pa
 
 
 def test_reasons_that_are_sought_are_said_to_be(painter: Painter) -> None:
-    painter.page.evaluate("() => { host.explain = () => ({ kind: 'started', what: 'explain' }); }")
+    painter.page.evaluate("() => { host.explain = () => ({ kind: 'started', task: 'explain' }); }")
     painter.button("Analysis").click()
     painter.button("Why not closer?").click()
     sought = painter.page.get_by_role("button", name="Finding reasons …")
@@ -73,7 +73,7 @@ def test_all_that_goes_on_is_counted_alike(painter: Painter) -> None:
         """() => {
           const now = performance.now();
           performance.now = () => now + 10000;  // ten seconds later
-          host.tell({ kind: 'progress', what: 'basis', done: 7, total: 16, unit: 'passes' });
+          host.tell({ kind: 'progress', task: 'basis', done: 7, total: 16, unit: 'passes' });
         }"""
     )
     page.locator(".working").get_by_text("Rendering the lights: 43 %, 20 s left").wait_for()

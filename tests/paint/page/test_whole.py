@@ -121,7 +121,7 @@ def exporting(painter: Painter) -> None:
     painter.button("Export").click()
     painter.page.evaluate(
         """() => {
-          const writing = { what: 'export', done: 205, total: 1024, unit: 'samples per pixel' };
+          const writing = { task: 'export', done: 205, total: 1024, unit: 'samples per pixel' };
           window.painter.store.set({ isWriting: true, writing });
         }"""
     )
@@ -141,7 +141,7 @@ def messages(painter: Painter) -> None:
     painter.page.evaluate(
         """async () => {
           const { TOAST } = await import('/fake/crowd.js');
-          const basis = { what: 'basis', done: 128, total: 1024, unit: 'samples per pixel' };
+          const basis = { task: 'basis', done: 128, total: 1024, unit: 'samples per pixel' };
           const toasts = [{ id: 1, text: TOAST, tone: 'warn' }];
           const closed = { reason: 'taken', text: `${TOAST} ${TOAST}` };
           window.painter.store.set({ basis, toasts, closed });
@@ -217,7 +217,7 @@ def test_a_sentence_with_its_button_is_whole(painter: Painter) -> None:
             headline: 'Farther from the paint than the present lighting, which undo brings back, '
               + 'and changes the back wall by ΔE 6.2. Brighter light on the annex is missing: '
               + 'annex_window is switched off.',
-            help: HELP, deltaE: 23, deltaAsked: 6.9, isJudged: true,
+            help: HELP, deltaE: 23, deltaPresent: 6.9, isJudged: true,
           });
         }"""
     )

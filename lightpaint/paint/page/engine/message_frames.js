@@ -7,7 +7,7 @@
  */
 
 /** Version of this protocol. */
-export const VERSION = 2;
+export const VERSION = 3;
 
 /** @typedef {import("../../../viewer/drawing/lut.js").Data} Data */
 /** @typedef {import("../../../viewer/drawing/lut.js").Picture} Picture */

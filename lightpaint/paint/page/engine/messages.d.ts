@@ -60,7 +60,7 @@ export interface LightInfo {
  * position: null for one at infinity, or without a place. direction: unit vector along its axis;
  * null for one without an axis. target: the requested point, or else the surface on its axis.
  * cutoff, beam: degrees from its axis; null for all but spots. rail: both ends of its rail.
- * why_not: why it cannot be moved; "" if it can.
+ * immovable_reason: why it cannot be moved; "" if it can.
  */
 export interface LightPlace {
   position: number[] | null;
@@ -69,19 +69,20 @@ export interface LightPlace {
   cutoff: number | null;
   beam: number | null;
   rail: [number[], number[]] | null;
-  why_not: string;
+  immovable_reason: string;
 }
 
 /**
- * A camera without a lens. A pixel (x, y) sees origin + s · (x · across + y · down + ahead).
+ * A camera without a lens. Pixel (x, y) sees origin + s · (x · x_axis + y · y_axis + forward).
  *
- * is_parallel: all rays have the direction `ahead`, and begin at origin + x · across + y · down.
+ * is_parallel: all rays have the direction `forward` and begin at
+ * origin + x · x_axis + y · y_axis.
  */
 export interface Camera {
   origin: number[];
-  across: number[];
-  down: number[];
-  ahead: number[];
+  x_axis: number[];
+  y_axis: number[];
+  forward: number[];
   is_parallel: boolean;
 }
 
@@ -158,12 +159,12 @@ export interface TableInfo {
 }
 
 /**
- * Numbers of samples per pixel: rendered, and wanted.
+ * Samples per pixel: of the present basis, and of the final one.
  */
 export interface SampleCount {
   spp: number;
-  wanted: number;
-  done: boolean;
+  target_spp: number;
+  is_complete: boolean;
 }
 
 /**
@@ -188,24 +189,24 @@ export interface ResolvedFit {
  * A constraint that keeps the lights from the paint and can be loosened.
  *
  * kind: of the constraint; `reach` if there is none, but moving lights may help. names: its
- * lights. closes: share of the error that disappears without it; null if more is needed. hold: the
+ * lights. gain: share of the error that disappears without it; null if more is needed. hold: the
  * weaker hold to set.
  */
 export interface Advice {
   kind: string;
   names: string[];
-  closes: number | null;
+  gain: number | null;
   hold: number | null;
 }
 
 /**
- * Closeness of an answer in one view. delta_e_asked: ΔE of the present look.
+ * Closeness of an answer in one view. delta_e_present: ΔE of the present look.
  */
 export interface Closeness {
   headline: string;
   help: Advice | null;
   delta_e: number;
-  delta_e_asked: number;
+  delta_e_present: number;
   sentences: string[];
 }
 
@@ -213,8 +214,8 @@ export interface Closeness {
  * The answer for one light.
  *
  * stops: relative to its present emission; null if it is, or was, off. kelvin: null for a colour
- * that is not white. share: of the light in the picture. error: its uncertainty, in words. held:
- * whether a constraint limits it. unreached: whether no paint depends on it.
+ * that is not white. share: of the light in the picture. error: its uncertainty, in words.
+ * is_constrained: whether a constraint limits it. is_unreached: whether no paint depends on it.
  */
 export interface LightAnswer {
   emission: RGB;
@@ -224,15 +225,15 @@ export interface LightAnswer {
   is_on: boolean;
   share: number;
   error?: string;
-  held?: boolean;
-  unreached?: boolean;
+  is_constrained?: boolean;
+  is_unreached?: boolean;
 }
 
 /**
  * Properties of an answer; the sentences follow later than the lights.
  *
  * lights: in the order of the state. shares: of each light, by view, if there are several.
- * of_views: closeness of each view; null for unpainted views.
+ * closeness: of each view; null for unpainted views.
  */
 export interface Findings {
   lights?: LightAnswer[];
@@ -240,26 +241,26 @@ export interface Findings {
   headline?: string;
   help?: Advice;
   delta_e?: number;
-  delta_e_asked?: number;
+  delta_e_present?: number;
   sentences?: string[];
-  of_views?: (Closeness | null)[];
+  closeness?: (Closeness | null)[];
 }
 
 /**
  * The steps that can be undone, and the requests in effect.
  *
- * asked: constraints by name of light, keys and values as in a lights file. ties: names on one
- * dimmer. settings: those that were set. resolved: the values in effect. poses: of moved lights,
- * by name. added: names of lights that the scene does not have. layers: of the painting.
+ * constraints: by name of light, keys and values as in a lights file. ties: names on one dimmer.
+ * settings: those that were set. effective_settings: those in effect. poses: of moved lights, by
+ * name. added_lights: names of lights that the scene does not have. layers: of the painting.
  */
 export interface EditState {
   history?: HistoryInfo;
-  asked?: Record<string, Record<string, any>>;
+  constraints?: Record<string, Record<string, any>>;
   ties?: string[][];
   settings?: Record<string, any>;
   poses?: Record<string, Record<string, any>>;
-  added?: string[];
-  resolved?: ResolvedFit;
+  added_lights?: string[];
+  effective_settings?: ResolvedFit;
   layers?: LayerList;
 }
 
@@ -270,7 +271,7 @@ export interface EditState {
  * version: of this protocol. size: height and width of the first view, and `objects` the names of
  * its objects.
  * lut: the grid of the tables `lut/NAME` of all `transforms`. resources: pictures, with a number
- * that grows when one is replaced. verified: the last verification of each view. first: whether
+ * that grows when one is replaced. verifications: the last one of each view. is_new: whether
  * the session has no steps yet. stroke: number of the last stroke that arrived. command: solves
  * for the exported paintings. is_back: the client had the session before, and no other client
  * since; also true if unasked. weights: (lights, 3) float64, the last answer.
@@ -279,12 +280,12 @@ export interface SessionState {
   kind: 'state';
   reply?: number;
   history?: HistoryInfo;
-  asked?: Record<string, Record<string, any>>;
+  constraints?: Record<string, Record<string, any>>;
   ties?: string[][];
   settings?: Record<string, any>;
   poses?: Record<string, Record<string, any>>;
-  added?: string[];
-  resolved?: ResolvedFit;
+  added_lights?: string[];
+  effective_settings?: ResolvedFit;
   layers?: LayerList;
   version: number;
   scene: string;
@@ -301,8 +302,8 @@ export interface SessionState {
   resources: Record<string, number>;
   looks: LookInfo[];
   basis: SampleCount;
-  verified: Omit<VerificationResult, 'kind' | 'arrays'>[];
-  first: boolean;
+  verifications: Omit<VerificationResult, 'kind' | 'arrays'>[];
+  is_new: boolean;
   stroke: number;
   command: string;
   answer: Findings;
@@ -344,16 +345,16 @@ export interface AnswerUpdate {
   headline?: string;
   help?: Advice;
   delta_e?: number;
-  delta_e_asked?: number;
+  delta_e_present?: number;
   sentences?: string[];
-  of_views?: (Closeness | null)[];
+  closeness?: (Closeness | null)[];
   history?: HistoryInfo;
-  asked?: Record<string, Record<string, any>>;
+  constraints?: Record<string, Record<string, any>>;
   ties?: string[][];
   settings?: Record<string, any>;
   poses?: Record<string, Record<string, any>>;
-  added?: string[];
-  resolved?: ResolvedFit;
+  added_lights?: string[];
+  effective_settings?: ResolvedFit;
   layers?: LayerList;
   version: number;
   stroke: number;
@@ -373,12 +374,12 @@ export interface CanvasPatch {
   kind: 'patch';
   reply?: number;
   history?: HistoryInfo;
-  asked?: Record<string, Record<string, any>>;
+  constraints?: Record<string, Record<string, any>>;
   ties?: string[][];
   settings?: Record<string, any>;
   poses?: Record<string, Record<string, any>>;
-  added?: string[];
-  resolved?: ResolvedFit;
+  added_lights?: string[];
+  effective_settings?: ResolvedFit;
   layers?: LayerList;
   region: Region;
   view: number;
@@ -425,13 +426,13 @@ export interface LookList {
 /**
  * The progress of a long task. Unasked.
  *
- * what: `export`, `basis`, `sampling` for samples added where the paint needs them, or the
+ * task: `export`, `basis`, `sampling` for samples added where the paint needs them, or the
  * renderer's name for the task.
  */
 export interface ProgressReport {
   kind: 'progress';
   reply?: number;
-  what: string;
+  task: string;
   done: number;
   total: number;
   unit: string;
@@ -439,12 +440,12 @@ export interface ProgressReport {
 }
 
 /**
- * Notice that a long task has started. what: the request, or `stop`.
+ * Notice that a long task has started. task: the request, or `stop`.
  */
 export interface TaskStarted {
   kind: 'started';
   reply?: number;
-  what: 'export' | 'verify' | 'explain' | 'preview' | 'rig' | 'place' | 'stop';
+  task: 'export' | 'verify' | 'explain' | 'preview' | 'rig' | 'place' | 'stop';
   arrays: {  };
 }
 
@@ -454,7 +455,7 @@ export interface TaskStarted {
 export interface TaskStopped {
   kind: 'stopped';
   reply?: number;
-  what: 'verify';
+  task: 'verify';
   arrays: {  };
 }
 
@@ -563,14 +564,14 @@ export interface PlacingResult {
 }
 
 /**
- * A sentence for users. Unasked. what: the task that it ends.
+ * A sentence for users. Unasked. task: the one that it ends.
  */
 export interface Notice {
-  kind: 'say';
+  kind: 'notice';
   reply?: number;
   text: string;
   tone: 'info' | 'warn';
-  what?: string;
+  task?: string;
   arrays: {  };
 }
 
@@ -618,16 +619,16 @@ export interface Hello {
  * Pixels under the brush; with arrays `image` (rows, columns, 3) float32 and `importance`
  * (rows, columns) float32. Answered by `answer`.
  *
- * stroke: number of the stroke, which the page counts. done: whether this ends the stroke; only
- * then it is kept. label: its name for undo. view: index of the painted view. layer: id of the
- * layer of these pixels. For all kinds but `pixels`, `importance` is the coverage, 0 to 1, and
+ * stroke: number of the stroke, which the page counts. is_final: whether this ends the stroke;
+ * only then it is kept. label: its name for undo. view: index of the painted view. layer: id of
+ * the layer of these pixels. For all kinds but `pixels`, `importance` is the coverage, 0 to 1, and
  * masks need no `image`. properties: of the layer, from now on; with an unused id they add a layer
  * on top.
  */
 export interface Paint {
   stroke: number;
   region: Region;
-  done?: boolean;
+  is_final?: boolean;
   label?: string;
   view?: number;
   layer?: number;
@@ -639,20 +640,21 @@ export interface Paint {
  *
  * layers: new or changed ones; new ones lie on top. order: ids of all that stay, the lowest first;
  * null for the present order. copies: ids of the originals by the id of each copy, which is among
- * `layers`. done: whether it becomes a step; false while a slider moves. label: its name for undo.
+ * `layers`. is_final: whether it becomes a step; false while a slider moves. label: its name for
+ * undo.
  */
 export interface ChangeLayers {
   layers?: Layer[];
   order?: number[] | null;
   copies?: Record<string, number>;
-  done?: boolean;
+  is_final?: boolean;
   label?: string;
 }
 
 /**
  * Cancel the unfinished stroke. Answered by `patch`.
  */
-export interface Drop {
+export interface DropStroke {
   stroke: number;
 }
 
@@ -671,61 +673,62 @@ export interface Redo {
 /**
  * New constraints on one light; an empty object frees it. Answered by `answer`.
  *
- * asked: keys and values as in a lights file: lock, off, limits, color, kelvin, duv, primaries.
- * done: whether it becomes a step; false while a slider moves.
+ * constraints: keys and values as in a lights file: lock, off, limits, color, kelvin, duv,
+ * primaries.
+ * is_final: whether it becomes a step; false while a slider moves.
  */
-export interface Ask {
+export interface ConstrainLight {
   light: number;
-  asked: Record<string, any>;
-  done?: boolean;
+  constraints: Record<string, any>;
+  is_final?: boolean;
 }
 
 /**
- * New constraints on several lights, by name, as in `Ask`: one step. Answered by
+ * New constraints on several lights, by name, as in `constrain_light`: one step. Answered by
  * `answer`.
  */
-export interface AskAll {
-  asked: Record<string, Record<string, any>>;
+export interface ConstrainLights {
+  constraints: Record<string, Record<string, any>>;
 }
 
 /**
  * New places, targets and cones of lights, by name. Answered by `answer`; `rig` follows.
  *
  * poses: changed fields of `lightpaint.Pose`: position, target, cutoff and beam; an empty object
- * restores a light's place from the scene. done: whether it becomes a step; false while a light is
- * dragged.
+ * restores a light's place from the scene. is_final: whether it becomes a step; false while a
+ * light is dragged.
  */
 export interface MoveLights {
   poses: Record<string, Record<string, any>>;
-  done?: boolean;
+  is_final?: boolean;
 }
 
 /**
  * A move of a light by a place in the picture. Answered by `answer`; `rig` follows.
  *
- * how: `aim` points it there; `highlight` hangs it so that its reflection appears there; `shadow`
- * hangs it so that the shadow of the surface at `edge` ends there. at, edge: column and row in
- * pixels. view: index of the view. done: as in `move`.
+ * mode: `aim` points it there; `highlight` hangs it so that its reflection appears there; `shadow`
+ * hangs it so that the shadow of the surface at `edge` ends there. pixel, edge: column and row in
+ * pixels. view: index of the view. is_final: as in `move`.
  */
 export interface PointLight {
   light: number;
-  how: 'aim' | 'highlight' | 'shadow';
-  at: [number, number];
+  mode: 'aim' | 'highlight' | 'shadow';
+  pixel: [number, number];
   edge?: [number, number] | null;
   view?: number;
-  done?: boolean;
+  is_final?: boolean;
 }
 
 /**
  * A new light, with a generated name: one step. Answered by `state`; `rig` follows.
  *
- * type: of the light. at: column and row in a picture; the light hangs a little before the surface
- * there, and points away from it. position: its place, instead; it points down. view: index of the
- * view.
+ * type: of the light. pixel: column and row in a picture; the light hangs a little before the
+ * surface there, and points away from it. position: its place, instead; it points down. view:
+ * index of the view.
  */
 export interface AddLight {
   type: 'spot' | 'point' | 'panel';
-  at?: [number, number] | null;
+  pixel?: [number, number] | null;
   position?: number[] | null;
   view?: number;
 }
@@ -743,15 +746,15 @@ export interface RemoveLight {
  * or to stop that. Answered by `started`, then by `trial` and later by `placed`; the result is one
  * step.
  *
- * new: kind of lights to add, instead of moving existing ones; null for none. count: maximum
- * number of them. on: names of rails, surfaces and shapes that they may hang on; none for anywhere
- * free.
+ * new_type: type of lights to add, instead of moving existing ones; null for none. max_count:
+ * maximum number of them. surfaces: names of rails, surfaces and shapes that they may hang on;
+ * none for anywhere free.
  */
 export interface PlaceLights {
   run?: boolean;
-  new?: 'spot' | 'point' | 'panel' | null;
-  count?: number;
-  on?: string[];
+  new_type?: 'spot' | 'point' | 'panel' | null;
+  max_count?: number;
+  surfaces?: string[];
 }
 
 /**
@@ -771,11 +774,11 @@ export interface TieLights {
 /**
  * Settings of the answer, as in `Fit`. Answered by `answer`.
  *
- * values: of hold, space, colors, literal, prefer_current, sparse; null for the default that
+ * settings: of hold, space, colors, literal, prefer_current, sparse; null for the default that
  * follows from the painting.
  */
-export interface Set {
-  values: Record<string, any>;
+export interface ChangeSettings {
+  settings: Record<string, any>;
 }
 
 /**
@@ -783,13 +786,14 @@ export interface Set {
  * `previewed`, with small pictures of the answer now and after the change, `before` and `after`
  * (h, w, 3) uint8.
  *
- * number: of the preview, which the page counts; `previewed` returns it. values, asked, ties: as
- * in `Set`, `AskAll` and `TieLights`; null for unchanged ties. view: index of the view.
+ * number: of the preview, which the page counts; `previewed` returns it. settings, constraints,
+ * ties: as in `change_settings`, `constrain_lights` and `tie`; null for unchanged ties. view:
+ * index of the view.
  */
 export interface Preview {
   number: number;
-  values?: Record<string, any>;
-  asked?: Record<string, Record<string, any>>;
+  settings?: Record<string, any>;
+  constraints?: Record<string, Record<string, any>>;
   ties?: string[][] | null;
   view?: number;
 }
@@ -845,10 +849,11 @@ export interface DropLook {
  * Write results to the folder of the session, or stop that. Answered by `started`, later by
  * `exported`, which names the files written, even if stopped.
  *
- * what: target: a painting of each painted view; picture: the displayed answer in each view.
+ * outputs: `target`: a painting of each painted view; `picture`: the displayed answer in each
+ * view.
  */
 export interface Export {
-  what: ('target' | 'picture' | 'lighting' | 'relit' | 'report')[];
+  outputs: ('target' | 'picture' | 'lighting' | 'relit' | 'report')[];
   run?: boolean;
 }
 
@@ -922,7 +927,7 @@ export interface Events {
   rig: Rig;
   trial: TrialPlaces;
   placed: PlacingResult;
-  say: Notice;
+  notice: Notice;
   failed: Failure;
   closed: Closing;
   done: Acknowledgement;
@@ -933,11 +938,11 @@ export interface Requests {
   hello: Hello;
   paint: Paint;
   change_layers: ChangeLayers;
-  drop: Drop;
+  drop_stroke: DropStroke;
   undo: Undo;
   redo: Redo;
-  ask: Ask;
-  ask_all: AskAll;
+  constrain_light: ConstrainLight;
+  constrain_lights: ConstrainLights;
   move: MoveLights;
   point: PointLight;
   add_light: AddLight;
@@ -945,7 +950,7 @@ export interface Requests {
   place: PlaceLights;
   show_rig: ShowRig;
   tie: TieLights;
-  set: Set;
+  change_settings: ChangeSettings;
   preview: Preview;
   save_look: SaveLook;
   load_look: LoadLook;

@@ -140,8 +140,8 @@ export class SessionMirror {
 
   /** Weights that come with a message. @param {Message} message */
   mix(message) {
-    const { poses, added } = message;
-    if (poses && added) this.isMoved = Object.keys(poses).length + added.length > 0;
+    const { poses, added_lights: addedLights } = message;
+    if (poses && addedLights) this.isMoved = Object.keys(poses).length + addedLights.length > 0;
     else if (poses) this.isMoved ||= Object.keys(poses).length > 0;
     const weights = message.arrays?.weights?.data;
     if (!weights) return;

@@ -32,7 +32,7 @@ import { VERSION, frame, pictureOf, unframe } from './message_frames.js';
  *   silence: {kind: 'silence', isSilent: boolean}}} HostEvents */
 
 /** Requests that do not wait for pending strokes. */
-export const UNQUEUED = ['paint', 'drop', 'hello', 'take_over', 'fetch'];
+export const UNQUEUED = ['paint', 'drop_stroke', 'hello', 'take_over', 'fetch'];
 
 /** Listeners by message kind: the part that all hosts share. */
 export class Emitter {

@@ -99,7 +99,7 @@ export class StrokeSender {
     for (const one of this.left) {
       if ('isDropped' in one) continue;
       const { stroke, view, cut, label } = one;
-      const fields = { stroke, view, region: cut, done: true, label };
+      const fields = { stroke, view, region: cut, is_final: true, label };
       // Earlier messages have arrived already.
       this.host.send('paint', fields, cutOf(one)).catch(() => {});
     }
@@ -170,25 +170,25 @@ export class StrokeSender {
   pump() {
     if (this.isBusy || !this.isOpen || this.isOver) return;
     const [next] = this.left;
-    if (next && 'isDropped' in next) this.send('drop', { stroke: next.stroke }, {}, next);
+    if (next && 'isDropped' in next) this.send('drop_stroke', { stroke: next.stroke }, {}, next);
     else if (next) {
       const { stroke, view, cut, label } = next;
-      this.send('paint', { stroke, view, region: cut, done: true, label }, cutOf(next), next);
+      this.send('paint', { stroke, view, region: cut, is_final: true, label }, cutOf(next), next);
     } else if (this.live?.dirty && this.canvas) {
       const { stroke, view, dirty } = this.live;
       this.live.dirty = null;
       this.live.isKnown = true;
-      const fields = { stroke, view, region: dirty, done: false };
+      const fields = { stroke, view, region: dirty, is_final: false };
       this.send('paint', fields, this.canvas.copy(dirty), null);
     }
   }
 
-  /** @template {"paint" | "drop"} K @param {K} kind
+  /** @template {"paint" | "drop_stroke"} K @param {K} kind
    * @param {import("./messages.js").Requests[K]} fields @param {Arrays} arrays
    * @param {PendingStroke | null} left what is answered with it */
   async send(kind, fields, arrays, left) {
     this.isBusy = true;
-    this.isDropping = kind === 'drop';
+    this.isDropping = kind === 'drop_stroke';
     try {
       const reply = await this.host.send(kind, fields, arrays);
       if (left && reply.kind !== 'closed') this.left = this.left.filter((one) => one !== left);

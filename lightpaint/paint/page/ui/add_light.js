@@ -25,7 +25,7 @@ export function AddLight({ ui, app }) {
   const { store, session } = app;
   const { adding, pointing, rig } = ui;
   const isClick = adding.where === CLICK;
-  const isOn = pointing?.how === 'hang';
+  const isOn = pointing?.mode === 'hang';
   const set = (/** @type {Partial<Ui["adding"]>} */ changed) =>
     store.set({ adding: { ...adding, ...changed }, pointing: null });
   const places = [
@@ -35,7 +35,7 @@ export function AddLight({ ui, app }) {
   ];
   const act = () =>
     isClick
-      ? store.set({ lamps: true, pointing: isOn ? null : { how: 'hang', type: adding.type } })
+      ? store.set({ lamps: true, pointing: isOn ? null : { mode: 'hang', type: adding.type } })
       : session.findLights(adding);
   return html`<div class="add-light" role="group" aria-label="Add a light">
     <${Select} label="New light" value=${adding.type} choices=${KINDS}

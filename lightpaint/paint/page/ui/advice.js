@@ -58,9 +58,9 @@ function titleOf({ kind, hold }, name) {
  * @param {Cause} cause @param {Ui} ui @param {App["session"]} session @returns {Change | null} */
 function changeOf({ kind, names, hold }, ui, session) {
   /** @param {string} key @param {any} value @returns {Change} */
-  const set = (key, value) => ({ kind: 'set', fields: { values: { [key]: value } } });
-  if (kind === 'hold') return ui.resolved.hold === hold ? null : set('hold', hold);
-  if (kind === 'colors') return ui.resolved.colors === 'free' ? null : set('colors', 'free');
+  const set = (key, value) => ({ kind: 'change_settings', fields: { settings: { [key]: value } } });
+  if (kind === 'hold') return ui.effectiveSettings.hold === hold ? null : set('hold', hold);
+  if (kind === 'colors') return ui.effectiveSettings.colors === 'free' ? null : set('colors', 'free');
   if (kind === 'sparse' || kind === 'prefer_current')
     return ui.settings[kind] ? set(kind, null) : null;
   if (kind === 'tie') {
@@ -68,9 +68,9 @@ function changeOf({ kind, names, hold }, ui, session) {
     return ties.length < ui.ties.length ? { kind: 'tie', fields: { ties } } : null;
   }
   const keys = KEYS[kind] ?? [];
-  if (!names.every((name) => keys.some((key) => key in (ui.asked[name] ?? {})))) return null;
-  const asked = names.map((name) => [name, without(name, keys, ui, session)]);
-  return { kind: 'ask_all', fields: { asked: Object.fromEntries(asked) } };
+  if (!names.every((name) => keys.some((key) => key in (ui.constraints[name] ?? {})))) return null;
+  const constraints = names.map((name) => [name, without(name, keys, ui, session)]);
+  return { kind: 'constrain_lights', fields: { constraints: Object.fromEntries(constraints) } };
 }
 
 /** Return the remaining constraints of a light; for one locked by hand, those from before.
@@ -78,8 +78,8 @@ function changeOf({ kind, names, hold }, ui, session) {
 function without(name, keys, ui, session) {
   const light = ui.lights.findIndex((one) => one.name === name);
   const isLevel = keys.includes('off') || keys.includes('lock');
-  const asked = (isLevel && session.unlockedConstraints.get(light)) || ui.asked[name];
-  return Object.fromEntries(Object.entries(asked).filter(([key]) => !keys.includes(key)));
+  const constraints = (isLevel && session.unlockedConstraints.get(light)) || ui.constraints[name];
+  return Object.fromEntries(Object.entries(constraints).filter(([key]) => !keys.includes(key)));
 }
 
 /** @param {{ui: Ui, app: App}} props */
@@ -89,9 +89,9 @@ export function AdviceButton({ ui, app }) {
   const change = help && changeOf(help, ui, app.session);
   if (!help || !change) return null;
   const name = nameOf(help);
-  const closes = help.closes === null ? '' : `: ${Math.round(100 * help.closes)} % closer`;
-  return html`<${Button} label=${`${nameOf(help, BUTTON_CHARACTERS)}${closes}`} class="help"
-    tip=${`${name}${closes}. Shows a preview first.`}
+  const gain = help.gain === null ? '' : `: ${Math.round(100 * help.gain)} % closer`;
+  return html`<${Button} label=${`${nameOf(help, BUTTON_CHARACTERS)}${gain}`} class="help"
+    tip=${`${name}${gain}. Shows a preview first.`}
     act=${() => app.session.preview(titleOf(help, name), change)} />`;
 }
 

@@ -47,7 +47,7 @@ export function AnswerLine({ ui, app }) {
         !state &&
         ui.deltaE !== null &&
         html`<span class="faint" data-tip=${DELTA_E}>ΔE ${number(ui.deltaE, 2)}${
-          ui.deltaAsked !== null && html`<span class="was">, was ${number(ui.deltaAsked, 2)}</span>`
+          ui.deltaPresent !== null && html`<span class="was">, was ${number(ui.deltaPresent, 2)}</span>`
         }</span>`
       }
     </p>

@@ -14,15 +14,15 @@ const COLOURS = [
   { value: 'primaries', label: 'LED mix' },
 ];
 
-/** Return the kind of colour constraint of a light. @param {Constraints} asked */
-export const colourOf = (asked) =>
-  ['color', 'kelvin', 'primaries'].find((key) => asked[key] !== undefined) ?? 'any';
+/** Return the kind of colour constraint of a light. @param {Constraints} constraints */
+export const colourOf = (constraints) =>
+  ['color', 'kelvin', 'primaries'].find((key) => constraints[key] !== undefined) ?? 'any';
 
 /** @param {import("./light_row.js").Props} props */
 export function ColourConstraint(props) {
-  const { k, app, asked = {}, rgb } = props;
-  const kind = colourOf(asked);
-  const { color, kelvin, duv, primaries, ...rest } = asked;
+  const { k, app, constraints = {}, rgb } = props;
+  const kind = colourOf(constraints);
+  const { color, kelvin, duv, primaries, ...rest } = constraints;
   const change = (/** @type {string} */ to) => {
     const made = {
       any: {},
@@ -48,8 +48,8 @@ export function ColourConstraint(props) {
 }
 
 /** @param {any} props */
-function SingleColour({ k, app, asked, rest, rgb }) {
-  const text = Array.isArray(asked.color) ? hexOf(asked.color) : String(asked.color);
+function SingleColour({ k, app, constraints, rest, rgb }) {
+  const text = Array.isArray(constraints.color) ? hexOf(constraints.color) : String(constraints.color);
   const found = toKelvin(rgb);
   return html`<div class="ask-row">
     <${TextField} label="Hex or kelvin" value=${text}
@@ -67,8 +67,8 @@ function SingleColour({ k, app, asked, rest, rgb }) {
 }
 
 /** @param {any} props */
-function WhiteRange({ k, app, asked, rest }) {
-  const ends = [asked.kelvin].flat();
+function WhiteRange({ k, app, constraints, rest }) {
+  const ends = [constraints.kelvin].flat();
   const [low, high] = [ends[0], ends.at(-1)];
   const set = (/** @type {number} */ a, /** @type {number} */ b, /** @type {number} */ duv) =>
     app.session.constrainLight(k, {
@@ -76,7 +76,7 @@ function WhiteRange({ k, app, asked, rest }) {
       kelvin: a === b ? a : [Math.min(a, b), Math.max(a, b)],
       ...(duv ? { duv } : {}),
     });
-  const duv = asked.duv ?? 0;
+  const duv = constraints.duv ?? 0;
   return html`<div class="ask-fields">
     <${NumberField} label="From" value=${low} least=${1000} most=${25000} step=${100} digits=${0}
       unit="K" change=${(/** @type {number} */ to) => set(to, high, duv)} />

@@ -34,7 +34,7 @@ function ShortcutsDialog({ close }) {
   </${Dialog}>`;
 }
 
-/** @type {{key: import("../engine/messages.js").Export["what"][number], label: string,
+/** @type {{key: import("../engine/messages.js").Export["outputs"][number], label: string,
  *   about: string}[]} */
 const EXPORTS = [
   { key: 'target', label: 'Painting', about: 'painting.exr, for lightpaint solve' },
@@ -53,21 +53,21 @@ function ExportDialog({ ui, app, close }) {
       (key !== 'relit' || ui.state?.can_render) &&
       (key !== 'report' || ui.state?.can_report !== false),
   );
-  const [what, setWhat] = useState(can.map(({ key }) => key));
+  const [outputs, setOutputs] = useState(can.map(({ key }) => key));
   const isBusy = ui.isWriting;
   const { exported } = ui;
   const folder = ui.state?.folder ?? '';
   return html`<${Dialog} title="Export" close=${close} class="export">
     ${can.map(
       ({ key, label, about }) => html`<div class="export-row" key=${key}>
-      <${Check} label=${label} on=${what.includes(key)} change=${(/** @type {boolean} */ on) =>
-        setWhat(on ? [...what, key] : what.filter((one) => one !== key))} />
+      <${Check} label=${label} on=${outputs.includes(key)} change=${(/** @type {boolean} */ on) =>
+        setOutputs(on ? [...outputs, key] : outputs.filter((one) => one !== key))} />
       <span class="faint">${about}</span></div>`,
     )}
     <div class="row"><span class="faint folder">to ${folder}</span>
       <${CopyButton} text=${folder} tip="Copy the folder's path" app=${app} />
-      <${Button} label=${isBusy ? 'Exporting …' : 'Export'} primary disabled=${isBusy || !what.length}
-        act=${() => app.session.write(what)} /></div>
+      <${Button} label=${isBusy ? 'Exporting …' : 'Export'} primary disabled=${isBusy || !outputs.length}
+        act=${() => app.session.write(outputs)} /></div>
     ${
       isBusy &&
       html`<div class="row"><span class="faint folder">You can close this window.</span>

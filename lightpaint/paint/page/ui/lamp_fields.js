@@ -23,12 +23,12 @@ const WAYS = /** @type {const} */ ({
 /** Hint on what to click next. @param {import("./ui_state.js").Pointing} pointing
  * @param {Ui["lights"]} lights */
 export function pointingHint(pointing, lights) {
-  if (pointing.how === 'hang')
+  if (pointing.mode === 'hang')
     return `Click the surface that the new ${pointing.type} hangs on, or its place in the plan. Esc cancels.`;
-  const { how, edge } = pointing;
+  const { mode, edge } = pointing;
   const name = lights[pointing.light]?.label ?? '';
-  if (how === 'aim') return `Click what ${name} is to point at. Esc cancels.`;
-  if (how === 'highlight') return `Click where the highlight of ${name} is to be seen. Esc cancels.`;
+  if (mode === 'aim') return `Click what ${name} is to point at. Esc cancels.`;
+  if (mode === 'highlight') return `Click where the highlight of ${name} is to be seen. Esc cancels.`;
   return edge
     ? 'Now click where that shadow is to end. Esc cancels.'
     : `Click the edge of what casts the shadow of ${name}. Esc cancels.`;
@@ -39,12 +39,12 @@ export function pointingHint(pointing, lights) {
 export function pointLamp(app, point) {
   const { pointing, view } = app.store.value;
   if (!pointing || !point) return;
-  const at = /** @type {[number, number]} */ ([point.x, point.y]);
-  if (pointing.how === 'hang') return void app.session.addLight({ type: pointing.type, at, view });
-  const { light, how, edge } = pointing;
-  if (how === 'shadow' && !edge) return app.store.set({ pointing: { light, how, edge: at } });
+  const pixel = /** @type {[number, number]} */ ([point.x, point.y]);
+  if (pointing.mode === 'hang') return void app.session.addLight({ type: pointing.type, pixel, view });
+  const { light, mode, edge } = pointing;
+  if (mode === 'shadow' && !edge) return app.store.set({ pointing: { light, mode, edge: pixel } });
   app.store.set({ pointing: null });
-  app.session.lampMoves.ask(light, { kind: 'point', how, at, ...(edge ? { edge } : {}), view });
+  app.session.lampMoves.ask(light, { kind: 'point', mode, pixel, ...(edge ? { edge } : {}), view });
 }
 
 /** @param {{k: number, ui: Ui, app: App}} props */
@@ -56,9 +56,9 @@ export function LampFields({ k, ui, app }) {
       tip="Mark the lights in the pictures, and move them" act=${() => session.toggleLamps()} /></div>`;
   const place = placeOf(ui, k);
   const { name, label } = ui.lights[k];
-  const isAdded = ui.added.includes(name);
-  if (place.why_not)
-    return html`<p class="faint lamp-fields">${label} ${place.why_not}: it stays where it is.</p>`;
+  const isAdded = ui.addedLights.includes(name);
+  if (place.immovable_reason)
+    return html`<p class="faint lamp-fields">${label} ${place.immovable_reason}: it stays where it is.</p>`;
   const vector = (
     /** @type {"position" | "target"} */ key,
     /** @type {string} */ title,
@@ -72,11 +72,11 @@ export function LampFields({ k, ui, app }) {
         figures=${4} step=${0.05} change=${(/** @type {number} */ x) =>
           session.moveLamp(k, { [key]: value.map((was, i) => (i === c ? x : was)) })} />`,
       )}</div>`;
-  const point = (/** @type {"aim" | "highlight" | "shadow"} */ how) => {
-    const isOn = ui.pointing?.how === how && 'light' in ui.pointing && ui.pointing.light === k;
-    return html`<${Button} key=${how} label=${WAYS[how].label} tip=${WAYS[how].tip} on=${isOn}
+  const point = (/** @type {"aim" | "highlight" | "shadow"} */ mode) => {
+    const isOn = ui.pointing?.mode === mode && 'light' in ui.pointing && ui.pointing.light === k;
+    return html`<${Button} key=${mode} label=${WAYS[mode].label} tip=${WAYS[mode].tip} on=${isOn}
       act=${() =>
-        store.set({ lamps: true, lamp: k, pointing: isOn ? null : { light: k, how } })} />`;
+        store.set({ lamps: true, lamp: k, pointing: isOn ? null : { light: k, mode } })} />`;
   };
   return html`<div class="lamp-fields" data-numbers>
     <h3>Place</h3>

@@ -47,9 +47,9 @@ function parts(a, b, c, v) {
  */
 export function seenAt(camera, point) {
   const [x, y, s] = parts(
-    camera.across,
-    camera.down,
-    camera.ahead,
+    camera.x_axis,
+    camera.y_axis,
+    camera.forward,
     minus(point, camera.origin),
   );
   if (camera.is_parallel) return { x, y, isAhead: s > 0 };
@@ -65,11 +65,11 @@ export function seenTowards(camera, direction) {
 
 /** Return the camera ray of a pixel. @param {Camera} camera @param {number} x @param {number} y
  * @returns {{origin: Vector, way: Vector}} */
-export function rayAt({ origin, across, down, ahead, is_parallel: isParallel }, x, y) {
-  const shifted = plus(plus([0, 0, 0], across, x), down, y);
+export function rayAt({ origin, x_axis: xAxis, y_axis: yAxis, forward, is_parallel: isParallel }, x, y) {
+  const shifted = plus(plus([0, 0, 0], xAxis, x), yAxis, y);
   return isParallel
-    ? { origin: plus(origin, shifted), way: unit(ahead) }
-    : { origin: plus(origin, [0, 0, 0]), way: unit(plus(shifted, ahead)) };
+    ? { origin: plus(origin, shifted), way: unit(forward) }
+    : { origin: plus(origin, [0, 0, 0]), way: unit(plus(shifted, forward)) };
 }
 
 /**

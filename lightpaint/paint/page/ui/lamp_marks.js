@@ -114,10 +114,10 @@ function Mark({ ui, app, light, place, pane, camera, at, isTwin }) {
   const { label } = ui.lights[light];
   const rgb = ui.weights[light] ?? ui.lights[light].present;
   const isOn = luminance(rgb) > 0;
-  const canDrag = place.why_not === '' && place.position !== null;
+  const canDrag = place.immovable_reason === '' && place.position !== null;
   const choose = () => app.store.set({ lamp: light });
-  const tip = place.why_not
-    ? `${label} ${place.why_not}: it stays where it is`
+  const tip = place.immovable_reason
+    ? `${label} ${place.immovable_reason}: it stays where it is`
     : `${label}: drag to move it, with Shift up and down`;
   const drag = useDrag(app, pane, (x, y, isShift, start) => {
     if (!canDrag || !place.position || !ui.rig) return null;
@@ -127,13 +127,13 @@ function Mark({ ui, app, light, place, pane, camera, at, isTwin }) {
       : isShift
         ? upAndDown(camera, from, ui.rig.up, x, y)
         : inPlane(camera, from, ui.rig.up, x, y);
-    return { place: { position: moved }, asked: { kind: 'move', pose: { position: moved } } };
+    return { place: { position: moved }, request: { kind: 'move', pose: { position: moved } } };
   });
   return html`<button type="button" class=${[
     'lamp',
     at.isInside ? '' : 'is-outside',
     ui.lamp === light ? 'is-chosen' : '',
-    place.why_not ? 'is-fixed' : '',
+    place.immovable_reason ? 'is-fixed' : '',
     isOn ? '' : 'is-off',
   ].join(' ')} style=${{
     left: `${at.x}px`,
@@ -158,9 +158,9 @@ function AimHandle({ ui, app, light, pane, camera, inner, onPage, isTwin }) {
   const drag = useDrag(app, pane, (x, y) => ({
     place: {},
     at: [x, y],
-    asked: { kind: 'point', how: 'aim', at: [x, y], view: ui.view },
+    request: { kind: 'point', mode: 'aim', pixel: [x, y], view: ui.view },
   }));
-  if (!place.position || !place.direction || !place.target || place.why_not) return null;
+  if (!place.position || !place.direction || !place.target || place.immovable_reason) return null;
   const dragged = ui.dragged?.light === light ? ui.dragged.at : undefined;
   const seen = dragged
     ? { x: dragged[0], y: dragged[1], isAhead: true }
@@ -240,12 +240,12 @@ function Beam({ place, camera, box, onPage }) {
  * @param {App} app @param {Pane} pane
  * @param {(x: number, y: number, isShift: boolean, start: {place: LightPlace}) =>
  *   {place: Partial<LightPlace>, at?: [number, number],
- *    asked: import("./lamp_moves.js").Asked} | null} of the pointer, in pixels of the picture
+ *    request: import("./lamp_moves.js").LampRequest} | null} of the pointer, in pixels of the picture
  */
 function useDrag(app, pane, of) {
   const start = useRef(
     /** @type {{light: number, place: LightPlace, dx: number, dy: number, isMoved: boolean,
-     *   last: import("./lamp_moves.js").Asked | null} | null} */ (null),
+     *   last: import("./lamp_moves.js").LampRequest | null} | null} */ (null),
   );
   const inPicture = (/** @type {PointerEvent} */ event) => {
     const { left, top } = app.engine.element.getBoundingClientRect();
@@ -276,9 +276,9 @@ function useDrag(app, pane, of) {
     const made = of(x - its.dx / pane.scale, y - its.dy / pane.scale, event.shiftKey, its);
     if (!made) return;
     its.isMoved = true;
-    its.last = made.asked;
+    its.last = made.request;
     app.store.set({ dragged: { light: its.light, place: made.place, at: made.at } });
-    app.session.lampMoves.ask(its.light, made.asked, false);
+    app.session.lampMoves.ask(its.light, made.request, false);
   };
   const up = (/** @type {PointerEvent} */ event) => {
     const its = start.current;

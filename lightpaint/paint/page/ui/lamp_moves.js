@@ -3,37 +3,37 @@
 /** @typedef {import("./session_controller.js").SessionController} SessionController */
 /** @typedef {Record<string, any>} Pose */
 /** A requested pose of a light, or a place to aim it by.
- * @typedef {{kind: "move", pose: Pose} | {kind: "point", how: "aim" | "highlight" | "shadow",
- *   at: [number, number], edge?: [number, number], view: number}} Asked */
+ * @typedef {{kind: "move", pose: Pose} | {kind: "point", mode: "aim" | "highlight" | "shadow",
+ *   pixel: [number, number], edge?: [number, number], view: number}} LampRequest */
 
 export class LampMoves {
   /** @param {SessionController} session */
   constructor(session) {
     this.session = session;
-    /** @type {{light: number, asked: Asked, done: boolean} | null} */
+    /** @type {{light: number, request: LampRequest, isFinal: boolean} | null} */
     this.next = null;
     this.isSending = false;
     /** Answers to moves so far. */
     this.answers = 0;
   }
 
-  /** @param {number} light @param {Asked} asked @param {boolean} [done] false while it is dragged */
-  ask(light, asked, done = true) {
-    this.next = { light, asked, done };
+  /** @param {number} light @param {LampRequest} request @param {boolean} [isFinal] false while it is dragged */
+  ask(light, request, isFinal = true) {
+    this.next = { light, request, isFinal };
     if (!this.isSending) void this.send();
   }
 
   async send() {
     this.isSending = true;
     while (this.next) {
-      const { light, asked, done } = this.next;
+      const { light, request, isFinal } = this.next;
       this.next = null;
       const name = this.session.store.value.lights[light].name;
-      const { kind, ...fields } = asked;
+      const { kind, ...fields } = request;
       const reply =
         kind === 'move'
-          ? await this.session.send('move', { poses: { [name]: asked.pose }, done })
-          : await this.session.send('point', /** @type {any} */ ({ light, ...fields, done }));
+          ? await this.session.send('move', { poses: { [name]: request.pose }, is_final: isFinal })
+          : await this.session.send('point', /** @type {any} */ ({ light, ...fields, is_final: isFinal }));
       if (reply?.kind === 'failed') this.session.revert();
       this.answers += 1;
     }

@@ -20,14 +20,14 @@ const LEVEL_MODES = [
 
 /** @param {import("./light_row.js").Props} props */
 export function LightConstraints(props) {
-  const { k, light, app, asked = {}, rgb, tied } = props;
+  const { k, light, app, constraints = {}, rgb, tied } = props;
   const { session } = app;
   if (light.is_fixed) return html`<p class="asking-light faint">This light is not adjusted.</p>`;
-  const mode = asked.off
+  const mode = constraints.off
     ? 'off'
-    : asked.lock === true
+    : constraints.lock === true
       ? 'present'
-      : asked.lock !== undefined
+      : constraints.lock !== undefined
         ? 'held'
         : 'free';
   const change = (/** @type {string} */ to) => {
@@ -48,7 +48,7 @@ export function LightConstraints(props) {
       mode === 'free' &&
       html`<${LevelLimits} ...${props} />
       ${
-        tied && colourOf(asked) === 'any'
+        tied && colourOf(constraints) === 'any'
           ? html`<p class="faint">Tied lights keep their present colours.</p>`
           : !light.is_scalar && html`<${ColourConstraint} ...${props} />`
       }`
@@ -120,8 +120,8 @@ function LockedColour({ k, app, rgb }) {
 }
 
 /** @param {import("./light_row.js").Props} props */
-function LevelLimits({ k, light, app, asked = {} }) {
-  const limits = asked.limits ?? {};
+function LevelLimits({ k, light, app, constraints = {} }) {
+  const limits = constraints.limits ?? {};
   const levels = Object.values(limits);
   const canShare = isOnNow(light);
   const [chosen, setUnit] = useState(canShare ? 'share' : 'value');
@@ -145,7 +145,7 @@ function LevelLimits({ k, light, app, asked = {} }) {
       );
       return;
     }
-    const { limits: _, ...rest } = asked;
+    const { limits: _, ...rest } = constraints;
     app.session.constrainLight(k, Object.keys(kept).length ? { ...rest, limits: kept } : rest);
   };
   const convert = (/** @type {string} */ to) => {
@@ -155,7 +155,7 @@ function LevelLimits({ k, light, app, asked = {} }) {
       const level = Number(amount(x, light, to).toPrecision(FIGURES));
       return [key, to === 'share' ? `${level}%` : level];
     });
-    app.session.constrainLight(k, { ...asked, limits: Object.fromEntries(turned) });
+    app.session.constrainLight(k, { ...constraints, limits: Object.fromEntries(turned) });
   };
   return html`<div class="ask-fields is-levels">
     <${NumberField} label="Min" value=${shown(limits.min)} least=${0} empty="–" step=${5}

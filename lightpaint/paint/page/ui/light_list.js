@@ -76,7 +76,7 @@ function row(ui, app, k, isMany) {
   const light = ui.lights[k];
   const isOpen = ui.unfolded.includes(k);
   return html`<${LightRow} key=${light.name} k=${k} light=${light} app=${app}
-    rgb=${ui.weights[k] ?? light.present} lit=${ui.lit[k]} asked=${constraintsOf(ui, k)} tied=${findTie(ui, k)}
+    rgb=${ui.weights[k] ?? light.present} lit=${ui.lit[k]} constraints=${constraintsOf(ui, k)} tied=${findTie(ui, k)}
     isLive=${ui.isLive} isSolo=${ui.solo.includes(k)} isMute=${ui.mute.includes(k)} isOpen=${isOpen}
     here=${ui.pointed?.shares[k]} hasSlider=${isOpen || !isMany}
     picture=${inView(`thumb/${k}`, ui.view)} thumb=${ui.resources[inView(`thumb/${k}`, ui.view)]}

@@ -16,7 +16,7 @@ import { Thumbnail } from './thumbnail.js';
 /** @typedef {import("./engine_interface.js").RGB} RGB */
 /** @typedef {import("./shortcuts.js").App} App */
 /**
- * @typedef {{k: number, light: Light, app: App, rgb: RGB, lit?: LightAnswer, asked?: Constraints,
+ * @typedef {{k: number, light: Light, app: App, rgb: RGB, lit?: LightAnswer, constraints?: Constraints,
  *   tied?: string[], isLive: boolean, isSolo: boolean, isMute: boolean, isOpen: boolean,
  *   here?: number, hasSlider: boolean, picture: string, thumb?: number, others?: Light[],
  *   ui?: import("./ui_state.js").Ui}} Props
@@ -44,9 +44,9 @@ export class LightRow extends Component {
   }
 
   render() {
-    const { k, light, app, isOpen, hasSlider, here, isMute, asked, ui } = this.props;
+    const { k, light, app, isOpen, hasSlider, here, isMute, constraints, ui } = this.props;
     const { store } = app;
-    const dim = isMute || asked?.off ? 'is-dim' : '';
+    const dim = isMute || constraints?.off ? 'is-dim' : '';
     const hover = (/** @type {number | null} */ hovered) => () => store.set({ hovered });
     return html`<div class=${`light ${dim} ${isOpen ? 'is-open' : ''}`} role="group"
       aria-label=${light.label} data-light=${light.name}>
@@ -76,11 +76,11 @@ export class LightRow extends Component {
 
   /** Buttons for the display; then, apart, those for the solve. */
   marks() {
-    const { k, light, app, isSolo, isMute, asked = {} } = this.props;
+    const { k, light, app, isSolo, isMute, constraints = {} } = this.props;
     const { store, session } = app;
     const turn = (/** @type {"solo" | "mute"} */ key, /** @type {boolean} */ on) =>
       store.set((ui) => ({ [key]: on ? ui[key].filter((one) => one !== k) : [...ui[key], k] }));
-    const isHeld = asked.lock !== undefined || Boolean(asked.off);
+    const isHeld = constraints.lock !== undefined || Boolean(constraints.off);
     const lock = () =>
       isHeld ? session.unlockLight(k) : session.lockLight(k, this.props.rgb, true);
     return html`<span class="marks" role="group" aria-label="Display">
@@ -124,7 +124,7 @@ export class LightRow extends Component {
   }
 
   dimmer() {
-    const { k, light, rgb, app, asked } = this.props;
+    const { k, light, rgb, app, constraints } = this.props;
     const stops = stopsOf(rgb, light) ?? DARKEST;
     const move = (/** @type {number} */ to, /** @type {boolean} */ done) => {
       this.grasped ??= rgb;
@@ -132,11 +132,11 @@ export class LightRow extends Component {
       if (done) this.grasped = null;
     };
     const text = luminance(rgb) > 0 ? stopsText(stops) : 'off';
-    return html`<div class=${`dimmer ${asked?.lock !== undefined ? 'is-held' : ''}`}>
+    return html`<div class=${`dimmer ${constraints?.lock !== undefined ? 'is-held' : ''}`}>
       <${Slider} plain label=${`${light.label}, stops from now`} value=${clamp(stops)}
         least=${DARKEST} most=${BRIGHTEST} step=${0.05} rest=${0} text=${text}
-        disabled=${Boolean(asked?.off)} change=${move} />
-      <${Level} light=${light} rgb=${rgb} disabled=${Boolean(asked?.off)}
+        disabled=${Boolean(constraints?.off)} change=${move} />
+      <${Level} light=${light} rgb=${rgb} disabled=${Boolean(constraints?.off)}
         say=${(/** @type {string} */ words) => app.session.toast(words)}
         change=${(/** @type {RGB} */ made) => app.session.lockLight(k, made, true)} />
     </div>`;
@@ -170,14 +170,14 @@ function Share({ share, here }) {
 }
 
 /** Remarks below the picture, where they do not change the height of the row.
- * @param {{light: Light, lit?: LightAnswer, asked?: Constraints, tied?: string[]}} props */
+ * @param {{light: Light, lit?: LightAnswer, constraints?: Constraints, tied?: string[]}} props */
 function Badge(props) {
-  const { lit, asked = {}, tied } = props;
+  const { lit, constraints = {}, tied } = props;
   const remarks = notes(props);
   if (!remarks.length) return null;
   // Constraints on all lights, such as their colours, are no remark on this one.
-  const isAsked = Boolean(tied ?? asked.limits ?? colourOf(asked));
-  const isBack = Boolean(lit?.held) && isAsked && asked.lock === undefined && !asked.off;
+  const isAsked = Boolean(tied ?? constraints.limits ?? colourOf(constraints));
+  const isBack = Boolean(lit?.is_constrained) && isAsked && constraints.lock === undefined && !constraints.off;
   const words = remarks.map(([, text]) => `${text}.`);
   if (isBack) words.push('This keeps it from what the painting asks for.');
   const more = remarks.length > 1 ? ` +${remarks.length - 1}` : '';
@@ -192,22 +192,22 @@ function unfold(store, k) {
   }));
 }
 
-/** Return the colour constraint, if there is one. @param {Constraints} asked */
+/** Return the colour constraint, if there is one. @param {Constraints} constraints */
 const colourOf = ({ color, kelvin, primaries }) => color ?? kelvin ?? primaries;
 
 /** Return a short and a long text for each remark.
- * @param {{light: Light, lit?: LightAnswer, asked?: Constraints, tied?: string[]}} about
+ * @param {{light: Light, lit?: LightAnswer, constraints?: Constraints, tied?: string[]}} about
  * @returns {string[][]} */
-function notes({ light, lit, asked = {}, tied }) {
+function notes({ light, lit, constraints = {}, tied }) {
   /** @type {[unknown, string, string][]} */
   const all = [
     [light.is_fixed, 'fixed', 'It stays as it is in the scene'],
-    [asked.off, 'off', 'You switched it off'],
-    [asked.lock !== undefined, 'locked', 'You locked it at this level'],
-    [asked.limits, 'limits', 'You limited its level'],
-    [colourOf(asked), 'colour', 'You limited its colour'],
+    [constraints.off, 'off', 'You switched it off'],
+    [constraints.lock !== undefined, 'locked', 'You locked it at this level'],
+    [constraints.limits, 'limits', 'You limited its level'],
+    [colourOf(constraints), 'colour', 'You limited its colour'],
     [tied, 'tied', `It is tied to ${tied?.filter((name) => name !== light.name).join(', ')}`],
-    [lit?.unreached, 'unseen', 'None of its light reaches the picture'],
+    [lit?.is_unreached, 'unseen', 'None of its light reaches the picture'],
   ];
   return all.filter(([isSo]) => isSo).map(([, ...words]) => words);
 }

@@ -27,14 +27,14 @@ function planOf({ rig, view, state }) {
   const camera = rig?.cameras[view] ?? rig?.cameras[0];
   if (!rig || !camera) return null;
   const [height, width] = state.size;
-  const middle = plus(plus(camera.ahead, camera.across, width / 2), camera.down, height / 2);
+  const middle = plus(plus(camera.forward, camera.x_axis, width / 2), camera.y_axis, height / 2);
   const level = (/** @type {number[]} */ v) => {
     const made = /** @type {Vector} */ ([...v]);
     made[rig.up] = 0;
     return unit(made);
   };
-  const away = level(camera.is_parallel ? camera.ahead : middle);
-  const right = level(minus(camera.across, away.map((x) => x * dot(camera.across, away))));
+  const away = level(camera.is_parallel ? camera.forward : middle);
+  const right = level(minus(camera.x_axis, away.map((x) => x * dot(camera.x_axis, away))));
   const corners = [0, 1, 2, 3].map((k) => {
     const corner = [...rig.low];
     const [a, b] = [0, 1, 2].filter((axis) => axis !== rig.up);
@@ -99,9 +99,9 @@ export function RoomPlan({ ui, app }) {
     app.store.set({ dragged: done ? null : { light, place: { position } } });
     app.session.moveLamp(light, { position }, done);
   };
-  const isHanging = ui.pointing?.how === 'hang';
+  const isHanging = ui.pointing?.mode === 'hang';
   const hang = (/** @type {PointerEvent} */ event) => {
-    if (ui.pointing?.how !== 'hang' || !frame.current) return;
+    if (ui.pointing?.mode !== 'hang' || !frame.current) return;
     const box = frame.current.getBoundingClientRect();
     const zoom = WIDTH / box.width;
     const height = rig.low[rig.up] + HUNG * (rig.high[rig.up] - rig.low[rig.up]);
@@ -135,13 +135,13 @@ export function RoomPlan({ ui, app }) {
         const [dx, dy] = place.direction ? plan.way(place.direction) : [0, 0];
         const rgb = ui.weights[k] ?? ui.lights[k].present;
         const { label } = ui.lights[k];
-        return html`<g key=${k} class=${`${ui.lamp === k ? 'is-chosen' : ''} ${place.why_not ? 'is-fixed' : ''}`}>
+        return html`<g key=${k} class=${`${ui.lamp === k ? 'is-chosen' : ''} ${place.immovable_reason ? 'is-fixed' : ''}`}>
           <line x1=${x} y1=${y} x2=${x + ARROW * dx} y2=${y + ARROW * dy} />
           <circle cx=${x} cy=${y} r="5" fill=${luminance(rgb) > 0 ? toHex(atFull(rgb)) : 'none'}
             data-tip=${label} onPointerDown=${(/** @type {PointerEvent} */ event) => {
               if (isHanging) return;
               app.store.set({ lamp: k });
-              if (place.why_not || place.rail) return;
+              if (place.immovable_reason || place.rail) return;
               held.current = k;
               frame.current?.setPointerCapture(event.pointerId);
             }}><title>${label}</title></circle></g>`;

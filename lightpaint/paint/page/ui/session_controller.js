@@ -13,35 +13,35 @@ export class SessionController extends SessionLink {
 
   /**
    * Set the constraints on a light.
-   * @param {number} light @param {Constraints} asked @param {boolean} [done] false while a slider moves
+   * @param {number} light @param {Constraints} constraints @param {boolean} [isFinal] false while a slider moves
    */
-  async constrainLight(light, asked, done = true) {
+  async constrainLight(light, constraints, isFinal = true) {
     const kept = Object.fromEntries(
-      Object.entries(asked).filter(
+      Object.entries(constraints).filter(
         ([, value]) => value !== null && value !== undefined && value !== false,
       ),
     );
-    this.store.set((ui) => ({ asked: { ...ui.asked, [ui.lights[light].name]: kept } }));
+    this.store.set((ui) => ({ constraints: { ...ui.constraints, [ui.lights[light].name]: kept } }));
     this.pendingConstraints.set(light, kept);
-    const reply = await this.send('ask', { light, asked: kept, done });
+    const reply = await this.send('constrain_light', { light, constraints: kept, is_final: isFinal });
     const isNewest = this.pendingConstraints.get(light) === kept;
     if (isNewest) this.pendingConstraints.delete(light);
     if (reply?.kind === 'failed') this.revert();
-    if (isNewest) this.forgetUnlocked(this.store.value.asked);
+    if (isNewest) this.forgetUnlocked(this.store.value.constraints);
     return reply;
   }
 
   /**
    * Set a light by its slider and lock it there; the others are solved around it. The page shows it
    * at once. One message is pending at a time, and the next carries the newest level.
-   * @param {number} light @param {RGB} emission @param {boolean} done
+   * @param {number} light @param {RGB} emission @param {boolean} isFinal
    */
-  lockLight(light, emission, done) {
-    const { lights, asked, weights } = this.store.value;
+  lockLight(light, emission, isFinal) {
+    const { lights, constraints, weights } = this.store.value;
     if (!this.unlockedConstraints.has(light)) {
-      this.unlockedConstraints.set(light, withoutLevel(asked[lights[light].name] ?? {}));
+      this.unlockedConstraints.set(light, withoutLevel(constraints[lights[light].name] ?? {}));
     }
-    this.moves.set(light, { rgb: emission, done });
+    this.moves.set(light, { rgb: emission, isFinal });
     this.store.set({ weights: weights.map((rgb, k) => (k === light ? emission : rgb)) });
     this.moveInProgress ??= this.sendMoves();
   }
@@ -57,9 +57,9 @@ export class SessionController extends SessionLink {
       const reply = await this.constrainLight(
         light,
         { lock: isScalar ? move.rgb[0] : move.rgb },
-        move.done,
+        move.isFinal,
       );
-      if (move.done && this.moves.get(light) === move) this.moves.delete(light);
+      if (move.isFinal && this.moves.get(light) === move) this.moves.delete(light);
       if (reply?.kind === 'failed') this.revert();
     }
     this.moveInProgress = null;
@@ -68,38 +68,38 @@ export class SessionController extends SessionLink {
   /** Unlock a light, or the light that it is tied to, and restore its earlier constraints.
    * @param {number} tied */
   unlockLight(tied) {
-    const { lights, asked } = this.store.value;
+    const { lights, constraints } = this.store.value;
     const light = lockingLight(this.store.value, tied);
     this.moves.delete(tied);
     this.moves.delete(light);
     const before =
-      this.unlockedConstraints.get(light) ?? withoutLevel(asked[lights[light].name] ?? {});
+      this.unlockedConstraints.get(light) ?? withoutLevel(constraints[lights[light].name] ?? {});
     this.unlockedConstraints.delete(light);
     return this.constrainLight(light, before);
   }
 
   /** Unlock all lights in one step, and restore their earlier constraints. */
   unlockAll() {
-    const { lights, asked } = this.store.value;
+    const { lights, constraints } = this.store.value;
     const locked = lockedLights(this.store.value);
     const unlocked = locked.map((k) => [
       lights[k].name,
-      this.unlockedConstraints.get(k) ?? withoutLevel(asked[lights[k].name]),
+      this.unlockedConstraints.get(k) ?? withoutLevel(constraints[lights[k].name]),
     ]);
     for (const k of locked) {
       this.moves.delete(k);
       this.unlockedConstraints.delete(k);
     }
-    return this.sendChange('ask_all', { asked: Object.fromEntries(unlocked) });
+    return this.sendChange('constrain_lights', { constraints: Object.fromEntries(unlocked) });
   }
 
   /** @param {number} light @param {boolean} off */
   switchLight(light, off) {
     if (!off) return this.unlockLight(light);
     this.moves.delete(light);
-    const { lights, asked } = this.store.value;
+    const { lights, constraints } = this.store.value;
     if (!this.unlockedConstraints.has(light)) {
-      this.unlockedConstraints.set(light, withoutLevel(asked[lights[light].name] ?? {}));
+      this.unlockedConstraints.set(light, withoutLevel(constraints[lights[light].name] ?? {}));
     }
     return this.constrainLight(light, { off: true });
   }
@@ -127,10 +127,10 @@ export class SessionController extends SessionLink {
   /** @param {string} key @param {any} value null for automatic */
   changeSetting(key, value) {
     this.store.set((ui) => ({ settings: { ...ui.settings, [key]: value } }));
-    return this.sendChange('set', { values: { [key]: value } });
+    return this.sendChange('change_settings', { settings: { [key]: value } });
   }
 
-  /** @template {"set" | "ask_all" | "tie"} K @param {K} kind @param {Requests[K]} fields */
+  /** @template {"change_settings" | "constrain_lights" | "tie"} K @param {K} kind @param {Requests[K]} fields */
   async sendChange(kind, fields) {
     const reply = await this.send(kind, fields);
     if (reply?.kind === 'failed') this.revert();
@@ -152,8 +152,8 @@ export class SessionController extends SessionLink {
     this.store.set({ preview: null });
     if (!preview) return undefined;
     const { kind, fields } = preview.change;
-    if (kind === 'set') {
-      const [[key, value]] = Object.entries(fields.values);
+    if (kind === 'change_settings') {
+      const [[key, value]] = Object.entries(fields.settings);
       return this.changeSetting(key, value);
     }
     return kind === 'tie' ? this.tieAll(fields.ties) : this.sendChange(kind, fields);
@@ -167,9 +167,9 @@ export class SessionController extends SessionLink {
   }
 
   /** Move a light. @param {number} light @param {Record<string, any>} change of its pose
-   * @param {boolean} [done] false while it is dragged */
-  moveLamp(light, change, done = true) {
-    this.lampMoves.ask(light, { kind: 'move', pose: change }, done);
+   * @param {boolean} [isFinal] false while it is dragged */
+  moveLamp(light, change, isFinal = true) {
+    this.lampMoves.ask(light, { kind: 'move', pose: change }, isFinal);
   }
 
   /** Start or stop the search for places of lights. @param {boolean} [run] */
@@ -179,10 +179,10 @@ export class SessionController extends SessionLink {
     if (!lamps) this.toggleLamps();
     /** @type {Record<string, number[]>} */
     const ghosts = {};
-    rig?.lights.forEach(({ position, why_not: whyNot }, k) => {
-      if (position && !whyNot) ghosts[lights[k].name] = position;
+    rig?.lights.forEach(({ position, immovable_reason: reason }, k) => {
+      if (position && !reason) ghosts[lights[k].name] = position;
     });
-    this.store.set({ placing: { what: 'place', done: 0, total: 0, unit: 'steps' }, ghosts });
+    this.store.set({ placing: { task: 'place', done: 0, total: 0, unit: 'steps' }, ghosts });
     return this.send('place', { run });
   }
 
@@ -204,9 +204,9 @@ export class SessionController extends SessionLink {
   findLights({ type, where, count }) {
     const { lamps } = this.store.value;
     if (!lamps) this.toggleLamps();
-    this.store.set({ placing: { what: 'place', done: 0, total: 0, unit: 'steps' }, ghosts: {} });
-    const on = where === 'anywhere' ? [] : [where];
-    return this.send('place', { run: true, new: type, count, on });
+    this.store.set({ placing: { task: 'place', done: 0, total: 0, unit: 'steps' }, ghosts: {} });
+    const surfaces = where === 'anywhere' ? [] : [where];
+    return this.send('place', { run: true, new_type: type, max_count: count, surfaces });
   }
 
   /** Restore a light's place from the scene. @param {number} light */
@@ -222,13 +222,13 @@ export class SessionController extends SessionLink {
 
   verify(run = true) {
     this.store.set({
-      verifying: run ? { what: 'verify', done: 0, total: 0, unit: '' } : null,
+      verifying: run ? { task: 'verify', done: 0, total: 0, unit: '' } : null,
     });
     return this.send('verify', { run, view: this.store.value.view });
   }
 }
 
-/** @param {Constraints} asked @returns {Constraints} */
+/** @param {Constraints} constraints @returns {Constraints} */
 function withoutLevel({ lock, off, ...rest }) {
   return rest;
 }

@@ -9,7 +9,7 @@ import {
   previewUpdate,
   progressUpdate,
   stateUpdate,
-  verifiedOf,
+  verificationUpdate,
 } from './state_updates.js';
 import { within } from './format.js';
 import { updateShow } from './tools.js';
@@ -34,7 +34,7 @@ const EVENT_KINDS = [
   'placed',
   'progress',
   'stopped',
-  'say',
+  'notice',
   'failed',
   'looks',
   'exported',
@@ -52,8 +52,8 @@ export class SessionLink {
     this.host = host;
     this.store = store;
     /** Messages that were handled: a reply arrives both at its sender and at the listeners. @type {WeakSet<Message>} */
-    this.done = new WeakSet();
-    /** Levels of lights whose dimmers move. @type {Map<number, {rgb: RGB, done: boolean}>} */
+    this.received = new WeakSet();
+    /** Levels of lights whose dimmers move. @type {Map<number, {rgb: RGB, isFinal: boolean}>} */
     this.moves = new Map();
     /** Pending work: moves of dimmers, and looks to save.
      * @type {Promise<void> | null} */
@@ -66,8 +66,8 @@ export class SessionLink {
     /** The number of previews so far. */
     this.previews = 0;
     /** The state that the session has confirmed, to return to when it refuses a request.
-     * @type {Pick<Ui, 'asked' | 'ties' | 'settings' | 'weights'>} */
-    this.confirmed = { asked: {}, ties: [], settings: {}, weights: [] };
+     * @type {Pick<Ui, 'constraints' | 'ties' | 'settings' | 'weights'>} */
+    this.confirmed = { constraints: {}, ties: [], settings: {}, weights: [] };
     for (const kind of EVENT_KINDS)
       host.on(kind, (message) => this.receive({ ...message, kind }, message));
   }
@@ -92,8 +92,8 @@ export class SessionLink {
 
   /** @param {Message} message @param {Message} [origin] */
   receive(message, origin = message) {
-    if (this.done.has(origin)) return;
-    this.done.add(origin);
+    if (this.received.has(origin)) return;
+    this.received.add(origin);
     const changes = /** @type {Record<string, (message: any) => Partial<Ui> | void>} */ ({
       state: (/** @type {HostEvents['state']} */ m) => stateUpdate(m, this.store.value),
       waiting: (/** @type {HostEvents['waiting']} */ m) => ({
@@ -113,12 +113,12 @@ export class SessionLink {
         this.store.value.placing ? { trial: m } : {},
       placed: (/** @type {HostEvents['placed']} */ m) => this.placingEnded(m),
       progress: (/** @type {HostEvents['progress']} */ m) => progressUpdate(m, this.store.value),
-      stopped: (/** @type {HostEvents['stopped']} */ m) => this.taskEnded(m.what),
-      say: (/** @type {HostEvents['say']} */ m) => this.showNotice(m),
+      stopped: (/** @type {HostEvents['stopped']} */ m) => this.taskEnded(m.task),
+      notice: (/** @type {HostEvents['notice']} */ m) => this.showNotice(m),
       failed: (/** @type {HostEvents['failed']} */ m) => this.toast(m.text, m.tone ?? 'warn'),
       looks: (/** @type {HostEvents['looks']} */ m) => looksUpdate(m, this.store.value),
       exported: (/** @type {HostEvents['exported']} */ m) => this.exportEnded(m),
-      verified: (/** @type {HostEvents['verified']} */ m) => verifiedOf(m, this.store.value),
+      verified: (/** @type {HostEvents['verified']} */ m) => verificationUpdate(m, this.store.value),
       explained: (/** @type {HostEvents['explained']} */ m) =>
         explanationUpdate(m, this.store.value),
       previewed: (/** @type {HostEvents['previewed']} */ m) => previewUpdate(m, this.store.value),
@@ -128,11 +128,11 @@ export class SessionLink {
       connection: (/** @type {HostEvents['connection']} */ m) => ({ connection: m.state }),
       silence: (/** @type {HostEvents['silence']} */ m) => ({ isSilent: m.isSilent }),
     })[message.kind]?.(message);
-    for (const key of /** @type {const} */ (['asked', 'ties', 'settings', 'weights']))
+    for (const key of /** @type {const} */ (['constraints', 'ties', 'settings', 'weights']))
       if (changes?.[key]) Object.assign(this.confirmed, { [key]: changes[key] });
     if (changes?.weights) changes.weights = this.withMoves(changes.weights);
     if (changes) this.store.set(changes);
-    if (changes?.asked) this.forgetUnlocked(changes.asked);
+    if (changes?.constraints) this.forgetUnlocked(changes.constraints);
   }
 
   /** Replace the weights of lights whose dimmers move. @param {RGB[]} weights @returns {RGB[]} */
@@ -142,11 +142,11 @@ export class SessionLink {
 
   /** Show the confirmed state, with pending requests. */
   revert() {
-    const { asked, ties, settings, weights } = this.confirmed;
+    const { constraints, ties, settings, weights } = this.confirmed;
     const { lights } = this.store.value;
     const asking = [...this.pendingConstraints].map(([light, its]) => [lights[light].name, its]);
     this.store.set({
-      asked: { ...asked, ...Object.fromEntries(asking) },
+      constraints: { ...constraints, ...Object.fromEntries(asking) },
       ties,
       settings,
       weights: this.withMoves(weights),
@@ -155,11 +155,11 @@ export class SessionLink {
 
   /** Forget the earlier constraints of lights that are no longer locked; undo unlocks lights, too.
    * Messages that precede the session's receipt of the lock do not count.
-   * @param {Record<string, Constraints>} asked */
-  forgetUnlocked(asked) {
+   * @param {Record<string, Constraints>} constraints */
+  forgetUnlocked(constraints) {
     for (const light of this.unlockedConstraints.keys()) {
       if (this.moves.has(light) || this.pendingConstraints.has(light)) continue;
-      const now = asked[this.store.value.lights[light]?.name] ?? {};
+      const now = constraints[this.store.value.lights[light]?.name] ?? {};
       if (now.lock === undefined && !now.off) this.unlockedConstraints.delete(light);
     }
   }
@@ -172,10 +172,10 @@ export class SessionLink {
     if (isShown) updateShow(this.store, { overlay: null });
   }
 
-  /** Show a notice. what: the task that it ends.
-   * @param {{text: string, tone: 'info' | 'warn', what?: string}} said */
-  showNotice({ text, tone, what }) {
-    if (what) this.taskEnded(what);
+  /** Show a notice. task: the one that it ends.
+   * @param {{text: string, tone: 'info' | 'warn', task?: string}} said */
+  showNotice({ text, tone, task }) {
+    if (task) this.taskEnded(task);
     this.toast(text, tone);
   }
 
@@ -196,10 +196,10 @@ export class SessionLink {
     return TASK_ENDED.place;
   }
 
-  /** Export files, or stop the export. @param {Requests["export"]["what"]} what empty to stop */
-  write(what) {
-    if (what.length) this.store.set({ isWriting: true, exported: null });
-    return this.send('export', { what, run: what.length > 0 });
+  /** Export files, or stop the export. @param {Requests["export"]["outputs"]} outputs empty to stop */
+  write(outputs) {
+    if (outputs.length) this.store.set({ isWriting: true, exported: null });
+    return this.send('export', { outputs, run: outputs.length > 0 });
   }
 
   /** @param {string} text @param {'info' | 'warn'} [tone] */

@@ -55,7 +55,7 @@ const PREFER_CURRENT = 0.01;
 
 /** @param {{ui: Ui, app: App}} props */
 export function SettingsPanel({ ui, app }) {
-  const { settings, resolved } = ui;
+  const { settings, effectiveSettings } = ui;
   const id = useId();
   const set = (/** @type {string} */ key) => (/** @type {any} */ value) =>
     app.session.changeSetting(key, value);
@@ -68,7 +68,7 @@ export function SettingsPanel({ ui, app }) {
       <h2 id=${id}>Solve settings</h2>
       <${Button} icon="close" tip="Close" keys="Escape" act=${close} />
     </div>
-    <${Row} title="Unpainted parts" says=${withSource(hold === null, describeHold(resolved.hold))}>
+    <${Row} title="Unpainted parts" says=${withSource(hold === null, describeHold(effectiveSettings.hold))}>
       <${Choice} label="Unpainted parts" value=${mode} choices=${HOLDS}
         change=${(/** @type {string} */ to) => set('hold')({ auto: null, hold: hold || HOLD, go: 0 }[to])} />
       ${
@@ -78,11 +78,11 @@ export function SettingsPanel({ ui, app }) {
         change=${set('hold')} />`
       }
     </${Row}>
-    <${Row} title="Colour space of the match" says=${withSource(!settings.space, DESCRIPTIONS.space[resolved.space])}>
+    <${Row} title="Colour space of the match" says=${withSource(!settings.space, DESCRIPTIONS.space[effectiveSettings.space])}>
       <${Choice} label="Colour space of the match" value=${settings.space ?? null} choices=${SPACES}
         change=${set('space')} /></${Row}>
     <${Row} title="Light colours"
-      says=${withSource(!settings.colors, DESCRIPTIONS.colors[resolved.colors])}>
+      says=${withSource(!settings.colors, DESCRIPTIONS.colors[effectiveSettings.colors])}>
       <${Choice} label="Light colours" value=${settings.colors ?? null}
         choices=${COLOURS} change=${set('colors')} /></${Row}>
     <${Row} title="Read the paint as" says=${

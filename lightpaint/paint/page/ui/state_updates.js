@@ -33,7 +33,7 @@ export function stateUpdate(message, /** @type {import('./ui_state.js').Ui} */ b
   const isBack = before.connection !== 'open' || before.closed !== null;
   const views = message.views ?? [];
   const view = before.view < views.length ? before.view : 0;
-  const { lights, asked, ties, settings, resolved, poses, added, history, looks, resources, basis } =
+  const { lights, constraints, ties, settings, effective_settings, poses, added_lights, history, looks, resources, basis } =
     message;
   return {
     ...lightNumbers(before, lights),
@@ -43,26 +43,26 @@ export function stateUpdate(message, /** @type {import('./ui_state.js').Ui} */ b
     view,
     views,
     lights,
-    asked: asked ?? {},
+    constraints: constraints ?? {},
     ties: ties ?? [],
     settings: settings ?? {},
-    resolved: resolved ?? {},
+    effectiveSettings: effective_settings ?? {},
     poses: poses ?? {},
-    added: added ?? [],
+    addedLights: added_lights ?? [],
     history,
     looks: looks ?? [],
     resources: resources ?? {},
-    hint: Boolean(message.first),
+    hint: Boolean(message.is_new),
     connection: 'open',
     closed: null,
     // Results in the meantime were missed; tasks that still run will report again.
     ...(isBack ? { ...IDLE, explained: [] } : {}),
     basis:
-      basis && !basis.done
-        ? { what: 'basis', done: basis.spp, total: basis.wanted, unit: 'samples' }
+      basis && !basis.is_complete
+        ? { task: 'basis', done: basis.spp, total: basis.target_spp, unit: 'samples' }
         : null,
     ...(isApart(looks ?? [], before) ? withoutMix(before) : {}),
-    ...(message.verified ? rendersUpdate(message.verified, view) : {}),
+    ...(message.verifications ? rendersUpdate(message.verifications, view) : {}),
     // At first a scene is shown at the exposure at which it is painted.
     ...(before.state ? {} : { show: { ...before.show, ...shownAs(message.transform) } }),
     ...answerFields(message.answer ?? {}, { ...before, view, views, lit: [] }),
@@ -132,13 +132,13 @@ function shownAs(transform) {
  * @param {any} answer @param {Ui} before @returns {Partial<Ui>}
  */
 function answerFields(answer, before) {
-  const { headline, lights, shares = null, of_views: ofViews = null } = answer;
+  const { headline, lights, shares = null, closeness = null } = answer;
   /** @type {Partial<Ui>} */
   const made = { isLive: false, isJudged: headline !== undefined };
   if (headline !== undefined)
-    Object.assign(made, { ofViews }, closenessUpdate({ ...answer, ofViews }, before));
+    Object.assign(made, { closeness }, closenessUpdate({ ...answer, closeness }, before));
   // Without paint there are no error bars and no reasons.
-  const unknown = made.deltaE === null && !ofViews ? UNKNOWN : {};
+  const unknown = made.deltaE === null && !closeness ? UNKNOWN : {};
   if (lights) {
     made.shares = shares;
     made.lit = lights.map((/** @type {any} */ one, /** @type {number} */ k) => ({
@@ -155,21 +155,21 @@ function answerFields(answer, before) {
  * @returns {Partial<Ui>} */
 function closenessUpdate(answer, { view, views }) {
   const isOne = views.length < 2;
-  const its = isOne || !answer.ofViews ? answer : answer.ofViews[view];
+  const its = isOne || !answer.closeness ? answer : answer.closeness[view];
   if (!its)
-    return { headline: UNPAINTED, help: null, deltaE: null, deltaAsked: null, sentences: [] };
+    return { headline: UNPAINTED, help: null, deltaE: null, deltaPresent: null, sentences: [] };
   return {
     headline: its.headline,
     help: its.help ?? null,
     deltaE: its.delta_e ?? null,
-    deltaAsked: its.delta_e_asked ?? null,
+    deltaPresent: its.delta_e_present ?? null,
     sentences: its.sentences ?? [],
   };
 }
 
 const UNPAINTED = 'Nothing is painted in this view. It follows the others.';
 
-const UNKNOWN = { error: null, held: false, unreached: false };
+const UNKNOWN = { error: null, is_constrained: false, is_unreached: false };
 
 /** Return the state that changes with the current view. @param {Ui} ui @param {number} view
  * @returns {Partial<Ui>} */
@@ -183,7 +183,7 @@ export function viewUpdate(ui, view) {
     ...(isRender ? { left: 'painting', right: 'solution' } : {}),
     ...(isAsLarge ? {} : { zoom: 1, pan: [0, 0] }),
   };
-  const { ofViews, shares } = ui;
+  const { closeness, shares } = ui;
   return {
     view,
     state: stateOfView(ui.state, view),
@@ -191,14 +191,14 @@ export function viewUpdate(ui, view) {
     explained: [],
     pointed: null,
     show,
-    ...(ofViews ? closenessUpdate({ ofViews }, { ...ui, view }) : {}),
+    ...(closeness ? closenessUpdate({ closeness }, { ...ui, view }) : {}),
     lit: ui.lit.map((one, k) => ({ ...one, share: shares?.[view]?.[k] ?? one.share })),
   };
 }
 
 /** Take a verification render of a view. @param {Events["verified"]} message @param {Ui} ui
  * @returns {Partial<Ui>} */
-export function verifiedOf(message, ui) {
+export function verificationUpdate(message, ui) {
   const { view = 0 } = message;
   const verified = render(message);
   const made = { verifiedOf: { ...ui.verifiedOf, [view]: verified }, verifying: null };
@@ -236,9 +236,11 @@ export function answerUpdate(message, ui) {
   if (message.version < ui.version) return {};
   const made = /** @type {Partial<Ui>} */ (weightsOf(message));
   made.version = message.version ?? ui.version;
-  for (const key of /** @type {const} */ (['history', 'asked', 'ties', 'settings', 'resolved', 'poses', 'added'])) {
+  for (const key of /** @type {const} */ (['history', 'constraints', 'ties', 'settings', 'poses'])) {
     if (message[key]) made[key] = message[key];
   }
+  if (message.effective_settings) made.effectiveSettings = message.effective_settings;
+  if (message.added_lights) made.addedLights = message.added_lights;
   if (message.lights) Object.assign(made, answerFields(message, ui));
   else if (!message.exact) {
     made.isLive = true;
@@ -257,13 +259,13 @@ export function answerUpdate(message, ui) {
 }
 
 /** @param {Events["progress"]} message @param {Ui} ui @returns {Partial<Ui>} */
-export function progressUpdate({ what, done, total, unit }, ui) {
-  const made = { what, done, total, unit };
-  if (what === 'export') return { writing: timed(made, ui.writing), isWriting: true };
-  if (what === 'place') return ui.placing ? { placing: timed(made, ui.placing) } : {};
+export function progressUpdate({ task, done, total, unit }, ui) {
+  const made = { task, done, total, unit };
+  if (task === 'export') return { writing: timed(made, ui.writing), isWriting: true };
+  if (task === 'place') return ui.placing ? { placing: timed(made, ui.placing) } : {};
   // The brush interrupts it, so the remaining time is unknown.
-  if (what === 'sampling') return { sampling: done < total ? made : null };
-  if (/verif/i.test(what)) return { verifying: timed(made, ui.verifying) };
+  if (task === 'sampling') return { sampling: done < total ? made : null };
+  if (/verif/i.test(task)) return { verifying: timed(made, ui.verifying) };
   return { basis: total && done >= total ? null : timed(made, ui.basis) };
 }
 

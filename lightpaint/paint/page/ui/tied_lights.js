@@ -8,7 +8,7 @@
 export const findTie = (ui, light) => ui.ties.find((tie) => tie.includes(ui.lights[light].name));
 
 /** @param {Ui} ui @param {string} name */
-const isLocked = ({ asked }, name) => asked[name]?.lock !== undefined || Boolean(asked[name]?.off);
+const isLocked = ({ constraints }, name) => constraints[name]?.lock !== undefined || Boolean(constraints[name]?.off);
 
 /** Return the lights that constraints lock or switch off. @param {Ui} ui */
 export const lockedLights = (ui) =>
@@ -25,9 +25,9 @@ export function lockingLight(ui, light) {
 /** Return the constraints of a light, with the level constraint of its dimmer.
  * @param {Ui} ui @param {number} light @returns {Constraints | undefined} */
 export function constraintsOf(ui, light) {
-  const own = ui.asked[ui.lights[light].name];
+  const own = ui.constraints[ui.lights[light].name];
   const locking = lockingLight(ui, light);
   if (locking === light) return own;
-  const { lock, off } = ui.asked[ui.lights[locking].name];
+  const { lock, off } = ui.constraints[ui.lights[locking].name];
   return { ...own, ...(lock === undefined ? {} : { lock }), ...(off ? { off } : {}) };
 }

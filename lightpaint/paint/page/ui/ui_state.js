@@ -12,8 +12,8 @@ import { ofKelvin } from './paint_colour.js';
 /** @typedef {Record<string, any>} Constraints */
 /** @typedef {import("../engine/messages.js").Advice} Advice */
 /** A request that changes settings or constraints.
- * @typedef {{[K in "set" | "ask_all" | "tie"]:
- *   {kind: K, fields: import("../engine/messages.js").Requests[K]}}["set" | "ask_all" | "tie"]}
+ * @typedef {{[K in "change_settings" | "constrain_lights" | "tie"]:
+ *   {kind: K, fields: import("../engine/messages.js").Requests[K]}}["change_settings" | "constrain_lights" | "tie"]}
  *   Change */
 /** A preview of a change: its name and the known part of its effect.
  * @typedef {{number: number, label: string, change: Change, text: string, isAtCost: boolean,
@@ -22,12 +22,12 @@ import { ofKelvin } from './paint_colour.js';
 /** @typedef {import("../engine/messages.js").Closeness} Seen */
 /** The effect of the next click: aim a light or hang a new one. edge: the place that casts the
  * shadow, once clicked.
- * @typedef {{light: number, how: "aim" | "highlight" | "shadow", edge?: [number, number]}
- *   | {how: "hang", type: NewKind}} Pointing */
+ * @typedef {{light: number, mode: "aim" | "highlight" | "shadow", edge?: [number, number]}
+ *   | {mode: "hang", type: NewKind}} Pointing */
 /** @typedef {"spot" | "point" | "panel"} NewKind */
 /** since: time of the first report, in ms, and the progress then; left_s: estimated seconds left,
  * once known.
- * @typedef {{what: string, done: number, total: number, unit: string,
+ * @typedef {{task: string, done: number, total: number, unit: string,
  *   since?: {ms: number, done: number}, left_s?: number}} Progress */
 /** @typedef {{id: number, text: string, tone: "info" | "warn"}} Toast */
 
@@ -41,7 +41,7 @@ import { ofKelvin } from './paint_colour.js';
  * @property {number} version how often the session had changed, as its last message says
  * @property {number} view that is shown
  * @property {{name: string, size: [number, number]}[]} views of the session
- * @property {(Seen | null)[] | null} ofViews how close each view is; null where nothing is painted
+ * @property {(Seen | null)[] | null} closeness how close each view is; null where nothing is painted
  * @property {number[][] | null} shares of each light, in each view
  * @property {Record<number, any>} verifiedOf renders, by view
  * @property {Light[]} lights
@@ -51,14 +51,14 @@ import { ofKelvin } from './paint_colour.js';
  * @property {Advice | null} help what the headline advises
  * @property {Preview | null} preview of a change that is looked at before it is made
  * @property {number | null} deltaE
- * @property {number | null} deltaAsked the same of the present lighting: how much was asked for
+ * @property {number | null} deltaPresent the same of the present lighting: how much was asked for
  * @property {string[]} sentences
  * @property {boolean} isLive the last answer is the quick one, of a stroke in progress
  * @property {boolean} isJudged whether what is said of the answer is of the last one
- * @property {Record<string, Constraints>} asked
+ * @property {Record<string, Constraints>} constraints
  * @property {string[][]} ties
  * @property {Record<string, Record<string, any>>} poses of lights that were moved, by name
- * @property {string[]} added names of lights that the scene does not have
+ * @property {string[]} addedLights names of lights that the scene does not have
  * @property {import("../engine/messages.js").Rig | null} rig where the lights hang, once it is known
  * @property {boolean} lamps whether lights are marked in the pictures
  * @property {number | null} lamp the marked light that was chosen, which has handles
@@ -75,7 +75,7 @@ import { ofKelvin } from './paint_colour.js';
  * @property {Record<string, number[]>} ghosts places of lights before a search has moved them, by name
  * @property {Pointing | null} pointing what the next click on a picture does
  * @property {Record<string, any>} settings
- * @property {Record<string, any>} resolved
+ * @property {Record<string, any>} effectiveSettings
  * @property {{undo: string[], redo: string[], count?: number}} history labels of the last steps,
  *   and how many there are
  * @property {Look[]} looks
@@ -161,7 +161,7 @@ export function initialState() {
     version: -1,
     view: 0,
     views: [],
-    ofViews: null,
+    closeness: null,
     shares: null,
     verifiedOf: {},
     lights: [],
@@ -171,14 +171,14 @@ export function initialState() {
     help: null,
     preview: null,
     deltaE: null,
-    deltaAsked: null,
+    deltaPresent: null,
     sentences: [],
     isLive: false,
     isJudged: true,
-    asked: {},
+    constraints: {},
     ties: [],
     poses: {},
-    added: [],
+    addedLights: [],
     rig: null,
     lamps: false,
     lamp: null,
@@ -190,7 +190,7 @@ export function initialState() {
     ghosts: {},
     pointing: null,
     settings: {},
-    resolved: {},
+    effectiveSettings: {},
     history: { undo: [], redo: [] },
     looks: [],
     lastLook: null,

@@ -28,8 +28,8 @@ export function ViewTabs({ ui, app }) {
   return html`<div class="views" role="group" aria-label="Views">
     ${ui.views.map(({ name }, k) => {
       const picture = inView('look', k);
-      const closeness = ui.ofViews?.[k];
-      const note = closeness ? `ΔE ${number(closeness.delta_e, 2)}` : ui.ofViews && 'not painted';
+      const closeness = ui.closeness?.[k];
+      const note = closeness ? `ΔE ${number(closeness.delta_e, 2)}` : ui.closeness && 'not painted';
       return html`<button type="button" class=${`view-tab ${k === ui.view ? 'is-on' : ''}`}
         key=${name} aria-pressed=${String(k === ui.view)} data-tip=${`Show and paint ${name}`}
         data-keys="N" onClick=${() => showView(app, k)}>

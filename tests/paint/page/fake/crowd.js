@@ -21,7 +21,7 @@ export const LONGEST =
   `${named(12)} and ${named(13)} are limited by their constraints.`;
 
 /** What has a button, of the name of a light. */
-export const HELP = { kind: 'limits', names: [named(0)], closes: 0.57, hold: null };
+export const HELP = { kind: 'limits', names: [named(0)], gain: 0.57, hold: null };
 
 export const SENTENCES = [
   'Of the difference (large errors count most), 41 % would need colours or levels that the ' +
@@ -44,7 +44,7 @@ export const TOAST =
   'present level, and its limits stay as they were before this was typed.';
 
 /** What is done by hand, in every manner. @param {number} k @param {number[]} present */
-function askedOf(k, present) {
+function constraintsOf(k, present) {
   switch (OTHERS[k % 12]) {
     case 'limits':
       return { limits: { min: '12.5%', max: '1234.56%' } };
@@ -84,7 +84,7 @@ export function crowd(host) {
       stamp: 0,
       thumbnail: `look/${k + 1}`,
     });
-  host.asked = Object.fromEntries(room.lights.map((one, k) => [one.name, askedOf(k, one.present)]));
+  host.constraints = Object.fromEntries(room.lights.map((one, k) => [one.name, constraintsOf(k, one.present)]));
   host.ties = [room.lights.slice(40, 44).map(({ name }) => name)];
   const { state, exact, asks } = host;
   host.exact = () => {
@@ -92,10 +92,10 @@ export function crowd(host) {
     const lights = made.lights.map((one, k) => ({
       ...one,
       error: ERRORS[k % ERRORS.length],
-      held: k % 12 < 4,
-      unreached: k % 10 === 9,
+      is_constrained: k % 12 < 4,
+      is_unreached: k % 10 === 9,
     }));
-    const seen = { headline: HEADLINE, help: HELP, delta_e: 11.24, delta_e_asked: 20.53 };
+    const seen = { headline: HEADLINE, help: HELP, delta_e: 11.24, delta_e_present: 20.53 };
     return { ...made, ...seen, sentences: SENTENCES.slice(2), lights };
   };
   host.asks = () => {
@@ -113,13 +113,13 @@ export function crowd(host) {
     }));
     const folder = `/shows/${'a_folder_of_a_long_name/'.repeat(6)}gallery-evening.paint`;
     const scene = 'museum-of-applied-arts-east-wing-second-floor-2031-rev-17';
-    return { ...made, lights, scene, folder, transforms, first: false };
+    return { ...made, lights, scene, folder, transforms, is_new: false };
   };
   host.explain = () => ({ kind: 'explained', sentences: SENTENCES });
   host.verify = () => ({ kind: 'verified', agrees: false, text: VERIFIED });
-  host.export = ({ what }) => ({
+  host.export = ({ outputs }) => ({
     kind: 'exported',
-    files: what.map((one) => `${host.state().folder}/${one}.with_a_long_name_of_its_own`),
+    files: outputs.map((one) => `${host.state().folder}/${one}.with_a_long_name_of_its_own`),
     command: `lightpaint solve ${host.state().folder}/painting.exr --hold 4 --lock '${named(3)}=12.5%'`,
     is_unpainted: false,
   });

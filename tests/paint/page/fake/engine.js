@@ -202,15 +202,15 @@ export class FakeEngine {
     }
   }
 
-  async send(done) {
-    if (this.busy && !done) return;
+  async send(isFinal) {
+    if (this.busy && !isFinal) return;
     this.busy = true;
     await this.host.send(
       'paint',
       {
         stroke: this.strokes,
         region: [0, this.room.h, 0, this.room.w],
-        done,
+        is_final: isFinal,
         label: this.tool.tool,
       },
       { image: { data: this.image, shape: [this.room.h, this.room.w, 3] } },
@@ -230,7 +230,7 @@ export class FakeEngine {
     this.calls.push(['cancel']);
     this.image = this.before;
     this.before = null;
-    this.host.send('drop', { stroke: this.strokes });
+    this.host.send('drop_stroke', { stroke: this.strokes });
     this.draw();
     return true;
   }

@@ -26,7 +26,7 @@ export class FakeHost {
       stroke: 0,
     });
     this.weights = room.lights.map(({ present }) => [...present]);
-    this.asked = {};
+    this.constraints = {};
     this.ties = [];
     this.settings = {
       hold: null,
@@ -84,12 +84,12 @@ export class FakeHost {
     const { room } = this;
     return {
       kind: 'state',
-      version: 2,
+      version: 3,
       size: [room.h, room.w],
       scene: 'gallery',
       can_report: true,
       is_back: false,
-      verified: [],
+      verifications: [],
       command: '',
       lut: { side: 2, low: 0, high: 1 },
       views: [
@@ -122,9 +122,9 @@ export class FakeHost {
       stroke: 0,
       looks: this.looks,
       basis: this.isFirst
-        ? { spp: 4, wanted: 64, done: false }
-        : { spp: 64, wanted: 64, done: true },
-      first: !this.steps.length,
+        ? { spp: 4, target_spp: 64, is_complete: false }
+        : { spp: 64, target_spp: 64, is_complete: true },
+      is_new: !this.steps.length,
       folder: '/shows/gallery-evening',
       answer: this.exact(),
       ...this.asks(),
@@ -134,10 +134,10 @@ export class FakeHost {
 
   asks() {
     return {
-      asked: this.asked,
+      constraints: this.constraints,
       ties: this.ties,
       settings: this.settings,
-      resolved: { space: 'display', hold: 3, colors: 'gentle' },
+      effective_settings: { space: 'display', hold: 3, colors: 'gentle' },
       history: {
         undo: this.steps.map(({ label }) => label),
         redo: this.undone.map(({ label }) => label),
@@ -163,8 +163,8 @@ export class FakeHost {
         is_on: true,
         share: level(rgb) / total,
         error: '±4 %',
-        held: false,
-        unreached: k === 11,
+        is_constrained: false,
+        is_unreached: k === 11,
       })),
     };
   }
@@ -203,14 +203,14 @@ export class FakeHost {
   }
 
   /** A step towards the paint: each light by how far it looks like what was painted since. */
-  paint({ stroke, region: [top, , left], done, label }, { image }) {
+  paint({ stroke, region: [top, , left], is_final, label }, { image }) {
     this.stroke = stroke;
     const { w, planes, lights } = this.room;
     const [rows, columns] = image.shape;
     const mixed = this.mixed();
     this.weights = this.weights.map((rgb, k) =>
       rgb.map((x, c) => {
-        if (this.asked[lights[k].name]?.lock) return x;
+        if (this.constraints[lights[k].name]?.lock) return x;
         let [up, own] = [0, 1e-9];
         for (let i = 0; i < rows * columns; i += 5) {
           const at = 3 * ((top + Math.floor(i / columns)) * w + left + (i % columns)) + c;
@@ -221,8 +221,8 @@ export class FakeHost {
         return Math.max(0, x + (0.3 * up) / own);
       }),
     );
-    if (done) this.step(label);
-    return this.answer(Boolean(done));
+    if (is_final) this.step(label);
+    return this.answer(Boolean(is_final));
   }
 
   mixed() {
@@ -233,7 +233,7 @@ export class FakeHost {
     return made;
   }
 
-  drop() {
+  drop_stroke() {
     return this.patch();
   }
   undo() {
@@ -247,24 +247,24 @@ export class FakeHost {
     if (step) this.steps.push(step);
     return this.patch();
   }
-  ask({ light, asked, done }) {
-    this.asked = { ...this.asked, [this.room.lights[light].name]: asked };
-    if (Array.isArray(asked.lock)) this.weights[light] = [...asked.lock];
-    if (asked.off) this.weights[light] = [0, 0, 0];
-    if (done) this.step('ask');
-    return this.answer(done);
+  constrain_light({ light, constraints, is_final }) {
+    this.constraints = { ...this.constraints, [this.room.lights[light].name]: constraints };
+    if (Array.isArray(constraints.lock)) this.weights[light] = [...constraints.lock];
+    if (constraints.off) this.weights[light] = [0, 0, 0];
+    if (is_final) this.step('constraint');
+    return this.answer(is_final);
   }
-  ask_all({ asked }) {
-    this.asked = { ...this.asked, ...asked };
-    this.step('ask');
+  constrain_lights({ constraints }) {
+    this.constraints = { ...this.constraints, ...constraints };
+    this.step('constraint');
     return this.answer();
   }
   tie({ ties }) {
     this.ties = ties;
     return this.answer();
   }
-  set({ values }) {
-    this.settings = { ...this.settings, ...values };
+  change_settings({ settings }) {
+    this.settings = { ...this.settings, ...settings };
     return this.answer();
   }
   kept() {
@@ -309,22 +309,22 @@ export class FakeHost {
     this.looks = this.looks.filter(({ id }) => id !== look);
     return this.kept();
   }
-  export({ what, run = true }) {
-    if (this.isWriting) return { kind: 'started', what: run ? 'export' : 'stop' };
-    const files = this.unpainted ? what.filter((one) => !['target', 'report'].includes(one)) : what;
+  export({ outputs, run = true }) {
+    if (this.isWriting) return { kind: 'started', task: run ? 'export' : 'stop' };
+    const files = this.unpainted ? outputs.filter((one) => !['target', 'report'].includes(one)) : outputs;
     return {
       kind: 'exported',
       files: files.map((one) => `/shows/gallery-evening/${one}`),
       command: files.includes('target')
         ? 'lightpaint solve gallery.xml gallery-evening/target.exr'
         : '',
-      is_unpainted: files.length < what.length,
+      is_unpainted: files.length < outputs.length,
     };
   }
   verify({ run }) {
     return run
-      ? { kind: 'progress', what: 'verify', done: 3, total: 16, unit: 'passes' }
-      : { kind: 'say', text: 'The render was stopped.', tone: 'info' };
+      ? { kind: 'progress', task: 'verify', done: 3, total: 16, unit: 'passes' }
+      : { kind: 'notice', text: 'The render was stopped.', tone: 'info' };
   }
   explain() {
     return {
@@ -347,7 +347,7 @@ export class FakeHost {
         arrays: { before: picture, after: picture },
       }),
     );
-    return { kind: 'started', what: 'preview' };
+    return { kind: 'started', task: 'preview' };
   }
   take_over() {
     return this.state();
