@@ -118,7 +118,7 @@ PAGE_WAIT_S = 5.0
 
 
 def _stop_after_failure(server: Server, error: Exception) -> None:
-    """Stop the server, since there is nothing to paint, and tell a page that is loading why."""
+    """Stop the server, since there is nothing to paint, and tell a loading page the reason."""
     end_s = time.monotonic() + (PAGE_WAIT_S if server.expects_page else 0.0)
     while not server.has_page and time.monotonic() < end_s:
         time.sleep(0.05)

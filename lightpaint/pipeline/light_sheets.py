@@ -17,12 +17,12 @@ from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
 
 #: Rendering of a light sheet, and its own seed: answers that continue a cached basis must not
-#: depend on whether somebody has looked at the lights.
+#: depend on an earlier sheet.
 SHEET, SHEET_SEED = Preset(16, 2**15), 2**31 - 1
 
-#: Maximum number of pixels of all lights together that are rendered for a sheet, and fewest of each
-#: light; most bytes of a cached basis that is read for it; most lights if each needs a render of
-#: its own.
+#: Maximum number of pixels of all lights together that are rendered for a sheet, and minimum per
+#: light; maximum bytes of a cached basis that is read for it; maximum number of lights if each
+#: needs a separate render.
 SHEET_MAX_PIXELS, LIGHT_MIN_PIXELS, MAX_BASIS_BYTES, MAX_RENDERS = 2**20, 2**12, 2**27, 6
 
 #: Key of the text in a PNG that marks it as a light sheet.

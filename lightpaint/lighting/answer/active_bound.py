@@ -18,14 +18,14 @@ class Bound:
     """A bound that holds back one light, or several on one dimmer.
 
     held_by: the constraint in few words (`LightSetting.constraint`); else the kind.
-    gain: the fall of the objective, all channels together, if this bound alone were
-    released. A kept, locked, limited, coloured or tied light then may have any emission >= 0, a
-    light that is left out any that its constraints allow, and one at zero takes light away. A pull
-    towards the present stays, is no part of the objective, and may make the gain negative.
-    multiplier: the initial change of the objective per unit by which the bound rises: >= 0 at a
-    lower limit, as zero is one, and <= 0 at an upper one, as `off` is. Three channels per
-    `emission`; one number per `luminance` of the emission; per unit of a `dimmer`, 1 being the
-    present, one number for each tied light moved by itself, or one for all.
+    gain: decrease of the objective, all channels together, if only this bound were released. A
+    kept, locked, limited, coloured or tied light may then have any emission >= 0, an unselected
+    light any that its constraints allow, and a light at zero negative emission. A pull towards the
+    present is kept; it is not part of the objective, so the gain may be negative. multiplier:
+    derivative of the objective by the bound: >= 0 at a lower limit, such as zero, and <= 0 at an
+    upper one, such as `off`. Three channels per `emission`; one number per `luminance` of the
+    emission; per unit of a `dimmer`, 1 being the present, one number for each tied light moved
+    separately, or one for all.
     tint: the side of its range of white to which the light would go.
     """
 
@@ -39,5 +39,5 @@ class Bound:
 
     @property
     def is_switched_off(self) -> bool:
-        """True if a person, or a choice of few lights, switched the light off."""
+        """True if the user, or a choice of few lights, switched the light off."""
         return self.kind in ("off", "left out")

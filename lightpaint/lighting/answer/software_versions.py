@@ -10,10 +10,10 @@ from lightpaint.version import __version__
 
 @dataclass(frozen=True)
 class Software:
-    """Versions as installed, and the processor's part in them.
+    """Installed versions, and the kernel for the processor.
 
-    blas: library of linear algebra under NumPy, and its version. kernel: its choice for the
-    processor, as `Haswell`, "" if unknown. mitsuba: "" if it is not installed.
+    blas: library of linear algebra under NumPy, and its version. kernel: of that library for the
+    processor, such as `Haswell`; "" if unknown. mitsuba: "" if it is not installed.
     """
 
     lightpaint: str

@@ -1,4 +1,4 @@
-"""The losses that paintings stand for."""
+"""The losses of paintings."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -41,8 +41,8 @@ def literal_squares(
 def ignored_paint(target: Target, is_emitter: Bools, emitters: Emitters) -> Bools:
     """Return, (h, w), the painted pixels that do not count because an emitter is in view there.
 
-    is_emitter: (h, w), where one is. Emitters count if somebody painted them; otherwise, at unit
-    emission, they would outshine everything that their light falls on.
+    is_emitter: (h, w), where one is. Emitters count only if they were painted; at unit emission
+    they would outshine everything that they light.
     """
     skips = target.everything if emitters == "auto" else emitters == "skip"
     return np.asarray(is_emitter & (target.importance > 0) & skips)
@@ -151,10 +151,10 @@ def choose_loss(
     painted: Callable[[], Floats],
     current: Callable[[], Floats],
 ) -> Loss:
-    """Choose the loss: `literal` itself if it is equal to it.
+    """Choose the loss; return `literal` itself if it is equal.
 
-    at_least: (h, w, 3), where brighter is as good. painted, current: Ψ and the present look,
-    called if they are needed.
+    at_least: (h, w, 3), where brighter is as good. painted, current: return Ψ and the present look,
+    if needed.
     """
     if transform is None and not (at_least.any() and at_least[literal.weight[..., 0] > 0].any()):
         return literal

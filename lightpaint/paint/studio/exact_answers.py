@@ -15,7 +15,7 @@ from lightpaint.progress import cancellable
 
 
 class OutdatedError(Exception):
-    """Signal that ends work whose result is outdated: the user has painted on, or left."""
+    """Signal that ends work whose result is outdated: the user has continued to paint, or left."""
 
 
 def raise_outdated() -> None:

@@ -1,5 +1,5 @@
 /**
- * The key to the painter's server: how a page gets it and presents it.
+ * The key to the painter's server, which a page obtains and presents.
  *
  * The address that a terminal shows has a token in its fragment, which browsers never send. The
  * page takes it from there and exchanges it for the key. Browsers attach a cookie to requests to

@@ -58,7 +58,7 @@ export class PictureEngine extends Emitter {
     this.encoder = null;
   }
 
-  // What is shown
+  // Display
 
   /** @param {number} width @param {number} height in CSS pixels */
   resize(width, height) {

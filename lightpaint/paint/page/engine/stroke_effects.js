@@ -8,12 +8,12 @@ import { VALUES } from '../../../viewer/drawing/half.js';
 /** @typedef {import("./message_frames.js").RGB} RGB */
 
 /**
- * The effect of a stroke. paint: the pixel becomes a colour, or light of that colour on its albedo;
- * of light on what reflects none, as a flame, nothing can be said, and it stays as it is.
- * erase: it is the present look again, and not painted; of a picture that was asked for as a whole
- * it is what was asked of that. weigh: it counts so many times as much
- * as it did; what is not painted is kept as it is, and counts as a stroke would. ask: its light is
- * scaledImportance, its luminance times `gain` and its colour by `tint`.
+ * The effect of a stroke. paint: the pixel becomes a colour, or light of that colour on its albedo.
+ * Surfaces without diffuse reflection, such as a flame, ignore light and keep their pixels. erase:
+ * the pixel shows the present look again, unpainted; in a picture that was adjusted as a whole, it
+ * shows that adjustment. weigh: its importance is multiplied by `times`; an unpainted pixel keeps
+ * its look, with the importance of a stroke. adjust: its luminance is multiplied by `gain` and its
+ * colour by `tint`.
  * @typedef {{kind: 'paint', rgb: RGB, as: 'light' | 'colour'} | {kind: 'erase', ground: WholeAdjustment | null} |
  *   {kind: 'weigh', times: number} | {kind: 'adjust', gain: number, tint: RGB}} Effect
  */

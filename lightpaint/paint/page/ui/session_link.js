@@ -189,7 +189,7 @@ export class SessionLink {
     return { exported: message, ...TASK_ENDED.export };
   }
 
-  /** A search for places has ended: what it did, and where lights hung before.
+  /** Take the result of a search for places, and the earlier places of lights.
    * @param {HostEvents["placed"]} message @returns {Partial<Ui>} */
   placingEnded({ text }) {
     this.toast(text);

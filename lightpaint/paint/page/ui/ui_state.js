@@ -1,4 +1,4 @@
-/** The state of the interface: what the session has sent, and settings of the page itself. */
+/** The state of the interface: data from the session, and settings of the page itself. */
 
 import { ofKelvin } from './paint_colour.js';
 
