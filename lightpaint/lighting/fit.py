@@ -37,7 +37,7 @@ class Fit:
     None is resolved by how the target was painted. Over the current look: the fit holds the rest to
     it, and lamps keep their colour. Through a view of a display: lamps keep their colour, and the
     fit compares display values. A float EXR with its own mask and nothing under it is fitted
-    literally: as light, each channel separately.
+    literally, as light, each channel separately.
 
     Attributes:
         space: `linear`, or `display` to come closest in display values.
