@@ -130,21 +130,7 @@ class Problem(LinearProblem):
             )
         whole, parts = joint_basis(bases)
         all_constraints = constraints_of(whole.requests).and_then(constraints or Constraints())
-        fit = fit or Fit()
-        fitted = [
-            resolve_importance(
-                target_of_view.fitted_to(view_basis.size, resize=resize),
-                view_basis.emitters_seen,
-                fit.emitters,
-            )
-            for target_of_view, view_basis in zip(targets, parts, strict=True)
-        ]
-        fit = resolve_for_targets(fit, fitted)
-        resolved = [
-            resolve_emitter_paint(x, view_basis, fit)
-            for x, view_basis in zip(fitted, parts, strict=True)
-        ]
-        views = Views(parts, tuple(resolved))
+        views, fit = _resolve_views(parts, targets, fit or Fit(), resize=resize)
         squares = joint_squares(views, unpainted=unpainted_weight_of(views, fit))
         loss = choose_loss(
             squares,
@@ -261,6 +247,26 @@ class Problem(LinearProblem):
             equations=NormalEquations.of(basis, squares.image, squares.weight),
             corrected=None,
         )
+
+
+def _resolve_views(
+    bases: tuple[Basis, ...], targets: Sequence[Target], fit: Fit, *, resize: bool
+) -> tuple[Views, Fit]:
+    """Return the views at the size of their bases, with the importance that the fit gives each
+    pixel, and the fit with no option left open.
+    """
+    fitted = [
+        resolve_importance(
+            target.fitted_to(basis.size, resize=resize), basis.emitters_seen, fit.emitters
+        )
+        for target, basis in zip(targets, bases, strict=True)
+    ]
+    fit = resolve_for_targets(fit, fitted)
+    resolved = (
+        resolve_emitter_paint(target, basis, fit)
+        for target, basis in zip(fitted, bases, strict=True)
+    )
+    return Views(bases, tuple(resolved)), fit
 
 
 def gamuts_for(basis: Basis, views: Views, fit: Fit) -> Gamuts | None:

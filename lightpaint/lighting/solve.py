@@ -236,6 +236,27 @@ def _descend_once(
     is_near: bool = False,
 ) -> Solution:
     """Descend to the least loss over the present reduction. For the arguments see `_descend`."""
+    descent, optimum = _least_loss(problem, start, blocks, is_near=is_near)
+    if blocks is not None:
+        solved = _problem_of_blocks(problem, descent, blocks)
+    else:
+        solved = replace(problem, squares=descent.squares, equations=descent.equations)
+    equations = solved.with_pull(solved.solved)
+    solution = _solution(make_answer(solved, optimum, descent.weights, equations, reached))
+    converged = optimum.converged and descent.reweighting.converged
+    result = solution.with_certificate_fields(
+        converged=converged, rounds=1 + descent.reweighting.rounds
+    )
+    return replace(result, reweighting=descent.reweighting)
+
+
+def _least_loss(
+    problem: Problem, start: Doubles, blocks: BinnedPixels | None, *, is_near: bool
+) -> tuple[Descent, ReducedOptimum]:
+    """Return the descent to the least loss, and the optimum of its last linear problem.
+
+    The descent begins at `start`, or at the present weights where these lead lower.
+    """
     basis, loss, pull, equations = problem.basis, problem.loss, problem.pull, problem.equations
     if blocks is not None:
         basis, loss, equations = blocks.basis, blocks.loss, blocks.equations
@@ -266,18 +287,7 @@ def _descend_once(
     if loss_at(descent.weights) > loss_at(present):
         # A worse valley: from the present every step leads downhill.
         descent = descend_from(present)
-    optimum = best_of(descent.equations, descent.reweighting.at)
-    if blocks is not None:
-        solved = _problem_of_blocks(problem, descent, blocks)
-    else:
-        solved = replace(problem, squares=descent.squares, equations=descent.equations)
-    equations = solved.with_pull(solved.solved)
-    solution = _solution(make_answer(solved, optimum, descent.weights, equations, reached))
-    converged = optimum.converged and descent.reweighting.converged
-    result = solution.with_certificate_fields(
-        converged=converged, rounds=1 + descent.reweighting.rounds
-    )
-    return replace(result, reweighting=descent.reweighting)
+    return descent, best_of(descent.equations, descent.reweighting.at)
 
 
 def nearest_to_present(problem: Problem) -> Doubles:

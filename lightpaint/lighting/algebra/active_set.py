@@ -44,7 +44,7 @@ def polish(q: Quadratic, x: Doubles, *, tolerance: float, max_steps: int) -> tup
         if not beyond.any() and not exceeded.any():
             progress += _objective_change(q, gradient, move)
             x = target
-            left, multipliers, residual = q.violations(x)
+            reduced_gradient, multipliers, residual = q.violations(x)
             since_best = 0 if residual < 0.5 * best else since_best + 1
             best = min(best, residual)
             if residual <= tolerance or since_best > 20 + 2 * q.n:
@@ -52,7 +52,7 @@ def polish(q: Quadratic, x: Doubles, *, tolerance: float, max_steps: int) -> tup
             if progress > -EPSILON * abs(float(q.b @ x)):
                 release_all = False
             progress = 0.0
-            _release(q, x, left, multipliers, working, release_all)
+            _release(q, x, reduced_gradient, multipliers, working, release_all)
             continue
         if not q.groups:
             clipped = np.where(beyond, np.clip(target, q.lower, q.upper), target)

@@ -93,14 +93,14 @@ def minimise(
     start_at = x
     with one_thread():
         x, sweeps, steps = by_method(q, x, tolerance, max_sweeps)
-        left, multipliers, residual = q.violations(x)
+        gradient, multipliers, residual = q.violations(x)
         if steps and (nearest := nearest_equal(q, x, start_at)) is not x:
             violations = q.violations(nearest)
             if violations[2] <= max(tolerance, residual):
-                x, (left, multipliers, residual) = nearest, violations
+                x, (gradient, multipliers, residual) = nearest, violations
     return Optimum(
         _unscaled(q, x, lower, upper),
-        left / q.scale,
+        gradient / q.scale,
         multipliers / q.cap_scale,
         residual,
         sweeps,
@@ -142,13 +142,13 @@ def minimise_each(
             max_sweeps=max_sweeps,
         )
 
-    left = [c for c in range(count) if c not in optima]
+    remaining = [c for c in range(count) if c not in optima]
     solved = (
-        parallel_map(solve, left)
-        if n > MAX_BATCHED_UNKNOWNS and len(left) > 1
-        else map(solve, left)
+        parallel_map(solve, remaining)
+        if n > MAX_BATCHED_UNKNOWNS and len(remaining) > 1
+        else map(solve, remaining)
     )
-    optima.update(zip(left, solved, strict=True))
+    optima.update(zip(remaining, solved, strict=True))
     return [optima[c] for c in range(count)]
 
 
@@ -211,7 +211,7 @@ def _solve_polished(
         if kkt <= tolerance and q.violations(solved)[2] <= tolerance:
             return solved, 0, steps
     elif residual > tolerance and max_sweeps > 0:
-        trial, left, steps, _ = clipped_newton(
+        trial, residuals, steps, _ = clipped_newton(
             q.M[None],
             q.b[None],
             q.lower[None],
@@ -220,7 +220,7 @@ def _solve_polished(
             np.array([q.size]),
             tolerance=tolerance,
         )
-        if left[0] <= tolerance:
+        if residuals[0] <= tolerance:
             return trial[0], 0, steps
     count = 0
     while residual > tolerance and sweeps < max_sweeps:

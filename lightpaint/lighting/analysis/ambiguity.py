@@ -24,13 +24,13 @@ MIN_PART = 0.05
 class Ambiguity:
     """Lights that can share their light among themselves in many equally good ways.
 
-    names: the lights. left: the part of their images that remains when they cancel: 1 − cos
+    names: the lights. remainder: the part of their images that remains when they cancel: 1 − cos
     of the angle between two; an eigenvalue for more. is_mix: whether a mix in some channel cancels;
     otherwise all are alike in all channels.
     """
 
     names: tuple[str, ...]
-    left: float
+    remainder: float
     is_mix: bool
 
     @property
@@ -106,7 +106,10 @@ def indistinguishable(
                 part = np.abs(vector) > MIN_PART * np.abs(vector).max()
                 mixed = tuple(names[i] for i in heads[part].tolist())
                 mixes[mixed] = min(mixes.get(mixed, np.inf), max(0.0, float(value)))
-    return (*ambiguities, *(Ambiguity(mixed, left, is_mix=True) for mixed, left in mixes.items()))
+    return (
+        *ambiguities,
+        *(Ambiguity(mixed, remainder, is_mix=True) for mixed, remainder in mixes.items()),
+    )
 
 
 def _least_cosine(cosines: Doubles, lit: Bools, i: int, j: int) -> float:

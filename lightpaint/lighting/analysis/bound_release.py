@@ -129,15 +129,15 @@ def _release(answer: BoundedAnswer, bound: ActiveBound) -> tuple[Reduction, Doub
         knobs[bound.knob] = replace(knob, unknowns=below)
     if bound.kind in ("left out", "zero"):
         return replace(answer.reduction, knobs=tuple(knobs)), x
-    left = [k for k, knob in enumerate(knobs) if not set(knob.lights) & set(bound.lights)]
+    remaining = [k for k, knob in enumerate(knobs) if not set(knob.lights) & set(bound.lights)]
     weights = answer.reduction.fixed_weights.copy()
     weights[list(bound.lights)] = 0
     freed = [
         Knob.of_any_colour(k, is_scalar=answer.basis.lights[k].is_scalar) for k in bound.lights
     ]
-    values = [x[list(answer.reduction.places[k])] for k in left]
+    values = [x[list(answer.reduction.places[k])] for k in remaining]
     values += [answer.w[k.lights[0], : len(k.unknowns)] for k in freed]
     released = replace(
-        answer.reduction, fixed_weights=weights, knobs=(*(knobs[k] for k in left), *freed)
+        answer.reduction, fixed_weights=weights, knobs=(*(knobs[k] for k in remaining), *freed)
     )
     return released, np.concatenate(values)

@@ -44,8 +44,8 @@ class PaintedTiles:
         self._is_old: Slices | None = everything
 
     def _set_unpainted(self, region: Slices) -> None:
-        left = np.maximum(1 - self._importance[region], 0)
-        self._unpainted[region] = np.where(self._seen[region], 0, left)
+        unpainted = np.maximum(1 - self._importance[region], 0)
+        self._unpainted[region] = np.where(self._seen[region], 0, unpainted)
 
     def _update_rest(self, region: Slices) -> None:
         """Update the sums of the rest; as the complement of the paint where both add up to 1."""

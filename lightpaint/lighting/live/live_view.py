@@ -132,8 +132,8 @@ class LiveView:
         first, last = columns.start // SEGMENT_PIXELS, -(-columns.stop // SEGMENT_PIXELS)
         segment = rows, slice(first * SEGMENT_PIXELS, last * SEGMENT_PIXELS)
         a = self._counted[segment].astype(np.float64)
-        left = np.where(self.basis.emitters_seen[segment], 0, np.maximum(1 - a, 0))
+        unpainted = np.where(self.basis.emitters_seen[segment], 0, np.maximum(1 - a, 0))
         starts = np.arange(0, a.shape[1], SEGMENT_PIXELS)
-        for k, values in enumerate((a, left)):
+        for k, values in enumerate((a, unpainted)):
             if a.size:
                 self._sums[rows, first:last, k] = np.add.reduceat(values, starts, axis=1)

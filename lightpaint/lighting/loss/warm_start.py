@@ -98,9 +98,9 @@ def sample_pixels(lit: LitPixels, power: Doubles, size: int) -> LitPixels:
     # The others share the size that certain pixels leave.
     for _ in range(4):
         certain = chance >= 1
-        left = size - np.count_nonzero(certain)
+        unclaimed = size - np.count_nonzero(certain)
         rest = float(chance[~certain].sum())
-        chance = np.where(certain, 1, chance * (left / rest if rest > 0 else 1))
+        chance = np.where(certain, 1, chance * (unclaimed / rest if rest > 0 else 1))
     chance = np.minimum(chance, 1)
     drawn = np.flatnonzero(np.diff(np.floor(np.cumsum(chance) + 0.5), prepend=0))
     pixels = lit.pixels.subset(drawn).scaled(1 / chance[drawn])

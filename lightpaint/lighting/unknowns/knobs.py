@@ -153,37 +153,8 @@ def tied_knob(
     """
     columns, lower, upper = [], 0.0, np.inf
     for k in members:
-        light, constraint = lights[k], constraints[k] or LightConstraint()
-        if constraint.primaries and len(constraint.primaries) > 1:
-            raise ConstraintError(
-                f"{constraint.where} asks for {constraint.label}, and {light.name!r} is on the "
-                f"dimmer of {names}"
-                ": a tied light has one color; leave it out of the tie"
-            )
-        present = np.array(light.emission)
-        if not present.any():
-            raise ConstraintError(
-                f"{tie.where}: {light.name!r} is off at present, so nothing says how bright it is "
-                f"beside the others of {names}: give it an emission, or leave it out"
-            )
-        color = tie.color or (constraint.primaries[0] if constraint.primaries else None)
-        if color is not None and light.is_scalar:
-            raise ConstraintError(
-                f"{constraint.where or tie.where} asks for a colour, and {light.name!r} can only "
-                f"be "
-                "dimmed as a whole"
-            )
-        direction = present if color is None else np.array(color) * float(luminance(present))
-        check_grey(constraint, light)
-        least, most = dimmer_limits(constraint, direction, light)
-        if constraint.is_fixed:
-            emission = (
-                np.zeros(3)
-                if constraint.lock is None
-                else locked_emission(light, constraint.lock, constraint.where)
-            )
-            least = most = float(luminance(emission) / luminance(present))
-            direction = emission / most if most > 0 else direction
+        constraint = constraints[k] or LightConstraint()
+        direction, least, most = _tied_direction(tie, names, lights[k], constraint)
         lower, upper = max(lower, least), min(upper, most)
         columns.append((k, direction))
     if lower > upper * (1 + ROUND_OFF):
@@ -192,6 +163,41 @@ def tied_knob(
             f"asks for at least {lower:.4g} times the present, another for at most {upper:.4g}"
         )
     return Knob(tuple(members), (Unknown(tuple(columns), min(lower, upper), upper),))
+
+
+def _tied_direction(
+    tie: Tie, names: str, light: BasisLight, constraint: LightConstraint
+) -> tuple[Doubles, float, float]:
+    """Return the emission (3,) of a tied light at dimmer 1, and the limits of the dimmer for it."""
+    present = np.array(light.emission)
+    if constraint.primaries and len(constraint.primaries) > 1:
+        raise ConstraintError(
+            f"{constraint.where} asks for {constraint.label}, and {light.name!r} is on the "
+            f"dimmer of {names}: a tied light has one color; leave it out of the tie"
+        )
+    if not present.any():
+        raise ConstraintError(
+            f"{tie.where}: {light.name!r} is off at present, so nothing says how bright it is "
+            f"beside the others of {names}: give it an emission, or leave it out"
+        )
+    color = tie.color or (constraint.primaries[0] if constraint.primaries else None)
+    if color is not None and light.is_scalar:
+        raise ConstraintError(
+            f"{constraint.where or tie.where} asks for a colour, and {light.name!r} can only be "
+            "dimmed as a whole"
+        )
+    direction = present if color is None else np.array(color) * float(luminance(present))
+    check_grey(constraint, light)
+    least, most = dimmer_limits(constraint, direction, light)
+    if constraint.is_fixed:
+        emission = (
+            np.zeros(3)
+            if constraint.lock is None
+            else locked_emission(light, constraint.lock, constraint.where)
+        )
+        least = most = float(luminance(emission) / luminance(present))
+        direction = emission / most if most > 0 else direction
+    return direction, least, most
 
 
 def locked_emission(light: BasisLight, lock: Lock, where: str) -> Doubles:

@@ -211,8 +211,10 @@ def compare_appearance(
     light, grain = look.pixels(predicted.image), look.pixels(predicted.half_difference)
     now = look.pixels(problem.basis.present_look)
     with_noise, missed = block_differences(look, light, grain)
-    delta_e, left = (float(np.average(x, weights=look.block_weights)) for x in (with_noise, missed))
-    appearance = Appearance(delta_e, max(delta_e - left, 0.0), look.mean(look.difference(now)))
+    delta_e, error = (
+        float(np.average(x, weights=look.block_weights)) for x in (with_noise, missed)
+    )
+    appearance = Appearance(delta_e, max(delta_e - error, 0.0), look.mean(look.difference(now)))
     if len(problem.views) > 1:
         return appearance
     appearance = replace(appearance, unpainted_change=_unpainted_change(solution, look, predicted))
@@ -222,31 +224,35 @@ def compare_appearance(
     appearance = replace(appearance, place=place, is_spot=share >= SPOT)
     if appearance.is_close and not appearance.is_spot:
         return appearance
-    local_lights, has_strong_light = lights_at(solution, place)
+    appearance = _with_local_lights(appearance, solution, place)
     if (objects := solution.basis.objects) is not None:
         appearance = replace(
             appearance,
             place=replace(place, object=object_with_most_error(look, objects, missed, light)),
         )
+    return replace(
+        appearance,
+        reasons=reasons_of(solution),
+        error_shares=error_shares(diagnosis or diagnose(solution)),
+    )
+
+
+def _with_local_lights(appearance: Appearance, solution: Solution, place: Place) -> Appearance:
+    """Return the appearance with the lights that reach a place, and those that constraints hold."""
+    local_lights, has_strong_light = lights_at(solution, place)
     # Without the constraint to be white, which applies to all.
-    by_light = constraints_by_light(problem.constraints, solution.basis.lights)
-    tied = tied_lights(problem.constraints, solution.basis.lights)
+    constraints, lights = solution.problem.constraints, solution.basis.lights
+    by_light, tied = constraints_by_light(constraints, lights), tied_lights(constraints, lights)
     limits = {
         light.name
         for k, light in enumerate(solution.lighting.lights)
         if light.is_active and (by_light[k] is not None or k in tied)
     }
-    held_lights = tuple(name for name in local_lights if name in limits)
-    appearance = replace(
+    return replace(
         appearance,
         local_lights=local_lights,
         has_strong_light=has_strong_light,
-        held_lights=held_lights,
-    )
-    return replace(
-        appearance,
-        reasons=reasons_of(solution),
-        error_shares=error_shares(diagnosis or diagnose(solution)),
+        held_lights=tuple(name for name in local_lights if name in limits),
     )
 
 

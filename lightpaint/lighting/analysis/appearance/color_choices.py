@@ -144,7 +144,7 @@ def _single_solver(solution: Solution) -> Callable[[Problem], Doubles]:
     if np.count_nonzero(loss.importance) > size:
         part = sample_pixels(lit, np.einsum("cii->ic", solution.equations.M), size)
 
-    def led(problem: Problem, begin: Doubles) -> RoundsResult:
+    def descend(problem: Problem, begin: Doubles) -> RoundsResult:
         def solve(equations: NormalEquations, begin: Doubles) -> Doubles:
             return solve_reduced(problem.with_pull(equations), problem.reduction, begin).weights
 
@@ -153,7 +153,7 @@ def _single_solver(solution: Solution) -> Callable[[Problem], Doubles]:
 
     def best(problem: Problem) -> Doubles:
         problem, begin = squares(problem)
-        descent = led(problem, begin)
+        descent = descend(problem, begin)
         is_bounded = problem.reduction.white_knobs or problem.reduction.gamut_knobs
         for _ in range(MAX_WHITE_STEPS if is_bounded else 0):
             equations = problem.with_pull(descent.equations)
@@ -161,7 +161,7 @@ def _single_solver(solution: Solution) -> Callable[[Problem], Doubles]:
             if relative_change(descent.equations, descent.weights, optimum.weights) <= LAST_STEP:
                 break
             problem = problem.with_whites(reduction)
-            descent = led(problem, optimum.weights)
+            descent = descend(problem, optimum.weights)
         return descent.weights
 
     return best

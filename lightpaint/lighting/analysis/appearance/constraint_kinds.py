@@ -69,7 +69,7 @@ class ConstraintsByLight:
             removed = {id(tied[k][0]) for k in lights}
             ties = tuple(tie for tie in self.constraints.ties if id(tie) not in removed)
             return replace(self.constraints, ties=ties)
-        left = [
+        tables = [
             {
                 key: value
                 for key, value in table.items()
@@ -79,7 +79,7 @@ class ConstraintsByLight:
         ]
         remaining = tuple(
             (light.name, table, f"light.{light.name}")
-            for light, table in zip(self.lights, left, strict=True)
+            for light, table in zip(self.lights, tables, strict=True)
             if table
         )
         return replace(self.constraints, lights=remaining)

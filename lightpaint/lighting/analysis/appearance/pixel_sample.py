@@ -181,31 +181,34 @@ class PixelSample:
         ones.
         """
         released = set(views) if "views" in without else set()
-        left = [k for k in range(len(self.bases)) if k not in released]
+        remaining = [k for k in range(len(self.bases)) if k not in released]
         fit = self.problem.fit if hold is None else replace(self.problem.fit, hold=hold)
         change: dict[str, Any] = {"hold": 0.0, "unpainted": 0.0}
         if "hold" not in without:
-            change["unpainted"] = self._unpainted_weight(fit, left)
+            change["unpainted"] = self._unpainted_weight(fit, remaining)
         if "colors" in without:
             change["colors"] = "free"
         in_force = self.problem.constraints if constraints is None else constraints
         problem = Problem.of(
-            [self.bases[k] for k in left],
-            [self.targets[k] for k in left],
+            [self.bases[k] for k in remaining],
+            [self.targets[k] for k in remaining],
             constraints=Constraints() if "constraints" in without else in_force,
             fit=replace(fit, **change),
         )
         begin = replace(problem, start=self.problem.start)
         return solution_of(begin).weights
 
-    def _unpainted_weight(self, fit: Fit, left: Sequence[int]) -> float:
+    def _unpainted_weight(self, fit: Fit, remaining: Sequence[int]) -> float:
         """Return the weight of each of the sampled unpainted pixels of some views.
 
         Relative to the painted ones, they weigh as much as all unpainted pixels do.
         """
         (painted, rest), (few_painted, few_rest) = (
             importance_sums(
-                Views(tuple(views.bases[k] for k in left), tuple(views.targets[k] for k in left))
+                Views(
+                    tuple(views.bases[k] for k in remaining),
+                    tuple(views.targets[k] for k in remaining),
+                )
             )
             for views in (self.problem.views, Views(tuple(self.bases), tuple(self.targets)))
         )

@@ -90,8 +90,8 @@ def _solved(solution: Solution, corrected: NormalEquations, share: float) -> Sol
 
 def _has_noise_of_target(solution: Solution, noise: Noise) -> bool:
     """Return True for a target that is a sum of this basis, as a template is."""
-    left = solution.equations.objective(solution.weights).sum()
-    return bool(left < SAME_NOISE_SHARE * noise.objective_noise.sum())
+    objective = solution.equations.objective(solution.weights).sum()
+    return bool(objective < SAME_NOISE_SHARE * noise.objective_noise.sum())
 
 
 def _loss(solution: Solution, removed: NormalEquations) -> float:
@@ -123,11 +123,11 @@ def _best_share(
     pull = solution.problem.pull
     stiffness = np.zeros((3 * n, 3 * n)) if pull is None else pull.full_matrix
     for directions in free_directions(solution):
-        M, left, stiff = (
+        M, noiseless, stiff = (
             directions.T @ x @ directions for x in (e.full_matrix, block_diagonal(least), stiffness)
         )
         C = directions.T @ noise.gradient.reshape(3 * n, 3 * n) @ directions
         for k, s in enumerate(shares):
-            inverse = pseudo_inverse((1 - s) * M + s * left + stiff)
+            inverse = pseudo_inverse((1 - s) * M + s * noiseless + stiff)
             cost[k] += np.einsum("ij,ji->", M, inverse @ C @ inverse)
     return float(shares[np.argmin(cost)])

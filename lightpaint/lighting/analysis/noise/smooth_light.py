@@ -93,15 +93,15 @@ def _share(noise: Planes, of_planes: Floats, of_noise: Floats) -> Floats:
 
     of_planes, of_noise: (n, h, w, 3), by how much the average changes either.
     """
-    variance, left, change = np.zeros((3, *noise.size))
+    variance, remainder, change = np.zeros((3, *noise.size))
     for half, of_plane, of_half in zip(noise, of_planes, of_noise, strict=True):
         squares = np.square(half, dtype=np.float64).mean(axis=-1)
         # Each light counts alike, by its noise.
         unit = 1 / max(float(squares.mean()), np.finfo(np.float64).tiny)
         variance += unit * squares
-        left += unit * np.square(of_half, dtype=np.float64).mean(axis=-1)
+        remainder += unit * np.square(of_half, dtype=np.float64).mean(axis=-1)
         change += unit * np.square(of_plane, dtype=np.float64).mean(axis=-1)
-    V, B = (box_mean(x, WINDOW_RADIUS) for x in (variance, change - left))
+    V, B = (box_mean(x, WINDOW_RADIUS) for x in (variance, change - remainder))
     total = V + np.maximum(B, 0)
     share = np.divide(V, total, out=np.zeros_like(total), where=total > 0)
     return share[..., None].astype(np.float32)
