@@ -66,7 +66,7 @@ def run_batch(
             run.run_all(stack)
         except KeyboardInterrupt:
             count = len(run.outcome.waiting)
-            raise Interrupted(f"{count} looks are left; the same command goes on") from None
+            raise Interrupted(f"{count} looks are left; run the same command to continue") from None
         finally:
             with suppress(LightpaintError):
                 if not options.shares_folder:
@@ -150,7 +150,9 @@ class _Run:
             return
         for result in solve_by_sums(tasks, self._engine, self._cache, self._listen):
             if result.is_disk_full:
-                raise OutputError(f"{result.failure}: make room; the same command goes on")
+                raise OutputError(
+                    f"{result.failure}: make room, and run the same command to continue"
+                )
             self._record(by_look[result.look], result)
 
     def _run_with_bases(self, steps: Sequence[PlanStep]) -> None:
@@ -207,7 +209,9 @@ class _Run:
             for result in _close_after(self._results(tasks)):
                 step = by_look[result.look]
                 if result.is_disk_full:
-                    raise OutputError(f"{result.failure}: make room; the same command goes on")
+                    raise OutputError(
+                        f"{result.failure}: make room, and run the same command to continue"
+                    )
                 if result.failure and self._may_retry(result):
                     self._listen.say(f"{result.look}: {result.failure}; trying again")
                     retries.append(step)

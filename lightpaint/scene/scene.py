@@ -134,7 +134,7 @@ class Scene(Shown):
         existing = {emitter.name for emitter in self.emitters}
         if set(grouped) != existing:
             raise SceneError(
-                f"{self.path} has other emitters than are asked for: it lacks "
+                f"{self.path} does not have the expected emitters: it lacks "
                 f"{some_names(sorted(set(grouped) - existing)) or 'none'} and also has "
                 f"{some_names(sorted(existing - set(grouped))) or 'none'}"
             )

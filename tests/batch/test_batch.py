@@ -236,7 +236,7 @@ def test_a_full_disk_stops_with_one_line_and_goes_on_after(
     assert done.returncode == 2
     [line] = done.stderr.splitlines()
     assert "No space left" in line
-    assert "the same command goes on" in line
+    assert "run the same command to continue" in line
     again = run(here, "batch", "looks.toml", "-o", "out", "--workers", 1)
     assert "3 looks were done earlier" in again.stderr
     assert contents(here / "out") == contents(here / "whole")
@@ -273,7 +273,7 @@ def test_a_disk_that_is_really_full(here: Path) -> None:
         done = run(here, "batch", "looks.toml", "-o", disk / "out", "-q")
         assert done.returncode == 2
         [line] = done.stderr.splitlines()
-        assert "No space left on device: make room; the same command goes on" in line
+        assert "No space left on device: make room, and run the same command to continue" in line
         assert not list((disk / "out").glob(".*"))
         more = ["mount", "-o", "remount,size=8M", str(disk)]
         subprocess.run(more, check=True)
@@ -292,7 +292,9 @@ def test_an_interrupt_says_how_to_go_on(
 
     with monkeypatch.context() as patch:
         patch.setattr(engine, "run_item", interrupted)
-        with pytest.raises(Interrupted, match="10 looks are left; the same command goes on"):
+        with pytest.raises(
+            Interrupted, match="10 looks are left; run the same command to continue"
+        ):
             run_item(here)
     run_item(here)
     assert contents(here / "out") == undisturbed[1]

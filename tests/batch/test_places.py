@@ -175,7 +175,7 @@ def test_an_interrupt_amid_the_search_leaves_no_places(here: Path) -> None:
             if label == "poses" and done:
                 raise KeyboardInterrupt
 
-    with pytest.raises(Interrupted, match="6 looks are left; the same command goes on"):
+    with pytest.raises(Interrupted, match="6 looks are left; run the same command to continue"):
         run_batch(plan(here / "looks.toml", here / "out"), RunOptions(), Stopped())
     assert not (here / "out" / "places").exists()
     assert len(plan(here / "looks.toml", here / "out").chosen_looks) == len(NAMES)

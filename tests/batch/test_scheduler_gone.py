@@ -98,7 +98,7 @@ def test_one_that_ends_later(call: str, caplog: pytest.LogCaptureFixture) -> Non
         while time.monotonic() - began_s < SOON_S:  # it may take a moment to be heard of
             LATER[call](at)
 
-    with pytest.raises(BatchError, match=r"is gone .*the same command goes on") as refusal:
+    with pytest.raises(BatchError, match=r"is gone .*run the same command to continue") as refusal:
         ask()
     assert time.monotonic() - began_s < SOON_S
     assert "\n" not in str(refusal.value)

@@ -123,7 +123,7 @@ def test_stopped_and_gone_on_is_as_if_never_stopped(
             assert time.monotonic() - stopped_s < 3
             assert code == 130
             assert said.startswith("lightpaint basis: interrupted")
-            assert "are kept; the same command goes on" in said
+            assert "are kept; run the same command to continue" in said
             assert said.count("\n") == 1
         [path] = kept(tmp_path, "stopped")
         part = read_basis(path)

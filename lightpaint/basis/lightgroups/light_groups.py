@@ -127,7 +127,7 @@ def read_light_groups(
 def _check_light(
     path: Path, lights: Mapping[str, RenderLayer], holes: npt.NDArray[np.bool_]
 ) -> None:
-    """Raise BasisError if a group has mostly negative light, which would make every result
+    """Raise BasisError if a group has much negative light, which would make every result
     useless.
     """
     for name, layer in lights.items():

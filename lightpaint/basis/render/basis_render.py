@@ -192,7 +192,7 @@ def _render_together(
             raise
         of = "" if budget.time_s is not None else f" of {budget.spp}"
         raise Interrupted(
-            f"{2 * done}{of} samples per pixel are kept; the same command goes on"
+            f"{2 * done}{of} samples per pixel are kept; run the same command to continue"
         ) from None
     else:
         return (

@@ -125,7 +125,7 @@ def render_separately(
         of = "" if budget.time_s is not None else f" of {budget.spp}"
         raise Interrupted(
             f"{mean:.3g}{of} samples per pixel, on average over the lights, are kept; "
-            "the same command goes on"
+            "run the same command to continue"
         ) from None
 
 

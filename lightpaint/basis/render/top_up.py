@@ -140,7 +140,9 @@ def top_up(
         except KeyboardInterrupt:
             if keep is None or not keep(sums.basis(extra, guide_table)):
                 raise
-            raise Interrupted("the samples so far are kept; the same command goes on") from None
+            raise Interrupted(
+                "the samples so far are kept; run the same command to continue"
+            ) from None
     return sums.basis(extra, guide_table)
 
 

@@ -121,8 +121,8 @@ class ClusterWorkers:
                 status = _reason(error)
         self.is_gone = True
         raise BatchError(
-            f"the scheduler at {self._address} is gone ({status}); the same command goes on once "
-            "it is back"
+            f"the scheduler at {self._address} is gone ({status}): once it is back, "
+            "run the same command to continue"
         )
 
     def _reasons_against(self, workers: list[str]) -> dict[str, str]:

@@ -188,7 +188,7 @@ def test_an_interrupt_keeps_what_is_done(small_room: Scene, counts: Any):
         kept.append(basis)
         return True
 
-    with pytest.raises(Interrupted, match="the same command goes on"):
+    with pytest.raises(Interrupted, match="run the same command to continue"):
         top_up.top_up(small_room, basis, counts, keep=keep, progress=press_ctrl_c)
     assert 0 < kept[-1].extra.sum() < counts.sum()
     rest = top_up.top_up(small_room, kept[-1], counts - kept[-1].extra)
