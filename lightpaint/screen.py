@@ -1,4 +1,4 @@
-"""Text for people: reprs of one screen, long lists cut, characters made visible, notebook pages."""
+"""Text for users: short reprs, truncated lists, visible control characters, notebook pages."""
 
 import re
 from collections.abc import Iterable, Sequence

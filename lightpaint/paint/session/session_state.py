@@ -17,7 +17,7 @@ def state_fields(
 ) -> dict[str, Any]:
     """Return fields of `SessionState`.
 
-    target_spp: the samples per pixel that the basis will have; None for those that it has.
+    target_spp: the samples per pixel that the basis will have; None if it is finished.
     """
     basis = session.basis
     views = tuple(map(view_info, session.views, session.bases))

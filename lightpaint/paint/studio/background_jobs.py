@@ -61,7 +61,7 @@ class JobHost(Protocol):
         """The lights and their places."""
 
     def finish_planes(self, check: Callable[[], None]) -> None:
-        """Render the planes of moved lights that are quick ones so far. check: raises to stop."""
+        """Replace the quick planes of moved lights by rendered ones. check: raises to stop."""
 
     def clean_planes(self, bases: Sequence[Basis]) -> Sequence[DenoisedPlanes | None]:
         """Return the denoised planes of these bases; None for each that has none yet."""
@@ -137,7 +137,7 @@ class BackgroundJobs:
     def solve_command(self, sensors: Sequence[str], requests: SessionRequests) -> str:
         """Return the command that solves exported paintings to the same answer; "" if none."""
         if requests.placed:
-            return ""  # which has no words for them
+            return ""  # which cannot express them
         subject = self._host.subjects[0]
         paths = {sensor: str(painting_path(subject.folder, sensor)) for sensor in sensors}
         return subject.command(paths, requests) if paths else ""
@@ -230,7 +230,7 @@ class BackgroundJobs:
                 check()
                 self._render_and_compare(request.view, check)
         except StoppedError:
-            if self._verify_request is None:  # else a page waits for the next one
+            if self._verify_request is None:  # otherwise a page would wait for the next one
                 self._host.publish(TaskStopped(task="verify"))
 
     def _render_and_compare(self, view: int, check: Callable[[], None]) -> None:

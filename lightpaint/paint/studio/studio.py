@@ -302,16 +302,16 @@ class Studio:
             yield self.session
 
     def planes_rendered(self) -> None:
-        """Note that the session has rendered planes in the place of quick ones."""
+        """Note that rendered planes have replaced quick ones."""
         self._exact_answers.notify()
 
     def finish_planes(self, check: Callable[[], None]) -> None:
-        """Render the planes of moved lights that are quick ones so far. check: raises to stop."""
+        """Replace the quick planes of moved lights by rendered ones. check: raises to stop."""
         self._mover.finish(self.session.requests.placed, check)
 
     @property
     def unmoved_bases(self) -> tuple[Basis, ...]:
-        """Bases of all views, with every light where the scene has it."""
+        """Bases of all views, with every light at its place in the scene."""
         return self.session.bases
 
     @property

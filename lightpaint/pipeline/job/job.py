@@ -168,9 +168,9 @@ class Job:
         return basis if isinstance(basis, LightGroups) else None
 
     def with_moved_lights(self, scenes: Sequence[Scene], constraints: Constraints) -> "Job":
-        """Return this job with lights elsewhere.
+        """Return this job with moved lights.
 
-        scenes: those of the views, on the same films. constraints: on lights that they add.
+        scenes: the scene of each view, on the same film. constraints: on added lights.
         """
         views = zip(self.views, scenes, strict=True)
         return copy(self)._set(
@@ -179,7 +179,7 @@ class Job:
         )
 
     def with_placement(self, placement: PlacementRecord) -> "Job":
-        """Return this job with lights where they were found for another look."""
+        """Return this job with the places of lights found for another look."""
         return copy(self)._set(placement=placement)
 
     def to_json(self) -> str:
@@ -209,7 +209,7 @@ class Job:
         return Job(**decode_job(text))
 
     def __eq__(self, other: object) -> bool:
-        """Return True if both ask the same of the same files; in memory, if identical."""
+        """Return True if requests and files are equal; objects in memory must be identical."""
         if self is other or not isinstance(other, Job):
             return self is other
         try:
@@ -221,7 +221,7 @@ class Job:
         return hash(self.folder)
 
     def _set(self, **fields: Any) -> "Job":
-        """Set fields of a job that nobody else has yet, and return it; it is frozen afterwards."""
+        """Set fields of a new job, and return it; it is frozen afterwards."""
         for name, value in fields.items():
             object.__setattr__(self, name, value)
         return self

@@ -31,8 +31,8 @@ def block_differences(
     """Return the mean ΔE in each block, (rows, columns), with and without the part of noise.
 
     Noise and error add as squares, since they are independent. But a painting over the same renders
-    shares their noise: so noise explains at most the differences between pixels that remain
-    without their mean, which noise hardly moves.
+    shares their noise: so noise explains at most the variation between pixels around their mean,
+    which noise hardly changes.
     """
     of_light, of_paint = look.lab(light), look.lab_goal(light)
     whole = look.in_blocks(ciede2000(of_light, of_paint))
@@ -47,8 +47,7 @@ def block_differences(
 def place_with_most_error(
     look: PaintComparison, missed: Doubles, light: Doubles, grain: Doubles
 ) -> tuple[Place, float]:
-    """Find the place with most of the fit's error, and the share of paint with visible error
-    there."""
+    """Find the place with most of the error, and the share of its paint with visible error."""
     weights = look.block_weights
     amount = weights * _block_errors(look, light, grain)
     if not amount.any():
@@ -117,7 +116,8 @@ def lights_at(solution: Solution, place: Place) -> tuple[tuple[str, ...], bool]:
         whole = np.full(len(part), part.sum())
     else:
         part, enough = np.where(basis.is_fixed, 0, luminance(local_light)), GETS_THERE
-        # One light at a time: the brightness of all would be as much as half of their pictures.
+        # One light at a time: the brightness of all lights would take half of the memory of their
+        # pictures.
         brightness = (luminance(x[::STEP, ::STEP]) for x in basis.planes)
         whole = np.array([np.percentile(x, 99) for x in brightness])
     share = np.where(whole > 0, part / np.where(whole > 0, whole, 1), 0)

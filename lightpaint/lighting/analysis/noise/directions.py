@@ -118,7 +118,7 @@ def all_columns(solution: Solution) -> Iterator[Doubles]:
     columns = np.zeros((3, len(scalar), 3, lights.size))
     for k, light in enumerate(lights):
         for c in range(3):
-            # One weight for all channels is the unknown of the first.
+            # With one weight for all channels, the unknown is that of the first channel.
             columns[c, light, 0 if scalar[light] else c, k] = lit[light, c]
     flat = columns.reshape(3 * len(scalar), 3, lights.size)
     if scalar.any():
