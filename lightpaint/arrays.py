@@ -67,12 +67,12 @@ def aligned(values: npt.ArrayLike, kind: type[_Kind]) -> npt.NDArray[_Kind]:
     one kernel for arrays that begin at such a place and another for those that do not, for each
     array that a kernel reads.
     """
-    its = np.asarray(values)
+    values_array = np.asarray(values)
     size = np.dtype(kind).itemsize
-    room = np.empty(its.size + ALIGNMENT // size, kind)
+    room = np.empty(values_array.size + ALIGNMENT // size, kind)
     begin = -room.ctypes.data % ALIGNMENT // size
-    copy = room[begin : begin + its.size]
-    copy[:] = its
+    copy = room[begin : begin + values_array.size]
+    copy[:] = values_array
     return copy
 
 

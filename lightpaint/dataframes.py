@@ -22,8 +22,8 @@ def xarray() -> Any:
 
 def by_channel(name: str, values: Any) -> dict[str, Any]:
     """Return a column for each channel: `{"red": ...}`, or `{"error_red": ...}` for a name."""
-    lead = f"{name}_" if name else ""
-    return {f"{lead}{channel}": values[k] for k, channel in enumerate(CHANNELS)}
+    prefix = f"{name}_" if name else ""
+    return {f"{prefix}{channel}": values[k] for k, channel in enumerate(CHANNELS)}
 
 
 def number(value: float | None) -> float:

@@ -117,20 +117,20 @@ def check_writable(folder: Path) -> None:
         if ".." in folder.parts:  # `..` below a missing folder leads nowhere
             last = len(folder.parts) - folder.parts[::-1].index("..")
             Path(*folder.parts[:last]).stat()
-        existing = next(f for f in (folder, *folder.absolute().parents) if f.exists())
-        with tempfile.TemporaryFile(dir=existing):
+        existing_folder = next(f for f in (folder, *folder.absolute().parents) if f.exists())
+        with tempfile.TemporaryFile(dir=existing_folder):
             pass
     except OSError as error:
         raise OutputError(f"cannot write into {folder}: {error.strerror or error}") from error
 
 
-def check_files(files: Iterable[Path], reads: Iterable[Path]) -> None:
+def check_files(files: Iterable[Path], inputs: Iterable[Path]) -> None:
     """Raise OutputError unless `files` can be written, and none of them is one of `reads`.
 
     A command never overwrites a file that it reads, under whatever name or link.
     """
     by_identity: dict[tuple[int, int], Path] = {}
-    for path in reads:
+    for path in inputs:
         with suppress(OSError):
             by_identity[_inode(path)] = path
     for file in files:

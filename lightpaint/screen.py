@@ -39,14 +39,14 @@ def _shortened(name: str) -> str:
 
 def some_of(texts: Sequence[str], joint: str = ", ", room: int = MAX_LIST_LENGTH) -> str:
     """Return as many of the texts as fit into `room` characters, joined, and how many are left."""
-    shown = ""
+    text_so_far = ""
     for k, text in enumerate(texts):
-        extended = f"{shown}{joint if k else ''}{text}"
+        extended = f"{text_so_far}{joint if k else ''}{text}"
         if len(extended) > room:
             rest_note = f"… and {len(texts) - k} more"
-            return f"{shown}{joint}{rest_note}" if k else rest_note
-        shown = extended
-    return shown
+            return f"{text_so_far}{joint}{rest_note}" if k else rest_note
+        text_so_far = extended
+    return text_so_far
 
 
 class Listed(tuple[_Item, ...]):

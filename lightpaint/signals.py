@@ -88,9 +88,9 @@ def interruptible_between_pieces() -> Iterator[Callable[[], None]]:
     or that are handled outside Python, are left alone.
     """
     # Signals arrive in the main thread; None stands for a handler that is not Python's.
-    elsewhere = threading.current_thread() is not threading.main_thread()
+    is_other_thread = threading.current_thread() is not threading.main_thread()
     previous = {
-        number: signal.getsignal(number) for number in (() if elsewhere else ENDING_SIGNALS)
+        number: signal.getsignal(number) for number in (() if is_other_thread else ENDING_SIGNALS)
     }
     handlers = {number: handler for number, handler in previous.items() if callable(handler)}
     pending: list[int] = []

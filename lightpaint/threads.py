@@ -63,35 +63,35 @@ def parallel_map(work: Callable[[Job], Result], jobs: Iterable[Job]) -> list[Res
     the first job is raised. A job may call this function itself. Cancelled work ends before the
     next job.
     """
-    waiting = list(jobs)
-    results: list[Any] = [None] * len(waiting)
+    remaining_jobs = list(jobs)
+    results: list[Any] = [None] * len(remaining_jobs)
     errors: dict[int, Exception] = {}
     turns = count()
-    ended, check = Event(), cancellation_check()
+    has_ended, check = Event(), cancellation_check()
 
     def check_both() -> None:
         check()
-        if ended.is_set():
+        if has_ended.is_set():
             raise _CancelledError
 
     def take_turns() -> None:
-        while not ended.is_set() and (k := next(turns)) < len(waiting):
+        while not has_ended.is_set() and (k := next(turns)) < len(remaining_jobs):
             try:
                 with cancellable(check_both):
                     check_both()
-                    results[k] = work(waiting[k])
+                    results[k] = work(remaining_jobs[k])
             except Exception as error:
                 errors[k] = error
 
     with one_thread():
         # One thread more than processors, so that three channels share two of them evenly.
         max_helpers = (os.cpu_count() or 1) if _limit is None else _limit - 1
-        helper_count = min(max_helpers, len(waiting) - 1)
+        helper_count = min(max_helpers, len(remaining_jobs) - 1)
         helpers = [_pool().submit(copy_context().run, take_turns) for _ in range(helper_count)]
         try:
             take_turns()
         except BaseException:
-            ended.set()  # an interrupt waits for no job that has not begun yet
+            has_ended.set()  # an interrupt waits for no job that has not begun yet
             raise
         finally:
             # A helper that has not begun by now has nothing to do, and others may need its thread.

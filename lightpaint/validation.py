@@ -35,44 +35,44 @@ def check_fields(record: Any, expected: Mapping[str, Check]) -> None:
     A field that is None by default may be None.
     """
     for field in fields(record):
-        value, (fits, words) = getattr(record, field.name), expected[field.name]
-        if not (fits(value) or (value is None and field.default is None)):
-            raise LightpaintError(f"{field.name} is {value!r}: expected {words}")
+        value, (is_valid, expectation) = getattr(record, field.name), expected[field.name]
+        if not (is_valid(value) or (value is None and field.default is None)):
+            raise LightpaintError(f"{field.name} is {value!r}: expected {expectation}")
 
 
 def whole(least: int, most: float = math.inf) -> Check:
     """Expect a whole number between the two."""
 
     # bool is an int to Python, and no number to people.
-    def fits(value: Any) -> bool:
+    def is_valid(value: Any) -> bool:
         return isinstance(value, Integral) and not _is_bool(value) and least <= int(value) <= most
 
-    return fits, f"a whole number >= {least}" + (f", at most {most}" if most < math.inf else "")
+    return is_valid, f"a whole number >= {least}" + (f", at most {most}" if most < math.inf else "")
 
 
 def number(about: str, *, may_be_zero: bool = False) -> Check:
     """Expect a number > 0, or >= 0, in the range of computations. about: the quantity."""
 
-    def fits(value: Any) -> bool:
+    def is_valid(value: Any) -> bool:
         if not isinstance(value, Real) or _is_bool(value):
             return False
         return 0 < float(value) <= BRIGHTEST or (may_be_zero and value == 0)
 
-    return fits, f"{about} {'>= 0' if may_be_zero else '> 0'}, at most {BRIGHTEST:g}"
+    return is_valid, f"{about} {'>= 0' if may_be_zero else '> 0'}, at most {BRIGHTEST:g}"
 
 
 def between(least: float, most: float, about: str) -> Check:
     """Expect a number between the two, `most` not included. about: the quantity."""
 
-    def fits(value: Any) -> bool:
+    def is_valid(value: Any) -> bool:
         return isinstance(value, Real) and not _is_bool(value) and least <= float(value) < most
 
-    return fits, f"{about} of at least {least:g} and less than {most:g}"
+    return is_valid, f"{about} of at least {least:g} and less than {most:g}"
 
 
-def one_of(words: Any) -> Check:
+def one_of(expectation: Any) -> Check:
     """Expect one of the words of a Literal."""
-    words_known = get_args(words)
+    words_known = get_args(expectation)
     expected = " or ".join(map(repr, words_known))
     return lambda value: isinstance(value, str) and value in words_known, expected
 

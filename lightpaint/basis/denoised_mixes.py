@@ -115,8 +115,8 @@ def share_of_clean(raw: Floats, half_difference: Floats, clean: Floats) -> Float
     is_stray = stray_pixels(raw, half_difference, clean)
     noise, change = mean_square(half_difference), mean_square(clean - raw)
     variance = box_mean(noise, RADIUS)
-    lost = np.maximum(box_mean(np.where(is_stray, 0, change - noise), RADIUS), 0)
-    total = variance + lost
+    lost_energy = np.maximum(box_mean(np.where(is_stray, 0, change - noise), RADIUS), 0)
+    total = variance + lost_energy
     share = np.divide(variance, total, out=np.zeros_like(total), where=total > 0)
     return np.where(is_stray, 1, share)[..., None].astype(np.float32)
 

@@ -114,8 +114,8 @@ class BlockPlanes(RowPlanes):
         step = max(1, READ_ROWS // self._side)
         for first in range(top, bottom, step):
             end = min(first + step, bottom)
-            lit = self._whole.rows(first * self._side, end * self._side)
-            for means, plane in zip(blocks, lit, strict=True):
+            source_rows = self._whole.rows(first * self._side, end * self._side)
+            for means, plane in zip(blocks, source_rows, strict=True):
                 means[first - top : end - top] = self._means(plane, first, end)
         return blocks
 
@@ -137,28 +137,29 @@ class BlockPlanes(RowPlanes):
         side, (height, width) = self._side, self._weight.shape
         rows, columns = np.divmod(blocks, self.size[1])
         # Indices of the blocks' pixels, with blocks side by side: (side, p * side).
-        along = np.arange(side)
+        offsets = np.arange(side)
         y, x = np.broadcast_arrays(
-            side * rows[:, None] + along[:, None, None], side * columns[:, None] + along
+            side * rows[:, None] + offsets[:, None, None], side * columns[:, None] + offsets
         )
         is_inside = ((y < height) & (x < width)).reshape(side, -1)
         y, x = (
             np.minimum(values, n - 1).reshape(side, -1) for values, n in ((y, height), (x, width))
         )
         weight = (self._weight[y, x] * is_inside)[..., None]
-        lit = self._whole.pixels((y * self._whole.size[1] + x).ravel())
+        source_rows = self._whole.pixels((y * self._whole.size[1] + x).ravel())
         total = self._total.reshape(-1, 1)[blocks]
-        sums = (block_sums(values.reshape(side, -1, 3) * weight, side)[0] for values in lit)
+        sums = (block_sums(values.reshape(side, -1, 3) * weight, side)[0] for values in source_rows)
         return np.array([values / total for values in sums], np.float32)
 
-    def _means(self, lit: Floats, top: int, bottom: int) -> npt.NDArray[np.float32]:
-        """Return block rows `top` to `bottom` of one plane. lit: its pixels, starting with those of
-        `top`.
+    def _means(self, source_rows: Floats, top: int, bottom: int) -> npt.NDArray[np.float32]:
+        """Return block rows `top` to `bottom` of one plane.
+
+        source_rows: its pixels, starting with those of `top`.
         """
         first = top * self._side
         weight = self._weight[first : bottom * self._side]
-        counted = lit[: len(weight), : weight.shape[1]] * weight[..., None]
-        return (block_sums(counted, self._side) / self._total[top:bottom]).astype(np.float32)
+        weighted = source_rows[: len(weight), : weight.shape[1]] * weight[..., None]
+        return (block_sums(weighted, self._side) / self._total[top:bottom]).astype(np.float32)
 
 
 def in_one_row(parts: Sequence[Planes]) -> Planes:
@@ -209,12 +210,12 @@ class JoinedRow(RowPlanes):
                 ]
                 return pieces[0] if len(pieces) == 1 else np.concatenate(pieces, axis=1)
             where = np.arange(start, stop, step)
-        joined = np.empty((3, self.count, len(where)), np.float32).transpose(1, 2, 0)
+        values = np.empty((3, self.count, len(where)), np.float32).transpose(1, 2, 0)
         of_part = np.searchsorted(self._ends, where, side="right") - 1
         for k in np.unique(of_part):
             in_part = np.flatnonzero(of_part == k)
-            joined[:, in_part] = self._parts[int(k)].pixels(where[in_part] - self._ends[k])
-        return joined
+            values[:, in_part] = self._parts[int(k)].pixels(where[in_part] - self._ends[k])
+        return values
 
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
         """Return Σ w_i Φ_i, (1, p, 3)."""

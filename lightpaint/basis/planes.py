@@ -124,9 +124,9 @@ class PlanesBase:
         """Return M (3, n, n), b (3, n) and ‖Ψ‖² (3,), in one walk over the pixels with weight."""
         height, width = self.size
         # Pixels without weight contribute nothing and need not be read.
-        apart = weight.shape[2:] == (3,)
-        weights = weight.reshape(height * width, 3 if apart else 1)
-        counted = np.flatnonzero(weights.any(axis=1) if apart else weights)
+        is_per_channel = weight.shape[2:] == (3,)
+        weights = weight.reshape(height * width, 3 if is_per_channel else 1)
+        counted = np.flatnonzero(weights.any(axis=1) if is_per_channel else weights)
         colours = image.reshape(-1, 3)
         return self.sums_of(counted, lambda where, _: (weights[where], colours[where]))
 
@@ -140,14 +140,14 @@ class PlanesBase:
         with one_thread() if n <= FEW_LIGHTS else nullcontext():
             for start in range(0, counted.size, BLOCK_PIXELS):
                 where = as_slice(counted[start : start + BLOCK_PIXELS])
-                lit = self.pixels(where)
-                weights, painted = squares(where, lit)
-                root, apart = np.sqrt(weights.astype(np.float64)), weights.shape[1] == 3
+                values = self.pixels(where)
+                weights, painted = squares(where, values)
+                root, is_per_channel = np.sqrt(weights.astype(np.float64)), weights.shape[1] == 3
                 # (n + 1, block): the target goes along as one more row.
                 block = room[:, : len(painted)]
                 for c in range(3):
-                    channel_root = root[:, c * apart]
-                    np.multiply(lit[..., c], channel_root, out=block[:n])
+                    channel_root = root[:, c * is_per_channel]
+                    np.multiply(values[..., c], channel_root, out=block[:n])
                     np.multiply(painted[:, c], channel_root, out=block[n])
                     gram[c] += block @ block.T
         return gram[:, :n, :n], gram[:, :n, n], gram[:, n, n]
@@ -225,14 +225,14 @@ def joined_planes(
     return MemoryPlanes(joint.reshape(n, rows, width, 3)), tuple(views)
 
 
-def power_and_totals(planes: Planes, counted: Bools) -> tuple[Doubles, Doubles]:
+def power_and_totals(planes: Planes, mask: Bools) -> tuple[Doubles, Doubles]:
     """Return ‖Φᵢ‖² over the counted pixels and Σ Φᵢ over all pixels, (n, 3) float64 each, in one
     walk.
 
-    counted: (h, w).
+    mask: (h, w).
     """
     power, totals = np.zeros((2, planes.count, 3))
-    counted_f64 = counted.ravel().astype(np.float64)
+    counted_f64 = mask.ravel().astype(np.float64)
     # NumPy sums over such short axes slowly, but multiplies matrices fast; in float64 and by blocks
     # a product is as exact as a sum, and needs no copy of the basis.
     for start in range(0, counted_f64.size, BLOCK_PIXELS):
@@ -258,8 +258,8 @@ def mix(images: Floats, weights: Doubles) -> npt.NDArray[np.float32]:
     n, height, width, _ = images.shape
     weights = np.asarray(weights, np.float32)
     if images.strides[-1] != images.itemsize:  # stored with channels first
-        apart = [np.einsum("nhw,n->hw", images[..., c], weights[:, c]) for c in range(3)]
-        return np.stack(apart, axis=-1)
+        is_per_channel = [np.einsum("nhw,n->hw", images[..., c], weights[:, c]) for c in range(3)]
+        return np.stack(is_per_channel, axis=-1)
     # One weight for each value of a row lets the innermost loop run along the whole row, rather
     # than over three channels at a time.
     along_row = np.tile(weights, (1, width))

@@ -84,11 +84,11 @@ def _cct_and_duv(*light: float) -> tuple[float, float] | None:
     # Newton's method ends where the difference is perpendicular to the locus, so it returns the
     # temperature that was given to `kelvin_to_rgb`, to 1e-9.
     for _ in range(NEWTON_STEPS):
-        at, tangent, bend = _locus(mired)
-        mired += float((uv - at) @ tangent / (tangent @ tangent - (uv - at) @ bend))
+        uv_at, tangent, bend = _locus(mired)
+        mired += float((uv - uv_at) @ tangent / (tangent @ tangent - (uv - uv_at) @ bend))
         mired = min(max(mired, 1e6 / (2 * KELVIN_RANGE[1])), 2e6 / KELVIN_RANGE[0])
-    at, tangent, _ = _locus(mired)
-    kelvin, duv = 1e6 / mired, float((uv - at) @ _towards_green(tangent))
+    uv_at, tangent, _ = _locus(mired)
+    kelvin, duv = 1e6 / mired, float((uv - uv_at) @ _towards_green(tangent))
     lowest, highest = KELVIN_RANGE
     # The ends of the range are only reproduced up to round-off.
     if not (lowest - 0.1 <= kelvin <= highest + 10 and abs(duv) <= LARGEST_DUV + 1e-5):
@@ -133,8 +133,8 @@ def _locus(mired: float) -> tuple[Doubles, Doubles, Doubles]:
     """Return CIE 1960 (u, v) of a black body at 1e6/mired kelvin, and two derivatives by mired."""
     step = 1e-4 * mired
     kelvin = 1e6 / (mired + step * np.array([-1, 0, 1]))
-    before, at, after = uv_of_black_body(kelvin)
-    return at, (after - before) / (2 * step), (after - 2 * at + before) / step**2
+    uv_before, uv_at, uv_after = uv_of_black_body(kelvin)
+    return uv_at, (uv_after - uv_before) / (2 * step), (uv_after - 2 * uv_at + uv_before) / step**2
 
 
 def _towards_green(along: Floats) -> Floats:

@@ -119,8 +119,8 @@ class ColorHull:
         room, own = self._sides @ rgb, self._sides @ self.own
         beyond = (room < 0) & (own > 0)
         # This much of the hull's own colour brings it within all sides.
-        mixed = rgb + float(np.max(-room[beyond] / own[beyond], initial=0.0)) * self.own
-        return np.asarray(mixed * (luminance(rgb) / luminance(mixed)), np.float64)
+        mixture = rgb + float(np.max(-room[beyond] / own[beyond], initial=0.0)) * self.own
+        return np.asarray(mixture * (luminance(rgb) / luminance(mixture)), np.float64)
 
 
 def _cross(first: Doubles, second: Doubles) -> Doubles:

@@ -99,11 +99,13 @@ class WhiteRange:
         places = self.places(rgb)
         k = np.minimum(places.astype(np.intp), self.last - 1)
         # Towards cooler whites, green is to the right of the locus.
-        along = np.diff(self._uv, axis=0)[k]
-        across = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.hypot(*along.T)[:, None]
+        tangents = np.diff(self._uv, axis=0)[k]
+        normals = (
+            np.stack([tangents[:, 1], -tangents[:, 0]], axis=1) / np.hypot(*tangents.T)[:, None]
+        )
         to_xyz = rgb_to_xyz(REC709).T
         offset = uv_of(np.where(lit[:, None], rgb, 1.0) @ to_xyz) - uv_of(self.at(places) @ to_xyz)
-        return np.where(lit, (offset * across).sum(axis=1), 0.0)
+        return np.where(lit, (offset * normals).sum(axis=1), 0.0)
 
     def window(self, place: float, width: int) -> tuple[int, int]:
         """Return the first and last white of a window of `width` pieces around a position, within
@@ -122,9 +124,9 @@ class WhiteRange:
         a, b = self.colors[first], self.colors[last]
         per_mired = (b - a) / (self.mireds[first] - self.mireds[last])
         backwards = min(reach, float(self.mireds[0] - self.mireds[first]))
-        ahead = min(reach, float(self.mireds[last] - self.mireds[-1]))
+        step = min(reach, float(self.mireds[last] - self.mireds[-1]))
         return np.stack(
-            [_moved_color(a, -backwards * per_mired), _moved_color(b, ahead * per_mired)]
+            [_moved_color(a, -backwards * per_mired), _moved_color(b, step * per_mired)]
         )
 
 
@@ -136,8 +138,8 @@ def white_range(low: float, high: float, duv: float = 0.0) -> WhiteRange:
     return whites
 
 
-def _moved_color(color: Doubles, way: Doubles) -> Doubles:
-    """Return a colour (3,) moved by `way`, (3,), or by as much of it as keeps all channels >= 0."""
+def _moved_color(color: Doubles, direction: Doubles) -> Doubles:
+    """Return a colour (3,) moved by `direction`, (3,), as far as all channels stay >= 0."""
     with np.errstate(divide="ignore"):
-        room = np.where(way < 0, color / np.where(way < 0, -way, 1), np.inf)
-    return np.asarray(np.maximum(color + min(1.0, float(room.min())) * way, 0))
+        room = np.where(direction < 0, color / np.where(direction < 0, -direction, 1), np.inf)
+    return np.asarray(np.maximum(color + min(1.0, float(room.min())) * direction, 0))

@@ -61,5 +61,5 @@ def _predicted(planes: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
     padded = np.pad(planes, ((0, 0), (1, 0), (1, 0)))
     left, above, corner = padded[:, 1:, :-1], padded[:, :-1, 1:], padded[:, :-1, :-1]
     # As in JPEG-LS: a plane through the three, clamped to the range of the two neighbours.
-    least, most = np.minimum(left, above), np.maximum(left, above)
-    return np.asarray(np.clip(left + above - corner, least, most))
+    lower, upper = np.minimum(left, above), np.maximum(left, above)
+    return np.asarray(np.clip(left + above - corner, lower, upper))

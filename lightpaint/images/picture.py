@@ -168,8 +168,8 @@ def _at_least(layer: ExrLayer) -> Mask | None:
     marks = [inner.channel(*names) for names in zip(*RGB_NAMES, strict=True)]
     if all(mark is None for mark in marks):
         return None
-    nowhere = np.zeros(layer.part.size, np.bool_)
-    return np.stack([nowhere if mark is None else mark > 0 for mark in marks], axis=-1)
+    empty_mask = np.zeros(layer.part.size, np.bool_)
+    return np.stack([empty_mask if mark is None else mark > 0 for mark in marks], axis=-1)
 
 
 def _stored(part: ExrPart) -> Mask | None:

@@ -37,8 +37,8 @@ def stray_pixels(raw: Floats, half_difference: Floats, clean: Floats) -> npt.NDA
     is_outstanding = brightness > OUTSTANDING * np.maximum(second, expected)
     largest = _window_maximum(2 * np.abs(half_difference).max(axis=-1))
     corners = product((-WINDOW_DISTANCE, WINDOW_DISTANCE), repeat=2)
-    around = np.stack([shifted(largest, *corner) for corner in corners])
-    by_chance = LARGEST_CHANCE * np.partition(around, -2, axis=0)[-2]
+    neighbours = np.stack([shifted(largest, *corner) for corner in corners])
+    by_chance = LARGEST_CHANCE * np.partition(neighbours, -2, axis=0)[-2]
     is_stray = is_outstanding & (brightness - expected <= by_chance)
     return np.asarray(is_stray, np.bool_)
 

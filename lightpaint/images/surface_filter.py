@@ -125,17 +125,17 @@ class _Band:
             left, right = max(-dx, 0), width - max(dx, 0)
             part = np.s_[:, :height, left:right]
             other = np.s_[:, dy : dy + height, left + dx : right + dx]
-            between = position[other] - position[part]
-            off = np.abs((between * normal[part]).sum(axis=0))
-            off += np.abs((between * normal[other]).sum(axis=0))
-            off *= (per_width[part][0] + per_width[other][0]) / 2
+            difference = position[other] - position[part]
+            offset = np.abs((difference * normal[part]).sum(axis=0))
+            offset += np.abs((difference * normal[other]).sum(axis=0))
+            offset *= (per_width[part][0] + per_width[other][0]) / 2
             cosine = np.clip((normal[part] * normal[other]).sum(axis=0), 0, 1)
             for _ in range(SQUARINGS):
                 cosine *= cosine
-            apart = float(np.hypot(dy, dx))
-            near = np.float32(1 / (NEAR_PLANE * (1 + BEND * apart)))
-            weight[:, left:right] = cosine * np.exp(-off * near)
-            weight *= np.float32(np.exp(-2 * (apart / r) ** 2))
+            distance = float(np.hypot(dy, dx))
+            nearness = np.float32(1 / (NEAR_PLANE * (1 + BEND * distance)))
+            weight[:, left:right] = cosine * np.exp(-offset * nearness)
+            weight *= np.float32(np.exp(-2 * (distance / r) ** 2))
         return weights
 
     @cached_property
@@ -187,8 +187,8 @@ def _pixels_per_length(position: Floats, is_seen: Bools) -> Floats:
     """
     length = np.full(is_seen.shape, np.inf, np.float32)
     for pixel, neighbour in ((np.s_[:-1, :], np.s_[1:, :]), (np.s_[:, :-1], np.s_[:, 1:])):
-        between = position[:, *pixel] - position[:, *neighbour]
-        step = np.sqrt(np.square(between).sum(axis=0))
+        difference = position[:, *pixel] - position[:, *neighbour]
+        step = np.sqrt(np.square(difference).sum(axis=0))
         step[~(is_seen[pixel] & is_seen[neighbour])] = np.inf
         for end in (pixel, neighbour):
             np.minimum(length[end], step, out=length[end])

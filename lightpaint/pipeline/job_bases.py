@@ -112,14 +112,14 @@ def _remark_on_samples(
 def obtain_bases_of(job: Job, bases: list[Basis] | None, listen: Listener) -> list[Basis]:
     """Return the basis of each view: passed in, given with the job, cached or rendered."""
     if bases is None:
-        obtained = [_basis_of(job, view, listen) for view in job.views]
+        new_bases = [_basis_of(job, view, listen) for view in job.views]
     else:
-        obtained = list(bases)
+        new_bases = list(bases)
         bases.clear()
     # With the present requests of the lights file, even for bases from before it changed.
     return [
         basis if view.scene is None else basis.with_requests(view.scene.requests)
-        for basis, view in zip(obtained, job.views, strict=True)
+        for basis, view in zip(new_bases, job.views, strict=True)
     ]
 
 

@@ -58,12 +58,12 @@ def render_sheet(scene: Scene, path: Path, progress: Progress = silent) -> str:
         pixels = max(
             min(SHEET.pixels or 0, SHEET_MAX_PIXELS // len(scene.lights)), LIGHT_MIN_PIXELS
         )
-        small = scene.reduced(f"1/{Preset(SHEET.spp, pixels).reduction(scene.film)}")
-        basis = obtain_basis(small, spp=SHEET.spp, seed=SHEET_SEED, progress=progress)
+        small_scene = scene.reduced(f"1/{Preset(SHEET.spp, pixels).reduction(scene.film)}")
+        basis = obtain_basis(small_scene, spp=SHEET.spp, seed=SHEET_SEED, progress=progress)
     title = f"{Path(*scene.path.parts[-2:])} through {sensor}, {len(scene.lights)} lights"
     texts = denoiser_text(basis.features, raw=f"basis of {basis.origin.spp} samples per pixel")
-    lit = {member.name: member.emission for member in scene.emitters}
-    lights = [HungLight(place, lit[place.name]) for place in scene.emitter_places]
+    emissions = {member.name: member.emission for member in scene.emitters}
+    lights = [HungLight(place, emissions[place.name]) for place in scene.emitter_places]
     image = light_sheet(basis, title=title, lights=lights, up=scene.up)
     write_bytes(path, png_bytes(image, {SHEET_KEY: "what each light does alone", **texts}))
     return ""

@@ -54,9 +54,11 @@ def suggest_move(
     if not placement.moves:
         return None
     best = placement.moves[0]
-    without, with_it = _pictures(job, view, solution, scene.moved({best.name: best.pose}), basis)
+    picture_without, picture_with = _pictures(
+        job, view, solution, scene.moved({best.name: best.pose}), basis
+    )
     aim = 5 * math.ceil((best.turn + MARGIN) / 5)
-    return MoveSuggestion(best.name, best.turn, best.gain_share, aim, without, with_it)
+    return MoveSuggestion(best.name, best.turn, best.gain_share, aim, picture_without, picture_with)
 
 
 def _turns(scene: Scene) -> dict[str, Freedom]:
@@ -74,18 +76,20 @@ def _turns(scene: Scene) -> dict[str, Freedom]:
 
 
 def _pictures(
-    job: Job, view: PaintedView, solution: Solution, moved: Scene, basis: Basis
+    job: Job, view: PaintedView, solution: Solution, moved_scene: Scene, basis: Basis
 ) -> tuple[Floats, Floats]:
     """Return the picture as solved, and after the move, on a small film."""
-    small = on_small_film(moved, basis, PIXELS)
-    factor = basis.size[0] // small.size[0]
-    before = block_mean(basis.predict(solution.weights).image, factor)
+    small_scene = on_small_film(moved_scene, basis, PIXELS)
+    factor = basis.size[0] // small_scene.size[0]
+    picture_before = block_mean(basis.predict(solution.weights).image, factor)
     look = block_mean(basis.present_look, factor), block_mean(basis.present_noise, factor)
-    spp = min(MAX_SPP, SAMPLES // (small.size[0] * small.size[1]))
-    rendered = render_basis(small, spp=spp, seed=job.settings.seed)
-    rendered = replace(rendered, former=Estimate(*look))
-    height, width = (factor * n for n in small.size)
+    spp = min(MAX_SPP, SAMPLES // (small_scene.size[0] * small_scene.size[1]))
+    small_basis = render_basis(small_scene, spp=spp, seed=job.settings.seed)
+    small_basis = replace(small_basis, former=Estimate(*look))
+    height, width = (factor * n for n in small_scene.size)
     target = view.target.cropped(height, width).reduced(factor)
-    problem = Problem.of(rendered, target, constraints=job.all_constraints, fit=job.fit)
-    again = solution_of(problem)
-    return before[: small.size[0], : small.size[1]], rendered.mix(again.weights)
+    problem = Problem.of(small_basis, target, constraints=job.all_constraints, fit=job.fit)
+    solution_with_turn = solution_of(problem)
+    return picture_before[: small_scene.size[0], : small_scene.size[1]], small_basis.mix(
+        solution_with_turn.weights
+    )

@@ -89,19 +89,19 @@ def add_needed_samples(job: Job, bases: list[Basis], listen: Listener) -> list[B
     with kept_loaded([view.scene for view in job.views if view.scene is not None]) as tracers:
         for _ in range(MAX_ROUNDS):
             state = Certainty.of(without_noise(job, solution_of(problem_of(job, bases))))
-            most = max(basis.origin.mean_spp for basis in bases)
-            if state.error <= settings.error or is_over() or most >= MAX_SPP:
+            most_spp = max(basis.origin.mean_spp for basis in bases)
+            if state.error <= settings.error or is_over() or most_spp >= MAX_SPP:
                 break
             listen.note(_text(state, bases))
             if all(basis.origin.method == ONE_PASS for basis in bases):
                 bases = _topped_up(job, bases, state, is_over, tracers, listen)
             else:
                 bases = _doubled(job, bases, listen)
-    added = sum(x.origin.mean_spp for x in bases) > sum(before)
+    has_added_samples = sum(x.origin.mean_spp for x in bases) > sum(before)
     text = _text(state, bases)
     if state.error > settings.error:
         text += f"; ± {spoken_percent(settings.error)} was asked for"
-    if added or state.error > settings.error:
+    if has_added_samples or state.error > settings.error:
         listen.say(text)
     return bases
 
@@ -110,11 +110,11 @@ def _text(state: Certainty, bases: Sequence[Basis]) -> str:
     """Return the largest error, and the samples so far, as text."""
     mean = sum(basis.origin.mean_spp for basis in bases) / len(bases)
     extra = sum(basis.origin.extra_spp for basis in bases) / len(bases)
-    where = f", {_spoken(extra)} of them where the painting needs them" if extra else ""
-    least = f"one below {spoken_percent(LEAST_SHARE)} of the picture's light counts as that"
+    extra_text = f", {_spoken(extra)} of them where the painting needs them" if extra else ""
+    least_text = f"one below {spoken_percent(LEAST_SHARE)} of the picture's light counts as that"
     return (
-        f"{_spoken(mean)} samples per pixel{where}: lights are known to "
-        f"± {spoken_percent(state.error)} (least sure: {state.light}; {least})"
+        f"{_spoken(mean)} samples per pixel{extra_text}: lights are known to "
+        f"± {spoken_percent(state.error)} (least sure: {state.light}; {least_text})"
     )
 
 
@@ -141,28 +141,30 @@ def needed_counts(state: Certainty, bases: Sequence[Basis], error: float) -> lis
     """Return the samples to add to each half of each pixel of each view, (h, w) each."""
     views, solution = state.solution.problem.views, state.solution
     variances = pixel_variances(solution, aims_of(state))
-    have = [_half_samples(basis) for basis in bases]
-    its = [
-        sample_demand(views.part(variances, k), views.part(solution.importance, k) > 0, have[k])
+    existing_halves = [_half_samples(basis) for basis in bases]
+    new_halves = [
+        sample_demand(
+            views.part(variances, k), views.part(solution.importance, k) > 0, existing_halves[k]
+        )
         for k in range(len(bases))
     ]
-    variance = np.concatenate([x.variance.ravel() for x in its])
-    density = np.concatenate([x.density.ravel() for x in its])
-    existing = np.concatenate([x.ravel() for x in have])
+    variance = np.concatenate([x.variance.ravel() for x in new_halves])
+    density = np.concatenate([x.density.ravel() for x in new_halves])
+    existing = np.concatenate([x.ravel() for x in existing_halves])
     goal = AIM * (error / state.error) ** 2 * variance.sum()
     for size in ROUND_SIZES:
         counts = top_up_counts(density, existing, size * existing.sum())
         if (variance * existing / (existing + counts)).sum() <= goal:
             break
-    ends = np.cumsum([x.size for x in have])[:-1]
+    ends = np.cumsum([x.size for x in existing_halves])[:-1]
     parts = zip(np.split(counts, ends), bases, strict=True)
     return [part.reshape(basis.size) for part, basis in parts]
 
 
 def _half_samples(basis: Basis) -> Doubles:
     """Return the samples of half A of each pixel, (h, w)."""
-    have = np.full(basis.size, float(basis.origin.halves[0]))
-    return have if basis.extra is None else have + basis.extra
+    existing_halves = np.full(basis.size, float(basis.origin.halves[0]))
+    return existing_halves if basis.extra is None else existing_halves + basis.extra
 
 
 def _topped_up(
@@ -175,12 +177,12 @@ def _topped_up(
 ) -> list[Basis]:
     """Return the bases with a round of samples where they are needed."""
     assert job.settings.error is not None
-    refined = []
+    refined_bases = []
     for view, basis, counts in zip(
         job.views, bases, needed_counts(state, bases, job.settings.error), strict=True
     ):
         assert view.scene is not None
-        topped = top_up_basis(
+        topped_up_basis = top_up_basis(
             view.scene,
             basis,
             counts,
@@ -189,8 +191,8 @@ def _topped_up(
             is_enough=is_over,
             tracers=tracers,
         )
-        refined.append(replace(topped, former=basis.former))
-    return refined
+        refined_bases.append(replace(topped_up_basis, former=basis.former))
+    return refined_bases
 
 
 def _doubled(job: Job, bases: Sequence[Basis], listen: Listener) -> list[Basis]:
@@ -199,12 +201,12 @@ def _doubled(job: Job, bases: Sequence[Basis], listen: Listener) -> list[Basis]:
     for view, basis in zip(job.views, bases, strict=True):
         assert view.scene is not None
         spp = 2 * max(PILOT_SPP, basis.origin.spp)
-        doubled = obtain_basis(
+        doubled_basis = obtain_basis(
             view.scene,
             spp=spp,
             seed=job.settings.seed,
             use_cache=job.settings.use_cache,
             progress=view_listener(job, view, listen),
         )
-        doubled_bases.append(replace(doubled, former=basis.former))
+        doubled_bases.append(replace(doubled_basis, former=basis.former))
     return doubled_bases

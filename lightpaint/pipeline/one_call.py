@@ -27,13 +27,13 @@ AnyTarget = str | Path | Target
 
 @overload
 def paint_with_light(
-    scene: AnyScene | None, target: AnyTarget, folder: str | Path, **how: Any
+    scene: AnyScene | None, target: AnyTarget, folder: str | Path, **options: Any
 ) -> Look: ...
 
 
 @overload
 def paint_with_light(
-    scene: Sequence[AnyScene], target: Sequence[AnyTarget], folder: str | Path, **how: Any
+    scene: Sequence[AnyScene], target: Sequence[AnyTarget], folder: str | Path, **options: Any
 ) -> list[Look]: ...
 
 
@@ -94,7 +94,7 @@ def paint_with_light(
         >>> look.verification.agrees
         True
     """
-    how = {
+    options = {
         "sensor": sensor,
         "parameters": {key: str(value) for key, value in (parameters or {}).items()},
         "lights": None if lights is None else tuple(lights),
@@ -111,7 +111,9 @@ def paint_with_light(
         basis, settings = None, settings | {"resolution": "1/1"}
     read = {"mask": mask and str(mask), "layer": layer, "find": find}
     requests = constraints or Constraints(), rigging or Rigging()
-    job = _job((scene, how), (target, read), Path(folder), basis, requests, Settings(**settings))
+    job = _job(
+        (scene, options), (target, read), Path(folder), basis, requests, Settings(**settings)
+    )
     looks = run(job, progress, bases=bases)
     return looks if job.by_sensor else looks[0]
 
@@ -135,7 +137,7 @@ def _job(
     }
     by_sensor = isinstance(scenes, list | tuple)
     painting_options = {**target_options, "transform": TransformChoice.of(settings.transform)}
-    unused = [name for name, value in target_options.items() if value not in (None, True)]
+    unused_options = [name for name, value in target_options.items() if value not in (None, True)]
     scenes = [SceneFile(str(x), **scene_options) if _is_path(x) else x for x in _as_list(scenes)]
     targets = [
         Painting(str(x), **painting_options) if _is_path(x) else x for x in _as_list(targets)
@@ -145,12 +147,12 @@ def _job(
     if scene_options and not any(isinstance(x, SceneFile) for x in scenes):
         names = ", ".join(f"{name}=..." for name in scene_options)
         raise SceneError(f"{names} cannot change a scene that is already loaded: give its path")
-    if unused and not any(isinstance(x, Painting) for x in targets):
-        names = ", ".join(f"{name}=..." for name in unused)
+    if unused_options and not any(isinstance(x, Painting) for x in targets):
+        names = ", ".join(f"{name}=..." for name in unused_options)
         raise TargetError(f"{names} cannot change a target that is already read: give its path")
     basis = BasisFile(str(basis)) if _is_path(basis) else basis
-    how: dict[str, Any] = {"by_sensor": by_sensor, "rigging": rigging}
-    return Job(tuple(scenes), tuple(targets), folder, basis, constraints, settings, **how)
+    options: dict[str, Any] = {"by_sensor": by_sensor, "rigging": rigging}
+    return Job(tuple(scenes), tuple(targets), folder, basis, constraints, settings, **options)
 
 
 def _as_list(value: Any) -> list[Any]:

@@ -43,18 +43,18 @@ def place_lights(
         placement = content(job.placement).hung_in(scenes)
     if placement.is_empty:
         return job, bases, placement
-    added = {light.name for light in placement.additions}
+    added_names = {light.name for light in placement.additions}
     constraints = rigged_lights(job.all_rigging, scenes[0]).constraints
-    asked = tuple(x for x in constraints.lights if x[0] in added)
+    new_light_constraints = tuple(x for x in constraints.lights if x[0] in added_names)
     films = [on_film_of(scene, basis) for scene, basis in zip(placement.scenes, bases, strict=True)]
-    moved = job.with_moved_lights(films, Constraints(asked))
-    before = list(bases)
+    job_with_moves = job.with_moved_lights(films, Constraints(new_light_constraints))
+    unmoved_bases = list(bases)
     bases.clear()
-    found = [
+    moved_bases = [
         moved_basis(scene, basis, job.settings, view_listener(job, view, listen))
-        for scene, basis, view in zip(films, before, moved.views, strict=True)
+        for scene, basis, view in zip(films, unmoved_bases, job_with_moves.views, strict=True)
     ]
-    return moved, found, placement
+    return job_with_moves, moved_bases, placement
 
 
 def find_places(jobs: Sequence[Job], bases: Sequence[Basis], listen: Listener) -> Placement:
@@ -70,15 +70,15 @@ def find_places(jobs: Sequence[Job], bases: Sequence[Basis], listen: Listener) -
         solution = solution_of(problem_of(job, [bases[k] for k in places]))
         solutions.append(without_noise(job, solution))
     films = [scenes[k] for k in range(len(bases))]
-    rigged = rigged_lights(jobs[0].all_rigging, films[0])
+    lights_with_moves = rigged_lights(jobs[0].all_rigging, films[0])
     return place(
         films,
         bases,
         solutions[0] if len(jobs) == 1 else solutions,
-        rigged.freedoms,
-        new=rigged.new,
-        pairs=rigged.pairs,
-        constraints=rigged.constraints,
+        lights_with_moves.freedoms,
+        new=lights_with_moves.new,
+        pairs=lights_with_moves.pairs,
+        constraints=lights_with_moves.constraints,
         seed=jobs[0].settings.seed,
         progress=lambda label, done, total, unit="": listen(label, done, total, "steps"),
     )
@@ -87,18 +87,18 @@ def find_places(jobs: Sequence[Job], bases: Sequence[Basis], listen: Listener) -
 def say_changes(placement: Placement | PlacementRecord, listen: Listener) -> None:
     """Tell the user which lights were moved and added, and for which looks they hang so."""
     changes = all_changes(placement)
-    lead = f"{some_names(placement.looks)}: " if placement.looks else ""
+    prefix = f"{some_names(placement.looks)}: " if placement.looks else ""
     for change in changes:
-        listen.say(f"{lead}{spoken_change(change)}")
+        listen.say(f"{prefix}{spoken_change(change)}")
     if not changes:
         reason = "no change is surely worth a hundredth of what is missed"
-        listen.say(f"{lead}no light is moved: {reason}")
+        listen.say(f"{prefix}no light is moved: {reason}")
 
 
 def _place_of(scene: Scene, bases: Sequence[Basis]) -> int:
     """Return the index of the basis with a scene's sensor and film."""
-    known = [(basis.origin.sensor, basis.size) for basis in bases]
-    return known.index((scene.sensor_names[scene.sensor], scene.size))
+    films_of_bases = [(basis.origin.sensor, basis.size) for basis in bases]
+    return films_of_bases.index((scene.sensor_names[scene.sensor], scene.size))
 
 
 def on_film_of(scene: Scene, basis: Basis) -> Scene:

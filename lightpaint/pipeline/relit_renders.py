@@ -34,8 +34,10 @@ def relit_folder(
     """
     files = answer_files(folder, scene=scene, has_lighting=True)
     files += [folder / view / name for view in views for name in ("relit.exr", "relit.png")]
-    reads = (lighting, *scene.read_files)
-    return ResultFolder(folder, tuple(files), reads, (lighting,), adds_to=lighting, force=force)
+    input_files = (lighting, *scene.read_files)
+    return ResultFolder(
+        folder, tuple(files), input_files, (lighting,), adds_to=lighting, force=force
+    )
 
 
 def relight_look(

@@ -25,7 +25,7 @@ from lightpaint.scene.quality_presets import Preset
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, render
 from lightpaint.scene.surfaces import render_features, render_surfaces
-from lightpaint.target.template import LIGHTS, SHOWN, Template, write_look, write_template
+from lightpaint.target.template import LIGHTS, SHOWN_FILE, Template, write_look, write_template
 
 #: Rendering of the small picture of each light, to recognise it by.
 THUMBNAIL = Preset(32, 2**14)
@@ -85,7 +85,7 @@ def render_template(
         mattes=surfaces.coverage,
         lights=_thumbnails(scene, basis, settings, progress),
         texts={
-            SHOWN: denoiser_text(features, raw="template.exr"),
+            SHOWN_FILE: denoiser_text(features, raw="template.exr"),
             LIGHTS: denoiser_text(features, raw="the basis of the scene"),
         },
     )
@@ -123,7 +123,7 @@ def template_of_basis(
     texts = {}
     if clean is not None:
         raw = denoiser_text(features, raw="template.exr")
-        texts = {SHOWN: raw, LIGHTS: denoiser_text(features, raw="the basis")}
+        texts = {SHOWN_FILE: raw, LIGHTS: denoiser_text(features, raw="the basis")}
     return write_template(
         Path(folder), template, lights=_small_planes(basis, min(factor, height, width)), texts=texts
     )
@@ -227,21 +227,23 @@ def _thumbnails(
     """Return, by name, each light alone at unit emission, (h', w', 3) linear, denoised."""
     factor = THUMBNAIL.reduction(scene.film)
     if basis is None:
-        small = scene.reduced(f"1/{factor}")
-        basis = render_basis(small, spp=THUMBNAIL.spp, seed=settings.seed, progress=progress)
+        small_features = scene.reduced(f"1/{factor}")
+        basis = render_basis(
+            small_features, spp=THUMBNAIL.spp, seed=settings.seed, progress=progress
+        )
         factor = 1
     return _small_planes(basis, factor)
 
 
 def _small_planes(basis: Basis, factor: int) -> dict[str, Floats]:
     """Return, by name, each light alone in means over blocks; denoised, if there is noise."""
-    small = {
+    small_features = {
         name: block_mean(image, factor)
         for name, image in zip(basis.names, basis.planes, strict=True)
     }
     if not basis.knows_noise:
-        return small
+        return small_features
     if factor == 1:
         return {name: denoise_plane(basis, k) for k, name in enumerate(basis.names)}
     features = None if basis.features is None else basis.features.reduced(factor)
-    return {name: denoised(image, features) for name, image in small.items()}
+    return {name: denoised(image, features) for name, image in small_features.items()}

@@ -51,14 +51,15 @@ class LightShares:
         """Return the shares of the lights of `basis` that `lighting` adjusts and does not switch
         off.
         """
-        lit = [x for x in lighting.lights if not x.is_fixed and any(x.weight)]
-        names = tuple(x.name for x in lit)
+        adjustable_lights = [x for x in lighting.lights if not x.is_fixed and any(x.weight)]
+        names = tuple(x.name for x in adjustable_lights)
         return cls.of_pictures(
             names,
             (
                 Estimate(basis.planes.plane(k) * weight, basis.noise.plane(k) * weight)
                 for k, weight in (
-                    (basis.names.index(x.name), np.array(x.weight, np.float32)) for x in lit
+                    (basis.names.index(x.name), np.array(x.weight, np.float32))
+                    for x in adjustable_lights
                 )
             ),
         )
@@ -121,11 +122,11 @@ def detection_power(
     deviation = np.sqrt(squares.sum(axis=(0, 1)))
     blocks, weight = block_sums(squares), brightness_weights(magnitude)
     spread = float(np.square(weight * 2 * blocks.sum(axis=-1)).sum())
-    means = tests.mean(error)
+    mean_shifts = tests.mean(error)
     limits = tests.limits(limit_of_tests(max(len(lights.names), 1), once=limit))
     power_of = {}
     for k, name in enumerate(lights.names):
-        by_light = _two_sided(float(means[k]), float(limits[k]))
+        by_light = _two_sided(float(mean_shifts[k]), float(limits[k]))
         by_sum = _two_sided(float(np.max(np.abs(error * lights.sums[k]) / deviation)), limit)
         blocks_and_noise = (lights.blocks[k].astype(np.float64), lights.noise[k].astype(np.float64))
         power: Doubles = error**2 * (
@@ -138,6 +139,6 @@ def detection_power(
     return power_of
 
 
-def _two_sided(off: float, limit: float) -> float:
-    """Return the probability that a normal variable with mean `off` lies beyond ±`limit`."""
-    return NORMAL.cdf(off - limit) + NORMAL.cdf(-off - limit)
+def _two_sided(shift: float, limit: float) -> float:
+    """Return the probability that a normal variable with mean `shift` lies beyond ±`limit`."""
+    return NORMAL.cdf(shift - limit) + NORMAL.cdf(-shift - limit)

@@ -66,11 +66,11 @@ class Changes:
     def _child_named(self, name: str) -> Element | None:
         """Return the child called `name`; None if there certainly is none."""
         child = self.element.child_named(name)
-        unknown = next((c for c in self.element.children if "$" in c.name), None)
-        if child is None and unknown is not None:
-            spelt = unknown.attributes["name"]
+        unresolved = next((c for c in self.element.children if "$" in c.name), None)
+        if child is None and unresolved is not None:
+            spelt = unresolved.attributes["name"]
             raise SceneError(
-                f"{self.xml.place_of(unknown)}: <{unknown.tag} name={spelt!r}> in "
+                f"{self.xml.place_of(unresolved)}: <{unresolved.tag} name={spelt!r}> in "
                 f"{self._title()} may be its {name}: write the name in the place of the parameter"
             )
         return child

@@ -103,9 +103,9 @@ def _exported(lighting: Lighting, source: Source) -> tuple[Lighting, str]:
     """
     if source.scene is None:
         return lighting, ""
-    tied = scene_of(source.scene, lighting)
+    regrouped_scene = scene_of(source.scene, lighting)
     tied_lighting, names = with_own_colors(
-        lighting, {light.name: light.emission for light in tied.lights}
+        lighting, {light.name: light.emission for light in regrouped_scene.lights}
     )
     if not names:
         return tied_lighting, ""

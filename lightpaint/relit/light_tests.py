@@ -43,8 +43,8 @@ class LightTests:
 
     def mean(self, error: float) -> Doubles:
         """Return the mean of the quotient t behind z, for a relative error of each light."""
-        grown = 1 + np.clip(error**2 * self.overlap, 0, 1)
-        return np.asarray(np.maximum(error * self.sensitivity, 0) / np.sqrt(grown))
+        inflation = 1 + np.clip(error**2 * self.overlap, 0, 1)
+        return np.asarray(np.maximum(error * self.sensitivity, 0) / np.sqrt(inflation))
 
     def limits(self, limit: float) -> Doubles:
         """Return the quotient t at which the z of each light reaches `limit`."""
@@ -87,11 +87,11 @@ def light_tests(
     sums = block_sums(first), block_sums(second)
     tests = []
     for light_blocks, its_half in zip(blocks.astype(np.float64), half_differences, strict=True):
-        lit = light_blocks + its_half, light_blocks - its_half
+        half_pair = light_blocks + its_half, light_blocks - its_half
         # Weights from each half, and quantities of the other half to which they are applied.
-        a = [_times(x, light) for x, light in zip(inverses, lit, strict=True)]
+        a = [_times(x, light) for x, light in zip(inverses, half_pair, strict=True)]
         x, y = _dot(a[0], sums[1]), _dot(a[1], sums[0])
-        x_signal, y_signal = _dot(a[0], lit[1]), _dot(a[1], lit[0])
+        x_signal, y_signal = _dot(a[0], half_pair[1]), _dot(a[1], half_pair[0])
         x_variance = _dot(a[0], _times(scatter[1], a[0]))
         y_variance = _dot(a[1], _times(scatter[0], a[1]))
         variance = max(float((x_variance + y_variance).sum()), TINY)

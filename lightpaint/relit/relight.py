@@ -25,7 +25,7 @@ from lightpaint.scene.scene_reader import load_scene
 from lightpaint.screen import some_names
 
 #: A parameter in Mitsuba's list of unused ones.
-UNUSED = re.compile(r"- \$(\w+)=")
+UNUSED_PARAMETER = re.compile(r"- \$(\w+)=")
 
 
 @keywords()
@@ -87,10 +87,10 @@ def _loaded(path: Path, scene: Scene) -> Scene:
         try:
             return load_scene(path, sensor=scene.sensor, parameters=left, use_lights_file=False)
         except SceneError as error:
-            unused = set(left) & set(UNUSED.findall(str(error)))
-            if not unused:
+            unused_parameters = set(left) & set(UNUSED_PARAMETER.findall(str(error)))
+            if not unused_parameters:
                 raise
-            left = {name: value for name, value in left.items() if name not in unused}
+            left = {name: value for name, value in left.items() if name not in unused_parameters}
 
 
 def settle(scene: Scene, lighting: Lighting, path: Path, home: Path) -> bool:
@@ -142,14 +142,14 @@ def scene_of(scene: Scene, lighting: Lighting) -> Scene:
             f"{some_names(sorted(emitter_names - scene_names)) or 'none'} that the scene does not "
             "have"
         )
-    tied = scene.with_lights(lighting.members, lighting.fixed)
+    regrouped_scene = scene.with_lights(lighting.members, lighting.fixed)
     for setting in lighting.lights:
-        if (unit := tied.light(setting.name).unit) != setting.unit:
+        if (unit := regrouped_scene.light(setting.name).unit) != setting.unit:
             raise LightingError(
                 f"the lighting has light {setting.name!r} in {setting.unit}, but in {scene.path} "
                 f"as it is now it would be {unit}: solve again"
             )
-    return tied
+    return regrouped_scene
 
 
 def placed_scene(scene: Scene, lighting: Lighting) -> Scene:

@@ -74,20 +74,20 @@ def relit_files(
     _edit_integrators(scene, edits)
     for file, offset, children in scene.moved_elements:
         edits.setdefault(file.resolve(), _Edits(file)).moved[offset] = children
-    written: dict[Path, bytes | Floats] = {}
+    contents: dict[Path, bytes | Floats] = {}
     for edit in edits.values():
         is_root = edit.original == root
         target = path if is_root else path.parent / _place_of_include(edit.original, root)
         content, images = _edit(edit, target.parent, scene, path.stem)
         # Mitsuba looks for images beside the scene, even for those of an included file.
-        written |= {path.parent / name: image for name, image in images.items()}
-        written[target] = content
+        contents |= {path.parent / name: image for name, image in images.items()}
+        contents[target] = content
     originals = {file.resolve() for file in scene.originals}
-    if in_the_way := [file for file in written if file.resolve() in originals]:
+    if in_the_way := [file for file in contents if file.resolve() in originals]:
         raise OutputError(
             f"{in_the_way[0]} belongs to the scene itself: write the relit scene to another folder"
         )
-    return written
+    return contents
 
 
 def _edit_integrators(scene: Scene, edits: dict[Path, _Edits]) -> None:
@@ -119,9 +119,9 @@ def _sampled_emitters(
     sampled, and as a last resort those that are hit by chance.
     """
     can_be_sampled = {emitter for emitter in settings if not emitter.hit_by_chance}
-    lit = {emitter for emitter in can_be_sampled if any(settings[emitter])}
-    if lit or any(emitter.sampling_weight for emitter in unchanged):
-        return lit
+    lit_emitters = {emitter for emitter in can_be_sampled if any(settings[emitter])}
+    if lit_emitters or any(emitter.sampling_weight for emitter in unchanged):
+        return lit_emitters
     return can_be_sampled or set(settings)
 
 

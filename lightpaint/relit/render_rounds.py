@@ -31,13 +31,13 @@ def refine_by_rendering(
     neither the other rounds, the basis nor a verification uses.
     """
     for k in range(rounds):
-        mixed = []
+        mixed_bases = []
         for scene, basis in views:
             its_seed = pass_seed(view_seed(seed, scene.sensor), Stream.REFINEMENT, k)
             label = f"refinement {k + 1}"
             samples = max(2, basis.origin.spp) if spp is None else spp
-            mixed.append(_mixed(scene, basis, solution, samples, its_seed, label, progress))
-        solution = refine(solution, joint_estimate(mixed))
+            mixed_bases.append(_mixed(scene, basis, solution, samples, its_seed, label, progress))
+        solution = refine(solution, joint_estimate(mixed_bases))
     return solution
 
 

@@ -42,9 +42,9 @@ def verification_budget(
     unless asked_spp is given. asked_spp: samples per pixel of the whole film, whatever they cost.
     """
     samples = basis_spp * basis_size[0] * basis_size[1]
-    whole = relit.size[0] * relit.size[1]
+    film_pixels = relit.size[0] * relit.size[1]
     if asked_spp is not None:
-        return VerificationBudget(relit, asked_spp, asked_spp * whole / samples)
+        return VerificationBudget(relit, asked_spp, asked_spp * film_pixels / samples)
     factor = whole_factor(relit.size, basis_size) or 1
     for part in range(1, factor + 1):
         if factor % part:

@@ -40,7 +40,7 @@ FIRST_LOOK = 2
 
 #: Share of the picture's light in which an error must be detectable before the test stops; and
 #: share from which on a single light must be among it.
-CHECKED, LARGE = 0.65, 1 / 7
+CHECKED, LARGE_SHARE = 0.65, 1 / 7
 
 #: Share of the picture's light that may stay unchecked although more samples would check it.
 UNCHECKED = 0.1
@@ -112,12 +112,12 @@ def can_tell(
         return True
     shares = lights.luminance()
     power = detection_power(predicted, verified, lights, tests, limit=limit)
-    missed = [share for name, share in shares.items() if power[name] < LOW_POWER]
-    if sum(missed) <= 1 - CHECKED and max(missed, default=0.0) < LARGE:
+    weak_shares = [share for name, share in shares.items() if power[name] < LOW_POWER]
+    if sum(weak_shares) <= 1 - CHECKED and max(weak_shares, default=0.0) < LARGE_SHARE:
         return True
     # With all samples, the noise of the render would be lower by this factor.
     at_end = Estimate(verified.image, verified.half_difference * done**0.5)
     tests = light_tests(predicted, at_end, lights.blocks, lights.noise)
     power = detection_power(predicted, at_end, lights, tests, limit=limit)
     later = [share for name, share in shares.items() if power[name] < LOW_POWER]
-    return sum(missed) - sum(later) < UNCHECKED
+    return sum(weak_shares) - sum(later) < UNCHECKED

@@ -95,8 +95,8 @@ class XmlFile:
         inner = f"{indent}    "
         if element.children:
             first = element.children[0].start
-            between = self.text[element.inner : first]
-            if b"\n" in between:
+            inner_text = self.text[element.inner : first]
+            if b"\n" in inner_text:
                 inner = _indent_before(self.text, first)
         body = "".join(f"{self._newline}{inner}{line}" for line in lines)
         self._edits.append((element.inner, element.inner, body.encode()))
@@ -136,12 +136,12 @@ def _parse(text: bytes) -> tuple[Element, dict[int, Element]]:
     Raises ValueError, with the line, if the tags do not match.
     """
     elements: dict[int, Element] = {}
-    opened: list[Element] = []
+    open_elements: list[Element] = []
     is_old = False
     for piece in markup(text):
         if piece["tag"] is not None:
             values = attributes(piece)
-            if not opened:
+            if not open_elements:
                 is_old = _is_old(values.get("version", ""))
             name = values.get("name", "")
             element = Element(
@@ -151,22 +151,26 @@ def _parse(text: bytes) -> tuple[Element, dict[int, Element]]:
                 start=piece.start(),
                 inner=piece.end(),
             )
-            if opened:
-                opened[-1].children.append(element)
-            opened.append(element)
+            if open_elements:
+                open_elements[-1].children.append(element)
+            open_elements.append(element)
             elements[element.start] = element
         end = None if piece["end"] is None else decoded(piece["end"])
-        if end is not None and (not opened or opened[-1].tag != end):
+        if end is not None and (not open_elements or open_elements[-1].tag != end):
             raise ValueError(
                 f"line {line_of(text, piece.start())}: </{end}> closes "
-                + (_opening(text, opened[-1]) if opened else "nothing")
+                + (_opening(text, open_elements[-1]) if open_elements else "nothing")
             )
         if end is not None or piece["empty"]:
-            element = opened.pop()
+            element = open_elements.pop()
             element.end = piece.end()
-            if not opened:
+            if not open_elements:
                 return element, elements
-    missing = f"{_opening(text, opened[-1])} has no end tag" if opened else "it has no element"
+    missing = (
+        f"{_opening(text, open_elements[-1])} has no end tag"
+        if open_elements
+        else "it has no element"
+    )
     raise ValueError(missing)
 
 

@@ -16,7 +16,7 @@ from lightpaint.scene.properties.emission import Scaling
 from lightpaint.scene.scene import Scene
 
 #: A non-existing folder that stands for any location of the relit scene.
-ELSEWHERE = ".lightpaint-patch"
+PATCH_SUFFIX = ".lightpaint-patch"
 
 
 def scene_patch(scene: Scene, lighting: Lighting) -> str:
@@ -28,7 +28,7 @@ def scene_patch(scene: Scene, lighting: Lighting) -> str:
     """
     scene = scene_of(scene, lighting)
     root = scene.files[0].resolve()
-    place = root.parent / ELSEWHERE / root.name
+    place = root.parent / PATCH_SUFFIX / root.name
     lines: list[str] = []
     for file, content in relit_files(scene, lighting.emission, place).items():
         if not isinstance(content, bytes):
@@ -38,14 +38,14 @@ def scene_patch(scene: Scene, lighting: Lighting) -> str:
             )
         name = file.relative_to(place.parent).as_posix()
         try:
-            old = (root.parent / name).read_text(encoding="utf-8")
+            old_text = (root.parent / name).read_text(encoding="utf-8")
         except OSError as error:
             raise OutputError(f"cannot read {name}: {error.strerror or error}") from error
         # A file that stays in its folder needs no search path for its assets.
         origin = os.path.relpath((root.parent / name).parent, file.parent)
         path_line = r"\r?\n[ \t]*" + re.escape(tag("path", value=Path(origin).as_posix()))
         new = re.sub(path_line, "", content.decode("utf-8"), count=1)
-        lines += difflib.unified_diff(_lines(old), _lines(new), f"a/{name}", f"b/{name}")
+        lines += difflib.unified_diff(_lines(old_text), _lines(new), f"a/{name}", f"b/{name}")
     return "".join(lines)
 
 
@@ -54,10 +54,10 @@ def emitters_of(scene: Scene, lighting: Lighting) -> list[tuple[str, str, RGB]]:
 
     The parameter is "" if the emission is a multiple of that in the scene, as for a sky.
     """
-    tied = scene_of(scene, lighting)
+    regrouped_scene = scene_of(scene, lighting)
     return [
         (emitter.name, _quantity(emitter), rgb)
-        for emitter, rgb in settings_of(tied, lighting.emission)
+        for emitter, rgb in settings_of(regrouped_scene, lighting.emission)
     ]
 
 

@@ -63,8 +63,8 @@ def coverage(importance: Floats) -> Floats:
 
     Importance itself, as alpha; where all of it is below 1, relative to its largest.
     """
-    most = float(importance.max(initial=0))
-    return np.clip(importance / min(1.0, most), 0, 1) if most > 0 else 0 * importance
+    peak = float(importance.max(initial=0))
+    return np.clip(importance / min(1.0, peak), 0, 1) if peak > 0 else 0 * importance
 
 
 def painted_coverage(target: Target, solution: Solution) -> Floats:
@@ -140,14 +140,14 @@ def importance_picture(
 
     finish: see `over_unpainted`.
     """
-    most = max(1.0, float(importance.max(initial=0)))
+    peak = max(1.0, float(importance.max(initial=0)))
 
     def yellow(look: Floats) -> Floats:
         grey = luminance(transform.encode(look))[..., None]
         return np.asarray((0.35 + 0.65 * grey) * np.array([1.0, 0.93, 0.70]))
 
     options: Any = {"transform": transform, "finish": finish}
-    return over_unpainted(yellow, current, coverage(importance / most), current, **options)
+    return over_unpainted(yellow, current, coverage(importance / peak), current, **options)
 
 
 @dataclass(frozen=True)
@@ -181,7 +181,7 @@ def residual_of(solution: Solution, predicted: Floats, *, transform: ViewTransfo
     exact = by_bands(lambda x, y: luminance(x.astype(np.float64) - y), predicted, goal)
     del goal
 
-    def averaged(radius: int) -> tuple[Floats, float]:
+    def mean_over(radius: int) -> tuple[Floats, float]:
         if radius == 0:
             values = exact
         else:
@@ -196,11 +196,11 @@ def residual_of(solution: Solution, predicted: Floats, *, transform: ViewTransfo
     noise = by_bands(lambda x: luminance(x.astype(np.float64)), half)
     spread = float(np.sqrt((np.square(noise) * counts).sum() / max(counts.sum(), 1)))
     if spread == 0:
-        return Residual(*averaged(0), 0)
-    aim = NOISE_SHARE * averaged(RADII[len(RADII) // 2])[1]
-    enough = (radius for radius in RADII if spread <= aim * (2 * radius + 1))
-    radius = next(enough, RADII[-1])
-    return Residual(*averaged(radius), radius)
+        return Residual(*mean_over(0), 0)
+    aim = NOISE_SHARE * mean_over(RADII[len(RADII) // 2])[1]
+    sufficient_radii = (radius for radius in RADII if spread <= aim * (2 * radius + 1))
+    radius = next(sufficient_radii, RADII[-1])
+    return Residual(*mean_over(radius), radius)
 
 
 def residual_picture(

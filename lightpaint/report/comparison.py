@@ -132,11 +132,16 @@ def _caption(
     """Draw a line of title, a smaller one of detail and, for a false-colour picture, one of
     scale."""
     (x, y), draw = corner, ImageDraw.Draw(sheet)
-    title, small = ImageFont.load_default(text), ImageFont.load_default(round(0.8 * text))
+    title, small_font = ImageFont.load_default(text), ImageFont.load_default(round(0.8 * text))
     draw.text((x, y), shorten_to_width(tile.title, title, width), TEXT, title)
-    draw.text((x, y + round(1.5 * text)), shorten_to_width(tile.detail, small, width), FAINT, small)
+    draw.text(
+        (x, y + round(1.5 * text)),
+        shorten_to_width(tile.detail, small_font, width),
+        FAINT,
+        small_font,
+    )
     if tile.limit is not None:
-        _scale_bar(sheet, tile.limit, (x, y + round(2.9 * text)), width, small)
+        _scale_bar(sheet, tile.limit, (x, y + round(2.9 * text)), width, small_font)
 
 
 def _scale_bar(

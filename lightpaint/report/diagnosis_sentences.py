@@ -115,22 +115,22 @@ def spoken_cause(reason: Reason, *, weaker: str = "a hold of", any_color: str = 
 
     weaker: the words before the strength of a weaker hold. any_color: as in `bound_sentences`.
     """
-    gained = f"would remove {spoken_percent(reason.share)} of the difference"
+    gain_text = f"would remove {spoken_percent(reason.share)} of the difference"
     if reason.is_joint:
-        gained += ", if the other constraints were lifted too"
+        gain_text += ", if the other constraints were lifted too"
     if reason.kind in RELEASE_CLAUSES:
         is_one = len(reason.names) == 1
         lights = spoken_lights(reason.names, start=True) + (" is" if is_one else " are")
-        return f"{lights} {RELEASE_CLAUSES[reason.kind][not is_one]} {gained}."
+        return f"{lights} {RELEASE_CLAUSES[reason.kind][not is_one]} {gain_text}."
     if reason.kind in JOINT_RELEASE_CLAUSES:
         clause = JOINT_RELEASE_CLAUSES[reason.kind].format(any_color=any_color)
-        return f"{clause} {gained}."
+        return f"{clause} {gain_text}."
     if reason.kind == "views":
         return ""
     if (loosening := reason.loosening) is None:
-        return f"Releasing unpainted parts {gained}."
-    share, rest = spoken_percent(loosening.share), loosening.unpainted_change
-    cost = "" if rest is None else f", and change {spoken_changed(rest)}"
+        return f"Releasing unpainted parts {gain_text}."
+    share, unpainted_change = spoken_percent(loosening.share), loosening.unpainted_change
+    cost = "" if unpainted_change is None else f", and change {spoken_changed(unpainted_change)}"
     return (
         f"A weaker hold on unpainted parts ({weaker} {loosening.hold:g}) would remove {share} of "
         f"the difference{cost}."

@@ -75,8 +75,8 @@ class _Grid:
     def size(self, *, has_foot: bool) -> tuple[int, int]:
         """Return (width, height) of the sheet."""
         rows = self.rows * (self.height + self.below + self.gap)
-        foot = round(1.8 * self.text) if has_foot else 0
-        return self.columns * (self.width + self.gap) + self.gap, self.head + rows + foot
+        foot_height = round(1.8 * self.text) if has_foot else 0
+        return self.columns * (self.width + self.gap) + self.gap, self.head + rows + foot_height
 
     def corner(self, k: int) -> tuple[int, int]:
         """Return the upper left corner of the picture of that index."""
@@ -100,11 +100,11 @@ def light_sheet(
     the room, and an elevation, with `lights`; up: the axis of the scene that is up.
     """
     shares = energy_shares(basis, Lighting.present(basis))
-    shown = sorted(np.argsort(-shares, kind="stable")[:MAX_LIGHTS].tolist())
-    grid = _grid(len(shown), basis.size)
+    shown_indices = sorted(np.argsort(-shares, kind="stable")[:MAX_LIGHTS].tolist())
+    grid = _grid(len(shown_indices), basis.size)
     factor = max(1, min(basis.size[1] // grid.width, min(basis.size)))
-    cells = [_cell(basis, k, float(shares[k]), factor) for k in shown]
-    left = _rest_sentence(shares, shown)
+    cells = [_cell(basis, k, float(shares[k]), factor) for k in shown_indices]
+    left = _rest_sentence(shares, shown_indices)
     sheet = Image.new("RGB", grid.size(has_foot=bool(left)), GROUND)
     draw, large = ImageDraw.Draw(sheet), ImageFont.load_default(round(1.1 * grid.text))
     small = ImageFont.load_default(round(0.9 * grid.text))
@@ -149,28 +149,28 @@ def _cell(basis: Basis, k: int, share: float, factor: int) -> _Cell:
     return _Cell(visible(name), text, encode_display(clean, stops=stops))
 
 
-def _rest_sentence(shares: Doubles, shown: list[int]) -> str:
+def _rest_sentence(shares: Doubles, shown_indices: list[int]) -> str:
     """Return the number and share of lights that are not shown; "" if all are."""
-    if not (rest := len(shares) - len(shown)):
+    if not (hidden_count := len(shares) - len(shown_indices)):
         return ""
-    other_share = max(1 - float(shares[shown].sum()), 0.0)
-    return f"and {rest} more lights, together {spoken_percent(other_share)} of the picture"
+    other_share = max(1 - float(shares[shown_indices].sum()), 0.0)
+    return f"and {hidden_count} more lights, together {spoken_percent(other_share)} of the picture"
 
 
 def _grid(count: int, size: tuple[int, int]) -> _Grid:
     """Return the grid for a number of pictures of a size (h, w), as near to ASPECT as possible."""
-    width = next(wide for most, wide in WIDTHS.items() if count <= most)
+    width = next(sheet_width for max_count, sheet_width in WIDTHS.items() if count <= max_count)
     # Very wide or tall pictures keep room for text, and at most a screen of height.
     height = min(max(round(width * size[0] / size[1]), width // 4), 2 * width)
     # An empty cell is as bad as a sheet that is far too wide.
     grids = [_Grid(width, height, columns, -(-count // columns)) for columns in range(1, count + 1)]
 
-    def off(grid: _Grid) -> float:
-        wide, high = grid.size(has_foot=False)
-        empty = (grid.columns * grid.rows - count) / count
-        return abs(float(np.log(high / wide / ASPECT))) + 3 * empty
+    def aspect_error(grid: _Grid) -> float:
+        sheet_width, high = grid.size(has_foot=False)
+        empty_share = (grid.columns * grid.rows - count) / count
+        return abs(float(np.log(high / sheet_width / ASPECT))) + 3 * empty_share
 
-    return min(grids, key=off)
+    return min(grids, key=aspect_error)
 
 
 def _draw(sheet: Image.Image, cell: _Cell, grid: _Grid, corner: tuple[int, int]) -> None:

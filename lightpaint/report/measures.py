@@ -122,9 +122,11 @@ def picture_errors(basis: Basis, uncertainty: Uncertainty) -> Doubles:
     low, high = uncertainty.interval
     side = np.maximum(uncertainty.weights - low, high - uncertainty.weights)
     side = np.where(np.isfinite(side), side, 0)
-    error, lit = ((basis.totals * x) @ LUMINANCE for x in (side, uncertainty.weights))
-    whole = lit.sum()
-    return np.asarray(error / np.maximum(lit, LEAST_SHARE * whole) if whole > 0 else 0 * error)
+    error, total_power = ((basis.totals * x) @ LUMINANCE for x in (side, uncertainty.weights))
+    power_sum = total_power.sum()
+    return np.asarray(
+        error / np.maximum(total_power, LEAST_SHARE * power_sum) if power_sum > 0 else 0 * error
+    )
 
 
 def most_uncertain(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> int | None:

@@ -19,26 +19,34 @@ MAX_NAME_CHARACTERS = 120
 COLOR_SHIFT = 0.06
 
 
-def spoken_changed(rest: UnpaintedChange) -> str:
+def spoken_changed(unpainted_change: UnpaintedChange) -> str:
     """Say which unpainted part changes most, and by how much: `the annex by ΔE 12`."""
-    return f"{spoken_part(rest)} by ΔE {spoken_amount(rest.worst)}"
+    return f"{spoken_part(unpainted_change)} by ΔE {spoken_amount(unpainted_change.worst)}"
 
 
-def spoken_elsewhere(rest: UnpaintedChange | None) -> str:
+def spoken_elsewhere(unpainted_change: UnpaintedChange | None) -> str:
     """Say `Unpainted parts change too, most of all the annex, by ΔE 12.`; "" for None."""
-    return f"Unpainted parts change too, most of all {_spoken_most(rest)}." if rest else ""
+    return (
+        f"Unpainted parts change too, most of all {_spoken_most(unpainted_change)}."
+        if unpainted_change
+        else ""
+    )
 
 
-def _spoken_most(rest: UnpaintedChange) -> str:
-    place = spoken_part(rest) if rest.object else spoken_ninth(rest.region)
-    return f"{place}, by ΔE {spoken_amount(rest.worst)}"
+def _spoken_most(unpainted_change: UnpaintedChange) -> str:
+    place = (
+        spoken_part(unpainted_change)
+        if unpainted_change.object
+        else spoken_ninth(unpainted_change.region)
+    )
+    return f"{place}, by ΔE {spoken_amount(unpainted_change.worst)}"
 
 
-def spoken_part(rest: UnpaintedChange) -> str:
+def spoken_part(unpainted_change: UnpaintedChange) -> str:
     """Name the part that changes most: `the annex`, or a region of the picture."""
-    if not rest.object:
-        return f"what is {spoken_ninth(rest.region)}"
-    return f"the {some_names([rest.object.replace('_', ' ').strip()])}"
+    if not unpainted_change.object:
+        return f"what is {spoken_ninth(unpainted_change.region)}"
+    return f"the {some_names([unpainted_change.object.replace('_', ' ').strip()])}"
 
 
 def spoken_amount(delta_e: float) -> str:
@@ -51,11 +59,11 @@ def spoken_lights(names: Sequence[str], *, start: bool = False) -> str:
 
     start: whether it begins a sentence. A long list is cut, with the number of other lights.
     """
-    listed = some_of([name or "without a name" for name in names], room=MAX_NAME_CHARACTERS)
+    names_text = some_of([name or "without a name" for name in names], room=MAX_NAME_CHARACTERS)
     if all(re.search("light|lamp", name, re.IGNORECASE) for name in names):
-        return listed
+        return names_text
     noun = "light" if len(names) == 1 else "lights"
-    return f"{noun.capitalize() if start else noun} {listed}"
+    return f"{noun.capitalize() if start else noun} {names_text}"
 
 
 def spoken_region(place: Place) -> str:
@@ -104,10 +112,17 @@ def spoken_difference(
         words.append("darker")
     if a.sum() > 0 and b.sum() > 0:
         shift = a / a.sum() - b / b.sum()
-        most = int(np.argmax(np.abs(shift)))
-        if abs(shift[most]) > COLOR_SHIFT:
-            more, less = ("redder", "greener", "bluer"), ("cooler", "pinker", "yellower")
-            words.append(more[most] if shift[most] > 0 else less[most])
+        main_channel = int(np.argmax(np.abs(shift)))
+        if abs(shift[main_channel]) > COLOR_SHIFT:
+            increase_words, decrease_words = (
+                ("redder", "greener", "bluer"),
+                ("cooler", "pinker", "yellower"),
+            )
+            words.append(
+                increase_words[main_channel]
+                if shift[main_channel] > 0
+                else decrease_words[main_channel]
+            )
     if not words:
         words = ["a little brighter" if bright_a > bright_b else "a little darker"]
     return " and ".join(words)

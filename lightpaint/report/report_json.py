@@ -156,12 +156,16 @@ def _reason(reason: Reason) -> dict[str, Any]:
     return numbers
 
 
-def _unpainted(rest: UnpaintedChange | None) -> dict[str, Any] | None:
+def _unpainted(unpainted_change: UnpaintedChange | None) -> dict[str, Any] | None:
     """Return the change of unpainted parts, in CIEDE2000."""
-    if rest is None:
+    if unpainted_change is None:
         return None
-    place = {"object": rest.object} if rest.object else {"region": rest.region}
-    return {"delta_e": rest.delta_e, "worst": rest.worst, **place}
+    place = (
+        {"object": unpainted_change.object}
+        if unpainted_change.object
+        else {"region": unpainted_change.region}
+    )
+    return {"delta_e": unpainted_change.delta_e, "worst": unpainted_change.worst, **place}
 
 
 def _choice(choice: ColorChoice) -> dict[str, Any]:

@@ -16,9 +16,9 @@ from lightpaint.report.phrases import CHANNELS, spoken_lights, spoken_percent
 from lightpaint.screen import some_of
 
 #: Texts for a light without a meaningful error: in a table, and in a sentence.
-UNTOLD = "undetermined"
+UNDETERMINED = "undetermined"
 
-UNTOLD_HERE = f"{UNTOLD} at this number of samples"
+UNTOLD_HERE = f"{UNDETERMINED} at this number of samples"
 
 
 def spoken_errors(uncertainty: Uncertainty | None, count: int) -> list[str]:
@@ -30,7 +30,10 @@ def spoken_errors(uncertainty: Uncertainty | None, count: int) -> list[str]:
     if uncertainty is None:
         return [""] * count
     lights = zip(*brightness(uncertainty), uncertainty.untold, strict=True)
-    return [UNTOLD if untold else _spoken_error(*ends) for *ends, untold in lights]
+    return [
+        UNDETERMINED if is_undetermined else _spoken_error(*ends)
+        for *ends, is_undetermined in lights
+    ]
 
 
 def untold_lights(lighting: Lighting) -> str:
@@ -38,10 +41,10 @@ def untold_lights(lighting: Lighting) -> str:
     names = [light.name for light in lighting.lights if light.untold]
     if not names:
         return ""
-    it, is_ = ("it", "is") if len(names) == 1 else ("them", "are")
+    pronoun, verb = ("it", "is") if len(names) == 1 else ("them", "are")
     return (
-        f"{spoken_lights(names, start=True)} {is_} {UNTOLD_HERE}: the samples show little "
-        f"but stray bright pixels of {it}. Render more samples, or keep {it}."
+        f"{spoken_lights(names, start=True)} {verb} {UNTOLD_HERE}: the samples show little "
+        f"but stray bright pixels of {pronoun}. Render more samples, or keep {pronoun}."
     )
 
 
@@ -80,9 +83,9 @@ def uncertainty_sentence(basis: Basis, solution: Solution, uncertainty: Uncertai
     halve it.
     """
     k = most_uncertain(basis, solution, uncertainty)
-    untold = untold_lights(solution.lighting)
-    if k is None and untold:
-        return untold
+    is_undetermined = untold_lights(solution.lighting)
+    if k is None and is_undetermined:
+        return is_undetermined
     if k is None:
         has_noise = any(x.any() for x in basis.noise)
         reason = "nothing in it depends on the noise" if has_noise else "the basis has no noise"
@@ -96,4 +99,4 @@ def uncertainty_sentence(basis: Basis, solution: Solution, uncertainty: Uncertai
         f"More samples would change {light}, by {change} (95 %); "
         f"{halving_spp(basis, uncertainty, k)} samples per pixel would halve that."
     )
-    return f"{untold} {sentence}" if untold else sentence
+    return f"{is_undetermined} {sentence}" if is_undetermined else sentence

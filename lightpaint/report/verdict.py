@@ -144,8 +144,8 @@ def spoken_reason(appearance: Appearance) -> str:
     """Return the causes of the largest error as text: the main cause first."""
     assert appearance.place is not None
     if appearance.causes:
-        *most, last = (spoken_holding(reason) for reason in appearance.causes)
-        return f"{', '.join(most)}, and {last}" if most else last
+        *first_phrases, last = (spoken_holding(reason) for reason in appearance.causes)
+        return f"{', '.join(first_phrases)}, and {last}" if first_phrases else last
     if not appearance.is_out_of_reach:
         return spoken_noise(appearance) or NO_MAIN_CAUSE
     if not appearance.local_lights:
@@ -158,8 +158,10 @@ def spoken_reason(appearance: Appearance) -> str:
     if _are_kept(appearance):
         reason = "is limited by its constraints"
         return f"{names} {reason if is_one else 'are limited by their constraints'}"
-    free = tuple(name for name in appearance.local_lights if name not in appearance.held_lights)
-    return f"{_spoken_some(free)[0]} would light too much else"
+    free_lights = tuple(
+        name for name in appearance.local_lights if name not in appearance.held_lights
+    )
+    return f"{_spoken_some(free_lights)[0]} would light too much else"
 
 
 def spoken_holding(reason: Reason) -> str:
@@ -170,8 +172,8 @@ def spoken_holding(reason: Reason) -> str:
     if len(reason.names) > MAX_NAMES:
         lights = f"{len(reason.names)} lights"
     else:
-        *most, last = [some_names([name]) for name in reason.names] or [""]
-        lights = f"{', '.join(most)} and {last}" if most else last
+        *first_phrases, last = [some_names([name]) for name in reason.names] or [""]
+        lights = f"{', '.join(first_phrases)} and {last}" if first_phrases else last
     return (singular if len(reason.names) == 1 else plural).format(lights)
 
 
@@ -228,11 +230,11 @@ def spoken_blindness(verification: Verification) -> str:
             f" but {some_names(other_names, joint=' and ')}" if other_names else ""
         )
     else:
-        least = [some_names([name]) for name in unseen[:MAX_UNSEEN_NAMES]] + [f"{unnamed} more"] * (
-            unnamed > 0
-        )
-        *most, last = least
-        names = f"{', '.join(most)} and {last}" if most else last
+        visible_names = [some_names([name]) for name in unseen[:MAX_UNSEEN_NAMES]] + [
+            f"{unnamed} more"
+        ] * (unnamed > 0)
+        *first_phrases, last = visible_names
+        names = f"{', '.join(first_phrases)} and {last}" if first_phrases else last
     return f"The render would probably have missed an error of {100 * ERROR:.0f} % in {names}"
 
 

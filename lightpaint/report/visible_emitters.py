@@ -75,10 +75,11 @@ def _known_by_sight_alone(solution: Solution, ignored: Bools) -> list[str]:
     names = [lights[k].name for k in np.unique(brightest) if lights[k].untold]
     if not names:
         return []
-    it, is_ = ("it", "it is") if len(names) == 1 else ("them", "they are")
+    pronoun, clause = ("it", "it is") if len(names) == 1 else ("them", "they are")
     return [
         f"WARNING: too few samples show the light of {some_of(names, room=300)} on surfaces, but "
-        f'the camera sees {it}: emitters="count" solves {it} by how bright {is_} painted'
+        f'the camera sees {pronoun}: emitters="count" solves {pronoun} by how bright '
+        f"{clause} painted"
     ]
 
 

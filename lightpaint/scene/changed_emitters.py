@@ -16,17 +16,17 @@ def with_motions(parsed: ParsedScene, motions: Mapping[int, Motion]) -> ParsedSc
     """Return a copy of a scene with moved emitters. motions: by emitter node."""
     import mitsuba as mi
 
-    other = copy(parsed)
-    other.state = mi.parser.ParserState(parsed.state)
-    other.moved = dict(parsed.moved)
+    copied = copy(parsed)
+    copied.state = mi.parser.ParserState(parsed.state)
+    copied.moved = dict(parsed.moved)
     for emitter, motion in motions.items():
         node = parsed.shape_of.get(emitter, emitter)
-        props = other.state.nodes[node].props
+        props = copied.state.nodes[node].props
         parameters = moved_parameters(props, motion)
         for parameter in parameters:
             props[parameter.name] = parameter.value
-        other.moved[node] = {**parsed.moved.get(node, {}), **{p.name: p.xml for p in parameters}}
-    return other
+        copied.moved[node] = {**parsed.moved.get(node, {}), **{p.name: p.xml for p in parameters}}
+    return copied
 
 
 def darkened(parsed: ParsedScene, dark: Mapping[int, EmitterSetting]) -> ParsedScene:
@@ -35,11 +35,11 @@ def darkened(parsed: ParsedScene, dark: Mapping[int, EmitterSetting]) -> ParsedS
     """
     import mitsuba as mi
 
-    other = copy(parsed)
-    other.state = mi.parser.ParserState(parsed.state)
+    copied = copy(parsed)
+    copied.state = mi.parser.ParserState(parsed.state)
     for node, setting in dark.items():
-        set_emission(other.state, node, setting, on_shape=node in parsed.shape_of)
-    return other
+        set_emission(copied.state, node, setting, on_shape=node in parsed.shape_of)
+    return copied
 
 
 def with_elements(parsed: ParsedScene, elements: Mapping[str, str]) -> ParsedScene:
@@ -49,10 +49,10 @@ def with_elements(parsed: ParsedScene, elements: Mapping[str, str]) -> ParsedSce
     """
     import mitsuba as mi
 
-    other = copy(parsed)
-    other.state = mi.parser.ParserState(parsed.state)
-    other.emitter_nodes, other.names = [*parsed.emitter_nodes], dict(parsed.names)
-    other.shape_of = dict(parsed.shape_of)
+    copied = copy(parsed)
+    copied.state = mi.parser.ParserState(parsed.state)
+    copied.emitter_nodes, copied.names = [*parsed.emitter_nodes], dict(parsed.names)
+    copied.shape_of = dict(parsed.shape_of)
     node_of = {name: node for node, name in parsed.names.items()}
     for name, text in elements.items():
         fragment = mi.parser.parse_string(parsed.config, f'<scene version="3.0.0">{text}</scene>')
@@ -62,15 +62,15 @@ def with_elements(parsed: ParsedScene, elements: Mapping[str, str]) -> ParsedSce
         if name in node_of:
             first = node_of[name] - inner + 1
         else:
-            first = len(other.state.nodes)
-            other.emitter_nodes.append(first + inner - 1)
-            other.names[first + inner - 1] = name
+            first = len(copied.state.nodes)
+            copied.emitter_nodes.append(first + inner - 1)
+            copied.names[first + inner - 1] = name
             if inner > 1:
-                other.shape_of[first + inner - 1] = first
-            root = other.state.nodes[0].props
+                copied.shape_of[first + inner - 1] = first
+            root = copied.state.nodes[0].props
             root[f"{name} of lightpaint"] = mi.Properties.ResolvedReference(first)
-        _put_nodes(other.state, first, fragment)
-    return other
+        _put_nodes(copied.state, first, fragment)
+    return copied
 
 
 def with_points(
@@ -84,20 +84,20 @@ def with_points(
     """
     import mitsuba as mi
 
-    other = darkened(parsed, dark)
-    other.emitter_nodes, other.names = [*parsed.emitter_nodes], dict(parsed.names)
+    copied = darkened(parsed, dark)
+    copied.emitter_nodes, copied.names = [*parsed.emitter_nodes], dict(parsed.names)
     for name, position in positions.items():
         node = mi.parser.SceneNode()
         node.type = mi.ObjectType.Emitter
         node.props = mi.Properties("point")
         node.props["position"] = mi.ScalarPoint3f(*position)
         node.props["intensity"] = mi.ScalarColor3f(1)
-        other.state.nodes.append(node)
-        k = len(other.state.nodes) - 1
-        other.state.nodes[0].props[f"{name} of lightpaint"] = mi.Properties.ResolvedReference(k)
-        other.emitter_nodes.append(k)
-        other.names[k] = name
-    return other
+        copied.state.nodes.append(node)
+        k = len(copied.state.nodes) - 1
+        copied.state.nodes[0].props[f"{name} of lightpaint"] = mi.Properties.ResolvedReference(k)
+        copied.emitter_nodes.append(k)
+        copied.names[k] = name
+    return copied
 
 
 def _put_nodes(state: Any, first: int, fragment: Any) -> None:

@@ -60,11 +60,11 @@ class SceneHasher:
         import mitsuba as mi
 
         parsed, kinds = self._parsed, mi.ObjectType
-        others = {*parsed.sensor_nodes} - {parsed.sensor_nodes[film.sensor]}
+        other_sensors = {*parsed.sensor_nodes} - {parsed.sensor_nodes[film.sensor]}
         children = [
             self._hash(k)
             for k in parsed.children_of(0)
-            if self._nodes[k].type != kinds.Emitter and k not in others
+            if self._nodes[k].type != kinds.Emitter and k not in other_sensors
         ]
         passes = has_null or parsed.has_media()
         # The index of the sensor counts, since views have independent random numbers.
@@ -74,13 +74,13 @@ class SceneHasher:
     def emitter(self, node: int, kind: EmissionKind | None) -> EmitterDigest:
         """Return the hashes of the emitter at `node`. kind: how it is scaled."""
         shape = self._parsed.shape_of.get(node)
-        where = "" if shape is None else self._hash(shape)
+        shape_hash = "" if shape is None else self._hash(shape)
         left_out = {"sampling_weight"}
         if kind is not None and kind.scaling is Scaling.COLOUR:
             left_out.add(kind.parameter)
         return EmitterDigest(
-            _digest((where, self._content(node, frozenset(left_out)))),
-            _digest((where, self._content(node))),
+            _digest((shape_hash, self._content(node, frozenset(left_out)))),
+            _digest((shape_hash, self._content(node))),
         )
 
     def _hash(self, node: int) -> str:
@@ -98,14 +98,14 @@ class SceneHasher:
         tree_node, props = self._nodes[node], self._nodes[node].props
         kinds, parts = mi.Properties.Type, []
         # A basis replaces the filter by a box, and the sampler by its own.
-        replaced = (mi.ObjectType.Sampler, mi.ObjectType.ReconstructionFilter)
+        replaced_types = (mi.ObjectType.Sampler, mi.ObjectType.ReconstructionFilter)
         for key in props:
             if key in left_out:
                 continue
             kind = props.type(key)
             if kind == kinds.ResolvedReference:
                 child = props[key].index()
-                if self._nodes[child].type in replaced:
+                if self._nodes[child].type in replaced_types:
                     continue
                 value: Any = self._hash(child)
             elif kind == kinds.String and "file" in key:

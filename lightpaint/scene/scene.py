@@ -33,7 +33,7 @@ from lightpaint.scene.scene_inspection import inspect_scene, shape_names
 from lightpaint.scene.scene_tree import ParsedScene
 from lightpaint.screen import Listed, Shown, some_names, some_of
 
-_Made = TypeVar("_Made")
+_Result_T = TypeVar("_Result_T")
 
 
 @keywords()
@@ -109,8 +109,8 @@ class Scene(Shown):
         # If all emitters are adjusted one by one, it is the content alone.
         if all(x.member_names == (x.name,) and not x.is_fixed for x in self.lights):
             return self.content
-        tied = [(x.name, x.member_names, x.is_fixed) for x in self.lights]
-        return hashlib.sha256(repr((self.content, tied)).encode()).hexdigest()[:32]
+        structure = [(x.name, x.member_names, x.is_fixed) for x in self.lights]
+        return hashlib.sha256(repr((self.content, structure)).encode()).hexdigest()[:32]
 
     @property
     def light_identities(self) -> tuple[str, ...]:
@@ -131,14 +131,14 @@ class Scene(Shown):
         Raises SceneError unless every emitter of the scene, and nothing else, is named once.
         """
         grouped = [name for names in members.values() for name in names]
-        existing = {emitter.name for emitter in self.emitters}
-        if set(grouped) != existing:
+        existing_names = {emitter.name for emitter in self.emitters}
+        if set(grouped) != existing_names:
             raise SceneError(
                 f"{self.path} does not have the expected emitters: it lacks "
-                f"{some_names(sorted(set(grouped) - existing)) or 'none'} and also has "
-                f"{some_names(sorted(existing - set(grouped))) or 'none'}"
+                f"{some_names(sorted(set(grouped) - existing_names)) or 'none'} and also has "
+                f"{some_names(sorted(existing_names - set(grouped))) or 'none'}"
             )
-        if len(grouped) > len(existing) or not all(members.values()):
+        if len(grouped) > len(existing_names) or not all(members.values()):
             raise SceneError(
                 f"every emitter belongs to one light, and every light has one: not so in {members}"
             )
@@ -182,16 +182,16 @@ class Scene(Shown):
         The other emitters become black, belong to no light and are not sampled, but stay in place,
         so that they still block and reflect light. Raises SceneError if a light does not exist.
         """
-        chosen = {self.light(name).name for name in names}
-        lights = tuple(light for light in self.lights if light.name in chosen)
+        chosen_names = {self.light(name).name for name in names}
+        lights = tuple(light for light in self.lights if light.name in chosen_names)
         members = {member.name for light in lights for member in light.members}
-        others = [x for x in self.emitters if x.name not in members]
+        other_emitters = [x for x in self.emitters if x.name not in members]
         # If nothing else may be sampled, black emitters are, since Mitsuba needs at least one.
         is_asked = any(not m.hit_by_chance for light in lights for m in light.members)
         black = (0.0, 0.0, 0.0)
         dark = {
             x.node: EmitterSetting(x.kind, black, 0.0 if is_asked else x.sampling_weight)
-            for x in others
+            for x in other_emitters
         }
         emitters = tuple(
             replace(x, emission=black, sampling_weight=dark[x.node].sampling_weight)
@@ -273,14 +273,14 @@ class Scene(Shown):
             >>> [x.name for x in lp.load_scene("room.xml").with_new_emitters([key]).lights]
             ['panel', 'bulb', 'key']
         """
-        taken = {*(x.name for x in self.emitters), *(x.name for x in self.lights)}
+        taken_names = {*(x.name for x in self.emitters), *(x.name for x in self.lights)}
         for emitter in emitters:
-            if emitter.name in taken:
+            if emitter.name in taken_names:
                 raise SceneError(
                     f"{self.path} has a light {emitter.name!r} already: give the new one another "
                     "name"
                 )
-            taken.add(emitter.name)
+            taken_names.add(emitter.name)
         parsed = with_elements(self.parsed, {x.name: "".join(x.lines()) for x in emitters})
         extended = self._inspected(parsed, [x.name for x in emitters])
         return replace(extended, added=(*self.added, *emitters))
@@ -348,8 +348,8 @@ class Scene(Shown):
     @property
     def places(self) -> frozenset[Path]:
         """Paths of its files, and of files that would change the scene if they existed."""
-        beside = self.lights_file or lights_file_beside(self.path)
-        return frozenset({*self.parsed.places(), beside})
+        lights_path = self.lights_file or lights_file_beside(self.path)
+        return frozenset({*self.parsed.places(), lights_path})
 
     def relocated(self, old: Path, new: Path) -> "Scene":
         """Return this scene after its folder `old` was moved to `new`."""
@@ -374,11 +374,11 @@ class Scene(Shown):
     @MITSUBA.acquired()
     def while_loaded(
         self,
-        work: Callable[[Any], _Made],
+        work: Callable[[Any], _Result_T],
         emission: Mapping[str, RGB] | None = None,
         *,
         views: Sequence["Scene"] = (),
-    ) -> _Made:
+    ) -> _Result_T:
         """Return the result of `work` on the loaded scene, which is released afterwards."""
         loaded = self.load(emission, views=views)
         try:

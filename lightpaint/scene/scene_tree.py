@@ -248,12 +248,12 @@ class ParsedScene:
         """Make relative paths resolve beside the scene's files within the block."""
         import mitsuba as mi
 
-        before = mi.file_resolver()
+        resolver_before = mi.file_resolver()
         mi.set_file_resolver(self.resolver)
         try:
             yield
         finally:
-            mi.set_file_resolver(before)
+            mi.set_file_resolver(resolver_before)
 
 
 def relocated_path(path: Path, old: Path, new: Path) -> Path:

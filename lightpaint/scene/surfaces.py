@@ -77,9 +77,9 @@ def loaded_features(scene: Scene, loaded: Any, seed: int) -> Features:
     camera = scene.camera(loaded)
     with tracing():
         image = mi.render(loaded, sensor=camera, integrator=integrator, spp=spp, seed=seed)
-    seen = np.nan_to_num(np.array(image)[..., -9:], nan=0, posinf=1, neginf=0)
-    seen = block_mean(seen, film.block)
-    albedo, normal, position = (seen[..., k : k + 3] for k in (0, 3, 6))
+    values = np.nan_to_num(np.array(image)[..., -9:], nan=0, posinf=1, neginf=0)
+    values = block_mean(values, film.block)
+    albedo, normal, position = (values[..., k : k + 3] for k in (0, 3, 6))
     length = np.linalg.norm(normal, axis=-1, keepdims=True)
     normal = normal / np.where(length > 0, length, 1)
     place = np.ascontiguousarray(position, np.float32)
@@ -100,10 +100,10 @@ def _objects(scene: Scene, loaded: Any, seed: int) -> Objects:
             let_others_through()
     indices = _most_frequent(np.concatenate(samples).astype(np.int32))
     names = _names_by_index(loaded, scene.shape_names)
-    seen = sorted(set(np.unique(indices).tolist()) - {0})
+    values = sorted(set(np.unique(indices).tolist()) - {0})
     place = np.full(int(indices.max(initial=0)) + 1, NOTHING_SEEN, np.int32)
-    place[seen] = np.arange(len(seen))
-    return Objects(place[indices], tuple(names.get(k, "") for k in seen))
+    place[values] = np.arange(len(values))
+    return Objects(place[indices], tuple(names.get(k, "") for k in values))
 
 
 def _most_frequent(votes: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
@@ -152,8 +152,8 @@ def _averaged(
     albedo = np.clip(samples[..., :3], 0, 1) * is_hit[..., None]
     normal = (samples[..., 3:6] * is_hit[..., None]).sum(axis=0)
     length = np.linalg.norm(normal, axis=-1, keepdims=True)
-    along = samples[..., 6:9] @ to_camera[2, :3] + to_camera[2, 3]
-    depth = np.where(is_hit, along, BACKGROUND).min(axis=0)
+    depths = samples[..., 6:9] @ to_camera[2, :3] + to_camera[2, 3]
+    depth = np.where(is_hit, depths, BACKGROUND).min(axis=0)
     coverage: dict[str, Floats] = {}
     for index in np.unique(indices[is_hit]).tolist():
         name = names.get(index) or f"shape {index}"

@@ -109,8 +109,8 @@ def read_record(
     kinds, values = get_type_hints(kind), {}
     record_fields = fields(kind)  # type: ignore[arg-type]
     names = {field.name for field in record_fields}
-    if not others and (unknown := [key for key in data if key not in names]):
-        raise ValueError(f"the key {unknown[0]!r} is unknown")
+    if not others and (unknown_keys := [key for key in data if key not in names]):
+        raise ValueError(f"the key {unknown_keys[0]!r} is unknown")
     for field in record_fields:
         name = field.name
         if name in data:

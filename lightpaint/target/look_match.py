@@ -17,11 +17,11 @@ from lightpaint.images.picture import Picture
 from lightpaint.target.painted_pixels import LOSSY, ROUNDING, compressed_like, lossy_difference
 
 #: Minimum share of informative pixels that must equal the look.
-MOST = 0.5
+MAX_DIFFERENCE = 0.5
 
 #: Display values of informative pixels: not near black or white, where many pictures are alike; and
 #: the minimum share of such pixels in a picture.
-TELLING, ENOUGH = (0.04, 0.96), 0.01
+TELLING_RANGE, MIN_TELLING_SHARE = (0.04, 0.96), 0.01
 
 #: Difference in stops up to which exposures are equal up to rounding in a file.
 BIN = 0.04
@@ -43,8 +43,8 @@ def view_of_look(
     if picture.transform is not None:
         views = list(_plausible(display, look, choice))
     agreements = [_agreement(path, picture, display, view.encode(look)) for view in views]
-    best = max(range(len(views)), key=agreements.__getitem__)
-    return views[best] if agreements[best][0] > MOST else None
+    best_index = max(range(len(views)), key=agreements.__getitem__)
+    return views[best_index] if agreements[best_index][0] > MAX_DIFFERENCE else None
 
 
 def _plausible(display: Floats, look: Floats, choice: TransformChoice) -> Iterator[ViewTransform]:
@@ -64,7 +64,7 @@ def _plausible(display: Floats, look: Floats, choice: TransformChoice) -> Iterat
 def _stops_between(view: ViewTransform, display: Floats, look: Floats) -> float:
     """Return the approximate exposure at which that view shows most of `look` as in `display`."""
     light, look_brightness = luminance(view.decode(display)), luminance(look)
-    low, high = TELLING
+    low, high = TELLING_RANGE
     is_unclipped = (display > low).all(axis=-1) & (display < high).all(axis=-1)
     is_unclipped &= (light > 0) & (look_brightness > 0)
     if not is_unclipped.any():
@@ -84,9 +84,9 @@ def _agreement(
 
     display, encoded_look: (h, w, 3), display values of the picture and of the look.
     """
-    low, high = TELLING
+    low, high = TELLING_RANGE
     is_informative = (largest(encoded_look) > low) & (encoded_look.min(axis=-1) < high)
-    if is_informative.mean() < ENOUGH:
+    if is_informative.mean() < MIN_TELLING_SHARE:
         return 0.0, 0.0
     if picture.lossy:
         difference, tolerance = (

@@ -28,8 +28,8 @@ def explain_mismatch(picture: Floats, template: Floats) -> str:
             "a single change of colours explains all of it: unless you graded it, it was saved "
             "through another view or profile (transform=..., mask=...)"
         )
-    for turn, turned in _turned(template):
-        if _is_function(picture, turned):
+    for turn, turned_template in _turned(template):
+        if _is_function(picture, turned_template):
             return f"it is the template {turn}: turn it back"
     down, right = _offset(picture, template)
     if (down or right) and _is_function(*_overlap(picture, template, down, right)):
@@ -46,8 +46,8 @@ def _is_function(picture: Floats, template: Floats) -> bool:
     if unclipped.size < 2 * terms.shape[1]:
         return False  # too few to decide
     solution, *_ = np.linalg.lstsq(terms, picture[unclipped], rcond=None)
-    missed = np.square(picture[unclipped] - terms @ solution).mean()
-    return bool(missed <= SMOOTH**2 * picture[unclipped].var(axis=0).mean())
+    mean_square_error = np.square(picture[unclipped] - terms @ solution).mean()
+    return bool(mean_square_error <= SMOOTH**2 * picture[unclipped].var(axis=0).mean())
 
 
 def _terms(rgb: Doubles) -> Doubles:

@@ -105,10 +105,10 @@ def lossy_difference(codes: Floats, look_codes: Floats) -> Floats:
     w).
     """
     rough = np.asarray(codes - look_codes, np.float64)
-    small, large = (
+    small_step, large_step = (
         largest(np.abs(box_mean(rough, radius))) for radius in (SHARP_RADIUS, LOSSY_RADIUS)
     )
-    return np.asarray(np.minimum(small, large))
+    return np.asarray(np.minimum(small_step, large_step))
 
 
 def compressed_like(path: Path, display: Floats) -> Floats:

@@ -24,14 +24,14 @@ NEGATIVE = 1e-3
 
 
 #: The name of a target made from arrays, unless another is given.
-UNNAMED = "target"
+DEFAULT_NAME = "target"
 
 
 def titled(name: str) -> str:
     """Return a target's name for messages: `target evening.exr`, or `the target` if it has no
     name.
     """
-    return "the target" if name == UNNAMED else f"target {name}"
+    return "the target" if name == DEFAULT_NAME else f"target {name}"
 
 
 @keywords()
@@ -95,10 +95,10 @@ class Target(Shown):
                 f"{titled(self.name)}: image {self.image.shape} and at_least {self.at_least.shape} "
                 "differ in size"
             )
-        if lost := int((~np.isfinite(self.image).all(axis=-1)).sum()):
+        if lost_count := int((~np.isfinite(self.image).all(axis=-1)).sum()):
             raise TargetError(
-                f"{titled(self.name)} holds NaN or Inf in {lost} of {self.importance.size} pixels: "
-                "make them 0, and their importance too"
+                f"{titled(self.name)} holds NaN or Inf in {lost_count} of "
+                f"{self.importance.size} pixels: make them 0, and their importance too"
             )
         if not np.isfinite(self.importance).all() or (self.importance < 0).any():
             raise TargetError(
@@ -116,7 +116,11 @@ class Target(Shown):
     @classmethod
     @keywords()
     def of(
-        cls, image: npt.ArrayLike, importance: npt.ArrayLike | None = None, *, name: str = UNNAMED
+        cls,
+        image: npt.ArrayLike,
+        importance: npt.ArrayLike | None = None,
+        *,
+        name: str = DEFAULT_NAME,
     ) -> "Target":
         """Create a target from arrays, which are copied as float32.
 
@@ -230,13 +234,13 @@ class Target(Shown):
         """Return the target with importance 0 in the pixels `holes`, (h, w), which the basis
         lacks.
         """
-        lost = holes & (self.importance > 0)
-        if not lost.any():
+        lost_mask = holes & (self.importance > 0)
+        if not lost_mask.any():
             return self
         return replace(
             self,
             importance=np.where(holes, np.float32(0), self.importance),
-            not_finite=self.not_finite + int(lost.sum()),
+            not_finite=self.not_finite + int(lost_mask.sum()),
         )
 
     def _at_least(self, mean: Callable[[Floats], Floats]) -> npt.NDArray[np.bool_] | None:
@@ -280,13 +284,14 @@ class Target(Shown):
 
 def _check_is_light(name: str, image: Floats, counts: npt.NDArray[np.bool_]) -> None:
     """Raise TargetError for negative luminance."""
-    bright = np.where(counts & np.isfinite(image).all(axis=-1), luminance(image), 0)
-    least = float(bright.min())
-    if least < -NEGATIVE * float(np.abs(bright).max()):
-        below = int((bright < 0).sum())
+    brightness = np.where(counts & np.isfinite(image).all(axis=-1), luminance(image), 0)
+    darkest = float(brightness.min())
+    if darkest < -NEGATIVE * float(np.abs(brightness).max()):
+        negative_count = int((brightness < 0).sum())
         raise TargetError(
-            f"{titled(name)} has a negative luminance in {below} of {bright.size} pixels, down to "
-            f"{least:.3g}: expected light, which is never below 0; np.maximum(image, 0) cuts it off"
+            f"{titled(name)} has a negative luminance in {negative_count} of {brightness.size} "
+            f"pixels, down to {darkest:.3g}: expected light, which is never below 0; "
+            "np.maximum(image, 0) cuts it off"
         )
 
 

@@ -20,8 +20,8 @@ from lightpaint.target.painting_file import painted_of
 from lightpaint.target.target import Target, share_of, spoken_share
 from lightpaint.target.template import (
     CLEAN,
-    LIGHT,
-    SHOWN,
+    LIGHT_FILE,
+    SHOWN_FILE,
     Template,
     find_template,
     read_template,
@@ -36,7 +36,7 @@ NEARLY_ALL = 0.97
 
 #: Ratio to the light on the template's brightest parts beyond which light is implausible; and the
 #: share of paint that may need such light without a remark.
-BEYOND, FEW = 10.0, 0.01
+BEYOND_FACTOR, FEW_SHARE = 10.0, 0.01
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class _Reading:
         """The name of the template in messages: its file that corresponds to the painting."""
         if self.look:
             return self.look
-        name = LIGHT if self.picture.codes is None else SHOWN
+        name = LIGHT_FILE if self.picture.codes is None else SHOWN_FILE
         return name if self.folder is None else str(self.folder / name)
 
 
@@ -101,7 +101,7 @@ def read_target(
         >>> lp.read_target("painting.exr").size
         (16, 16)
     """
-    return _target_of(_opened(Path(path), layer, transform, template, find=find), mask, paint)
+    return _target_of(_open_picture(Path(path), layer, transform, template, find=find), mask, paint)
 
 
 def read_over_look(
@@ -123,8 +123,8 @@ def read_over_look(
     if not painted_where(path, picture, template).any():
         return None  # it is the look itself, so all of it counts
     shown = None if picture.transform is None else view
-    through = "" if shown is None else f" through {shown.spoken}"
-    return _target_of(_Reading(path, picture, template, None, shown, (), f"{name}{through}"))
+    transform_text = "" if shown is None else f" through {shown.spoken}"
+    return _target_of(_Reading(path, picture, template, None, shown, (), f"{name}{transform_text}"))
 
 
 def _target_of(reading: _Reading, mask: str | Path | None = None, paint: Paint = "look") -> Target:
@@ -165,7 +165,7 @@ def _target_of(reading: _Reading, mask: str | Path | None = None, paint: Paint =
     )
 
 
-def _opened(
+def _open_picture(
     path: Path,
     layer: str | None,
     transform: ViewTransform | TransformChoice | None,
@@ -174,33 +174,33 @@ def _opened(
     find: bool,
 ) -> _Reading:
     """Read the picture and the template it was painted on. Arguments as in `read_target`."""
-    choice, opened = TransformChoice.of(transform), None
+    choice, base = TransformChoice.of(transform), None
     notes: tuple[str, ...] = ()
     folder = None if template is None else Path(template)
     if folder is not None:
         # A file in the folder stands for the folder.
         folder = folder.parent if folder.is_file() else folder
-        opened = read_template(folder)
-        choice = TransformChoice.of(choice.over(opened.transform))
+        base = read_template(folder)
+        choice = TransformChoice.of(choice.over(base.transform))
     elif find and (folder := find_template(path)) is not None:
-        opened = read_template(folder)
-    otherwise = None if opened is None else opened.transform
+        base = read_template(folder)
+    otherwise = None if base is None else base.transform
     picture = read_picture(path, layer=layer, transform=choice, otherwise=otherwise)
-    if opened is not None and folder is not None and opened.size != picture.size:
+    if base is not None and folder is not None and base.size != picture.size:
         if template is not None:
             raise SizeError(
-                f"{path} is {picture.size[1]}x{picture.size[0]} but {folder / SHOWN} is "
-                f"{opened.size[1]}x{opened.size[0]}: give the template it was painted on"
+                f"{path} is {picture.size[1]}x{picture.size[0]} but {folder / SHOWN_FILE} is "
+                f"{base.size[1]}x{base.size[0]}: give the template it was painted on"
             )
-        notes = (f"not compared with {folder / SHOWN}, which has another size",)
+        notes = (f"not compared with {folder / SHOWN_FILE}, which has another size",)
         # The painting has another template, and therefore another transform.
-        opened, otherwise = None, None
+        base, otherwise = None, None
         picture = read_picture(path, layer=layer, transform=choice)
     own_marks = painted_of(picture.attributes, path)
     if own_marks is not None:
         otherwise = own_marks.transform
     shown = picture.transform or (otherwise if choice.is_open else choice.over(otherwise))
-    return _Reading(path, picture, opened, folder, shown, notes)
+    return _Reading(path, picture, base, folder, shown, notes)
 
 
 def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | None, list[str]]:
@@ -229,7 +229,9 @@ def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | No
     share = share_of(importance)
     if share == 0:
         folder = Path(reading.painted_on).parent
-        if path.resolve() in [(folder / name).resolve() for name in (LIGHT, SHOWN, CLEAN)]:
+        if path.resolve() in [
+            (folder / name).resolve() for name in (LIGHT_FILE, SHOWN_FILE, CLEAN)
+        ]:
             raise TargetError(f"{path} is the template itself: give the painting made over it")
         raise TargetError(
             f"nothing in {path} differs from {reading.painted_on}: paint over it, or pass "
@@ -265,8 +267,10 @@ def _lit(reading: _Reading, counted: Floats) -> tuple[Floats, Floats, list[str]]
     counted_light = np.where(blind, 0, counted)
     if not counted_light.any():
         raise TargetError(f"{reading.path}: no painted pixel shows a surface that reflects light")
-    lost = int(blind.sum())
-    note = [f"{lost} painted pixels show no surface that reflects light"] if lost else []
+    lost_count = int(blind.sum())
+    note = (
+        [f"{lost_count} painted pixels show no surface that reflects light"] if lost_count else []
+    )
     return (reading.picture.image * albedo).astype(np.float32), counted_light, note
 
 
@@ -282,16 +286,16 @@ def _beyond(reading: _Reading, counted: Floats) -> list[str]:
         return []
     light = np.maximum(reading.picture.image, 0) / albedo
     light_needed = np.asarray(luminance(np.maximum(template.image, 0) / albedo))
-    bright = float(np.percentile(light_needed[there_is], 95))
+    bright_level = float(np.percentile(light_needed[there_is], 95))
     # Nearly black pixels need little light, whatever the ratio.
-    is_beyond = (light > BEYOND * bright) & (
+    is_beyond = (light > BEYOND_FACTOR * bright_level) & (
         reading.picture.image > 0.02 * template.transform.white
     )
     share = float((is_beyond.any(axis=-1) & painted).sum() / painted.sum())
-    if share <= FEW:
+    if share <= FEW_SHARE:
         return []
     return [
         f"{100 * share:.0f} % of the paint needs a colour that the surface hardly reflects, and so "
-        f"more than {BEYOND:g} times the light of the template's brightest parts: "
+        f"more than {BEYOND_FACTOR:g} times the light of the template's brightest parts: "
         'paint="light" paints the light instead'
     ]

@@ -24,7 +24,12 @@ from lightpaint.storage.staging import is_below, staged
 FORMAT: Literal["lightpaint-template 1"] = "lightpaint-template 1"
 
 #: The files of a template: its origin, pictures to paint on, and pictures that help.
-ABOUT, LIGHT, SHOWN, ALBEDO = "template.json", "template.exr", "template.png", "albedo.exr"
+RECORD_FILE, LIGHT_FILE, SHOWN_FILE, ALBEDO = (
+    "template.json",
+    "template.exr",
+    "template.png",
+    "albedo.exr",
+)
 CLEAN, NORMALS, DEPTH, MATTES, LIGHTS = (
     "clean.exr",
     "normals.exr",
@@ -34,7 +39,7 @@ CLEAN, NORMALS, DEPTH, MATTES, LIGHTS = (
 )
 
 #: Its files except the pictures of single objects or lights.
-PLAIN = (LIGHT, SHOWN, CLEAN, ALBEDO, NORMALS, DEPTH, ABOUT)
+PLAIN_FILES = (LIGHT_FILE, SHOWN_FILE, CLEAN, ALBEDO, NORMALS, DEPTH, RECORD_FILE)
 
 #: Maximum size of template.json in bytes.
 MAX_ABOUT = 2**20
@@ -77,7 +82,7 @@ class Template:
 
 
 @dataclass(frozen=True)
-class _Shown:
+class _ShownTransform:
     """A view transform and its exposure."""
 
     name: str
@@ -85,7 +90,7 @@ class _Shown:
 
 
 @dataclass(frozen=True)
-class _About:
+class _TemplateRecord:
     """Content of template.json. size: (width, height). files: files of the template, relative to
     it.
     """
@@ -95,7 +100,7 @@ class _About:
     content: str
     sensor: str
     size: tuple[int, int]
-    view: _Shown
+    view: _ShownTransform
     files: tuple[str, ...] = ()
 
 
@@ -125,17 +130,17 @@ def write_template(
         DEPTH: depth,
     }
     optional = [name for name, image in arrays.items() if image is not None]
-    written = [LIGHT, SHOWN, *optional, ABOUT, *matte_files, *light_files]
+    written_names = [LIGHT_FILE, SHOWN_FILE, *optional, RECORD_FILE, *matte_files, *light_files]
     with staged(folder, earlier_files(folder)) as stage:
         write_look(
-            stage / LIGHT,
+            stage / LIGHT_FILE,
             template.image,
             template.transform,
             clean=template.clean,
-            texts=all_texts.get(SHOWN),
+            texts=all_texts.get(SHOWN_FILE),
         )
         if template.clean is not None:
-            write_rgb(stage / CLEAN, template.clean, attributes=all_texts.get(SHOWN))
+            write_rgb(stage / CLEAN, template.clean, attributes=all_texts.get(SHOWN_FILE))
         if template.albedo is not None:
             write_rgb(stage / ALBEDO, template.albedo)
         if normals is not None:
@@ -148,28 +153,28 @@ def write_template(
             write_bytes(
                 stage / file, _thumbnail(look, template.transform.name, all_texts.get(LIGHTS))
             )
-        write_text(stage / ABOUT, _about(template, written))
-    return [folder / name for name in written]
+        write_text(stage / RECORD_FILE, _record_text(template, written_names))
+    return [folder / name for name in written_names]
 
 
 def _thumbnail(look: Floats, transform: str, texts: Mapping[str, str] | None) -> bytes:
     """Return a linear picture as PNG, exposed to be visible at any brightness."""
-    bright = max(float(np.percentile(look.max(axis=-1), 99)), 1e-12)
-    shown = ViewTransform(transform, float(np.clip(-np.log2(bright), -60, 60)))
+    white_level = max(float(np.percentile(look.max(axis=-1), 99)), 1e-12)
+    shown = ViewTransform(transform, float(np.clip(-np.log2(white_level), -60, 60)))
     return png_bytes(to_8_bit(shown.encode(look)), texts)
 
 
-def _about(template: Template, files: Iterable[str]) -> str:
+def _record_text(template: Template, files: Iterable[str]) -> str:
     height, width = template.size
-    shown = _Shown(template.transform.name, template.transform.stops)
+    shown = _ShownTransform(template.transform.name, template.transform.stops)
     identity = (template.scene, template.content, template.sensor)
-    record = fields_of(_About(FORMAT, *identity, (width, height), shown, tuple(files)))
+    record = fields_of(_TemplateRecord(FORMAT, *identity, (width, height), shown, tuple(files)))
     return json.dumps(record, indent=2, ensure_ascii=False) + "\n"
 
 
 def earlier_files(folder: Path) -> list[Path]:
     """Return the files of a template in `folder`; none if the folder is something else."""
-    if not (folder / ABOUT).is_file():
+    if not (folder / RECORD_FILE).is_file():
         return []
     try:
         names = _read_about(folder).files
@@ -177,24 +182,24 @@ def earlier_files(folder: Path) -> list[Path]:
         names = ()
     if names:
         return [folder / name for name in names if is_below(name)]
-    plain = [folder / name for name in PLAIN]
-    return [*plain, *(folder / MATTES).glob("*.png"), *(folder / LIGHTS).glob("*.png")]
+    plain_paths = [folder / name for name in PLAIN_FILES]
+    return [*plain_paths, *(folder / MATTES).glob("*.png"), *(folder / LIGHTS).glob("*.png")]
 
 
 def files_in_the_way(folder: Path) -> list[Path]:
     """Return the existing files that a new template in `folder` might replace, whatever they
     are.
     """
-    plain = [folder / name for name in PLAIN]
+    plain_paths = [folder / name for name in PLAIN_FILES]
     # The names of objects and lights are not known yet.
     pictures = [*(folder / MATTES).glob("*.png"), *(folder / LIGHTS).glob("*.png")]
-    existing = [*earlier_files(folder), *plain, *pictures]
-    return list(dict.fromkeys(file for file in existing if os.path.lexists(file)))
+    existing_files = [*earlier_files(folder), *plain_paths, *pictures]
+    return list(dict.fromkeys(file for file in existing_files if os.path.lexists(file)))
 
 
 def template_files(folder: Path) -> list[Path]:
     """Return the files of the template in `folder` that `read_template` reads."""
-    return [folder / name for name in (ABOUT, LIGHT, CLEAN, ALBEDO)]
+    return [folder / name for name in (RECORD_FILE, LIGHT_FILE, CLEAN, ALBEDO)]
 
 
 def write_look(
@@ -221,7 +226,7 @@ def read_template(folder: Path) -> Template:
     try:
         record = _read_about(folder)
         transform = ViewTransform(record.view.name, record.view.stops)
-        image = _read_picture(folder / LIGHT, record.size)
+        image = _read_picture(folder / LIGHT_FILE, record.size)
         albedo, clean = (
             _read_picture(folder / name, record.size) if (folder / name).exists() else None
             for name in (ALBEDO, CLEAN)
@@ -235,17 +240,19 @@ def read_template(folder: Path) -> Template:
     return Template(image, transform, record.scene, record.content, record.sensor, albedo, clean)
 
 
-def _read_about(folder: Path) -> _About:
+def _read_about(folder: Path) -> _TemplateRecord:
     """Read template.json. Raises TargetError if it is missing, ValueError if it is damaged."""
-    text = read_text(folder / ABOUT, "file", TargetError, limit=MAX_ABOUT)
-    return read_record(_About, strict_json(text), others=True)
+    text = read_text(folder / RECORD_FILE, "file", TargetError, limit=MAX_ABOUT)
+    return read_record(_TemplateRecord, strict_json(text), others=True)
 
 
 def _read_picture(path: Path, size: tuple[int, int]) -> Floats:
     image = read_parts(path)[0].rgb()
     height, width, _ = image.shape
     if size != (width, height):
-        raise ValueError(f"{path.name} is {width}x{height}, but {ABOUT} says {size[0]}x{size[1]}")
+        raise ValueError(
+            f"{path.name} is {width}x{height}, but {RECORD_FILE} says {size[0]}x{size[1]}"
+        )
     if not np.isfinite(image).all():
         raise ValueError(f"{path.name} holds NaN or Inf")
     return image
@@ -257,19 +264,19 @@ def find_template(painting: Path) -> Path | None:
     The candidates are its own folder, `template/` in it, and `template/` in the current folder.
     """
     places = (painting.parent, painting.parent / "template", Path("template"))
-    return next((place for place in places if (place / ABOUT).is_file()), None)
+    return next((place for place in places if (place / RECORD_FILE).is_file()), None)
 
 
 def file_names(names: Iterable[str]) -> list[str]:
     """Return a file name for each name, valid on all systems and unique even without case."""
     files: list[str] = []
-    used: set[str] = set()
+    used_names: set[str] = set()
     for name in names:
         stem = re.sub(r"[^\w.+-]", "_", name).strip("._")[:80] or "_"
         unique, k = stem, 2
-        while unique.lower() in used:
+        while unique.lower() in used_names:
             unique, k = f"{stem}-{k}", k + 1
-        used.add(unique.lower())
+        used_names.add(unique.lower())
         files.append(unique)
     return files
 

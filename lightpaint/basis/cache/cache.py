@@ -200,12 +200,12 @@ def _prune(path: Path) -> None:
         if _is_leftover(leftover) and time.time() - leftover.stat().st_mtime > LEFTOVER_S:
             shutil.rmtree(leftover, ignore_errors=True)
     delete_orphans(UNUSED_S)
-    rest = MAX_BYTES - _entry(path).size
+    remaining_bytes = MAX_BYTES - _entry(path).size
     for entry in reversed(entries()):
         if entry.path == path:
             continue
-        rest -= entry.size
-        if rest < 0:
+        remaining_bytes -= entry.size
+        if remaining_bytes < 0:
             for file in (*companions_of(entry.path), entry.path):
                 file.unlink(missing_ok=True)
 
@@ -215,7 +215,7 @@ def _is_leftover(path: Path) -> bool:
     name = LEFTOVER_NAME.fullmatch(path.name)
     if name is None or not path.is_dir() or path.is_symlink():
         return False
-    return {inside.name for inside in path.iterdir()} <= {name[1]}
+    return {entry.name for entry in path.iterdir()} <= {name[1]}
 
 
 def entries() -> list[Entry]:
@@ -233,17 +233,17 @@ def entries_named(pattern: str) -> list[Entry]:
     return [entry for entry in entries() if any(fnmatchcase(x, pattern) for x in _names(entry))]
 
 
-def delete_entries(dropped: Iterable[Entry]) -> int:
+def delete_entries(entries: Iterable[Entry]) -> int:
     """Delete entries and return the number of bytes freed. Raises OutputError."""
-    freed = 0
-    for entry in dropped:
+    freed_bytes = 0
+    for entry in entries:
         try:
             for file in (*companions_of(entry.path), entry.path):
                 file.unlink(missing_ok=True)
         except OSError as error:
             raise OutputError(f"cannot delete {entry.path}: {error.strerror or error}") from error
-        freed += entry.size
-    return freed
+        freed_bytes += entry.size
+    return freed_bytes
 
 
 def _names(entry: Entry) -> set[str]:

@@ -109,15 +109,15 @@ def delete_orphans(unused_s: float = 0.0) -> int:
     """Delete derived files whose basis is gone and which were not used for `unused_s` seconds.
     Returns the number of bytes freed.
     """
-    freed = 0
+    freed_bytes = 0
     for path, name in _companions():
         with suppress(OSError):
             status = path.stat()
             is_alone = not path.with_name(name + SUFFIX).exists()
             if is_alone and time.time() - status.st_mtime >= unused_s:
                 path.unlink()
-                freed += status.st_size
-    return freed
+                freed_bytes += status.st_size
+    return freed_bytes
 
 
 def _companions() -> list[tuple[Path, str]]:

@@ -103,11 +103,11 @@ def obtain_basis(
     if start is not None:
         # A basis cached by an earlier version may know less about the same lights.
         start = replace(start, lights=basis_lights(scene), source=str(scene.path))
-        enough = [
+        sufficient_entries = [
             sum(counts[:2]) >= (1 if goal_spp is None else goal_spp) for counts in counts_of(start)
         ]
-        if 0 < sum(enough) < len(enough):
-            report_reuse(sum(enough), len(enough))
+        if 0 < sum(sufficient_entries) < len(sufficient_entries):
+            report_reuse(sum(sufficient_entries), len(sufficient_entries))
     options = dict[str, Any](
         time_s=time_s, seed=seed, keep=keep, is_final=is_final, progress=progress
     )
@@ -182,13 +182,13 @@ def _completed(
         names, goal = least_sampled_lights(start, spp)
         if not names:
             break
-        alone, whole = scene.only(names), start
+        lights_scene, whole = scene.only(names), start
 
         def keep(part: Basis, whole: Basis = whole) -> bool:
             return bool(options["keep"](merge(scene, whole, part)))
 
         part_options = options | budget(goal) | {"keep": keep}
-        part = render(alone, start=restrict(whole, alone), **part_options)
+        part = render(lights_scene, start=restrict(whole, lights_scene), **part_options)
         start = merge(scene, whole, part)
         if end_s is not None and time.monotonic() >= end_s:
             return start
@@ -216,7 +216,7 @@ def top_up_basis(
     `top_up`.
     """
     keep = cache.keep if use_cache else None
-    refined = top_up(
+    topped_up_basis = top_up(
         scene,
         basis,
         counts,
@@ -225,7 +225,7 @@ def top_up_basis(
         is_enough=is_enough,
         tracers=tracers,
     )
-    return as_stored(refined) if keep is None else as_stored(refined, keep)
+    return as_stored(topped_up_basis) if keep is None else as_stored(topped_up_basis, keep)
 
 
 def check_same_view(scene: Scene, basis: Basis) -> None:

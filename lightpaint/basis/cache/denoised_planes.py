@@ -120,20 +120,20 @@ class RoughPlanes:
         if self._small is None:
             return rough
         small = self._small.plane(k)
-        wanted, there = (
+        target_mean, mean_here = (
             resampled(x, self.basis.size)
             for x in (small, block_mean(rough, -(-self.basis.size[0] // len(small))))
         )
         # Where a block has hardly any light, its ratio is unreliable.
-        least = np.float32(1e-4) * there.mean()
-        gain = np.clip((wanted + least) / (there + least), 0, MAX_BLOCK_GAIN)
+        floor = np.float32(1e-4) * mean_here.mean()
+        gain = np.clip((target_mean + floor) / (mean_here + floor), 0, MAX_BLOCK_GAIN)
         return np.asarray(rough * gain, np.float32)
 
     def _share_of_present(self, k: int) -> Floats:
         parts = self.basis.indirect
         indirect = None if parts is None else parts.planes.plane(k)
-        lit, total = self._averaged(self.basis.planes.plane(k), indirect), self._total
-        share = np.divide(lit, total, out=np.zeros_like(lit), where=total > 0)
+        smoothed, total = self._averaged(self.basis.planes.plane(k), indirect), self._total
+        share = np.divide(smoothed, total, out=np.zeros_like(smoothed), where=total > 0)
         return self.present * resampled(share, self.basis.size)
 
     @cached_property

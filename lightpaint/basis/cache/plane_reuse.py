@@ -96,24 +96,25 @@ def gather_planes(
 
     def gain(entry: cache.Entry) -> int:
         assert entry.origin is not None
-        has = entry.origin.spp if spp is None else min(entry.origin.spp, spp)
+        cached_spp = entry.origin.spp if spp is None else min(entry.origin.spp, spp)
         covered = (
             plane
             for name, plane in zip(identities, planes, strict=True)
             if name in entry.identities
         )
         return sum(
-            max(0, has - (0 if plane is None else sum(plane.counts[:2]))) for plane in covered
+            max(0, cached_spp - (0 if plane is None else sum(plane.counts[:2])))
+            for plane in covered
         )
 
     entries = cache.entries() if use_cache else []
     candidates = [entry for entry in entries if _is_like(entry, scene, seed)]
     while candidates:
-        best = max(candidates, key=gain)
-        if gain(best) == 0:
+        best_entry = max(candidates, key=gain)
+        if gain(best_entry) == 0:
             break
-        candidates.remove(best)
-        if (other := cache.read(best)) is not None:
+        candidates.remove(best_entry)
+        if (other := cache.read(best_entry)) is not None:
             planes = [
                 _better_sampled(plane, other, identity)
                 for plane, identity in zip(planes, identities, strict=True)
@@ -168,8 +169,8 @@ def merge(scene: Scene, whole: Basis, part: Basis) -> Basis:
         for i, name in enumerate(whole.names)
     ]
     seen = whole.emitters_seen | part.emitters_seen
-    merged = _compose_basis(scene, whole.origin.seed, sources, seen)
-    return replace(merged, features=part.features, objects=part.objects)
+    merged_basis = _compose_basis(scene, whole.origin.seed, sources, seen)
+    return replace(merged_basis, features=part.features, objects=part.objects)
 
 
 def _is_like(entry: cache.Entry, scene: Scene, seed: int) -> bool:
@@ -186,12 +187,12 @@ def _is_like(entry: cache.Entry, scene: Scene, seed: int) -> bool:
 
 def _better_sampled(plane: KeptPlane | None, other: Basis, identity: str) -> KeptPlane | None:
     """Return the plane with that identity in `other` if it has more samples, else `plane`."""
-    has = 0 if plane is None else sum(plane.counts[:2])
+    cached_spp = 0 if plane is None else sum(plane.counts[:2])
     for i, light in enumerate(other.lights):
         if light.identity == identity != "":
             candidate = KeptPlane(other, i)
             # With only one half, the noise is unknown.
-            if min(candidate.counts[:2]) and sum(candidate.counts[:2]) > has:
+            if min(candidate.counts[:2]) and sum(candidate.counts[:2]) > cached_spp:
                 return candidate
     return plane
 
@@ -239,10 +240,14 @@ def _count_fields(each_light: Sequence[Counts], *, is_one_pass: bool) -> dict[st
     if is_one_pass:
         passes = max(counts[2] for counts in each_light), max(counts[3] for counts in each_light)
         each_light = [(*counts[:2], *(passes if any(counts) else (0, 0))) for counts in each_light]
-    least = np.array(each_light).min(axis=0).tolist()
+    least_counts = np.array(each_light).min(axis=0).tolist()
     if len(set(each_light)) == 1:
-        return {"halves": tuple(least[:2]), "passes": tuple(least[2:]), "each_light": ()}
-    spp, passes_each = min(least[:2]), min(least[2:])
+        return {
+            "halves": tuple(least_counts[:2]),
+            "passes": tuple(least_counts[2:]),
+            "each_light": (),
+        }
+    spp, passes_each = min(least_counts[:2]), min(least_counts[2:])
     return {
         "halves": (spp, spp),
         "passes": (passes_each, passes_each),
@@ -256,10 +261,10 @@ def _emitters_seen_in(scene: Scene, sources: Sequence[Basis]) -> Bools:
     All of them have the same emitting shapes, but an environment may be missing in some.
     """
     is_surrounded = any(emitter.plugin in ENVIRONMENTS for emitter in scene.emitters)
-    alike = [
+    matching_masks = [
         source.emitters_seen for source in sources if _is_surrounded(source.lights) == is_surrounded
     ]
-    seen: Bools = np.logical_or.reduce(alike) if alike else emitters_seen(scene)
+    seen: Bools = np.logical_or.reduce(matching_masks) if matching_masks else emitters_seen(scene)
     return seen
 
 

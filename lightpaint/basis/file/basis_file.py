@@ -73,9 +73,9 @@ def write_basis(path: str | Path, basis: Basis) -> None:
             yield head, part.channels
 
     def texts() -> dict[str, str]:
-        seen = checksum("", others[0].channels)
+        seen_checksum = checksum("", others[0].channels)
         guide = "" if basis.guide_table is None else checksum("", others[1].channels)
-        checksums = Checksums(sums, checksum(of_origin, {}), seen, guide)
+        checksums = Checksums(sums, checksum(of_origin, {}), seen_checksum, guide)
         return {FORMAT_KEY: FORMAT, ORIGIN_KEY: of_origin, CHECKSUMS_KEY: checksums.text()}
 
     write_streamed(Path(path), parts(), room=_room(basis, others, of_origin), texts=texts)
@@ -83,8 +83,10 @@ def write_basis(path: str | Path, basis: Basis) -> None:
 
 def _room(basis: Basis, others: Sequence[ExrPart], of_origin: str) -> int:
     """Return an upper bound for the number of bytes before the first pixel of a basis file."""
-    scaled = [PlaneEncoding(scale=LARGEST_SCALE)] * len(PLANE_CHANNELS)
-    lights = [(light.name, light_texts(light, scaled), basis.size[0]) for light in basis.lights]
+    scaled_encodings = [PlaneEncoding(scale=LARGEST_SCALE)] * len(PLANE_CHANNELS)
+    lights = [
+        (light.name, light_texts(light, scaled_encodings), basis.size[0]) for light in basis.lights
+    ]
     parts = [(part.name, part.attributes, part.size[0]) for part in others]
     checksums = Checksums(dict.fromkeys(basis.names, "0" * 8), *("0" * 8,) * 3)
     of_file = {FORMAT_KEY: FORMAT, ORIGIN_KEY: of_origin, CHECKSUMS_KEY: checksums.text()}
@@ -100,11 +102,11 @@ def as_stored(basis: Basis, keep: Callable[[Basis], object] = lambda basis: None
 
     keep: called with the basis in stored encoding, which can be written without further rounding.
     """
-    stored = _encoded(basis)
-    keep(stored)
+    stored_basis = _encoded(basis)
+    keep(stored_basis)
     if is_encoded(len(basis.lights), basis.size):
-        return stored
-    for planes, stored_planes in zip(plane_sets(basis), plane_sets(stored), strict=True):
+        return stored_basis
+    for planes, stored_planes in zip(plane_sets(basis), plane_sets(stored_basis), strict=True):
         if planes is not stored_planes:
             for plane, rounded in zip(planes, stored_planes, strict=True):
                 plane[...] = rounded

@@ -71,8 +71,8 @@ def read_basis(path: str | Path) -> Basis:
     path = Path(path)
     file_length(path, "image file", ImageError, limit=MAX_BYTES)
     try:
-        if (large := _read_large(path)) is not None:
-            return replace(large, source=str(path))
+        if (large_basis := _read_large(path)) is not None:
+            return replace(large_basis, source=str(path))
         parts = read_parts(path)
         head = _head(p.attributes for p in parts)
         return replace(leave_indirect(_basis_of_parts(parts, head), path), source=str(path))
@@ -95,10 +95,10 @@ def leave_indirect(basis: Basis, path: Path) -> Basis:
         return basis
     try:
         file = RowFile(path)
-        lit = {
+        light_parts = {
             strict_json(p.texts[LIGHT_KEY])["name"]: p for p in file.parts if LIGHT_KEY in p.texts
         }
-        parts = [lit[name] for name in basis.names]
+        parts = [light_parts[name] for name in basis.names]
         origin = read_record(Origin, strict_json(_head(p.texts for p in file.parts)[ORIGIN_KEY]))
     except (RowsUnsupportedError, OSError, BasisError, *_HEADER_ERRORS):
         return basis
@@ -121,8 +121,8 @@ def _read_large(path: Path) -> Basis | None:
         file = RowFile(path)
     except (RowsUnsupportedError, OSError):
         return None
-    lit = [p for p in file.parts if LIGHT_KEY in p.texts]
-    if not lit or not is_large(len(lit), lit[0].size):
+    light_parts = [p for p in file.parts if LIGHT_KEY in p.texts]
+    if not light_parts or not is_large(len(light_parts), light_parts[0].size):
         return None
     return _basis_of_rows(file, _head(p.texts for p in file.parts))
 
@@ -141,23 +141,26 @@ def _head(texts: Iterable[Mapping[str, str]]) -> Mapping[str, str]:
 
 def _basis_of_parts(parts: Sequence[ExrPart], head: Mapping[str, str]) -> Basis:
     """Return the basis of EXR parts. Raises BasisError or one of _HEADER_ERRORS."""
-    lit = [p.in_display_window() for p in parts if LIGHT_KEY in p.attributes]
+    light_parts = [p.in_display_window() for p in parts if LIGHT_KEY in p.attributes]
     others = [p for p in parts if LIGHT_KEY not in p.attributes]
-    scales = [scales_of(p.attributes) for p in lit]
+    scales = [scales_of(p.attributes) for p in light_parts]
 
     def planes(order: Sequence[int], number: int) -> Planes:
-        channels = [(lit[k], scales[k][number]) for k in order]
-        if is_encoded(len(lit), lit[0].size):
-            stored = stored_channels(channels, PLANE_CHANNELS[number])
+        channels = [(light_parts[k], scales[k][number]) for k in order]
+        if is_encoded(len(light_parts), light_parts[0].size):
+            channel_readers = stored_channels(channels, PLANE_CHANNELS[number])
             return EncodedPlanes(
-                [encoded_plane(*x) for x in zip(stored, (s for _, s in channels), strict=True)]
+                [
+                    encoded_plane(*x)
+                    for x in zip(channel_readers, (s for _, s in channels), strict=True)
+                ]
             )
         return as_planes(stack_channels(channels, PLANE_CHANNELS[number]))
 
-    stored = [partial(getattr, part, "channels") for part in lit]
-    has_indirect = all(p.channels.keys() >= INDIRECT_CHANNELS for p in lit)
-    texts = [p.attributes for p in lit]
-    return _checked_basis(texts, stored, others, head, planes, has_indirect=has_indirect)
+    channel_readers = [partial(getattr, part, "channels") for part in light_parts]
+    has_indirect = all(p.channels.keys() >= INDIRECT_CHANNELS for p in light_parts)
+    texts = [p.attributes for p in light_parts]
+    return _checked_basis(texts, channel_readers, others, head, planes, has_indirect=has_indirect)
 
 
 def _basis_of_rows(file: RowFile, head: Mapping[str, str]) -> Basis | None:
@@ -165,31 +168,33 @@ def _basis_of_rows(file: RowFile, head: Mapping[str, str]) -> Basis | None:
 
     Raises the errors of `_basis_of_parts`.
     """
-    lit = [p for p in file.parts if LIGHT_KEY in p.texts]
+    light_parts = [p for p in file.parts if LIGHT_KEY in p.texts]
     if any(
-        p.size != p.display or p.size != lit[0].size or not {*p.channels} >= LIGHT_CHANNELS
-        for p in lit
+        p.size != p.display or p.size != light_parts[0].size or not {*p.channels} >= LIGHT_CHANNELS
+        for p in light_parts
     ):
         return None
-    scales = [scales_of(p.texts) for p in lit]
+    scales = [scales_of(p.texts) for p in light_parts]
 
     def part(layout: PartLayout) -> ExrPart:
         return ExrPart("", file.channels(layout), layout.texts, layout.display)
 
     def planes(order: Sequence[int], number: int) -> Planes:
         plane_scales = [scales[k][number] for k in order]
-        return FilePlanes(file, [lit[k] for k in order], PLANE_CHANNELS[number], plane_scales)
+        return FilePlanes(
+            file, [light_parts[k] for k in order], PLANE_CHANNELS[number], plane_scales
+        )
 
-    stored = [partial(file.channels, p) for p in lit]
+    channel_readers = [partial(file.channels, p) for p in light_parts]
     others = [part(p) for p in file.parts if LIGHT_KEY not in p.texts]
-    has_indirect = all({*p.channels} >= INDIRECT_CHANNELS for p in lit)
-    texts = [p.texts for p in lit]
-    return _checked_basis(texts, stored, others, head, planes, has_indirect=has_indirect)
+    has_indirect = all({*p.channels} >= INDIRECT_CHANNELS for p in light_parts)
+    texts = [p.texts for p in light_parts]
+    return _checked_basis(texts, channel_readers, others, head, planes, has_indirect=has_indirect)
 
 
 def _checked_basis(
     texts: Sequence[Mapping[str, str]],
-    stored: Sequence[Callable[[], Channels]],
+    channel_readers: Sequence[Callable[[], Channels]],
     others: Sequence[ExrPart],
     head: Mapping[str, str],
     planes: Callable[[Sequence[int], int], Planes],
@@ -198,12 +203,12 @@ def _checked_basis(
 ) -> Basis:
     """Return the basis of a file after checking it.
 
-    texts: attributes of each light's part. stored: functions that read the channels of each light's
-    part. planes: function of an order of the parts and an index into `PLANE_CHANNELS` that returns
-    those planes. has_indirect: whether the parts have planes of indirect light.
+    texts: attributes of each light's part. channel_readers: functions that read the channels of
+    each light's part. planes: function of an order of the parts and an index into `PLANE_CHANNELS`
+    that returns those planes. has_indirect: whether the parts have planes of indirect light.
     """
-    seen = [p.in_display_window().channels["Y"] for p in others if "Y" in p.channels]
-    if not texts or not seen:
+    seen_masks = [p.in_display_window().channels["Y"] for p in others if "Y" in p.channels]
+    if not texts or not seen_masks:
         raise BasisError("has lost parts of its basis: make it again with lightpaint basis")
     try:
         lights = [
@@ -225,14 +230,14 @@ def _checked_basis(
             lights=Lights(tuple(lights[k] for k in order)),
             planes=images,
             noise=noise,
-            emitters_seen=seen[0] > 0,
+            emitters_seen=seen_masks[0] > 0,
             origin=origin,
             indirect=IndirectLight(planes(order, 2), planes(order, 3)) if has_indirect else None,
             **fields_of_others(others, checksums, images.size),
         )
     except (BasisError, ImageError) as error:
         raise BasisError(f"is a damaged basis: {one_line(str(error))}") from error
-    for light, attributes, read in zip(lights, texts, stored, strict=True):
+    for light, attributes, read in zip(lights, texts, channel_readers, strict=True):
         channels = read()  # one light at a time, since together they may exceed memory
         names = LIGHT_CHANNELS | INDIRECT_CHANNELS if has_indirect else LIGHT_CHANNELS
         if not all(np.isfinite(channels[name]).all() for name in names):
@@ -245,7 +250,7 @@ def _checked_basis(
                 channels,
             )
     if checksums is not None:
-        check(checksums.seen, "mask of seen emitters", "", {"Y": seen[0]})
+        check(checksums.seen, "mask of seen emitters", "", {"Y": seen_masks[0]})
     return basis
 
 
@@ -256,8 +261,8 @@ def read_origin(path: Path) -> tuple[Origin, tuple[int, int], tuple[str, ...]]:
     file_length(path, "basis", BasisError, limit=MAX_BYTES)
     try:
         headers, size = read_headers(path)
-        lit = [strict_json(header[LIGHT_KEY]) for header in headers if LIGHT_KEY in header]
-        identities = tuple(str(light.get("identity", "")) for light in lit)
+        light_parts = [strict_json(header[LIGHT_KEY]) for header in headers if LIGHT_KEY in header]
+        identities = tuple(str(light.get("identity", "")) for light in light_parts)
         text = next(header[ORIGIN_KEY] for header in headers if ORIGIN_KEY in header)
         return read_record(Origin, strict_json(text)), size, identities
     except (*_HEADER_ERRORS, BasisError, StopIteration) as error:

@@ -57,8 +57,10 @@ class Checksums:
                 "remove it"
             )
         if len(names) > len(self.lights):
-            twice = next(name for name in names if names.count(name) > 1)
-            raise BasisError(f"has the light {one_line(twice)!r} more than once: remove one")
+            repeated_name = next(name for name in names if names.count(name) > 1)
+            raise BasisError(
+                f"has the light {one_line(repeated_name)!r} more than once: remove one"
+            )
         return [list(names).index(name) for name in self.lights]
 
 

@@ -114,9 +114,9 @@ def _is_scale(scale: object) -> bool:
 
 def stack_channels(parts: Sequence[tuple[ExrPart, float]], names: Sequence[str]) -> Floats:
     """Return the named channels of parts, each part multiplied by its scale, (n, h, w, 3)."""
-    stored = stored_channels(parts, names)
+    channels_of_parts = stored_channels(parts, names)
     stacked = np.empty((len(parts), *parts[0][0].size, 3), np.float32)
-    for image, channels, (_, scale) in zip(stacked, stored, parts, strict=True):
+    for image, channels, (_, scale) in zip(stacked, channels_of_parts, parts, strict=True):
         for k, channel in enumerate(channels):
             image[..., k] = channel
         if scale != 1:
@@ -143,9 +143,9 @@ def stored_channels(
 
 def other_parts(basis: Basis) -> Iterator[ExrPart]:
     """Yield all parts except those of the lights, beginning with the visible emitters."""
-    seen = {"Y": basis.emitters_seen.astype(np.float16)}
+    seen_channel = {"Y": basis.emitters_seen.astype(np.float16)}
     # OpenEXR requires unique part names, and a light may already have this one.
-    yield ExrPart(free_name(VISIBLE_EMITTERS_PART, basis.names), seen)
+    yield ExrPart(free_name(VISIBLE_EMITTERS_PART, basis.names), seen_channel)
     if basis.guide_table is not None:
         guide_table = dict(zip(("received", "asked"), basis.guide_table, strict=True))
         # A table rather than a picture, but OpenEXR requires one display window for all parts.
@@ -155,10 +155,10 @@ def other_parts(basis: Basis) -> Iterator[ExrPart]:
         about_them = {FEATURES_KEY: checksum("", channels)}
         yield ExrPart(free_name(FEATURES_PART, basis.names), channels, about_them)
     if basis.objects is not None:
-        named = json.dumps(basis.objects.names, ensure_ascii=False)
+        names_text = json.dumps(basis.objects.names, ensure_ascii=False)
         # Integers small enough for float32.
         index = {"index": basis.objects.index.astype(np.float32)}
-        about_it = {NAMES_KEY: named, OBJECTS_KEY: checksum(named, index)}
+        about_it = {NAMES_KEY: names_text, OBJECTS_KEY: checksum(names_text, index)}
         yield ExrPart(free_name(OBJECTS_PART, basis.names), index, about_it)
     if basis.extra is not None:
         counts = {"samples": basis.extra.astype(np.float32)}
@@ -228,10 +228,10 @@ def features_of(others: Sequence[ExrPart], size: tuple[int, int]) -> Features | 
 def objects_of(others: Sequence[ExrPart], size: tuple[int, int]) -> Objects | None:
     """Return the map of objects; None if it is missing or damaged, since it is optional."""
     for part in (p.in_display_window() for p in others if OBJECTS_KEY in p.attributes):
-        named = part.attributes.get(NAMES_KEY, "")
-        if checksum(named, part.channels) != part.attributes[OBJECTS_KEY] or part.size != size:
+        names_text = part.attributes.get(NAMES_KEY, "")
+        if checksum(names_text, part.channels) != part.attributes[OBJECTS_KEY] or part.size != size:
             return None
-        names = strict_json(named)
+        names = strict_json(names_text)
         if not (isinstance(names, list) and all(isinstance(name, str) for name in names)):
             return None
         return Objects(part.channels["index"].astype(np.int32), tuple(names))

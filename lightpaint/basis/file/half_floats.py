@@ -147,8 +147,8 @@ def _encode(plane: Floats, hidden: Doubles) -> EncodedPlane:
             rows = np.ascontiguousarray(plane[top : top + TILE].transpose(2, 0, 1))
             numbers[:, top : top + TILE] = stored = encoding.encoded(rows)
             with np.errstate(over="ignore", invalid="ignore"):
-                missed = encoding.decoded(stored) - rows
-            if not (_row_power(missed) <= hidden[k]).all():
+                rounding = encoding.decoded(stored) - rows
+            if not (_row_power(rounding) <= hidden[k]).all():
                 break
         else:
             return EncodedPlane(encoding, numbers)

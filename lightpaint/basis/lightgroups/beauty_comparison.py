@@ -17,7 +17,7 @@ WARNING_EXCESS = 1e-3
 
 #: Largest relative error of rounding to float16; its absolute error below the normal range;
 #: relative error of a renderer's float32 sum over samples, whose order differs between layers.
-HALF, SUBNORMAL, SUMMED = 2.0**-11, 2.0**-25, 2.0**-20
+HALF_PRECISION, SUBNORMAL, SUM_PRECISION = 2.0**-11, 2.0**-25, 2.0**-20
 
 #: Maximum number of layers for which every pair is tried as the sum and the one left out.
 MAX_CANDIDATES = 40
@@ -68,8 +68,10 @@ def missing_and_exceeding(rest: Floats, whole: Floats) -> tuple[float, float]:
     total = float((np.abs(whole) @ LUMINANCE).sum())
     if total == 0:
         return 0.0, float(bool(rest.any()))
-    lacking, excess = np.maximum(rest, 0), np.maximum(-rest, 0)
-    return float((lacking @ LUMINANCE).sum()) / total, float((excess @ LUMINANCE).sum()) / total
+    missing_light, excess = np.maximum(rest, 0), np.maximum(-rest, 0)
+    return float((missing_light @ LUMINANCE).sum()) / total, float(
+        (excess @ LUMINANCE).sum()
+    ) / total
 
 
 def rounding(layers: Sequence[RenderLayer]) -> Floats:
@@ -82,7 +84,7 @@ def rounding(layers: Sequence[RenderLayer]) -> Floats:
 
 def _rounded(image: Floats, *, is_half: bool) -> Floats:
     size = np.abs(np.nan_to_num(image.astype(np.float64), posinf=0, neginf=0))
-    return np.asarray((size * HALF + SUBNORMAL if is_half else 0) + size * SUMMED)
+    return np.asarray((size * HALF_PRECISION + SUBNORMAL if is_half else 0) + size * SUM_PRECISION)
 
 
 @dataclass(frozen=True)
@@ -127,13 +129,13 @@ class LayerSum:
         it.
         """
         size = np.nan_to_num(np.abs(beauty.image), posinf=0, neginf=0).sum(dtype=np.float64)
-        most = NEGLIGIBLE_SHARE * size
+        largest_share = NEGLIGIBLE_SHARE * size
         # The excess only grows with more pixels, so a few of them can rule a picture out.
         coarse = (slice(None, None, COARSE_STEP), slice(None, None, COARSE_STEP))
         return bool(
             size > 0
-            and self._excess(beauty, coarse, less_itself=less_itself) <= most
-            and self._excess(beauty, (), less_itself=less_itself) <= most
+            and self._excess(beauty, coarse, less_itself=less_itself) <= largest_share
+            and self._excess(beauty, (), less_itself=less_itself) <= largest_share
         )
 
     def _excess(
@@ -162,14 +164,14 @@ def find_beauty_of_lights(
     """Return the layer among `others` that is the sum of the lights; None if there is none."""
     if not others or not lights:
         return None
-    added = LayerSum.of(lights)
-    return next((layer for layer in others if added.is_of(layer)), None)
+    layer_sum = LayerSum.of(lights)
+    return next((layer for layer in others if layer_sum.is_of(layer)), None)
 
 
 def find_beauty(layers: Sequence[RenderLayer]) -> RenderLayer | None:
     """Return the layer that is the sum of the others; None if there is none."""
-    added = LayerSum.of(layers)
-    return next((layer for layer in layers if added.is_of(layer, less_itself=True)), None)
+    layer_sum = LayerSum.of(layers)
+    return next((layer for layer in layers if layer_sum.is_of(layer, less_itself=True)), None)
 
 
 def unrelated_layer(
@@ -197,14 +199,14 @@ def unrelated_layer(
 
 def _unrelated_candidates(layers: Sequence[RenderLayer], beauty: RenderLayer | None) -> list[int]:
     """Return the indices of layers without which the others may add up to the picture."""
-    added = LayerSum.of(layers)
+    layer_sum = LayerSum.of(layers)
     candidates = []
     for k, layer in enumerate(layers):
-        less = added.without(layer)
-        if beauty is not None and less.is_of(beauty):
+        remaining_sum = layer_sum.without(layer)
+        if beauty is not None and remaining_sum.is_of(beauty):
             candidates.append(k)
         if beauty is None and any(
-            less.is_of(other, less_itself=True) for j, other in enumerate(layers) if j != k
+            remaining_sum.is_of(other, less_itself=True) for j, other in enumerate(layers) if j != k
         ):
             candidates.append(k)
     return candidates

@@ -85,26 +85,26 @@ def split_passes(layers: Sequence[RenderLayer]) -> tuple[list[RenderLayer], Deno
     has_albedo = any(_plain_name(x) in ALBEDO_NAMES for x in layers)
     of_surfaces = {*ALBEDO_NAMES, *(NORMAL_NAMES + POSITION_NAMES if has_albedo else ())}
     surfaces: list[RenderLayer] = []
-    lit: list[RenderLayer] = []
+    light_layers: list[RenderLayer] = []
     for layer in layers:
         is_surface = layer.is_vector or _plain_name(layer) in of_surfaces
-        (surfaces if is_surface else lit).append(layer)
-    by_name = {x.name: x for x in lit}
+        (surfaces if is_surface else light_layers).append(layer)
+    by_name = {x.name: x for x in light_layers}
     parts: dict[str, dict[str, RenderLayer]] = {}
-    for layer in lit:
+    for layer in light_layers:
         match = PART.fullmatch(layer.name)
         owner = None if match is None else _owner(match, by_name)
         if match is not None and owner is not None and _is_part(layer, owner):
             which = (match["after"] or match["before"]).casefold()
             parts.setdefault(owner.name, {})[which] = layer
-    used = [layer.name for pair in parts.values() for layer in pair.values()]
+    used_names = [layer.name for pair in parts.values() for layer in pair.values()]
     indirect = {
         owner: pair["indirect"].image.astype(np.float32)
         if "indirect" in pair
         else by_name[owner].image.astype(np.float32) - pair["direct"].image
         for owner, pair in parts.items()
     }
-    left = [x for x in lit if x.name not in used]
+    left = [x for x in light_layers if x.name not in used_names]
     return left, DenoisingPasses(tuple(surfaces), indirect)
 
 

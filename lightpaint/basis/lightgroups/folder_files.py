@@ -68,8 +68,12 @@ def candidate_files(
     }
     text = _list_with_reasons({file: reason for file, reason in reasons.items() if reason})
     if not left:
-        none = f"{folder} holds no .exr file" if not text else f"{folder} holds no light: {text}"
-        raise BasisError(f"{none}; give the EXR with the light groups, or a folder of them")
+        empty_message = (
+            f"{folder} holds no .exr file" if not text else f"{folder} holds no light: {text}"
+        )
+        raise BasisError(
+            f"{empty_message}; give the EXR with the light groups, or a folder of them"
+        )
     return left, [f"left out of the lights: {text}"] if text else []
 
 

@@ -86,19 +86,21 @@ def short_names(stems: Sequence[str]) -> dict[str, str]:
         return {stem: stem for stem in stems}
     head = _shared_head(stems)
     head = head[: max((head.rfind(joint) + 1 for joint in SEPARATORS), default=0)]
-    cut = [stem[len(head) :] for stem in stems]
-    tail = _shared_head([name[::-1] for name in cut])[::-1]
+    trimmed_names = [stem[len(head) :] for stem in stems]
+    tail = _shared_head([name[::-1] for name in trimmed_names])[::-1]
     starts = [k for joint in SEPARATORS if (k := tail.find(joint)) >= 0]
     tail = tail[min(starts) :] if starts else ""
-    cut = [name.removesuffix(tail) for name in cut]
-    return dict(zip(stems, cut if all(cut) else stems, strict=True))
+    trimmed_names = [name.removesuffix(tail) for name in trimmed_names]
+    return dict(zip(stems, trimmed_names if all(trimmed_names) else stems, strict=True))
 
 
 def _shared_head(names: Sequence[str]) -> str:
     """Return the common start of all names."""
     low, high = min(names), max(names)
-    same = next((k for k, (a, b) in enumerate(zip(low, high, strict=False)) if a != b), len(low))
-    return low[:same]
+    common_length = next(
+        (k for k, (a, b) in enumerate(zip(low, high, strict=False)) if a != b), len(low)
+    )
+    return low[:common_length]
 
 
 def _by_convention(
@@ -142,10 +144,10 @@ def _by_convention(
 def _light_names(convention: Convention, matches: list[re.Match[str]]) -> list[tuple[str, str]]:
     """Return pairs of light and layer names, with prefixes if these differ."""
     prefixes = [m.groupdict().get("prefix") or "" for m in matches]
-    several = len(set(prefixes)) > 1
+    has_several_prefixes = len(set(prefixes)) > 1
     return [
         (
-            f"{prefix}_" * bool(several and prefix)
+            f"{prefix}_" * bool(has_several_prefixes and prefix)
             + convention.light.replace(NAME_FIELD, m["name"]),
             m[0],
         )
@@ -160,10 +162,12 @@ def _by_pattern(layers: Mapping[str, Sequence[str]], pattern: str, file_name: st
             "like 'Light_{name}'"
         )
     before, after = pattern.split(NAME_FIELD)
-    fits = re.compile(f"{re.escape(before)}(.+){re.escape(after)}", re.DOTALL)
+    name_pattern = re.compile(f"{re.escape(before)}(.+){re.escape(after)}", re.DOTALL)
     matches = []
     for layer, other_names in layers.items():
-        match = next((m for name in (layer, *other_names) if (m := fits.fullmatch(name))), None)
+        match = next(
+            (m for name in (layer, *other_names) if (m := name_pattern.fullmatch(name))), None
+        )
         if match:
             matches.append((match[1], layer))
     if not matches:
@@ -216,13 +220,17 @@ def _example_pattern(layers: Iterable[str]) -> str:
     example.
     """
     names = [name for name in layers if beauty_name([name]) is None]
-    heads: dict[str, int] = {}
+    head_counts: dict[str, int] = {}
     for name in names:
         for k in (name.find(joint) for joint in SEPARATORS):
             if 0 < k < len(name) - 1:
-                heads[name[: k + 1]] = heads.get(name[: k + 1], 0) + 1
-    best = max(heads, key=lambda head: heads[head], default=None)
-    return f"{best}{NAME_FIELD}" if best and heads[best] > 1 else f"Light_{NAME_FIELD}"
+                head_counts[name[: k + 1]] = head_counts.get(name[: k + 1], 0) + 1
+    best_head = max(head_counts, key=lambda head: head_counts[head], default=None)
+    return (
+        f"{best_head}{NAME_FIELD}"
+        if best_head and head_counts[best_head] > 1
+        else f"Light_{NAME_FIELD}"
+    )
 
 
 def _layer_list(layers: Iterable[str]) -> str:

@@ -95,8 +95,8 @@ def _drop(lights: dict[str, RenderLayer], layer: RenderLayer | None) -> None:
 
 def _is_light(layer: RenderLayer, lights: Sequence[RenderLayer], beauty: RenderLayer) -> bool:
     """Return True if a layer named like the whole picture is in fact one of the lights."""
-    alone = LayerSum.of([layer])
-    return LayerSum.of(lights).and_also(layer).lacks(beauty) < alone.lacks(beauty)
+    single_sum = LayerSum.of([layer])
+    return LayerSum.of(lights).and_also(layer).lacks(beauty) < single_sum.lacks(beauty)
 
 
 def _improves_sum(layer: RenderLayer, lights: Sequence[RenderLayer], beauty: RenderLayer) -> bool:
@@ -105,8 +105,8 @@ def _improves_sum(layer: RenderLayer, lights: Sequence[RenderLayer], beauty: Ren
     """
     if not lights:
         return True
-    added = LayerSum.of(lights)
-    return added.and_also(layer).lacks(beauty) < added.lacks(beauty)
+    light_sum = LayerSum.of(lights)
+    return light_sum.and_also(layer).lacks(beauty) < light_sum.lacks(beauty)
 
 
 def _choose_roles(path: Path, layers: dict[str, RenderLayer], pattern: str | None) -> LayerChoice:

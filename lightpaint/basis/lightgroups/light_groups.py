@@ -161,10 +161,10 @@ def _light_groups(
         raise BasisError(f"{path} holds NaN or Inf in every pixel: render it again")
     _check_light(path, roles.lights, holes)
     missing = _missing_light(roles, holes)
-    listed = f"light groups named as in {roles.renderer}: {some_names(names)}"
+    remark = f"light groups named as in {roles.renderer}: {some_names(names)}"
     if beauty is not None:
-        listed += f"; the whole picture: {beauty.name or 'R, G, B'}"
-    remarks = [*first_remarks, listed, *roles.remarks, missing.remark]
+        remark += f"; the whole picture: {beauty.name or 'R, G, B'}"
+    remarks = [*first_remarks, remark, *roles.remarks, missing.remark]
     remarks += _remarks_on_black(roles.lights, missing.share)
     if lights[0].primaries is not None:
         remarks.append(
@@ -235,9 +235,13 @@ def _remarks_on_black(lights: Mapping[str, RenderLayer], missing: float | None) 
 
 def _remarks_on_passes(basis: Basis) -> list[str]:
     """Return a sentence on the passes used for denoising, if the file has any."""
-    known = ["albedo and normals"] if basis.features is not None else []
-    known += ["direct and indirect light"] if basis.indirect is not None else []
-    return [f"pictures are denoised by {' and by '.join(known)} of the file"] if known else []
+    known_parts = ["albedo and normals"] if basis.features is not None else []
+    known_parts += ["direct and indirect light"] if basis.indirect is not None else []
+    return (
+        [f"pictures are denoised by {' and by '.join(known_parts)} of the file"]
+        if known_parts
+        else []
+    )
 
 
 def _basis(
@@ -260,16 +264,16 @@ def _basis(
             _light(free_name(REST_NAME, lights), "beauty less the groups", "rest", is_fixed=True)
         )
         images[-1] = first.in_rec709(rest)
-    unknown = as_planes(np.zeros_like(images))
+    unknown_noise = as_planes(np.zeros_like(images))
     indirect = _indirect_planes(roles, passes, images, holes)
     return Basis(
         lights=Lights(tuple(basis_lights)),
         planes=as_planes(images),
-        noise=unknown,
+        noise=unknown_noise,
         emitters_seen=np.zeros(holes.shape, dtype=bool),
         origin=_origin(path, roles, images, [*lights]),
         features=passes.features(roles.view),
-        indirect=None if indirect is None else IndirectLight(as_planes(indirect), unknown),
+        indirect=None if indirect is None else IndirectLight(as_planes(indirect), unknown_noise),
     )
 
 

@@ -102,9 +102,9 @@ def read_layers(
                 "have the same colour space"
             )
     names = [layer.name for layer in colours]
-    if twice := sorted({name for name in names if names.count(name) > 1}):
+    if repeated := sorted({name for name in names if names.count(name) > 1}):
         raise BasisError(
-            f"{path} has the layers {some_names(name or 'R, G, B' for name in twice)} more than "
+            f"{path} has the layers {some_names(name or 'R, G, B' for name in repeated)} more than "
             "once: is it a sequence of frames, or several views? give one file of one view"
         )
     vectors = [x for x in layers if x.is_vector and x.image.shape == first.image.shape]
@@ -116,8 +116,8 @@ def _of_files(files: Sequence[Path]) -> list[RenderLayer]:
     if len(files) == 1:
         return _of_file(files[0])
     read = {file: _of_file(file) for file in files}
-    plain = [file.stem for file, layers in read.items() if [x.name for x in layers] == [""]]
-    short = short_names(plain)
+    plain_stems = [file.stem for file, layers in read.items() if [x.name for x in layers] == [""]]
+    short = short_names(plain_stems)
     layers_of_folder = []
     for file, layers in read.items():
         for x in layers:

@@ -155,9 +155,9 @@ class FileSums:
         try:
             self._file = TemporaryArray(shape)
         except OSError as error:
-            needed = 4 * int(np.prod(shape))
+            needed_bytes = 4 * int(np.prod(shape))
             raise SceneError(
-                f"rendering needs {needed / 1e9:.1f} GB in {tempfile.gettempdir()} "
+                f"rendering needs {needed_bytes / 1e9:.1f} GB in {tempfile.gettempdir()} "
                 f"({error.strerror or error}): set TMPDIR to a folder with more room, or use "
                 "resolution=... or fewer lights"
             ) from error

@@ -190,9 +190,9 @@ def _render_together(
             raise Interrupted("too early for anything to be kept") from None
         if not keeper.keep(basis(is_last=True)):
             raise
-        of = "" if budget.time_s is not None else f" of {budget.spp}"
+        budget_text = "" if budget.time_s is not None else f" of {budget.spp}"
         raise Interrupted(
-            f"{2 * done}{of} samples per pixel are kept; run the same command to continue"
+            f"{2 * done}{budget_text} samples per pixel are kept; run the same command to continue"
         ) from None
     else:
         return (

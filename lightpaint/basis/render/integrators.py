@@ -46,12 +46,12 @@ def remark_on_separate_renders(scene: Scene) -> str | None:
     if (reason := why_not_one_pass(scene)) is None or count == 1:
         return None
     if use_variant().is_jit:
-        instead = "the integrator path, where it shows the same,"
+        alternative = "the integrator path, where it shows the same,"
     else:
-        instead = "a variant like llvm_ad_rgb"
+        alternative = "a variant like llvm_ad_rgb"
     return (
         f"{reason}: each of the {count} lights is rendered by itself, {count} times the work; "
-        f"{instead} renders all in one pass"
+        f"{alternative} renders all in one pass"
     )
 
 

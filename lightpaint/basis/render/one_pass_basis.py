@@ -45,11 +45,11 @@ def basis_of_sums(
         total[: len(part)] += part
     is_split = len(indirect[0]) == n and (start is None or start.indirect is not None)
     if start is not None:
-        begun = half_counts(start.origin.halves[0], start)
-        add_halves(totals, start.planes, start.noise, begun)
+        start_counts = half_counts(start.origin.halves[0], start)
+        add_halves(totals, start.planes, start.noise, start_counts)
         seen = seen | start.emitters_seen
         if is_split and start.indirect is not None:
-            add_halves(indirect, start.indirect.planes, start.indirect.noise, begun)
+            add_halves(indirect, start.indirect.planes, start.indirect.noise, start_counts)
     pairs = [mean_and_half_difference(totals, spp)]
     if is_split:
         pairs.append(mean_and_half_difference(indirect, spp))

@@ -37,12 +37,12 @@ def memory_needed(scene: Scene, *, in_bands: bool = False) -> int:
 
 def check_memory(scene: Scene, *, in_bands: bool = False) -> None:
     """Raise SceneError if a basis of `scene` does not fit, before the system kills the process."""
-    needed, free = memory_needed(scene, in_bands=in_bands), _free_memory()
-    if free is not None and needed > free:
+    needed_bytes, free_bytes = memory_needed(scene, in_bands=in_bands), _free_memory()
+    if free_bytes is not None and needed_bytes > free_bytes:
         height, width = scene.size
         raise SceneError(
-            f"{len(scene.lights)} lights at {width}x{height} need {needed / 1e9:.1f} GB, and "
-            f"{free / 1e9:.1f} GB are free: use resolution=... or fewer lights"
+            f"{len(scene.lights)} lights at {width}x{height} need {needed_bytes / 1e9:.1f} GB, and "
+            f"{free_bytes / 1e9:.1f} GB are free: use resolution=... or fewer lights"
         )
 
 

@@ -25,14 +25,14 @@ def is_of(scene: Scene, basis: Basis, seed: int) -> bool:
     """Return True if `basis` was made from `scene` in its present state, with its sensor, film and
     `seed`.
     """
-    of = basis.origin
+    start_origin = basis.origin
     current = replace(
-        origin_of(scene, seed, of.method, of.halves, of.passes),
-        each_light=of.each_light,
-        is_composed=of.is_composed,
-        extra_spp=of.extra_spp,
+        origin_of(scene, seed, start_origin.method, start_origin.halves, start_origin.passes),
+        each_light=start_origin.each_light,
+        is_composed=start_origin.is_composed,
+        extra_spp=start_origin.extra_spp,
     )
-    return of == current and basis.size == scene.size
+    return start_origin == current and basis.size == scene.size
 
 
 def is_on_the_way(scene: Scene, basis: Basis, spp: int | None) -> bool:

@@ -208,18 +208,18 @@ class PartSums:
         assert not self._left
         scene, start = self._scene, self._start
         if self._lights is not None:
-            made = self._lights.basis(self._seed)
+            start_basis = self._lights.basis(self._seed)
         elif self._halves is None:  # `start` had all samples, so there were no parts
             assert start is not None
-            made = start
+            start_basis = start
         else:
             halves, seen = list(self._halves), self._seen > 0
-            made = basis_of_sums(
+            start_basis = basis_of_sums(
                 scene, self._seed, halves, seen, self._half, guide_table, start=start
             )
         if start is not None:
-            made = replace(made, features=start.features, objects=start.objects)
-        return with_first_hits(made, scene, self._seed)
+            start_basis = replace(start_basis, features=start.features, objects=start.objects)
+        return with_first_hits(start_basis, scene, self._seed)
 
 
 class LightPasses:

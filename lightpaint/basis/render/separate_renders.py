@@ -122,9 +122,9 @@ def render_separately(
         if not sums.spp.any() or keeper.keep is None or not keeper.keep(basis()):
             raise
         mean = sums.spp.sum() / len(scene.lights)
-        of = "" if budget.time_s is not None else f" of {budget.spp}"
+        budget_text = "" if budget.time_s is not None else f" of {budget.spp}"
         raise Interrupted(
-            f"{mean:.3g}{of} samples per pixel, on average over the lights, are kept; "
+            f"{mean:.3g}{budget_text} samples per pixel, on average over the lights, are kept; "
             "run the same command to continue"
         ) from None
 

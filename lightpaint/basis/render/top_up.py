@@ -56,9 +56,9 @@ class KeptTracer:
         tracer, its_seed = self._tracers.get(number, (None, seed))
         if tracer is None or its_seed != seed or not _is_equal(tracer.guide_table, table):
             loaded = next((x.loaded for x, _ in self._tracers.values()), None)
-            others = [view for view in self._views if view is not scene]
+            other_views = [view for view in self._views if view is not scene]
             numbers = view_seed(seed, scene.sensor)
-            tracer = Tracer(scene, numbers, table, loaded=loaded, views=others)
+            tracer = Tracer(scene, numbers, table, loaded=loaded, views=other_views)
             self._tracers[number] = tracer, seed
         return tracer
 
@@ -157,12 +157,15 @@ def pixel_batches(counts: Indices, planes: int) -> Iterator[Indices]:
     pixels = np.flatnonzero(flat)
     pixels = pixels[np.argsort(flat[pixels], kind="stable")]
     ends = np.cumsum(flat[pixels], dtype=np.int64)
-    largest, most = largest_pass(1, shorter=PASS_DIVISOR), max(1, PART_MAX_BYTES // (12 * planes))
+    largest, max_count = (
+        largest_pass(1, shorter=PASS_DIVISOR),
+        max(1, PART_MAX_BYTES // (12 * planes)),
+    )
     start = 0
     while start < pixels.size:
         before = ends[start - 1] if start else 0
         end = max(start + 1, int(np.searchsorted(ends, before + largest, side="right")))
-        end = min(end, start + most)
+        end = min(end, start + max_count)
         yield pixels[start:end]
         start = end
 

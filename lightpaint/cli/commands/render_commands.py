@@ -45,7 +45,14 @@ from lightpaint.scene.quality_presets import on_film, samples
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
 from lightpaint.storage.staging import finish
-from lightpaint.target.template import CLEAN, LIGHT, LIGHTS, MATTES, SHOWN, files_in_the_way
+from lightpaint.target.template import (
+    CLEAN,
+    LIGHT_FILE,
+    LIGHTS,
+    MATTES,
+    SHOWN_FILE,
+    files_in_the_way,
+)
 
 
 def basis(*, scene: SceneFile, output: Path, settings: Settings) -> CommandOutcome:
@@ -135,8 +142,8 @@ def _show_template(
 ) -> CommandOutcome:
     """Print the purpose of each file of a template."""
     is_tree = is_folder(output)
-    picture = output / SHOWN if is_tree else output.with_suffix(".png")
-    linear = output / LIGHT if is_tree else output
+    picture = output / SHOWN_FILE if is_tree else output.with_suffix(".png")
+    linear = output / LIGHT_FILE if is_tree else output
     for line in template_lines(output, files, is_denoised=is_denoised):
         terminal.write(line)
     folder = output if is_tree else output.parent
@@ -147,7 +154,7 @@ def _show_template(
 def template_lines(output: Path, files: Sequence[Path], *, is_denoised: bool = True) -> list[str]:
     """Return a line on each file of a template, those to paint over first."""
     is_tree = is_folder(output)
-    picture = output / SHOWN if is_tree else output.with_suffix(".png")
+    picture = output / SHOWN_FILE if is_tree else output.with_suffix(".png")
     look = "the current look, denoised" if is_denoised else "the current look"
     steps = "paint over it in any program, save that under another name beside it, and solve for it"
     lines = [f"{picture}: {look}; {steps}"]
@@ -158,7 +165,7 @@ def template_lines(output: Path, files: Sequence[Path], *, is_denoised: bool = T
     description = (
         "the look as rendered, with its noise" if is_denoised else "the same in linear light"
     )
-    lines.append(f"{output / LIGHT if is_tree else output}: {description}")
+    lines.append(f"{output / LIGHT_FILE if is_tree else output}: {description}")
     if is_tree and (output / MATTES) in {file.parent for file in files}:
         lines.append(f"{output}/{MATTES}: a mask for each object")
         lines.append(f"{output}/{LIGHTS}: what each light does alone")

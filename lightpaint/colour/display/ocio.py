@@ -86,9 +86,9 @@ class OcioEncoding:
         for k in range(3):
             direction = np.zeros((3, 1))
             direction[k] = 1
-            up = self.encode((planes + step * direction).T)
+            forward = self.encode((planes + step * direction).T)
             down = self.encode((planes - step * direction).T)
-            columns.append((up - down).T / (2 * step))
+            columns.append((forward - down).T / (2 * step))
         return self.encode_planes(planes), np.stack(columns, axis=1)
 
     def _check_round_trip(self) -> None:

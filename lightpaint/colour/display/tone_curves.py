@@ -47,11 +47,11 @@ class Curve:
     def with_slopes(self, planes: Floats) -> tuple[Floats, Floats]:
         light = self._mixed_planes(planes)
         clipped = np.minimum(np.maximum(light, 0), self.white)
-        shown, slopes = self.with_derivative(clipped)
+        encoded, slopes = self.with_derivative(clipped)
         slopes *= clipped == light
         if self.matrix is None:
-            return shown, slopes
-        return shown, slopes[:, None] * self.matrix.astype(slopes.dtype)[..., None]
+            return encoded, slopes
+        return encoded, slopes[:, None] * self.matrix.astype(slopes.dtype)[..., None]
 
     def _mixed_planes(self, planes: Floats) -> Floats:
         return planes if self.matrix is None else self.matrix.astype(planes.dtype) @ planes
@@ -98,9 +98,9 @@ def _filmic_inverse(display: Floats) -> Floats:
 def _filmic_with_derivative(light: Floats) -> tuple[Floats, Floats]:
     below = light * (_C * light + _D) + _E
     above = light * (_A * light + _B)
-    shown, slope = _srgb_with_derivative(np.minimum(above / below, 1))
+    encoded, slope = _srgb_with_derivative(np.minimum(above / below, 1))
     steep = ((2 * _A * light + _B) * below - above * (2 * _C * light + _D)) / below**2
-    return shown, slope * steep
+    return encoded, slope * steep
 
 
 class _Sigmoid:
@@ -139,9 +139,9 @@ class _Sigmoid:
         scale, power = scale.astype(x.dtype), power.astype(x.dtype)
         run = self.contrast * (x - self.pivot[0])
         u = np.abs(run) / scale
-        grown = 1 + u**power
-        root = grown ** (-1 / power)
-        return self.pivot[1] + run * root, self.contrast * root / grown
+        growth = 1 + u**power
+        root = growth ** (-1 / power)
+        return self.pivot[1] + run * root, self.contrast * root / growth
 
     def _run(self, away: Floats, scale: float, power: float) -> Floats:
         h = away / scale
@@ -170,11 +170,11 @@ def _agx_inverse(display: Floats) -> Floats:
 
 
 def _agx_with_derivative(light: Floats) -> tuple[Floats, Floats]:
-    shown, slope = _SIGMOID.with_derivative(_agx_log(light))
+    encoded, slope = _SIGMOID.with_derivative(_agx_log(light))
     above = light >= 2.0**_AGX_LOW
     slope *= above
     slope /= np.where(above, light, 1) * (math.log(2) * _AGX_RANGE)
-    return shown, slope
+    return encoded, slope
 
 
 #: The built-in curves by name.

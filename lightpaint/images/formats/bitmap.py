@@ -108,9 +108,9 @@ def _decoded(path: Path, kind: str) -> tuple[Any, npt.NDArray[Any]]:
     import OpenImageIO
 
     OpenImageIO.geterror()  # clears the error of an earlier file
-    plain = OpenImageIO.ImageSpec()
-    plain["oiio:UnassociatedAlpha"] = 1  # otherwise OpenImageIO multiplies display values by alpha
-    file = OpenImageIO.ImageInput.open(str(path), plain)
+    spec = OpenImageIO.ImageSpec()
+    spec["oiio:UnassociatedAlpha"] = 1  # otherwise OpenImageIO multiplies display values by alpha
+    file = OpenImageIO.ImageInput.open(str(path), spec)
     if file is None:
         raise ImageError(f"is damaged: {first_line(OpenImageIO.geterror(), path=path)}")
     try:

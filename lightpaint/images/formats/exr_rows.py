@@ -226,8 +226,8 @@ def _layout(
     table = values["channels"]
     while table[end]:
         name, end = _text(table, end)
-        kind, _, wide, high = struct.unpack_from("<iIii", table, end)
-        if (wide, high) != (1, 1):
+        kind, _, width, height = struct.unpack_from("<iIii", table, end)
+        if (width, height) != (1, 1):
             raise RowsUnsupportedError("chroma of lower resolution")
         channels[name], end = TYPES[kind], end + 16
     lines = LINES[values["compression"][0]]

@@ -30,22 +30,22 @@ def silenced() -> Iterator[None]:
     """
     with _silence_lock:
         _flush_standard_streams()
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        saved = [(fd, _copy_if_open(fd)) for fd in (1, 2) if fd != nowhere]
+        null_device = os.open(os.devnull, os.O_WRONLY)
+        saved_descriptors = [(fd, _copy_if_open(fd)) for fd in (1, 2) if fd != null_device]
         try:
-            for fd, _ in saved:
-                os.dup2(nowhere, fd)
+            for fd, _ in saved_descriptors:
+                os.dup2(null_device, fd)
             with redirect_stdout(io.StringIO()):
                 yield
         finally:
             _flush_standard_streams()
-            for fd, copy in saved:
+            for fd, copy in saved_descriptors:
                 if copy is None:
                     os.close(fd)
                 else:
                     os.dup2(copy, fd)
                     os.close(copy)
-            os.close(nowhere)
+            os.close(null_device)
 
 
 def _flush_standard_streams() -> None:

@@ -15,7 +15,7 @@ from lightpaint.images.formats.png import PNG_HEAD, longest_png
 
 #: Media types of layered zip archives, and the name of their merged picture.
 LAYERED = {b"image/openraster": "ora", b"application/x-krita": "kra"}
-MERGED = "mergedimage.png"
+MERGED_PICTURE = "mergedimage.png"
 
 #: Maximum size in bytes of a merged picture.
 MAX_MERGED = 2**30
@@ -49,10 +49,10 @@ def read_merged(path: Path, kind: str) -> Bitmap:
     """Return the merged picture of a layered file. Raises ImageError, without naming the file."""
     try:
         with zipfile.ZipFile(path) as archive, tempfile.TemporaryDirectory() as folder:
-            member = archive.getinfo(MERGED)
+            member = archive.getinfo(MERGED_PICTURE)
             if member.file_size > MAX_MERGED:
                 raise ImageError("declares a merged picture that is too large to unpack")
-            merged = Path(folder) / MERGED
+            merged = Path(folder) / MERGED_PICTURE
             with archive.open(member) as packed, merged.open("wb") as unpacked:
                 head = packed.read(PNG_HEAD)
                 if kind_of(head) != "png":
@@ -63,7 +63,7 @@ def read_merged(path: Path, kind: str) -> Bitmap:
                 _copy(packed, unpacked, member.file_size - len(head))
             return replace(read_bitmap(merged, "png"), kind=kind)
     except KeyError:
-        raise ImageError(f"has no merged picture ({MERGED}): save it again") from None
+        raise ImageError(f"has no merged picture ({MERGED_PICTURE}): save it again") from None
     except DAMAGES as error:
         # The message contains names from the archive, which may be anything.
         raise ImageError(f"is damaged: {ascii(str(error))[1:-1][:200]}") from error
@@ -71,9 +71,9 @@ def read_merged(path: Path, kind: str) -> Bitmap:
 
 def _copy(source: IO[bytes], target: IO[bytes], length: int) -> None:
     """Copy `length` bytes. Raises ImageError if there are more."""
-    copied = 0
+    copied_bytes = 0
     while chunk := source.read(2**20):
-        copied += len(chunk)
-        if copied > length:
+        copied_bytes += len(chunk)
+        if copied_bytes > length:
             raise ImageError("is damaged: its merged picture is longer than declared")
         target.write(chunk)

@@ -54,10 +54,10 @@ def write_png_16(
     with replacing(path) as temporary:
         output = OpenImageIO.ImageOutput.create("png")
         assert output is not None  # OpenImageIO is always built with PNG
-        done = output.open(str(temporary), spec) and output.write_image(
+        is_written = output.open(str(temporary), spec) and output.write_image(
             np.ascontiguousarray(values)
         )
-        if not (output.close() and done):
+        if not (output.close() and is_written):
             raise OutputError(f"cannot write {path}: {output.geterror() or 'no reason given'}")
 
 

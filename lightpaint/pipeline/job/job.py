@@ -236,10 +236,10 @@ class Job:
             raise LightpaintError("give a scene, a basis, or both")
         if not self.targets:
             raise TargetError("no painting to solve for: give a target")
-        several = len(self.targets) > 1 or len(self.scenes) > 1
-        if several and self.basis is not None:
+        has_several_views = len(self.targets) > 1 or len(self.scenes) > 1
+        if has_several_views and self.basis is not None:
             raise BasisError("a basis has only one view: give the scene to solve for several")
-        if several and self.settings.suggest:
+        if has_several_views and self.settings.suggest:
             raise LightpaintError("lights can be suggested for one view only: leave out the others")
         if self.scenes and len(self.targets) != len(self.scenes):
             raise TargetError(
@@ -307,10 +307,12 @@ class Job:
             check_same_picture(target, scene)
         if scene is not None and basis is None:
             scene = on_film(scene, self.settings.quality, self._resolution(scene, target))
-        sized = scene if basis is None else basis
-        assert sized is not None
-        resized = target.fitted_to(sized.size, resize=self.settings.resize)
-        return scene, resized if self.groups is None else resized.without(self.groups.holes)
+        sized_source = scene if basis is None else basis
+        assert sized_source is not None
+        resized_target = target.fitted_to(sized_source.size, resize=self.settings.resize)
+        return scene, resized_target if self.groups is None else resized_target.without(
+            self.groups.holes
+        )
 
     def _resolution(self, scene: Scene, target: Target) -> str | None:
         """Return the resolution in the settings, else that of a smaller painted template."""
@@ -325,13 +327,13 @@ class Job:
         remarks = []
         if self.groups is not None:
             remarks += [*self.groups.remarks, *spoken_unreadable(self.groups, self.folder)]
-        rendered = [] if self.basis is not None else [x.scene for x in self.views if x.scene]
+        rendered_scenes = [] if self.basis is not None else [x.scene for x in self.views if x.scene]
         if (first := self.views[0].scene) is not None:
-            remarks += remarks_of_scene(first, is_rendered=bool(rendered))
-        films = [scene.size for scene in scenes] if rendered else [None] * len(targets)
+            remarks += remarks_of_scene(first, is_rendered=bool(rendered_scenes))
+        films = [scene.size for scene in scenes] if rendered_scenes else [None] * len(targets)
         for target, view, film in zip(targets, self.views, films, strict=True):
             remarks += remarks_of_target(target, view.target.size, view.scene, self.fit, film=film)
-        for scene in rendered:
+        for scene in rendered_scenes:
             remarks += [*remarks_of_film(scene, self.settings), *remarks_of_memory(scene)]
         return remarks + remarks_of_pictures()
 

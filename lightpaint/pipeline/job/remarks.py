@@ -45,9 +45,9 @@ def remarks_of_film(scene: Scene, settings: Settings) -> list[str]:
     film, remarks = scene.film, []
     width, height = film.pixels
     if any(film.left_out):
-        whole = "x".join(map(str, film.crop_size))
+        film_text = "x".join(map(str, film.crop_size))
         remarks.append(
-            f"film of {whole} reduced to {width}x{height} blocks of {film.block}x{film.block} "
+            f"film of {film_text} reduced to {width}x{height} blocks of {film.block}x{film.block} "
             f"pixels: {_remainder_text(film.left_out)} left over and ignored"
         )
     max_pixels = None
@@ -61,9 +61,12 @@ def remarks_of_film(scene: Scene, settings: Settings) -> list[str]:
     return remarks
 
 
-def _remainder_text(rest: tuple[int, int]) -> str:
-    """Return `3 columns of pixels at the right and 1 row at the bottom are`. rest: their counts."""
-    columns, rows = rest
+def _remainder_text(remainder: tuple[int, int]) -> str:
+    """Return `3 columns of pixels at the right and 1 row at the bottom are`.
+
+    remainder: their counts.
+    """
+    columns, rows = remainder
     parts = [f"{columns} column{'s' * (columns > 1)} of pixels at the right"] * bool(columns)
     parts += [f"{rows} row{'s' * (rows > 1)} at the bottom"] * bool(rows)
     return f"{' and '.join(parts)} {'is' if columns + rows == 1 else 'are'}"
@@ -76,12 +79,12 @@ def remarks_of_pictures() -> list[str]:
 
 def remarks_of_memory(scene: Scene) -> list[str]:
     """Return a remark if the basis of `scene` takes much memory."""
-    needed = memory_needed(scene, in_bands=renders_in_bands(scene))
-    if needed <= MUCH_MEMORY:
+    needed_bytes = memory_needed(scene, in_bands=renders_in_bands(scene))
+    if needed_bytes <= MUCH_MEMORY:
         return []
     return [
         f"{len(scene.lights)} lights of {scene.size[1]}x{scene.size[0]} pixels: "
-        f"up to {needed / 1e9:.1f} GB of memory"
+        f"up to {needed_bytes / 1e9:.1f} GB of memory"
     ]
 
 
@@ -104,10 +107,10 @@ def remarks_of_target(
     (height, width), (mine_h, mine_w) = size, target.size
     is_asked_for = fit.resize or fit.resolution or fit.quality
     if size != target.size and not is_asked_for:
-        rest = left_over(target.size, whole_factor(target.size, size) or 1)
+        remainder = left_over(target.size, whole_factor(target.size, size) or 1)
         remark = f"{mine_w}x{mine_h} pixels averaged to the basis's {width}x{height}"
-        if any(rest):
-            remark += f": {_remainder_text((rest[1], rest[0]))} left over and ignored"
+        if any(remainder):
+            remark += f": {_remainder_text((remainder[1], remainder[0]))} left over and ignored"
         remarks.append(remark)
     if film not in (None, size) and not is_asked_for:
         remarks.append(f"solved at {width}x{height} pixels, the size of its template")

@@ -131,9 +131,9 @@ class Settings(Fit):
                 "rendering time, not both"
             )
         if self.error is not None and (self.spp is not None or self.exact_spp):
-            given = f"spp {self.spp}" if self.exact_spp is False else "exact_spp True"
+            given_text = f"spp {self.spp}" if self.exact_spp is False else "exact_spp True"
             raise LightpaintError(
-                f"error is {self.error:g} and {given}: expected either the largest error of a "
+                f"error is {self.error:g} and {given_text}: expected either the largest error of a "
                 "light, or a number of samples"
             )
         if self.exact_spp and self.time_s is not None:

@@ -24,9 +24,9 @@ from lightpaint.target.target import Target
 from lightpaint.target.target_reader import Paint, read_over_look, read_target
 
 #: Settings of sampling, of rendering, and those that light groups do not support.
-SAMPLED = ("spp", "exact_spp", "time_s", "error", "quality", "resolution")
-RENDERED = (*SAMPLED, "refine", "suggest", "verify_spp")
-NOT_IN_GROUPS = (*RENDERED, "seed", "noise_correction", "cd_per_unit", "emitters")
+SAMPLING_SETTINGS = ("spp", "exact_spp", "time_s", "error", "quality", "resolution")
+RENDER_SETTINGS = (*SAMPLING_SETTINGS, "refine", "suggest", "verify_spp")
+NOT_IN_GROUPS = (*RENDER_SETTINGS, "seed", "noise_correction", "cd_per_unit", "emitters")
 
 
 class ReadOnce:
@@ -205,7 +205,7 @@ def check_nothing_unused(settings: Settings, basis: Any) -> None:
 
     basis: a saved one, or light groups.
     """
-    names = NOT_IN_GROUPS if isinstance(basis, LightGroups | GroupsFile) else RENDERED
+    names = NOT_IN_GROUPS if isinstance(basis, LightGroups | GroupsFile) else RENDER_SETTINGS
     default = Settings()
-    idle = [name for name in names if getattr(settings, name) != getattr(default, name)]
-    check_needed(idle, basis)
+    unused_settings = [name for name in names if getattr(settings, name) != getattr(default, name)]
+    check_needed(unused_settings, basis)

@@ -15,10 +15,10 @@ def hung_of(placement: Placement | PlacementRecord, lighting: Lighting | None) -
     """Return the changes of a placement and the lights of an answer; none without a placement."""
     changes = [_change_of(change) for change in all_changes(placement)]
     changes.sort(key=lambda change: -change.numbers["gain_share"])
-    missed = placement.missed_before, placement.missed_after
+    missed_shares = placement.missed_before, placement.missed_after
     lights = () if lighting is None else hung_lights(lighting)
-    up = (0.0, 1.0, 0.0) if lighting is None else lighting.up
-    return HungLights(lights, tuple(changes), up, *missed, placement.looks)
+    up_axis = (0.0, 1.0, 0.0) if lighting is None else lighting.up
+    return HungLights(lights, tuple(changes), up_axis, *missed_shares, placement.looks)
 
 
 def all_changes(placement: Placement | PlacementRecord) -> list[Move | AddedLight]:
@@ -41,26 +41,26 @@ def _change_of(change: Move | AddedLight) -> LightChange:
 def spoken_change(change: Move | AddedLight) -> str:
     """Return a light's change and gain: `spot_knot turned by 12°, slid 0.6: a fifth …`."""
     if isinstance(change, Move):
-        done = spoken_move(change)
+        phrase = spoken_move(change)
     else:
         x, y, z = (f"{v:.2f}" for v in change.site.position or (0.0, 0.0, 0.0))
-        done = f"a new {change.emitter.kind} at ({x}, {y}, {z})".replace("-", "−")
+        phrase = f"a new {change.emitter.kind} at ({x}, {y}, {z})".replace("-", "−")
         if change.place_error:
-            done += f" ± {change.place_error:.1g}"
-    text = f"{change.name} {done}: {spoken_fraction(change.gain_share)} of what was missed"
+            phrase += f" ± {change.place_error:.1g}"
+    text = f"{change.name} {phrase}: {spoken_fraction(change.gain_share)} of what was missed"
     return f"{text}; {HARDLY_VISIBLE}" if change.is_hardly_visible else text
 
 
 def spoken_move(move: Move) -> str:
     """Return a light's change with its errors: `turned by 12° ± 1°, slid 0.6 ± 0.05`."""
-    done = []
+    phrases = []
     if move.turn >= 0.5:
         error = f" ± {move.turn_error:.1g}°" if (move.turn_error or 0) >= LEAST_TURN_ERROR else ""
-        done.append(f"turned by {move.turn:.0f}°{error}")
+        phrases.append(f"turned by {move.turn:.0f}°{error}")
     if move.distance > 0:
         is_told = (move.place_error or 0) >= LEAST_SHARE * move.distance
         error = f" ± {move.place_error:.1g}" if is_told else ""
-        done.append(f"slid {move.distance:.2g}{error}")
+        phrases.append(f"slid {move.distance:.2g}{error}")
     if move.new.cutoff is not None and move.new.cutoff != move.old.cutoff:
-        done.append(f"its cone ends at {move.new.cutoff:.0f}° (was {move.old.cutoff:.0f}°)")
-    return ", ".join(done)
+        phrases.append(f"its cone ends at {move.new.cutoff:.0f}° (was {move.old.cutoff:.0f}°)")
+    return ", ".join(phrases)

@@ -67,21 +67,21 @@ class ResultFolder:
         finish(self.folder)
         check_writable(self.folder)
         record = self._record()
-        replaced = dict.fromkeys(self._obsolete(record) + list(self.files))
-        check_files([*replaced, self.folder / RECORD], self.reads)
-        existing = [file for file in replaced if os.path.lexists(file)]
+        replaced_files = dict.fromkeys(self._obsolete(record) + list(self.files))
+        check_files([*replaced_files, self.folder / RECORD], self.reads)
+        existing_files = [file for file in replaced_files if os.path.lexists(file)]
         if self._read_record() is None and os.path.lexists(self.folder / RECORD):
-            existing.append(self.folder / RECORD)
-        if self.force or not existing or (record is None and self._belongs_to_lighting):
+            existing_files.append(self.folder / RECORD)
+        if self.force or not existing_files or (record is None and self._belongs_to_lighting):
             return
         if record is None:
-            raise self._unrecorded(existing)
+            raise self._unrecorded(existing_files)
         if not self._is_own(record):
             raise OutputError(
                 f"{self.folder} holds the answer to {self._names_of(record.answers)}, not to "
                 f"{self._names_of(self._answers)}: {REMEDY}"
             )
-        for file in existing:
+        for file in existing_files:
             checksum = record.files.get(file.relative_to(self.folder).as_posix())
             if checksum is None:
                 raise OutputError(f"{file} exists and is not a result of lightpaint: {REMEDY}")
@@ -150,15 +150,15 @@ class ResultFolder:
         except (LightpaintError, ValueError):
             return None
 
-    def _write_record(self, stage: Path, earlier: _Record | None) -> None:
+    def _write_record(self, stage: Path, earlier_record: _Record | None) -> None:
         """Record the files in `stage`, and their sources."""
         answers, files = tuple(self._answers), {}
         if self._belongs_to_lighting:
-            if earlier is None:  # results of an older version stay without a record
+            if earlier_record is None:  # results of an older version stay without a record
                 return
-            answers, files = earlier.answers, dict(earlier.files)
-        written = sorted(file for file in stage.rglob("*") if file.is_file())
-        files |= {file.relative_to(stage).as_posix(): _checksum(file) for file in written}
+            answers, files = earlier_record.answers, dict(earlier_record.files)
+        written_files = sorted(file for file in stage.rglob("*") if file.is_file())
+        files |= {file.relative_to(stage).as_posix(): _checksum(file) for file in written_files}
         record = asdict(_Record(FORMAT, answers, files))
         write_text(stage / RECORD, json.dumps(record, indent=2, ensure_ascii=False) + "\n")
 
@@ -172,14 +172,16 @@ class ResultFolder:
         ]
         return one_line(" and ".join(names))
 
-    def _unrecorded(self, existing: list[Path]) -> OutputError:
+    def _unrecorded(self, existing_files: list[Path]) -> OutputError:
         """Return the error for a folder without a record."""
-        if self.folder / "lighting.json" in existing:
+        if self.folder / "lighting.json" in existing_files:
             return OutputError(
                 f"{self.folder} holds results of an older lightpaint, which do not name their "
                 f"painting: {REMEDY}"
             )
-        return OutputError(f"{existing[0]} exists and is not a result of lightpaint: {REMEDY}")
+        return OutputError(
+            f"{existing_files[0]} exists and is not a result of lightpaint: {REMEDY}"
+        )
 
 
 def is_as_written(folder: Path) -> bool:
@@ -203,7 +205,7 @@ def _checksum(file: Path) -> str:
     if not file.is_file():
         return ""
     crc = 0
-    with file.open("rb") as opened:
-        while data := opened.read(2**24):
+    with file.open("rb") as stream:
+        while data := stream.read(2**24):
             crc = zlib.crc32(data, crc)
     return f"{crc:08x}"

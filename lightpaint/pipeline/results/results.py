@@ -194,15 +194,15 @@ def write_report(folder: Path, look: Look, *, command: str, is_shown: bool = Tru
         write_text(folder / "report.json", report_numbers(**arguments))
         return
     verified = look.verification.verified.image if look.verification else None
-    larger = None
+    larger_features = None
     if look.relit is not None and verified is not None:
         height, width = size = verified.shape[:2]
         if size != look.basis.size:
             is_whole = size == look.relit.size
             film = look.relit if is_whole else look.relit.reduced(f"{width}x{height}")
-            larger = render_features(film)
+            larger_features = render_features(film)
     weights, predicted = look.solution.weights, look.predicted.image
-    looks = CleanLooks.clean(look.basis, weights, predicted, verified, larger=larger)
+    looks = CleanLooks.clean(look.basis, weights, predicted, verified, larger=larger_features)
     transform = report_transform(look.target, look.basis, predicted)
     missed = residual_of(look.solution, predicted, transform=transform)
 

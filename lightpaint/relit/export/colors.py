@@ -10,7 +10,7 @@ from lightpaint.lighting.answer.light_setting import LightSetting
 from lightpaint.lighting.answer.lighting import Lighting
 
 #: Width of a 95 % interval, relative to the brightest channel, above which a light is hardly known.
-WIDE = 1.0
+UNBOUNDED = 1.0
 
 
 def with_own_colors(
@@ -36,25 +36,37 @@ def with_own_colors(
 
 def _own_color(light: LightSetting, present: RGB) -> RGB | None:
     """Return the emission in the scene's colour; None if the painting determines another colour."""
-    color, solved = np.array(present, np.float64), np.array(light.emission, np.float64)
+    color, solved_emission = np.array(present, np.float64), np.array(light.emission, np.float64)
     ends = light.interval
-    if light.is_fixed or light.constraint or ends is None or not color.any() or not solved.any():
+    if (
+        light.is_fixed
+        or light.constraint
+        or ends is None
+        or not color.any()
+        or not solved_emission.any()
+    ):
         return None
     ends_known = [x for x in ends if x is not None]
-    if len(ends_known) < 3 or max(high - low for low, high in ends_known) <= WIDE * solved.max():
+    if (
+        len(ends_known) < 3
+        or max(high - low for low, high in ends_known) <= UNBOUNDED * solved_emission.max()
+    ):
         return None
     if np.allclose(
-        solved * color.max(), color * solved.max(), rtol=0, atol=1e-6 * color.max() * solved.max()
+        solved_emission * color.max(),
+        color * solved_emission.max(),
+        rtol=0,
+        atol=1e-6 * color.max() * solved_emission.max(),
     ):
         return None  # it has that colour already
     # The range of factors for the present emission that fits all channels.
-    least, most = 0.0, np.inf
+    lowest, highest = 0.0, np.inf
     for (low, high), value in zip(ends_known, color, strict=True):
         if value == 0:
-            least = least if low <= 0 else np.inf
+            lowest = lowest if low <= 0 else np.inf
         else:
-            least, most = max(least, low / value), min(most, high / value)
-    if least > most:
+            lowest, highest = max(lowest, low / value), min(highest, high / value)
+    if lowest > highest:
         return None
-    times = float(luminance(solved)) / float(luminance(color))
-    return as_rgb(color * min(max(times, least), most))
+    times = float(luminance(solved_emission)) / float(luminance(color))
+    return as_rgb(color * min(max(times, lowest), highest))

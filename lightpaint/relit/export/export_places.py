@@ -31,8 +31,8 @@ def has_new_cone(place: EmitterPlace) -> bool:
     """Return whether the cone of a spot differs from that in the scene's file."""
     if place.cutoff is None or place.moved_from is None:
         return bool(place.new) and place.cutoff is not None
-    old = place.moved_from
-    return (old.cutoff, old.beam) != (place.cutoff, place.beam)
+    old_place = place.moved_from
+    return (old_place.cutoff, old_place.beam) != (place.cutoff, place.beam)
 
 
 def axis_conversions(up: Position, program_up: Position) -> list[Doubles]:
@@ -99,11 +99,11 @@ def conversion_of(
     ]
     size = float(np.abs(places_known).max(initial=0.0))
     pairs = [
-        (old, present[place.name])
+        (old_place, present[place.name])
         for place in places
-        if place.name in present and (old := old_position(place)) is not None
+        if place.name in present and (old_place := old_position(place)) is not None
     ]
     conversions = [Conversion(rotation, size) for rotation in rotations]
     counts = [sum(way.is_at(a, b) for a, b in pairs) for way in conversions]
-    best = int(np.argmax(counts))
-    return replace(conversions[best], is_known=not pairs or counts[best] > 0)
+    best_index = int(np.argmax(counts))
+    return replace(conversions[best_index], is_known=not pairs or counts[best_index] > 0)

@@ -93,13 +93,13 @@ def lights_table(groups: LightGroups, lighting: Lighting) -> str:
         stops = f"{round(math.log2(y), 3) + 0.0:+.3f}" if y > 0 else "off"
         stops = "unknown" if light.name in unreached else stops
         numbers = [f"{v:.9g}" for v in (*light.weight, y)]
-        fixed = "yes" if light.is_fixed else "no"
+        is_fixed_text = "yes" if light.is_fixed else "no"
         # Undetermined channels, whose multipliers are unchanged.
-        untold = "".join(
+        notes_html = "".join(
             c for c, is_reached in zip("RGB", light.reached, strict=True) if not is_reached
         )
         names = map(plain_cell, (light.name, layers.get(light.name, "")))
-        rows.append(_row(*names, *numbers, stops, fixed, untold))
+        rows.append(_row(*names, *numbers, stops, is_fixed_text, notes_html))
     return "".join(rows)
 
 

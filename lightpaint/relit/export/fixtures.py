@@ -98,20 +98,20 @@ def fixtures_of(lighting: Lighting) -> list[Fixture]:
 
 
 def _fixture(lighting: Lighting, light: LightSetting, full: Mapping[str, float]) -> Fixture:
-    measured = lighting.photometry(light)
+    light_photometry = lighting.photometry(light)
     dmx = None if light.is_fixed else dmx_of(light.emission, full[light.unit])
     return Fixture(
         light.name,
         light.members,
         light.unit,
         *light.emission,
-        measured.y,
-        measured.hex,
-        measured.kelvin,
-        measured.duv,
-        measured.luminous,
-        measured.luminous_unit,
-        measured.flux_lm,
+        light_photometry.y,
+        light_photometry.hex,
+        light_photometry.kelvin,
+        light_photometry.duv,
+        light_photometry.luminous,
+        light_photometry.luminous_unit,
+        light_photometry.flux_lm,
         dmx,
         _place_of(lighting, light),
     )
@@ -132,16 +132,16 @@ def _place_of(lighting: Lighting, light: LightSetting) -> FixturePlace | None:
 def pan_and_tilt(direction: Position, up: Position) -> tuple[float, float]:
     """Return pan and tilt in degrees, as in `FixturePlace`; straight down has a pan of 0."""
     axis, way = np.array(up), np.array(direction)
-    ahead = np.array([0.0, 0.0, -1.0]) if abs(axis[1]) > 0.5 else np.array([0.0, 1.0, 0.0])
+    forward = np.array([0.0, 0.0, -1.0]) if abs(axis[1]) > 0.5 else np.array([0.0, 1.0, 0.0])
     if abs(axis[0]) > 0.5:
-        ahead = np.array([0.0, 0.0, 1.0])
-    right = np.cross(ahead, axis)
+        forward = np.array([0.0, 0.0, 1.0])
+    right = np.cross(forward, axis)
     tilt = math.degrees(math.acos(float(np.clip(-way @ axis, -1, 1))))
-    sideways, along = float(way @ right), float(way @ ahead)
-    if math.hypot(sideways, along) < 1e-6:
+    sideways, forward_part = float(way @ right), float(way @ forward)
+    if math.hypot(sideways, forward_part) < 1e-6:
         return 0.0, tilt
     # Adding 0 removes the sign of a negative zero.
-    return round(math.degrees(math.atan2(sideways, along)), 6) + 0.0, tilt
+    return round(math.degrees(math.atan2(sideways, forward_part)), 6) + 0.0, tilt
 
 
 def dmx_of(emission: RGB, full: float) -> Dmx:
@@ -169,10 +169,10 @@ def fixtures_csv(lighting: Lighting) -> str:
     table.writerow(COLUMNS)
     for fixture in fixtures_of(lighting):
         record = asdict(fixture)
-        sent = record.pop("dmx") or dict.fromkeys(("dimmer", "red", "green", "blue"))
+        dmx_values = record.pop("dmx") or dict.fromkeys(("dimmer", "red", "green", "blue"))
         place = record.pop("place") or asdict(FixturePlace())
         record["emitters"] = " ".join(fixture.emitters)
-        cells = (*record.values(), *sent.values(), *place.values())
+        cells = (*record.values(), *dmx_values.values(), *place.values())
         table.writerow([_cell(value) for value in cells])
     return text.getvalue()
 

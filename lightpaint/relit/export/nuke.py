@@ -88,10 +88,10 @@ def spoken_unreadable(groups: LightGroups, folder: Path) -> list[str]:
     if not (bad := [file for file in files if _is_evaluated(file)]):
         return []
     # The path may be printed to a terminal.
-    listed = one_line(str(bad[0])) + (f" and {len(bad) - 1} more" if len(bad) > 1 else "")
+    names_text = one_line(str(bad[0])) + (f" and {len(bad) - 1} more" if len(bad) > 1 else "")
     characters = "".join(sorted({c for file in bad for c in EVALUATED.findall(_path(file))}))
     return [
-        f"Nuke would evaluate {one_line(characters)} in the path {listed}: relit.nk leaves it "
+        f"Nuke would evaluate {one_line(characters)} in the path {names_text}: relit.nk leaves it "
         "out: choose it by hand in the Read nodes, or rename it"
     ]
 
@@ -132,8 +132,8 @@ def nuke_layer(layer: RenderLayer) -> str:
 
 def _in_nuke(name: str) -> str:
     pieces = [piece.lstrip("0123456789") for piece in name.split(".")]
-    spoken = "_".join(piece for piece in pieces if piece).encode("utf-8", "surrogateescape")
-    return re.sub(rb"[^A-Za-z0-9]", b"_", spoken).decode("ascii")
+    name_text = "_".join(piece for piece in pieces if piece).encode("utf-8", "surrogateescape")
+    return re.sub(rb"[^A-Za-z0-9]", b"_", name_text).decode("ascii")
 
 
 def _copied_names(groups: LightGroups) -> list[str]:
@@ -151,8 +151,8 @@ def _sources(groups: LightGroups, folder: Path) -> tuple[list[_Source], _Source 
         *lights, beauty = (_Source(file, name) for name in _copied_names(groups))
         return lights, beauty if groups.beauty is not None else None
     sources = [_Source(x.file, nuke_layer(x)) for x in groups.layers]
-    whole = groups.beauty
-    return sources, None if whole is None else _Source(whole.file, nuke_layer(whole))
+    layer = groups.beauty
+    return sources, None if layer is None else _Source(layer.file, nuke_layer(layer))
 
 
 def _file_knobs(file: Path) -> dict[str, str]:

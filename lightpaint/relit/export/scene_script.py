@@ -66,22 +66,22 @@ def scene_script(
 def _placed(places: Sequence[EmitterPlace], up: Position) -> dict[str, str]:
     """Return the places in the form of the script, in the scene's axes."""
     rotations = axis_conversions(up, UP)
-    own = conversion_of(places, [np.eye(3)], {})
+    own_conversion = conversion_of(places, [np.eye(3)], {})
     present = {place.name: old for place in places if (old := old_position(place)) is not None}
-    moved, added = {}, {}
+    moved_places, new_places = {}, {}
     for place in filter(is_changed, places):
         cone = _cone(place) if has_new_cone(place) else None
         if place.new:
-            axes = own.frame(place).tolist()
-            added[place.name] = (LAMPS[place.new], place.position, axes, cone, place.size)
+            axes = own_conversion.frame(place).tolist()
+            new_places[place.name] = (LAMPS[place.new], place.position, axes, cone, place.size)
         else:
-            moved[place.name] = (place.position, place.direction, cone)
+            moved_places[place.name] = (place.position, place.direction, cone)
     return {
         "rotations": repr([np.round(rotation, 12).tolist() for rotation in rotations]),
         "present": _table(present),
-        "same_place": repr(SAME_PLACE * own.size),
-        "moved": _table(moved),
-        "added": _table(added),
+        "same_place": repr(SAME_PLACE * own_conversion.size),
+        "moved": _table(moved_places),
+        "added": _table(new_places),
     }
 
 

@@ -78,12 +78,12 @@ def usd_overrides(
     check_usd()
     from pxr import Sdf
 
-    opened = None if stage is None else _opened(stage)
+    opened_stage = None if stage is None else _opened(stage)
     layer = Sdf.Layer.CreateAnonymous(".usda")
     layer.comment = about
     # The layer's own stage is closed when this call returns: while open, it would look for
     # sublayers as soon as there are any, starting from a layer without a path.
-    left, unplaced = _write_lights(layer, opened, list(emitters), places, up)
+    left, unplaced = _write_lights(layer, opened_stage, list(emitters), places, up)
     if stage is not None:
         layer.subLayerPaths.append(Path(os.path.relpath(stage, folder)).as_posix())
         _like(layer, stage)
@@ -92,7 +92,7 @@ def usd_overrides(
 
 def _write_lights(
     layer: Any,
-    opened: Any,
+    opened_stage: Any,
     emitters: Sequence[tuple[str, str, RGB]],
     places: Sequence[EmitterPlace],
     up: Position,
@@ -102,19 +102,19 @@ def _write_lights(
 
     layer_stage = Usd.Stage.Open(layer)
     names = dict.fromkeys([*(name for name, _, _ in emitters), *(x.name for x in places)])
-    if opened is None:
+    if opened_stage is None:
         new = {place.name for place in places if place.new}
         prims = _assumed_prims(name for name in names if name not in new)
     else:
-        prims = _prims_of(opened, names)
-    writer = UsdPlaces(layer_stage, opened, prims, places, up)
-    lit = {**prims, **writer.add_new(_scope(opened))}
+        prims = _prims_of(opened_stage, names)
+    writer = UsdPlaces(layer_stage, opened_stage, prims, places, up)
+    light_prims = {**prims, **writer.add_new(_scope(opened_stage))}
     left = []
     for name, parameter, emission in emitters:
-        if parameter not in NORMALIZED or name not in lit:
+        if parameter not in NORMALIZED or name not in light_prims:
             left.append(name)
             continue
-        path, kind = lit[name]
+        path, kind = light_prims[name]
         _override(layer_stage.OverridePrim(path), kind, parameter, emission)
     return tuple(left), writer.move()
 
@@ -126,11 +126,11 @@ def _assumed_prims(names: Iterable[str]) -> dict[str, tuple[str, str]]:
     return {name: (f"{SCOPE}/{Tf.MakeValidIdentifier(name)}", "SphereLight") for name in names}
 
 
-def _prims_of(opened: Any, names: Iterable[str]) -> dict[str, tuple[str, str]]:
+def _prims_of(opened_stage: Any, names: Iterable[str]) -> dict[str, tuple[str, str]]:
     """Return path and type of the lights that occur exactly once in the stage."""
     from pxr import Tf
 
-    stage_lights, prims = _lights_of(opened), {}
+    stage_lights, prims = _lights_of(opened_stage), {}
     for name in names:
         types = stage_lights.get(name) or stage_lights.get(Tf.MakeValidIdentifier(name)) or {}
         if len(types) == 1:
@@ -138,9 +138,9 @@ def _prims_of(opened: Any, names: Iterable[str]) -> dict[str, tuple[str, str]]:
     return prims
 
 
-def _scope(opened: Any) -> str:
+def _scope(opened_stage: Any) -> str:
     """Return the path of the parent of new lights."""
-    if opened is None or not (root := opened.GetDefaultPrim()):
+    if opened_stage is None or not (root := opened_stage.GetDefaultPrim()):
         return SCOPE
     return f"{root.GetPath()}{SCOPE}"
 
@@ -173,12 +173,12 @@ def _opened(stage: Path) -> Any:
         raise OutputError(f"{stage} is not a USD stage: {message}") from None
 
 
-def _lights_of(opened: Any) -> Mapping[str, dict[str, str]]:
+def _lights_of(opened_stage: Any) -> Mapping[str, dict[str, str]]:
     """Return path and type of each light of a stage, by name."""
     from pxr import UsdLux
 
     by_path: dict[str, dict[str, str]] = {}
-    for prim in opened.Traverse():
+    for prim in opened_stage.Traverse():
         if prim.HasAPI(UsdLux.LightAPI):
             for name in dict.fromkeys((prim.GetName(), prim.GetDisplayName())):
                 if name:

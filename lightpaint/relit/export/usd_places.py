@@ -71,13 +71,13 @@ class UsdPlaces:
         """
         from pxr import Tf, UsdLux
 
-        added: dict[str, tuple[str, str]] = {}
-        used = self._children(scope)
+        added_prims: dict[str, tuple[str, str]] = {}
+        used_names = self._children(scope)
         for place in self._changed:
             if not place.new or place.name in self._prims or not self._conversion.is_known:
                 continue
-            identifier = free_name(Tf.MakeValidIdentifier(place.name), used)
-            used.add(identifier)
+            identifier = free_name(Tf.MakeValidIdentifier(place.name), used_names)
+            used_names.add(identifier)
             path, schema = f"{scope}/{identifier}", SCHEMAS[place.new]
             prim = self._defined(scope, path, schema)
             if identifier != place.name:
@@ -91,8 +91,8 @@ class UsdPlaces:
                 UsdLux.SphereLight(prim).CreateTreatAsPointAttr(True)
                 UsdLux.SphereLight(prim).CreateRadiusAttr(RADIUS)
             self._place(path, place, None)
-            added[place.name] = path, schema
-        return added
+            added_prims[place.name] = path, schema
+        return added_prims
 
     def move(self) -> tuple[str, ...]:
         """Set the places of lights that moved; return the names of those that were left unchanged.

@@ -19,7 +19,7 @@ COLOR_MEANINGS: dict[Colors, str] = {
 }
 
 #: Headings of the table.
-HEADS = ("light colours", "mean ΔE", "what would change")
+HEADINGS = ("light colours", "mean ΔE", "what would change")
 
 #: ΔE by which a closer choice is mentioned at once, and below which it is as close.
 MIN_GAIN, SAME_DELTA_E = 1.0, 0.1
@@ -79,7 +79,7 @@ def colors_section(choices: Choices) -> str:
     return (
         "<section><h2>What light colours cost</h2>"
         "<p>How close the lights would come with each setting of <code>colors</code>, all else "
-        f"equal. These are quick estimates.</p>{table(HEADS, rows, kind='choices')}</section>"
+        f"equal. These are quick estimates.</p>{table(HEADINGS, rows, kind='choices')}</section>"
     )
 
 

@@ -72,8 +72,8 @@ def _curve(solution: Solution, free: Solution) -> str:
         *((_lights(count), missed) for count, missed in curve if (count, missed) not in points),
     ]
     rows = [row(label, share_cell(spoken_percent(x), min(x, 1.0))) for label, x in entries]
-    heads = ("lights on, the best set found", "missed")
-    return f"<div>{table(heads, rows, shown=len(points) + 1)}</div>"
+    headings = ("lights on, the best set found", "missed")
+    return f"<div>{table(headings, rows, shown=len(points) + 1)}</div>"
 
 
 def _numbers(

@@ -26,7 +26,7 @@ from lightpaint.report.answer_pictures import (
 from lightpaint.threads import parallel_map
 
 #: Ends of the importance map's legend, as `importance_picture` shows a mid grey.
-UNCOUNTED, COUNTED = "#393939", "#e8d8a2"
+UNCOUNTED_COLOR, COUNTED_COLOR = "#393939", "#e8d8a2"
 
 #: Colours of a signed quantity from its lower to its upper end, for the legend.
 SIGNED = [f"rgb({red} {green} {blue})" for red, green, blue in to_8_bit(DIVERGING)]
@@ -114,9 +114,9 @@ def resized(image: Floats, factor: float) -> Floats:
 def exposure_of(image: Floats, emitters_seen: npt.NDArray[np.bool_]) -> float:
     """Return the stops that make a light's 98th percentile white, without visible emitters."""
     bright = largest(image)
-    lit = bright[(bright > 0) & ~emitters_seen]
-    lit = lit if lit.size else bright[bright > 0]
-    return float(np.round(-np.log2(np.percentile(lit, 98)), 1)) if lit.size else 0.0
+    brightest = bright[(bright > 0) & ~emitters_seen]
+    brightest = brightest if brightest.size else bright[bright > 0]
+    return float(np.round(-np.log2(np.percentile(brightest, 98)), 1)) if brightest.size else 0.0
 
 
 def _raw_uri(look: PagePicture) -> str:
@@ -132,18 +132,18 @@ def wipe(looks: list[PagePicture]) -> str:
     # The prediction first: it is the answer, and less noisy than the render that checks it.
     a, b = (next(k for k, x in enumerate(looks) if x.name == n) for n in ("painting", "answer"))
 
-    def choices(chosen: int) -> str:
+    def choices(selected_index: int) -> str:
         return "".join(
-            f'<option value="{k}"{" selected" if k == chosen else ""}>{look.name}</option>'
+            f'<option value="{k}"{" selected" if k == selected_index else ""}>{look.name}</option>'
             for k, look in enumerate(looks)
         )
 
-    shown = parallel_map(lambda look: data_uri(look.pixels), looks)
+    uris = parallel_map(lambda look: data_uri(look.pixels), looks)
     raw = parallel_map(_raw_uri, looks)
     images = "".join(
         f'<img class="{"is-a" if k == a else "is-b" if k == b else ""}" data-look="{k}" '
         f'width="{width}" height="{height}" draggable="false" alt="{look.name}: {look.alt}" '
-        f'src="{shown[k]}">'
+        f'src="{uris[k]}">'
         for k, look in enumerate(looks)
     )
     images += "".join(
@@ -202,7 +202,9 @@ def maps(
             ),
             f"How much each pixel counts: {solution.importance.mean():.2g} on average, "
             f"{solution.importance.max():.3g} at most.",
-            scale([UNCOUNTED, COUNTED], "hatched: does not count", "yellow: counts fully"),
+            scale(
+                [UNCOUNTED_COLOR, COUNTED_COLOR], "hatched: does not count", "yellow: counts fully"
+            ),
         ),
     ]
     if verification is not None:

@@ -50,9 +50,9 @@ def fit_table(solution: Solution) -> str:
     ]
     total = relative_residual(solution)
     # One path carries all channels, so that their errors go together.
-    whole = "" if errors is None else f" ± {errors.sum() / norm2.sum():.1g}"
+    total_text = "" if errors is None else f" ± {errors.sum() / norm2.sum():.1g}"
     rows.append(
-        f'<tr class="total"><th scope="row">all</th><td>{total**2:.3g}{whole}</td>'
+        f'<tr class="total"><th scope="row">all</th><td>{total**2:.3g}{total_text}</td>'
         f"<td>{total:.3g}</td>"
         f"<td>{max(q.kkt_residual):.1e}</td><td>{max(q.sweeps)}</td></tr>"
     )
@@ -64,12 +64,12 @@ def verification_table(verification: Verification | None) -> str:
     if verification is None:
         return facts([("Result", "not verified")])
     v = verification
-    means = ", ".join(f"{value:+.2f}" for value in v.z_mean).replace("-", "−")
+    means_text = ", ".join(f"{value:+.2f}" for value in v.z_mean).replace("-", "−")
     return facts(
         [
             ("Result", "agrees within noise" if v.agrees else "DISAGREES beyond noise"),
             ("RMSE of the pixels", f"{v.rmse:.3g}; noise alone gives {v.noise_rmse:.3g}"),
-            ("z of the whole image", f"{means} (R, G, B); limit ±{v.limit:.3g}"),
+            ("z of the whole image", f"{means_text} (R, G, B); limit ±{v.limit:.3g}"),
             ("z of the pattern", f"{v.z_pattern:+.2f}; limit {v.limit:.3g}".replace("-", "−")),
             ("z of 8×8 blocks, RMS", f"{v.z_rms:.3f}; about 1 is noise"),
             ("ΔE2000", f"mean {v.delta_e_mean:.2f}; 95 % of pixels below {v.delta_e_95:.2f}"),
@@ -90,8 +90,8 @@ def _light_tests(v: Verification) -> list[tuple[str, str]]:
     if v.z_lights:
         name, z = max(v.z_lights.items(), key=lambda entry: abs(entry[1]))
         limit = limit_of_tests(len(v.z_lights), once=v.limit)
-        far = f"{z:+.2f} in {name}, the largest of {len(v.z_lights)}; limit ±{limit:.3g}"
-        rows.insert(0, ("z of each light", far.replace("-", "−")))
+        farthest_text = f"{z:+.2f} in {name}, the largest of {len(v.z_lights)}; limit ±{limit:.3g}"
+        rows.insert(0, ("z of each light", farthest_text.replace("-", "−")))
     return rows
 
 
@@ -105,14 +105,14 @@ def render_table(
     """Return facts on the origin of the basis, and on pixels and lights that took no part."""
     origin, q = basis.origin, solution.certificate
     height, width = basis.size
-    stopped = f"no: stopped after {max(q.sweeps)} sweeps"
+    convergence_text = f"no: stopped after {max(q.sweeps)} sweeps"
     emitter_pixels = int(basis.emitters_seen.sum())
     ignored_pixels = int(
         ignored_paint(target, basis.emitters_seen, solution.problem.fit.emitters).sum()
     )
     adjusted = int((~basis.is_fixed).sum())
     entries: list[tuple[str, str]] = [
-        ("Solve converged", "yes" if q.converged else stopped),
+        ("Solve converged", "yes" if q.converged else convergence_text),
         ("Lights", f"{adjusted}, of them {_lights_off(solution) or 'none'} off"),
         ("Image", f"{width} × {height} pixels{_full_size(basis, verification)}"),
         ("Basis", f"{origin.method}, {_samples(basis)}"),

@@ -19,11 +19,11 @@ def table(
 
     kind: its class. It scrolls if it is wider than the page.
     """
-    heads = "".join(f'<th scope="col">{heading}</th>' for heading in headings)
+    cells = "".join(f'<th scope="col">{heading}</th>' for heading in headings)
 
     def part(rows: Iterable[str]) -> str:
         return (
-            f'<div class="scroll" tabindex="0"><table class="{kind}"><thead><tr>{heads}</tr>'
+            f'<div class="scroll" tabindex="0"><table class="{kind}"><thead><tr>{cells}</tr>'
             f"</thead><tbody>{''.join(rows)}</tbody></table></div>"
         )
 
@@ -45,11 +45,13 @@ def breakable_name(name: str) -> Html:
 
 def name_list(names: Sequence[str]) -> Html:
     """Return names with commas, escaped; the rest of many is folded."""
-    first, more = names, ""
+    first, fold_html = names, ""
     if len(names) > ROWS_SHOWN + SPARE_ROWS:
-        first, rest = names[:ROWS_SHOWN], names[ROWS_SHOWN:]
-        more = fold(f"and {len(rest)} more", ", ".join(map(breakable_name, rest)))
-    return Html(", ".join(map(breakable_name, first)) + more)
+        first, further_names = names[:ROWS_SHOWN], names[ROWS_SHOWN:]
+        fold_html = fold(
+            f"and {len(further_names)} more", ", ".join(map(breakable_name, further_names))
+        )
+    return Html(", ".join(map(breakable_name, first)) + fold_html)
 
 
 def row(name: str, *cells: str) -> str:

@@ -33,7 +33,7 @@ from lightpaint.report.page.figures import data_uri, thumbnail
 from lightpaint.report.page.html import breakable_name, fold, share_cell
 from lightpaint.report.phrases import spoken_percent
 from lightpaint.report.uncertainty_sentences import (
-    UNTOLD,
+    UNDETERMINED,
     UNTOLD_HERE,
     spoken_errors,
     unreached_channels,
@@ -71,28 +71,29 @@ def lights_table(
     if len(rows) <= ROWS_SHOWN + SPARE_ROWS:
         return _table(rows, solution)
     shares = largest_shares(basis, solution.lighting)
-    most = most_visible_lights(basis, solution.lighting)
-    rest = np.setdiff1d(np.arange(len(rows)), most)
+    visible_indices = most_visible_lights(basis, solution.lighting)
+    other_indices = np.setdiff1d(np.arange(len(rows)), visible_indices)
     note = (
-        f"{len(rest)} more lights, each at most "
-        f"{spoken_percent(float(shares[rest].max()))} of the picture, now or as solved"
+        f"{len(other_indices)} more lights, each at most "
+        f"{spoken_percent(float(shares[other_indices].max()))} of the picture, now or as solved"
     )
     return (
-        f"<p>The {len(most)} lights with the largest shares of the picture, now or as solved.</p>"
-        + _table([rows[k] for k in most], solution)
-        + fold(note, _table([rows[k] for k in rest], solution))
+        f"<p>The {len(visible_indices)} lights with the largest shares of the picture, "
+        "now or as solved.</p>"
+        + _table([rows[k] for k in visible_indices], solution)
+        + fold(note, _table([rows[k] for k in other_indices], solution))
     )
 
 
 def _table(rows: list[str], solution: Solution) -> str:
     amounts = "flux<br>(relative)" if solution.lighting.cd_per_unit is None else "output"
-    heads = "".join(
+    cells = "".join(
         f'<th scope="col" class="{kind}">{heading.format(amounts=amounts)}</th>'
         for kind, heading in COLUMNS
     )
     return (
         '<div class="scroll" role="region" aria-labelledby="lights" tabindex="0">'
-        f'<table class="lights"><thead><tr>{heads}</tr></thead><tbody>{"".join(rows)}</tbody>'
+        f'<table class="lights"><thead><tr>{cells}</tr></thead><tbody>{"".join(rows)}</tbody>'
         "</table></div>"
     )
 
@@ -107,7 +108,7 @@ def _rows(
     rows, thumbnails = [], thumbnails_of(basis, is_clean=is_clean)
     for k, (light, (uri, shape, stops)) in enumerate(zip(basis.lights, thumbnails, strict=True)):
         name, setting = escape(light.name), settings[light.name]
-        error = UNTOLD_HERE if errors[k] == UNTOLD else errors[k]
+        error = UNTOLD_HERE if errors[k] == UNDETERMINED else errors[k]
         error = f" <small>{error}</small>" if error else ""
         caption = f"What {name} lights alone, shown at {stops:+.1f} stops"
         rows.append(
@@ -146,16 +147,16 @@ def thumbnails_of(basis: Basis, *, is_clean: bool) -> list[tuple[str, tuple[int,
 
 def _emission_cells(light: BasisLight, setting: LightSetting, lighting: Lighting) -> str:
     """Return cells with colour, emission before and after, their unit, and photometry."""
-    measured = lighting.photometry(setting)
+    light_photometry = lighting.photometry(setting)
     if light.is_fixed:
         return "".join(f'<td class="{kind}"></td>' for kind, _ in COLUMNS[2:7])
     return (
-        f'<td class="colour">{_swatch(setting, measured)}</td>'
+        f'<td class="colour">{_swatch(setting, light_photometry)}</td>'
         f'<td class="rgb now">{_rgb(light.emission)}</td>'
         f'<td class="rgb new">{_rgb(setting.emission, setting.reached)}</td>'
         f'<td class="unit">{escape(light.parameter)} <small>{escape(light.unit)}</small></td>'
         f'<td class="rgb amount{" flux" * (lighting.cd_per_unit is None)}">'
-        f"{_amounts(measured)}</td>"
+        f"{_amounts(light_photometry)}</td>"
     )
 
 
@@ -194,27 +195,29 @@ def hex_color(emission: RGB) -> str | None:
     return rgb_to_hex(np.array(emission)) if any(emission) else None
 
 
-def _swatch(setting: LightSetting, measured: Photometry) -> str:
+def _swatch(setting: LightSetting, light_photometry: Photometry) -> str:
     """Return the colour of a light; for a multiplier, the colour of its factor."""
     if setting.is_partly_reached:
         return '<span class="swatch none"></span><small>not known</small>'
     emission = setting.emission
-    color = measured.hex or hex_color(emission)
+    color = light_photometry.hex or hex_color(emission)
     if color is None or not any(emission):
         return '<span class="swatch none"></span> <small>off</small>'
-    kelvin = "" if measured.kelvin is None else f"{measured.kelvin:.0f} K"
-    away = "" if measured.duv is None else f"Duv {measured.duv:+.3f}".replace("-", "−")
+    kelvin = "" if light_photometry.kelvin is None else f"{light_photometry.kelvin:.0f} K"
+    duv_text = (
+        "" if light_photometry.duv is None else f"Duv {light_photometry.duv:+.3f}".replace("-", "−")
+    )
     return (
         f'<span class="swatch" style="background: {color}"></span><code>{color}</code>'
-        f"{f' <small>{kelvin}</small> <small>{away}</small>' if kelvin else ''}"
+        f"{f' <small>{kelvin}</small> <small>{duv_text}</small>' if kelvin else ''}"
     )
 
 
-def _amounts(measured: Photometry) -> str:
+def _amounts(light_photometry: Photometry) -> str:
     """Return luminous quantity and flux; without a scale, the relative flux."""
-    if measured.luminous is not None or measured.flux_lm is not None:
-        return " <br>".join(filter(None, measured.amounts))
-    return "" if measured.flux_y is None else f"{measured.flux_y:.3g}"
+    if light_photometry.luminous is not None or light_photometry.flux_lm is not None:
+        return " <br>".join(filter(None, light_photometry.amounts))
+    return "" if light_photometry.flux_y is None else f"{light_photometry.flux_y:.3g}"
 
 
 def _rgb(emission: RGB, reached: Sequence[bool] = ALL_REACHED) -> str:
@@ -227,8 +230,8 @@ def _rgb(emission: RGB, reached: Sequence[bool] = ALL_REACHED) -> str:
 
 def largest_shares(basis: Basis, lighting: Lighting) -> Doubles:
     """Return the larger of the present and the solved share of each light, (n,)."""
-    present = energy_shares(basis, Lighting.present(basis))
-    return np.maximum(energy_shares(basis, lighting), present)
+    present_shares = energy_shares(basis, Lighting.present(basis))
+    return np.maximum(energy_shares(basis, lighting), present_shares)
 
 
 def most_visible_lights(basis: Basis, lighting: Lighting) -> Indices:

@@ -102,11 +102,11 @@ def _shown_planes(
     basis: Basis, lighting: Lighting, shown: Indices, *, is_clean: bool
 ) -> tuple[list[int], list[dict[str, Any]]]:
     """Return size and planes of each light; then of all others, in the answer and at present."""
-    rest = np.setdiff1d(np.arange(len(basis.lights)), shown)
-    if not rest.size:
+    other_indices = np.setdiff1d(np.arange(len(basis.lights)), shown)
+    if not other_indices.size:
         return planes_for_page(basis, is_clean=is_clean)
     looks = [
-        np.where(np.isin(np.arange(len(x)), rest)[:, None], x, 0)
+        np.where(np.isin(np.arange(len(x)), other_indices)[:, None], x, 0)
         for x in (lighting.weights_for(basis), basis.present_weights)
     ]
     return _compact_planes(basis, shown, looks, is_clean=is_clean)
@@ -177,23 +177,25 @@ def light_data(light: BasisLight) -> dict[str, Any]:
 
 
 def _kelvin(emission: Any, unit: str) -> float | None:
-    measured = photometry(emission, unit=unit)
+    light_photometry = photometry(emission, unit=unit)
     is_white = (
-        measured.kelvin is not None and measured.duv is not None and abs(measured.duv) <= WHITE
+        light_photometry.kelvin is not None
+        and light_photometry.duv is not None
+        and abs(light_photometry.duv) <= WHITE
     )
-    return measured.kelvin if is_white else None
+    return light_photometry.kelvin if is_white else None
 
 
 def _rest(basis: Basis, lighting: Lighting, shown: Indices) -> dict[str, Any] | None:
-    rest = np.setdiff1d(np.arange(len(basis.lights)), shown)
-    if not rest.size:
+    other_indices = np.setdiff1d(np.arange(len(basis.lights)), shown)
+    if not other_indices.size:
         return None
 
     def by_name(weights: Doubles) -> dict[str, list[float]]:
-        return {basis.names[k]: weights[k].tolist() for k in rest if not basis.is_fixed[k]}
+        return {basis.names[k]: weights[k].tolist() for k in other_indices if not basis.is_fixed[k]}
 
     return {
-        "label": f"{len(rest)} more lights together",
+        "label": f"{len(other_indices)} more lights together",
         "answer": by_name(lighting.weights_for(basis)),
         "present": by_name(basis.present_weights),
     }
@@ -211,12 +213,14 @@ def kelvin_colors() -> list[Any]:
 def transform_data(transform: ViewTransform) -> dict[str, Any]:
     """Return a transform for the page: sRGB by name, a curve, or a lattice if channels mix."""
     data: dict[str, Any] = {"stops": transform.stops, "low": LOW, "high": HIGH}
-    plain = ViewTransform(transform.name)
+    transform_without_exposure = ViewTransform(transform.name)
     curve, lattice = None, None
     if transform.name != "srgb" and transform.is_per_channel:
-        curve = [round(float(x), 5) for x in curve_of(plain, CURVE, LOW, HIGH)]
+        curve = [round(float(x), 5) for x in curve_of(transform_without_exposure, CURVE, LOW, HIGH)]
     elif transform.name != "srgb":
-        table = lattice_of(plain, SIDE, LOW, HIGH).reshape(SIDE * SIDE, SIDE, 3)
+        table = lattice_of(transform_without_exposure, SIDE, LOW, HIGH).reshape(
+            SIDE * SIDE, SIDE, 3
+        )
         lattice = _plane_data(pack_picture(table, dropped=1))
     return {**data, "curve": curve, "lattice": lattice}
 

@@ -79,10 +79,13 @@ def lighting_html(lighting: Lighting) -> str:
 
     def row(k: int) -> Sequence[str]:
         light = lighting.lights[k]
-        measured = lighting.photometry(light)
+        light_photometry = lighting.photometry(light)
         constraint = "kept" if light.is_fixed else light.constraint
         constraint = ", ".join(filter(None, (constraint, UNTOLD_HERE if light.untold else "")))
-        colour, output = _swatch(light.emission, measured), " ".join(measured.amounts)
+        colour, output = (
+            _swatch(light.emission, light_photometry),
+            " ".join(light_photometry.amounts),
+        )
         if light.is_partly_reached:
             colour = _Markup("")
         return light.name, colour, _rgb(light.emission), light.unit, output, constraint
@@ -90,8 +93,8 @@ def lighting_html(lighting: Lighting) -> str:
     certificate = (
         "" if lighting.certificate is None else f"<p>{escape(str(lighting.certificate))}</p>"
     )
-    heads = ("light", "colour", "emission", "unit", "output", "asked")
-    return certificate + _table(heads, row, _sizes(lighting.lights))
+    headings = ("light", "colour", "emission", "unit", "output", "asked")
+    return certificate + _table(headings, row, _sizes(lighting.lights))
 
 
 @html_of.register
@@ -112,8 +115,8 @@ def solution_html(solution: Solution) -> str:
         return light.name, colour, now, new, change_text, setting.constraint
 
     change_size = np.abs(solution.weights - basis.present_weights) * basis.totals @ LUMINANCE
-    heads = ("light", "colour", "now", "new", "change", "asked")
-    return f"<p>{escape(str(solution.certificate))}</p>" + _table(heads, row, change_size)
+    headings = ("light", "colour", "now", "new", "change", "asked")
+    return f"<p>{escape(str(solution.certificate))}</p>" + _table(headings, row, change_size)
 
 
 @html_of.register
@@ -187,7 +190,7 @@ def target_png(target: Target) -> bytes:
     return png_bytes(to_8_bit(_wide(share * paint + (1 - share) * rest)))
 
 
-def _table(heads: Sequence[str], row: Callable[[int], Sequence[str]], sizes: Any) -> str:
+def _table(headings: Sequence[str], row: Callable[[int], Sequence[str]], sizes: Any) -> str:
     """Return the rows of the largest, and the number of others; texts that are not HTML are
     escaped.
     """
@@ -201,7 +204,7 @@ def _table(heads: Sequence[str], row: Callable[[int], Sequence[str]], sizes: Any
     body = "".join(cells("td", row(k)) for k in chosen)
     left = len(sizes) - len(chosen)
     note = f"<p>… and {left} more, which matter less</p>" if left else ""
-    return f"<table>{cells('th', heads)}{body}</table>{note}"
+    return f"<table>{cells('th', headings)}{body}</table>{note}"
 
 
 class _Markup(str):
@@ -229,13 +232,13 @@ def _rgb(emission: RGB) -> str:
     return " ".join(f"{v:.4g}" for v in emission) if any(emission) else "off"
 
 
-def _swatch(emission: RGB, measured: Photometry) -> _Markup:
+def _swatch(emission: RGB, light_photometry: Photometry) -> _Markup:
     """Return the colour of a light; for a multiplier, the colour of its factor."""
-    color = (measured.hex or hex_color(emission)) if any(emission) else None
+    color = (light_photometry.hex or hex_color(emission)) if any(emission) else None
     if color is None:
         return _Markup("")
     box = f"display: inline-block; width: 1em; height: 1em; background: {color}"
-    kelvin = "" if measured.kelvin is None else f" {measured.kelvin:.0f} K"
+    kelvin = "" if light_photometry.kelvin is None else f" {light_photometry.kelvin:.0f} K"
     return _Markup(f'<span style="{box}" title="{color}"></span>{kelvin}')
 
 

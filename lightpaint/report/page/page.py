@@ -88,7 +88,7 @@ def report_page(
     transform = looks.encoder(report_transform(target, basis, predicted.image))
     current = looks.current
     # Most of the time goes into pictures, which are independent of each other.
-    making: dict[str, Callable[[], str]] = {
+    makers: dict[str, Callable[[], str]] = {
         "mixer": partial(_mixer, basis, target, solution, looks, transform=transform),
         "maps": partial(
             maps,
@@ -114,8 +114,8 @@ def report_page(
         ),
         "lights": partial(lights_table, basis, solution, uncertainty, is_clean=looks.is_clean),
     }
-    results = in_turns(lambda make: make(), tuple(making.values()), basis.size)
-    parts = dict(zip(making, results, strict=True))
+    results = in_turns(lambda make: make(), tuple(makers.values()), basis.size)
+    parts = dict(zip(makers, results, strict=True))
     parts["missed"] += parts.pop("constraints") + colors_section(color_choices)
     parts["mixer"] += mixer_assets()
     template = resources.files("lightpaint.report.page").joinpath("page.html.in")
@@ -177,9 +177,9 @@ def _wipe(
 ) -> str:
     """Return the pictures to compare, in the order of the page's lists."""
 
-    def picture(name: str, alt: str, clean: Floats, noisy: Floats) -> PagePicture:
+    def picture(name: str, alt: str, clean: Floats, raw: Floats) -> PagePicture:
         size = looks.predicted.shape[:2]
-        pair = [to_8_bit(covered(transform.encode(x), size)) for x in (clean, noisy)]
+        pair = [to_8_bit(covered(transform.encode(x), size)) for x in (clean, raw)]
         return PagePicture(name, alt, pair[0], pair[1] if looks.is_clean else None)
 
     pictures = [

@@ -13,25 +13,25 @@ from lightpaint.report.rig.rig_drawing import rig_drawing
 
 
 def placement_section(
-    hung: HungLights | None, picture: npt.NDArray[np.uint8], features: Features | None
+    placement: HungLights | None, picture: npt.NDArray[np.uint8], features: Features | None
 ) -> str:
     """Return the moves with reasons, the picture with arrows, and the room's plan and elevation.
 
     None gives no section. picture: the answer, (h, w, 3) in 8 bits.
     """
-    if hung is None:
+    if placement is None:
         return ""
-    listed = "".join(f"<li>{escape(change.text)}</li>" for change in hung.changes)
-    listed = f"<ul>{listed}</ul>" if listed else ""
+    items = "".join(f"<li>{escape(change.text)}</li>" for change in placement.changes)
+    items = f"<ul>{items}</ul>" if items else ""
     figures = ""
-    arrows = aim_picture(picture, features, hung.lights)
+    arrows = aim_picture(picture, features, placement.lights)
     if arrows is not None:
         figures += _figure(
             arrows,
             "The answer with an arrow for each light that moved",
             "Rings: where lights pointed, or hung; dots: where they do now.",
         )
-    drawing = rig_drawing(features, hung.lights, up=hung.up)
+    drawing = rig_drawing(features, placement.lights, up=placement.up)
     if drawing is not None:
         figures += _figure(
             drawing,
@@ -39,7 +39,7 @@ def placement_section(
             "The room is what the camera sees of it; lengths are in units of the scene.",
         )
     return (
-        f"<section><h2>Where the lights hang</h2><p>{escape(hung.sentence)}</p>{listed}"
+        f"<section><h2>Where the lights hang</h2><p>{escape(placement.sentence)}</p>{items}"
         f'<div class="rig">{figures}</div></section>'
     )
 

@@ -26,12 +26,14 @@ def spoken_suggestions(suggestions: Sequence[Suggestion]) -> str:
     if not suggestions:
         return "No point light would certainly remove a hundredth of the difference."
     first, last = suggestions[0], suggestions[-1]
-    beginning = f"A light at {spoken_position(first)} would remove "
+    first_words = f"A light at {spoken_position(first)} would remove "
     share = f"{spoken_percent(first.gain_share)} of the difference (in energy)"
     if len(suggestions) == 1:
-        return f"{beginning}{share}."
-    together = spoken_percent(1 - last.missed_share)
-    return f"{beginning}{share}; all {len(suggestions)} suggested lights together, {together}."
+        return f"{first_words}{share}."
+    joint_percent = spoken_percent(1 - last.missed_share)
+    return (
+        f"{first_words}{share}; all {len(suggestions)} suggested lights together, {joint_percent}."
+    )
 
 
 def spoken_position(suggestion: Suggestion) -> str:
@@ -105,19 +107,21 @@ def _suggestion_html(
     """Return one suggested light. before: whether there are earlier ones, which are in both
     pictures.
     """
-    measured = suggestion.photometry(cd_per_unit)
-    amounts = ", ".join(filter(None, measured.amounts))
+    light_photometry = suggestion.photometry(cd_per_unit)
+    amounts = ", ".join(filter(None, light_photometry.amounts))
     entries = [
         ("at", spoken_position(suggestion)),
         ("intensity", f"{' '.join(f'{v:.4g}' for v in suggestion.emission)} W/sr"),
-        ("colour", measured.color),
+        ("colour", light_photometry.color),
         ("amount", amounts),
         ("removes", f"{spoken_percent(suggestion.gain_share)} of the difference"),
         ("leaves", f"{spoken_percent(suggestion.missed_share)} of it"),
     ]
-    listed = facts((k, v) for k, v in entries if v)
+    facts_html = facts((k, v) for k, v in entries if v)
     swatch = (
-        f'<span class="swatch" style="background: {measured.hex}"></span>' if measured.hex else ""
+        f'<span class="swatch" style="background: {light_photometry.hex}"></span>'
+        if light_photometry.hex
+        else ""
     )
     position = (
         "the ring marks its position, which may be hidden"
@@ -130,7 +134,7 @@ def _suggestion_html(
         f'<h3 style="margin-top:24px">{name}</h3><div class="maps">'
         f"{_picture(suggestion.without, f'Without {name}', without, None, transform)}"
         f"{_picture(suggestion.with_it, f'With {name}', position, suggestion.seen_at, transform)}"
-        f"<div>{swatch}<dl>{listed}</dl></div></div>"
+        f"<div>{swatch}<dl>{facts_html}</dl></div></div>"
         f'<pre style="margin-top:12px">{escape(suggestion.xml)}</pre>'
     )
 

@@ -35,29 +35,29 @@ def aim_picture(
     draw, text = ImageDraw.Draw(sheet), FINER * max(12, round(zoom * width / FINER / 60))
     font, is_any = ImageFont.load_default(text), False
     for light in changed:
-        old = light.place.moved_from
+        old_site = light.place.moved_from
         new = _shown_point(geometry, light.place.site)
-        before = None if old is None else _shown_point(geometry, old)
+        old_point = None if old_site is None else _shown_point(geometry, old_site)
         if new is None:
             continue
         is_any = True
         tip = zoom * np.array(new)
-        if before is not None:
-            tail = zoom * np.array(before)
+        if old_point is not None:
+            tail = zoom * np.array(old_point)
             circle(draw, tail, 0.35 * text, outline=CHANGED, width=max(2, text // 8))
             if float(np.hypot(*(tip - tail))) > text:
                 arrow(draw, tail, tip, CHANGED, width=max(2, text // 8), head=0.8 * text)
         circle(draw, tip, 0.3 * text, outline=CHANGED, width=1, fill=CHANGED)
         label = visible(light.place.name)
-        wide = font.getlength(label)
-        x = float(np.clip(tip[0] + 0.6 * text, 0, max(size[0] - wide - 4, 0)))
+        label_width = font.getlength(label)
+        x = float(np.clip(tip[0] + 0.6 * text, 0, max(size[0] - label_width - 4, 0)))
         y = float(np.clip(tip[1], text, size[1] - text))
         edge = {"stroke_width": text // 7, "stroke_fill": GROUND}
         draw.text((x, y), label, CHANGED, font, anchor="lm", **edge)
     if not is_any:
         return None
-    small = (size[0] // FINER, size[1] // FINER)
-    return np.asarray(sheet.resize(small, Image.Resampling.LANCZOS))
+    small_size = (size[0] // FINER, size[1] // FINER)
+    return np.asarray(sheet.resize(small_size, Image.Resampling.LANCZOS))
 
 
 def _shown_point(geometry: ViewGeometry, site: Site) -> tuple[float, float] | None:

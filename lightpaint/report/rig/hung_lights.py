@@ -20,7 +20,7 @@ FRACTIONS = {
     2 / 3: "two thirds",
     3 / 4: "three quarters",
 }
-NEAR = 0.02
+FRACTION_TOLERANCE = 0.02
 
 
 @dataclass(frozen=True)
@@ -107,6 +107,6 @@ def hung_lights(lighting: Lighting) -> tuple[HungLight, ...]:
 def spoken_fraction(share: float) -> str:
     """Return a share in words: `a fifth`, or `8 %` where none is near."""
     near = min(FRACTIONS, key=lambda fraction: abs(fraction - share))
-    if abs(near - share) <= NEAR * max(near, 0.25) / 0.25:
+    if abs(near - share) <= FRACTION_TOLERANCE * max(near, 0.25) / 0.25:
         return FRACTIONS[near]
     return spoken_percent(share)

@@ -17,7 +17,7 @@ GROUND = (24, 24, 26)
 FINER = 2
 
 #: Margin around the visible points, and the distance up to which lights are drawn, as shares.
-MARGIN, FAR = 0.08, 1.5
+MARGIN, MAX_DISTANCE = 0.08, 1.5
 
 #: Maximum height of both drawings, relative to their width.
 TALLEST = 1.3
@@ -71,8 +71,8 @@ def plan_and_elevation(
 
     row: the most height of each beside the other; None for one below the other.
     """
-    ahead = _ahead(geometry, up)
-    left = np.cross(up, ahead)
+    forward = _forward_direction(geometry, up)
+    left = np.cross(up, forward)
     places = _places_near(geometry, lights)
     low, high = np.percentile(geometry.points, [0.5, 99.5], axis=0)
     points = np.concatenate([places, [low, high]])
@@ -80,10 +80,10 @@ def plan_and_elevation(
         ("plan: the camera looks to the right", left),
         ("elevation", up),
     ]
-    flat = np.stack([points @ ahead, points @ left, points @ up], axis=1)
-    least, most = flat.min(axis=0), flat.max(axis=0)
-    room = MARGIN * float((most - least).max())
-    least, extent = least - room, most - least + 2 * room
+    flat = np.stack([points @ forward, points @ left, points @ up], axis=1)
+    lowest, highest = flat.min(axis=0), flat.max(axis=0)
+    room = MARGIN * float((highest - lowest).max())
+    lowest, extent = lowest - room, highest - lowest + 2 * room
     if row is None:
         scale = min(width / extent[0], TALLEST * width / (extent[1] + extent[2]))
     else:
@@ -91,9 +91,9 @@ def plan_and_elevation(
     return [
         Panel(
             title,
-            ahead,
+            forward,
             along,
-            least[[0, k]],
+            lowest[[0, k]],
             scale,
             (int(extent[0] * scale), int(extent[k] * scale)),
         )
@@ -101,7 +101,7 @@ def plan_and_elevation(
     ]
 
 
-def _ahead(geometry: ViewGeometry, up: Doubles) -> Doubles:
+def _forward_direction(geometry: ViewGeometry, up: Doubles) -> Doubles:
     """Return the axis of the scene across `up` that leads away from the camera."""
     camera = geometry.camera
     way = np.ptp(geometry.points, axis=0)
@@ -120,7 +120,7 @@ def _places_near(geometry: ViewGeometry, lights: Sequence[HungLight]) -> Doubles
     sites += [light.place.moved_from for light in lights if light.place.moved_from is not None]
     places = [site.position for site in sites if site.position is not None]
     low, high = np.percentile(geometry.points, [0.5, 99.5], axis=0)
-    reach = FAR * float((high - low).max())
-    listed = np.array(places, dtype=float).reshape(-1, 3)
-    near = ((listed > low - reach) & (listed < high + reach)).all(axis=1)
-    return np.asarray(listed[near])
+    margin = MAX_DISTANCE * float((high - low).max())
+    positions = np.array(places, dtype=float).reshape(-1, 3)
+    is_near = ((positions > low - margin) & (positions < high + margin)).all(axis=1)
+    return np.asarray(positions[is_near])

@@ -71,27 +71,27 @@ def _drawn(
     draw = ImageDraw.Draw(picture, "RGBA")
     if geometry.camera is not None:
         _draw_camera(draw, panel, geometry, text)
-    ordered = sorted(lights, key=lambda light: light.is_changed)
-    for light in ordered:
+    ordered_lights = sorted(lights, key=lambda light: light.is_changed)
+    for light in ordered_lights:
         _draw_beam(draw, panel, geometry, light)
-    for light in ordered:
+    for light in ordered_lights:
         _draw_light(draw, panel, light, text)
     names = {light.place.name: light for light in lights}
     if len(lights) > MOST_NAMES:
         names = {name: light for name, light in names.items() if light.is_changed}
     _draw_names(draw, panel, names, text)
-    whole = Image.new("RGB", (width, height + round(2.4 * text)), GROUND)
-    whole.paste(picture, (0, 0))
-    below = ImageDraw.Draw(whole)
+    sheet_image = Image.new("RGB", (width, height + round(2.4 * text)), GROUND)
+    sheet_image.paste(picture, (0, 0))
+    label_draw = ImageDraw.Draw(sheet_image)
     font = ImageFont.load_default(text)
     y = height + round(1.2 * text)
-    below.text((text, y), panel.title, FAINT, font, anchor="lm")
+    label_draw.text((text, y), panel.title, FAINT, font, anchor="lm")
     length = _round_length(0.25 * width / panel.scale)
     end = width - text
-    below.line([(end - length * panel.scale, y), (end, y)], FAINT, max(2, text // 8))
+    label_draw.line([(end - length * panel.scale, y), (end, y)], FAINT, max(2, text // 8))
     label = f"{length:g}"
-    below.text((end - length * panel.scale - text / 2, y), label, FAINT, font, anchor="rm")
-    return whole
+    label_draw.text((end - length * panel.scale - text / 2, y), label, FAINT, font, anchor="rm")
+    return sheet_image
 
 
 def _room(panel: Panel, geometry: ViewGeometry, colors: Doubles) -> npt.NDArray[np.uint8]:
@@ -150,12 +150,12 @@ def _draw_beam(
     length = BEAM * panel.size[0] / panel.scale
     if aim is not None:
         length = math.dist(aim, site.position)
-    spread = math.radians(site.cutoff or 12.0)
+    half_angle = math.radians(site.cutoff or 12.0)
     way = np.array(site.direction) * length
     start, end = panel.at(site.position), panel.at(np.array(site.position) + way)
     along = end - start
     side = np.array([-along[1], along[0]]) / max(float(np.hypot(*along)), 1e-9)
-    half = math.tan(min(spread, 1.2)) * length * panel.scale
+    half = math.tan(min(half_angle, 1.2)) * length * panel.scale
     corners = [tuple(start), tuple(end + half * side), tuple(end - half * side)]
     r, g, b = _shown(light.color)
     draw.polygon(corners, fill=(r, g, b, 60 if light.is_changed else 26))
@@ -169,40 +169,40 @@ def _draw_light(draw: ImageDraw.ImageDraw, panel: Panel, light: HungLight, text:
     """Draw a light at its place and, if it moved, its earlier place."""
     assert light.place.position is not None
     centre, radius = panel.at(light.place.position), 0.42 * text
-    thin = max(2, text // 9)
-    old = light.place.moved_from
-    if old is not None and old.position is not None:
-        old_centre = panel.at(old.position)
-        circle(draw, old_centre, 0.8 * radius, outline=CHANGED, width=thin)
+    line_width = max(2, text // 9)
+    old_site = light.place.moved_from
+    if old_site is not None and old_site.position is not None:
+        old_centre = panel.at(old_site.position)
+        circle(draw, old_centre, 0.8 * radius, outline=CHANGED, width=line_width)
         if float(np.hypot(*(centre - old_centre))) > 2.2 * radius:
-            arrow(draw, old_centre, centre, CHANGED, width=thin, head=0.8 * text)
+            arrow(draw, old_centre, centre, CHANGED, width=line_width, head=0.8 * text)
     edge = CHANGED if light.is_changed else TEXT
-    circle(draw, centre, radius, fill=_shown(light.color), outline=edge, width=thin)
+    circle(draw, centre, radius, fill=_shown(light.color), outline=edge, width=line_width)
 
 
 def _draw_names(
     draw: ImageDraw.ImageDraw, panel: Panel, names: Mapping[str, HungLight], text: int
 ) -> None:
     """Draw names beside lights, moved down where one would cover another."""
-    font, occupied = ImageFont.load_default(round(0.9 * text)), list[tuple[float, ...]]()
+    font, label_boxes = ImageFont.load_default(round(0.9 * text)), list[tuple[float, ...]]()
     for name, light in sorted(names.items(), key=lambda item: not item[1].is_changed):
         assert light.place.position is not None
         x, y = panel.at(light.place.position)
         label = visible(name)
-        wide = font.getlength(label)
+        label_width = font.getlength(label)
         left = x + 0.7 * text
-        if left + wide > panel.size[0]:
-            left = x - 0.7 * text - wide
+        if left + label_width > panel.size[0]:
+            left = x - 0.7 * text - label_width
         top = y - 0.5 * text
         for _ in range(len(names)):
-            box = (left, top, left + wide, top + 1.05 * text)
-            over = [b for b in occupied if _overlap(box, b)]
-            if not over:
+            box = (left, top, left + label_width, top + 1.05 * text)
+            overlapping_boxes = [b for b in label_boxes if _overlap(box, b)]
+            if not overlapping_boxes:
                 break
-            top = max(b[3] for b in over)
+            top = max(b[3] for b in overlapping_boxes)
         if top + text > panel.size[1]:
             continue  # a plan of a hundred lamps has no room for their names
-        occupied.append((left, top, left + wide, top + 1.05 * text))
+        label_boxes.append((left, top, left + label_width, top + 1.05 * text))
         color = CHANGED if light.is_changed else (190, 190, 194)
         draw.text((left, top), label, color, font, stroke_width=text // 8, stroke_fill=GROUND)
 

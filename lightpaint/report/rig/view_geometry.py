@@ -14,13 +14,13 @@ from lightpaint.images.denoiser import Features
 from lightpaint.scene.properties.site import Site
 
 #: Pixels that a projection is fitted to, and the least that it takes.
-FITTED, LEAST = 4000, 12
+MAX_POINTS, MIN_POINTS = 4000, 12
 
 #: Least length of a pixel's mean normal: at edges it is shorter, and the position between two.
-WHOLE = 0.999
+MIN_NORMAL_LENGTH = 0.999
 
 #: Passes of the fit, each without the pixels that the last one misses by most.
-PASSES, KEPT = 3, 0.9
+PASSES, KEPT_SHARE = 3, 0.9
 
 #: Median error in pixels beyond which a camera has no such projection.
 MOST_ERROR = 1.5
@@ -50,9 +50,9 @@ class ViewGeometry:
             return None
         height, width = features.size
         y, x = np.mgrid[:height, :width] + 0.5
-        whole = np.linalg.norm(features.normal, axis=-1) > WHOLE
+        whole = np.linalg.norm(features.normal, axis=-1) > MIN_NORMAL_LENGTH
         whole &= np.isfinite(features.position).all(axis=-1)
-        if int(whole.sum()) < LEAST:
+        if int(whole.sum()) < MIN_POINTS:
             return None
         points = features.position[whole].astype(np.float64)
         pixels = np.stack([x[whole], y[whole]], axis=1)
@@ -80,9 +80,9 @@ class ViewGeometry:
         rows = self.projection[:, :3] / np.linalg.norm(self.projection[2, :3])
         middle = float(rows[0] @ rows[2])
         focal = math.sqrt(max(float(rows[0] @ rows[0]) - middle**2, 1e-12))
-        away = self.points - np.array(camera)
-        distance = np.linalg.norm(away, axis=1)
-        cosine = np.abs((away * self.normals).sum(axis=1)) / np.maximum(distance, 1e-12)
+        offsets = self.points - np.array(camera)
+        distance = np.linalg.norm(offsets, axis=1)
+        cosine = np.abs((offsets * self.normals).sum(axis=1)) / np.maximum(distance, 1e-12)
         return np.asarray(1.3 * distance / focal / np.maximum(cosine, 0.06))
 
     def pixel(self, point: Position) -> tuple[float, float] | None:
@@ -99,21 +99,27 @@ class ViewGeometry:
         """Return the visible point that a light at `site` points at; None if there is none."""
         if site.position is None or site.direction is None:
             return None
-        away = self.points - np.array(site.position)
-        length = np.linalg.norm(away, axis=1)
-        cosine = away @ np.array(site.direction) / np.maximum(length, 1e-12)
-        near = np.flatnonzero(cosine > np.cos(np.radians(NEAR_AXIS)))
+        offsets = self.points - np.array(site.position)
+        length = np.linalg.norm(offsets, axis=1)
+        cosine = offsets @ np.array(site.direction) / np.maximum(length, 1e-12)
+        nearest_indices = np.flatnonzero(cosine > np.cos(np.radians(NEAR_AXIS)))
         # The beam lights the first surface on its way.
-        near = near[length[near] < 1.1 * length[near].min()] if len(near) else near
-        if not len(near):
+        nearest_indices = (
+            nearest_indices[length[nearest_indices] < 1.1 * length[nearest_indices].min()]
+            if len(nearest_indices)
+            else nearest_indices
+        )
+        if not len(nearest_indices):
             return None
-        x, y, z = (float(v) for v in self.points[near[np.argmax(cosine[near])]])
+        x, y, z = (
+            float(v) for v in self.points[nearest_indices[np.argmax(cosine[nearest_indices])]]
+        )
         return x, y, z
 
 
 def _projection(points: Doubles, pixels: Doubles) -> Doubles | None:
     """Return the projection that maps points to pixels, positive in front of the camera."""
-    step = max(1, len(points) // FITTED)
+    step = max(1, len(points) // MAX_POINTS)
     points, pixels = points[::step], pixels[::step]
     # Numbers of equal size keep the equations well conditioned.
     to_unit, from_unit = _to_unit(points), np.linalg.inv(_to_unit(pixels))
@@ -126,7 +132,7 @@ def _projection(points: Doubles, pixels: Doubles) -> Doubles | None:
         if np.median(seen[:, 2]) < 0:
             matrix, seen = -matrix, -seen
         error = np.linalg.norm(seen[:, :2] / seen[:, 2:] - scaled_pixels, axis=1)
-        inliers = np.argsort(error)[: max(LEAST, int(KEPT * len(error)))]
+        inliers = np.argsort(error)[: max(MIN_POINTS, int(KEPT_SHARE * len(error)))]
     whole = from_unit @ matrix @ to_unit
     seen = np.c_[points, np.ones(len(points))] @ whole.T
     errors = np.linalg.norm(seen[:, :2] / seen[:, 2:] - pixels, axis=1)

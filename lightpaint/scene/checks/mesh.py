@@ -128,16 +128,16 @@ def check_serialized(path: Path, index: int) -> None:
     data = path.read_bytes()
     try:
         version = struct.unpack_from("<2H", data)[1]
-        wide = version != 3
+        has_wide_indices = version != 3
         count = struct.unpack_from("<I", data, len(data) - 4)[0]
         start = 0
         if index:
-            size = 8 if wide else 4
+            size = 8 if has_wide_indices else 4
             start = int.from_bytes(data[-4 - size * (count - index) :][:size], "little")
         stream = zlib.decompressobj()
         mesh = stream.decompress(data[start + 4 :], MAX_UNPACKED)
         flags = struct.unpack_from("<I", mesh)[0]
-        position = 4 if not wide else mesh.index(b"\0", 4) + 1
+        position = 4 if not has_wide_indices else mesh.index(b"\0", 4) + 1
         vertices, faces = struct.unpack_from("<2Q", mesh, position)
     except (struct.error, ValueError, zlib.error) as error:
         raise MeshError(str(error)) from None

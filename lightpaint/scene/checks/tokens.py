@@ -108,8 +108,8 @@ def place_of_node(state: Any, node: Any) -> str:
         line = line_of(file.read_bytes(), int(node.offset))
     except (IndexError, OSError, OverflowError, TypeError):
         return ""
-    lead = f"{file.name}, " if node.file_index else ""
-    return f"{lead}line {line}: "
+    prefix = f"{file.name}, " if node.file_index else ""
+    return f"{prefix}line {line}: "
 
 
 def tag(element: str, /, **attributes: str) -> str:
@@ -126,5 +126,5 @@ def tag(element: str, /, **attributes: str) -> str:
                 f"cannot write <{element} {key}={value!r}>: Mitsuba reads $ as the start of a "
                 "parameter; rename the folder or file, or choose other parameters=..."
             )
-    listed = "".join(f" {key}={quoteattr(value)}" for key, value in attributes.items())
-    return f"<{element}{listed}/>"
+    attribute_text = "".join(f" {key}={quoteattr(value)}" for key, value in attributes.items())
+    return f"<{element}{attribute_text}/>"

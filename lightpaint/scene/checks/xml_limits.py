@@ -90,20 +90,20 @@ def _deepest(children: Sequence[Sequence[int]]) -> int:
     ignored.
     """
     depth = [0] * len(children)  # of the subtree; -1 while it is being computed
-    done = [False] * len(children)
+    is_done = [False] * len(children)
     for root in range(len(children)):
         stack = [root]
         while stack:
             node = stack[-1]
-            if done[node]:
+            if is_done[node]:
                 stack.pop()
             elif depth[node] == -1:
-                depth[node] = 1 + max((depth[c] for c in children[node] if done[c]), default=0)
-                done[node] = True
+                depth[node] = 1 + max((depth[c] for c in children[node] if is_done[c]), default=0)
+                is_done[node] = True
                 stack.pop()
             else:
                 depth[node] = -1
-                stack += [c for c in children[node] if not done[c] and depth[c] != -1]
+                stack += [c for c in children[node] if not is_done[c] and depth[c] != -1]
     return max(depth, default=0)
 
 
@@ -128,8 +128,8 @@ class _Walk:
         try:
             data = self._read(path)
         except SceneError as error:
-            lead = f"{chain[-2]}: " if len(chain) > 1 else ""
-            raise SceneError(f"{lead}{error}") from None
+            prefix = f"{chain[-2]}: " if len(chain) > 1 else ""
+            raise SceneError(f"{prefix}{error}") from None
         self.bytes += len(data)
         self.includes += 1
         if self.bytes > MAX_XML or self.includes > MAX_INCLUDES:
@@ -140,24 +140,24 @@ class _Walk:
         inner = mi.FileResolver(resolver)
         if len(chain) > 1:
             inner.prepend(str(path.parent))
-        opened = depth
+        open_count = depth
         for token in _markup(path, data):
             if token["tag"] is not None:
-                opened += 1
-                if opened > MAX_NESTING:
+                open_count += 1
+                if open_count > MAX_NESTING:
                     line = line_of(data, token.start())
                     raise SceneError(
                         f"{path}, line {line}: elements are nested more than {MAX_NESTING} deep"
                     )
                 self._count(token["tag"], chain[0])
                 try:
-                    self._element(token, inner, opened, chain)
+                    self._element(token, inner, open_count, chain)
                 except ValueError as error:
                     line = line_of(data, token.start())
                     raise SceneError(f"{path}, line {line}: {error}") from None
             if token["end"] is not None or token["empty"]:
-                opened -= 1
-                if opened <= depth:
+                open_count -= 1
+                if open_count <= depth:
                     return
 
     def _read(self, path: Path) -> bytes:

@@ -118,9 +118,9 @@ def tie(name: str, members: Sequence[Emitter]) -> Light:
         assert first.kind is not None
         return Light(name, tuple(members), first.kind.parameter, first.kind.unit, first.emission)
     if not any(any(member.emission) for member in members):
-        listed = some_names(f"{m.name} ({m.plugin})" for m in members)
+        members_text = some_names(f"{m.name} ({m.plugin})" for m in members)
         raise SceneError(
-            f"group {name!r} has only black lights of different kinds, {listed}, so their "
+            f"group {name!r} has only black lights of different kinds, {members_text}, so their "
             "relative brightness is unknown: give one of them a colour"
         )
     parameters = {member.kind.parameter for member in members if member.kind is not None}

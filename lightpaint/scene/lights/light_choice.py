@@ -48,15 +48,15 @@ def choose_lights(
         if not emitter.obstacle:
             by_light.setdefault(group_of.get(emitter.name, emitter.name), []).append(emitter)
     if lights is not None:
-        chosen = _chosen(_as_list(lights, "lights"), by_light, group_of, emitters, scene)
-        by_light = {name: members for name, members in by_light.items() if name in chosen}
+        chosen_names = _chosen(_as_list(lights, "lights"), by_light, group_of, emitters, scene)
+        by_light = {name: members for name, members in by_light.items() if name in chosen_names}
     if not by_light:
-        listed = some_names((f"{e.name!r} {e.obstacle}" for e in emitters), "; ")
-        raise SceneError(f"{scene} has no light that can be solved for: {listed}")
-    tied = [
+        items = some_names((f"{e.name!r} {e.obstacle}" for e in emitters), "; ")
+        raise SceneError(f"{scene} has no light that can be solved for: {items}")
+    grouped_emitters = [
         replace(tie(name, members), is_found=name in similar) for name, members in by_light.items()
     ]
-    return _with_rest(tied, emitters)
+    return _with_rest(grouped_emitters, emitters)
 
 
 def _similar_lights(
@@ -68,22 +68,22 @@ def _similar_lights(
     """Return lights of many similar emitters, excluding those in groups or selected
     individually.
     """
-    free = [emitter for emitter in emitters if emitter.name not in group_of]
-    similar = alike_groups(free, {*groups, *(emitter.name for emitter in emitters)})
-    inside = {member.name for members in similar.values() for member in members}
-    lights = {*groups, *similar, *(emitter.name for emitter in free)} - inside
+    ungrouped_emitters = [emitter for emitter in emitters if emitter.name not in group_of]
+    similar = alike_groups(ungrouped_emitters, {*groups, *(emitter.name for emitter in emitters)})
+    grouped_names = {member.name for members in similar.values() for member in members}
+    lights = {*groups, *similar, *(emitter.name for emitter in ungrouped_emitters)} - grouped_names
     separated: set[str] = set()
     for pattern in patterns:
-        if pattern in inside:
+        if pattern in grouped_names:
             separated.add(pattern)
         elif not any(fnmatchcase(name, pattern) for name in lights):
-            separated |= {name for name in inside if fnmatchcase(name, pattern)}
+            separated |= {name for name in grouped_names if fnmatchcase(name, pattern)}
     return remove_separated(similar, separated)
 
 
 def _with_rest(lights: Sequence[Light], emitters: Sequence[Emitter]) -> tuple[Light, ...]:
-    adjusted = {member.name for light in lights for member in light.members}
-    left = [emitter for emitter in emitters if emitter.name not in adjusted]
+    adjusted_names = {member.name for light in lights for member in light.members}
+    left = [emitter for emitter in emitters if emitter.name not in adjusted_names]
     if not left:
         return tuple(lights)
     name, used_names = REST, {light.name for light in lights} | {e.name for e in emitters}
@@ -101,8 +101,8 @@ def _members_of_groups(
     for group, patterns in groups.items():
         if not 0 < len(group) <= MAX_NAME:
             raise SceneError(f"a group needs a name of at most {MAX_NAME} characters")
-        listed = _as_list(patterns, f"group {group!r}")
-        for pattern in listed:
+        items = _as_list(patterns, f"group {group!r}")
+        for pattern in items:
             matches = _matching(pattern, names, f"group {group!r}", scene)
             members = [e for e in emitters if e.name in matches]
             if pattern not in names:
@@ -133,7 +133,7 @@ def _chosen(
     scene: str,
 ) -> set[str]:
     """Return the names of the lights that the patterns select."""
-    chosen: set[str] = set()
+    chosen_names: set[str] = set()
     for pattern in patterns:
         if pattern not in by_light:
             check_adjustable([emitter for emitter in emitters if emitter.name == pattern])
@@ -142,8 +142,8 @@ def _chosen(
                     f"light {pattern!r} is part of the group {group!r}: choose that, or leave "
                     f"{pattern!r} out of it"
                 )
-        chosen |= _matching(pattern, [*by_light], "lights", scene)
-    return chosen
+        chosen_names |= _matching(pattern, [*by_light], "lights", scene)
+    return chosen_names
 
 
 def _matching(pattern: str, names: Sequence[str], place: str, scene: str) -> set[str]:
@@ -165,9 +165,9 @@ def _matching(pattern: str, names: Sequence[str], place: str, scene: str) -> set
 def _as_list(names: Iterable[str], place: str) -> list[str]:
     """Return names as a list, checked to be non-empty."""
     # A string would otherwise become a list of its letters.
-    listed = [names] if isinstance(names, str) else list(names)
-    if len(listed) > MAX_LISTED:
-        raise SceneError(f"{place} lists {len(listed)} names: expected at most {MAX_LISTED}")
-    if not listed or not all(isinstance(name, str) and name for name in listed):
+    items = [names] if isinstance(names, str) else list(names)
+    if len(items) > MAX_LISTED:
+        raise SceneError(f"{place} lists {len(items)} names: expected at most {MAX_LISTED}")
+    if not items or not all(isinstance(name, str) and name for name in items):
         raise SceneError(f"{place}: expected a list of at least one name")
-    return listed
+    return items

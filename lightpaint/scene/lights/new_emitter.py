@@ -122,35 +122,35 @@ class NewEmitter:
             ]
             return self._element([*self._transform(), *angles, *shine])
         black = tag("rgb", name="reflectance", value="0")
-        inside = [
+        child_elements = [
             *self._transform(),
             f'<bsdf type="diffuse">{black}</bsdf>',
             '<emitter type="area">',
             *(f"    {line}" for line in shine),
             "</emitter>",
         ]
-        return self._element(inside, "shape", "rectangle")
+        return self._element(child_elements, "shape", "rectangle")
 
     def _transform(self) -> list[str]:
         place, target = self.pose.position, self.pose.target
         assert place is not None
         assert target is not None
         up = across(np.subtract(target, np.asarray(place)))[0]
-        origin, seen, above = (
+        origin, target_point, up_point = (
             ", ".join(f"{v:.9g}" for v in point) for point in (place, target, up.tolist())
         )
         scale = []
         if self.size is not None:
             x, y = (f"{side / 2:.9g}" for side in self.size)
             scale = [f"    {tag('scale', x=x, y=y)}"]
-        lookat = f"    {tag('lookat', origin=origin, target=seen, up=above)}"
+        lookat = f"    {tag('lookat', origin=origin, target=target_point, up=up_point)}"
         return ['<transform name="to_world">', *scale, lookat, "</transform>"]
 
     def _element(
-        self, inside: Sequence[str], element: str = "emitter", plugin: str = ""
+        self, child_elements: Sequence[str], element: str = "emitter", plugin: str = ""
     ) -> list[str]:
         start = tag(element, type=plugin or self.plugin, id=self.name).replace("/>", ">")
-        return [start, *(f"    {line}" for line in inside), f"</{element}>"]
+        return [start, *(f"    {line}" for line in child_elements), f"</{element}>"]
 
 
 def new_emitter_at(place: EmitterPlace) -> NewEmitter:

@@ -98,8 +98,8 @@ def reduction_to(film: Film, pixels: int) -> int:
     if that divides the film evenly.
     """
     width, height = film.pixels
-    enough = math.isqrt(max(width * height - 1, 0) // pixels) + 1
-    smallest = min(enough, width, height)
+    factor = math.isqrt(max(width * height - 1, 0) // pixels) + 1
+    smallest = min(factor, width, height)
     even = (k for k in even_reductions(film) if smallest <= k < 2 * smallest)
     return next(even, smallest)
 
@@ -123,9 +123,9 @@ def reduction(film: Film, resolution: str) -> int:
     if width and height:
         factor = whole_factor(film.pixels, (width, height))
     if not factor or factor > min(film.pixels):
-        whole = "x".join(map(str, film.pixels))
+        size = "x".join(map(str, film.pixels))
         raise SceneError(
-            f"a film of {whole} cannot be reduced to {resolution}, since its parts must be square "
+            f"a film of {size} cannot be reduced to {resolution}, since its parts must be square "
             f"blocks of pixels: {_possible(film, width)} will do"
         )
     return factor
@@ -149,14 +149,14 @@ def reduced(film: Film, factor: int) -> Film:
     """Return `film` in blocks of factor × factor pixels, or in larger blocks if their number is the
     same.
     """
-    small = blocks_in(film.pixels, factor)
-    factor = whole_factor(film.pixels, small) or factor
+    block_count = blocks_in(film.pixels, factor)
+    factor = whole_factor(film.pixels, block_count) or factor
     if film.block > 1 or factor not in even_reductions(film):
         return replace(film, block=film.block * factor)
     return replace(
         film,
         size=blocks_in(film.size, factor),
-        crop_size=small,
+        crop_size=block_count,
         crop_offset=blocks_in(film.crop_offset, factor),
     )
 
@@ -200,6 +200,6 @@ def sensor_index(sensor: int | str | None, names: Sequence[str], path: Path) -> 
     except ValueError:
         index = -1
     if not 0 <= index < len(names):
-        listed = some_names(f"{k} ({name})" for k, name in enumerate(names))
-        raise SceneError(f"{path} has no sensor {sensor!r}: it has {listed}")
+        names_text = some_names(f"{k} ({name})" for k, name in enumerate(names))
+        raise SceneError(f"{path} has no sensor {sensor!r}: it has {names_text}")
     return index

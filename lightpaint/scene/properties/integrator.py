@@ -117,22 +117,25 @@ def replace_integrator(state: Any, choice: IntegratorChoice) -> IntegratorChoice
     """
     import mitsuba as mi
 
-    present: dict[str, Any] = {}
+    given_values: dict[str, Any] = {}
     nodes = integrator_nodes(state)
     while nodes:
         props = state.nodes[nodes[0]].props
-        present = {**{key: props[key] for key in INHERITED["path"] if key in props}, **present}
+        given_values = {
+            **{key: props[key] for key in INHERITED["path"] if key in props},
+            **given_values,
+        }
         nodes = nodes[1:] + integrator_nodes(state, nodes[0])
-    choice = choice.over(present)
+    choice = choice.over(given_values)
     node = mi.parser.SceneNode()
     node.type = mi.ObjectType.Integrator
     node.props = mi.Properties(choice.plugin)
     for key, value in choice.options.items():
         node.props[key] = value
-    replaced = [key for key, _ in _references(state, 0, mi.ObjectType.Integrator)]
+    replaced_keys = [key for key, _ in _references(state, 0, mi.ObjectType.Integrator)]
     state.nodes.append(node)  # appending moves the nodes in memory: keep no references to them
     root = state.nodes[0].props
-    for key in replaced:
+    for key in replaced_keys:
         del root[key]
     root["integrator of lightpaint"] = mi.Properties.ResolvedReference(len(state.nodes) - 1)
     return choice

@@ -73,8 +73,8 @@ class Pose:
 
     def __repr__(self) -> str:
         values = {field.name: getattr(self, field.name) for field in fields(self)}
-        listed = (f"{name}={value!r}" for name, value in values.items() if value is not None)
-        return f"Pose({', '.join(listed)})"
+        values_text = (f"{name}={value!r}" for name, value in values.items() if value is not None)
+        return f"Pose({', '.join(values_text)})"
 
 
 def pose_of(site: Site) -> Pose:
@@ -225,21 +225,25 @@ def moved_parameters(props: Any, motion: Motion) -> list[MovedParameter]:
 
     props: Mitsuba's properties of the emitter, or of its shape if it has one.
     """
-    moved, site = [], motion.site
+    moved_elements, site = [], motion.site
     if "position" in props and "to_world" not in props:
-        moved.append(_vector("point", "position", site.position))
+        moved_elements.append(_vector("point", "position", site.position))
     elif "direction" in props:
-        moved.append(_vector("vector", "direction", site.direction))
+        moved_elements.append(_vector("vector", "direction", site.direction))
     elif not np.array_equal(motion.matrix, np.eye(4)):
-        old = np.eye(4) if "to_world" not in props else _matrix(props)
+        old_matrix = np.eye(4) if "to_world" not in props else _matrix(props)
         is_spot = props.plugin_name() == "spot"
-        moved.append(_transform(motion.matrix @ old, is_spot=is_spot, target=motion.target))
+        moved_elements.append(
+            _transform(motion.matrix @ old_matrix, is_spot=is_spot, target=motion.target)
+        )
     if motion.changes_cone:
         for name, angle in (("cutoff_angle", site.cutoff), ("beam_width", site.beam)):
             assert angle is not None
             text = f"{angle:.9g}"
-            moved.append(MovedParameter(name, float(text), tag("float", name=name, value=text)))
-    return moved
+            moved_elements.append(
+                MovedParameter(name, float(text), tag("float", name=name, value=text))
+            )
+    return moved_elements
 
 
 def _vector(element: str, name: str, value: Position | None) -> MovedParameter:
@@ -258,24 +262,26 @@ def _transform(matrix: Doubles, *, is_spot: bool, target: Position | None) -> Mo
     squares = matrix[:3, :3].T @ matrix[:3, :3]
     is_rigid = np.allclose(squares, np.eye(3), atol=1e-6) and np.cross(up, ahead) @ left > 0
     if is_spot and is_rigid:
-        seen = origin + ahead if target is None else np.array(target)
-        texts = {key: _texts(v) for key, v in (("origin", origin), ("target", seen), ("up", up))}
+        target_point = origin + ahead if target is None else np.array(target)
+        texts = {
+            key: _texts(v) for key, v in (("origin", origin), ("target", target_point), ("up", up))
+        }
         value = mi.ScalarAffineTransform4d().look_at(
-            **{key: [float(v) for v in listed] for key, listed in texts.items()}
+            **{key: [float(v) for v in values_text] for key, values_text in texts.items()}
         )
-        text = tag("lookat", **{key: ", ".join(listed) for key, listed in texts.items()})
+        text = tag("lookat", **{key: ", ".join(values_text) for key, values_text in texts.items()})
     else:
-        listed = _texts(matrix.ravel())
-        value = mi.ScalarAffineTransform4d(np.array([float(v) for v in listed]).reshape(4, 4))
-        text = tag("matrix", value=" ".join(listed))
+        values_text = _texts(matrix.ravel())
+        value = mi.ScalarAffineTransform4d(np.array([float(v) for v in values_text]).reshape(4, 4))
+        text = tag("matrix", value=" ".join(values_text))
     element = f'<transform name="to_world">{text}</transform>'
     return MovedParameter("to_world", value, element)
 
 
 def _texts(values: Doubles) -> list[str]:
     """Return numbers as text, with values that are only rounding errors set to 0."""
-    least = 1e-9 * float(np.abs(values).max(initial=1e-300))
-    return [f"{v if abs(v) > least else 0.0:.9g}" for v in values]
+    tolerance = 1e-9 * float(np.abs(values).max(initial=1e-300))
+    return [f"{v if abs(v) > tolerance else 0.0:.9g}" for v in values]
 
 
 def _point(name: str, value: Any) -> Position:

@@ -34,8 +34,10 @@ class Site:
     def is_near(self, other: "Site") -> bool:
         """Return whether two sites differ only by the rounding in a file."""
         pairs = zip(self._numbers, other._numbers, strict=False)
-        same = len(self._numbers) == len(other._numbers)
-        return same and all(math.isclose(a, b, rel_tol=1e-5, abs_tol=1e-5) for a, b in pairs)
+        has_same_length = len(self._numbers) == len(other._numbers)
+        return has_same_length and all(
+            math.isclose(a, b, rel_tol=1e-5, abs_tol=1e-5) for a, b in pairs
+        )
 
     @property
     def _numbers(self) -> tuple[float, ...]:

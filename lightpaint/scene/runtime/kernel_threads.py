@@ -34,8 +34,8 @@ def kernels(threads: int | None = None) -> Iterator[None]:
         return
     import drjit as dr
 
-    before = dr.thread_count()
-    if limit >= before:
+    count_before = dr.thread_count()
+    if limit >= count_before:
         yield
         return
     dr.set_thread_count(limit)
@@ -44,4 +44,4 @@ def kernels(threads: int | None = None) -> Iterator[None]:
         # Kernels run asynchronously, so wait for them.
         dr.sync_thread()
     finally:
-        dr.set_thread_count(before)
+        dr.set_thread_count(count_before)

@@ -45,12 +45,12 @@ def prepare_llvm() -> Llvm | None:
 def llvm_candidates() -> tuple[Llvm, ...]:
     """Return LLVM libraries in the order of preference, up to the first usable one."""
     candidates: list[Llvm] = []
-    seen: set[Path] = set()
+    seen_paths: set[Path] = set()
     for path, origin in _llvm_paths():
         resolved = path.resolve()
-        if resolved in seen:
+        if resolved in seen_paths:
             continue
-        seen.add(resolved)
+        seen_paths.add(resolved)
         candidates.append(_probe(path, origin))
         if candidates[-1].version is not None:
             break
@@ -58,8 +58,8 @@ def llvm_candidates() -> tuple[Llvm, ...]:
 
 
 def _llvm_paths() -> Iterator[tuple[Path, str]]:
-    if named := os.environ.get("DRJIT_LIBLLVM_PATH"):
-        yield Path(named), "DRJIT_LIBLLVM_PATH"
+    if environment_path := os.environ.get("DRJIT_LIBLLVM_PATH"):
+        yield Path(environment_path), "DRJIT_LIBLLVM_PATH"
     try:
         files = importlib.metadata.files("karellen-llvm-core") or []
     except importlib.metadata.PackageNotFoundError:

@@ -37,8 +37,8 @@ def mitsuba_errors(path: Path, instead: IntegratorChoice | None = None) -> Itera
         if "integrator plugin" in text:
             hint = f"; the requested integrator is {instead}"
             hint = hint if instead else '; integrator="path" renders it with another'
-        lead = "" if isinstance(error, UnknownPluginError) else "Mitsuba refuses "
-        raise SceneError(f"{lead}{path}: {text}{hint}") from error
+        prefix = "" if isinstance(error, UnknownPluginError) else "Mitsuba refuses "
+        raise SceneError(f"{prefix}{path}: {text}{hint}") from error
 
 
 @contextmanager

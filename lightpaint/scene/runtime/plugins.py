@@ -45,22 +45,22 @@ def loaded_plugins() -> frozenset[str]:
     """
     import mitsuba as mi
 
-    own = Path(mi.__file__).resolve().parent / "plugins"
-    names = _load_folder(own)
+    plugin_folder = Path(mi.__file__).resolve().parent / "plugins"
+    names = _load_folder(plugin_folder)
     if user_folder := os.environ.get(VARIABLE):
         folder = Path(user_folder).absolute()
         if not folder.is_dir():
             raise BackendError(
                 f"{VARIABLE} is {folder}, which is not a folder: set it to a folder of plugins"
             )
-        added = {path.stem for path in _files(folder)}
-        if duplicates := sorted(added & (names | IN_PYTHON)):
+        added_plugins = {path.stem for path in _files(folder)}
+        if duplicates := sorted(added_plugins & (names | IN_PYTHON)):
             raise BackendError(
                 f"{VARIABLE}: {folder} has a plugin {duplicates[0]!r}, which Mitsuba has itself: "
                 "give it another name"
             )
         plugins = _load_folder(folder)
-        if missing := sorted(added - plugins):
+        if missing := sorted(added_plugins - plugins):
             raise BackendError(
                 f"{VARIABLE}: {folder} has {missing[0]!r}, which this Mitsuba cannot load as a "
                 "plugin"
@@ -80,16 +80,16 @@ def check_plugins(state: Any, resolver: Any) -> None:
         if name in plugins:
             continue
         kind = str(node.type).rpartition(".")[2].lower()
-        lead = f"{place_of_node(state, node)}Mitsuba has no {kind} plugin {one_line(repr(name))}"
+        prefix = f"{place_of_node(state, node)}Mitsuba has no {kind} plugin {one_line(repr(name))}"
         if name in IN_PYTHON:
             if file := _shadowing_file(name, resolver):
                 raise UnknownPluginError(
-                    f"{lead} except in Python, and {file} would run instead: move that file away"
+                    f"{prefix} except in Python, and {file} would run instead: move that file away"
                 )
             continue
         close = difflib.get_close_matches(name, plugins | IN_PYTHON, n=1, cutoff=0.75)
         suggestion = f"; did you mean {close[0]!r}?" if close else ""
-        raise UnknownPluginError(f"{lead}{suggestion}")
+        raise UnknownPluginError(f"{prefix}{suggestion}")
 
 
 def _in_use(state: Any) -> Iterator[Any]:
@@ -99,14 +99,16 @@ def _in_use(state: Any) -> Iterator[Any]:
     import mitsuba as mi
 
     resolved = mi.Properties.Type.ResolvedReference
-    reached, waiting = {0}, [0]
-    while waiting:
-        node = state.nodes[waiting.pop()]
+    reached_indices, open_indices = {0}, [0]
+    while open_indices:
+        node = state.nodes[open_indices.pop()]
         yield node
         props = node.props
-        below = {int(props[key].index()) for key in props if props.type(key) == resolved} - reached
-        reached |= below
-        waiting += sorted(below)
+        referenced_indices = {
+            int(props[key].index()) for key in props if props.type(key) == resolved
+        } - reached_indices
+        reached_indices |= referenced_indices
+        open_indices += sorted(referenced_indices)
 
 
 def _shadowing_file(name: str, resolver: Any) -> Path | None:
@@ -126,12 +128,12 @@ def _load_folder(folder: Path) -> frozenset[str]:
 
     manager = mi.PluginManager.instance()
     # Plugins may read Mitsuba's data files while loading.
-    own = Path(mi.__file__).resolve().parent
+    plugin_folder = Path(mi.__file__).resolve().parent
     with (
-        tempfile.TemporaryDirectory(prefix="lightpaint-") as above,
-        _resolving_only_in(Path(above), own),
+        tempfile.TemporaryDirectory(prefix="lightpaint-") as parent_folder,
+        _resolving_only_in(Path(parent_folder), plugin_folder),
     ):
-        (Path(above) / "plugins").symlink_to(folder, target_is_directory=True)
+        (Path(parent_folder) / "plugins").symlink_to(folder, target_is_directory=True)
         kinds = {path.stem: manager.plugin_type(path.stem) for path in _files(folder)}
     return frozenset(name for name, kind in kinds.items() if kind != mi.ObjectType.Unknown)
 
@@ -141,8 +143,8 @@ def _resolving_only_in(*folders: Path) -> Iterator[None]:
     """Restrict Mitsuba's file search to these folders within the block."""
     import mitsuba as mi
 
-    before = mi.file_resolver()
-    resolver = mi.FileResolver(before)
+    resolver_before = mi.file_resolver()
+    resolver = mi.FileResolver(resolver_before)
     resolver.clear()
     for folder in folders:
         resolver.append(str(folder))
@@ -150,4 +152,4 @@ def _resolving_only_in(*folders: Path) -> Iterator[None]:
     try:
         yield
     finally:
-        mi.set_file_resolver(before)
+        mi.set_file_resolver(resolver_before)

@@ -30,12 +30,12 @@ class Turns:
         self._holder: int | None = None
         self._depth = 0
         self._waiting = deque[object]()  # threads of normal priority
-        self._idle: dict[
+        self._low_priority_since: dict[
             object, float
         ] = {}  # low-priority threads, with the time since when they wait
-        self._away = 0  # number of threads that are lending their turn
-        self._called: object | None = None  # the thread whose turn it is, until it takes it
-        self._own = local()
+        self._lent_count = 0  # number of threads that are lending their turn
+        self._next_thread: object | None = None  # the thread whose turn it is, until it takes it
+        self._thread_state = local()
 
     @contextmanager
     def acquired(self) -> Iterator[None]:
@@ -55,11 +55,11 @@ class Turns:
     @contextmanager
     def low_priority(self) -> Iterator[None]:
         """Give this thread low priority within the block."""
-        before, self._own.is_low_priority = self._is_low_priority, True
+        was_low_priority, self._thread_state.is_low_priority = self._is_low_priority, True
         try:
             yield
         finally:
-            self._own.is_low_priority = before
+            self._thread_state.is_low_priority = was_low_priority
 
     @contextmanager
     def aside(self) -> Iterator[None]:
@@ -80,7 +80,7 @@ class Turns:
                 self._take(depth)
             finally:
                 with self._changed:
-                    self._away -= urgent
+                    self._lent_count -= urgent
                     self._call()
 
     def let_others(self) -> None:
@@ -93,47 +93,50 @@ class Turns:
 
     @property
     def _is_low_priority(self) -> bool:
-        return getattr(self._own, "is_low_priority", False)
+        return getattr(self._thread_state, "is_low_priority", False)
 
     def _take(self, depth: int) -> None:
         ticket = object()
         with self._changed:
             if self._is_low_priority:
-                self._idle[ticket] = monotonic()
+                self._low_priority_since[ticket] = monotonic()
             else:
                 self._waiting.append(ticket)
             try:
                 self._call()
-                self._changed.wait_for(lambda: self._called is ticket)
+                self._changed.wait_for(lambda: self._next_thread is ticket)
                 self._holder, self._depth = get_ident(), depth
             finally:
-                if self._idle.pop(ticket, None) is None:
+                if self._low_priority_since.pop(ticket, None) is None:
                     self._waiting.remove(ticket)
-                if self._called is ticket:
-                    self._called = None
+                if self._next_thread is ticket:
+                    self._next_thread = None
                 self._call()  # an interrupted thread must not block others
 
     def _call(self) -> None:
         """Choose the next thread if nobody has a turn; only once, since the choice depends on
         time.
         """
-        if self._holder is None and self._called is None:
-            self._called = self._next()
+        if self._holder is None and self._next_thread is None:
+            self._next_thread = self._next()
             self._changed.notify_all()
 
     def _next(self) -> object | None:
         """Return the ticket of the next thread; None if no thread waits."""
-        idle = next(iter(self._idle), None)
-        if idle is not None and monotonic() - self._idle[idle] > MAX_WAIT_S:
-            return idle
+        low_priority_thread = next(iter(self._low_priority_since), None)
+        if (
+            low_priority_thread is not None
+            and monotonic() - self._low_priority_since[low_priority_thread] > MAX_WAIT_S
+        ):
+            return low_priority_thread
         if self._waiting:
             return self._waiting[0]
-        return None if self._away else idle
+        return None if self._lent_count else low_priority_thread
 
     def _leave(self, away: bool = False) -> None:
         with self._changed:
             self._holder, self._depth = None, 0
-            self._away += away
+            self._lent_count += away
             self._call()
 
 

@@ -39,17 +39,17 @@ _current: Backend | None = None
 
 
 @keywords()
-def use_variant(wanted: str | None = None) -> Backend:
-    """Start Mitsuba with the variant `wanted`, or with the fastest RGB variant that works here.
+def use_variant(requested: str | None = None) -> Backend:
+    """Start Mitsuba with the variant `requested`, or with the fastest RGB variant that works here.
 
     Later calls return the same backend.
 
     Args:
-        wanted: A variant such as `llvm_ad_rgb`; None for the fastest.
+        requested: A variant such as `llvm_ad_rgb`; None for the fastest.
 
     Raises:
-        BackendError: If Mitsuba is missing, if `wanted` is not an RGB variant of this installation,
-            or if another one is already in use.
+        BackendError: If Mitsuba is missing, if this installation has no RGB variant of the name
+            `requested`, or if another one is already in use.
 
     Examples:
         >>> lp.use_variant().variant
@@ -58,21 +58,21 @@ def use_variant(wanted: str | None = None) -> Backend:
     global _current
     if _current is not None:
         _check_unchanged(_current)
-        if wanted not in (None, _current.variant):
+        if requested not in (None, _current.variant):
             raise BackendError(
                 f"this process already renders with {_current.variant}: "
-                f"start a new one for {wanted}"
+                f"start a new one for {requested}"
             )
         return _current
 
     # An interrupt while C++ modules initialise would crash the process.
     with interruptible_between_pieces():
-        _current = _start(wanted)
+        _current = _start(requested)
     return _current
 
 
-def _start(wanted: str | None) -> Backend:
-    needs_llvm = wanted is None or wanted.startswith("llvm")
+def _start(requested: str | None) -> Backend:
+    needs_llvm = requested is None or requested.startswith("llvm")
     llvm = prepare_llvm() if needs_llvm else None
     try:
         import mitsuba as mi
@@ -80,18 +80,18 @@ def _start(wanted: str | None) -> Backend:
         raise BackendError(f"Mitsuba cannot be imported ({error}): pip install mitsuba") from error
 
     # A notebook or a script may have set a variant already, which is respected.
-    present = mi.variant()
-    if present is not None and wanted in (None, present):
-        _check_is_rgb(present)
-        if present.startswith("llvm"):
+    current = mi.variant()
+    if current is not None and requested in (None, current):
+        _check_is_rgb(current)
+        if current.startswith("llvm"):
             import drjit as dr
 
-            _check_llvm_in_use(dr, present)
-        backend = Backend(present)
-    elif wanted is None:
+            _check_llvm_in_use(dr, current)
+        backend = Backend(current)
+    elif requested is None:
         backend = _choose(mi, llvm)
     else:
-        backend = _set(mi, wanted, llvm)
+        backend = _set(mi, requested, llvm)
     mi.set_log_level(mi.LogLevel.Error)
     loaded_plugins()  # before any scene adds search folders
     return backend

@@ -140,8 +140,8 @@ class EmitterGuide:
         axis = dr.select(
             size.x > dr.maximum(size.y, size.z), 0, dr.select(size.y > size.z, 1, mi.UInt32(2))
         )
-        towards = dr.select(axis == 0, normal.x, dr.select(axis == 1, normal.y, normal.z))
-        key = exponent * 6 + axis * 2 + dr.select(towards > 0, 1, mi.UInt32(0))
+        facing = dr.select(axis == 0, normal.x, dr.select(axis == 1, normal.y, normal.z))
+        key = exponent * 6 + axis * 2 + dr.select(facing > 0, 1, mi.UInt32(0))
         for coordinate, factor in ((x, 0x9E3779B1), (y, 0x85EBCA77), (z, 0xC2B2AE3D)):
             key += mi.UInt32(coordinate) * mi.UInt32(factor)
         return hashed(key) & (self.cells - 1)
