@@ -10,10 +10,9 @@ import numpy.typing as npt
 from lightpaint.arrays import Bools, Doubles, Floats, Indices, read_only
 from lightpaint.basis.lights import Lights
 from lightpaint.basis.origin import Origin
-from lightpaint.basis.planes import Planes, as_planes, power_and_totals
+from lightpaint.basis.planes import IndirectLight, Planes, as_planes, power_and_totals
 from lightpaint.colour.color import luminance
-from lightpaint.colour.display.exposure import choose_exposure
-from lightpaint.dataframes import CHANNELS, by_channel, pandas, xarray
+from lightpaint.dataframes import CHANNELS, pandas, xarray
 from lightpaint.errors import BasisError
 from lightpaint.images.denoiser import Features
 from lightpaint.images.estimate import Estimate
@@ -22,17 +21,6 @@ from lightpaint.images.surface_filter import SurfaceFilter
 from lightpaint.keywords import keywords
 from lightpaint.scene.lights.lights_file import SceneRequests
 from lightpaint.screen import Shown, some_names, some_of
-
-
-@dataclass(frozen=True)
-class IndirectLight:
-    """The part of the images that was scattered by more than one surface.
-
-    planes, noise: as in `Basis`, for that part alone.
-    """
-
-    planes: Planes
-    noise: Planes
 
 
 @keywords()
@@ -104,22 +92,27 @@ class Basis(Shown):
             object.__setattr__(self, name, as_planes(value))
         if self.noise.size != self.planes.size:
             raise BasisError("half differences and images differ in shape")
-        if self.emitters_seen.shape != self.size:
-            raise BasisError("the mask of seen emitters has another size than the images")
-        if self.features is not None and self.features.size != self.size:
-            raise BasisError("albedo and normals have another size than the images")
-        if self.objects is not None and self.objects.size != self.size:
-            raise BasisError("the picture of objects has another size than the images")
+        self._check_pictures()
         if self.indirect is not None:
             parts = self.indirect.planes, self.indirect.noise
             if any((part.count, part.size) != (n, self.size) for part in parts):
                 raise BasisError("indirect light and images differ in shape")
         if (self.extra is None) != (self.origin.extra_spp == 0):
             raise BasisError("extra samples go with a picture of their numbers")
-        if self.extra is not None and self.extra.shape != self.size:
-            raise BasisError("the numbers of extra samples have another size than the images")
         if len(self.origin.each_light) not in (0, n):
             raise BasisError(f"samples of {len(self.origin.each_light)} lights for {n} lights")
+
+    def _check_pictures(self) -> None:
+        """Raise BasisError for a picture that has another size than the images."""
+        features, objects, extra = self.features, self.objects, self.extra
+        for name, size in (
+            ("the mask of seen emitters has", self.emitters_seen.shape),
+            ("albedo and normals have", None if features is None else features.size),
+            ("the picture of objects has", None if objects is None else objects.size),
+            ("the numbers of extra samples have", None if extra is None else extra.shape),
+        ):
+            if size is not None and size != self.size:
+                raise BasisError(f"{name} another size than the images")
 
     def __repr__(self) -> str:
         (height, width), origin = self.size, self.origin
@@ -138,17 +131,7 @@ class Basis(Shown):
         pixels = self.size[0] * self.size[1]
         means = self.totals / pixels * self.present_weights
         rows = [
-            {
-                "plugin": light.plugin,
-                "parameter": light.parameter,
-                "unit": light.unit,
-                **by_channel("", light.emission),
-                "mean": float(luminance(mean)),
-                "form": light.form,
-                "is_fixed": light.is_fixed,
-                "is_scalar": light.is_scalar,
-                "members": ", ".join(light.members),
-            }
+            light.to_row(float(luminance(mean)))
             for light, mean in zip(self.lights, means, strict=True)
         ]
         return pandas().DataFrame(rows, index=pandas().Index(self.names, name="light"))
@@ -336,15 +319,3 @@ class Basis(Shown):
     @cached_property
     def _predicted(self) -> dict[bytes, Estimate]:
         return {}
-
-
-def meter_exposure(image: Floats, *bases: Basis) -> float:
-    """Return the exposure in stops at which to show a picture mixed from `bases`.
-
-    image: (h, w, 3) linear; for several bases, their pixels in one row, (1, p, 3). Visible emitters
-    are ignored, except in light groups, which do not say where they are.
-    """
-    if not all(basis.knows_noise for basis in bases):
-        return choose_exposure(image)
-    is_emitter = [basis.emitters_seen.ravel() for basis in bases]
-    return choose_exposure(image, np.concatenate(is_emitter).reshape(image.shape[:2]))

@@ -3,11 +3,12 @@
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 
 from lightpaint.arrays import RGB, Bools, Doubles, read_only
+from lightpaint.dataframes import by_channel
 from lightpaint.errors import BasisError
 from lightpaint.scene.lights.lights_file import SceneRequests
 from lightpaint.screen import Listed, some_names
@@ -58,6 +59,20 @@ class BasisLight:
                 f"light {self.name!r} has a flux of {list(self.unit_flux)} at unit emission: need "
                 f"three numbers from 0 to {BRIGHTEST:g}"
             )
+
+    def to_row(self, mean: float) -> dict[str, Any]:
+        """Return this light as a row of a table. mean: luminance of its image, over all pixels."""
+        return {
+            "plugin": self.plugin,
+            "parameter": self.parameter,
+            "unit": self.unit,
+            **by_channel("", self.emission),
+            "mean": mean,
+            "form": self.form,
+            "is_fixed": self.is_fixed,
+            "is_scalar": self.is_scalar,
+            "members": ", ".join(self.members),
+        }
 
     def __repr__(self) -> str:
         emission = " ".join(f"{v:.4g}" for v in self.emission)

@@ -6,6 +6,7 @@ Code outside this package uses the protocol below and never indexes an array of 
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Protocol
 
@@ -266,3 +267,14 @@ def mix(images: Floats, weights: Doubles) -> npt.NDArray[np.float32]:
     rows = images.reshape(n, height, width * 3)
     mixed = np.einsum("nhk,nk->hk", rows, along_row)
     return np.asarray(mixed.reshape(height, width, 3), np.float32)
+
+
+@dataclass(frozen=True)
+class IndirectLight:
+    """The part of the images that was scattered by more than one surface.
+
+    planes, noise: as in `Basis`, for that part alone.
+    """
+
+    planes: Planes
+    noise: Planes

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from lightpaint.basis.basis import Basis, meter_exposure
+from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache
 from lightpaint.basis.cache.scene_facts import SceneFacts
+from lightpaint.basis.exposure_meter import meter_exposure
 from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
 from lightpaint.files import scene_name

@@ -5,9 +5,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis, meter_exposure
+from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache
 from lightpaint.basis.denoised_mixes import denoise_plane, denoise_present_look
+from lightpaint.basis.exposure_meter import meter_exposure
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.basis.render.render_origin import is_of

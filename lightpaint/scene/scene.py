@@ -8,37 +8,46 @@ import gc
 import hashlib
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numpy as np
-
-from lightpaint.arrays import RGB, Floats, Position
-from lightpaint.errors import SceneError
+from lightpaint.arrays import RGB, Position
 from lightpaint.keywords import keywords
 from lightpaint.scene.changed_emitters import darkened, with_elements, with_motions
 from lightpaint.scene.lights.emitters import Emitter
-from lightpaint.scene.lights.light import Light, light_named, lights_of, settings_for
-from lightpaint.scene.lights.lights_file import SceneRequests, lights_file_beside
-from lightpaint.scene.lights.new_emitter import NewEmitter, moved_emitter
-from lightpaint.scene.properties.emission import EmitterSetting
+from lightpaint.scene.lights.light import (
+    Light,
+    black_emitters,
+    check_grouping,
+    emitter_named,
+    light_named,
+    lights_of,
+    settings_for,
+)
+from lightpaint.scene.lights.lights_file import SceneRequests
+from lightpaint.scene.lights.new_emitter import (
+    NewEmitter,
+    check_new_names,
+    moved_emitter,
+    places_of,
+)
 from lightpaint.scene.properties.film import Film, camera_named, reduced, reduction
 from lightpaint.scene.properties.integrator import Integrator, IntegratorChoice
 from lightpaint.scene.properties.pose import Pose, motion_of, upward_axis
 from lightpaint.scene.properties.site import EmitterPlace, Site
 from lightpaint.scene.runtime.mitsuba_errors import mitsuba_errors, render_errors
 from lightpaint.scene.runtime.render_lock import MITSUBA
-from lightpaint.scene.scene_inspection import inspect_scene, shape_names
+from lightpaint.scene.scene_files import SceneFiles
+from lightpaint.scene.scene_inspection import inspect_scene
 from lightpaint.scene.scene_tree import ParsedScene
-from lightpaint.screen import Listed, Shown, some_names, some_of
+from lightpaint.screen import Listed, Shown, some_of
 
 _Result_T = TypeVar("_Result_T")
 
 
 @keywords()
 @dataclass(frozen=True)
-class Scene(Shown):
+class Scene(SceneFiles, Shown):
     """A parsed scene, seen through one of its sensors.
 
     Attributes:
@@ -130,18 +139,7 @@ class Scene(Shown):
         members: light name → names of its emitters. fixed: lights that stay as they are.
         Raises SceneError unless every emitter of the scene, and nothing else, is named once.
         """
-        grouped = [name for names in members.values() for name in names]
-        existing_names = {emitter.name for emitter in self.emitters}
-        if set(grouped) != existing_names:
-            raise SceneError(
-                f"{self.path} does not have the expected emitters: it lacks "
-                f"{some_names(sorted(set(grouped) - existing_names)) or 'none'} and also has "
-                f"{some_names(sorted(existing_names - set(grouped))) or 'none'}"
-            )
-        if len(grouped) > len(existing_names) or not all(members.values()):
-            raise SceneError(
-                f"every emitter belongs to one light, and every light has one: not so in {members}"
-            )
+        check_grouping(members, self.emitters, scene=str(self.path))
         return replace(self, lights=lights_of(self.emitters, members, fixed))
 
     @property
@@ -184,21 +182,7 @@ class Scene(Shown):
         """
         chosen_names = {self.light(name).name for name in names}
         lights = tuple(light for light in self.lights if light.name in chosen_names)
-        members = {member.name for light in lights for member in light.members}
-        other_emitters = [x for x in self.emitters if x.name not in members]
-        # If nothing else may be sampled, black emitters are, since Mitsuba needs at least one.
-        is_asked = any(not m.hit_by_chance for light in lights for m in light.members)
-        black = (0.0, 0.0, 0.0)
-        dark = {
-            x.node: EmitterSetting(x.kind, black, 0.0 if is_asked else x.sampling_weight)
-            for x in other_emitters
-        }
-        emitters = tuple(
-            replace(x, emission=black, sampling_weight=dark[x.node].sampling_weight)
-            if x.node in dark
-            else x
-            for x in self.emitters
-        )
+        emitters, dark = black_emitters(self.emitters, lights)
         names = tuple(light.name for light in lights)
         content = hashlib.sha256(repr((self.content, names)).encode()).hexdigest()[:32]
         return replace(
@@ -230,7 +214,7 @@ class Scene(Shown):
         motions, elements, added = {}, {}, {x.name: x for x in self.added}
         old_sites = dict(self.old_sites)
         for name, pose in poses.items():
-            emitter = self._emitter(name)
+            emitter = emitter_named(name, self.emitters, self.lights, scene=str(self.path))
             motion = motion_of(emitter.name, emitter.plugin, emitter.site, pose)
             if emitter.name in added:
                 moved = moved_emitter(added[emitter.name], motion.site, motion.target)
@@ -246,16 +230,7 @@ class Scene(Shown):
     @property
     def emitter_places(self) -> tuple[EmitterPlace, ...]:
         """Places of the emitters that have a position or a direction."""
-        added = {x.name: x for x in self.added}
-        places = []
-        for emitter in self.emitters:
-            if emitter.site == Site():
-                continue
-            place = EmitterPlace.of(emitter.name, emitter.site, self.old_sites.get(emitter.name))
-            if (new := added.get(emitter.name)) is not None:
-                place = replace(place, new=new.kind, size=new.size)
-            places.append(place)
-        return tuple(places)
+        return places_of(self.emitters, self.added, self.old_sites)
 
     @MITSUBA.acquired()
     def with_new_emitters(self, emitters: Sequence[NewEmitter]) -> "Scene":
@@ -274,13 +249,7 @@ class Scene(Shown):
             ['panel', 'bulb', 'key']
         """
         taken_names = {*(x.name for x in self.emitters), *(x.name for x in self.lights)}
-        for emitter in emitters:
-            if emitter.name in taken_names:
-                raise SceneError(
-                    f"{self.path} has a light {emitter.name!r} already: give the new one another "
-                    "name"
-                )
-            taken_names.add(emitter.name)
+        check_new_names(emitters, taken_names, scene=str(self.path))
         parsed = with_elements(self.parsed, {x.name: "".join(x.lines()) for x in emitters})
         extended = self._inspected(parsed, [x.name for x in emitters])
         return replace(extended, added=(*self.added, *emitters))
@@ -303,53 +272,12 @@ class Scene(Shown):
             parsed=parsed,
         )
 
-    def _emitter(self, name: str) -> Emitter:
-        """Return the emitter called `name`, or the only emitter of the light called `name`."""
-        if emitter := next((x for x in self.emitters if x.name == name), None):
-            return emitter
-        light = self.light(name)
-        if len(light.members) > 1:
-            raise SceneError(
-                f"light {name!r} is {len(light.members)} emitters: move one of them, "
-                f"{some_names(light.member_names)}"
-            )
-        return light.members[0]
-
     @property
     def up(self) -> Position:
         """The up axis of the scene, estimated from its camera and its lights."""
         node = self.parsed.state.nodes[self.parsed.sensor_nodes[self.sensor]]
         shining = [x.site.direction for x in self.emitters if x.site.direction is not None]
         return upward_axis(node.props, shining)
-
-    @property
-    def moved_elements(self) -> tuple[tuple[Path, int, Mapping[str, str]], ...]:
-        """Elements in the files that `moved` changed.
-
-        For each: its file, the byte offset of its `<`, and the child elements to set, as XML by
-        name.
-        """
-        nodes = self.parsed.state.nodes
-        return tuple(
-            (self.files[nodes[k].file_index], int(nodes[k].offset) - 1, children)
-            for k, children in self.parsed.moved.items()
-        )
-
-    @property
-    def originals(self) -> tuple[Path, ...]:
-        """All files of the scene: XML, meshes, textures, tables."""
-        return (*self.files, *self.parsed.assets())
-
-    @property
-    def read_files(self) -> tuple[Path, ...]:
-        """`originals`, and the lights file if there is one."""
-        return (*self.originals, *([] if self.lights_file is None else [self.lights_file]))
-
-    @property
-    def places(self) -> frozenset[Path]:
-        """Paths of its files, and of files that would change the scene if they existed."""
-        lights_path = self.lights_file or lights_file_beside(self.path)
-        return frozenset({*self.parsed.places(), lights_path})
 
     def relocated(self, old: Path, new: Path) -> "Scene":
         """Return this scene after its folder `old` was moved to `new`."""
@@ -387,25 +315,3 @@ class Scene(Shown):
         finally:
             del loaded
             gc.collect()
-
-    @cached_property
-    def shape_names(self) -> tuple[str, ...]:
-        """Names of the shapes, in the order of a loaded scene."""
-        return shape_names(self.parsed)
-
-    @property
-    def replaced_integrators(self) -> tuple[tuple[Path, int], ...]:
-        """The integrators that `instead` replaces: file, and byte offset of the element."""
-        return tuple((self.files[file], offset) for file, offset in self.parsed.replaced)
-
-    def emitted_image(self, emitter: Emitter) -> Floats:
-        """Return the image that `emitter` emits, (h, w, 3) linear Rec.709, without its scale."""
-        import mitsuba as mi
-
-        assert emitter.kind is not None
-        path, raw = self.parsed.image_file(emitter.node, emitter.kind.parameter)
-        bitmap = mi.Bitmap(str(path))
-        if raw:
-            bitmap.set_srgb_gamma(False)
-        rgb = bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False)
-        return np.array(rgb)

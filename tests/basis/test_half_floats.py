@@ -10,7 +10,6 @@ import pytest
 
 import lightpaint as lp
 from lightpaint.arrays import round_to_halves
-from lightpaint.basis.basis import IndirectLight
 from lightpaint.basis.file import basis_file, file_parts, half_floats
 from lightpaint.basis.file.basis_file import FORMAT_KEY, as_stored, write_basis
 from lightpaint.basis.file.basis_reader import read_basis
@@ -25,7 +24,7 @@ from lightpaint.basis.file.half_floats import (
     PlaneEncoding,
     encode_pair,
 )
-from lightpaint.basis.planes import MemoryPlanes, as_planes
+from lightpaint.basis.planes import IndirectLight, MemoryPlanes, as_planes
 from lightpaint.errors import BasisError
 from lightpaint.images.formats.exr import read_parts, write_parts
 

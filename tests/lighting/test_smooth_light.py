@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.basis.basis import Basis, IndirectLight
+from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.origin import Origin
-from lightpaint.basis.planes import as_planes
+from lightpaint.basis.planes import IndirectLight, as_planes
 from lightpaint.images.denoiser import Features
 from lightpaint.lighting.analysis.noise import smooth_light
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise

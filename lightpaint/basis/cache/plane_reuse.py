@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Bools
-from lightpaint.basis.basis import Basis, IndirectLight
+from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache
 from lightpaint.basis.derived_planes import PlaneReference, compose_planes
 from lightpaint.basis.file.basis_file import is_large
 from lightpaint.basis.lights import Lights
-from lightpaint.basis.planes import Planes
+from lightpaint.basis.planes import IndirectLight, Planes
 from lightpaint.basis.render.render_origin import ONE_PASS, basis_lights, method_of, origin_of
 from lightpaint.basis.render.separate_renders import emitters_seen
 from lightpaint.scene.properties.emission import ENVIRONMENTS

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from lightpaint.basis.basis import Basis, IndirectLight
+from lightpaint.basis.basis import Basis
 from lightpaint.basis.file.checksums import CHECKSUMS_KEY, Checksums, checksum
 from lightpaint.basis.file.file_parts import (
     LARGEST_SCALE,
@@ -22,6 +22,7 @@ from lightpaint.basis.file.file_parts import (
     plane_sets,
 )
 from lightpaint.basis.file.half_floats import EncodedPlanes, PlaneEncoding
+from lightpaint.basis.planes import IndirectLight
 from lightpaint.images.formats.exr import (
     Channels,
     ExrPart,

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lightpaint.basis.basis import Basis, IndirectLight
+from lightpaint.basis.basis import Basis
 from lightpaint.basis.file.basis_file import (
     FORMAT,
     FORMAT_KEY,
@@ -32,7 +32,7 @@ from lightpaint.basis.file.file_planes import FilePlanes
 from lightpaint.basis.file.half_floats import EncodedPlanes, encoded_plane
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.basis.origin import Origin
-from lightpaint.basis.planes import Planes, as_planes
+from lightpaint.basis.planes import IndirectLight, Planes, as_planes
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.file_reading import file_length
 from lightpaint.files import one_line

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis, IndirectLight
+from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.beauty_comparison import (
     NEGLIGIBLE_SHARE,
     describe_sum,
@@ -26,7 +26,7 @@ from lightpaint.basis.lightgroups.layer_roles import Roles, roles_of
 from lightpaint.basis.lightgroups.render_layers import RenderLayer, read_layers
 from lightpaint.basis.lights import BasisLight, Lights, free_name
 from lightpaint.basis.origin import LIGHT_GROUPS, Origin
-from lightpaint.basis.planes import as_planes
+from lightpaint.basis.planes import IndirectLight, as_planes
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.errors import BasisError
 from lightpaint.keywords import keywords

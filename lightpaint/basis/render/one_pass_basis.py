@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from lightpaint.arrays import Bools, Floats
-from lightpaint.basis.basis import Basis, IndirectLight
-from lightpaint.basis.planes import Planes, as_planes
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.planes import IndirectLight, Planes, as_planes
 from lightpaint.basis.render.half_sums import HalfCounts, add_halves, mean_and_half_difference
 from lightpaint.basis.render.render_origin import (
     FINISHED,

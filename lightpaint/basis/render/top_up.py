@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lightpaint.arrays import Floats, Indices
-from lightpaint.basis.basis import Basis, IndirectLight
-from lightpaint.basis.planes import Planes, as_planes
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.planes import IndirectLight, Planes, as_planes
 from lightpaint.basis.render.guide_training import train
 from lightpaint.basis.render.half_sums import add_halves, mean_and_half_difference
 from lightpaint.basis.render.integrators import has_indirect_planes, plane_count

@@ -5,9 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.light_groups import LightGroups
-from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.basis.render.render_memory import memory_needed
 from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.folder_names import check_gallery
@@ -17,7 +15,12 @@ from lightpaint.batch.manifest.manifest import Manifest, read_manifest
 from lightpaint.batch.manifest.variations import vary
 from lightpaint.batch.plan.fingerprint import Fingerprints
 from lightpaint.batch.plan.journal import Journal
-from lightpaint.batch.plan.look_errors import collect_errors
+from lightpaint.batch.plan.look_checks import (
+    check_by_sums,
+    check_given_lighting,
+    collect_errors,
+    files_of_lighting_look,
+)
 from lightpaint.batch.plan.place_groups import (
     PlaceGroup,
     deciding_looks,
@@ -38,14 +41,11 @@ from lightpaint.batch.work.task import (
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import LOOK_ERRORS, BatchError, LightpaintError
 from lightpaint.files import check_writable
-from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.problem_sums import reason_against_sums
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.results.result_folder import is_as_written
 from lightpaint.pipeline.results.results import view_names
-from lightpaint.relit.relight import scene_of
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.screen import some_names
@@ -236,7 +236,7 @@ class _Planner:
             )
             job = self._job(entry, scenes, basis, settings, constraints)
         if entry.is_by_sums:
-            _check_by_sums(job)
+            check_by_sums(job)
         elif job.all_rigging and entry.basis is None:
             self._looks_with_moves.append(entry.name)
         elif entry.shares_places:
@@ -271,27 +271,9 @@ class _Planner:
         scene = scenes[0] if scenes else None
         basis = None if entry.basis is None else entry.basis.content
         groups = basis if isinstance(basis, LightGroups) else None
-        source_files: tuple[Path, ...] = () if scene is None else scene.read_files
-        if groups is not None:
-            source_files += tuple(groups.files)
-        elif entry.basis is not None:
-            source_files += (Path(entry.basis.path),)
+        source_files = files_of_lighting_look(entry, scene, groups)
         if entry.lighting:
-            lighting = read_lighting(entry.lighting)
-            source_files += (Path(entry.lighting),)
-            if scene is not None:
-                lights = scene_of(scene, lighting).lights
-                lighting_names, scene_names = set(lighting), {light.name for light in lights}
-                if lighting_names != scene_names:
-                    raise BatchError(
-                        f"{entry.lighting} has the lights {some_names(sorted(lighting_names))}, "
-                        f"and the scene {some_names(sorted(scene_names))}: load it with the same "
-                        "lights and groups"
-                    )
-            elif isinstance(basis, LightGroups | Basis):
-                names = (basis.basis if isinstance(basis, LightGroups) else basis).names
-                if set(lighting) != set(names):
-                    raise BatchError(f"{entry.lighting} is of other lights than {entry.basis}")
+            check_given_lighting(entry, scene, basis)
         folders = [str(self._folders[name] / "lighting.json") for name in entry.combined_looks]
         lightings = tuple([entry.lighting] if entry.lighting else folders)
         views = view_names(scenes) if entry.by_sensor else [""]
@@ -323,15 +305,3 @@ class _Planner:
                 film.spp if spp is None else spp,
                 memory_needed(film),
             )
-
-
-def _check_by_sums(job: Job) -> None:
-    """Raise BatchError if the lighting of a job does not follow from sums alone."""
-    [view] = job.views
-    reason = reason_against_sums(view.target, job.fit)
-    if not reason and view.basis is None and view.scene is not None:
-        reason = why_not_one_pass(view.scene) or ""
-    if job.all_rigging:
-        reason = "lights may move in it, unless move_lights is false"
-    if reason:
-        raise BatchError(f"want = ['lights'] takes sums alone, and {reason}: want 'solve' instead")

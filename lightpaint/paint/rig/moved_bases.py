@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis, IndirectLight
+from lightpaint.basis.basis import Basis
 from lightpaint.basis.derived_planes import PlaneReference, compose_planes
 from lightpaint.basis.file.basis_file import is_large
 from lightpaint.basis.lights import BasisLight
-from lightpaint.basis.planes import MemoryPlanes, Planes
+from lightpaint.basis.planes import IndirectLight, MemoryPlanes, Planes
 from lightpaint.images.estimate import Estimate
 
 

@@ -15,7 +15,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.cached_render import check_same_view
 from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.basis.render.render_origin import basis_lights
-from lightpaint.errors import BasisError, ConstraintError, LightpaintError, TargetError
+from lightpaint.errors import LightpaintError
 from lightpaint.files import check_writable
 from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.keywords import keywords
@@ -23,6 +23,13 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.fit import resolve_for_targets
 from lightpaint.lighting.unknowns.constraint_reduction import reduce_to
+from lightpaint.pipeline.job.job_checks import (
+    check_inputs,
+    check_painting_is_no_light,
+    check_same_picture,
+    check_target,
+    rigging_for,
+)
 from lightpaint.pipeline.job.job_record import decode_job, encode_job
 from lightpaint.pipeline.job.remarks import (
     remarks_of_film,
@@ -45,8 +52,7 @@ from lightpaint.pipeline.results.answer_folder import answer_files
 from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.pipeline.results.results import SOLVE_RESULTS, VIEW_RESULTS, view_names
 from lightpaint.placement.placement_record import PlacementRecord
-from lightpaint.placement.rigging.rigged_lights import rigged_lights
-from lightpaint.placement.rigging.rigging import Rigging, rigging_of
+from lightpaint.placement.rigging.rigging import Rigging
 from lightpaint.placement.suggestions.light_search import check_suggestible
 from lightpaint.relit.export.nuke import spoken_unreadable
 from lightpaint.scene.quality_presets import on_film
@@ -125,7 +131,7 @@ class Job:
     __repr__ = short_repr
 
     def __post_init__(self) -> None:
-        self._check_counts()
+        check_inputs(self.scenes, self.targets, self.basis, self.constraints, self.settings)
         if not self.scenes:
             check_nothing_unused(self.settings, self.basis)
         # Paintings and basis are read in parallel; an error in a painting is reported first.
@@ -138,7 +144,7 @@ class Job:
         folders = [self.folder]
         if self.by_sensor or len(scenes) > 1:
             folders = [self.folder / name for name in view_names(scenes)]
-        self._check_painting_is_no_light()
+        check_painting_is_no_light(self.groups, self.targets)
         source = scenes[0] if scenes else basis
         all_constraints = self.constraints
         if isinstance(source, Scene | Basis):
@@ -149,7 +155,7 @@ class Job:
         reduce_to(all_constraints, basis_lights(scenes[0]) if basis is None else basis.lights)
         if self.settings.suggest:
             check_suggestible(scenes[0])
-        all_rigging = self._rigging_for(scenes)
+        all_rigging = rigging_for(self.rigging, scenes, self.settings)
         views = tuple(
             PaintedView(*self._with_equal_size(scene, target, basis), folder, basis)
             for scene, target, folder in zip(scenes or [None], targets, folders, strict=True)
@@ -226,52 +232,6 @@ class Job:
             object.__setattr__(self, name, value)
         return self
 
-    def _check_counts(self) -> None:
-        """Raise unless every view has a painting, and there is a scene or a basis."""
-        if not isinstance(self.constraints, Constraints):
-            raise ConstraintError(
-                f"the constraints are a {type(self.constraints).__name__}: pass Constraints.of(...)"
-            )
-        if not self.scenes and self.basis is None:
-            raise LightpaintError("give a scene, a basis, or both")
-        if not self.targets:
-            raise TargetError("no painting to solve for: give a target")
-        has_several_views = len(self.targets) > 1 or len(self.scenes) > 1
-        if has_several_views and self.basis is not None:
-            raise BasisError("a basis has only one view: give the scene to solve for several")
-        if has_several_views and self.settings.suggest:
-            raise LightpaintError("lights can be suggested for one view only: leave out the others")
-        if self.scenes and len(self.targets) != len(self.scenes):
-            raise TargetError(
-                f"{len(self.targets)} targets for {len(self.scenes)} views: give one for each; "
-                "several paintings of one view need a job each"
-            )
-
-    def _rigging_for(self, scenes: Sequence[Scene]) -> Rigging:
-        """Return the rigging of the scene. Raises for lights that cannot move, before rendering."""
-        if not scenes:
-            if self.rigging:
-                raise LightpaintError("lights can only move in their scene: give it, too")
-            return Rigging()
-        rigging = rigging_of(scenes[0].requests).and_then(self.rigging)
-        if not self.settings.move_lights:
-            return Rigging()
-        if rigging:
-            rigged_lights(rigging, scenes[0])
-        return rigging
-
-    def _check_painting_is_no_light(self) -> None:
-        """Raise BasisError if a folder of light groups includes the painting as a light."""
-        if self.groups is None or not self.groups.path.is_dir():
-            return
-        files = {layer.file.resolve() for layer in self.groups.layers}
-        for target in self.targets:
-            if isinstance(target, Painting) and Path(target.path).resolve() in files:
-                raise BasisError(
-                    f"the painting {target.path} is among the lights of {self.groups.path}: pass "
-                    "it to read_light_groups in leave_out, or move it elsewhere"
-                )
-
     def _result_folder(
         self, views: Sequence[PaintedView], scenes: Sequence[Scene], targets: Sequence[Target]
     ) -> ResultFolder:
@@ -299,10 +259,7 @@ class Job:
         self, scene: Scene | None, target: Target, basis: Basis | None
     ) -> tuple[Scene | None, Target]:
         """Return scene and target in the size that the basis has, or will have."""
-        if not isinstance(target, Target):
-            raise TargetError(
-                f"the target is a {type(target).__name__}: pass what read_target returns"
-            )
+        check_target(target)
         if scene is not None:
             check_same_picture(target, scene)
         if scene is not None and basis is None:
@@ -343,13 +300,3 @@ def _over_look(source: Target | Painting, target: Target, basis: Basis) -> Targe
     if not isinstance(source, Painting):
         return target
     return source.over(basis.present_look, f"the look of {basis.origin.scene}") or target
-
-
-def check_same_picture(target: Target, scene: Scene) -> None:
-    """Raise TargetError if the painting's sensor is not that of `scene`."""
-    sensor = scene.sensor_names[scene.sensor]
-    if target.sensor not in ("", sensor):
-        raise TargetError(
-            f"{target.name} was painted on a template of the sensor {target.sensor}, not of "
-            f"{sensor}: choose it with sensor={target.sensor!r}, or pass find=False"
-        )

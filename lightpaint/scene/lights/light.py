@@ -213,3 +213,58 @@ def check_adjustable(emitters: Iterable[Emitter]) -> None:
             raise SceneError(
                 f"light {emitter.name!r} {emitter.obstacle}, so it can only stay as it is"
             )
+
+
+def check_grouping(
+    members: Mapping[str, Sequence[str]], emitters: Sequence[Emitter], *, scene: str
+) -> None:
+    """Raise SceneError unless `members` name every emitter, and nothing else, once."""
+    grouped = [name for names in members.values() for name in names]
+    existing = {emitter.name for emitter in emitters}
+    if set(grouped) != existing:
+        raise SceneError(
+            f"{scene} does not have the expected emitters: it lacks "
+            f"{some_names(sorted(set(grouped) - existing)) or 'none'} and also has "
+            f"{some_names(sorted(existing - set(grouped))) or 'none'}"
+        )
+    if len(grouped) > len(existing) or not all(members.values()):
+        raise SceneError(
+            f"every emitter belongs to one light, and every light has one: not so in {members}"
+        )
+
+
+def emitter_named(
+    name: str, emitters: Sequence[Emitter], lights: Sequence[Light], *, scene: str
+) -> Emitter:
+    """Return the emitter called `name`, or the only emitter of the light called `name`."""
+    if emitter := next((x for x in emitters if x.name == name), None):
+        return emitter
+    light = light_named(name, lights, scene=scene)
+    if len(light.members) > 1:
+        raise SceneError(
+            f"light {name!r} is {len(light.members)} emitters: move one of them, "
+            f"{some_names(light.member_names)}"
+        )
+    return light.members[0]
+
+
+def black_emitters(
+    emitters: Sequence[Emitter], lights: Sequence[Light]
+) -> tuple[tuple[Emitter, ...], dict[int, EmitterSetting]]:
+    """Return all emitters, those outside `lights` black, and the settings of these by node."""
+    members = {member.name for light in lights for member in light.members}
+    # If nothing else may be sampled, black emitters are, since Mitsuba needs at least one.
+    can_be_sampled = any(not m.hit_by_chance for light in lights for m in light.members)
+    black = (0.0, 0.0, 0.0)
+    settings = {
+        x.node: EmitterSetting(x.kind, black, 0.0 if can_be_sampled else x.sampling_weight)
+        for x in emitters
+        if x.name not in members
+    }
+    all_emitters = tuple(
+        replace(x, emission=black, sampling_weight=settings[x.node].sampling_weight)
+        if x.node in settings
+        else x
+        for x in emitters
+    )
+    return all_emitters, settings

@@ -3,8 +3,8 @@
 The same element is written to files and parsed by Mitsuba in memory, so both give the same scene.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from lightpaint.arrays import RGB, Position, as_rgb
 from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
 from lightpaint.scene.checks.tokens import tag
+from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.properties.emission import PLUGINS
 from lightpaint.scene.properties.pose import (
     DEFAULT_BEAM_SHARE,
@@ -189,3 +190,35 @@ def _amounts(name: str, emission: Any) -> RGB:
             f"new light {name!r} has the emission {emission!r}: expected three amounts"
         )
     return rgb
+
+
+def check_new_names(
+    emitters: Sequence[NewEmitter], taken_names: Collection[str], *, scene: str
+) -> None:
+    """Raise SceneError if two of the emitters, or one and a light of the scene, share a name."""
+    names = set(taken_names)
+    for emitter in emitters:
+        if emitter.name in names:
+            raise SceneError(
+                f"{scene} has a light {emitter.name!r} already: give the new one another name"
+            )
+        names.add(emitter.name)
+
+
+def places_of(
+    emitters: Sequence[Emitter], added: Sequence[NewEmitter], old_sites: Mapping[str, Site]
+) -> tuple[EmitterPlace, ...]:
+    """Return the places of the emitters that have a position or a direction.
+
+    added: those of them that are in no file. old_sites: by name, before they were moved.
+    """
+    new_emitters = {x.name: x for x in added}
+    places = []
+    for emitter in emitters:
+        if emitter.site == Site():
+            continue
+        place = EmitterPlace.of(emitter.name, emitter.site, old_sites.get(emitter.name))
+        if (new := new_emitters.get(emitter.name)) is not None:
+            place = replace(place, new=new.kind, size=new.size)
+        places.append(place)
+    return tuple(places)

@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass
 from enum import Enum
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import RGB
+from lightpaint.arrays import RGB, Floats
 from lightpaint.errors import SceneError
 
 #: The emission of an unchanged light if the unit is a multiple of that in the scene.
@@ -177,3 +178,13 @@ def child_named(state: Any, node: int, name: str) -> int | None:
     if name not in props or props.type(name) != mi.Properties.Type.ResolvedReference:
         return None
     return int(props[name].index())
+
+
+def read_emitted_image(path: Path, is_linear: bool) -> Floats:
+    """Return the image in a file, (h, w, 3) linear Rec.709. is_linear: of its stored values."""
+    import mitsuba as mi
+
+    bitmap = mi.Bitmap(str(path))
+    if is_linear:
+        bitmap.set_srgb_gamma(False)
+    return np.array(bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))

@@ -1,21 +1,30 @@
-"""All errors of a look that cannot be planned, found one by one, so that none hides another."""
+"""Checks of looks before anything is rendered, and all errors of a look that cannot be planned."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
+from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.basis.lights import BasisLight
+from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.basis.render.render_origin import basis_lights
 from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.keys import Mistakes
 from lightpaint.batch.work.worker_cache import WorkerCache
-from lightpaint.errors import LOOK_ERRORS, LightpaintError
+from lightpaint.errors import LOOK_ERRORS, BatchError, LightpaintError
+from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.problem_sums import reason_against_sums
 from lightpaint.lighting.unknowns.constraint_reduction import reduce_to
+from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.sources import check_nothing_unused, content
+from lightpaint.relit.relight import scene_of
 from lightpaint.scene.quality_presets import on_film
+from lightpaint.scene.scene import Scene
+from lightpaint.screen import some_names
 
 
 def collect_errors(entry: LookEntry, cache: WorkerCache, mistakes: Mistakes) -> None:
@@ -69,3 +78,46 @@ def _split_constraints(constraints: Constraints) -> Iterator[Constraints]:
     for tie in constraints.ties:
         yield Constraints(ties=(tie,))
     yield Constraints(prefer_current=constraints.prefer_current, sparse=constraints.sparse)
+
+
+def check_by_sums(job: Job) -> None:
+    """Raise BatchError if the lighting of a job does not follow from sums alone."""
+    [view] = job.views
+    reason = reason_against_sums(view.target, job.fit)
+    if not reason and view.basis is None and view.scene is not None:
+        reason = why_not_one_pass(view.scene) or ""
+    if job.all_rigging:
+        reason = "lights may move in it, unless move_lights is false"
+    if reason:
+        raise BatchError(f"want = ['lights'] takes sums alone, and {reason}: want 'solve' instead")
+
+
+def files_of_lighting_look(
+    entry: LookEntry, scene: Scene | None, groups: LightGroups | None
+) -> tuple[Path, ...]:
+    """Return the files that a look with a given or combined lighting reads."""
+    files: tuple[Path, ...] = () if scene is None else scene.read_files
+    if groups is not None:
+        files += tuple(groups.files)
+    elif entry.basis is not None:
+        files += (Path(entry.basis.path),)
+    return (*files, Path(entry.lighting)) if entry.lighting else files
+
+
+def check_given_lighting(
+    entry: LookEntry, scene: Scene | None, basis: Basis | LightGroups | None
+) -> None:
+    """Raise BatchError if the lighting of a look has other lights than its scene or basis."""
+    lighting = read_lighting(entry.lighting)
+    lighting_names = set(lighting)
+    if scene is not None:
+        scene_names = {light.name for light in scene_of(scene, lighting).lights}
+        if lighting_names != scene_names:
+            raise BatchError(
+                f"{entry.lighting} has the lights {some_names(sorted(lighting_names))}, and the "
+                f"scene {some_names(sorted(scene_names))}: load it with the same lights and groups"
+            )
+    elif isinstance(basis, LightGroups | Basis):
+        names = (basis.basis if isinstance(basis, LightGroups) else basis).names
+        if lighting_names != set(names):
+            raise BatchError(f"{entry.lighting} is of other lights than {entry.basis}")

@@ -1,0 +1,88 @@
+"""Checks of a job's inputs that need no renderer: their number, their kinds, their sensors."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from lightpaint.basis.lightgroups.light_groups import LightGroups
+from lightpaint.errors import BasisError, ConstraintError, LightpaintError, TargetError
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.sources import Painting
+from lightpaint.placement.rigging.rigged_lights import rigged_lights
+from lightpaint.placement.rigging.rigging import Rigging, rigging_of
+from lightpaint.scene.scene import Scene
+from lightpaint.target.target import Target
+
+
+def check_inputs(
+    scenes: Sequence[Any],
+    targets: Sequence[Any],
+    basis: object,
+    constraints: object,
+    settings: Settings,
+) -> None:
+    """Raise unless every view has a painting, and there is a scene or a basis."""
+    if not isinstance(constraints, Constraints):
+        raise ConstraintError(
+            f"the constraints are a {type(constraints).__name__}: pass Constraints.of(...)"
+        )
+    if not scenes and basis is None:
+        raise LightpaintError("give a scene, a basis, or both")
+    if not targets:
+        raise TargetError("no painting to solve for: give a target")
+    has_several_views = len(targets) > 1 or len(scenes) > 1
+    if has_several_views and basis is not None:
+        raise BasisError("a basis has only one view: give the scene to solve for several")
+    if has_several_views and settings.suggest:
+        raise LightpaintError("lights can be suggested for one view only: leave out the others")
+    if scenes and len(targets) != len(scenes):
+        raise TargetError(
+            f"{len(targets)} targets for {len(scenes)} views: give one for each; "
+            "several paintings of one view need a job each"
+        )
+
+
+def check_painting_is_no_light(
+    groups: LightGroups | None, targets: Sequence[Target | Painting]
+) -> None:
+    """Raise BasisError if a folder of light groups includes the painting as a light."""
+    if groups is None or not groups.path.is_dir():
+        return
+    files = {layer.file.resolve() for layer in groups.layers}
+    for target in targets:
+        if isinstance(target, Painting) and Path(target.path).resolve() in files:
+            raise BasisError(
+                f"the painting {target.path} is among the lights of {groups.path}: pass it to "
+                "read_light_groups in leave_out, or move it elsewhere"
+            )
+
+
+def check_target(target: object) -> None:
+    """Raise TargetError for anything but a target."""
+    if not isinstance(target, Target):
+        raise TargetError(f"the target is a {type(target).__name__}: pass what read_target returns")
+
+
+def check_same_picture(target: Target, scene: Scene) -> None:
+    """Raise TargetError if the painting's sensor is not that of `scene`."""
+    sensor = scene.sensor_names[scene.sensor]
+    if target.sensor not in ("", sensor):
+        raise TargetError(
+            f"{target.name} was painted on a template of the sensor {target.sensor}, not of "
+            f"{sensor}: choose it with sensor={target.sensor!r}, or pass find=False"
+        )
+
+
+def rigging_for(rigging: Rigging, scenes: Sequence[Scene], settings: Settings) -> Rigging:
+    """Return the rigging of the scene. Raises for lights that cannot move, before rendering."""
+    if not scenes:
+        if rigging:
+            raise LightpaintError("lights can only move in their scene: give it, too")
+        return Rigging()
+    all_rigging = rigging_of(scenes[0].requests).and_then(rigging)
+    if not settings.move_lights:
+        return Rigging()
+    if all_rigging:
+        rigged_lights(all_rigging, scenes[0])
+    return all_rigging
