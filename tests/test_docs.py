@@ -28,7 +28,7 @@ from lightpaint.paint.server.session_clients import MAX_PAGES
 from lightpaint.scene.lights.similar_emitters import MAX_SEPARATE
 from lightpaint.scene.quality_presets import PRESETS
 from lightpaint.scene.scene_reader import load_scene
-from lightpaint.target.template import PLAIN
+from lightpaint.target.template import PLAIN_FILES
 from lightpaint.validation import MAX_NAME
 
 ROOT = Path(__file__).parent.parent
@@ -204,7 +204,9 @@ def test_which_files_are_painted_over_is_said_alike():
     """In the README, in the document on targets, and by `lightpaint template` itself."""
     told = {
         match[1]
-        for line in template_lines(Path("template"), [Path("template") / name for name in PLAIN])
+        for line in template_lines(
+            Path("template"), [Path("template") / name for name in PLAIN_FILES]
+        )
         if (match := re.match(r"template/(\S+): .*paint over", line))
     }
     readme = (ROOT / "README.md").read_text()

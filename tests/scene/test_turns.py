@@ -105,7 +105,9 @@ def test_two_who_wait_agree_whose_turn_it_is(work: Work, monkeypatch: pytest.Mon
     monkeypatch.setattr(
         "lightpaint.scene.runtime.render_lock.monotonic",
         lambda: (
-            0.0 if not turns._idle else MAX_WAIT_S * (0.99 if hasattr(idle, "is_one") else 1.01)
+            0.0
+            if not turns._low_priority_since
+            else MAX_WAIT_S * (0.99 if hasattr(idle, "is_one") else 1.01)
         ),
     )
 
@@ -116,7 +118,7 @@ def test_two_who_wait_agree_whose_turn_it_is(work: Work, monkeypatch: pytest.Mon
     def holds() -> None:
         with turns.acquired():
             work.piece("first")
-            while not (turns._waiting and turns._idle):
+            while not (turns._waiting and turns._low_priority_since):
                 time.sleep(PIECE_S)
 
     _together(holds, leisure, work.urgent, work=work)
