@@ -1,7 +1,6 @@
 """Lights that a session moves: quick planes at once, and rendered ones in the background."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from contextlib import AbstractContextManager
 from functools import partial
 from statistics import mean
 from typing import Any, Protocol
@@ -17,6 +16,7 @@ from lightpaint.basis.cache.denoised_planes import (
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.errors import LightpaintError
 from lightpaint.paint.background_threads import BackgroundThreads, LatestWork, StoppedError
+from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.protocol import (
     AddLight,
     Message,
@@ -45,8 +45,8 @@ class MoverHost(Protocol):
     def session(self) -> Session:
         """The session. Raises PaintError before there is a basis."""
 
-    def changing(self) -> AbstractContextManager[Session]:
-        """Return a context in which no other thread changes the session."""
+    def publish_made(self, make: Callable[[], Message | None]) -> None:
+        """Make a message while no other thread changes the session, and send it afterwards."""
 
     def publish(self, message: Message | None) -> None:
         """Send a message to pages."""
@@ -121,10 +121,11 @@ class LightMover:
         )
         return name, values_of(with_level(emitter, alone, present))
 
-    def follow(self) -> bool:
+    def follow(self, send: Callable[[Message], None]) -> bool:
         """Show the planes of newly moved lights, and render them once they rest.
 
-        Returns whether lights were added or removed, so that pages need the whole state.
+        send: receives the messages about them. Returns whether lights were added or removed, so
+        that pages need the whole state.
         """
         session = self._host.session
         placed, shown = session.requests.placed, self._shown
@@ -142,20 +143,13 @@ class LightMover:
             session, sorted(names & {*session.basis.names}), is_dragged=is_dragged
         )
         if not is_other:  # the whole state has these
-            self._host.publish(offered)
-            self._publish_rig()
+            for message in (offered, *self.rig_messages()):
+                send(message)
         if not is_dragged:
-            self._warn_of_unlit(session, names & {*placed})
+            for warning in _unlit_warnings(session, names & {*placed}):
+                send(warning)
             self.render_behind()
         return is_other
-
-    def _warn_of_unlit(self, session: Session, names: Collection[str]) -> None:
-        """Warn of lights that light nothing visible, such as those inside a wall or behind one."""
-        for name in sorted(names):
-            k = session.basis.names.index(name)
-            if not any(view.basis.planes.plane(k).any() for view in session.views):
-                text = f"{name} lights nothing that is seen from there: it may be in a wall"
-                self._host.publish(Notice(text=text, tone="warn"))
 
     def render_behind(self) -> None:
         """Replace quick planes by rendered ones, in the background."""
@@ -190,11 +184,16 @@ class LightMover:
         for name in self.rig.unrendered(placed):
             check()
             self.rig.render(self._host.session.bases, name, placed[name], check)
-            with self._host.changing() as session:
-                if session.requests.placed.get(name) == placed[name]:
-                    session.renew_planes([name])
-                    self._host.publish(self._offer(session, [name], is_dragged=False))
+            self._host.publish_made(partial(self._renew, name, placed[name]))
             self._host.planes_rendered()
+
+    def _renew(self, name: str, values: Mapping[str, Any]) -> PictureUpdate | None:
+        """Give the session the rendered planes of a light, unless it has moved on."""
+        session = self._host.session
+        if session.requests.placed.get(name) != values:
+            return None
+        session.renew_planes([name])
+        return self._offer(session, [name], is_dragged=False)
 
     def offer_all(self, session: Session) -> None:
         """Offer the pictures of all moved lights, after those of the bases without moves.
@@ -242,15 +241,33 @@ class LightMover:
             scale = plane_scale(unmoved, k)
             halves, own = denoise_to_halves(basis, k)
             picture = as_halves(halves.astype("float32") * own, scale)
-            with self._host.changing():
-                if view.basis.planes is basis.planes:
-                    table, resources = self._host.pictures, {}
-                    small = plane_thumbnail(picture.astype("float32"), basis.emitters_seen)
-                    for plain, its in ((f"clean/{k}", picture), (f"thumb/{k}", small)):
-                        full = name_in_view(plain, view.view)
-                        table.put(full, its)
-                        resources[full] = table.generations[full]
-                    self._host.publish(PictureUpdate(resources=resources))
+            self._host.publish_made(partial(self._put_denoised, view, basis, k, picture))
+
+    def _put_denoised(
+        self, view: Canvas, basis: Basis, k: int, picture: Picture
+    ) -> PictureUpdate | None:
+        """Put the denoised picture of a plane of `basis`, unless the view has other planes now."""
+        if view.basis.planes is not basis.planes:
+            return None
+        table, resources = self._host.pictures, {}
+        thumbnail = plane_thumbnail(picture.astype("float32"), basis.emitters_seen)
+        for name, new_picture in ((f"clean/{k}", picture), (f"thumb/{k}", thumbnail)):
+            full = name_in_view(name, view.view)
+            table.put(full, new_picture)
+            resources[full] = table.generations[full]
+        return PictureUpdate(resources=resources)
+
+
+def _unlit_warnings(session: Session, names: Collection[str]) -> list[Notice]:
+    """Return warnings of lights that light nothing visible, such as those inside a wall."""
+    numbers = {name: session.basis.names.index(name) for name in sorted(names)}
+    return [
+        Notice(
+            text=f"{name} lights nothing that is seen from there: it may be in a wall", tone="warn"
+        )
+        for name, k in numbers.items()
+        if not any(view.basis.planes.plane(k).any() for view in session.views)
+    ]
 
 
 def _kept_halves(planes: DenoisedPlanes, k: int) -> Picture:

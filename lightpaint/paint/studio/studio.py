@@ -4,8 +4,8 @@ Requests are answered at once, by one thread at a time. Rendering the basis, exa
 denoising, exports and verification have threads of their own, which publish through `on_message`.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from threading import RLock
 from typing import Any
@@ -85,7 +85,10 @@ class Studio:
         self._looks: LookLibrary | None = None
         self._progress: ProgressReport | None = None  # of the first picture
         self._lock, self.is_open, self._failed = RLock(), True, ""
-        self._publish_lock = RLock()  # taken before `_lock`, to send messages in order
+        # Locks are taken in this order: `_publish_lock`, which keeps messages in order; a lock of
+        # the receiver, as the notebook has; `_lock`. So a background thread sends no message while
+        # it holds `_lock`. Whoever handles a request holds the receiver's lock already.
+        self._publish_lock = RLock()
         self._denoiser = PlaneDenoiser(
             self.publish_picture,
             lambda: self.is_open,
@@ -176,7 +179,7 @@ class Studio:
         with self._lock:
             if self._session is not None and self._session.is_open:
                 self._session.client_left(with_stroke=not is_back)
-                self._mover.follow()
+                self._mover.follow(self.publish)
                 self._exact_answers.notify()
             state = self.state()
             return replace(state, is_back=is_back)
@@ -218,11 +221,16 @@ class Studio:
         self._exact_answers.notify()
         return messages
 
-    def _followed(self, messages: list[Message]) -> list[Message]:
+    def _followed(
+        self, messages: list[Message], send: Callable[[Message], None] | None = None
+    ) -> list[Message]:
         """Return the answers to a request, after lights have followed it: the whole state where
         some have come or gone.
+
+        send: receives messages about these lights; by default they are published at once.
         """
-        return [self.state(), *self._mover.rig_messages()] if self._mover.follow() else messages
+        has_others = self._mover.follow(send or self.publish)
+        return [self.state(), *self._mover.rig_messages()] if has_others else messages
 
     def hang_lights(self, label: str, placed: Placed, *, before: Placed) -> bool:
         """Move lights and add others, by name, in one step, and notify pages.
@@ -233,8 +241,9 @@ class Studio:
             with self._lock:
                 if self.session.requests.placed != before:
                     return False
-                messages = self._followed(self.session.hang_lights(label, placed))
-            for message in messages:
+                news: list[Message] = []
+                answers = self._followed(self.session.hang_lights(label, placed), news.append)
+            for message in (*news, *answers):
                 self.publish(message)
         self._exact_answers.notify()
         return True
@@ -294,12 +303,6 @@ class Studio:
     def denoised(self, bases: Sequence[Basis]) -> Sequence[DenoisedPlanes | None]:
         """Return the denoised planes of bases without moved lights; None for each that has none."""
         return self._denoiser.planes_for(bases)
-
-    @contextmanager
-    def changing(self) -> Iterator[Session]:
-        """Return a block in which nobody else changes the session."""
-        with self._lock:
-            yield self.session
 
     def planes_rendered(self) -> None:
         """Note that rendered planes have replaced quick ones."""
