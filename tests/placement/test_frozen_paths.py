@@ -1,6 +1,7 @@
 """Columns of frozen paths: the light that plain renders have, at any place, by the same paths."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +46,24 @@ def test_columns_are_the_planes_of_a_basis(room: Scene) -> None:
     for plane, column in zip(planes, columns, strict=True):
         assert column.mean() == pytest.approx(plane.mean(), rel=0.02)  # noise
         assert np.square(column - plane).sum() < 0.03 * np.square(plane).sum()  # noise
+
+
+def test_vertices_of_all_paths_share_kernels(room: Scene) -> None:
+    """Each takes a second to compile: none is of a film, a number of paths or a bounce alone."""
+    dr = pytest.importorskip("drjit")
+    sizes = (room, 1, 1), (room, 16, 4), (room.reduced("1/2"), 4, 2)
+    kernels: dict[Any, str] = {}
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
+        dr.kernel_history_clear()
+        for scene, hits, bounces in sizes:
+            columns = partial(FrozenPaths.columns, sites=sites(scene))
+            along_paths(scene, columns, first_hits=hits, bounces=bounces)
+        for kernel in dr.kernel_history([dr.KernelType.JIT]):
+            ir = kernel["ir"]
+            if kernel["size"] > 1:  # a single vertex is read in another way
+                kernels[kernel["hash"]] = ir if isinstance(ir, str) else ir.getvalue()
+    for call in ("BSDF::sample()", "BSDF::eval()"):
+        assert sum(f"Call: {call}" in ir for ir in kernels.values()) == 1
 
 
 def test_a_search_refines_on_a_larger_film_than_it_compares_on(room: Scene) -> None:

@@ -89,7 +89,7 @@ def later_vertices_of(
             si = hits.interaction
             rays, weight = si.spawn_ray(si.to_world(bsdf_sample.wo)), hits.throughput * bsdf_weight
             pixels = hits.pixels
-            dr.eval(rays, weight)
+            dr.make_opaque(rays, weight)
     return _joined(vertices)
 
 
@@ -97,6 +97,7 @@ def _camera_rays(
     camera: Any, size: tuple[int, int], side: int, rng: np.random.Generator
 ) -> tuple[Any, Any, npt.NDArray[np.int64]]:
     """Return rays, their weights for a pixel's mean, and their pixels, ascending."""
+    import drjit as dr
     import mitsuba as mi
 
     height, width = size
@@ -108,7 +109,12 @@ def _camera_rays(
     position = mi.Point2f(*_floats((x, y)))
     lens = mi.Point2f(*_floats(rng.random((2, len(pixels)), dtype=np.float32)))
     rays, weight = camera.sample_ray(camera.shutter_open(), 0.5, position, lens)
-    return mi.Ray3f(rays), mi.Color3f(weight) / side**2, pixels
+    rays, weight = mi.Ray3f(rays), mi.Color3f(weight) / side**2
+    # Arrays, as they are of rays that surfaces scatter: the same kernels trace both.
+    weight += dr.zeros(mi.Color3f, len(pixels))
+    rays.time += dr.zeros(mi.Float, len(pixels))
+    dr.make_opaque(rays, weight)
+    return rays, weight, pixels
 
 
 def _floats(rows: Iterable[Floats]) -> list[Any]:
@@ -123,12 +129,15 @@ def _compressed(si: Any, weight: Any, pixels: npt.NDArray[np.int64]) -> Vertices
     import drjit as dr
     import mitsuba as mi
 
+    # All at once: else each field is computed by a kernel of its own, with all that it depends on.
+    # What is constant is an array as well, so that the kernels for all vertices are the same.
+    dr.make_opaque(si, weight)
     is_lit = dr.compress(si.is_valid() & (dr.max(weight) > 0))
     if not dr.width(is_lit):
         return Vertices(si, weight, pixels[:0])
     si = dr.gather(mi.SurfaceInteraction3f, si, is_lit)
     weight = dr.gather(mi.Color3f, weight, is_lit)
-    dr.eval(si, weight)
+    dr.make_opaque(si, weight)
     return Vertices(si, weight, pixels[np.array(is_lit, dtype=np.int64)])
 
 
