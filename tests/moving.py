@@ -53,8 +53,16 @@ class Moving:
 
     def rendered(self) -> "Moving":
         """Wait until all planes are rendered ones."""
-        session = self.studio.session
-        self.wait(lambda: not self.studio.rig.unrendered(session.requests.poses))
+        session, rig = self.studio.session, self.studio.rig
+
+        def has_rendered_planes() -> bool:
+            placed = session.requests.placed
+            if rig.unrendered(placed):
+                return False
+            basis = rig.bases(session.bases, placed)[0]
+            return all(np.array_equal(self.plane(x), basis.image(x)) for x in placed)
+
+        self.wait(has_rendered_planes)
         return self
 
     def close(self) -> None:

@@ -1,8 +1,10 @@
 """Lights that a session moves: poses in undo, looks and files, planes that renders have."""
 
 import math
+import time
 from collections.abc import Iterator
 from pathlib import Path
+from threading import RLock
 from typing import Any
 
 import numpy as np
@@ -43,6 +45,27 @@ def test_a_moved_light_has_the_plane_of_its_place(moving: Moving) -> None:
         if name != "bulb":
             assert np.array_equal(moving.plane(name), before[name])
     assert np.array_equal(session.basis.present_look, look)
+
+
+def test_a_receiver_with_a_lock_may_change_the_session_while_it_is_sent_planes(
+    moving: Moving,
+) -> None:
+    """As the notebook does: it takes its own lock, then that of the studio."""
+    studio, lock = moving.studio, RLock()
+
+    def receive(message: Any) -> None:
+        with lock:
+            moving.messages.append(message)
+
+    studio.on_message = receive
+    with lock:
+        moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}))
+        moving.wait(lambda: not studio.rig.unrendered(studio.session.requests.placed))
+        for _ in range(10):  # meanwhile a thread offers what it has rendered
+            time.sleep(0.1)
+            assert studio._lock.acquire(timeout=5)
+            studio._lock.release()
+    moving.rendered()
 
 
 def test_undo_looks_and_the_file_know_places(moving: Moving) -> None:
