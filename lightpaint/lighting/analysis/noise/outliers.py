@@ -48,18 +48,19 @@ def weakest_matrix(
     basis, M = solution.basis, solution.equations.M
     weight = solution.problem.squares.weight
     weakest = corrected.copy()
-    for k, c in np.argwhere(doubts > 0):
-        D = weight[..., c % weight.shape[2]].ravel()
-        image, half = (x.plane(k)[..., c].ravel() for x in (basis.planes, basis.noise))
-        smooth, error = _least_power(image, half, D)
-        # Only the part that no other light can replace may shrink.
-        noisy, alone = (1 / float(pseudo_inverse(x[c])[k, k]) for x in (M, weakest))
-        least = max(
-            noisy - float(power[c, k, k]) - SAFE_ERRORS * error,
-            alone - float(weakest[c, k, k]) + smooth,
-            MIN_LEFT * float(M[c, k, k]),
-        )
-        weakest[c, k, k] -= doubts[k, c] * max(alone - least, 0)
+    for k in np.flatnonzero((doubts > 0).any(axis=1)):
+        image, half = (planes.plane(k) for planes in (basis.planes, basis.noise))
+        for c in np.flatnonzero(doubts[k] > 0):
+            D = weight[..., c % weight.shape[2]].ravel()
+            smooth, error = _least_power(image[..., c].ravel(), half[..., c].ravel(), D)
+            # Only the part that no other light can replace may shrink.
+            noisy, alone = (1 / float(pseudo_inverse(x[c])[k, k]) for x in (M, weakest))
+            least = max(
+                noisy - float(power[c, k, k]) - SAFE_ERRORS * error,
+                alone - float(weakest[c, k, k]) + smooth,
+                MIN_LEFT * float(M[c, k, k]),
+            )
+            weakest[c, k, k] -= doubts[k, c] * max(alone - least, 0)
     return weakest
 
 
