@@ -48,7 +48,7 @@ def weakest_matrix(
     basis, M = solution.basis, solution.equations.M
     weight = solution.problem.squares.weight
     weakest = corrected.copy()
-    for k in np.flatnonzero((doubts > 0).any(axis=1)):
+    for k in np.flatnonzero((doubts > 0).any(axis=1)).tolist():
         image, half = (planes.plane(k) for planes in (basis.planes, basis.noise))
         for c in np.flatnonzero(doubts[k] > 0):
             D = weight[..., c % weight.shape[2]].ravel()
