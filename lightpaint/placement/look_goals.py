@@ -22,13 +22,15 @@ class LookGoal:
     """The goal of one look.
 
     goal: (p, 3); importance: (p, 3), >= 0. reduction: of its unknowns by constraints. pull: penalty
-    on weights, beside the picture.
+    on weights, beside the picture. noise: (p, 3), half differences of the goal as far as it is the
+    current look, whose noise is the basis's own.
     """
 
     goal: Floats
     importance: Floats
     reduction: Reduction
     pull: NormalEquations | None
+    noise: Floats
 
     @property
     def norm2(self) -> float:
@@ -55,10 +57,11 @@ def goal_of(
     """
     images: list[Floats] = [np.zeros((height * width, 3)) for height, width in sizes]
     weights: list[Floats] = [np.zeros_like(its) for its in images]
+    noises: list[Floats] = [np.zeros_like(its) for its in images]
     for k, view in enumerate(views):
         problem = solution.problem.view_problem(k)
         reduced = reduced_goal(problem, problem.basis.size[0] // sizes[view][0])
-        for listed, image in zip((images, weights), reduced, strict=True):
+        for listed, image in zip((images, weights, noises), reduced, strict=True):
             whole = np.broadcast_to(image, (*image.shape[:-1], 3))
             listed[view] = whole.reshape(-1, 3)
     all_constraints = solution.problem.constraints.and_then(constraints or Constraints())
@@ -67,6 +70,7 @@ def goal_of(
         np.concatenate(weights),
         _with_new_lights(solution.problem.local_reduction, new, all_constraints),
         pull_with_more(solution, len(new)),
+        np.concatenate(noises),
     )
 
 
@@ -125,13 +129,18 @@ def pull_with_more(solution: Solution, count: int) -> NormalEquations | None:
     )
 
 
-def reduced_goal(problem: Problem, factor: int) -> tuple[Floats, Floats]:
-    """Return the goal of a view and its importance on a film with a pixel for each block of pixels.
+def reduced_goal(problem: Problem, factor: int) -> tuple[Floats, Floats, Floats]:
+    """Return the goal of a view, its importance and its noise on a film of blocks of pixels.
 
-    Goals are means weighted with importance; importance is that of whole blocks.
+    Goals and noise are means weighted with importance; importance is that of whole blocks.
     """
     squares = problem.squares
     importance = squares.weight.astype(np.float64)
     weight = block_mean(importance, factor)
-    weighted = block_mean(squares.image * importance, factor)
-    return weighted / np.where(weight > 0, weight, 1), weight * factor**2
+    total = np.where(weight > 0, weight, 1)
+    goal = block_mean(squares.image * importance, factor) / total
+    noise = np.zeros_like(goal)
+    if squares.share.any():
+        shared = squares.share * problem.basis.present_noise
+        noise = block_mean(shared * importance, factor) / total
+    return goal, weight * factor**2, noise

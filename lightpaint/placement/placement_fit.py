@@ -81,7 +81,8 @@ class Ranking:
 class PlacementFit:
     """Goals on a small film, and the columns of all lights at their present places.
 
-    The loss is Σ D (r² − n²), where r is the residual and n the mix of half differences.
+    The loss is Σ D (r² − n²), where r is the residual and n its half difference: that of the goal,
+    as far as it is the current look, less the mix of those of the columns.
 
     Looks that share places have separate weights, so they act as further channels: 3 for each look,
     which share the columns. So a search does not deal with looks. A look counts by its relative
@@ -96,6 +97,7 @@ class PlacementFit:
         importance = np.concatenate([look.importance for look in self._looks], axis=1)
         self._root = np.sqrt(importance.astype(np.float64))
         self._goal = np.concatenate([look.goal for look in self._looks], axis=1) * self._root
+        self._goal_noise = np.concatenate([look.noise for look in self._looks], axis=1) * self._root
         self.norm2 = float(np.square(self._goal).sum())
 
     @property
@@ -138,9 +140,9 @@ class PlacementFit:
         return self._mixed(columns[:, : self.pixels], weights)
 
     def _noise(self, columns: Floats, weights: Doubles) -> Doubles:
-        """Return the mix of half differences, weighed, (p, c); without any, (0, c)."""
-        noise = self._mixed(columns[:, self.pixels :], weights)
-        return noise * self._root[: len(noise)]
+        """Return the half difference of the residual, (p, c); without any, (0, c)."""
+        mixed = self._mixed(columns[:, self.pixels :], weights)
+        return np.asarray(self._goal_noise[: len(mixed)] - mixed * self._root[: len(mixed)])
 
     def _mixed(self, columns: Floats, weights: Doubles) -> Doubles:
         looks = [weights[:, 3 * k : 3 * k + 3] for k in range(len(self._looks))]
@@ -173,8 +175,8 @@ class PlacementFit:
         `numbers`, which several columns may share.
         """
         residual = self._residual(fitted.columns, fitted.weights)
-        # Half differences act like pixels, with their mix as the residual.
-        residual = np.concatenate([residual, self._noise(fitted.columns, fitted.weights)])
+        # Half differences act like pixels that count negatively.
+        residual = np.concatenate([residual, -self._noise(fitted.columns, fitted.weights)])
         p, count = self.pixels, max(numbers) + 1
         matrix, gradient = np.zeros((count, count)), np.zeros(count)
         for c in self.channels:
@@ -213,8 +215,12 @@ class PlacementFit:
         b = np.einsum("ipc,pc->ci", weighed, goal)
         equations = NormalEquations(_products(weighed), b, np.square(goal).sum(axis=0))
         if (noise := columns[:, self.pixels :]).size:
-            denoised = denoised_matrix(equations, _products(noise * root))
-            equations = replace(equations, M=denoised)
+            weighed, goal = noise * root, self._goal_noise[:, 3 * k : 3 * k + 3]
+            equations = NormalEquations(
+                denoised_matrix(equations, _products(weighed)),
+                b - np.einsum("ipc,pc->ci", weighed, goal),
+                equations.target_norm2 - np.square(goal).sum(axis=0),
+            )
         return equations if pull is None else equations + pull
 
 

@@ -14,10 +14,11 @@ RNG = np.random.default_rng(3)
 TRUE = RNG.random((PIXELS, 3)) + 0.2
 
 
-def fit_to(goal: Doubles) -> PlacementFit:
-    """The fit of one light of any colour, black as yet."""
+def fit_to(goal: Doubles, noise: Doubles | None = None) -> PlacementFit:
+    """The fit of one light of any colour, black as yet. noise: half differences of the goal."""
     reduction = Reduction(np.zeros((1, 3)), ("",), (Knob.of_any_colour(0),))
-    look = LookGoal(goal, np.ones_like(goal), reduction, None)
+    noise = np.zeros_like(goal) if noise is None else noise
+    look = LookGoal(goal, np.ones_like(goal), reduction, None, noise)
     return PlacementFit(np.zeros((1, 2 * PIXELS, 3), np.float32), [look])
 
 
@@ -38,6 +39,18 @@ def test_a_noisy_true_column_misses_less_than_a_clean_false_one() -> None:
     assert abs(noisy.missed) < 0.02 * fit.norm2
 
 
+def test_noise_that_goal_and_column_share_is_none_of_the_residual() -> None:
+    """Where a picture is held to the current look, which is a sum of the columns themselves."""
+    present = column(TRUE, 0.2)
+    image, half = present[0, :PIXELS], present[0, PIXELS:]
+    fit = fit_to(2.0 * image, 2.0 * half)
+    fitted = fit.fitted(present)
+    assert fitted.weights == pytest.approx(np.full((1, 3), 2.0), rel=1e-6)
+    assert abs(fitted.missed) < 1e-6 * fit.norm2
+    other = fit.fitted(column(TRUE, 0.2))
+    assert other.weights == pytest.approx(np.full((1, 3), 2.0), rel=0.02)
+
+
 def test_the_loss_of_pixels_sums_to_that_of_the_fit() -> None:
     fit = fit_to(2 * TRUE)
     fitted = fit.fitted(column(TRUE, 0.1))
@@ -46,8 +59,8 @@ def test_the_loss_of_pixels_sums_to_that_of_the_fit() -> None:
 
 
 def test_the_gradient_of_the_loss_is_that_of_finite_differences() -> None:
-    """Of a column that a number changes linearly, noise included."""
-    fit = fit_to(2 * TRUE)
+    """Of a column that a number changes linearly, noise included, and that of the goal."""
+    fit = fit_to(2 * TRUE, 0.1 * RNG.normal(size=TRUE.shape))
     start, slope = column(TRUE, 0.1), column(RNG.random((PIXELS, 3)), 0.1)
 
     def missed(step: float) -> float:

@@ -112,6 +112,10 @@ class PlacementJudge:
                 [self._fit.missed_map(changed_columns, weights) for changed_columns in columns]
             )
 
+        def is_worth(lost: Doubles) -> bool:
+            """Return whether an error, (2, p), is surely worth a change. Noise may leave no other."""
+            return float(lost[1].sum()) >= max(WORTH * total, SURE * standard_error(lost))
+
         moved = [k >= count_before or x != start.sites[k] for k, x in enumerate(best.sites)]
         changed = np.array(moved, dtype=bool)
         before = missed(np.zeros(len(movables), dtype=bool))
@@ -123,18 +127,22 @@ class PlacementJudge:
                 without = changed.copy()
                 without[k] = False
                 lost[int(k)] = missed(without) - after
-                gains[k] = float(lost[int(k)][1].sum()) / max(total, 1e-300)
+                gains[k] = float(lost[int(k)][1].sum())
             least = min(lost, key=lambda k: gains[k])
-            if gains[least] * total >= max(WORTH * total, SURE * standard_error(lost[least])):
+            if is_worth(lost[least]):
                 break
             changed[least], gains[least] = False, 0.0
             after = missed(changed)
         norm2 = self._fit.norm2 or 1.0
+        # Where the estimate of the noise is too large, less than nothing is missed.
+        rest = max(float(after[1].sum()), 0.0)
+        error = rest + max(total - float(after[1].sum()), 0.0)
+        reported = (np.arange(len(movables)) < count_before) | changed
         return Found(
             self._with_changes(start, best, changed),
-            tuple(gains[(np.arange(len(movables)) < count_before) | changed].tolist()),
-            total / norm2,
-            float(after[1].sum()) / norm2,
+            tuple((gains[reported] / max(error, 1e-300)).tolist()),
+            error / norm2,
+            rest / norm2,
         )
 
     def is_worth(self, before: Arrangement, after: Arrangement) -> bool:

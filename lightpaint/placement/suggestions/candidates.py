@@ -54,7 +54,7 @@ class Candidates:
                 f"candidates of {size[1]}x{size[0]} for a basis of {basis.size[1]}x"
                 f"{basis.size[0]}: render them on blocks of its pixels"
             )
-        image, importance = reduced_goal(solution.problem, factor)
+        image, importance, _ = reduced_goal(solution.problem, factor)
         free = ~added.is_fixed
         count = int(free.sum())
         pictures, noise = (
