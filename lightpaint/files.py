@@ -8,8 +8,8 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from lightpaint.display_text import visible
 from lightpaint.errors import OutputError
-from lightpaint.screen import visible
 
 #: Longest name of a file, in bytes: most systems allow 255, and suffixes are added here.
 LONGEST_NAME = 255 - 32

@@ -7,8 +7,8 @@ from dataclasses import fields
 from functools import wraps
 from typing import Any, TypeVar
 
+from lightpaint.display_text import some_names
 from lightpaint.errors import KeywordError
-from lightpaint.screen import some_names
 
 _Call = TypeVar("_Call", bound=Callable[..., Any])
 

@@ -13,7 +13,7 @@ from lightpaint.basis.origin import Origin
 from lightpaint.paint import protocol
 from lightpaint.paint.layers.layer import Layer, LayerKind
 from lightpaint.paint.session.session import Session
-from lightpaint.paint.store.steps import Identity
+from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.store import MemoryStore, Store
 from lightpaint.pipeline.job.settings import Settings
 

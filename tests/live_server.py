@@ -17,7 +17,7 @@ from websockets.datastructures import Headers
 from websockets.typing import Subprotocol
 from websockets.uri import parse_uri
 
-from lightpaint.paint.frames import from_frame, to_frame
+from lightpaint.paint.message_frames import from_frame, to_frame
 from lightpaint.paint.server.guard import PROTOCOL
 from lightpaint.paint.server.server import Server
 

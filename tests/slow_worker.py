@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.render import guide_training
-from lightpaint.batch.work import work
+from lightpaint.batch.work import item_execution
 
 #: Of a lesson, here and in the tests: what is learned does not matter to them.
 LESSON = (2**12,)
 
 _FOLDER = Path(os.environ["LIGHTPAINT_TEST_SLOW"])
-_run = work._run
+_run = item_execution._run
 
 
 def _slowly(item: Any, *others: Any) -> Any:
@@ -30,5 +30,5 @@ def _slowly(item: Any, *others: Any) -> Any:
     raise MemoryError
 
 
-work._run = _slowly
+item_execution._run = _slowly
 guide_training.TRAINING_SAMPLES = LESSON

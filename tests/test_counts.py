@@ -19,7 +19,7 @@ from lightpaint.errors import BatchError, ConstraintError, LightingError, PaintE
 from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.answer.lighting_file import MAX_BYTES, read_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.paint.frames import parse_request
+from lightpaint.paint.message_frames import parse_request
 from lightpaint.paint.protocol import Message
 from lightpaint.paint.server.session_clients import Connections
 from lightpaint.pipeline.job.settings import Settings

@@ -22,12 +22,12 @@ from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.analysis.diagnosis import diagnose
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.answer.lighting_file import read_lighting
+from lightpaint.lighting.joined_views import joint_basis
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solve import solve
-from lightpaint.lighting.views import joint_basis
 from lightpaint.paint.protocol import ConstrainLight, Export, Message, Paint
 from lightpaint.paint.session_file import session_identity
-from lightpaint.paint.store.steps import ViewIdentity
+from lightpaint.paint.store.history_steps import ViewIdentity
 from lightpaint.paint.store.store import MemoryStore
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject_factory import make_subjects

@@ -13,6 +13,7 @@ from lightpaint.basis.origin import Origin
 from lightpaint.basis.planes import IndirectLight, Planes, as_planes, power_and_totals
 from lightpaint.colour.color import luminance
 from lightpaint.dataframes import CHANNELS, pandas, xarray
+from lightpaint.display_text import Shown, some_names, some_of
 from lightpaint.errors import BasisError
 from lightpaint.images.denoiser import Features
 from lightpaint.images.estimate import Estimate
@@ -20,7 +21,6 @@ from lightpaint.images.object_map import Objects
 from lightpaint.images.surface_filter import SurfaceFilter
 from lightpaint.keywords import keywords
 from lightpaint.scene.lights.lights_file import SceneRequests
-from lightpaint.screen import Shown, some_names, some_of
 
 
 @keywords()

@@ -9,9 +9,9 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Bools, Doubles, read_only
 from lightpaint.dataframes import by_channel
+from lightpaint.display_text import Listed, some_names
 from lightpaint.errors import BasisError
 from lightpaint.scene.lights.lights_file import SceneRequests
-from lightpaint.screen import Listed, some_names
 from lightpaint.validation import BRIGHTEST, MAX_NAME, is_amount
 
 

@@ -7,10 +7,11 @@ from lightpaint.basis.basis import Basis
 from lightpaint.batch.distribution.engine import Engine
 from lightpaint.batch.plan.place_groups import PlaceGroup
 from lightpaint.batch.task_bases import obtain_moved_basis, obtain_scene_basis, save_bases
+from lightpaint.batch.work.item_execution import job_fields
 from lightpaint.batch.work.shared_places import SharedPlacing
 from lightpaint.batch.work.task import Task, key_of_scene
-from lightpaint.batch.work.work import job_fields
 from lightpaint.batch.work.worker_cache import WorkerCache
+from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.files import write_bytes, write_text
 from lightpaint.images.formats.png import png_bytes
@@ -22,7 +23,6 @@ from lightpaint.progress import Listener
 from lightpaint.report.rig.hung_lights import HungLight
 from lightpaint.report.rig.rig_drawing import rig_drawing
 from lightpaint.scene.scene import Scene
-from lightpaint.screen import some_names
 
 #: Rough seconds of a search on one thread, to detect hung workers.
 SEARCH_S = 300.0

@@ -23,14 +23,14 @@ from lightpaint.batch.plan.journal import Journal, JournalLine
 from lightpaint.batch.plan.plan import Plan, PlannedLook, PlanStep, by_bases, waves
 from lightpaint.batch.run_options import BatchOutcome, RunOptions
 from lightpaint.batch.task_bases import has_basis, obtain_bases, save_bases, save_former_looks
-from lightpaint.batch.work.task import Task
-from lightpaint.batch.work.work import (
+from lightpaint.batch.work.item_execution import (
     OUT_OF_MEMORY_TEXT,
     attempt,
     final_render,
     is_disk_full,
     job_fields,
 )
+from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work_items import ItemResult
 from lightpaint.errors import BatchError, LightpaintError, OutputError
 from lightpaint.files import sweep

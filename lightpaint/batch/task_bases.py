@@ -11,8 +11,8 @@ from lightpaint.basis.cache import cache
 from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.batch.distribution.basis_parts import PartwiseRender
 from lightpaint.batch.distribution.engine import Engine
+from lightpaint.batch.work.item_execution import job_fields
 from lightpaint.batch.work.task import Task
-from lightpaint.batch.work.work import job_fields
 from lightpaint.batch.work.work_items import SceneFilm
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.images.estimate import write_estimate

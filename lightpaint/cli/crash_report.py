@@ -11,8 +11,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from lightpaint.cli.output import lines
+from lightpaint.display_text import visible
 from lightpaint.files import one_line
-from lightpaint.screen import visible
 from lightpaint.version import __version__
 
 #: Exit code of an unexpected error: EX_SOFTWARE of sysexits.h.

@@ -16,7 +16,7 @@ from lightpaint.batch.work.derived_looks import (
     variation_folder,
     variation_jobs,
 )
-from lightpaint.batch.work.work import is_disk_full
+from lightpaint.batch.work.item_execution import is_disk_full
 from lightpaint.cli.output import terminal
 from lightpaint.cli.output.documents import files_document
 from lightpaint.errors import LOOK_ERRORS, OutputError

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from lightpaint.arrays import Floats
+from lightpaint.display_text import short_repr, some_names
 from lightpaint.errors import ImageError
 from lightpaint.files import one_line
 from lightpaint.images.formats.exr import ExrPart, read_parts, rgb_channels, write_parts
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.keywords import keywords
-from lightpaint.screen import short_repr, some_names
 
 #: EXR layer that holds half the difference of two independent halves of the samples.
 HALF_DIFFERENCE = "half_difference"

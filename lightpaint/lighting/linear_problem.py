@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Self
 from lightpaint.arrays import Bools, Doubles
 from lightpaint.basis.lights import Lights
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.display_text import short_repr
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.white_lights import whiten_open_lights
 from lightpaint.lighting.fit import Fit
@@ -15,7 +16,6 @@ from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.constraint_reduction import reduce_to
 from lightpaint.lighting.unknowns.gamuts import Gamuts
 from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.screen import short_repr
 
 
 class LinearProblem:

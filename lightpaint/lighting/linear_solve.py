@@ -15,7 +15,7 @@ from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.reduced_problem import ReducedOptimum, reduced_problems
 from lightpaint.lighting.unknowns.reduction import only_knobs
 from lightpaint.lighting.unknowns.sparse_lights import choose_knobs
-from lightpaint.lighting.unknowns.white_neighbours import solve_on_locus
+from lightpaint.lighting.unknowns.white_mixes import solve_on_locus
 
 #: Gradient, with a unit diagonal and relative to b, from which a constraint has an effect.
 MIN_PULL = 1e-7

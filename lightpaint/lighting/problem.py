@@ -12,11 +12,13 @@ from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import Lights
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.display_text import short_repr
 from lightpaint.errors import BasisError, ConstraintError, TargetError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.fit import Fit, Space, resolve_for_targets
+from lightpaint.lighting.joined_views import Views, joint_basis
 from lightpaint.lighting.linear_problem import LinearProblem, reduce_lights
 from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.loss import Loss, Squares
@@ -33,9 +35,7 @@ from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.round_off import remove_traces
 from lightpaint.lighting.unknowns.gamuts import Gamuts, PaintedLight
 from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.lighting.unknowns.white_neighbours import tangent_reduction
-from lightpaint.lighting.views import Views, joint_basis
-from lightpaint.screen import short_repr
+from lightpaint.lighting.unknowns.white_mixes import tangent_reduction
 from lightpaint.target.target import Target
 
 #: Mireds by which a light of a range may leave its white in the analysis of uncertainty and bounds.
@@ -65,7 +65,7 @@ class Problem(LinearProblem):
 
     Attributes:
         basis: The basis of all views together.
-        views: Basis and target of each view (views.py).
+        views: Basis and target of each view (joined_views.py).
         loss: The loss of a picture.
         squares: The linear problem that approximates the loss, or the loss itself if it is linear;
             before a solve, the literal squares of the painting.

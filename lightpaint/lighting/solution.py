@@ -10,6 +10,7 @@ from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import luminance
 from lightpaint.dataframes import CHANNELS, by_channel, xarray
+from lightpaint.display_text import Shown
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.certificate import Certificate
 from lightpaint.lighting.answer.lighting import Lighting
@@ -17,7 +18,6 @@ from lightpaint.lighting.fit import Space
 from lightpaint.lighting.loss.reweighting import Reweighting
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
-from lightpaint.screen import Shown
 
 
 @keywords()

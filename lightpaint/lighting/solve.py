@@ -28,7 +28,7 @@ from lightpaint.lighting.unknowns.reduced_problem import (
     ReducedOptimum,
     solve_reduced,
 )
-from lightpaint.lighting.unknowns.white_neighbours import next_whites
+from lightpaint.lighting.unknowns.white_mixes import next_whites
 from lightpaint.target.target import Target
 
 #: Maximum number of steps of lights to other whites, for a loss that is not linear, and the share

@@ -4,15 +4,15 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
+from lightpaint.display_text import some_names
 from lightpaint.errors import PaintError
 from lightpaint.files import is_name, one_line
 from lightpaint.paint.lazy_scene import LazyScene
 from lightpaint.paint.server.server import Server
-from lightpaint.paint.store.steps import Identity, ViewIdentity
+from lightpaint.paint.store.history_steps import Identity, ViewIdentity
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.subject import Subject, sensor_name
 from lightpaint.scene.scene import Scene
-from lightpaint.screen import some_names
 
 
 def session_identity(

@@ -9,8 +9,8 @@ import numpy as np
 from lightpaint.arrays import Doubles, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.cached_render import obtain_basis, top_up_basis
+from lightpaint.basis.render.pixel_top_up import KeptTracer, kept_loaded
 from lightpaint.basis.render.render_origin import ONE_PASS
-from lightpaint.basis.render.top_up import KeptTracer, kept_loaded
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.analysis.noise.sample_demand import (

@@ -6,6 +6,7 @@ from dataclasses import replace
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.cached_render import Render
 from lightpaint.basis.render.basis_render import render_basis
+from lightpaint.display_text import some_names
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solution_of
@@ -21,7 +22,6 @@ from lightpaint.placement.placement_record import PlacementRecord
 from lightpaint.placement.rigging.rigged_lights import rigged_lights
 from lightpaint.progress import Listener
 from lightpaint.scene.scene import Scene
-from lightpaint.screen import some_names
 
 
 def place_lights(

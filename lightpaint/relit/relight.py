@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from lightpaint.arrays import RGB
+from lightpaint.display_text import some_names
 from lightpaint.errors import LightingError, SceneError
 from lightpaint.files import write_bytes
 from lightpaint.images.formats.exr import write_rgb
@@ -22,7 +23,6 @@ from lightpaint.scene.properties.emission import Scaling
 from lightpaint.scene.properties.pose import pose_of
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
-from lightpaint.screen import some_names
 
 #: A parameter in Mitsuba's list of unused ones.
 UNUSED_PARAMETER = re.compile(r"- \$(\w+)=")

@@ -7,8 +7,8 @@ from pathlib import Path
 from lightpaint.basis.basis import Basis
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.noise.refinement import refine
+from lightpaint.lighting.joined_views import joint_estimate
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.views import joint_estimate
 from lightpaint.progress import Progress, silent
 from lightpaint.relit.relight import relight
 from lightpaint.scene.scene import Scene

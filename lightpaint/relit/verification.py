@@ -13,11 +13,11 @@ import numpy as np
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.colour.color_difference import delta_e
 from lightpaint.colour.display.exposure import choose_exposure
+from lightpaint.display_text import Shown
 from lightpaint.errors import SizeError
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.keywords import keywords
-from lightpaint.screen import Shown
 
 #: Side of the blocks of pixels over which differences are summed before the tests.
 BLOCK = 8

@@ -10,6 +10,7 @@ from PIL import Image, ImageDraw, ImageFont
 from lightpaint.arrays import Doubles, Floats, Position
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.srgb import encode_display, to_8_bit
+from lightpaint.display_text import visible
 from lightpaint.images.denoiser import denoised
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.lighting.answer.lighting import Lighting
@@ -19,7 +20,6 @@ from lightpaint.report.page.figures import exposure_of
 from lightpaint.report.phrases import spoken_percent
 from lightpaint.report.rig.hung_lights import HungLight
 from lightpaint.report.rig.rig_drawing import rig_drawing
-from lightpaint.screen import visible
 
 #: Maximum number of lights shown; the others, with the smallest shares, are counted.
 MAX_LIGHTS = 64

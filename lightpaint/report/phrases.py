@@ -6,9 +6,9 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from lightpaint.colour.color import luminance
+from lightpaint.display_text import some_names, some_of
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
 from lightpaint.lighting.analysis.diagnosis import Place
-from lightpaint.screen import some_names, some_of
 
 CHANNELS = ("red", "green", "blue")
 

@@ -31,7 +31,7 @@ from lightpaint.report.answer_pictures import (
     report_transform,
     residual_of,
 )
-from lightpaint.report.influences import fit_options
+from lightpaint.report.fit_influences import fit_options
 from lightpaint.report.measures import (
     brightness,
     count_at_least_pixels,

@@ -1,6 +1,7 @@
 """Sentences on the certainty of the answer, and on the samples that would raise it."""
 
 from lightpaint.basis.basis import Basis
+from lightpaint.display_text import some_of
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.light_setting import LightSetting
 from lightpaint.lighting.answer.lighting import Lighting
@@ -13,7 +14,6 @@ from lightpaint.report.measures import (
     relative_errors,
 )
 from lightpaint.report.phrases import CHANNELS, spoken_lights, spoken_percent
-from lightpaint.screen import some_of
 
 #: Texts for a light without a meaningful error: in a table, and in a sentence.
 UNDETERMINED = "undetermined"

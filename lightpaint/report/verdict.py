@@ -3,6 +3,7 @@
 import numpy as np
 
 from lightpaint.colour.color import luminance
+from lightpaint.display_text import some_names
 from lightpaint.images.estimate import Estimate
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.appearance.appearance import Appearance, compare_appearance
@@ -16,7 +17,6 @@ from lightpaint.report.phrases import (
     spoken_percent,
     spoken_where,
 )
-from lightpaint.screen import some_names
 
 #: Maximum number of barely visible lights that a sentence names.
 MAX_UNSEEN_NAMES = 2

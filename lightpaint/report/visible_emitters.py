@@ -7,11 +7,11 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import luminance
+from lightpaint.display_text import some_of
 from lightpaint.images.bands import sum_by_bands
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.loss.painting import ignored_paint
 from lightpaint.lighting.solution import Solution
-from lightpaint.screen import some_of
 from lightpaint.target.target import Target
 
 #: Ratio to the painted brightness from which an emitter that does not count is worth a warning.

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from lightpaint.arrays import RGB, Position
+from lightpaint.display_text import Listed, Shown, some_of
 from lightpaint.keywords import keywords
 from lightpaint.scene.changed_emitters import darkened, with_elements, with_motions
 from lightpaint.scene.lights.emitters import Emitter
@@ -40,7 +41,6 @@ from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.scene.scene_files import SceneFiles
 from lightpaint.scene.scene_inspection import inspect_scene
 from lightpaint.scene.scene_tree import ParsedScene
-from lightpaint.screen import Listed, Shown, some_of
 
 _Result_T = TypeVar("_Result_T")
 

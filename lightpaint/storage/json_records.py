@@ -11,7 +11,7 @@ from dataclasses import MISSING, asdict, fields, is_dataclass
 from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from lightpaint.screen import some_names
+from lightpaint.display_text import some_names
 
 #: Maximum length of a string in characters, and maximum number of values in a list or an object.
 MAX_CHARACTERS, MAX_VALUES = 2**14, 2**17

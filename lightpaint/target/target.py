@@ -10,11 +10,11 @@ import numpy.typing as npt
 from lightpaint.arrays import Floats
 from lightpaint.colour.color import luminance
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.display_text import Shown
 from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.pixel_blocks import block_mean, whole_factor
 from lightpaint.images.resampling import resampled
 from lightpaint.keywords import keywords
-from lightpaint.screen import Shown
 
 #: Margin above one half by which a share prevails, beyond float32 rounding.
 TIE = 1e-5

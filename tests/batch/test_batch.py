@@ -25,7 +25,7 @@ from lightpaint.batch.manifest.folder_names import FILES, is_reserved
 from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import _Run, run_batch
 from lightpaint.batch.run_options import RunOptions
-from lightpaint.batch.work import work
+from lightpaint.batch.work import item_execution
 from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work_items import ItemResult
 from lightpaint.errors import BatchError, OutputError
@@ -198,7 +198,7 @@ def test_what_fails_is_tried_again_as_often_as_is_asked(
     here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tries: list[str] = []
-    answer = work._answer
+    answer = item_execution._answer
 
     def sometimes(task: Task, *others: Any) -> None:
         tries.append(task.look)
@@ -206,7 +206,7 @@ def test_what_fails_is_tried_again_as_often_as_is_asked(
             raise RuntimeError("a library's\nown words")
         answer(task, *others)
 
-    monkeypatch.setattr(work, "_answer", sometimes)
+    monkeypatch.setattr(item_execution, "_answer", sometimes)
     outcome = run_item(here, retry=1)
     assert outcome.failed["p1"] == "RuntimeError: a library's"
     assert outcome.failed["p1-warmer"] == "it is made of p1, which failed"
@@ -219,7 +219,7 @@ def test_a_full_disk_stops_with_one_line_and_goes_on_after(
 ) -> None:
     succeed(here, "batch", "looks.toml", "-o", "out")
     (here / "out").rename(here / "whole")
-    answer, count = work._answer, 0
+    answer, count = item_execution._answer, 0
 
     def full(task: Task, *others: Any) -> None:
         nonlocal count
@@ -231,7 +231,7 @@ def test_a_full_disk_stops_with_one_line_and_goes_on_after(
         answer(task, *others)
 
     with monkeypatch.context() as patch:
-        patch.setattr(work, "_answer", full)
+        patch.setattr(item_execution, "_answer", full)
         done = run(here, "batch", "looks.toml", "-o", "out", "-q")
     assert done.returncode == 2
     [line] = done.stderr.splitlines()

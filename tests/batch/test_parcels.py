@@ -11,8 +11,8 @@ from light_groups import interleaved, pictures
 from lightpaint.batch.cluster.parcels import FileHashes, Parcel, ParcelStore, pack, pieces, unpack
 from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import run_batch
+from lightpaint.batch.work.item_execution import run_item
 from lightpaint.batch.work.task import Task
-from lightpaint.batch.work.work import run_item
 from lightpaint.batch.work.work_items import ItemResult, WorkItem
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import BatchError, OutputError

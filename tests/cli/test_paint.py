@@ -33,10 +33,10 @@ from lightpaint.cli.options.job_options import settings_of
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.cli.options.source_options import painted_of
 from lightpaint.paint.background_threads import BackgroundThreads
-from lightpaint.paint.frames import from_frame, to_frame
+from lightpaint.paint.message_frames import from_frame, to_frame
 from lightpaint.paint.protocol import VERSION
+from lightpaint.paint.store.history_steps import Identity, Step
 from lightpaint.paint.store.session_requests import SessionRequests
-from lightpaint.paint.store.steps import Identity, Step
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.subject_factory import make_subject, make_subjects
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile

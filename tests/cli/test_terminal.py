@@ -14,10 +14,10 @@ from rich.markup import escape
 from lightpaint.basis.cache import cache
 from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.cli.output import lines, terminal
+from lightpaint.display_text import some_names, visible
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import write_lighting
-from lightpaint.screen import some_names, visible
 
 #: A name that colours, erases, breaks the line, turns the reading order, and speaks rich's markup.
 BAD = "b\x1b[2J\x1b[31m\r\n\t\x7f\x9b\u202e\u2066\u2028\u200b[red]c[/red][/]\\"

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from lightpaint.errors import BasisError
-from lightpaint.lighting.views import check_same_lights, joint_basis
+from lightpaint.lighting.joined_views import check_same_lights, joint_basis
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from lightpaint.paint.notebook import widget_arguments
 from lightpaint.paint.session.look_library import LookLibrary
 from lightpaint.paint.session.picture_table import PictureTable
 from lightpaint.paint.session.session import Session
-from lightpaint.paint.store.steps import Identity
+from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.store import MemoryStore, Store
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.target.painting_file import write_painting

@@ -17,7 +17,7 @@ from starlette.websockets import WebSocketDisconnect
 
 import lightpaint as lp
 from lightpaint.errors import PaintError
-from lightpaint.paint.frames import from_frame, to_frame
+from lightpaint.paint.message_frames import from_frame, to_frame
 from lightpaint.paint.protocol import (
     VERSION,
     CanvasPatch,
@@ -39,7 +39,7 @@ from lightpaint.paint.server.session_clients import Connections
 from lightpaint.paint.session.look_library import MAX_PROPOSALS, LookLibrary
 from lightpaint.paint.session.picture_table import PictureTable
 from lightpaint.paint.session.session import Session
-from lightpaint.paint.store.steps import Identity
+from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.store import MemoryStore
 from lightpaint.pipeline.job.settings import Settings
 

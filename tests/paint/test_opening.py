@@ -21,7 +21,7 @@ from lightpaint.images.object_map import Objects
 from lightpaint.paint import subject_factory
 from lightpaint.paint.lazy_scene import LazyScene
 from lightpaint.paint.session_file import session_identity
-from lightpaint.paint.store.steps import Identity
+from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.subject import Subject
 from lightpaint.paint.subject_factory import make_subject

@@ -16,7 +16,7 @@ from hypothesis.extra import numpy as arrays
 from raw_message import RawMessage
 
 from lightpaint.errors import PaintError
-from lightpaint.paint.frames import DTYPES, MAX_TEXT, from_frame, parse_request, to_frame
+from lightpaint.paint.message_frames import DTYPES, MAX_TEXT, from_frame, parse_request, to_frame
 from lightpaint.paint.protocol import (
     EVENTS,
     REQUESTS,

@@ -23,7 +23,7 @@ from starlette.testclient import TestClient, WebSocketDenialResponse, WebSocketT
 from starlette.websockets import WebSocketDisconnect
 
 from lightpaint.errors import PaintError
-from lightpaint.paint.frames import from_frame, to_frame
+from lightpaint.paint.message_frames import from_frame, to_frame
 from lightpaint.paint.protocol import VERSION, Message, Paint, PictureData, PictureUpdate
 from lightpaint.paint.server import client, server
 from lightpaint.paint.server.address import Address, Reach

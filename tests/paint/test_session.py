@@ -21,13 +21,13 @@ from lightpaint.lighting.fit import DEFAULT_HOLD
 from lightpaint.paint import protocol
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.canvas_pixels import Pixels
+from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.session_requests import (
     ALL_LIGHTS_KEYS,
     FIT_KEYS,
     TITLES,
     SessionRequests,
 )
-from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import MemoryStore
 from lightpaint.pipeline.job.settings import Settings
 

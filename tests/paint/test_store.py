@@ -28,7 +28,14 @@ from lightpaint.paint.store import database
 from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.compression import pack, unpack
 from lightpaint.paint.store.database import set_aside
-from lightpaint.paint.store.steps import Identity, Patch, Step, StoredLook, ViewIdentity, replay
+from lightpaint.paint.store.history_steps import (
+    Identity,
+    Patch,
+    Step,
+    StoredLook,
+    ViewIdentity,
+    replay,
+)
 from lightpaint.paint.store.store import MemoryStore, Store
 from lightpaint.pipeline.job.settings import Settings
 

@@ -28,7 +28,7 @@ from lightpaint.paint import background_threads, protocol
 from lightpaint.paint.notebook import painter_files, widget_arguments
 from lightpaint.paint.store import write_queue
 from lightpaint.paint.store.canvas_pixels import Pixels
-from lightpaint.paint.store.steps import Identity
+from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio import studio
 from lightpaint.paint.studio.studio import Studio

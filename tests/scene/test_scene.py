@@ -9,7 +9,7 @@ import pytest
 from renderer import CORNELL, LIGHTS, mitsuba_render, write_room
 
 from lightpaint.errors import BackendError, SceneError
-from lightpaint.scene.point_lights import lit_by_points
+from lightpaint.scene.probe_lights import lit_by_points
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene

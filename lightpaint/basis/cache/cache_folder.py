@@ -14,9 +14,9 @@ from pathlib import Path
 
 from platformdirs import user_cache_path
 
+from lightpaint.display_text import some_names
 from lightpaint.errors import OutputError
 from lightpaint.files import write_text
-from lightpaint.screen import some_names
 
 #: Environment variable that overrides the default folder in the user's cache.
 VARIABLE = "LIGHTPAINT_CACHE"

@@ -18,6 +18,7 @@ from lightpaint.basis.cache.plane_reuse import (
 from lightpaint.basis.file.basis_file import as_stored, is_large
 from lightpaint.basis.file.basis_reader import leave_indirect
 from lightpaint.basis.render.basis_render import render_basis
+from lightpaint.basis.render.pixel_top_up import KeptTracer, top_up
 from lightpaint.basis.render.render_origin import (
     ONE_PASS,
     basis_lights,
@@ -25,12 +26,11 @@ from lightpaint.basis.render.render_origin import (
     is_on_the_way,
     method_of,
 )
-from lightpaint.basis.render.top_up import KeptTracer, top_up
+from lightpaint.display_text import some_names
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.scene import Scene
-from lightpaint.screen import some_names
 
 #: Smallest time budget of a render in seconds, which still renders one step.
 SHORTEST_S = 1e-3

@@ -9,12 +9,12 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from lightpaint.basis.file.basis_file import FORMAT_KEY
+from lightpaint.display_text import some_names
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.estimate import HALF_DIFFERENCE
 from lightpaint.images.formats.exr import OWN, read_channels, read_headers
 from lightpaint.images.formats.exr_layers import KRITA_LAYERS
 from lightpaint.images.formats.file_kinds import head_of, kind_of
-from lightpaint.screen import some_names
 
 #: Maximum number of files in a folder of light groups: more are probably frames of a film.
 MAX_FILES = 1000

@@ -16,8 +16,8 @@ from lightpaint.basis.lightgroups.naming_conventions import (
     Convention,
     beauty_name,
 )
+from lightpaint.display_text import some_names
 from lightpaint.errors import BasisError
-from lightpaint.screen import some_names
 
 #: Name for files that no convention matches, in place of a renderer.
 ONE_FILE_PER_LIGHT = "one file per light"

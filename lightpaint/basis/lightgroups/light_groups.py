@@ -28,9 +28,9 @@ from lightpaint.basis.lights import BasisLight, Lights, free_name
 from lightpaint.basis.origin import LIGHT_GROUPS, Origin
 from lightpaint.basis.planes import IndirectLight, as_planes
 from lightpaint.colour.color import LUMINANCE
+from lightpaint.display_text import short_repr, some_names
 from lightpaint.errors import BasisError
 from lightpaint.keywords import keywords
-from lightpaint.screen import short_repr, some_names
 
 #: The unit of weights.
 AS_RENDERED = "× as rendered"

@@ -16,6 +16,7 @@ from lightpaint.basis.lightgroups.folder_files import candidate_files
 from lightpaint.basis.lightgroups.layer_choice import short_names
 from lightpaint.basis.lightgroups.naming_conventions import is_known
 from lightpaint.colour.primaries import are_same, converted, to_rec709
+from lightpaint.display_text import some_names
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.formats.exr import ExrPart, read_parts
 from lightpaint.images.formats.exr_layers import (
@@ -25,7 +26,6 @@ from lightpaint.images.formats.exr_layers import (
     primaries_of,
     vector_channels,
 )
-from lightpaint.screen import some_names
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ import numpy as np
 from lightpaint.arrays import Bools, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.planes import IndirectLight, Planes, as_planes
-from lightpaint.basis.render.half_sums import HalfCounts, add_halves, mean_and_half_difference
 from lightpaint.basis.render.render_origin import (
     FINISHED,
     ONE_PASS,
@@ -16,6 +15,7 @@ from lightpaint.basis.render.render_origin import (
     basis_lights,
     origin_of,
 )
+from lightpaint.basis.render.sample_halves import HalfCounts, add_halves, mean_and_half_difference
 from lightpaint.scene.scene import Scene
 
 

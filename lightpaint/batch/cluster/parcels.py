@@ -14,10 +14,10 @@ from pathlib import Path
 
 from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work_items import ItemResult, WorkItem
+from lightpaint.display_text import some_names
 from lightpaint.errors import BatchError, OutputError
 from lightpaint.files import first_line
 from lightpaint.pipeline.results.result_folder import RECORD, ResultFolder
-from lightpaint.screen import some_names
 from lightpaint.storage.json_records import strict_json
 from lightpaint.storage.staging import is_below
 

@@ -12,7 +12,7 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 
 from lightpaint.batch.cluster.parcels import Parcel, ParcelStore
-from lightpaint.batch.work.work import run_item
+from lightpaint.batch.work.item_execution import run_item
 from lightpaint.batch.work.work_items import ItemResult, item_label
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.progress import silent

@@ -5,7 +5,7 @@
 from collections.abc import Iterator, Sequence
 from typing import Protocol
 
-from lightpaint.batch.work.work import run_item
+from lightpaint.batch.work.item_execution import run_item
 from lightpaint.batch.work.work_items import ItemResult, WorkItem
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.progress import Listener

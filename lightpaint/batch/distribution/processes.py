@@ -11,7 +11,7 @@ from concurrent.futures.process import BrokenProcessPool
 from threadpoolctl import threadpool_limits
 
 from lightpaint.batch.distribution.engine import LOST_TEXT, MAX_TRIES
-from lightpaint.batch.work.work import run_item
+from lightpaint.batch.work.item_execution import run_item
 from lightpaint.batch.work.work_items import ItemResult, WorkItem, item_label
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.progress import Listener, silent

@@ -28,10 +28,10 @@ from lightpaint.batch.manifest.folder_names import SUMMARY
 from lightpaint.batch.plan.journal import JournalLine
 from lightpaint.batch.plan.plan import Plan
 from lightpaint.batch.work.task import Kind
+from lightpaint.display_text import visible
 from lightpaint.files import write_bytes, write_text
 from lightpaint.images.formats.png import png_bytes
 from lightpaint.report.comparison import shorten_to_width
-from lightpaint.screen import visible
 from lightpaint.version import __version__
 from lightpaint.viewer.bundle import bundled, styles
 

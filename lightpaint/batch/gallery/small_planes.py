@@ -14,8 +14,8 @@ from typing import Any
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.batch.manifest.folder_names import THUMBNAILS
+from lightpaint.batch.work.item_execution import job_fields
 from lightpaint.batch.work.task import Task
-from lightpaint.batch.work.work import job_fields
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import LightpaintError
 from lightpaint.file_reading import read_text

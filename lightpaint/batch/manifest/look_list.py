@@ -15,8 +15,8 @@ from lightpaint.batch.manifest.folder_names import is_reserved, name_clashes
 from lightpaint.batch.manifest.keys import MAX_FRAMES, Mistakes
 from lightpaint.batch.manifest.manifest import Manifest, Table
 from lightpaint.batch.manifest.sequence import frame_position
+from lightpaint.display_text import some_names
 from lightpaint.errors import BatchError
-from lightpaint.screen import some_names
 
 
 def entries_of(manifest: Manifest) -> LookEntries:

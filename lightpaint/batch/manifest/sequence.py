@@ -11,9 +11,9 @@ from lightpaint.batch.manifest.keys import Space
 from lightpaint.batch.manifest.variations import with_emission
 from lightpaint.colour.color import cct_and_duv, kelvin_to_rgb, luminance
 from lightpaint.colour.hue_names import WHITE_DUV
+from lightpaint.display_text import some_names
 from lightpaint.errors import LightingError
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.screen import some_names
 
 #: Stops below the brighter end at which a light that is off begins or ends, in `log`.
 OFF_STOPS = 10.0

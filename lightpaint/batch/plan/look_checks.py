@@ -14,6 +14,7 @@ from lightpaint.basis.render.render_origin import basis_lights
 from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.keys import Mistakes
 from lightpaint.batch.work.worker_cache import WorkerCache
+from lightpaint.display_text import some_names
 from lightpaint.errors import LOOK_ERRORS, BatchError, LightpaintError
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -24,7 +25,6 @@ from lightpaint.pipeline.job.sources import check_nothing_unused, content
 from lightpaint.relit.relight import scene_of
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
-from lightpaint.screen import some_names
 
 
 def collect_errors(entry: LookEntry, cache: WorkerCache, mistakes: Mistakes) -> None:

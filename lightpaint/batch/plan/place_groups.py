@@ -10,9 +10,9 @@ from pathlib import Path
 from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.folder_names import PLACES
 from lightpaint.batch.work.task import Task, render_settings
+from lightpaint.display_text import some_names
 from lightpaint.errors import BatchError, LightpaintError
 from lightpaint.placement.placement_record import PlacementRecord, read_placement
-from lightpaint.screen import some_names
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.plan.place_groups import PlaceGroup
 from lightpaint.batch.work.task import Kind, Task
 from lightpaint.batch.work.worker_cache import WorkerCache
+from lightpaint.display_text import some_names
 from lightpaint.errors import BatchError
-from lightpaint.screen import some_names
 
 
 @dataclass(frozen=True)

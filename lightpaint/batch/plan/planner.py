@@ -39,6 +39,7 @@ from lightpaint.batch.work.task import (
     render_task,
 )
 from lightpaint.batch.work.worker_cache import WorkerCache
+from lightpaint.display_text import some_names
 from lightpaint.errors import LOOK_ERRORS, BatchError, LightpaintError
 from lightpaint.files import check_writable
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -48,7 +49,6 @@ from lightpaint.pipeline.results.result_folder import is_as_written
 from lightpaint.pipeline.results.results import view_names
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
-from lightpaint.screen import some_names
 
 
 def plan(

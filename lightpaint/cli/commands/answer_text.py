@@ -12,6 +12,7 @@ from lightpaint.cli.output import terminal
 from lightpaint.cli.output.tables import spoken_agreement
 from lightpaint.cli.output.vocabulary import BY_OPTION, spoken
 from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
+from lightpaint.display_text import some_names, some_of
 from lightpaint.lighting.analysis.appearance.constraint_kinds import KEYS_BY_KIND
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.answer.light_setting import LightSetting
@@ -19,7 +20,7 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.results.results import Look
 from lightpaint.report.answer_pictures import spoken_view
 from lightpaint.report.diagnosis_sentences import bound_sentences, error_sentences, spoken_cause
-from lightpaint.report.influences import fit_sentence
+from lightpaint.report.fit_influences import fit_sentence
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.color_section import closer_choice
 from lightpaint.report.phrases import spoken_percent
@@ -30,7 +31,6 @@ from lightpaint.report.uncertainty_sentences import (
     unreached_channels,
     untold_lights,
 )
-from lightpaint.screen import some_names, some_of
 
 Table = Literal["short", "full"]
 

@@ -19,9 +19,9 @@ from lightpaint.batch.run_options import BatchOutcome, RunOptions
 from lightpaint.batch.work.work_items import ItemResult
 from lightpaint.cli.output import documents, terminal
 from lightpaint.cli.output.output_mode import CommandOutcome
+from lightpaint.display_text import some_of, visible
 from lightpaint.errors import BatchError, OutputError
 from lightpaint.files import scene_name
-from lightpaint.screen import some_of, visible
 
 #: Maximum number of looks that are listed at the end; of more only unfinished ones.
 MAX_LISTED = 40

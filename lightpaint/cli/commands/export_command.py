@@ -9,7 +9,7 @@ from lightpaint.errors import OutputError
 from lightpaint.files import check_files, check_writable, write_text
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.pipeline.job.sources import GroupsFile, SceneFile, content
-from lightpaint.relit.export_forms import Source, names_of_forms, writers_of
+from lightpaint.relit.export_formats import Source, names_of_forms, writers_of
 from lightpaint.storage.staging import finish
 
 

@@ -8,8 +8,8 @@ from lightpaint.basis.cache.cache_folder import delete_orphans, folder
 from lightpaint.cli.doctor import examine
 from lightpaint.cli.output import documents, tables, terminal
 from lightpaint.cli.output.output_mode import CommandOutcome
+from lightpaint.display_text import some_names
 from lightpaint.errors import BasisError
-from lightpaint.screen import some_names
 
 
 def cache(*, action: str, names: Sequence[str]) -> CommandOutcome:

@@ -8,6 +8,7 @@ from lightpaint.cli.commands.answer_text import Table, show_look, spoken_setting
 from lightpaint.cli.output import documents, tables, terminal
 from lightpaint.cli.output.output_mode import CommandOutcome
 from lightpaint.cli.tolerances import Tolerances
+from lightpaint.display_text import some_of
 from lightpaint.errors import LOOK_ERRORS
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.pipeline import run
@@ -15,7 +16,6 @@ from lightpaint.pipeline.results.results import Look
 from lightpaint.placement.placement_record import PlacementRecord, record_of
 from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.report.page.suggestion_section import spoken_turn
-from lightpaint.screen import some_of
 
 if TYPE_CHECKING:
     from lightpaint.cli.solve_variations import LookSet

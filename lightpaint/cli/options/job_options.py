@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from lightpaint.cli.options.source_options import basis_of, scene_of
 from lightpaint.cli.output.vocabulary import BY_OPTION, from_any_folder
 from lightpaint.colour.display.view_transform import TransformChoice
+from lightpaint.display_text import some_names
 from lightpaint.errors import LOOK_ERRORS, OutputError, TargetError
 from lightpaint.files import check_files, is_name, is_utf_8, one_line
 from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
@@ -17,7 +18,6 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import Painting
 from lightpaint.placement.rigging.rigging import Rigging
 from lightpaint.scene.lights.lights_file import MOVES
-from lightpaint.screen import some_names
 
 if TYPE_CHECKING:
     from lightpaint.pipeline.job.job import Job

@@ -7,9 +7,9 @@ or look like a new line, are made visible (`screen.visible`).
 import os
 import sys
 
+from lightpaint.display_text import visible
 from lightpaint.errors import OutputError
 from lightpaint.images.formats.library_output import unsilenced
-from lightpaint.screen import visible
 
 #: Longest line on stderr, in characters: no sentence is longer.
 MAX_LINE_LENGTH = 4000

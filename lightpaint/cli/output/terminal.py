@@ -24,7 +24,7 @@ from rich.text import Text
 from lightpaint.cli.output import lines
 from lightpaint.cli.output.output_mode import output_mode
 from lightpaint.cli.output.vocabulary import spoken
-from lightpaint.screen import visible
+from lightpaint.display_text import visible
 
 
 def numbers(rgb: tuple[float, float, float]) -> str:

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Floats
+from lightpaint.display_text import some_names
 from lightpaint.errors import ViewError
 from lightpaint.files import first_line
-from lightpaint.screen import some_names
 
 #: Names of linear Rec.709 in OpenColorIO's built-in configurations and in others.
 LINEAR_REC709 = (

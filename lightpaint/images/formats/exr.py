@@ -16,11 +16,11 @@ import numpy.typing as npt
 import OpenEXR
 
 from lightpaint.arrays import Floats
+from lightpaint.display_text import some_names
 from lightpaint.errors import ImageError, OutputError
 from lightpaint.files import first_line, replacing
 from lightpaint.images.formats.file_kinds import head_of, kind_of, name_of
 from lightpaint.images.formats.library_output import silenced
-from lightpaint.screen import some_names
 from lightpaint.version import __version__
 
 #: Prefix of lightpaint's text attributes, and the attribute that all its files have.

@@ -16,9 +16,9 @@ from lightpaint.colour.primaries import (
     rgb_to_xyz,
     to_rec709,
 )
+from lightpaint.display_text import some_names
 from lightpaint.errors import ImageError
 from lightpaint.images.formats.exr import ExrPart
-from lightpaint.screen import some_names
 
 #: Attribute of EXR files with separate Krita layers, which have no merged picture.
 KRITA_LAYERS = "krita_layers_info"

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
+from lightpaint.display_text import short_repr
 from lightpaint.images.bands import in_turns
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.ambiguity import Ambiguity, ambiguities
@@ -21,7 +22,6 @@ from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.problem import gamuts_for
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
-from lightpaint.screen import short_repr
 
 
 @keywords()

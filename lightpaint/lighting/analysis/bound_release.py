@@ -20,7 +20,7 @@ from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.unknowns.knobs import Knob
 from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
 from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.lighting.unknowns.white_neighbours import move_to_best_white, next_whites
+from lightpaint.lighting.unknowns.white_mixes import move_to_best_white, next_whites
 
 #: Maximum number of bounds to release; for large problems, about MAX_UNKNOWNS unknowns in all; the
 #: fewest bounds.

@@ -6,8 +6,8 @@ With the closest weights u of any sign, Ψ − ΣuΦ is orthogonal to every ligh
 
 exactly: no mix of the lights can reach the first part, and w >= 0 forbids the second. The first
 part is split further into the noise of the prediction, the noise of the painting if it is a render
-or a photograph (`grain.py`), and the rest. If the lighting answers several views, part of the
-second is the compromise with the others. After reweighting, all parts are of the last linear
+or a photograph (`painting_grain.py`), and the rest. If the lighting answers several views, part of
+the second is the compromise with the others. After reweighting, all parts are of the last linear
 problem: without clipping by a display, and on a scale of its own.
 """
 
@@ -19,15 +19,15 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats, as_rgb
+from lightpaint.display_text import short_repr
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.bound_release import bounds_of
 from lightpaint.lighting.analysis.error_energies import ErrorEnergies, grain_power
-from lightpaint.lighting.analysis.noise.directions import all_columns
 from lightpaint.lighting.analysis.noise.noise import pseudo_inverse
+from lightpaint.lighting.analysis.noise.weight_directions import all_columns
 from lightpaint.lighting.answer.active_bound import Bound
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solve_again
-from lightpaint.screen import short_repr
 
 #: Blocks along each side of the image for finding where light is missing, and regions along each
 #: side that sentences name: left, middle, right.

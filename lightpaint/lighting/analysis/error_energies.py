@@ -7,7 +7,7 @@ import numpy as np
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.colour.color import luminance
 from lightpaint.images.bands import bands_of
-from lightpaint.lighting.analysis.noise.grain import channel_grain
+from lightpaint.lighting.analysis.noise.painting_grain import channel_grain
 from lightpaint.lighting.analysis.noise.residuals import Residuals
 from lightpaint.lighting.solution import Solution
 from lightpaint.threads import parallel_map

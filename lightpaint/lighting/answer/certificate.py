@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, as_rgb
+from lightpaint.display_text import short_repr
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.active_bound import Bound
 from lightpaint.lighting.answer.software_versions import Software
-from lightpaint.screen import short_repr
 
 
 @keywords()

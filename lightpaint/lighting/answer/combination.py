@@ -8,11 +8,11 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
+from lightpaint.display_text import some_of
 from lightpaint.errors import LightingError, UnknownLightError
 from lightpaint.images.estimate import Estimate
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.screen import some_of
 
 
 @keywords()

@@ -13,12 +13,12 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.colour.photometry import Photometry, photometry
 from lightpaint.dataframes import CHANNELS, by_channel, number, pandas, xarray
+from lightpaint.display_text import Shown, some_names, some_of
 from lightpaint.errors import LightingError, UnknownLightError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.certificate import Certificate
 from lightpaint.lighting.answer.light_setting import ALL_REACHED, LightSetting
 from lightpaint.scene.properties.site import EmitterPlace
-from lightpaint.screen import Shown, some_names, some_of
 from lightpaint.validation import BRIGHTEST
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 from lightpaint.arrays import RGB
 from lightpaint.colour.white_range import WhiteRange
+from lightpaint.display_text import some_of
 from lightpaint.errors import ConstraintError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.values import (
@@ -27,7 +28,6 @@ from lightpaint.lighting.constraints.values import (
     parse_strength,
     parse_whites,
 )
-from lightpaint.screen import some_of
 from lightpaint.validation import MAX_LISTED
 
 #: Keys of the constraints on one light.

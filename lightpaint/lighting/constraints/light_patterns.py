@@ -6,6 +6,7 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 from lightpaint.basis.lights import BasisLight
+from lightpaint.display_text import some_names
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.constraints import (
     Constraints,
@@ -14,7 +15,6 @@ from lightpaint.lighting.constraints.constraints import (
     is_pattern,
     merge_tables,
 )
-from lightpaint.screen import some_names
 
 
 def constraints_by_light(

@@ -38,7 +38,7 @@ from lightpaint.lighting.unknowns.gamut_bounds import solve_near_sides
 from lightpaint.lighting.unknowns.gamuts import Gamuts, PaintedLight
 from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
 from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.lighting.unknowns.white_neighbours import (
+from lightpaint.lighting.unknowns.white_mixes import (
     center_windows,
     clip_to_gamuts,
     next_whites,

@@ -8,7 +8,11 @@ from lightpaint.arrays import Doubles, Floats, Slices
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.live.live_sums import MAX_FILM_PIXELS, PaintedTiles, SmallFilm
-from lightpaint.lighting.loss.emitter_paint import affected_region, dark_threshold, find_glow_paint
+from lightpaint.lighting.loss.paint_on_emitters import (
+    affected_region,
+    dark_threshold,
+    find_glow_paint,
+)
 
 #: Pixels of a part of a row over which importance is summed.
 SEGMENT_PIXELS = 64

@@ -10,10 +10,10 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import TargetError
 from lightpaint.lighting.fit import Emitters, Fit
-from lightpaint.lighting.loss.emitter_paint import dark_threshold, find_glow_paint
+from lightpaint.lighting.joined_views import Views
 from lightpaint.lighting.loss.loss import Loss, Squares
+from lightpaint.lighting.loss.paint_on_emitters import dark_threshold, find_glow_paint
 from lightpaint.lighting.loss.painting_loss import PaintingLoss
-from lightpaint.lighting.views import Views
 from lightpaint.target.target import Target, titled
 
 

@@ -21,11 +21,11 @@ from lightpaint.basis.planes import BLOCK_PIXELS, Planes, as_planes
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.pixel_blocks import block_sums, enlarged
+from lightpaint.lighting.joined_views import Views
 from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.loss import Cut, Loss
 from lightpaint.lighting.loss.weight_penalty import pull_to_present
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.views import Views
 
 #: Largest RMS noise of the present look, relative to the display's range, at which single pixels
 #: are fitted: that of some 32 samples per pixel on the shipped scenes (docs/benchmarks.md).

@@ -13,7 +13,7 @@ from lightpaint.lighting.algebra.optimum import Method
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.reduced_problem import ReducedOptimum, solve_reduced
 from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.lighting.unknowns.white_neighbours import knobs_outside_gamuts
+from lightpaint.lighting.unknowns.white_mixes import knobs_outside_gamuts
 
 #: Maximum number of times that lights move to other sides for one answer.
 MAX_TURNS = 3

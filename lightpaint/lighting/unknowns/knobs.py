@@ -40,7 +40,7 @@ class Knob:
 
     limit: coefficients, minimum and maximum of a limited sum over its unknowns.
     whites: the range of white of a light that keeps to one. window: the two of these
-    that its two unknowns mix at present (white_neighbours.py).
+    that its two unknowns mix at present (white_mixes.py).
     gamut: the gamut that confines the light, if it would leave it otherwise: all of it, or the part
     towards one `side` (gamut_bounds.py).
     """

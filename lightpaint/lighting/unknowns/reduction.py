@@ -4,7 +4,7 @@ A light that may have any colour has three unknowns; one of fixed colour, or sev
 have a single one; one that mixes primaries has an unknown for each. Locked lights are in w₀, which
 moves to the right-hand side. Limits are bounds on x, or on its luminance. So the problem stays one
 convex quadratic under all constraints; with ranges of white it is one for each choice of
-neighbouring whites (white_neighbours.py).
+neighbouring whites (white_mixes.py).
 """
 
 from collections.abc import Collection, Mapping

@@ -19,7 +19,7 @@ from lightpaint.paint.layers.layer_stack import (
 )
 from lightpaint.paint.layers.open_stroke import OpenStroke
 from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
-from lightpaint.paint.store.steps import Patch, Step
+from lightpaint.paint.store.history_steps import Patch, Step
 from lightpaint.target.target import Target
 
 #: Largest importance, and largest light, that a page may paint.

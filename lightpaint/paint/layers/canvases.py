@@ -18,7 +18,7 @@ from lightpaint.paint.layers.layer_stack import (
     stack_after,
 )
 from lightpaint.paint.store.canvas_pixels import Pixels, Region
-from lightpaint.paint.store.steps import Patch, Step
+from lightpaint.paint.store.history_steps import Patch, Step
 
 
 class Canvases:

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Bools
 from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
-from lightpaint.paint.store.steps import Patch, replay
+from lightpaint.paint.store.history_steps import Patch, replay
 
 #: Side of a tile, in pixels.
 TILE_SIDE = 64

@@ -6,7 +6,7 @@ from typing import Any
 
 from lightpaint.errors import PaintError
 from lightpaint.paint.layers.layer import MAX_FACTOR, MAX_STRENGTH, PAINTING, Layer
-from lightpaint.paint.store.steps import Step
+from lightpaint.paint.store.history_steps import Step
 
 #: Maximum number of layers in a session.
 MAX_LAYERS = 1000

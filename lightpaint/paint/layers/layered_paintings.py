@@ -13,7 +13,7 @@ from lightpaint.paint.layers.layer import PAINTING_ID, Layer
 from lightpaint.paint.layers.layer_pixels import LayerPixels, enclosing, is_empty
 from lightpaint.paint.layers.layer_stack import LayerStack
 from lightpaint.paint.store.canvas_pixels import Pixels, Region
-from lightpaint.paint.store.steps import Patch, name_in_view
+from lightpaint.paint.store.history_steps import Patch, name_in_view
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import write_lighting
 from lightpaint.paint.notebook.widget_arguments import notebook_advice
 from lightpaint.paint.session.snapshot import SessionSnapshot
-from lightpaint.paint.store.steps import Identity
+from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.store import MemoryStore, Store
 from lightpaint.target.painting_file import write_painting
 from lightpaint.viewer.bundle import bundled, styles

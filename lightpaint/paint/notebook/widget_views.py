@@ -5,7 +5,7 @@ from threading import RLock
 from typing import Any
 
 from lightpaint.paint.background_threads import error_text, error_tone
-from lightpaint.paint.frames import is_other_version, parse_request
+from lightpaint.paint.message_frames import is_other_version, parse_request
 from lightpaint.paint.protocol import Closing, Failure, Hello, Message, TakeOver
 from lightpaint.paint.session_owner import SessionOwner
 from lightpaint.paint.studio.studio import Studio

@@ -16,7 +16,7 @@ import { RoomPlan } from './ui/room_plan.js';
 import { SessionController } from './ui/session_controller.js';
 import { SettingsPanel } from './ui/settings_panel.js';
 import { SkipLinks } from './ui/skip_links.js';
-import { Stage } from './ui/stage.js';
+import { Stage } from './ui/picture_stage.js';
 import { Store } from './ui/ui_store.js';
 import { Ask, ToolBar, ToolOptions } from './ui/toolbar.js';
 import { TopBar } from './ui/topbar.js';

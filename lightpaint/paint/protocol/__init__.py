@@ -1,7 +1,7 @@
 """The messages between a session and its clients, in both directions, each a frozen dataclass.
 
-`frames.py` says how they travel. Lights, views and objects are known by their place in what `state`
-lists. A region is rows and columns of a picture, `[top, bottom, left, right]`, the ends not
+`message_frames.py` says how they travel. Lights, views and objects are known by their place in what
+`state` lists. A region is rows and columns of a picture, `[top, bottom, left, right]`, the ends not
 included. Colours are linear Rec.709.
 
 Pictures are fetched, and not sent: `resources` in `state` and `renewed` say which there are, those

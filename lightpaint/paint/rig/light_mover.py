@@ -33,7 +33,7 @@ from lightpaint.paint.session.moved_lights import Placed, added_names
 from lightpaint.paint.session.picture_table import Picture, PictureTable, plane_thumbnail
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.view_pictures import plane_scale
-from lightpaint.paint.store.steps import name_in_view
+from lightpaint.paint.store.history_steps import name_in_view
 
 
 class MoverHost(Protocol):

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy.typing as npt
 
 from lightpaint.errors import PaintError
-from lightpaint.paint.frames import from_frame, is_other_version, parse_request, to_frame
+from lightpaint.paint.message_frames import from_frame, is_other_version, parse_request, to_frame
 from lightpaint.paint.protocol import (
     AnswerUpdate,
     AnyRequest,

@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from lightpaint.errors import PaintError
-from lightpaint.paint.frames import MAX_FRAME
+from lightpaint.paint.message_frames import MAX_FRAME
 from lightpaint.paint.protocol import VERSION
 from lightpaint.paint.server.address import BoundSocket, listen
 from lightpaint.paint.server.client import Client

@@ -12,8 +12,8 @@ from lightpaint.paint.protocol import HistoryInfo
 from lightpaint.paint.session.live_answer import LiveAnswer
 from lightpaint.paint.store.canvas_pixels import Region
 from lightpaint.paint.store.database import DamagedError
+from lightpaint.paint.store.history_steps import Patch, Step
 from lightpaint.paint.store.session_requests import SessionRequests
-from lightpaint.paint.store.steps import Patch, Step
 from lightpaint.paint.store.store import Store
 
 #: Number of steps listed to a page, backwards and forwards.

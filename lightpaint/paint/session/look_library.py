@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, as_rgb
+from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.paint.layers.layer_stack import LayerStack
 from lightpaint.paint.layers.layered_paintings import LayeredPaintings
@@ -29,9 +30,8 @@ from lightpaint.paint.protocol import (
 from lightpaint.paint.session.picture_table import PictureTable, display_thumbnail
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.canvas_pixels import Pixels
+from lightpaint.paint.store.history_steps import StoredLook, name_in_view
 from lightpaint.paint.store.session_requests import SessionRequests
-from lightpaint.paint.store.steps import StoredLook, name_in_view
-from lightpaint.screen import some_names
 
 #: Maximum length of a look's name.
 MAX_NAME_LENGTH = 80

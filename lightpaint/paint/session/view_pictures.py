@@ -16,7 +16,7 @@ from lightpaint.paint.protocol import ViewInfo
 from lightpaint.paint.session import picture_table
 from lightpaint.paint.session.edit_messages import layer_picture
 from lightpaint.paint.session.picture_table import Picture, PictureTable
-from lightpaint.paint.store.steps import name_in_view
+from lightpaint.paint.store.history_steps import name_in_view
 
 
 def offer_transforms(table: PictureTable, transforms: Sequence[ViewTransform]) -> None:

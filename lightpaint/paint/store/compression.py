@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from lightpaint.errors import PaintError
 from lightpaint.paint.store.canvas_pixels import Pixels, Region
-from lightpaint.paint.store.steps import Patch
+from lightpaint.paint.store.history_steps import Patch
 
 #: The fastest level, since strokes must not wait.
 ZLIB_LEVEL = 1

@@ -12,10 +12,10 @@ from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
 
+from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError, OutputError, PaintError
 from lightpaint.files import first_line, flush
-from lightpaint.paint.store.steps import Identity, ViewIdentity
-from lightpaint.screen import some_names
+from lightpaint.paint.store.history_steps import Identity, ViewIdentity
 from lightpaint.storage.json_records import read_record, strict_json
 
 #: "lpnt", which marks a file as a session, and the version of its tables.

@@ -11,7 +11,7 @@ from lightpaint.errors import PaintError
 from lightpaint.files import first_line
 from lightpaint.paint.store.canvas_pixels import Pixels, Region
 from lightpaint.paint.store.compression import pack, unpack
-from lightpaint.paint.store.steps import Patch
+from lightpaint.paint.store.history_steps import Patch
 from lightpaint.storage.json_records import strict_json
 
 #: Element types of a look's arrays.

@@ -14,6 +14,7 @@ from contextlib import closing, suppress
 from dataclasses import asdict
 from pathlib import Path
 
+from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.files import flush
 from lightpaint.paint.store.compression import unpack, unpack_patch
@@ -26,11 +27,10 @@ from lightpaint.paint.store.database import (
     open_database,
     transaction,
 )
+from lightpaint.paint.store.history_steps import Identity, name_in_view
 from lightpaint.paint.store.lazy_arrays import DTYPES
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.session_rows import parse_place
-from lightpaint.paint.store.steps import Identity, name_in_view
-from lightpaint.screen import some_names
 from lightpaint.storage.json_records import read_record, strict_json
 
 #: Errors raised by damaged values.

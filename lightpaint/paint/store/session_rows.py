@@ -9,8 +9,8 @@ from lightpaint.errors import PaintError
 from lightpaint.files import first_line
 from lightpaint.paint.store.canvas_pixels import Region
 from lightpaint.paint.store.compression import is_marked
+from lightpaint.paint.store.history_steps import Patch
 from lightpaint.paint.store.lazy_arrays import PackedArray, PackedArrays
-from lightpaint.paint.store.steps import Patch
 
 #: A stored step: id, kind, label, fields and places, the last two as JSON.
 StepRow = tuple[int, str, str, str, str]

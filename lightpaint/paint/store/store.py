@@ -27,6 +27,7 @@ from lightpaint.paint.store.database import (
     damaged_error,
     identify,
 )
+from lightpaint.paint.store.history_steps import Identity, Step, StoredLook
 from lightpaint.paint.store.lazy_arrays import (
     LookArrays,
     PackedArray,
@@ -48,7 +49,6 @@ from lightpaint.paint.store.session_rows import (
     step_rows,
     to_json,
 )
-from lightpaint.paint.store.steps import Identity, Step, StoredLook
 from lightpaint.paint.store.write_queue import WriteJob, WriteQueue
 from lightpaint.storage.json_records import strict_json
 

@@ -12,8 +12,8 @@ from pathlib import Path
 from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.files import first_line
 from lightpaint.paint.store.database import file_id, open_database, rewrite, transaction
+from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.session_rows import update_position
-from lightpaint.paint.store.steps import Identity
 
 WriteJob = Callable[[sqlite3.Connection], object]
 

@@ -28,8 +28,8 @@ from lightpaint.paint.rig.lamp_rig import LampRig
 from lightpaint.paint.rig.moved_subjects import of_moved_scenes
 from lightpaint.paint.session.picture_table import Picture
 from lightpaint.paint.session.snapshot import SessionSnapshot
+from lightpaint.paint.store.history_steps import name_in_view
 from lightpaint.paint.store.session_requests import SessionRequests
-from lightpaint.paint.store.steps import name_in_view
 from lightpaint.paint.subject import Subject, painting_path
 from lightpaint.progress import Progress, cancellable
 

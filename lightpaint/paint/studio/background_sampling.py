@@ -115,8 +115,8 @@ def add_round(
     """
     # Imported here: saved bases need no renderer.
     from lightpaint.basis.cache.cached_render import top_up_basis
+    from lightpaint.basis.render.pixel_top_up import kept_loaded
     from lightpaint.basis.render.render_origin import ONE_PASS
-    from lightpaint.basis.render.top_up import kept_loaded
     from lightpaint.pipeline.needed_samples import Certainty, needed_counts
 
     settings, bases = snapshot.settings, list(snapshot.bases)

@@ -17,7 +17,7 @@ from lightpaint.basis.denoised_mixes import denoise_present_look
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.session.picture_table import Picture, plane_thumbnail
 from lightpaint.paint.session.session import Session
-from lightpaint.paint.store.steps import name_in_view
+from lightpaint.paint.store.history_steps import name_in_view
 from lightpaint.report.basis_memo import page_reduction
 
 

@@ -46,8 +46,8 @@ from lightpaint.paint.session.session_state import offered_transforms, state_fie
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session.view_pictures import offer_layers, offer_transforms, offer_view
 from lightpaint.paint.store.canvas_pixels import Pixels
+from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.session_requests import SessionRequests
-from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio.background_jobs import BackgroundJobs
 from lightpaint.paint.studio.background_sampling import BackgroundSampling

@@ -15,6 +15,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.cached_render import check_same_view
 from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.basis.render.render_origin import basis_lights
+from lightpaint.display_text import short_repr
 from lightpaint.errors import LightpaintError
 from lightpaint.files import check_writable
 from lightpaint.images.pixel_blocks import whole_factor
@@ -57,7 +58,6 @@ from lightpaint.placement.suggestions.light_search import check_suggestible
 from lightpaint.relit.export.nuke import spoken_unreadable
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
-from lightpaint.screen import short_repr
 from lightpaint.target.target import Target
 from lightpaint.threads import parallel_map
 

@@ -2,13 +2,13 @@
 
 from lightpaint.basis.render.integrators import remark_on_separate_renders
 from lightpaint.basis.render.render_memory import memory_needed, renders_in_bands
+from lightpaint.display_text import some_names
 from lightpaint.images.denoiser import MISSING_REMARK, oidn_is_installed
 from lightpaint.images.pixel_blocks import Size, left_over, whole_factor
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.scene.quality_presets import PRESETS
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
-from lightpaint.screen import some_names
 from lightpaint.target.target import Target
 
 #: Bytes of memory above which a basis gets a remark.

@@ -8,6 +8,7 @@ from typing import Any
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.origin import Origin
+from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.files import is_name, one_line, write_bytes, write_text
 from lightpaint.images.bands import in_turns
@@ -35,7 +36,6 @@ from lightpaint.report.verdict import verdict
 from lightpaint.report.visible_emitters import emitter_remarks
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.surfaces import render_features
-from lightpaint.screen import some_names
 from lightpaint.storage.staging import finish
 from lightpaint.target.target import Target
 

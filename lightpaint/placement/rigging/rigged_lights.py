@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Position
+from lightpaint.display_text import some_names
 from lightpaint.errors import ConstraintError, SceneError
 from lightpaint.lighting.constraints.constraints import Constraints, is_pattern
 from lightpaint.placement.freedom import Freedom
@@ -19,7 +20,6 @@ from lightpaint.placement.rigging.rigging_values import constraint_of, names_of
 from lightpaint.placement.space.free_space import as_position
 from lightpaint.scene.lights.light import Light
 from lightpaint.scene.scene import Scene
-from lightpaint.screen import some_names
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from lightpaint.display_text import some_of
 from lightpaint.errors import ConstraintError
 from lightpaint.files import one_line
 from lightpaint.keywords import keywords
@@ -19,7 +20,6 @@ from lightpaint.placement.rigging.rigging_values import (
     check_pair,
 )
 from lightpaint.scene.lights.lights_file import MOVES, SceneRequests
-from lightpaint.screen import some_of
 from lightpaint.validation import MAX_LISTED
 
 #: A table of keys and values, and the name of its source in errors; the same with a name before it.

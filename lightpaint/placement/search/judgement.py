@@ -113,7 +113,7 @@ class PlacementJudge:
             )
 
         def is_worth(lost: Doubles) -> bool:
-            """Return whether an error, (2, p), is surely worth a change. Noise may leave no other."""
+            """Return whether an error that a change removes, (2, p), is surely worth it."""
             return float(lost[1].sum()) >= max(WORTH * total, SURE * standard_error(lost))
 
         moved = [k >= count_before or x != start.sites[k] for k, x in enumerate(best.sites)]

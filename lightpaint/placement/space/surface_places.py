@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Doubles
+from lightpaint.display_text import some_names
 from lightpaint.errors import NoPlaceError, SceneError
 from lightpaint.placement.space.free_space import CLEARANCE, FreeSpace
 from lightpaint.placement.space.permitted_places import Triangles
 from lightpaint.scene.scene import Scene
-from lightpaint.screen import some_names
 
 #: Number of random places that determine the free side of triangles.
 TESTED = 2000

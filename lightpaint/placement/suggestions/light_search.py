@@ -31,7 +31,7 @@ from lightpaint.placement.suggestions.suggestion import Suggestion
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.lights.light import free_names
-from lightpaint.scene.point_lights import lit_by_points
+from lightpaint.scene.probe_lights import lit_by_points
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, pass_seed
 

@@ -6,10 +6,10 @@ import numpy as np
 
 from lightpaint.colour.color import cct_and_duv
 from lightpaint.colour.hue_names import hue_name
+from lightpaint.display_text import some_names
 from lightpaint.lighting.analysis.appearance.color_choices import Choices, ColorChoice
 from lightpaint.lighting.fit import Colors
 from lightpaint.report.page.html import row, table
-from lightpaint.screen import some_names
 
 #: The colours that lamps may have, in few words.
 COLOR_MEANINGS: dict[Colors, str] = {

@@ -8,6 +8,7 @@ import platform
 import numpy as np
 
 from lightpaint.basis.basis import Basis
+from lightpaint.display_text import some_of
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.answer.software_versions import Software, version
 from lightpaint.lighting.loss.painting import ignored_paint
@@ -23,7 +24,6 @@ from lightpaint.report.measures import (
 )
 from lightpaint.report.page.html import facts, name_list, row
 from lightpaint.report.uncertainty_sentences import partly_reached
-from lightpaint.screen import some_of
 from lightpaint.target.target import Target
 from lightpaint.version import __version__
 

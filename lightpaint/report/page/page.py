@@ -34,7 +34,7 @@ from lightpaint.report.answer_pictures import (
 )
 from lightpaint.report.basis_memo import ROWS_SHOWN, SPARE_ROWS
 from lightpaint.report.clean_pictures import MAX_CLEAN_THUMBNAILS, CleanLooks
-from lightpaint.report.influences import fit_sentence
+from lightpaint.report.fit_influences import fit_sentence
 from lightpaint.report.page.color_section import colors_section
 from lightpaint.report.page.constraint_section import constraints_section
 from lightpaint.report.page.diagnosis_section import missed_section, sure_section

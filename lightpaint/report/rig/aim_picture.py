@@ -5,13 +5,13 @@ import numpy.typing as npt
 from PIL import Image, ImageDraw, ImageFont
 
 from lightpaint.arrays import Position
+from lightpaint.display_text import visible
 from lightpaint.images.denoiser import Features
+from lightpaint.report.rig.drawing_panels import FINER, GROUND
 from lightpaint.report.rig.hung_lights import HungLight
-from lightpaint.report.rig.panels import FINER, GROUND
 from lightpaint.report.rig.rig_drawing import CHANGED, arrow, circle
 from lightpaint.report.rig.view_geometry import ViewGeometry
 from lightpaint.scene.properties.site import Site
-from lightpaint.screen import visible
 
 #: Width that narrower pictures are enlarged to.
 MIN_WIDTH = 640

@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from lightpaint.arrays import RGB, Position
+from lightpaint.display_text import some_names
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.report.phrases import spoken_percent
 from lightpaint.scene.properties.site import EmitterPlace
-from lightpaint.screen import some_names
 
 #: Shares that have a word of their own, and the farthest that one may be from it.
 FRACTIONS = {

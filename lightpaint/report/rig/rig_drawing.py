@@ -12,11 +12,18 @@ import numpy.typing as npt
 from PIL import Image, ImageDraw, ImageFont
 
 from lightpaint.arrays import RGB, Doubles, Position
+from lightpaint.display_text import visible
 from lightpaint.images.denoiser import Features
+from lightpaint.report.rig.drawing_panels import (
+    FINER,
+    GROUND,
+    Panel,
+    in_column,
+    in_row,
+    plan_and_elevation,
+)
 from lightpaint.report.rig.hung_lights import HungLight
-from lightpaint.report.rig.panels import FINER, GROUND, Panel, in_column, in_row, plan_and_elevation
 from lightpaint.report.rig.view_geometry import ViewGeometry
-from lightpaint.screen import visible
 
 #: Colours of texts and of changes.
 TEXT, FAINT, EDGE = (226, 226, 226), (142, 142, 146), (58, 58, 62)

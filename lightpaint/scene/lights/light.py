@@ -5,11 +5,11 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from lightpaint.arrays import RGB
+from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.plane_identity import combined_identity
 from lightpaint.scene.properties.emission import AS_AUTHORED, MULTIPLE, EmitterSetting, Scaling
-from lightpaint.screen import some_names
 
 #: Parameter of a light whose emission is a multiple of that in the scene.
 WHOLE_EMISSION = "emission"

@@ -8,11 +8,11 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 
+from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.lights.light import Light, check_adjustable, keep, tie
 from lightpaint.scene.lights.similar_emitters import alike_groups, remove_separated
-from lightpaint.screen import some_names
 from lightpaint.validation import MAX_LISTED, MAX_NAME
 
 #: Name of the fixed light; underscores are added if another light has that name.

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.images.pixel_blocks import blocks_in, left_over, whole_factor
-from lightpaint.screen import some_names
 
 #: Maximum number of pixels of a film, and maximum samples per pixel: larger numbers are mistakes.
 MAX_PIXELS = 2**28

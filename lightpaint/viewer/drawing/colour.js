@@ -4,7 +4,7 @@
  * Kelvin is a place on Planck's locus; green is the distance from it in CIE 1960 (u, v), times
  * 1000, positive towards green (1000 Duv).
  */
-import { decodeSrgb, encodeSrgb } from './lut.js';
+import { decodeSrgb, encodeSrgb } from './view_transform.js';
 
 /** @typedef {[number, number, number]} RGB */
 

@@ -5,9 +5,9 @@
  * the budget, only every second row and column is mixed while the brush is down, and all when it
  * rests.
  */
-import { VALUES, finite, toFloats } from './half.js';
-import { Layer } from './layer.js';
-import { SRGB } from './lut.js';
+import { VALUES, finite, toFloats } from './half_floats.js';
+import { Layer } from './cpu_picture.js';
+import { SRGB } from './view_transform.js';
 import { Mix } from './mix.js';
 import { INKS, falseColour, fullOf, inkOf, inked, missed } from './overlay.js';
 import { GROUND, SQUARES, panes } from './view.js';
@@ -37,7 +37,7 @@ export class CpuView {
     this.mixes = { solution: new Mix(size), other: new Mix(size) };
     /** @type {Map<string, Layer>} */
     this.layers = new Map();
-    /** @type {import("./lut.js").Lut} */
+    /** @type {import("./view_transform.js").Lut} */
     this.lut = SRGB;
     /** @type {Float32Array} */
     this.importance = new Float32Array(0);
@@ -91,7 +91,7 @@ export class CpuView {
     for (const layer of this.layers.values()) layer.forget();
   }
 
-  /** @param {import("./lut.js").Lut} lut */
+  /** @param {import("./view_transform.js").Lut} lut */
   setLut(lut) {
     this.lut = lut;
   }

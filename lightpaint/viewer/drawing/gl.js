@@ -6,7 +6,7 @@
  */
 import { mixedAt } from './cpu.js';
 import { Planes } from './gpu.js';
-import { SRGB } from './lut.js';
+import { SRGB } from './view_transform.js';
 import { fullOf } from './overlay.js';
 import { GROUND, SQUARES, panes } from './view.js';
 
@@ -62,7 +62,7 @@ export class GlView {
       options.onRestored?.();
     });
     this.planes = new Planes(gl, size);
-    /** @type {import("./lut.js").Lut} */
+    /** @type {import("./view_transform.js").Lut} */
     this.lut = SRGB;
     /** @type {WebGLTexture | null} */
     this.lattice = null;
@@ -136,7 +136,7 @@ export class GlView {
     this.beyond = beyond && this.textures.bytes(beyond);
   }
 
-  /** @param {import("./lut.js").Lut} lut */
+  /** @param {import("./view_transform.js").Lut} lut */
   setLut(lut) {
     if (lut === this.lut) return;
     this.lut = lut;

@@ -1,5 +1,5 @@
 /** Shaders of gl.js. They take their constants from overlay.js, so that each is defined once. */
-import { LARGEST } from './half.js';
+import { LARGEST } from './half_floats.js';
 import { BANDS, FULL, GREY, HATCH, INKS, LUMA } from './overlay.js';
 import { GROUND } from './view.js';
 

@@ -1,5 +1,5 @@
 /** Sums of weighted planes, Σ weights[k] · plane[k], without a GPU. */
-import { VALUES } from './half.js';
+import { VALUES } from './half_floats.js';
 
 /** @typedef {{halves: Uint16Array | null, scale: number}} Plane (h, w, 3), light at unit emission
  *   over scale */

@@ -1,6 +1,6 @@
 /** Textures and programs of WebGL2, with their properties. */
-import { LARGEST } from './half.js';
-import { SRGB } from './lut.js';
+import { LARGEST } from './half_floats.js';
+import { SRGB } from './view_transform.js';
 
 /** @typedef {import("./view.js").Region} Region */
 
@@ -185,7 +185,7 @@ export class Textures {
     );
   }
 
-  /** @param {import("./lut.js").Lut} lut */
+  /** @param {import("./view_transform.js").Lut} lut */
   lattice({ shaper, lattice }) {
     const { gl } = this;
     const side = lattice ? shaper.side : 1;

@@ -1,13 +1,13 @@
 /**
  * The interface of a view, and the layout of pictures on its canvas.
  *
- * There are two views, gl.js and cpu.js, which agree to one display code; choose.js chooses one for
+ * There are two views, gl.js and cpu.js, which agree to one display code; choose_renderer.js chooses one for
  * a page. A view holds one plane per light, denoised or raw, as set last.
  */
 
 /** Rows and columns of the picture, ends not included.
  * @typedef {[top: number, bottom: number, left: number, right: number]} Region */
-/** @typedef {import("./lut.js").Shaper} Shaper */
+/** @typedef {import("./view_transform.js").Shaper} Shaper */
 
 /** The painting; the mix of the planes with the weights; the mix with other weights (another
  * look); a picture that was set by name.
@@ -54,7 +54,7 @@ export const DEFAULTS = Object.freeze({
  *   what changed, and the whole painting (h, w, 3) and importance (h, w). May keep both.
  * @property {(kind: 'verified' | 'present', halves: Uint16Array | null) => void} setPicture
  * @property {(beyond: Uint8Array | null) => void} setBeyond (h, w)
- * @property {(lut: import("./lut.js").Lut) => void} setLut
+ * @property {(lut: import("./view_transform.js").Lut) => void} setLut
  * @property {(params: Params) => void} draw
  * @property {(x: number, y: number, width: number, height: number) => Uint8Array} read
  *   RGBA truly on the canvas after the last draw, in device pixels from its top left

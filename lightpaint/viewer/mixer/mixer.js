@@ -3,7 +3,7 @@
  *
  * Fills each `.mixer` element from the JSON in it; without scripts the element stays hidden.
  */
-import { Encoder, SRGB } from '../drawing/lut.js';
+import { Encoder, SRGB } from '../drawing/view_transform.js';
 import { Mix } from '../drawing/mix.js';
 import { canvasOfSize, contextOf, drawLight } from './mixer_canvas.js';
 import { lutOf, unpackMixer } from './mixer_data.js';
@@ -22,7 +22,7 @@ const [THUMBNAIL_WIDTH, WHITE_SHARE] = [88, 0.98];
 
 class Mixer {
   /** @param {HTMLElement} root @param {Data} data @param {Uint16Array[]} planes
-   * @param {import("../drawing/lut.js").Lut} lut */
+   * @param {import("../drawing/view_transform.js").Lut} lut */
   constructor(root, data, planes, lut) {
     this.data = data;
     this.planes = planes.map((halves, k) => ({ halves, scale: data.planes[k].scale }));

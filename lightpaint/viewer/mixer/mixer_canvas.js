@@ -1,6 +1,6 @@
 /** Canvases that show light. */
 
-/** @typedef {import("../drawing/lut.js").Encoder} Encoder */
+/** @typedef {import("../drawing/view_transform.js").Encoder} Encoder */
 
 /** Draw light on a canvas of its size. @param {HTMLCanvasElement} canvas
  * @param {Float32Array} light @param {Encoder} encoder */

@@ -1,9 +1,9 @@
 /** The data of a mixer, from JSON in the page, and their unpacked planes. */
-import { VALUES } from '../drawing/half.js';
-import { SRGB } from '../drawing/lut.js';
-import { unpacked } from './unpack.js';
+import { VALUES } from '../drawing/half_floats.js';
+import { SRGB } from '../drawing/view_transform.js';
+import { unpacked } from './packed_picture.js';
 
-/** @typedef {import("./unpack.js").Compact} Compact */
+/** @typedef {import("./packed_picture.js").Compact} Compact */
 /** @typedef {import("./mixer_light.js").Light} Light */
 /** @typedef {import("../drawing/colour.js").RGB} RGB */
 
@@ -35,7 +35,7 @@ export function unpackMixer(root) {
   return promise;
 }
 
-/** @param {Data['transform']} transform @returns {Promise<import("../drawing/lut.js").Lut>} */
+/** @param {Data['transform']} transform @returns {Promise<import("../drawing/view_transform.js").Lut>} */
 export async function lutOf({ low, high, curve, lattice }) {
   if (curve) {
     // With a curve no lattice is needed.

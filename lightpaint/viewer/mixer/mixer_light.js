@@ -1,6 +1,6 @@
 /** One light of the mixer: its row with its sliders. */
 
-import { slideByTouch } from '../touch.js';
+import { slideByTouch } from '../touch_sliders.js';
 import { createElement, createSlider } from './page_elements.js';
 
 /** @typedef {import("../drawing/colour.js").RGB} RGB */

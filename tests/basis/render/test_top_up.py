@@ -16,7 +16,7 @@ from lightpaint.basis.cache import cache
 from lightpaint.basis.cache.cached_render import obtain_basis, top_up_basis
 from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.basis.file.basis_reader import read_basis
-from lightpaint.basis.render import guide_training, top_up
+from lightpaint.basis.render import guide_training, pixel_top_up
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.render_origin import is_on_the_way
 from lightpaint.errors import BasisError
@@ -59,7 +59,7 @@ def close(a: Any, b: Any) -> None:
 
 def test_pixels_without_further_samples_keep_their_bits(small_room: Scene, counts: Any):
     basis = render_basis(small_room, spp=8)
-    topped = top_up.top_up(small_room, basis, counts)
+    topped = pixel_top_up.top_up(small_room, basis, counts)
     for a, b in ((basis, topped), (basis.indirect, topped.indirect)):
         np.testing.assert_array_equal(a.planes.rows(0, 6), b.planes.rows(0, 6))
         np.testing.assert_array_equal(a.noise.rows(0, 6), b.noise.rows(0, 6))
@@ -72,13 +72,13 @@ def test_in_two_goes_as_in_one(small_room: Scene, counts: Any, tmp_path: Path):
     """Samples of a pixel are terms of a sequence, and means are weighed by their numbers."""
     basis = render_basis(small_room, spp=8)
     first = np.random.default_rng(1).integers(0, counts + 1)
-    in_one = top_up.top_up(small_room, basis, counts)
-    begun = top_up.top_up(small_room, basis, first)
-    same_basis(top_up.top_up(small_room, begun, counts - first), in_one)
+    in_one = pixel_top_up.top_up(small_room, basis, counts)
+    begun = pixel_top_up.top_up(small_room, basis, first)
+    same_basis(pixel_top_up.top_up(small_room, begun, counts - first), in_one)
     write_basis(tmp_path / "b.exr", begun)
     read = read_basis(tmp_path / "b.exr")
     np.testing.assert_array_equal(read.extra, begun.extra)
-    same_basis(top_up.top_up(small_room, read, counts - first), in_one, of_file=True)
+    same_basis(pixel_top_up.top_up(small_room, read, counts - first), in_one, of_file=True)
 
 
 def test_a_scene_that_stays_loaded_changes_no_bit(
@@ -89,15 +89,15 @@ def test_a_scene_that_stays_loaded_changes_no_bit(
     kept = [render_basis(scene, spp=4) for scene in scenes]
     alone, rounds = list(kept), [0, 0, 1, 0]
     for k in rounds:
-        alone[k] = top_up.top_up(scenes[k], alone[k], counts)
+        alone[k] = pixel_top_up.top_up(scenes[k], alone[k], counts)
     loads: list[Scene] = []
     load = Scene.load
     monkeypatch.setattr(
         Scene, "load", lambda self, *a, **how: loads.append(self) or load(self, *a, **how)
     )
-    with top_up.kept_loaded() as tracers:
+    with pixel_top_up.kept_loaded() as tracers:
         for k in rounds:
-            kept[k] = top_up.top_up(scenes[k], kept[k], counts, tracers=tracers)
+            kept[k] = pixel_top_up.top_up(scenes[k], kept[k], counts, tracers=tracers)
     assert [scenes.index(its) for its in loads] == [0, 1, 0]
     for a, b in zip(kept, alone, strict=True):
         same_basis(a, b)
@@ -108,7 +108,7 @@ def test_views_of_a_scene_are_loaded_once(counts: Any, tmp_path: Path, monkeypat
     path = write_room(tmp_path, lights=LIGHTS["panel"] + LIGHTS["bulb"], sensors=SECOND_SENSOR)
     scenes = [load_scene(path, sensor=k) for k in range(2)]
     kept = [render_basis(scene, spp=4) for scene in scenes]
-    alone = [top_up.top_up(*its, counts) for its in zip(scenes, kept, strict=True)]
+    alone = [pixel_top_up.top_up(*its, counts) for its in zip(scenes, kept, strict=True)]
     loads: list[Scene] = []
     load = Scene.load
 
@@ -117,10 +117,10 @@ def test_views_of_a_scene_are_loaded_once(counts: Any, tmp_path: Path, monkeypat
         return load(self, *a, **how)
 
     monkeypatch.setattr(Scene, "load", counting)
-    with top_up.kept_loaded(scenes) as tracers:
+    with pixel_top_up.kept_loaded(scenes) as tracers:
         for _ in range(2):
             made = [
-                top_up.top_up(scene, its, counts, tracers=tracers)
+                pixel_top_up.top_up(scene, its, counts, tracers=tracers)
                 for scene, its in zip(scenes, kept, strict=True)
             ]
     assert loads == scenes[:1]
@@ -131,7 +131,7 @@ def test_views_of_a_scene_are_loaded_once(counts: Any, tmp_path: Path, monkeypat
 def test_uniform_samples_go_on_after_a_top_up(small_room: Scene, counts: Any):
     """Both kinds of samples come to the same, in whichever order they are taken."""
     basis = render_basis(small_room, spp=8)
-    before = top_up.top_up(small_room, basis, counts)
+    before = pixel_top_up.top_up(small_room, basis, counts)
     after = render_basis(small_room, spp=24, start=before)
     np.testing.assert_array_equal(after.extra, counts)
     uniform = weighted(render_basis(small_room, spp=24), np.full(counts.shape, 12.0))
@@ -145,16 +145,16 @@ def test_batches_change_no_bit(
     small_room: Scene, counts: Any, monkeypatch: pytest.MonkeyPatch, most: int
 ):
     basis = render_basis(small_room, spp=4)
-    whole = top_up.top_up(small_room, basis, counts)
-    monkeypatch.setattr(top_up, "PART_MAX_BYTES", 12 * 20 * most)
-    again = top_up.top_up(small_room, basis, counts * (counts > 18) if most == 1 else counts)
+    whole = pixel_top_up.top_up(small_room, basis, counts)
+    monkeypatch.setattr(pixel_top_up, "PART_MAX_BYTES", 12 * 20 * most)
+    again = pixel_top_up.top_up(small_room, basis, counts * (counts > 18) if most == 1 else counts)
     its = counts > 18 if most == 1 else counts >= 0
     np.testing.assert_array_equal(again.images[:, its], whole.images[:, its])
     np.testing.assert_array_equal(again.half_differences[:, its], whole.half_differences[:, its])
 
 
 def test_batches_have_every_pixel_once(counts: Any):
-    batches = list(top_up.pixel_batches(counts, 10))
+    batches = list(pixel_top_up.pixel_batches(counts, 10))
     its = np.concatenate(batches)
     np.testing.assert_array_equal(np.sort(its), np.flatnonzero(counts))
     taken = [int(counts.ravel()[pixels].sum()) for pixels in batches]
@@ -168,7 +168,7 @@ def test_noise_falls_with_the_samples(small_room: Scene):
     long = render_basis(small_room, spp=512, seed=90)
     missed, told = np.zeros((2, 2))
     for seed in range(1, 6):
-        basis = top_up.top_up(small_room, render_basis(small_room, spp=4, seed=seed), counts)
+        basis = pixel_top_up.top_up(small_room, render_basis(small_room, spp=4, seed=seed), counts)
         for k in range(2):
             missed[k] += np.square(basis.images[:, k::2] - long.images[:, k::2]).sum()
             told[k] += np.square(basis.half_differences[:, k::2]).sum()
@@ -189,15 +189,15 @@ def test_an_interrupt_keeps_what_is_done(small_room: Scene, counts: Any):
         return True
 
     with pytest.raises(Interrupted, match="run the same command to continue"):
-        top_up.top_up(small_room, basis, counts, keep=keep, progress=press_ctrl_c)
+        pixel_top_up.top_up(small_room, basis, counts, keep=keep, progress=press_ctrl_c)
     assert 0 < kept[-1].extra.sum() < counts.sum()
-    rest = top_up.top_up(small_room, kept[-1], counts - kept[-1].extra)
-    same_basis(rest, top_up.top_up(small_room, basis, counts))
+    rest = pixel_top_up.top_up(small_room, kept[-1], counts - kept[-1].extra)
+    same_basis(rest, pixel_top_up.top_up(small_room, basis, counts))
 
 
 def test_enough_is_enough(small_room: Scene, counts: Any):
     basis = render_basis(small_room, spp=4)
-    same_basis(top_up.top_up(small_room, basis, counts, is_enough=lambda: True), basis)
+    same_basis(pixel_top_up.top_up(small_room, basis, counts, is_enough=lambda: True), basis)
 
 
 def test_what_is_kept_is_not_taken_for_uniform_samples(
@@ -219,7 +219,7 @@ def test_what_is_kept_is_not_taken_for_uniform_samples(
 
 
 def test_damaged_numbers_of_samples_are_no_basis(small_room: Scene, counts: Any, tmp_path: Path):
-    topped = top_up.top_up(small_room, render_basis(small_room, spp=4), counts)
+    topped = pixel_top_up.top_up(small_room, render_basis(small_room, spp=4), counts)
     write_basis(tmp_path / "b.exr", topped)
     plain = replace(topped, extra=None, origin=replace(topped.origin, extra_spp=0.0))
     write_basis(tmp_path / "plain.exr", plain)
@@ -237,4 +237,4 @@ def test_nothing_else_is_topped_up(small_room: Scene, counts: Any, tmp_path: Pat
     basis = render_basis(small_room, spp=4)
     changed = load_scene(write_room(tmp_path), parameters={"width": 20})
     with pytest.raises(BasisError, match="of this scene and film"):
-        top_up.top_up(changed, basis, counts)
+        pixel_top_up.top_up(changed, basis, counts)

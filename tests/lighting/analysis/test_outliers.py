@@ -7,14 +7,14 @@ import pytest
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
-from lightpaint.lighting.analysis.noise.peaks import (
+from lightpaint.lighting.analysis.noise.dominant_pixels import (
     PEAK_SHARE,
     T_RATIOS,
     TWO_PATHS,
     Peaks,
     t_ratios,
 )
+from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars, with_error_bars
 from lightpaint.lighting.solve import solve
 from lightpaint.report.page.lights_table import lights_table

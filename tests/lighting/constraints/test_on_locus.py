@@ -16,7 +16,7 @@ from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solve import solution_of
 from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
-from lightpaint.lighting.unknowns.white_neighbours import next_whites
+from lightpaint.lighting.unknowns.white_mixes import next_whites
 
 SIZE = (12, 10)
 

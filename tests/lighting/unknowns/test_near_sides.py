@@ -16,7 +16,7 @@ from lightpaint.lighting.unknowns.gamuts import Gamuts, PaintedLight
 from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.lighting.unknowns.starting_unknowns import nearest_unknowns
-from lightpaint.lighting.unknowns.white_neighbours import next_whites
+from lightpaint.lighting.unknowns.white_mixes import next_whites
 
 SIZE = (9, 8)
 

@@ -1,7 +1,7 @@
 /** What tests of the picture engine call in the browser. */
 import { PaintCanvas } from "/engine/paint_canvas.js";
-import { chooseView } from "/viewer/drawing/choose.js";
-import { SRGB, lutOf } from "/viewer/drawing/lut.js";
+import { chooseView } from "/viewer/drawing/choose_renderer.js";
+import { SRGB, lutOf } from "/viewer/drawing/view_transform.js";
 import { pictureOf } from "/engine/message_frames.js";
 import { DEFAULTS } from "/viewer/drawing/view.js";
 

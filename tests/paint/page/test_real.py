@@ -24,7 +24,7 @@ from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.paint.server.server import Server
-from lightpaint.paint.store.steps import name_in_view
+from lightpaint.paint.store.history_steps import name_in_view
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from raw_message import RawMessage
 
-from lightpaint.paint.frames import from_frame, parse_request, to_frame
+from lightpaint.paint.message_frames import from_frame, parse_request, to_frame
 from lightpaint.paint.protocol import VERSION
 
 

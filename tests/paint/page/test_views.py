@@ -236,7 +236,7 @@ def test_without_a_gpu_the_view_is_chosen_that_is_faster_there(page: Any):
     # WebGL2 in software says that it is slow; and where there is none, nothing else is left.
     chosen = page.evaluate(
         """async () => {
-            const { chooseView } = await import("/viewer/drawing/choose.js");
+            const { chooseView } = await import("/viewer/drawing/choose_renderer.js");
             const names = [chooseView(document.body, [30, 40], 3).name];
             const real = HTMLCanvasElement.prototype.getContext;
             HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {

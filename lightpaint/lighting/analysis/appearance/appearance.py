@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from lightpaint.display_text import short_repr
 from lightpaint.images.estimate import Estimate
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.appearance.constraint_kinds import (
@@ -43,7 +44,6 @@ from lightpaint.lighting.analysis.diagnosis import (
 )
 from lightpaint.lighting.constraints.light_patterns import constraints_by_light, tied_lights
 from lightpaint.lighting.solution import Solution
-from lightpaint.screen import short_repr
 
 #: Mean ΔE up to which a result is close: visible only side by side; and from which on it is another
 #: picture.

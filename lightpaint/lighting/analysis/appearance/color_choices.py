@@ -13,6 +13,7 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, as_rgb
 from lightpaint.colour.color import luminance
+from lightpaint.display_text import short_repr
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.fit import Colors
@@ -31,8 +32,7 @@ from lightpaint.lighting.problem import Problem, gamuts_for
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
 from lightpaint.lighting.unknowns.reduction import only_knobs
-from lightpaint.lighting.unknowns.white_neighbours import next_whites, solve_on_locus
-from lightpaint.screen import short_repr
+from lightpaint.lighting.unknowns.white_mixes import next_whites, solve_on_locus
 
 #: The least number of pixels in a sample, the pixels for each light, and compared painted pixels.
 MIN_SAMPLE, PIXELS_PER_LIGHT, COMPARED_PIXELS = 2**12, 2**6, 2**12

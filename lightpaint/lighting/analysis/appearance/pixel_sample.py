@@ -20,11 +20,11 @@ from lightpaint.lighting.analysis.appearance.constraint_kinds import (
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit
+from lightpaint.lighting.joined_views import Views
 from lightpaint.lighting.loss.painting import importance_sums, unpainted_weight
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
-from lightpaint.lighting.views import Views
 from lightpaint.target.target import Target
 
 #: Groups of reasons: the hold of unpainted pixels, colours of lights, constraints, and the

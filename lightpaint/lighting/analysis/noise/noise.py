@@ -12,7 +12,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.planes import BLOCK_PIXELS, FEW_LIGHTS, Planes, as_slice
-from lightpaint.lighting.analysis.noise.peaks import Peaks, t_ratios
+from lightpaint.lighting.analysis.noise.dominant_pixels import Peaks, t_ratios
 from lightpaint.lighting.analysis.noise.residuals import Residuals
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
@@ -40,7 +40,7 @@ class Noise:
     part of b that is noise of the current look, where this is a goal.
     gradient: (3, n, 3, n), covariance of the gradient. objective_error, objective_noise: as in
     `Uncertainty`.
-    hidden: (3, n), variance of a light that a few pixels may hide (peaks.py).
+    hidden: (3, n), variance of a light that a few pixels may hide (dominant_pixels.py).
     freedom: (3, n), degrees of freedom of the variance of a light's gradient: the number of pixels
     of equal noise that would determine it as well.
     """

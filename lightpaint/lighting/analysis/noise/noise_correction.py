@@ -7,10 +7,6 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.errors import BasisError
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.noise.directions import (
-    free_directions,
-    solve_for,
-)
 from lightpaint.lighting.analysis.noise.noise import (
     Noise,
     denoised_matrix,
@@ -18,6 +14,10 @@ from lightpaint.lighting.analysis.noise.noise import (
     pseudo_inverse,
 )
 from lightpaint.lighting.analysis.noise.smooth_light import can_smooth, on_smooth_light
+from lightpaint.lighting.analysis.noise.weight_directions import (
+    free_directions,
+    solve_for,
+)
 from lightpaint.lighting.normal_equations import NormalEquations, block_diagonal
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solve_again

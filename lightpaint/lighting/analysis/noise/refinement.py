@@ -16,13 +16,13 @@ from lightpaint.basis.planes import BLOCK_PIXELS
 from lightpaint.errors import BasisError, SizeError
 from lightpaint.images.estimate import Estimate
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.noise.directions import free_directions
 from lightpaint.lighting.analysis.noise.noise import (
     gradient_bias,
     noise_sums,
     pseudo_inverse,
 )
 from lightpaint.lighting.analysis.noise.residuals import Residuals
+from lightpaint.lighting.analysis.noise.weight_directions import free_directions
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Refinement
 from lightpaint.lighting.solution import Solution

@@ -21,9 +21,9 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.planes import Planes, as_planes
 from lightpaint.images.estimate import box_mean
 from lightpaint.images.surface_filter import SurfaceFilter
+from lightpaint.lighting.joined_views import joint_basis
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.views import joint_basis
 
 #: Fewest lights for which sums use averaged light: with a dozen, the basis itself is as good.
 MIN_LIGHTS = 64

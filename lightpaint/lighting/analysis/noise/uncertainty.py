@@ -11,20 +11,20 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, as_rgb
 from lightpaint.colour.color import LUMINANCE
+from lightpaint.display_text import short_repr
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.noise.directions import solve_for
+from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95
 from lightpaint.lighting.analysis.noise.noise import (
     denoised_matrix,
     gradient_bias,
     noise_sums,
 )
 from lightpaint.lighting.analysis.noise.outliers import noise_doubts, weakest_matrix
-from lightpaint.lighting.analysis.noise.peaks import NORMAL_95
+from lightpaint.lighting.analysis.noise.weight_directions import solve_for
 from lightpaint.lighting.analysis.noise.weight_spread import weight_spread
 from lightpaint.lighting.answer.light_setting import LightSetting
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
-from lightpaint.screen import short_repr
 
 
 @keywords()

@@ -6,14 +6,14 @@ from statistics import NormalDist
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.lighting.analysis.noise.directions import BlockFreedom, block_freedoms
+from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95
 from lightpaint.lighting.analysis.noise.noise import (
     NULL_EIGENVALUE,
     Noise,
     noise_sums,
     pseudo_inverse,
 )
-from lightpaint.lighting.analysis.noise.peaks import NORMAL_95
+from lightpaint.lighting.analysis.noise.weight_directions import BlockFreedom, block_freedoms
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
 

@@ -1,5 +1,5 @@
 /**
- * Messages between page and session as bytes; the twin of paint/frames.py. `messages.d.ts` has their
+ * Messages between page and session as bytes; the twin of paint/message_frames.py. `messages.d.ts` has their
  * types.
  *
  * A frame is: uint32 length of the JSON, little endian | JSON | padding to 8 bytes | buffers, each
@@ -9,8 +9,8 @@
 /** Version of this protocol. */
 export const VERSION = 3;
 
-/** @typedef {import("../../../viewer/drawing/lut.js").Data} Data */
-/** @typedef {import("../../../viewer/drawing/lut.js").Picture} Picture */
+/** @typedef {import("../../../viewer/drawing/view_transform.js").Data} Data */
+/** @typedef {import("../../../viewer/drawing/view_transform.js").Picture} Picture */
 /** @typedef {Record<string, Picture>} Arrays */
 /** @typedef {import("../../../viewer/drawing/view.js").Region} Region */
 /** @typedef {import("../../../viewer/drawing/colour.js").RGB} RGB */
@@ -20,7 +20,7 @@ export const VERSION = 3;
  * Message */
 
 /** @typedef {import("./messages.js").LightInfo} Light */
-/** @typedef {import("../../../viewer/drawing/lut.js").Shaper} Shaper */
+/** @typedef {import("../../../viewer/drawing/view_transform.js").Shaper} Shaper */
 
 /** @typedef {{name: string, dtype: string, shape: number[]}} About */
 

@@ -6,8 +6,8 @@
  * keep the old values where the stroke has been.
  */
 import { pixelChange } from './stroke_effects.js';
-import { VALUES, toFloats } from '../../../viewer/drawing/half.js';
-import { union } from '../../../viewer/drawing/layer.js';
+import { VALUES, toFloats } from '../../../viewer/drawing/half_floats.js';
+import { union } from '../../../viewer/drawing/cpu_picture.js';
 
 /** @typedef {import("./message_frames.js").Region} Region */
 /** @typedef {import("./stroke_effects.js").Effect} Effect */

@@ -5,13 +5,13 @@
  * pixels and weights that the session sends.
  */
 import { luminance } from '../../../viewer/drawing/colour.js';
-import { VALUES } from '../../../viewer/drawing/half.js';
+import { VALUES } from '../../../viewer/drawing/half_floats.js';
 import { DEFAULT_TOOL, LABELS, Stroke, adjustArea } from './stroke.js';
 import { Emitter, SocketHost } from './socket_host.js';
-import { union } from '../../../viewer/drawing/layer.js';
-import { Encoder } from '../../../viewer/drawing/lut.js';
+import { union } from '../../../viewer/drawing/cpu_picture.js';
+import { Encoder } from '../../../viewer/drawing/view_transform.js';
 import { fullOf } from '../../../viewer/drawing/overlay.js';
-import { Screen } from './screen.js';
+import { Screen } from './picture_canvas.js';
 import { at, zoomed } from '../../../viewer/drawing/view.js';
 import { SessionMirror } from './session_mirror.js';
 

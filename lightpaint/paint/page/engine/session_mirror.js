@@ -2,9 +2,9 @@
  * The page's copy of the session: painting, weights and pictures, kept up to date by its messages.
  */
 import { PaintCanvas } from './paint_canvas.js';
-import { union } from '../../../viewer/drawing/layer.js';
+import { union } from '../../../viewer/drawing/cpu_picture.js';
 import { PictureLoader } from './picture_loader.js';
-import { SRGB, lutOf } from '../../../viewer/drawing/lut.js';
+import { SRGB, lutOf } from '../../../viewer/drawing/view_transform.js';
 import { VERSION, inView, stateOfView } from './message_frames.js';
 import { showsPresent, sizes, wantedPictures } from './picture_slots.js';
 import { StrokeSender } from './stroke_sender.js';
@@ -14,7 +14,7 @@ import { StrokeSender } from './stroke_sender.js';
 /** @typedef {import("./message_frames.js").Picture} Picture */
 /** @typedef {import("./message_frames.js").Region} Region */
 /** @typedef {import("./message_frames.js").RGB} RGB */
-/** @typedef {import("./screen.js").Screen} Screen */
+/** @typedef {import("./picture_canvas.js").Screen} Screen */
 /** @typedef {import("./picture_slots.js").Show} Show */
 
 export class SessionMirror {
@@ -47,7 +47,7 @@ export class SessionMirror {
     this.isMoved = false;
     /** Revision of the session in its last message. */
     this.version = -1;
-    /** @type {import("../../../viewer/drawing/lut.js").Lut} */
+    /** @type {import("../../../viewer/drawing/view_transform.js").Lut} */
     this.lut = SRGB;
     /** Whether the present look exists, and whether the view has it. */
     this.knowsPresent = false;
@@ -246,7 +246,7 @@ export class SessionMirror {
     this.redraw([canvas.whole]);
   }
 
-  /** @param {import("../../../viewer/drawing/lut.js").Lut} lut */
+  /** @param {import("../../../viewer/drawing/view_transform.js").Lut} lut */
   setLut(lut) {
     this.lut = lut;
     this.screen.view?.setLut(lut);

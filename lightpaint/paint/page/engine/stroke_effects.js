@@ -1,6 +1,6 @@
 /** Effects of strokes on the pixels that they cover. */
 import { luminance } from '../../../viewer/drawing/colour.js';
-import { VALUES } from '../../../viewer/drawing/half.js';
+import { VALUES } from '../../../viewer/drawing/half_floats.js';
 
 /** @typedef {import("./paint_canvas.js").PaintCanvas} PaintCanvas */
 /** @typedef {import("./paint_canvas.js").Tile} Tile */

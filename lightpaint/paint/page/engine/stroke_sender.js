@@ -4,7 +4,7 @@
  * Changes in the meantime go with the next message. A finished stroke is kept until the session
  * confirms it, and sent again as a whole after a lost connection.
  */
-import { union } from '../../../viewer/drawing/layer.js';
+import { union } from '../../../viewer/drawing/cpu_picture.js';
 
 /** @typedef {import("./message_frames.js").Region} Region */
 /** @typedef {import("./message_frames.js").Arrays} Arrays */

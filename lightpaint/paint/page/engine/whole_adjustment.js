@@ -1,6 +1,6 @@
 /** The adjustment of a whole picture, under the strokes that were painted on it. */
 import { luminance } from '../../../viewer/drawing/colour.js';
-import { VALUES } from '../../../viewer/drawing/half.js';
+import { VALUES } from '../../../viewer/drawing/half_floats.js';
 
 /** @typedef {import("./paint_canvas.js").PaintCanvas} PaintCanvas */
 /** @typedef {import("./message_frames.js").RGB} RGB */

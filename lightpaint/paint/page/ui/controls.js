@@ -1,6 +1,6 @@
 /** The controls that panels are made of. All have labels and work by keyboard and touch. */
 
-import { slideByTouch } from '../../../viewer/touch.js';
+import { slideByTouch } from '../../../viewer/touch_sliders.js';
 import { html, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
 import { asTyped } from './format.js';
 import { Icon } from './icons.js';

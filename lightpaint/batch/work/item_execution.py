@@ -40,7 +40,7 @@ from lightpaint.pipeline.relit_renders import relight_look, relit_folder
 from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.pipeline.results.results import view_names
 from lightpaint.progress import Listener
-from lightpaint.relit.export_forms import Source, names_of_forms, writers_of
+from lightpaint.relit.export_formats import Source, names_of_forms, writers_of
 from lightpaint.scene.scene import Scene
 
 #: Error numbers of a full disk.

@@ -1,5 +1,5 @@
 /** Unpacks the pictures that images/packed_picture.py packs. */
-import { finite } from '../drawing/half.js';
+import { finite } from '../drawing/half_floats.js';
 
 /** data: base64, deflated. @typedef {{data: string, scale: number, dropped: number,
  *   size: [height: number, width: number]}} Compact */

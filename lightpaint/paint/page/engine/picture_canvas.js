@@ -1,5 +1,5 @@
 /** The canvas of the pictures: its view, its size in device pixels, and when it draws. */
-import { chooseView } from '../../../viewer/drawing/choose.js';
+import { chooseView } from '../../../viewer/drawing/choose_renderer.js';
 import { DEFAULTS, panes } from '../../../viewer/drawing/view.js';
 
 /** @typedef {import("../../../viewer/drawing/view.js").PictureView} PictureView */

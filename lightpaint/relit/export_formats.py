@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lightpaint.basis.lightgroups.light_groups import LightGroups
+from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.progress import Listener
@@ -17,7 +18,6 @@ from lightpaint.relit.export.usd import check_usd, usd_overrides
 from lightpaint.relit.relight import scene_of
 from lightpaint.relit.xml_patch import emitters_of, scene_patch
 from lightpaint.scene.scene import Scene
-from lightpaint.screen import some_names
 
 #: Name of the file in each format, for a scene and for light groups; None if not available.
 FORMS: dict[str, tuple[str | None, str | None]] = {

@@ -5,10 +5,10 @@
  * for all light below 2^low. Interpolation is trilinear. sRGB (IEC 61966-2-1) is computed exactly.
  * If each display value depends on its own channel only, one curve replaces the lattice.
  */
-import { VALUES } from './half.js';
+import { VALUES } from './half_floats.js';
 
 /** @typedef {Uint8Array | Int16Array | Uint16Array | Float32Array | Float64Array} Data */
-/** An array. float16: bits of halves in a Uint16Array (see half.js).
+/** An array. float16: bits of halves in a Uint16Array (see half_floats.js).
  * @typedef {{data: Data, shape: number[]}} Picture */
 /** @typedef {{side: number, low: number, high: number}} Shaper */
 

@@ -18,11 +18,11 @@ from lightpaint.arrays import Floats, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.planes import IndirectLight, Planes, as_planes
 from lightpaint.basis.render.guide_training import train
-from lightpaint.basis.render.half_sums import add_halves, mean_and_half_difference
 from lightpaint.basis.render.integrators import has_indirect_planes, plane_count
 from lightpaint.basis.render.render_budget import PASS_DIVISOR
 from lightpaint.basis.render.render_origin import ONE_PASS, is_of
 from lightpaint.basis.render.render_parts import PART_MAX_BYTES
+from lightpaint.basis.render.sample_halves import add_halves, mean_and_half_difference
 from lightpaint.errors import BasisError
 from lightpaint.progress import Interrupted, Progress, silent
 from lightpaint.scene.runtime.mitsuba_errors import render_errors

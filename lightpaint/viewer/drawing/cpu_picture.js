@@ -1,5 +1,5 @@
 /** One picture as the CPU shows it: its light, its codes, and a canvas with them. */
-import { Encoder, SRGB } from './lut.js';
+import { Encoder, SRGB } from './view_transform.js';
 
 /** @typedef {import("./view.js").Region} Region */
 
@@ -39,7 +39,7 @@ export class Layer {
   }
 
   /** Bring codes and canvas up to date.
-   * @param {import("./lut.js").Lut} lut @param {number} stops
+   * @param {import("./view_transform.js").Lut} lut @param {number} stops
    * @param {string | null} overlay its name, null for none
    * @param {(rgba: Uint8ClampedArray) => void} lay draws it over all codes */
   show(lut, stops, overlay, lay) {
