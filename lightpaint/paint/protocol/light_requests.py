@@ -1,0 +1,116 @@
+"""Requests about lights: their constraints, ties and places."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from lightpaint.paint.protocol.base import Message
+from lightpaint.paint.protocol.message_parts import Place
+
+
+@dataclass(frozen=True)
+class ConstrainLight(Message, kind="constrain_light"):
+    """New constraints on one light; an empty object frees it. Answered by `answer`.
+
+    constraints: keys and values as in a lights file: lock, off, limits, color, kelvin, duv,
+    primaries.
+    is_final: whether it becomes a step; false while a slider moves.
+    """
+
+    light: int
+    constraints: Mapping[str, Any]
+    is_final: bool = True
+
+
+@dataclass(frozen=True)
+class ConstrainLights(Message, kind="constrain_lights"):
+    """New constraints on several lights, by name, as in `constrain_light`: one step. Answered by
+    `answer`.
+    """
+
+    constraints: Mapping[str, Mapping[str, Any]]
+
+
+@dataclass(frozen=True)
+class MoveLights(Message, kind="move"):
+    """New places, targets and cones of lights, by name. Answered by `answer`; `rig` follows.
+
+    poses: changed fields of `lightpaint.Pose`: position, target, cutoff and beam; an empty object
+    restores a light's place from the scene. is_final: whether it becomes a step; false while a
+    light is dragged.
+    """
+
+    poses: Mapping[str, Mapping[str, Any]]
+    is_final: bool = True
+
+
+@dataclass(frozen=True)
+class PointLight(Message, kind="point"):
+    """A move of a light by a place in the picture. Answered by `answer`; `rig` follows.
+
+    mode: `aim` points it there; `highlight` hangs it so that its reflection appears there; `shadow`
+    hangs it so that the shadow of the surface at `edge` ends there. pixel, edge: column and row in
+    pixels. view: index of the view. is_final: as in `move`.
+    """
+
+    light: int
+    mode: Literal["aim", "highlight", "shadow"]
+    pixel: tuple[float, float]
+    edge: tuple[float, float] | None = None
+    view: int = 0
+    is_final: bool = True
+
+
+@dataclass(frozen=True)
+class AddLight(Message, kind="add_light"):
+    """A new light, with a generated name: one step. Answered by `state`; `rig` follows.
+
+    type: of the light. pixel: column and row in a picture; the light hangs a little before the
+    surface there, and points away from it. position: its place, instead; it points down. view:
+    index of the view.
+    """
+
+    type: Literal["spot", "point", "panel"]
+    pixel: tuple[float, float] | None = None
+    position: Place | None = None
+    view: int = 0
+
+
+@dataclass(frozen=True)
+class RemoveLight(Message, kind="remove_light"):
+    """A request to remove an added light, by name: one step. Answered by `state`; `rig`
+    follows.
+    """
+
+    name: str
+
+
+@dataclass(frozen=True)
+class ShowRig(Message, kind="show_rig"):
+    """A request for the places of all lights, and for `rig` after every later move. Answered by
+    `started`, later by `rig`.
+    """
+
+
+@dataclass(frozen=True)
+class PlaceLights(Message, kind="place"):
+    """A request to find places, directions and cones of lights that come closest to the paintings,
+    or to stop that. Answered by `started`, then by `trial` and later by `placed`; the result is one
+    step.
+
+    new_type: type of lights to add, instead of moving existing ones; null for none. max_count:
+    maximum number of them. surfaces: names of rails, surfaces and shapes that they may hang on;
+    none for anywhere free.
+    """
+
+    run: bool = True
+    new_type: Literal["spot", "point", "panel"] | None = None
+    max_count: int = 1
+    surfaces: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class TieLights(Message, kind="tie"):
+    """The lights that share a dimmer: all such groups, of names. Answered by `answer`."""
+
+    ties: tuple[tuple[str, ...], ...]

@@ -1,0 +1,134 @@
+"""Requests about the painting: strokes, layers, undo, and looks, which keep a painting."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from lightpaint.arrays import RGB
+from lightpaint.paint.layers.layer import PAINTING_ID, Layer
+from lightpaint.paint.protocol.base import Message
+from lightpaint.paint.store.canvas_pixels import Region
+
+
+@dataclass(frozen=True)
+class Paint(Message, kind="paint"):
+    """Pixels under the brush; with arrays `image` (rows, columns, 3) float32 and `importance`
+    (rows, columns) float32. Answered by `answer`.
+
+    stroke: number of the stroke, which the page counts. is_final: whether this ends the stroke;
+    only then it is kept. label: its name for undo. view: index of the painted view. layer: id of
+    the layer of these pixels. For all kinds but `pixels`, `importance` is the coverage, 0 to 1, and
+    masks need no `image`. properties: of the layer, from now on; with an unused id they add a layer
+    on top.
+    """
+
+    request_buffers: ClassVar[Mapping[str, str]] = {
+        "image": "(rows, columns, 3) float32",
+        "importance": "(rows, columns) float32",
+    }
+
+    stroke: int
+    region: Region
+    is_final: bool = False
+    label: str = "stroke"
+    view: int = 0
+    layer: int = PAINTING_ID
+    properties: Layer | None = None
+
+    def __post_init__(self) -> None:
+        if self.stroke >= 2**53:  # largest exact integer of a page
+            raise ValueError("stroke is a number below 2**53")
+
+
+@dataclass(frozen=True)
+class ChangeLayers(Message, kind="change_layers"):
+    """A change of layers, their properties or their order: one step. Answered by `answer`.
+
+    layers: new or changed ones; new ones lie on top. order: ids of all that stay, the lowest first;
+    null for the present order. copies: ids of the originals by the id of each copy, which is among
+    `layers`. is_final: whether it becomes a step; false while a slider moves. label: its name for
+    undo.
+    """
+
+    layers: tuple[Layer, ...] = ()
+    order: tuple[int, ...] | None = None
+    copies: Mapping[str, int] = field(default_factory=dict)
+    is_final: bool = True
+    label: str = "layers"
+
+
+@dataclass(frozen=True)
+class DropStroke(Message, kind="drop_stroke"):
+    """Cancel the unfinished stroke. Answered by `patch`."""
+
+    stroke: int
+
+
+@dataclass(frozen=True)
+class Undo(Message, kind="undo"):
+    """Undo the last step, whether paint, constraints or settings. Answered by `patch`."""
+
+
+@dataclass(frozen=True)
+class Redo(Message, kind="redo"):
+    """Redo a step that was undone. Answered by `patch`."""
+
+
+@dataclass(frozen=True)
+class SaveLook(Message, kind="save_look"):
+    """Keep painting and answer under a name. Answered by `looks`."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class LoadLook(Message, kind="load_look"):
+    """Continue from a look; a step that can be undone. Answered by `patch`."""
+
+    look: int
+
+
+@dataclass(frozen=True)
+class RenameLook(Message, kind="rename_look"):
+    """Give a look another name. Answered by `looks`."""
+
+    look: int
+    name: str
+
+
+@dataclass(frozen=True)
+class CopyLook(Message, kind="copy_look"):
+    """Keep a copy of a look. Answered by `looks`."""
+
+    look: int
+
+
+@dataclass(frozen=True)
+class MixLooks(Message, kind="mix_looks"):
+    """Keep a mix of two looks: its lights are locked at the share `part` of the way from the first
+    to the second. Answered by `looks`.
+    """
+
+    first: int
+    second: int
+    part: float
+    name: str
+
+
+@dataclass(frozen=True)
+class DropLook(Message, kind="drop_look"):
+    """Delete a look. Answered by `looks`."""
+
+    look: int
+
+
+@dataclass(frozen=True)
+class Propose(Message, kind="propose"):
+    """Propose a lighting to the painter: it becomes a look with each light locked at the proposed
+    level, and replaces an earlier proposal of that name. Answered by `looks`.
+
+    lights: emission by name of light; other lights keep that of the present answer.
+    """
+
+    name: str
+    lights: Mapping[str, RGB]
