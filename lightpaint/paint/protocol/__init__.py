@@ -15,23 +15,14 @@ from lightpaint.paint.protocol.events import (
     AnswerUpdate,
     CanvasPatch,
     Closing,
-    Explanation,
-    ExportResult,
     Failure,
     LookList,
     Notice,
     PictureData,
     PictureUpdate,
-    PlacingResult,
-    PreviewResult,
-    ProgressReport,
     Rig,
     SessionPending,
     SessionState,
-    TaskStarted,
-    TaskStopped,
-    TrialPlaces,
-    VerificationResult,
 )
 from lightpaint.paint.protocol.light_requests import (
     AddLight,
@@ -92,6 +83,17 @@ from lightpaint.paint.protocol.requests import (
     Preview,
     TakeOver,
     Verify,
+)
+from lightpaint.paint.protocol.task_events import (
+    Explanation,
+    ExportResult,
+    PlacingResult,
+    PreviewResult,
+    ProgressReport,
+    TaskStarted,
+    TaskStopped,
+    TrialPlaces,
+    VerificationResult,
 )
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""Records inside the messages of `events.py`."""
+"""Records inside events."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

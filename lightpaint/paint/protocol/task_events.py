@@ -1,0 +1,114 @@
+"""Events about tasks that run in the background: how far they are, and their results."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.paint.protocol.base import OPTIONAL, Message
+from lightpaint.paint.protocol.message_parts import Place
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ProgressReport(Message, kind="progress"):
+    """The progress of a long task. Unasked.
+
+    task: `export`, `basis`, `sampling` for samples added where the paint needs them, or the
+    renderer's name for the task.
+    """
+
+    task: str
+    done: int
+    total: int
+    unit: str
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class VerificationResult(Message, kind="verified"):
+    """The result of a verification; its render is the picture `verified`. Unasked.
+
+    is_old: whether the session has changed since.
+    """
+
+    agrees: bool
+    text: str
+    view: int
+    is_old: bool
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TaskStarted(Message, kind="started"):
+    """Notice that a long task has started. task: the request, or `stop`."""
+
+    task: Literal["export", "verify", "explain", "preview", "rig", "place", "stop"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TaskStopped(Message, kind="stopped"):
+    """Notice that a stopped task has ended. Unasked."""
+
+    task: Literal["verify"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ExportResult(Message, kind="exported"):
+    """Files that were written. Unasked.
+
+    command: solves for the exported paintings; "" for none. is_stopped: whether the export was
+    stopped before its end. is_unpainted: whether files that need a painting were left out.
+    """
+
+    files: tuple[str, ...]
+    command: str
+    is_stopped: bool | None = field(default=None, metadata=OPTIONAL)
+    is_unpainted: bool | None = field(default=None, metadata=OPTIONAL)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Explanation(Message, kind="explained"):
+    """The reasons why a view is not closer to its painting; the picture `beyond` shows where.
+    Unasked.
+    """
+
+    sentences: tuple[str, ...]
+    view: int
+    is_old: bool
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PreviewResult(Message, kind="previewed"):
+    """The effect of a change, before it is made. Unasked. number: of the preview. is_at_cost:
+    whether it changes the unpainted part by more than it gains. before, after: (h, w, 3) uint8.
+    """
+
+    number: int
+    view: int
+    text: str
+    is_at_cost: bool
+    is_old: bool
+    before: npt.NDArray[np.uint8]
+    after: npt.NDArray[np.uint8]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TrialPlaces(Message, kind="trial"):
+    """The places that a search is trying. Unasked.
+
+    positions, directions: by name of light, including new ones.
+    """
+
+    positions: Mapping[str, Place]
+    directions: Mapping[str, Place]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PlacingResult(Message, kind="placed"):
+    """The result of a search for places of lights. Unasked.
+
+    text: the moves or additions and their gain, or why there are none. names: of these lights.
+    """
+
+    text: str
+    names: tuple[str, ...]
