@@ -9,6 +9,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.pixel_blocks import block_mean, enlarged, whole_factor
 from lightpaint.lighting.analysis.appearance.appearance import Appearance, compare_appearance
@@ -69,14 +70,9 @@ def comparison_image(
     target = target.fitted_to(basis.size, resize=False)
     looks = looks or CleanLooks.raw(basis, predicted, verified)
     transform = looks.encoder(report_transform(target, basis, predicted))
-    is_part = target.painted_share < WHOLE_SHARE
     view_note = f" ({spoken_view(transform)})" if spoken_view(transform) else ""
     tiles = [
-        Tile(
-            f"target: {target.name}",
-            f"{target.spoken_share} painted{', the rest hatched' if is_part else ''}",
-            target_picture(target, solution, looks.current, transform=transform, finish=to_8_bit),
-        ),
+        _target_tile(target, solution, looks.current, transform=transform),
         Tile(
             f"predicted{view_note}",
             _short_verdict(appearance or compare_appearance(solution)),
@@ -84,14 +80,11 @@ def comparison_image(
         ),
     ]
     if verified is not None and looks.verified is not None:
-        factor = whole_factor(verified.shape[:2], predicted.shape[:2])
-        assert factor is not None
-        gap = predicted.astype(np.float64) - block_mean(verified, factor)
-        rmse = float(np.sqrt(np.square(gap).mean()))
+        difference = _rms_difference(predicted, verified)
         tiles.append(
             Tile(
                 f"verified{view_note}",
-                f"independent render, {rmse:.2g} RMS off the prediction",
+                f"independent render, {difference:.2g} RMS off the prediction",
                 to_8_bit(transform.encode(looks.verified)),
             )
         )
@@ -102,6 +95,28 @@ def comparison_image(
     detail = f"luminance, predicted - target{missed.spoken}"
     tiles.append(Tile("residual", detail, picture, missed.limit))
     return compose(tiles)
+
+
+def _target_tile(
+    target: Target, solution: Solution, current: Floats, *, transform: ViewTransform
+) -> Tile:
+    """Return the picture of the target. current: the background of pixels that do not count."""
+    is_part = target.painted_share < WHOLE_SHARE
+    return Tile(
+        f"target: {target.name}",
+        f"{target.spoken_share} painted{', the rest hatched' if is_part else ''}",
+        target_picture(target, solution, current, transform=transform, finish=to_8_bit),
+    )
+
+
+def _rms_difference(predicted: Floats, verified: Floats) -> float:
+    """Return the RMS of the difference, (h, w, 3) each, `verified` possibly at a multiple of the
+    size.
+    """
+    factor = whole_factor(verified.shape[:2], predicted.shape[:2])
+    assert factor is not None
+    gap = predicted.astype(np.float64) - block_mean(verified, factor)
+    return float(np.sqrt(np.square(gap).mean()))
 
 
 def compose(tiles: list[Tile]) -> npt.NDArray[np.uint8]:

@@ -184,15 +184,18 @@ def _maps(
             )
         )
     if diagnosis.ignored > 0:
-        colours = by_bands(lambda x: to_8_bit(diverging(-x / limit)), diagnosis.ignored_map)
-        figures.append(
-            figure(
-                PagePicture("Not counted", "False-colour map of what does not count.", colours),
-                "The difference where the importance is small.",
-                signed_scale(limit),
-            )
-        )
+        figures.append(_ignored_map(diagnosis, limit))
     return "".join(figures)
+
+
+def _ignored_map(diagnosis: Diagnosis, limit: float) -> str:
+    """Return the figure of the error that does not count. limit: that of the scale."""
+    colours = by_bands(lambda x: to_8_bit(diverging(-x / limit)), diagnosis.ignored_map)
+    return figure(
+        PagePicture("Not counted", "False-colour map of what does not count.", colours),
+        "The difference where the importance is small.",
+        signed_scale(limit),
+    )
 
 
 def maps_limit(solution: Solution, diagnosis: Diagnosis, *, transform: ViewTransform) -> float:

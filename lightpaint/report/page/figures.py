@@ -138,21 +138,7 @@ def wipe(looks: list[PagePicture]) -> str:
             for k, look in enumerate(looks)
         )
 
-    uris = parallel_map(lambda look: data_uri(look.pixels), looks)
-    raw = parallel_map(_raw_uri, looks)
-    images = "".join(
-        f'<img class="{"is-a" if k == a else "is-b" if k == b else ""}" data-look="{k}" '
-        f'width="{width}" height="{height}" draggable="false" alt="{look.name}: {look.alt}" '
-        f'src="{uris[k]}">'
-        for k, look in enumerate(looks)
-    )
-    images += "".join(
-        f'<img class="as-rendered" data-look="{k}" data-raw="" width="{width}" '
-        f'height="{height}" draggable="false" alt="{look.name}, raw: {look.alt}" '
-        f'src="{raw[k]}">'
-        for k, look in enumerate(looks)
-        if look.raw is not None
-    )
+    images = _wipe_images(looks, a, b, width=width, height=height)
     switch = '<label><input type="checkbox" id="raw"> Raw, as rendered</label>'
     switch = switch if any(look.raw is not None for look in looks) else ""
     return (
@@ -166,6 +152,28 @@ def wipe(looks: list[PagePicture]) -> str:
         '<label class="slide">Wipe <input type="range" id="split" min="0" max="100" step="1" '
         'value="50"></label>'
         f'<label>Right <select id="b">{choices(b)}</select></label>{switch}</figcaption></figure>'
+    )
+
+
+def _wipe_images(looks: list[PagePicture], a: int, b: int, *, width: int, height: int) -> str:
+    """Return the images of the wipe, on top of each other, and those that are not denoised.
+
+    a, b: the indices of the looks that the wipe shows first.
+    """
+    uris = parallel_map(lambda look: data_uri(look.pixels), looks)
+    raw = parallel_map(_raw_uri, looks)
+    images = "".join(
+        f'<img class="{"is-a" if k == a else "is-b" if k == b else ""}" data-look="{k}" '
+        f'width="{width}" height="{height}" draggable="false" alt="{look.name}: {look.alt}" '
+        f'src="{uris[k]}">'
+        for k, look in enumerate(looks)
+    )
+    return images + "".join(
+        f'<img class="as-rendered" data-look="{k}" data-raw="" width="{width}" '
+        f'height="{height}" draggable="false" alt="{look.name}, raw: {look.alt}" '
+        f'src="{raw[k]}">'
+        for k, look in enumerate(looks)
+        if look.raw is not None
     )
 
 
@@ -192,34 +200,33 @@ def maps(
             "count.",
             signed_scale(missed.limit),
         ),
-        figure(
-            PagePicture(
-                "Importance",
-                "Map of how much each pixel counts.",
-                importance_picture(
-                    solution.importance, current, transform=transform, finish=to_8_bit
-                ),
-            ),
-            f"How much each pixel counts: {solution.importance.mean():.2g} on average, "
-            f"{solution.importance.max():.3g} at most.",
-            scale(
-                [UNCOUNTED_COLOR, COUNTED_COLOR], "hatched: does not count", "yellow: counts fully"
-            ),
-        ),
+        _importance_map(solution.importance, current, transform=transform),
     ]
     if verification is not None:
-        z = verification.z.mean(axis=-1, dtype=np.float64)
-        figures.append(
-            figure(
-                PagePicture(
-                    "Verification", "False-colour map of z.", to_8_bit(diverging(z / LIMIT))
-                ),
-                "Answer − render in standard errors, mean of the channels. Noise alone "
-                "looks like even grain; a shape in it is an error.",
-                scale(SIGNED, f"−{LIMIT:g} answer darker", "0", f"answer brighter +{LIMIT:g}"),
-            )
-        )
+        figures.append(_verification_map(verification))
     return "".join(figures)
+
+
+def _importance_map(importance: Floats, current: Floats, *, transform: ViewTransform) -> str:
+    """Return the figure of how much each pixel counts. importance: (h, w)."""
+    picture = importance_picture(importance, current, transform=transform, finish=to_8_bit)
+    return figure(
+        PagePicture("Importance", "Map of how much each pixel counts.", picture),
+        f"How much each pixel counts: {importance.mean():.2g} on average, "
+        f"{importance.max():.3g} at most.",
+        scale([UNCOUNTED_COLOR, COUNTED_COLOR], "hatched: does not count", "yellow: counts fully"),
+    )
+
+
+def _verification_map(verification: Verification) -> str:
+    """Return the figure of where the render disagrees with the answer."""
+    z = verification.z.mean(axis=-1, dtype=np.float64)
+    return figure(
+        PagePicture("Verification", "False-colour map of z.", to_8_bit(diverging(z / LIMIT))),
+        "Answer − render in standard errors, mean of the channels. Noise alone looks like even "
+        "grain; a shape in it is an error.",
+        scale(SIGNED, f"−{LIMIT:g} answer darker", "0", f"answer brighter +{LIMIT:g}"),
+    )
 
 
 def figure(picture: PagePicture, caption: str, legend: str) -> str:
