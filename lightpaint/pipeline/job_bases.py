@@ -30,26 +30,7 @@ def obtain(
     samples. before: a basis of the scene with lights elsewhere, whose other planes are taken.
     """
     listen = listener(progress)
-    is_rendered = is_all_rendered = is_reused = False
-
-    def report(label: str, done: int, total: int, unit: str = "passes") -> None:
-        nonlocal is_rendered, is_all_rendered
-        is_all_rendered |= not is_rendered and done == 0
-        is_rendered = True
-        listen(label, done, total, unit)
-
-    def report_reuse(count: int, of: int) -> None:
-        nonlocal is_reused
-        is_reused = True
-        left = of - count
-        if before is not None:
-            listen.note(f"{left} of {of} lights are rendered where they are now")
-            return
-        listen.say(
-            f"{count} of {of} lights come from an earlier run; "
-            f"{left} {'is' if left == 1 else 'are'} rendered (use_cache=False renders all again)"
-        )
-
+    watch = _RenderWatch(listen, has_moved=before is not None)
     spp, time_s = settings.basis_spp, None if settings.error else settings.time_s
     began_s = time.perf_counter()
     basis = obtain_basis(
@@ -59,20 +40,46 @@ def obtain(
         seed=settings.seed,
         use_cache=settings.use_cache,
         exact_spp=settings.exact_spp,
-        progress=report,
+        progress=watch.report,
         render=render,
-        report_reuse=report_reuse,
+        report_reuse=watch.report_reuse,
         before=before,
     )
-    if is_all_rendered and not is_reused:
+    if watch.is_all_rendered and not watch.is_reused:
         basis = replace(basis, render_s=time.perf_counter() - began_s)
     if settings.use_cache and not cache.is_cached(basis):
         listen.say(
             f"the basis could not be saved in {folder()}, so the next run renders it again: "
             "is the disk full, or the folder not yours?"
         )
-    _remark_on_samples(scene, basis, settings, spp, listen, is_rendered=is_rendered)
+    _remark_on_samples(scene, basis, settings, spp, listen, is_rendered=watch.is_rendered)
     return basis
+
+
+class _RenderWatch:
+    """A watch on how a basis is obtained, which passes reports on and remembers what happened."""
+
+    def __init__(self, listen: Listener, *, has_moved: bool) -> None:
+        self._listen, self._has_moved = listen, has_moved
+        self.is_rendered = self.is_all_rendered = self.is_reused = False
+
+    def report(self, label: str, done: int, total: int, unit: str = "passes") -> None:
+        """Pass progress on. All is rendered if the first report has nothing done."""
+        self.is_all_rendered |= not self.is_rendered and done == 0
+        self.is_rendered = True
+        self._listen(label, done, total, unit)
+
+    def report_reuse(self, count: int, of: int) -> None:
+        """Say how many of all lights are reused."""
+        self.is_reused = True
+        left = of - count
+        if self._has_moved:
+            self._listen.note(f"{left} of {of} lights are rendered where they are now")
+            return
+        self._listen.say(
+            f"{count} of {of} lights come from an earlier run; "
+            f"{left} {'is' if left == 1 else 'are'} rendered (use_cache=False renders all again)"
+        )
 
 
 def _remark_on_samples(

@@ -103,10 +103,7 @@ def paint_with_light(
     }
     bases = basis if isinstance(basis, list) else None
     if bases is not None:
-        scene = [
-            _with_film_of(x, view_basis)
-            for x, view_basis in zip(_as_list(scene), bases, strict=True)
-        ]
+        scene = [_with_film_of(*pair) for pair in zip(_as_list(scene), bases, strict=True)]
         # These scenes have the films of their bases already.
         basis, settings = None, settings | {"resolution": "1/1"}
     read = {"mask": mask and str(mask), "layer": layer, "find": find}

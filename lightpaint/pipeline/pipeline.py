@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 from lightpaint.basis.basis import Basis
 from lightpaint.images.estimate import Estimate, write_estimate
@@ -24,6 +25,7 @@ from lightpaint.pipeline.results.answer_folder import (
 from lightpaint.pipeline.results.results import Look, write_predicted, write_report
 from lightpaint.placement.placement import Placement
 from lightpaint.placement.suggestions.light_search import suggest_lights
+from lightpaint.placement.suggestions.suggestion import MoveSuggestion, Suggestion
 from lightpaint.progress import Listener, Progress, listener, silent
 from lightpaint.relit.detection_power import LightShares, with_light_tests
 from lightpaint.relit.render_rounds import refine_by_rendering
@@ -125,11 +127,8 @@ def _finish_view(
     if scene is not None:
         relit = answer.seen_through(scene.sensor)
         budget = _budget(settings, basis, relit)
-        if relit.parameters and view is job.views[0]:
-            arguments = " ".join(f"-D{name}={value}" for name, value in relit.parameters.items())
-            listen.say(
-                f"relit.xml keeps the scene's own defaults: pass {arguments} to Mitsuba with it"
-            )
+        if view is job.views[0]:
+            _remark_on_parameters(relit, listen)
     spp, size = basis.origin.spp, basis.size
     if budget is not None:
         spp, size = budget.spp, budget.scene.size
@@ -137,17 +136,10 @@ def _finish_view(
         folder / "predicted.exr", predicted, origin=basis.origin, spp=spp, size=size, scene=relit
     )
     if budget is not None and settings.verify:
-        listen.say(_verification_text(budget, basis, is_fixed=settings.verify_spp is not None))
         verification = _verify(settings, predicted, budget, solution, listen)
         write_estimate(folder / "verified.exr", verification.verified, {})
-        listen.note(f"verified with {verification.spp} samples per pixel")
     if settings.suggest and scene is not None:
-        suggestions = suggest_lights(
-            scene, basis, solution, count=settings.suggest, seed=settings.seed, progress=listen
-        )
-        if not job.all_rigging:
-            turn = suggest_move(job, view, solution, listen)
-        listen.note("lights suggested")
+        suggestions, turn = _suggest(job, view, scene, solution, listen)
     look = Look(
         target=view.target,
         basis=basis,
@@ -167,6 +159,26 @@ def _finish_view(
     return look
 
 
+def _remark_on_parameters(relit: Scene, listen: Listener) -> None:
+    """Say which parameters Mitsuba needs with the relit scene, if it has any."""
+    if relit.parameters:
+        arguments = " ".join(f"-D{name}={value}" for name, value in relit.parameters.items())
+        listen.say(f"relit.xml keeps the scene's own defaults: pass {arguments} to Mitsuba with it")
+
+
+def _suggest(
+    job: Job, view: PaintedView, scene: Scene, solution: Solution, listen: Listener
+) -> tuple[tuple[Suggestion, ...], MoveSuggestion | None]:
+    """Suggest lights to add, and a move unless the job has searched for moves itself."""
+    settings = job.settings
+    suggestions = suggest_lights(
+        scene, solution.basis, solution, count=settings.suggest, seed=settings.seed, progress=listen
+    )
+    move = None if job.all_rigging else suggest_move(job, view, solution, listen)
+    listen.note("lights suggested")
+    return suggestions, move
+
+
 def _verify(
     settings: Settings,
     predicted: Estimate,
@@ -175,21 +187,16 @@ def _verify(
     listen: Listener,
 ) -> Verification:
     """Render the relit scene and compare, with the given samples or until the result is clear."""
-    basis, lighting = solution.basis, solution.lighting
-    if settings.verify_spp is None:
-        return verify_in_stages(
-            predicted,
-            budget.scene,
-            basis,
-            lighting,
-            spp=budget.spp,
-            seed=settings.seed,
-            progress=listen,
-        )
-    verification = verify(
-        predicted, budget.scene, spp=budget.spp, seed=settings.seed, progress=listen
-    )
-    return with_light_tests(verification, predicted, LightShares.of(basis, lighting))
+    basis, lighting, is_fixed = solution.basis, solution.lighting, settings.verify_spp is not None
+    listen.say(_verification_text(budget, basis, is_fixed=is_fixed))
+    options: dict[str, Any] = {"spp": budget.spp, "seed": settings.seed, "progress": listen}
+    if is_fixed:
+        verification = verify(predicted, budget.scene, **options)
+        verification = with_light_tests(verification, predicted, LightShares.of(basis, lighting))
+    else:
+        verification = verify_in_stages(predicted, budget.scene, basis, lighting, **options)
+    listen.note(f"verified with {verification.spp} samples per pixel")
+    return verification
 
 
 def _budget(settings: Settings, basis: Basis, relit: Scene) -> VerificationBudget:
