@@ -16,15 +16,15 @@ import { LookMixers } from './look_mixers.js';
 const NUMERIC = { numeric: true };
 
 /** The filtered looks, in their order. @type {Look[]} */
-let shown = [];
+let filteredLooks = [];
 
-const comparison = new LookComparison(() => shown);
+const comparison = new LookComparison(() => filteredLooks);
 const table = new LightsTable();
 const mixers = new LookMixers();
 const cards = createCards({
   enlarge: (look) => comparison.enlarge(look),
   choose: (side, look) => comparison.toggle(side, look),
-  mixerOf: (look) => (mixers.has(look) ? () => mix(look) : null),
+  mixerOf: (look) => (mixers.canMix(look) ? () => mix(look) : null),
 });
 comparison.cards = cards;
 
@@ -44,17 +44,18 @@ const searchTexts = new Map(
 function arrange() {
   const words = inputOf('filter').value.toLowerCase().split(/\s+/).filter(Boolean);
   const state = inputOf('state').value;
-  shown = looks.filter((look) => {
+  filteredLooks = looks.filter((look) => {
     const text = searchTexts.get(look) ?? '';
     return (!state || look.state === state) && words.every((word) => text.includes(word));
   });
   const order = inputOf('order').value;
-  if (order === 'look') shown.sort((a, b) => titleOf(a).localeCompare(titleOf(b), 'en', NUMERIC));
-  if (order === 'delta_e') shown.sort((a, b) => (b.delta_e ?? -1) - (a.delta_e ?? -1));
-  elementOf('cards').replaceChildren(...shown.map((look) => cards.get(look) ?? ''));
-  elementOf('count').textContent = `${shown.length} of ${looks.length}`;
-  elementOf('none').hidden = shown.length > 0;
-  if (!elementOf('lights-panel').hidden) table.fill(shown);
+  if (order === 'look')
+    filteredLooks.sort((a, b) => titleOf(a).localeCompare(titleOf(b), 'en', NUMERIC));
+  if (order === 'delta_e') filteredLooks.sort((a, b) => (b.delta_e ?? -1) - (a.delta_e ?? -1));
+  elementOf('cards').replaceChildren(...filteredLooks.map((look) => cards.get(look) ?? ''));
+  elementOf('count').textContent = `${filteredLooks.length} of ${looks.length}`;
+  elementOf('none').hidden = filteredLooks.length > 0;
+  if (!elementOf('lights-panel').hidden) table.fill(filteredLooks);
 }
 for (const id of ['filter', 'state', 'order']) elementOf(id).addEventListener('input', arrange);
 elementOf('large').addEventListener('input', () =>
@@ -62,14 +63,14 @@ elementOf('large').addEventListener('input', () =>
 );
 elementOf('unit').addEventListener('input', () => {
   table.clear();
-  table.fill(shown);
+  table.fill(filteredLooks);
 });
 
 // -------------------------------------------------------------------------------------- mixer
 
 /** Show the mixer, starting from a look. @param {Look} look */
 function mix(look) {
-  if (!mixers.has(look)) return;
+  if (!mixers.canMix(look)) return;
   mixers.begin(look);
   select('mixer');
 }
@@ -92,16 +93,16 @@ function select(name) {
   elementOf('filters').style.visibility = name === 'mixer' ? 'hidden' : '';
   elementOf('size').hidden = name !== 'looks';
   comparison.showTray();
-  if (name === 'lights') table.fill(shown);
+  if (name === 'lights') table.fill(filteredLooks);
   if (name === 'mixer' && !mixers.requests && mixers.looks.length) mixers.begin(mixers.looks[0]);
 }
 tabs.forEach((tab, k) => {
   tab.addEventListener('click', () => select(tab.id.replace('-tab', '')));
   tab.addEventListener('keydown', (event) => {
-    const by = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
-    if (!by) return;
-    const visible = tabs.filter((other) => !other.hidden);
-    const next = visible[(visible.indexOf(tab) + by + visible.length) % visible.length];
+    const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+    if (!step) return;
+    const visible = tabs.filter((tab) => !tab.hidden);
+    const next = visible[(visible.indexOf(tab) + step + visible.length) % visible.length];
     next.focus();
     next.click();
   });

@@ -62,17 +62,17 @@ export class LookComparison {
 
   /** @param {Side} side @param {Look | null} look */
   choose(side, look) {
-    const before = this.chosen[side];
+    const previous = this.chosen[side];
     this.chosen[side] = look;
     const { a, b } = this.chosen;
-    for (const changed of [before, look]) {
-      const card = changed && this.cards.get(changed);
+    for (const changedLook of [previous, look]) {
+      const card = changedLook && this.cards.get(changedLook);
       if (!card) continue;
       for (const button of card.querySelectorAll('[data-side]')) {
-        const chosen = /** @type {HTMLElement} */ (button).dataset.side === 'a' ? a : b;
-        button.setAttribute('aria-pressed', String(chosen === changed));
+        const chosenLook = /** @type {HTMLElement} */ (button).dataset.side === 'a' ? a : b;
+        button.setAttribute('aria-pressed', String(chosenLook === changedLook));
       }
-      card.classList.toggle('is-chosen', a === changed || b === changed);
+      card.classList.toggle('is-chosen', a === changedLook || b === changedLook);
     }
     this.showTray();
   }
@@ -142,14 +142,14 @@ export class LookComparison {
     inputOf('slide').value = String(percent);
   }
 
-  /** Go to the look before or after this one, among the visible ones. @param {number} by */
-  step(by) {
+  /** Go to the look before or after this one, among the visible ones. @param {number} count */
+  step(count) {
     const side = this.chosen.b ? 'b' : 'a';
     const looks = this.shownLooks().filter((look) => look.picture);
     if (!looks.length) return;
     const present = looks.indexOf(/** @type {Look} */ (this.chosen[side]));
     const border = Number(inputOf('slide').value);
-    this.choose(side, looks[(present + by + looks.length) % looks.length]);
+    this.choose(side, looks[(present + count + looks.length) % looks.length]);
     this.open();
     if (this.chosen.b) this.moveBorder(border);
   }
@@ -160,19 +160,19 @@ export class LookComparison {
 function listLights(a, b) {
   const lightsOfB = new Map((b?.lights ?? []).map((light) => [light.name, light]));
   const rows = (a.lights ?? []).map((light) => {
-    const other = lightsOfB.get(light.name);
-    const [y, z] = [light.y, other?.y ?? 0];
+    const lightOfB = lightsOfB.get(light.name);
+    const [y, z] = [light.y, lightOfB?.y ?? 0];
     const stops = y > 0 && z > 0 ? Math.log2(z / y) : y > 0 || z > 0 ? Infinity : 0;
     const row = createElement('tr');
     row.append(createElement('th', '', light.name), lightCell(light, luminanceText(light.y)));
-    if (b && other) {
+    if (b && lightOfB) {
       const change = Number.isFinite(stops) ? stopsText(stops) : z > 0 ? 'on' : 'off';
-      row.append(lightCell(other, luminanceText(other.y)));
+      row.append(lightCell(lightOfB, luminanceText(lightOfB.y)));
       row.append(createElement('td', '', y === z ? '=' : change));
     }
     return { row, weight: b ? Math.abs(stops) : 0 };
   });
-  if (b) rows.sort((one, other) => other.weight - one.weight || 0);
+  if (b) rows.sort((rowA, rowB) => rowB.weight - rowA.weight || 0);
   const heads = b ? ['light', 'A', 'B', 'stops'] : ['light', 'luminance'];
   elementOf('beside-head').replaceChildren(headRow(heads));
   elementOf('beside-body').replaceChildren(...rows.map(({ row }) => row));

@@ -28,10 +28,12 @@ export class LightsTable {
     this.rows = new Map();
   }
 
-  /** @param {Look[]} shown */
-  fill(shown) {
+  /** @param {Look[]} visibleLooks */
+  fill(visibleLooks) {
     elementOf('lights-head').replaceChildren(headRow(['look', ...this.brightest.keys()]));
-    const rows = shown.filter((look) => this.looks.has(look)).map((look) => this.rowOf(look));
+    const rows = visibleLooks
+      .filter((look) => this.looks.has(look))
+      .map((look) => this.rowOf(look));
     elementOf('lights-body').replaceChildren(...rows);
   }
 

@@ -18,7 +18,7 @@ export class LookMixers {
     this.roots = new Map();
     for (const root of document.querySelectorAll('.mixer'))
       if (root instanceof HTMLElement) this.roots.set(root.dataset.basis ?? '', root);
-    this.looks = looks.filter((look) => this.has(look));
+    this.looks = looks.filter((look) => this.canMix(look));
     /** Number of requests: a mixer that unpacks slowly does not replace a later one. */
     this.requests = 0;
     for (const look of this.looks) {
@@ -29,7 +29,7 @@ export class LookMixers {
   }
 
   /** @param {Look} look */
-  has(look) {
+  canMix(look) {
     return look.basis !== undefined && this.roots.has(look.basis);
   }
 
@@ -38,7 +38,7 @@ export class LookMixers {
     const root = this.roots.get(look.basis ?? '');
     if (!root) return;
     const request = ++this.requests;
-    for (const other of this.roots.values()) if (other !== root) other.hidden = true;
+    for (const mixer of this.roots.values()) if (mixer !== root) mixer.hidden = true;
     inputOf('from').value = String(looks.indexOf(look));
     begin(root, startOf(look), () => request === this.requests);
     scrollTo(0, 0);

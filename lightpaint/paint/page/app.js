@@ -76,7 +76,7 @@ function listen(app) {
   engine.on('view', ({ view }) => showView(app, view));
   engine.on('lost', ({ count, isStale }) => {
     if (isStale) store.set({ unheard: count });
-    else session.toast(given(count), 'warn');
+    else session.toast(droppedText(count), 'warn');
   });
   engine.on('trouble', ({ text }) => session.toast(text, 'warn'));
   let isSized = false;
@@ -116,10 +116,10 @@ function foldByItself(root, store) {
 }
 
 /** @param {number} count */
-function given(count) {
-  const [strokes, they] =
+function droppedText(count) {
+  const [strokes, subject] =
     count === 1 ? ['A stroke', 'It is'] : [counted(count, 'stroke'), 'They are'];
-  return `${strokes} in this tab had not been sent when another tab took over. ${they} dropped, so as
+  return `${strokes} in this tab had not been sent when another tab took over. ${subject} dropped, so as
     not to cover what was painted there.`.replace(/\s+/g, ' ');
 }
 
@@ -161,11 +161,11 @@ function Side({ ui, app }) {
   const fold = (
     /** @type {string} */ name,
     /** @type {string} */ title,
-    /** @type {any} */ made,
+    /** @type {any} */ content,
     /** @type {any} */ extra = null,
   ) =>
     html`<${Fold} title=${title} class=${`is-${name}`} open=${Boolean(ui.open[name])} extra=${extra}
-      toggle=${() => store.set({ open: { ...ui.open, [name]: !ui.open[name] } })}>${made}</${Fold}>`;
+      toggle=${() => store.set({ open: { ...ui.open, [name]: !ui.open[name] } })}>${content}</${Fold}>`;
   return html`<aside class="side" aria-label="Panels">
     ${fold('colour', 'Colour', html`<${ColourPanel} ui=${ui} app=${app} />`)}
     ${fold('ask', 'Adjust by numbers', html`<${Ask} ui=${ui} app=${app} />`)}

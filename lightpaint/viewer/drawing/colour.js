@@ -103,9 +103,9 @@ export function toKelvin(rgb) {
 export function warmer(mired) {
   const least = 1e6 / KELVIN.high - NEUTRAL_MIRED;
   const most = 500 - NEUTRAL_MIRED; // Below 2000 K hardly any blue is left.
-  const to = ofKelvin(1e6 / (NEUTRAL_MIRED + Math.min(most, Math.max(least, mired))));
-  const from = ofKelvin(1e6 / NEUTRAL_MIRED);
-  const gains = three((c) => to[c] / from[c]);
+  const target = ofKelvin(1e6 / (NEUTRAL_MIRED + Math.min(most, Math.max(least, mired))));
+  const neutral = ofKelvin(1e6 / NEUTRAL_MIRED);
+  const gains = three((c) => target[c] / neutral[c]);
   return three((c) => gains[c] / luminance(gains));
 }
 

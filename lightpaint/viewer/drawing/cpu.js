@@ -148,7 +148,7 @@ export class CpuView {
   /** @param {'solution' | 'other'} kind @param {Params} params */
   mixedLayer(kind, params) {
     const mix = this.mixes[kind];
-    const started = performance.now();
+    const startTime = performance.now();
     const isOther = mix.update(this.planes, this.step, params.live);
     const layer = this.layer(kind, this.step);
     if (isOther) layer.setLight(mix.light);
@@ -160,10 +160,11 @@ export class CpuView {
     layer.show(this.lut, params.stops, overlay === 'importance' ? null : overlay, (rgba) => {
       const grid = this.grid(this.step);
       if (overlay === 'falsecolor') falseColour(rgba, layer.light, 2 ** params.stops);
-      else if (overlay === 'beyond' && beyond) inked(rgba, (p) => beyond[p] / 255, INKS.beyond, grid);
+      else if (overlay === 'beyond' && beyond)
+        inked(rgba, (p) => beyond[p] / 255, INKS.beyond, grid);
       else if (painting) missed(rgba, painting, this.importance, grid);
     });
-    if (isOther) this.pace = (performance.now() - started) * this.step ** 2;
+    if (isOther) this.pace = (performance.now() - startTime) * this.step ** 2;
     return layer;
   }
 
@@ -195,9 +196,9 @@ export class CpuView {
   /** @param {number} x @param {number} y */
   planesAt(x, y) {
     const values = new Float32Array(3 * this.planes.length);
-    const from = 3 * (y * this.size[1] + x);
+    const start = 3 * (y * this.size[1] + x);
     this.planes.forEach(({ halves, scale }, k) => {
-      for (let c = 0; halves && c < 3; c++) values[3 * k + c] = VALUES[halves[from + c]] * scale;
+      for (let c = 0; halves && c < 3; c++) values[3 * k + c] = VALUES[halves[start + c]] * scale;
     });
     return values;
   }
@@ -207,9 +208,9 @@ export class CpuView {
   lightAt(kind, x, y) {
     if (kind === 'solution' || kind === 'other')
       return mixedAt(this.planesAt(x, y), this.mixes[kind].weights);
-    const from = 3 * (y * this.size[1] + x);
+    const start = 3 * (y * this.size[1] + x);
     const light = this.layers.get(kind)?.light;
-    return light ? [light[from], light[from + 1], light[from + 2]] : [0, 0, 0];
+    return light ? [light[start], light[start + 1], light[start + 2]] : [0, 0, 0];
   }
 
   lost() {

@@ -149,8 +149,8 @@ export class GlView {
     const { gl, canvas } = this;
     this.last = params;
     if (this.lost()) return;
-    const shown = panes(params, canvas, this.size);
-    for (const { kind } of shown)
+    const visiblePanes = panes(params, canvas, this.size);
+    for (const { kind } of visiblePanes)
       if (kind === 'solution' || kind === 'other') this.planes.mix(kind);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.viewport(0, 0, canvas.width, canvas.height);
@@ -159,7 +159,7 @@ export class GlView {
     gl.clearColor(red, green, blue, 1);
     gl.clear(gl.COLOR_BUFFER_BIT);
     gl.enable(gl.SCISSOR_TEST);
-    for (const pane of shown) this.show(pane, params);
+    for (const pane of visiblePanes) this.show(pane, params);
     gl.disable(gl.SCISSOR_TEST);
   }
 
@@ -223,12 +223,12 @@ export class GlView {
   lightAt(kind, x, y) {
     if (kind === 'solution' || kind === 'other')
       return mixedAt(this.planesAt(x, y), this.planes.mixes[kind].weights);
-    const from = 3 * (y * this.size[1] + x);
+    const start = 3 * (y * this.size[1] + x);
     if (kind === 'painting' && this.image)
-      return [this.image[from], this.image[from + 1], this.image[from + 2]];
+      return [this.image[start], this.image[start + 1], this.image[start + 2]];
     const texture = this.texture(kind);
     if (!texture) return [0, 0, 0];
-    this.planes.onto(texture, this.size[1], this.size[0]);
+    this.planes.bindTarget(texture, this.size[1], this.size[0]);
     const rgba = new Float32Array(4);
     this.gl.readPixels(x, y, 1, 1, this.gl.RGBA, this.gl.FLOAT, rgba);
     return [rgba[0], rgba[1], rgba[2]];

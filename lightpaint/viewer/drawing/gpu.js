@@ -85,7 +85,7 @@ export class Planes {
     this.textures.bind(1, gl.TEXTURE_2D, this.textures.weights(scaled));
     gl.uniform1i(uniform('planes'), 0);
     gl.uniform1i(uniform('weights'), 1);
-    this.onto(mix.texture, this.size[1], this.size[0]);
+    this.bindTarget(mix.texture, this.size[1], this.size[0]);
     gl.clearColor(0, 0, 0, 1);
     gl.clear(gl.COLOR_BUFFER_BIT);
     gl.enable(gl.BLEND);
@@ -102,11 +102,11 @@ export class Planes {
 
   /** Direct drawing to a texture. @param {WebGLTexture} texture @param {number} width
    * @param {number} height */
-  onto(texture, width, height) {
+  bindTarget(texture, width, height) {
     const { gl } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.target);
-    const to = gl.COLOR_ATTACHMENT0;
-    gl.framebufferTexture2D(gl.FRAMEBUFFER, to, gl.TEXTURE_2D, texture, 0);
+    const attachment = gl.COLOR_ATTACHMENT0;
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, attachment, gl.TEXTURE_2D, texture, 0);
     gl.viewport(0, 0, width, height);
   }
 
@@ -119,13 +119,13 @@ export class Planes {
     gl.uniform1i(uniform('planes'), 0);
     gl.uniform2i(uniform('at'), x, y);
     this.slices.forEach((slice, i) => {
-      const here = Math.min(perSlice, count - i * perSlice);
+      const sliceCount = Math.min(perSlice, count - i * perSlice);
       this.textures.bind(0, gl.TEXTURE_2D_ARRAY, slice);
-      this.onto(this.textures.probe(here), here, 1);
+      this.bindTarget(this.textures.probe(sliceCount), sliceCount, 1);
       gl.drawArrays(gl.TRIANGLES, 0, 3);
-      const rgba = new Float32Array(4 * here);
-      gl.readPixels(0, 0, here, 1, gl.RGBA, gl.FLOAT, rgba);
-      for (let k = 0; k < here; k++)
+      const rgba = new Float32Array(4 * sliceCount);
+      gl.readPixels(0, 0, sliceCount, 1, gl.RGBA, gl.FLOAT, rgba);
+      for (let k = 0; k < sliceCount; k++)
         for (let c = 0; c < 3; c++)
           values[3 * (i * perSlice + k) + c] = rgba[4 * k + c] * this.scales[i * perSlice + k];
     });

@@ -41,19 +41,19 @@ export class Mix {
    * @returns {boolean} whether `light` is another one */
   update(planes, step, live) {
     const weights = this.weights;
-    const before = step === this.step ? this.mixed : null;
-    const isSame = before !== null && weights.every((w, i) => w === before[i]);
+    const previous = step === this.step ? this.mixed : null;
+    const isSame = previous !== null && weights.every((w, i) => w === previous[i]);
     if (isSame && (live || this.isExact)) return false;
-    const changed = before
+    const changedPlanes = previous
       ? planes
           .map((_, k) => k)
-          .filter((k) => [0, 1, 2].some((c) => weights[3 * k + c] !== before[3 * k + c]))
+          .filter((k) => [0, 1, 2].some((c) => weights[3 * k + c] !== previous[3 * k + c]))
       : [];
     this.step = step;
-    const isCarried = live && before !== null && 2 * changed.length <= planes.length;
+    const isCarried = live && previous !== null && 2 * changedPlanes.length <= planes.length;
     if (isCarried) {
-      const more = weights.map((w, i) => w - before[i]);
-      this.add(planes, changed, more, false);
+      const differences = weights.map((w, i) => w - previous[i]);
+      this.add(planes, changedPlanes, differences, false);
     } else
       this.add(
         planes,
@@ -66,14 +66,14 @@ export class Mix {
     return true;
   }
 
-  /** @param {Plane[]} planes @param {number[]} which @param {Float64Array} weights
+  /** @param {Plane[]} planes @param {number[]} indices @param {Float64Array} weights
    * @param {boolean} fresh */
-  add(planes, which, weights, fresh) {
+  add(planes, indices, weights, fresh) {
     const [height, width] = this.sizeAt(this.step);
     const name = this.step === 1 ? 'full' : 'half';
     if (this[name].length !== height * width * 3) this[name] = new Float32Array(height * width * 3);
     const terms = [];
-    for (const k of which) {
+    for (const k of indices) {
       const { halves, scale } = planes[k];
       const [r, g, b] = [0, 1, 2].map((c) => weights[3 * k + c] * scale);
       if (halves && (r || g || b)) terms.push({ halves, weights: [r, g, b] });
@@ -89,60 +89,60 @@ export class Mix {
 /** @typedef {{halves: Uint16Array, weights: number[]}} Term */
 
 /** Add planes to light, four at a time.
- * @param {Float32Array} light @param {Term[]} terms @param {number} across width of the planes
+ * @param {Float32Array} light @param {Term[]} terms @param {number} planeWidth width of the planes
  * @param {number} width of the light @param {number} step @param {boolean} fresh whether light
  * starts from black */
-export function addPlanes(light, terms, across, width, step, fresh) {
+export function addPlanes(light, terms, planeWidth, width, step, fresh) {
   let isFresh = fresh;
-  let done = 0;
-  for (; done + 4 <= terms.length; done += 4) {
-    addFour(light, terms.slice(done, done + 4), across, width, step, isFresh);
+  let next = 0;
+  for (; next + 4 <= terms.length; next += 4) {
+    addFour(light, terms.slice(next, next + 4), planeWidth, width, step, isFresh);
     isFresh = false;
   }
   if (isFresh) light.fill(0);
-  for (; done < terms.length; done++) addOne(light, terms[done], across, width, step);
+  for (; next < terms.length; next++) addOne(light, terms[next], planeWidth, width, step);
 }
 
-/** @param {Float32Array} light @param {Term[]} terms @param {number} across
+/** @param {Float32Array} light @param {Term[]} terms @param {number} planeWidth
  * @param {number} width @param {number} step @param {boolean} fresh */
-function addFour(light, terms, across, width, step, fresh) {
+function addFour(light, terms, planeWidth, width, step, fresh) {
   const [a, b, c, d] = terms.map((term) => term.halves);
   const [[a0, a1, a2], [b0, b1, b2], [c0, c1, c2], [d0, d1, d2]] = terms.map((x) => x.weights);
   const values = VALUES;
   const [stride, row] = [3 * step, 3 * width];
-  for (let to = 0, y = 0; to < light.length; y += step) {
-    const end = to + row;
-    for (let i = 3 * across * y; to < end; i += stride, to += 3) {
+  for (let p = 0, y = 0; p < light.length; y += step) {
+    const end = p + row;
+    for (let i = 3 * planeWidth * y; p < end; i += stride, p += 3) {
       const j = i + 1;
       const k = i + 2;
       const r = a0 * values[a[i]] + b0 * values[b[i]] + c0 * values[c[i]] + d0 * values[d[i]];
       const g = a1 * values[a[j]] + b1 * values[b[j]] + c1 * values[c[j]] + d1 * values[d[j]];
       const e = a2 * values[a[k]] + b2 * values[b[k]] + c2 * values[c[k]] + d2 * values[d[k]];
       if (fresh) {
-        light[to] = r;
-        light[to + 1] = g;
-        light[to + 2] = e;
+        light[p] = r;
+        light[p + 1] = g;
+        light[p + 2] = e;
       } else {
-        light[to] += r;
-        light[to + 1] += g;
-        light[to + 2] += e;
+        light[p] += r;
+        light[p + 1] += g;
+        light[p + 2] += e;
       }
     }
   }
 }
 
-/** @param {Float32Array} light @param {Term} term @param {number} across @param {number} width
+/** @param {Float32Array} light @param {Term} term @param {number} planeWidth @param {number} width
  * @param {number} step */
-function addOne(light, { halves, weights }, across, width, step) {
+function addOne(light, { halves, weights }, planeWidth, width, step) {
   const [r, g, b] = weights;
   const values = VALUES;
   const [stride, row] = [3 * step, 3 * width];
-  for (let to = 0, y = 0; to < light.length; y += step) {
-    const end = to + row;
-    for (let i = 3 * across * y; to < end; i += stride, to += 3) {
-      light[to] += r * values[halves[i]];
-      light[to + 1] += g * values[halves[i + 1]];
-      light[to + 2] += b * values[halves[i + 2]];
+  for (let p = 0, y = 0; p < light.length; y += step) {
+    const end = p + row;
+    for (let i = 3 * planeWidth * y; p < end; i += stride, p += 3) {
+      light[p] += r * values[halves[i]];
+      light[p + 1] += g * values[halves[i + 1]];
+      light[p + 2] += b * values[halves[i + 2]];
     }
   }
 }

@@ -51,16 +51,17 @@ export function band(luminance) {
 /** Return the share of ink that a hatch lets through at a pixel of the picture; slope ±1.
  * @param {number} x @param {number} y @param {number} slope */
 export function hatch(x, y, slope) {
-  const along = (((x + slope * y) % HATCH.period) + HATCH.period) % HATCH.period;
-  return along < HATCH.thin ? HATCH.strength : 1;
+  const phase = (((x + slope * y) % HATCH.period) + HATCH.period) % HATCH.period;
+  return phase < HATCH.thin ? HATCH.strength : 1;
 }
 
 /** Lay ink over a pixel of RGBA: the pixel below loses its colour and half its light.
- * @param {Uint8ClampedArray} rgba @param {number} at @param {number[]} ink
+ * @param {Uint8ClampedArray} rgba @param {number} index @param {number[]} ink
  * @param {number} amount 0 to 1 */
-export function lay(rgba, at, ink, amount) {
-  const grey = (LUMA[0] * rgba[at] + LUMA[1] * rgba[at + 1] + LUMA[2] * rgba[at + 2]) * 0.6;
-  for (let c = 0; c < 3; c++) rgba[at + c] = grey + (ink[c] - grey) * amount;
+export function lay(rgba, index, ink, amount) {
+  const grey =
+    (LUMA[0] * rgba[index] + LUMA[1] * rgba[index + 1] + LUMA[2] * rgba[index + 2]) * 0.6;
+  for (let c = 0; c < 3; c++) rgba[index + c] = grey + (ink[c] - grey) * amount;
 }
 
 /** Pixels of a picture that are shown: every `step`th of every `step`th row.
@@ -69,23 +70,23 @@ export function lay(rgba, at, ink, amount) {
 /** Visit each pixel shown: its index in RGBA, and its column, row and index in the whole picture.
  * @param {Grid} grid @param {(at: number, x: number, y: number, p: number) => void} visit */
 function visitPixels({ height, width, step }, visit) {
-  let at = 0;
+  let index = 0;
   for (let y = 0; y < height; y += step)
-    for (let x = 0; x < width; x += step, at += 4) visit(at, x, y, y * width + x);
+    for (let x = 0; x < width; x += step, index += 4) visit(index, x, y, y * width + x);
 }
 
 /** Draw the difference of solution and painting, both as codes, where something is painted.
  * @param {Uint8ClampedArray} rgba of the solution, changed @param {Uint8ClampedArray} painting
  * @param {Float32Array} importance @param {Grid} grid of the solution */
 export function missed(rgba, painting, importance, grid) {
-  visitPixels(grid, (at, x, y, p) => {
-    const r = rgba[at] - painting[4 * p];
-    const g = rgba[at + 1] - painting[4 * p + 1];
-    const b = rgba[at + 2] - painting[4 * p + 2];
+  visitPixels(grid, (index, x, y, p) => {
+    const r = rgba[index] - painting[4 * p];
+    const g = rgba[index + 1] - painting[4 * p + 1];
+    const b = rgba[index + 2] - painting[4 * p + 2];
     const most = Math.max(Math.abs(r), Math.abs(g), Math.abs(b));
     const isDark = LUMA[0] * r + LUMA[1] * g + LUMA[2] * b < 0;
     const amount = importance[p] > 0 ? Math.min(1, most / FULL) : 0;
-    lay(rgba, at, isDark ? INKS.dark : INKS.bright, amount * hatch(x, y, isDark ? -1 : 1));
+    lay(rgba, index, isDark ? INKS.dark : INKS.bright, amount * hatch(x, y, isDark ? -1 : 1));
   });
 }
 
@@ -105,7 +106,9 @@ export const inkOf = (x, most) => Math.log1p(Math.max(0, x)) / Math.log1p(most);
 /** @param {Uint8ClampedArray} rgba changed @param {(p: number) => number} amount of ink at a pixel
  * @param {number[]} ink @param {Grid} grid */
 export function inked(rgba, amount, ink, grid) {
-  visitPixels(grid, (at, x, y, p) => lay(rgba, at, ink, 0.8 * Math.min(1, amount(p)) * hatch(x, y, 1)));
+  visitPixels(grid, (index, x, y, p) =>
+    lay(rgba, index, ink, 0.8 * Math.min(1, amount(p)) * hatch(x, y, 1)),
+  );
 }
 
 /** @param {Uint8ClampedArray} rgba changed @param {Float32Array} light (…, 3)

@@ -143,12 +143,12 @@ export class Textures {
     for (let top = 0; top < height; top += this.rows) {
       const rows = Math.min(this.rows, height - top);
       const end = 3 * width * (top + rows);
-      for (let from = 3 * width * top, to = 0; from < end; to++)
+      for (let source = 3 * width * top, p = 0; source < end; p++)
         for (let c = 0; c < 3; c++) {
-          const bits = halves[from++];
+          const bits = halves[source++];
           const magnitude = bits & 0x7fff;
           const isFinite = magnitude < 0x7c00;
-          rgba[to++] = isFinite ? bits : magnitude > 0x7c00 ? 0 : (bits & 0x8000) | 0x7bff;
+          rgba[p++] = isFinite ? bits : magnitude > 0x7c00 ? 0 : (bits & 0x8000) | 0x7bff;
         }
       yield { top, rows, rgba: rgba.subarray(0, 4 * rows * width) };
     }
@@ -161,12 +161,12 @@ export class Textures {
     const [height, width] = [bottom - top, right - left];
     if (height <= 0 || width <= 0) return;
     const rgba = new Float32Array(4 * height * width);
-    for (let y = top, to = 0; y < bottom; y++)
-      for (let p = y * this.size[1] + left, end = p + width; p < end; p++, to += 4) {
-        rgba[to] = Math.min(LARGEST, image[3 * p]);
-        rgba[to + 1] = Math.min(LARGEST, image[3 * p + 1]);
-        rgba[to + 2] = Math.min(LARGEST, image[3 * p + 2]);
-        rgba[to + 3] = importance[p];
+    for (let y = top, destination = 0; y < bottom; y++)
+      for (let p = y * this.size[1] + left, end = p + width; p < end; p++, destination += 4) {
+        rgba[destination] = Math.min(LARGEST, image[3 * p]);
+        rgba[destination + 1] = Math.min(LARGEST, image[3 * p + 1]);
+        rgba[destination + 2] = Math.min(LARGEST, image[3 * p + 2]);
+        rgba[destination + 3] = importance[p];
       }
     this.bind(0, gl.TEXTURE_2D, texture);
     gl.texSubImage2D(gl.TEXTURE_2D, 0, left, top, width, height, gl.RGBA, gl.FLOAT, rgba);

@@ -87,22 +87,24 @@ export const GROUND = [24, 24, 26];
  * @param {[height: number, width: number]} size of the picture @returns {Pane[]} */
 export function panes(params, canvas, size) {
   const { width, height } = canvas;
-  const whole = { x: 0, y: 0, width, height };
-  if (params.layout === 'blink') return [placed(params[params.blink], whole, whole, params, size)];
+  const area = { x: 0, y: 0, width, height };
+  if (params.layout === 'blink') return [placed(params[params.blink], area, area, params, size)];
   if (params.layout === 'wipe') {
     const cut = Math.round(width * Math.min(1, Math.max(0, params.wipe)));
-    const front = { ...whole, width: cut };
-    const back = { ...whole, x: cut, width: width - cut };
+    const front = { ...area, width: cut };
+    const back = { ...area, x: cut, width: width - cut };
     return [
-      placed(params.right, back, whole, params, size),
-      placed(params.left, front, whole, params, size),
+      placed(params.right, back, area, params, size),
+      placed(params.left, front, area, params, size),
     ].filter((pane) => pane.width > 0);
   }
   const columnWidth = Math.max(1, Math.floor((width - GAP) / 2));
   const rowHeight = Math.max(1, Math.floor((height - GAP) / 2));
   const isBeside = fit([columnWidth, height], size) >= fit([width, rowHeight], size);
-  const first = isBeside ? { ...whole, width: columnWidth } : { ...whole, height: rowHeight };
-  const second = isBeside ? { ...first, x: width - columnWidth } : { ...first, y: height - rowHeight };
+  const first = isBeside ? { ...area, width: columnWidth } : { ...area, height: rowHeight };
+  const second = isBeside
+    ? { ...first, x: width - columnWidth }
+    : { ...first, y: height - rowHeight };
   return [
     placed(params.left, first, first, params, size),
     placed(params.right, second, second, params, size),
@@ -110,9 +112,9 @@ export function panes(params, canvas, size) {
 }
 
 /** Return the picture and its pixel, not rounded, at a place of the canvas; null between pictures.
- * @param {Pane[]} shown @param {number} x @param {number} y */
-export function at(shown, x, y) {
-  for (const pane of [...shown].reverse()) {
+ * @param {Pane[]} visiblePanes @param {number} x @param {number} y */
+export function at(visiblePanes, x, y) {
+  for (const pane of [...visiblePanes].reverse()) {
     const isIn = x >= pane.x && x < pane.x + pane.width && y >= pane.y && y < pane.y + pane.height;
     if (isIn) return { pane, ...inPicture(pane, x, y) };
   }

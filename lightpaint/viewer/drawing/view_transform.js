@@ -74,37 +74,37 @@ export class Encoder {
     this.table = this.isCurve ? new Uint8ClampedArray(length) : new Float32Array(length);
     for (let i = 0; i < length; i++) {
       bits[0] = ((this.first + i) << SHIFT) | (1 << (SHIFT - 1)); // the middle of the step
-      this.table[i] = this.at(Math.log2(float[0]) + stops);
+      this.table[i] = this.valueAt(Math.log2(float[0]) + stops);
     }
   }
 
   /** Return the table's value for a logarithm of light. @param {number} log */
-  at(log) {
+  valueAt(log) {
     const { shaper, lattice, curve } = this.lut;
     if (!lattice) return 255 * encodeSrgb(2 ** log);
     const last = shaper.side - 1;
     const place = ((log - shaper.low) / (shaper.high - shaper.low)) * last;
-    const kept = Math.min(last, Math.max(0, place));
-    if (!curve) return kept;
-    const i = Math.min(last - 1, Math.floor(kept));
-    return 255 * (curve[i] + (kept - i) * (curve[i + 1] - curve[i]));
+    const clamped = Math.min(last, Math.max(0, place));
+    if (!curve) return clamped;
+    const i = Math.min(last - 1, Math.floor(clamped));
+    return 255 * (curve[i] + (clamped - i) * (curve[i + 1] - curve[i]));
   }
 
   /** Write the codes of a range of pixels (…, 3) into RGBA.
-   * @param {Float32Array} light @param {Uint8ClampedArray} rgba @param {number} from
-   * @param {number} to */
-  pixels(light, rgba, from, to) {
+   * @param {Float32Array} light @param {Uint8ClampedArray} rgba @param {number} start
+   * @param {number} end */
+  pixels(light, rgba, start, end) {
     const bits = new Int32Array(light.buffer, light.byteOffset, light.length);
-    if (this.isCurve) this.curved(bits, rgba, from, to);
-    else this.mixed(bits, rgba, from, to);
+    if (this.isCurve) this.encodeByCurve(bits, rgba, start, end);
+    else this.encodeByLattice(bits, rgba, start, end);
   }
 
-  /** @param {Int32Array} bits @param {Uint8ClampedArray} rgba @param {number} from
-   * @param {number} to */
-  curved(bits, rgba, from, to) {
+  /** @param {Int32Array} bits @param {Uint8ClampedArray} rgba @param {number} start
+   * @param {number} end */
+  encodeByCurve(bits, rgba, start, end) {
     const { table, first } = this;
     const last = table.length - 1;
-    for (let p = from; p < to; p++) {
+    for (let p = start; p < end; p++) {
       const r = (bits[3 * p] >> SHIFT) - first;
       const g = (bits[3 * p + 1] >> SHIFT) - first;
       const b = (bits[3 * p + 2] >> SHIFT) - first;
@@ -115,16 +115,16 @@ export class Encoder {
     }
   }
 
-  /** @param {Int32Array} bits @param {Uint8ClampedArray} rgba @param {number} from
-   * @param {number} to */
-  mixed(bits, rgba, from, to) {
+  /** @param {Int32Array} bits @param {Uint8ClampedArray} rgba @param {number} start
+   * @param {number} end */
+  encodeByLattice(bits, rgba, start, end) {
     const { table, first } = this;
     const codes = /** @type {Float32Array} */ (this.codes);
     const side = this.lut.shaper.side;
     const last = table.length - 1;
     const red = side * side * 3;
     const green = side * 3;
-    for (let p = from; p < to; p++) {
+    for (let p = start; p < end; p++) {
       const i = (bits[3 * p] >> SHIFT) - first;
       const j = (bits[3 * p + 1] >> SHIFT) - first;
       const k = (bits[3 * p + 2] >> SHIFT) - first;
@@ -147,10 +147,10 @@ export class Encoder {
       let a10 = a00 + red;
       let a11 = a10 + green;
       for (let c = 4 * p; c < 4 * p + 3; c++, a00++, a01++, a10++, a11++) {
-        const near = w00 * codes[a00] + w01 * codes[a01] + w10 * codes[a10] + w11 * codes[a11];
+        const nearFace = w00 * codes[a00] + w01 * codes[a01] + w10 * codes[a10] + w11 * codes[a11];
         const far =
           w00 * codes[a00 + 3] + w01 * codes[a01 + 3] + w10 * codes[a10 + 3] + w11 * codes[a11 + 3];
-        rgba[c] = near + fb * (far - near);
+        rgba[c] = nearFace + fb * (far - nearFace);
       }
       rgba[4 * p + 3] = 255;
     }
@@ -164,10 +164,11 @@ function curveOf(lattice, side) {
     { length: side },
     (_, i) => lattice[i * (side * side + side + 1) * 3],
   );
-  let at = 0;
+  let index = 0;
   for (let r = 0; r < side; r++)
     for (let g = 0; g < side; g++)
       for (let b = 0; b < side; b++)
-        for (const i of [r, g, b]) if (Math.abs(lattice[at++] - curve[i]) > 1 / 1024) return null;
+        for (const i of [r, g, b])
+          if (Math.abs(lattice[index++] - curve[i]) > 1 / 1024) return null;
   return curve;
 }

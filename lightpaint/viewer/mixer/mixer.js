@@ -141,7 +141,8 @@ class Mixer {
   weights() {
     const isSolo = this.rows.some((row) => row.isSolo);
     const weights = new Float64Array(3 * this.planes.length);
-    if (!isSolo) for (const k of this.hiddenLights()) weights.set(this.data.lights[k][this.look], 3 * k);
+    if (!isSolo)
+      for (const k of this.hiddenLights()) weights.set(this.data.lights[k][this.look], 3 * k);
     for (const row of this.rows) {
       const isOn = isSolo ? row.isSolo : !row.isMute;
       // The rest has a plane per look; the last reset chose it.
@@ -171,41 +172,41 @@ class Mixer {
   /** Draw the small picture of one light alone. @param {Row} row */
   thumb(row) {
     const [height, width] = this.data.size;
-    const alone = new Mix(this.data.size);
-    alone.weights = new Float64Array(3 * this.planes.length);
+    const mix = new Mix(this.data.size);
+    mix.weights = new Float64Array(3 * this.planes.length);
     const { rgb } = row;
-    alone.weights.set(luminance(rgb) > 0 ? rgb : [1, 1, 1], 3 * row.plane);
-    alone.update(this.planes, 1, false);
-    const bright = alone.light.filter((x) => x > 0).sort();
+    mix.weights.set(luminance(rgb) > 0 ? rgb : [1, 1, 1], 3 * row.plane);
+    mix.update(this.planes, 1, false);
+    const bright = mix.light.filter((x) => x > 0).sort();
     const white = bright[Math.floor(WHITE_SHARE * (bright.length - 1))] || 1;
-    const whole = canvasOfSize(this.data.size);
-    drawLight(whole, alone.light, new Encoder(SRGB, -Math.log2(white)));
+    const canvas = canvasOfSize(this.data.size);
+    drawLight(canvas, mix.light, new Encoder(SRGB, -Math.log2(white)));
     const { thumb } = row;
     thumb.width = THUMBNAIL_WIDTH;
     thumb.height = Math.max(1, Math.round((THUMBNAIL_WIDTH * height) / width));
     const context = contextOf(thumb);
     context.imageSmoothingQuality = 'high';
-    context.drawImage(whole, 0, 0, thumb.width, thumb.height);
+    context.drawImage(canvas, 0, 0, thumb.width, thumb.height);
   }
 
   /** Return the mix as a lighting file. */
   lighting() {
     const file = structuredClone(this.data.lighting);
     /** @param {string} name @param {RGB} rgb */
-    const set = (name, rgb) => {
+    const add = (name, rgb) => {
       Object.assign(file.lights[name], { emission: [...rgb], weight: [...rgb] });
     };
     for (const k of this.hiddenLights()) {
       const light = this.data.lights[k];
-      set(light.name, light[this.look]);
+      add(light.name, light[this.look]);
     }
     for (const { light, rgb } of this.rows) {
-      if (!light.isRest) set(light.name, rgb);
+      if (!light.isRest) add(light.name, rgb);
       else if (this.data.rest)
         for (const [name, emission] of Object.entries(this.data.rest[this.look]))
-          set(name, /** @type {RGB} */ (emission.map((x, c) => x * rgb[c])));
+          add(name, /** @type {RGB} */ (emission.map((x, c) => x * rgb[c])));
     }
-    for (const { light } of this.rows) if (light.isFixed) set(light.name, [1, 1, 1]);
+    for (const { light } of this.rows) if (light.isFixed) add(light.name, [1, 1, 1]);
     return JSON.stringify(file, null, 2) + '\n';
   }
 

@@ -27,9 +27,9 @@ export function kelvinTable(table) {
     const place = Math.min(last, Math.max(0, (mired - mireds[0]) / step));
     const k = Math.min(last - 1, Math.floor(place));
     const [a, b] = [table[k][1], table[k + 1][1]];
-    const mixed = /** @type {RGB} */ (a.map((x, c) => x + (place - k) * (b[c] - x)));
-    const level = luminance(mixed);
-    return /** @type {RGB} */ (mixed.map((x) => x / level));
+    const blend = /** @type {RGB} */ (a.map((x, c) => x + (place - k) * (b[c] - x)));
+    const level = luminance(blend);
+    return /** @type {RGB} */ (blend.map((x) => x / level));
   };
   return { rgb, coolest: mireds[0], warmest: mireds[last] };
 }
@@ -133,8 +133,8 @@ export class Row {
   reset(look) {
     const { light } = this;
     this.isSolo = this.isMute = false;
-    const other = look === 'answer' ? light.present : light.answer;
-    const lit = [light[look], other].find((rgb) => luminance(rgb) > 0);
+    const otherEmission = look === 'answer' ? light.present : light.answer;
+    const lit = [light[look], otherEmission].find((rgb) => luminance(rgb) > 0);
     this.hue = lit ?? [1, 1, 1];
     this.rgb = light[look];
     this.kelvin = light.kelvin[look];
@@ -180,8 +180,8 @@ function hexOf(rgb) {
   const top = Math.max(...rgb) || 1;
   const codes = rgb.map((x) => {
     const light = x / top;
-    const shown = light <= 0.0031308 ? 12.92 * light : 1.055 * light ** (1 / 2.4) - 0.055;
-    return Math.round(255 * shown);
+    const display = light <= 0.0031308 ? 12.92 * light : 1.055 * light ** (1 / 2.4) - 0.055;
+    return Math.round(255 * display);
   });
   return `rgb(${codes.join(' ')})`;
 }

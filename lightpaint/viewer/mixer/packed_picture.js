@@ -22,19 +22,20 @@ export async function unpacked({ data, dropped, size: [height, width] }) {
 
 /** Return the numbers of one channel. Each is stored as the difference from a prediction by its
  * neighbours.
- * @param {Uint8Array} bytes @param {number} first @param {number} all @param {number} height
+ * @param {Uint8Array} bytes @param {number} first @param {number} numberCount @param {number} height
  * @param {number} width @returns {Int32Array} */
-function unpackPlane(bytes, first, all, height, width) {
+function unpackPlane(bytes, first, numberCount, height, width) {
   const numbers = new Int32Array(height * width);
   for (let y = 0, i = 0; y < height; y++) {
     for (let x = 0; x < width; x++, i++) {
-      const folded = bytes[first + i] | (bytes[all + first + i] << 8);
+      const folded = bytes[first + i] | (bytes[numberCount + first + i] << 8);
       const left = x ? numbers[i - 1] : 0;
       const above = y ? numbers[i - width] : 0;
       const corner = x && y ? numbers[i - width - 1] : 0;
       const [low, high] = left < above ? [left, above] : [above, left];
       const plane = left + above - corner;
-      numbers[i] = ((folded >> 1) ^ -(folded & 1)) + (plane < low ? low : plane > high ? high : plane);
+      numbers[i] =
+        ((folded >> 1) ^ -(folded & 1)) + (plane < low ? low : plane > high ? high : plane);
     }
   }
   return numbers;

@@ -102,7 +102,7 @@ class Fox:
     def seen(self, x: int, y: int) -> list[int]:
         """Codes on the canvas where a pixel of the painting is shown."""
         return self.look(
-            "const { left, top, scale } = screen.panes()[0]; screen.now();"
+            "const { left, top, scale } = screen.panes()[0]; screen.drawNow();"
             f"return Array.from(screen.view.read(Math.floor(left + {x + 0.5} * scale),"
             f" Math.floor(top + {y + 0.5} * scale), 1, 1)).slice(0, 3)"
         )  # type: ignore[no-any-return]

@@ -68,7 +68,7 @@ def run(page: Any, site_of: Any) -> Any:
                 const isThere = await until(() => engine.place && loads.at(-1)[1] === 0);
                 const at = (x, y) => ({{ x, y, pressure: 1 }});
                 const codes = (x, y, side = 0) => {{
-                    engine.screen.now();
+                    engine.screen.drawNow();
                     return Array.from(engine.screen.view.read(x + side * (W + 4), y, 1, 1))
                         .slice(0, 3);
                 }};

@@ -139,7 +139,7 @@ class Person:
     def seen(self, x: int, y: int, pane: int = 0) -> list[int]:
         """Codes on the canvas where a pixel of the picture is shown."""
         return self.look(
-            "const { left, top, scale } = screen.panes()[given[2]]; screen.now();"
+            "const { left, top, scale } = screen.panes()[given[2]]; screen.drawNow();"
             "const at = [left + (given[0] + 0.5) * scale, top + (given[1] + 0.5) * scale];"
             "return Array.from(screen.view.read(Math.floor(at[0]), Math.floor(at[1]), 1, 1))"
             ".slice(0, 3)",

@@ -32,13 +32,13 @@ export function stamp(canvas, { x, y, pressure }, { size, hardness, flow }) {
   const region = canvas.clipped(y - reach, y + reach, x - reach, x + reach);
   const strength = flow * pressure;
   const inner = hardness * Math.max(0, radius - 0.5);
-  const [most, least] = [(radius + 0.5 * hardness) ** 2, inner ** 2];
-  canvas.cover(region, (column, row, before) => {
+  const [outer2, inner2] = [(radius + 0.5 * hardness) ** 2, inner ** 2];
+  canvas.cover(region, (column, row, coverage) => {
     const [dx, dy] = [column + 0.5 - x, row + 0.5 - y];
     const square = dx * dx + dy * dy;
-    if (square >= most) return before;
-    const covered = square <= least ? 1 : profile(Math.sqrt(square), radius, hardness);
-    return before + strength * covered * (1 - before);
+    if (square >= outer2) return coverage;
+    const covered = square <= inner2 ? 1 : profile(Math.sqrt(square), radius, hardness);
+    return coverage + strength * covered * (1 - coverage);
   });
   return region;
 }
@@ -58,18 +58,18 @@ export class Path {
 
   /** Continue the path to a point. @param {Point} point @returns {Region[]} what is covered anew */
   moveTo(point) {
-    const from = this.last ?? point;
-    const length = Math.hypot(point.x - from.x, point.y - from.y);
+    const origin = this.last ?? point;
+    const length = Math.hypot(point.x - origin.x, point.y - origin.y);
     const regions = [];
     // The tolerance lets steps with round-off reach the end.
     for (; this.left <= length + 1e-6; this.left += this.step) {
       const t = length > 0 ? this.left / length : 0;
-      const between = {
-        x: from.x + t * (point.x - from.x),
-        y: from.y + t * (point.y - from.y),
-        pressure: from.pressure + t * (point.pressure - from.pressure),
+      const position = {
+        x: origin.x + t * (point.x - origin.x),
+        y: origin.y + t * (point.y - origin.y),
+        pressure: origin.pressure + t * (point.pressure - origin.pressure),
       };
-      regions.push(stamp(this.canvas, between, this.brush));
+      regions.push(stamp(this.canvas, position, this.brush));
     }
     this.left -= length;
     this.last = point;
@@ -83,10 +83,10 @@ export function fill(canvas, object, flow) {
   const { objects, width } = canvas;
   const region = objects ? boundsOf(objects, width, object) : canvas.whole;
   let count = 0;
-  canvas.cover(region, (x, y, before) => {
+  canvas.cover(region, (x, y, coverage) => {
     const isIn = !objects || objects[y * width + x] === object;
     if (isIn) count += 1;
-    return isIn ? before + flow * (1 - before) : before;
+    return isIn ? coverage + flow * (1 - coverage) : coverage;
   });
   canvas.covers(count / canvas.importance.length);
   return region;

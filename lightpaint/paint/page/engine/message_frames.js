@@ -53,22 +53,23 @@ const DTYPES = {
 };
 
 /** Description of the bytes of an array.
- * @param {string} dtype @param {number[]} shape @param {ArrayBuffer} buffer @param {number} at
+ * @param {string} dtype @param {number[]} shape @param {ArrayBuffer} buffer @param {number} offset
  * @returns {Picture} */
-export function pictureOf(dtype, shape, buffer, at = 0) {
-  const made = DTYPES[dtype];
+export function pictureOf(dtype, shape, buffer, offset = 0) {
+  const ArrayType = DTYPES[dtype];
   const length = shape.reduce((a, b) => a * b, 1);
-  if (!made) throw new Error(`an array of ${dtype}: expected ${Object.keys(DTYPES).join(', ')}`);
-  if (at + length * made.BYTES_PER_ELEMENT > buffer.byteLength)
+  if (!ArrayType)
+    throw new Error(`an array of ${dtype}: expected ${Object.keys(DTYPES).join(', ')}`);
+  if (offset + length * ArrayType.BYTES_PER_ELEMENT > buffer.byteLength)
     throw new Error(`${buffer.byteLength} bytes are no array of shape ${shape.join(' × ')}`);
-  return { data: new made(buffer, at, length), shape };
+  return { data: new ArrayType(buffer, offset, length), shape };
 }
 
 /** Element type of an array. Halves travel from session to page only.
  * @param {Data} data */
 export function dtypeOf(data) {
-  for (const [name, made] of Object.entries(DTYPES))
-    if (name !== 'float16' && data instanceof made) return name;
+  for (const [name, ArrayType] of Object.entries(DTYPES))
+    if (name !== 'float16' && data instanceof ArrayType) return name;
   throw new Error('an array that no message holds');
 }
 
@@ -86,20 +87,22 @@ export function bufferInfo(arrays) {
  * @param {Record<string, unknown>} content @param {Arrays} [arrays]
  * @returns {ArrayBuffer} */
 export function frame(content, arrays = {}) {
-  const text = new TextEncoder().encode(JSON.stringify({ ...content, buffers: bufferInfo(arrays) }));
+  const text = new TextEncoder().encode(
+    JSON.stringify({ ...content, buffers: bufferInfo(arrays) }),
+  );
   const pictures = Object.values(arrays);
   const start = padded(4 + text.length);
-  const size = pictures.reduce((at, { data }) => at + padded(data.byteLength), start);
-  const made = new ArrayBuffer(size);
-  new DataView(made).setUint32(0, text.length, true);
-  const bytes = new Uint8Array(made);
+  const size = pictures.reduce((offset, { data }) => offset + padded(data.byteLength), start);
+  const buffer = new ArrayBuffer(size);
+  new DataView(buffer).setUint32(0, text.length, true);
+  const bytes = new Uint8Array(buffer);
   bytes.set(text, 4);
-  let at = start;
+  let place = start;
   for (const { data } of pictures) {
-    bytes.set(new Uint8Array(data.buffer, data.byteOffset, data.byteLength), at);
-    at += padded(data.byteLength);
+    bytes.set(new Uint8Array(data.buffer, data.byteOffset, data.byteLength), place);
+    place += padded(data.byteLength);
   }
-  return made;
+  return buffer;
 }
 
 /** Decode a binary frame. Throws if it is not one.
@@ -112,14 +115,14 @@ export function unframe(buffer) {
 }
 
 /** Decode a message whose buffers are consecutive, each padded.
- * @param {Record<string, any>} content @param {ArrayBuffer} buffer @param {number} at
+ * @param {Record<string, any>} content @param {ArrayBuffer} buffer @param {number} offset
  * @returns {Message} */
-function withArrays(content, buffer, at) {
+function withArrays(content, buffer, offset) {
   /** @type {Arrays} */
   const arrays = {};
   for (const { name, dtype, shape } of /** @type {About[]} */ (content.buffers ?? [])) {
-    arrays[name] = pictureOf(dtype, shape, buffer, at);
-    at += padded(arrays[name].data.byteLength);
+    arrays[name] = pictureOf(dtype, shape, buffer, offset);
+    offset += padded(arrays[name].data.byteLength);
   }
   return { ...content, kind: String(content.kind), arrays };
 }

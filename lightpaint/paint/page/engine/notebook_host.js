@@ -37,7 +37,7 @@ export class ModelHost extends Emitter {
     model.on('msg:custom', this.onContent);
     // A comm is open from the start and can only close, for example when the kernel restarts. Later
     // messages are lost.
-    this.end = () => this.ended();
+    this.end = () => this.handleEnd();
     model.on('comm_live_update', this.end);
     this.isOver = false;
     this.isSilent = false;
@@ -80,10 +80,10 @@ export class ModelHost extends Emitter {
   /** Wait for the next answer, if one is pending. A busy kernel answers late; one that has ended
    * never answers, and the model may not learn of it. A message older than an answered one may have
    * been lost, which says nothing about the kernel.
-   * @param {number} answered */
-  listen(answered) {
+   * @param {number} answeredSeq */
+  listen(answeredSeq) {
     clearTimeout(this.timer);
-    const isWaiting = [...this.asked.keys()].some((seq) => seq > answered);
+    const isWaiting = [...this.asked.keys()].some((seq) => seq > answeredSeq);
     this.timer = isWaiting ? setTimeout(() => this.hush(true), SILENCE_MS) : undefined;
   }
 
@@ -94,7 +94,7 @@ export class ModelHost extends Emitter {
   }
 
   /** Handle the end of the kernel. */
-  ended() {
+  handleEnd() {
     this.leave(ENDED_TEXT);
     this.hush(false);
     this.emit('closed', { kind: 'closed', reason: 'ended', text: ENDED_TEXT });

@@ -68,10 +68,10 @@ export class PaintCanvas {
    * @param {number} top @param {number} bottom @param {number} left @param {number} right
    * @returns {Region} */
   clipped(top, bottom, left, right) {
-    const within = (/** @type {number} */ x, /** @type {number} */ most) =>
-      Math.min(most, Math.max(0, x));
-    const [y0, x0] = [within(Math.floor(top), this.height), within(Math.floor(left), this.width)];
-    const [y1, x1] = [within(Math.ceil(bottom), this.height), within(Math.ceil(right), this.width)];
+    const clamp = (/** @type {number} */ x, /** @type {number} */ maximum) =>
+      Math.min(maximum, Math.max(0, x));
+    const [y0, x0] = [clamp(Math.floor(top), this.height), clamp(Math.floor(left), this.width)];
+    const [y1, x1] = [clamp(Math.ceil(bottom), this.height), clamp(Math.ceil(right), this.width)];
     return [y0, Math.max(y0, y1), x0, Math.max(x0, x1)];
   }
 
@@ -97,8 +97,8 @@ export class PaintCanvas {
    * rest was held.
    */
   coversAll() {
-    const painted = this.importance.reduce((sum, x) => sum + x, 0);
-    this.lift = this.isAll ? 1 : accent(painted / this.importance.length);
+    const total = this.importance.reduce((sum, x) => sum + x, 0);
+    this.lift = this.isAll ? 1 : accent(total / this.importance.length);
     this.covers(1);
   }
 
@@ -107,7 +107,7 @@ export class PaintCanvas {
    * how far a pixel is covered from now on */
   cover(region, cover) {
     this.region = union(this.region, region);
-    this.each(region, true, (tile, q, p, x, y) => {
+    this.visitTiles(region, true, (tile, q, p, x, y) => {
       tile.coverage[q] = cover(x, y, tile.coverage[q]);
     });
   }
@@ -116,7 +116,7 @@ export class PaintCanvas {
   uncover() {
     const { region } = this;
     if (region)
-      this.each(region, false, (tile, q, p) => {
+      this.visitTiles(region, false, (tile, q, p) => {
         this.restore(tile, q, p);
         tile.coverage[q] = 0;
       });
@@ -128,7 +128,7 @@ export class PaintCanvas {
   apply(region, effect) {
     const change = pixelChange(this, effect);
     const { importance, image, present } = this;
-    this.each(region, false, (tile, q, p) => {
+    this.visitTiles(region, false, (tile, q, p) => {
       const covered = tile.coverage[q];
       if (covered <= 0) return;
       change(tile, q, p, covered);
@@ -156,13 +156,13 @@ export class PaintCanvas {
    * @param {Float32Array} importance */
   set([top, bottom, left, right], image, importance) {
     const width = right - left;
-    for (let y = top, from = 0; y < bottom; y++, from += width) {
-      const to = y * this.width + left;
-      this.image.set(image.subarray(3 * from, 3 * (from + width)), 3 * to);
-      this.importance.set(importance.subarray(from, from + width), to);
+    for (let y = top, source = 0; y < bottom; y++, source += width) {
+      const destination = y * this.width + left;
+      this.image.set(image.subarray(3 * source, 3 * (source + width)), 3 * destination);
+      this.importance.set(importance.subarray(source, source + width), destination);
     }
     if (this.tiles)
-      this.each([top, bottom, left, right], false, (tile, q, p) => {
+      this.visitTiles([top, bottom, left, right], false, (tile, q, p) => {
         this.keep(tile, q, p);
         tile.coverage[q] = 0;
       });
@@ -181,7 +181,7 @@ export class PaintCanvas {
   /** @param {Tile} tile */
   follow(tile) {
     const region = this.clipped(tile.top, tile.top + TILE, tile.left, tile.left + TILE);
-    this.each(region, false, (_, q, p) => {
+    this.visitTiles(region, false, (_, q, p) => {
       if (!tile.importance[q])
         for (let c = 0; c < 3; c++) tile.image[3 * q + c] = VALUES[this.present[3 * p + c]];
     });
@@ -192,10 +192,10 @@ export class PaintCanvas {
     const [height, width] = [bottom - top, right - left];
     const image = new Float32Array(3 * height * width);
     const importance = new Float32Array(height * width);
-    for (let y = top, to = 0; y < bottom; y++, to += width) {
-      const from = y * this.width + left;
-      image.set(this.image.subarray(3 * from, 3 * (from + width)), 3 * to);
-      importance.set(this.importance.subarray(from, from + width), to);
+    for (let y = top, destination = 0; y < bottom; y++, destination += width) {
+      const source = y * this.width + left;
+      image.set(this.image.subarray(3 * source, 3 * (source + width)), 3 * destination);
+      importance.set(this.importance.subarray(source, source + width), destination);
     }
     return {
       image: { data: image, shape: [height, width, 3] },
@@ -215,13 +215,13 @@ export class PaintCanvas {
    * @param {Region} region @param {boolean} isNew
    * @param {(tile: Tile, q: number, p: number, x: number, y: number) => void} visit q: place in
    * the tile, p: in the picture */
-  each([top, bottom, left, right], isNew, visit) {
+  visitTiles([top, bottom, left, right], isNew, visit) {
     const { tiles } = this;
     if (!tiles) return;
-    const across = Math.ceil(this.width / TILE);
+    const tilesPerRow = Math.ceil(this.width / TILE);
     for (let row = Math.floor(top / TILE); row * TILE < bottom; row++)
       for (let column = Math.floor(left / TILE); column * TILE < right; column++) {
-        const key = row * across + column;
+        const key = row * tilesPerRow + column;
         const tile = tiles.get(key) ?? (isNew ? this.tile(row * TILE, column * TILE) : null);
         if (!tile) continue;
         tiles.set(key, tile);

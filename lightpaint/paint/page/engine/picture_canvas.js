@@ -44,16 +44,16 @@ export class Screen {
 
   /** Start a view for pictures of a size and a number of lights.
    * @param {[height: number, width: number]} size @param {number} count
-   * @param {'gl' | 'cpu' | null} [which] */
-  begin(size, count, which = this.options.view ?? null) {
+   * @param {'gl' | 'cpu' | null} [viewName] */
+  begin(size, count, viewName = this.options.view ?? null) {
     clearTimeout(this.waiting);
     this.view?.close();
     this.view?.canvas.remove();
     this.size = size;
     this.count = count;
     const onRestored = () => this.restored(view);
-    const view = chooseView(this.element, size, count, { view: which, onRestored });
-    view.canvas.addEventListener('webglcontextlost', () => this.lost(view));
+    const view = chooseView(this.element, size, count, { view: viewName, onRestored });
+    view.canvas.addEventListener('webglcontextlost', () => this.handleLoss(view));
     this.view = view;
     this.fit();
   }
@@ -66,7 +66,7 @@ export class Screen {
 
   /** Handle the loss of the GPU: continue without it if it does not come back.
    * @param {PictureView} view */
-  lost(view) {
+  handleLoss(view) {
     // A closed view releases its context, and its event arrives after the next view has started.
     if (view !== this.view) return;
     clearTimeout(this.waiting);
@@ -103,7 +103,7 @@ export class Screen {
     );
     if (canvas.width !== width) canvas.width = width;
     if (canvas.height !== height) canvas.height = height;
-    this.now();
+    this.drawNow();
   }
 
   /** Device pixels per CSS pixel. */
@@ -124,7 +124,7 @@ export class Screen {
       this.isLive = true;
       this.wait();
     }
-    this.frame ||= requestAnimationFrame(() => this.now());
+    this.frame ||= requestAnimationFrame(() => this.drawNow());
   }
 
   /** Draw sharply after a pause. */
@@ -137,12 +137,12 @@ export class Screen {
     }, REST);
   }
 
-  now() {
+  drawNow() {
     cancelAnimationFrame(this.frame);
     this.frame = 0;
     const { left, right } = this.params;
-    const shown = { left: this.standIn(left), right: this.standIn(right) };
-    this.view?.draw({ ...this.params, ...shown, live: this.isLive });
+    const kinds = { left: this.standIn(left), right: this.standIn(right) };
+    this.view?.draw({ ...this.params, ...kinds, live: this.isLive });
   }
 
   /** Return the picture shown in place of another.

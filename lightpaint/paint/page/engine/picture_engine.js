@@ -36,8 +36,8 @@ export function openHost() {
 /** @param {Host} host @param {{view?: 'gl' | 'cpu' | null}} [options]
  * @returns {PictureEngine} */
 export function openEngine(host, options = {}) {
-  const asked = new URLSearchParams(location.search).get('view');
-  const view = options.view ?? (asked === 'gl' || asked === 'cpu' ? asked : null);
+  const parameter = new URLSearchParams(location.search).get('view');
+  const view = options.view ?? (parameter === 'gl' || parameter === 'cpu' ? parameter : null);
   return new PictureEngine(host, { view });
 }
 
@@ -99,7 +99,7 @@ export class PictureEngine extends Emitter {
    * @param {number} y
    * @returns {RGB} */
   lightAt(kind, x, y) {
-    const place = this.within(x, y);
+    const place = this.pixelAt(x, y);
     return place && this.screen.view ? this.screen.view.lightAt(kind, ...place) : [0, 0, 0];
   }
 
@@ -108,12 +108,12 @@ export class PictureEngine extends Emitter {
    * @param {Kind} kind @param {number} x @param {number} y @param {RGB} [light] that light, where it
    * is known: the GPU is waited for else @returns {RGB} */
   paintAt(kind, x, y, light = this.lightAt(kind, x, y)) {
-    const place = this.within(x, y);
+    const place = this.pixelAt(x, y);
     const { albedo, width } = this.mirror.canvas ?? {};
     if (this.tool.as === 'colour' || !place || !albedo || !width) return light;
-    const at = 3 * (place[1] * width + place[0]);
+    const index = 3 * (place[1] * width + place[0]);
     return /** @type {RGB} */ (
-      light.map((x, c) => x / Math.max(MIN_ALBEDO, VALUES[albedo[at + c]]))
+      light.map((x, c) => x / Math.max(MIN_ALBEDO, VALUES[albedo[index + c]]))
     );
   }
 
@@ -122,17 +122,17 @@ export class PictureEngine extends Emitter {
    * @param {number} x @param {number} y
    * @returns {{object: string | null, index: number, shares: number[]} | null} */
   pointed(x, y) {
-    const place = this.within(x, y);
+    const place = this.pixelAt(x, y);
     const { canvas, state, weights } = this.mirror;
     if (!place || !this.screen.view || !canvas || !state) return null;
-    const light = this.screen.view.planesAt(...place).map((one, i) => one * weights[i]);
+    const light = this.screen.view.planesAt(...place).map((value, i) => value * weights[i]);
     const levels = Array.from({ length: weights.length / 3 }, (_, k) =>
       Math.max(0, luminance(light.subarray(3 * k, 3 * k + 3))),
     );
-    const whole = levels.reduce((a, b) => a + b, 0);
+    const total = levels.reduce((a, b) => a + b, 0);
     const index = canvas.objectAt(...place);
     const object = state.objects?.[index] ?? null;
-    return { object, index, shares: levels.map((level) => (whole > 0 ? level / whole : 0)) };
+    return { object, index, shares: levels.map((level) => (total > 0 ? level / total : 0)) };
   }
 
   /** Return the object index of each pixel, once known.
@@ -158,7 +158,7 @@ export class PictureEngine extends Emitter {
   }
 
   /** @param {number} x @param {number} y @returns {[number, number] | null} */
-  within(x, y) {
+  pixelAt(x, y) {
     const [height, width] = this.screen.size;
     const [column, row] = [Math.floor(x), Math.floor(y)];
     return column >= 0 && row >= 0 && column < width && row < height ? [column, row] : null;
@@ -192,13 +192,13 @@ export class PictureEngine extends Emitter {
     this.stroke = new Stroke(place.canvas, this.tool, point, scale);
     this.mirror.isPainting = this.screen.isHeld = true;
     place.strokes.begin();
-    this.touched(this.stroke.begin());
+    this.drawChange(this.stroke.begin());
   }
 
   /** @param {Point[]} points */
   move(points) {
     if (!this.stroke) return;
-    this.touched(this.stroke.move(points));
+    this.drawChange(this.stroke.move(points));
     if (this.stroke.settings.tool === 'adjust') this.emit('asking', this.stroke.asked);
   }
 
@@ -207,7 +207,7 @@ export class PictureEngine extends Emitter {
     if (!stroke || !place) return;
     const { stops, mired } = stroke.asked;
     if (stroke.settings.tool === 'adjust' && !stops && !mired) return void this.cancel();
-    this.ended();
+    this.clearStroke();
     place.canvas.end();
     place.strokes.end(LABELS[stroke.settings.tool]);
   }
@@ -216,7 +216,7 @@ export class PictureEngine extends Emitter {
   cancel() {
     const { stroke, place } = this;
     if (!stroke || !place) return false;
-    this.ended();
+    this.clearStroke();
     const region = place.canvas.drop();
     place.strokes.drop();
     if (region) this.mirror.redraw([region]);
@@ -227,37 +227,37 @@ export class PictureEngine extends Emitter {
    * it. */
   dropStroke() {
     if (!this.stroke) return;
-    this.ended();
+    this.clearStroke();
     const region = this.mirror.canvas?.drop();
     if (region) this.mirror.redraw([region]);
   }
 
-  ended() {
+  clearStroke() {
     this.stroke = null;
     this.mirror.isPainting = this.screen.isHeld = false;
   }
 
-  /** Draw a whole straight stroke. @param {Point} from @param {Point} to */
-  line(from, to) {
-    this.begin(from);
-    this.move([to]);
+  /** Draw a whole straight stroke. @param {Point} start @param {Point} end */
+  line(start, end) {
+    this.begin(start);
+    this.move([end]);
     this.end();
   }
 
   /** Make an object, or for null everything, brighter and warmer.
-   * @param {{stops: number, mired: number, object: number | null}} asked */
-  adjust(asked) {
+   * @param {{stops: number, mired: number, object: number | null}} adjustment */
+  adjust(adjustment) {
     if (this.stroke) this.end();
     const { place } = this;
     if (!place || place.strokes.isTaken) return;
     place.strokes.begin();
-    this.touched([adjustArea(place.canvas, asked)]);
+    this.drawChange([adjustArea(place.canvas, adjustment)]);
     place.canvas.end();
     place.strokes.end(LABELS.adjust);
   }
 
   /** @param {Region[]} regions */
-  touched(regions) {
+  drawChange(regions) {
     this.mirror.redraw(regions);
     const region = regions.reduce((a, b) => /** @type {Region} */ (union(a, b)), regions[0]);
     if (region) this.mirror.strokes?.touch(region);

@@ -56,9 +56,9 @@ export class PictureLoader {
 
   /** Set the wanted pictures of slots, and keep them up to date. Fetching begins once all are
    * named, since it could otherwise fetch a slot's earlier picture.
-   * @param {[slot: string, name: string | null][]} named null for none any more */
-  want(named) {
-    for (const [slot, name] of named)
+   * @param {[slot: string, name: string | null][]} names null for none any more */
+  want(names) {
+    for (const [slot, name] of names)
       if (name === null) this.wanted.delete(slot);
       else this.wanted.set(slot, name);
     this.pump();
@@ -70,9 +70,9 @@ export class PictureLoader {
   }
 
   /** Forget the pictures in slots, which the view has lost.
-   * @param {(slot: string) => boolean} [which] */
-  forget(which = () => true) {
-    for (const slot of [...this.there.keys()]) if (which(slot)) this.there.delete(slot);
+   * @param {(slot: string) => boolean} [isLost] */
+  forget(isLost = () => true) {
+    for (const slot of [...this.there.keys()]) if (isLost(slot)) this.there.delete(slot);
   }
 
   /** Return the slots without their wanted picture. */

@@ -17,22 +17,22 @@ const COMMON = ['present', 'albedo', 'objects', 'verified', 'beyond'];
 /**
  * Return the name of the picture for each slot, null for none: clean planes where there are any and
  * they are shown, else raw ones.
- * @param {number} count of lights @param {Show | null} shown @param {number} view
+ * @param {number} count of lights @param {Show | null} show @param {number} view
  * @param {Record<string, number>} resources
  * @returns {[slot: string, name: string | null][]}
  */
-export function wantedPictures(count, shown, view, resources) {
-  const isClean = shown?.clean ?? true;
+export function wantedPictures(count, show, view, resources) {
+  const isClean = show?.clean ?? true;
   /** @type {[slot: string, name: string | null][]} */
-  const wanted = COMMON.map((name) => [name, inView(name, view)]);
+  const names = COMMON.map((name) => [name, inView(name, view)]);
   for (let k = 0; k < count; k++) {
     const clean = inView(`clean/${k}`, view);
     const isThere = isClean && clean in resources;
-    wanted.push([`plane ${k}`, isThere ? clean : inView(`plane/${k}`, view)]);
+    names.push([`plane ${k}`, isThere ? clean : inView(`plane/${k}`, view)]);
   }
-  const transform = shown?.transform ?? 'srgb';
-  wanted.push(['lut', transform === 'srgb' ? null : `lut/${transform}`]);
-  return wanted;
+  const transform = show?.transform ?? 'srgb';
+  names.push(['lut', transform === 'srgb' ? null : `lut/${transform}`]);
+  return names;
 }
 
 /** Return the size of each view, as text to compare. @param {Message} state */

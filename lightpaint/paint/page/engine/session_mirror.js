@@ -26,7 +26,7 @@ export class SessionMirror {
     this.emit = emit;
     this.loader = new PictureLoader(
       host,
-      (slot, name, picture) => this.loaded(slot, name, picture),
+      (slot, name, picture) => this.takePicture(slot, name, picture),
       (done, total, isFirst) => emit('loading', { done, total, isFirst }),
     );
     /** The last state from the session, and its part for the current view.
@@ -59,7 +59,7 @@ export class SessionMirror {
     /** Whether a stroke is in progress. */
     this.isPainting = false;
     host.on('state', (message) => this.begin(message));
-    host.on('answer', (message) => this.answered(message));
+    host.on('answer', (message) => this.takeAnswer(message));
     host.on('patch', (message) => this.patched(message));
     host.on('closed', () => this.loader.hold());
     host.on('renewed', ({ resources }) => {
@@ -92,15 +92,15 @@ export class SessionMirror {
 
   /** @param {Message} message @param {number} view */
   open(message, view) {
-    const before = this.state;
+    const previous = this.state;
     const state = stateOfView(message, view);
-    const isOther = !before || !this.latestState || sizes(this.latestState) !== sizes(message);
+    const isOther = !previous || !this.latestState || sizes(this.latestState) !== sizes(message);
     const isSame = !isOther && this.view === view;
     this.latestState = message;
     this.state = state;
     this.view = view;
     if (isSame) {
-      if (before?.lights.length !== state.lights.length) this.setLights(state.lights.length);
+      if (previous?.lights.length !== state.lights.length) this.setLights(state.lights.length);
       return;
     }
     const [height, width] = /** @type {[number, number]} */ (state.size);
@@ -109,9 +109,9 @@ export class SessionMirror {
     if (isOther || !this.strokes) {
       const refused = () => this.host.send('hello', { version: VERSION }).catch(() => {});
       this.strokes?.close();
-      const lost = (/** @type {number} */ count, /** @type {boolean} */ isStale) =>
+      const reportLoss = (/** @type {number} */ count, /** @type {boolean} */ isStale) =>
         this.emit('lost', { count, isStale });
-      this.strokes = new StrokeSender(this.host, refused, lost);
+      this.strokes = new StrokeSender(this.host, refused, reportLoss);
       this.strokes.count = Math.max(0, Number(state.stroke) || 0);
     }
     this.strokes.paintOn(this.canvas, view);
@@ -132,7 +132,7 @@ export class SessionMirror {
 
   /** Take the weights of an answer or a patch, unless a later message has arrived already.
    * @param {Message} message */
-  answered(message) {
+  takeAnswer(message) {
     if (message.version < this.version) return;
     this.version = message.version ?? this.version;
     this.mix(message);
@@ -154,7 +154,7 @@ export class SessionMirror {
   /** @param {Message} message */
   patched(message) {
     const { canvas, strokes } = this;
-    this.answered(message);
+    this.takeAnswer(message);
     const { image, importance } = message.arrays;
     const isOwn = strokes?.isDropping;
     if (strokes) strokes.isDropping = false;
@@ -215,7 +215,7 @@ export class SessionMirror {
   }
 
   /** @param {string} slot @param {string} name @param {Picture} picture */
-  loaded(slot, name, picture) {
+  takePicture(slot, name, picture) {
     const { view } = this.screen;
     const { canvas, state } = this;
     if (!view || !canvas || !state) return;
@@ -266,12 +266,12 @@ export class SessionMirror {
 
   /** @param {Show} show */
   show(show) {
-    const before = this.shown;
+    const previous = this.shown;
     this.shown = show;
     this.screen.params = { ...show, live: false };
-    if (before?.transform !== show.transform || before?.clean !== show.clean) this.want();
+    if (previous?.transform !== show.transform || previous?.clean !== show.clean) this.want();
     this.weigh();
-    if (showsPresent(show) !== showsPresent(before)) this.showPresent();
+    if (showsPresent(show) !== showsPresent(previous)) this.showPresent();
     this.screen.request();
   }
 

@@ -115,14 +115,14 @@ export class SocketHost extends Emitter {
     };
     socket.onmessage = ({ data }) => this.receive(unframe(data));
     socket.onclose = () => {
-      this.dropped(socket);
+      this.handleDrop(socket);
       // Browsers do not tell a page why a socket was refused.
       if (!wasOpen && !this.isOver) void this.askWhy();
     };
   }
 
   /** @param {WebSocket} socket */
-  dropped(socket) {
+  handleDrop(socket) {
     if (socket !== this.socket) return;
     this.socket = null;
     const error = new Error('the connection to the painter is lost');

@@ -93,25 +93,25 @@ export class Stroke {
     return this.applied(points.flatMap((point) => this.path.moveTo(point)));
   }
 
-  /** Draw a straight line from the start. @param {Point} to @returns {Region[]} */
-  line(to) {
+  /** Draw a straight line from the start. @param {Point} end @returns {Region[]} */
+  line(end) {
     const { canvas, settings, start } = this;
-    const before = canvas.uncover();
+    const uncovered = canvas.uncover();
     canvas.region = null;
     const path = new Path(canvas, settings);
     // The last stamp is at the end of the line.
-    const length = Math.hypot(to.x - start.x, to.y - start.y);
+    const length = Math.hypot(end.x - start.x, end.y - start.y);
     path.step = length / Math.max(1, Math.ceil(length / path.step)) || path.step;
-    const ends = [start, to].map((point) => path.moveTo({ ...point, pressure: 1 }));
+    const ends = [start, end].map((point) => path.moveTo({ ...point, pressure: 1 }));
     const regions = ends.flat();
-    return [...(before ? [before] : []), ...this.applied(regions)];
+    return [...(uncovered ? [uncovered] : []), ...this.applied(regions)];
   }
 
-  /** @param {Point} to @returns {Region[]} */
-  adjust(to) {
+  /** @param {Point} point @returns {Region[]} */
+  adjust(point) {
     const { start, scale, canvas } = this;
-    const stops = ((start.y - to.y) * scale) / DRAG.stop;
-    const mired = ((to.x - start.x) * scale) / DRAG.mired;
+    const stops = ((start.y - point.y) * scale) / DRAG.stop;
+    const mired = ((point.x - start.x) * scale) / DRAG.mired;
     this.asked = { stops: Math.min(MAX_STOPS, Math.max(-MAX_STOPS, stops)), mired };
     this.effect = adjustment(this.asked.stops, mired);
     return this.applied(canvas.region ? [canvas.region] : []);
@@ -146,9 +146,9 @@ function effectOf(canvas, settings) {
  * be computed several times. @param {Region[]} regions @returns {Region[]} */
 function merged(regions) {
   /** @type {Region[]} */
-  const made = [];
+  const mergedRegions = [];
   for (const region of regions) {
-    const last = made.at(-1);
+    const last = mergedRegions.at(-1);
     const isNear =
       last &&
       region[0] < last[1] &&
@@ -158,13 +158,13 @@ function merged(regions) {
     if (
       last &&
       isNear &&
-      made.length > 0 &&
+      mergedRegions.length > 0 &&
       area(around(last, region)) < 2 * area(last) + area(region)
     )
-      made[made.length - 1] = around(last, region);
-    else made.push(region);
+      mergedRegions[mergedRegions.length - 1] = around(last, region);
+    else mergedRegions.push(region);
   }
-  return made;
+  return mergedRegions;
 }
 
 /** @param {Region} a @param {Region} b @returns {Region} */

@@ -24,17 +24,17 @@ const [MIN, MAX] = [0.01, 1000];
 /** Multiply importance within these bounds. A value beyond them already stays.
  * @param {number} importance @param {number} times */
 function scaledImportance(importance, times) {
-  const least = Math.min(MIN, importance);
-  return Math.min(Math.max(MAX, importance), Math.max(least, importance * times));
+  const minimum = Math.min(MIN, importance);
+  return Math.min(Math.max(MAX, importance), Math.max(minimum, importance * times));
 }
 
 /** Make light brighter and warmer. The gain alone decides the luminance, whatever the colour.
  * @param {Float64Array} light changed @param {WholeAdjustment} by */
 function adjust(light, { gain, tint }) {
-  const before = luminance(light);
+  const oldLevel = luminance(light);
   for (let c = 0; c < 3; c++) light[c] *= tint[c];
-  const after = luminance(light);
-  const level = after > 0 ? (gain * before) / after : gain;
+  const newLevel = luminance(light);
+  const level = newLevel > 0 ? (gain * oldLevel) / newLevel : gain;
   for (let c = 0; c < 3; c++) light[c] *= level;
 }
 
@@ -44,26 +44,34 @@ function adjust(light, { gain, tint }) {
 export function pixelChange(canvas, effect) {
   const { image, importance, present, albedo } = canvas;
   /** @type {(tile: Tile, q: number, p: number, covered: number, to: (c: number) => number) => void} */
-  const towards = (tile, q, p, covered, to) => {
+  const blend = (tile, q, p, covered, target) => {
     for (let c = 0; c < 3; c++) {
-      const before = tile.image[3 * q + c];
-      image[3 * p + c] = before + covered * (to(c) - before);
+      const value = tile.image[3 * q + c];
+      image[3 * p + c] = value + covered * (target(c) - value);
     }
   };
   const { full, lift } = canvas;
   const pixel = new Float64Array(3); // reused for all pixels, for speed
   /** @type {(tile: Tile, q: number, p: number, covered: number) => void} */
   const count = (tile, q, p, covered) => {
-    const before = scaledImportance(tile.importance[q], lift);
-    importance[p] = before < full ? before + covered * (full - before) : before;
+    const weight = scaledImportance(tile.importance[q], lift);
+    importance[p] = weight < full ? weight + covered * (full - weight) : weight;
   };
   switch (effect.kind) {
     case 'paint': {
       const { rgb } = effect;
-      const on = effect.as === 'light' ? albedo : null;
+      const reflectance = effect.as === 'light' ? albedo : null;
       return (tile, q, p, covered) => {
-        if (on && !VALUES[on[3 * p]] && !VALUES[on[3 * p + 1]] && !VALUES[on[3 * p + 2]]) return;
-        towards(tile, q, p, covered, (c) => (on ? VALUES[on[3 * p + c]] * rgb[c] : rgb[c]));
+        if (
+          reflectance &&
+          !VALUES[reflectance[3 * p]] &&
+          !VALUES[reflectance[3 * p + 1]] &&
+          !VALUES[reflectance[3 * p + 2]]
+        )
+          return;
+        blend(tile, q, p, covered, (c) =>
+          reflectance ? VALUES[reflectance[3 * p + c]] * rgb[c] : rgb[c],
+        );
         count(tile, q, p, covered);
       };
     }
@@ -73,25 +81,25 @@ export function pixelChange(canvas, effect) {
         return (tile, q, p, covered) => {
           for (let c = 0; c < 3; c++) pixel[c] = VALUES[present[3 * p + c]];
           adjust(pixel, ground);
-          towards(tile, q, p, covered, (c) => pixel[c]);
+          blend(tile, q, p, covered, (c) => pixel[c]);
           importance[p] = tile.importance[q] + covered * (1 - tile.importance[q]);
         };
       return (tile, q, p, covered) => {
-        towards(tile, q, p, covered, (c) => VALUES[present[3 * p + c]]);
+        blend(tile, q, p, covered, (c) => VALUES[present[3 * p + c]]);
         importance[p] = tile.importance[q] * (1 - covered);
       };
     }
     case 'weigh':
       return (tile, q, p, covered) => {
-        towards(tile, q, p, 0, () => 0);
-        const before = tile.importance[q];
-        importance[p] = before + covered * (scaledImportance(before || 1, effect.times) - before);
+        blend(tile, q, p, 0, () => 0);
+        const weight = tile.importance[q];
+        importance[p] = weight + covered * (scaledImportance(weight || 1, effect.times) - weight);
       };
     case 'adjust':
       return (tile, q, p, covered) => {
         for (let c = 0; c < 3; c++) pixel[c] = tile.image[3 * q + c];
         adjust(pixel, effect);
-        towards(tile, q, p, covered, (c) => pixel[c]);
+        blend(tile, q, p, covered, (c) => pixel[c]);
         count(tile, q, p, covered);
       };
   }

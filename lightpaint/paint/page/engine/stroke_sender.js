@@ -21,15 +21,15 @@ import { union } from '../../../viewer/drawing/cpu_picture.js';
 export class StrokeSender {
   /** @param {import("./socket_host.js").Host} host
    * @param {() => void} [refused] hears that the session has not taken a stroke
-   * @param {(count: number, isStale: boolean) => void} [lost] hears how many strokes are not sent
+   * @param {(count: number, isStale: boolean) => void} [onLoss] hears how many strokes are not sent
    * any more, since another page had the session in between; stale: since it is there no more */
-  constructor(host, refused = () => {}, lost = () => {}) {
+  constructor(host, refused = () => {}, onLoss = () => {}) {
     this.host = host;
     /** @type {PaintCanvas | null} */
     this.canvas = null;
     this.view = 0;
     this.refused = refused;
-    this.lost = lost;
+    this.lost = onLoss;
     this.count = 0;
     /** @type {CurrentStroke | null} */
     this.live = null;
@@ -78,7 +78,7 @@ export class StrokeSender {
    * would receive them. */
   forget(isStale = false) {
     const count =
-      this.left.filter((one) => !('isDropped' in one)).length + (this.live?.whole ? 1 : 0);
+      this.left.filter((stroke) => !('isDropped' in stroke)).length + (this.live?.whole ? 1 : 0);
     this.left = [];
     this.live = null;
     this.resolveWaiting();
@@ -96,12 +96,12 @@ export class StrokeSender {
   /** The page closes: send finished strokes now, without waiting for answers. */
   hurry() {
     if (!this.isOpen || this.isOver) return;
-    for (const one of this.left) {
-      if ('isDropped' in one) continue;
-      const { stroke, view, cut, label } = one;
+    for (const pending of this.left) {
+      if ('isDropped' in pending) continue;
+      const { stroke, view, cut, label } = pending;
       const fields = { stroke, view, region: cut, is_final: true, label };
       // Earlier messages have arrived already.
-      this.host.send('paint', fields, cutOf(one)).catch(() => {});
+      this.host.send('paint', fields, cutOf(pending)).catch(() => {});
     }
   }
 
@@ -160,7 +160,7 @@ export class StrokeSender {
     this.isOpen = isOpen;
     if (!isOpen) {
       // It is unknown which of them arrived.
-      for (const one of this.left) if (!('isDropped' in one)) one.cut = one.whole;
+      for (const stroke of this.left) if (!('isDropped' in stroke)) stroke.cut = stroke.whole;
       if (this.live) this.live.dirty = this.live.whole;
     }
     this.pump();
@@ -185,14 +185,15 @@ export class StrokeSender {
 
   /** @template {"paint" | "drop_stroke"} K @param {K} kind
    * @param {import("./messages.js").Requests[K]} fields @param {Arrays} arrays
-   * @param {PendingStroke | null} left what is answered with it */
-  async send(kind, fields, arrays, left) {
+   * @param {PendingStroke | null} pending what is answered with it */
+  async send(kind, fields, arrays, pending) {
     this.isBusy = true;
     this.isDropping = kind === 'drop_stroke';
     try {
       const reply = await this.host.send(kind, fields, arrays);
-      if (left && reply.kind !== 'closed') this.left = this.left.filter((one) => one !== left);
-      if (left && reply.kind === 'failed') this.refused();
+      if (pending && reply.kind !== 'closed')
+        this.left = this.left.filter((stroke) => stroke !== pending);
+      if (pending && reply.kind === 'failed') this.refused();
     } catch {
       // Pause after a lost connection, until `connected` is called.
       this.isOpen = false;
@@ -209,17 +210,17 @@ export class StrokeSender {
 function cutOf({ cut, whole, arrays }) {
   const [height, width] = [cut[1] - cut[0], cut[3] - cut[2]];
   if (cut === whole) return arrays;
-  const across = whole[3] - whole[2];
+  const rowLength = whole[3] - whole[2];
   /** @type {Arrays} */
-  const made = {};
+  const parts = {};
   for (const [name, { data, shape }] of Object.entries(arrays)) {
     const depth = shape[2] ?? 1;
     const part = new Float32Array(height * width * depth);
     for (let y = 0; y < height; y++) {
-      const from = ((cut[0] - whole[0] + y) * across + cut[2] - whole[2]) * depth;
-      part.set(data.subarray(from, from + width * depth), y * width * depth);
+      const start = ((cut[0] - whole[0] + y) * rowLength + cut[2] - whole[2]) * depth;
+      part.set(data.subarray(start, start + width * depth), y * width * depth);
     }
-    made[name] = { data: part, shape: [height, width, ...shape.slice(2)] };
+    parts[name] = { data: part, shape: [height, width, ...shape.slice(2)] };
   }
-  return made;
+  return parts;
 }

@@ -26,18 +26,22 @@ export function wholeAdjustment({ isAll, importance, image, present }) {
   /** Luminance, and red and blue over green, in stops. @type {[number[], number[], number[]]} */
   const ratios = [[], [], []];
   const step = Math.max(1, Math.floor(importance.length / LOOKED_AT));
-  const at = (/** @type {number} */ p, /** @type {boolean} */ isNow) =>
+  const valueAt = (/** @type {number} */ p, /** @type {boolean} */ isNow) =>
     [0, 1, 2].map((c) => (isNow ? VALUES[present[3 * p + c]] : image[3 * p + c]));
   let sum = 0;
-  for (let p = 0; p < importance.length; p += step) sum += luminance(at(p, true));
+  for (let p = 0; p < importance.length; p += step) sum += luminance(valueAt(p, true));
   const dark = (DARK * sum * step) / importance.length;
   for (let p = 0; p < importance.length; p += step) {
-    const [now, then] = [at(p, true), at(p, false)];
-    const isGround = importance[p] <= 1 && luminance(now) > dark;
-    if (!isGround || Math.min(...now, ...then) <= 0) continue;
-    ratios[0].push(Math.log2(luminance(then) / luminance(now)));
-    ratios[1].push(Math.log2((then[0] * now[1]) / (now[0] * then[1])));
-    ratios[2].push(Math.log2((then[2] * now[1]) / (now[2] * then[1])));
+    const [presentLight, paintedLight] = [valueAt(p, true), valueAt(p, false)];
+    const isGround = importance[p] <= 1 && luminance(presentLight) > dark;
+    if (!isGround || Math.min(...presentLight, ...paintedLight) <= 0) continue;
+    ratios[0].push(Math.log2(luminance(paintedLight) / luminance(presentLight)));
+    ratios[1].push(
+      Math.log2((paintedLight[0] * presentLight[1]) / (presentLight[0] * paintedLight[1])),
+    );
+    ratios[2].push(
+      Math.log2((paintedLight[2] * presentLight[1]) / (presentLight[2] * paintedLight[1])),
+    );
   }
   if (ratios[0].length < ENOUGH) return null;
   const [gain, red, blue] = ratios.map(median);
