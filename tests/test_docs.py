@@ -25,7 +25,7 @@ from lightpaint.paint.server.address import DEFAULT_PORT
 from lightpaint.paint.server.client import MAX_QUEUED, MAX_QUEUED_BYTES
 from lightpaint.paint.server.http_connections import MAX_UNAUTHENTICATED
 from lightpaint.paint.server.session_clients import MAX_PAGES
-from lightpaint.scene.lights.similar_emitters import MAX_SEPARATE
+from lightpaint.scene.lights.light_choice import MAX_SEPARATE
 from lightpaint.scene.quality_presets import PRESETS
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.template import PLAIN_FILES

@@ -1,17 +1,19 @@
-"""The painter in a browser: opens and closes session file, studio and server."""
+"""The painter in a browser: opens and closes session file, studio, server and connection file."""
 
 import gc
+import json
+import os
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from lightpaint.errors import OutputError
-from lightpaint.files import check_writable
+from lightpaint.files import check_writable, replacing
 from lightpaint.paint.server.address import BoundSocket, listen
-from lightpaint.paint.server.connection_file import ConnectionFile
 from lightpaint.paint.server.server import Server, check_installed
 from lightpaint.paint.session_file import SessionFile
 from lightpaint.paint.store.database import set_aside
@@ -22,6 +24,9 @@ from lightpaint.signals import interruptible_between_pieces
 
 #: Name of the session file, in its folder.
 SESSION_FILE = "session.db"
+
+#: Name of the file by which programs find a running painter, in the same folder.
+CONNECTION_FILE = "painter.json"
 
 
 def paint_in_browser(
@@ -95,6 +100,35 @@ def _serve_session(
             raise studio.failure
     finally:
         _close(studio, session_file.store)
+
+
+class ConnectionFile:
+    """The file by which programs find a running painter, readable only by its owner.
+
+    folder: folder of the session. about: content of the file, as JSON: the address, and a `token`
+    unique to this painter.
+    """
+
+    def __init__(self, folder: Path, about: Mapping[str, Any]) -> None:
+        self.path, self._about = folder / CONNECTION_FILE, dict(about)
+
+    def write(self) -> None:
+        """Write the file, replacing one that a killed painter has left.
+
+        Raises OutputError if the file cannot be written.
+        """
+        with replacing(self.path) as temporary:
+            # No other user may read it, even under its temporary name, and no link is followed.
+            descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+            with open(descriptor, "w", encoding="utf-8") as file:
+                file.write(json.dumps(self._about) + "\n")
+
+    def remove(self) -> None:
+        """Delete the file, unless another painter has replaced it."""
+        with suppress(OSError, ValueError, AttributeError):
+            record = json.loads(self.path.read_text(encoding="utf-8"))
+            if record.get("token") == self._about["token"]:
+                self.path.unlink()
 
 
 @contextmanager

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from lightpaint.errors import OutputError
-from lightpaint.paint.server.connection_file import CONNECTION_FILE, ConnectionFile
+from lightpaint.paint.launch import CONNECTION_FILE, ConnectionFile
 
 
 def about(token: str) -> dict[str, Any]:

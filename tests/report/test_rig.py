@@ -10,8 +10,7 @@ from conftest import BasisFactory
 
 from lightpaint.images.denoiser import Features
 from lightpaint.report.light_sheet import light_sheet
-from lightpaint.report.page.placement_section import placement_section
-from lightpaint.report.rig.aim_picture import aim_picture
+from lightpaint.report.page.placement_section import aim_picture, placement_section
 from lightpaint.report.rig.hung_lights import (
     HungLight,
     HungLights,

@@ -14,8 +14,12 @@ from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.pipeline.job.remarks import remarks_of_scene
 from lightpaint.scene.lights.emitters import Emitter, point_emitter
-from lightpaint.scene.lights.light_choice import choose_lights
-from lightpaint.scene.lights.similar_emitters import MAX_SEPARATE, SIZE_TOLERANCE, alike_groups
+from lightpaint.scene.lights.light_choice import (
+    MAX_SEPARATE,
+    SIZE_TOLERANCE,
+    alike_groups,
+    choose_lights,
+)
 from lightpaint.scene.properties.emission import EmissionKind, Scaling
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene

@@ -14,7 +14,6 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from lightpaint.batch.gallery.gallery_mixers import mixers_html, script_json, transforms_of
-from lightpaint.batch.gallery.places_section import places_section
 from lightpaint.batch.gallery.small_planes import drop_planes, planes_name
 from lightpaint.batch.gallery.summary import (
     SummaryRow,
@@ -26,11 +25,14 @@ from lightpaint.batch.gallery.summary import (
 )
 from lightpaint.batch.manifest.folder_names import SUMMARY
 from lightpaint.batch.plan.journal import JournalLine
+from lightpaint.batch.plan.place_groups import PlaceGroup
 from lightpaint.batch.plan.plan import Plan
 from lightpaint.batch.work.task import Kind
 from lightpaint.display_text import visible
 from lightpaint.files import write_bytes, write_text
 from lightpaint.images.formats.png import png_bytes
+from lightpaint.pipeline.results.placement_changes import hung_of
+from lightpaint.placement.placement_record import PlacementRecord
 from lightpaint.report.comparison import shorten_to_width
 from lightpaint.version import __version__
 from lightpaint.viewer.bundle import bundled, styles
@@ -113,6 +115,31 @@ def gallery_page(
         script=bundled("batch/gallery/gallery.js"),
         version=escape(__version__),
     )
+
+
+def places_section(plan: Plan) -> str:
+    """Return the section on moved lights: for each group of looks a table, a plan and an elevation.
+
+    Looks that are placed alone are in their own reports instead.
+    """
+    placed_groups = [(group, group.read_record()) for group in plan.groups if len(group.tasks) > 1]
+    parts = "".join(
+        _group_html(group, record) for group, record in placed_groups if record is not None
+    )
+    return f'<section class="places"><h2>Where the lights hang</h2>{parts}</section>' * bool(parts)
+
+
+def _group_html(group: PlaceGroup, record: PlacementRecord) -> str:
+    placement = hung_of(record, None)
+    items = "".join(f"<li>{escape(change.text)}</li>" for change in placement.changes)
+    picture = ""
+    if group.picture.is_file():
+        data = base64.b64encode(group.picture.read_bytes()).decode("ascii")
+        picture = (
+            '<img alt="Plan and elevation of the room with its lights." '
+            f'src="data:image/png;base64,{data}">'
+        )
+    return f"<p>{escape(placement.shared_sentence)}</p><ul>{items}</ul>{picture}"
 
 
 def counts_text(rows: Sequence[SummaryRow]) -> str:

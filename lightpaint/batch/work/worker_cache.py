@@ -1,13 +1,16 @@
-"""The memory of a process that works on a batch."""
+"""The memory of a process that works on a batch: its scenes, bases and renderers."""
 
+import gc
 from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file.basis_reader import read_basis
 from lightpaint.basis.render.render_parts import PartRenderer
-from lightpaint.batch.work.render_passes import PassRenderer
+from lightpaint.batch.manifest.keys import Final
 from lightpaint.batch.work.spool import read_guide_table
 from lightpaint.batch.work.task import key_of_basis
 from lightpaint.batch.work.work_items import (
@@ -21,8 +24,40 @@ from lightpaint.images.estimate import read_estimate
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
 from lightpaint.placement.placement_record import read_placement
 from lightpaint.scene.quality_presets import on_film
+from lightpaint.scene.runtime.render_lock import tracing
 from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_render import Stream, pass_sum, passes_of
 from lightpaint.target.target import Target
+
+
+class PassRenderer:
+    """A renderer of passes of one relit scene, which stays loaded until `close`.
+
+    The sums of all ranges of passes equal those of one render to the last bit.
+    """
+
+    def __init__(self, scene: Scene, final: Final) -> None:
+        self._scene, self._final = scene, final
+        self._passes = passes_of(scene, final.spp)
+        self._loaded_scene: Any = scene.load()
+
+    def sum(self, passes: range) -> dict[int, Doubles]:
+        """Return the undivided sums, (h, w, 3), of the given passes for each half, by the half."""
+        sums: dict[int, Doubles] = {}
+        for k in passes:
+            half, spp = self._passes[k]
+            seed, stream = self._final.seed, Stream.VERIFICATION
+            with tracing():
+                pass_total = pass_sum(
+                    self._loaded_scene, self._scene, k, spp, seed=seed, stream=stream
+                )
+            sums[half] = sums[half] + pass_total if half in sums else pass_total
+        return sums
+
+    def close(self) -> None:
+        """Release the scene."""
+        self._loaded_scene = None
+        gc.collect()
 
 
 class WorkerCache:
