@@ -31,7 +31,7 @@ from lightpaint.paint.protocol import (
     SaveLook,
     SessionPending,
 )
-from lightpaint.paint.server import client, session_clients
+from lightpaint.paint.server import client, observers
 from lightpaint.paint.server.address import Address, Reach
 from lightpaint.paint.server.guard import Guard
 from lightpaint.paint.server.server import page_app
@@ -296,7 +296,7 @@ def test_who_has_the_session_does_not_become_an_observer(served: Served) -> None
 def test_observers_are_few_and_speak_this_version(
     served: Served, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(session_clients, "MAX_OBSERVERS", 1)
+    monkeypatch.setattr(observers, "MAX_OBSERVERS", 1)
     with served.program() as one, served.program() as other:
         say(one, "observe", version=VERSION + 1)
         assert hear(one)["reason"] == "version"
@@ -363,19 +363,16 @@ class Deaf:
 
 
 def test_what_waits_for_a_slow_observer_is_replaced_and_nothing_asked_is_lost() -> None:
-    line = Connections(FakeSession(), None)
     slow = client.Client(Deaf())
     slow.is_observer = True
-    line._clients.add(slow)
+    line = observers.Observers([slow])
     history = HistoryInfo(("stroke",), (), 1)
-    line._send_to_observers(
-        fake_answer(version=0, history=history, constraints={"lamp": {"off": True}})
-    )
+    line.send(fake_answer(version=0, history=history, constraints={"lamp": {"off": True}}))
     for k in range(1, 2000):
-        line._send_to_observers(fake_answer(version=k))
-        line._send_to_observers(fake_progress("basis", k))
-        line._send_to_observers(fake_state({"present": k}))
-        line._send_to_observers(PictureUpdate(resources={"present": k}))
+        line.send(fake_answer(version=k))
+        line.send(fake_progress("basis", k))
+        line.send(fake_state({"present": k}))
+        line.send(PictureUpdate(resources={"present": k}))
     unsent = [message.fields for message, _ in slow._unsent]
     assert [one.get("version") for one in unsent] == [1999, None, VERSION, None]
     assert unsent[0]["history"]["count"] == 1
@@ -383,9 +380,8 @@ def test_what_waits_for_a_slow_observer_is_replaced_and_nothing_asked_is_lost() 
 
 
 def test_of_what_a_canvas_holds_observers_get_the_lighting() -> None:
-    line, slow = Connections(FakeSession(), None), client.Client(Deaf())
+    slow = client.Client(Deaf())
     slow.is_observer = True
-    line._clients.add(slow)
     pixels = np.zeros((1, 1, 3), np.float32)
     patch = CanvasPatch(
         region=(0, 1, 0, 1),
@@ -399,7 +395,7 @@ def test_of_what_a_canvas_holds_observers_get_the_lighting() -> None:
         importance=pixels[..., 0],
         weights=np.ones((2, 3)),
     )
-    line._send_to_observers(patch)
+    observers.Observers([slow]).send(patch)
     [(told, _)] = slow._unsent
     assert told.kind == "answer"
     assert list(told.arrays) == ["weights"]

@@ -1,4 +1,4 @@
-"""The connections between clients and one session: its owner, and the order of requests.
+"""The connections between clients and one session, and the order of requests.
 
 One page owns the session. Another page gets a notice and may take it over; then the first one gets
 a notice. Requests of a page wait in its queue, and one thread handles them in order; of live paint
@@ -10,10 +10,9 @@ An error in the session becomes an answer to the page, and never ends the connec
 import asyncio
 import traceback
 from collections.abc import Callable, Coroutine
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy.typing as npt
 
@@ -21,16 +20,10 @@ from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.paint.background_threads import error_text, error_tone
 from lightpaint.paint.protocol import (
     Acknowledgement,
-    AnswerUpdate,
     AnyRequest,
-    CanvasPatch,
     Closing,
     ConstrainLight,
-    Export,
-    ExportResult,
     Failure,
-    Fetch,
-    LookList,
     Message,
     MoveLights,
     Notice,
@@ -39,22 +32,18 @@ from lightpaint.paint.protocol import (
     PictureData,
     PictureUpdate,
     PointLight,
-    ProgressReport,
     Propose,
     SessionState,
-    VerificationResult,
 )
 from lightpaint.paint.server.client import Client, IncomingMessage
+from lightpaint.paint.server.observers import Observers, check_observer_request
+from lightpaint.paint.server.page_owner import PageOwner, taken_message
 from lightpaint.paint.server.served_session import ServedSession
-from lightpaint.paint.session_owner import SessionOwner
+from lightpaint.paint.server.session_thread import SessionThread
 from lightpaint.paint.store.store import Store
-from lightpaint.progress import cancellable
 
 #: Maximum number of clients.
 MAX_PAGES = 16
-
-#: Maximum number of observers.
-MAX_OBSERVERS = 8
 
 #: Longest wait, in seconds, of a program's download for the brush to rest.
 REST_S = 10.0
@@ -64,20 +53,6 @@ CLOSING_S = 1.0
 
 #: Requests during a drag, until one with `is_final`.
 LIVE_REQUESTS = (Paint, ConstrainLight, MoveLights, PointLight)
-
-#: Events that observers receive.
-OBSERVED_EVENTS = (
-    SessionState,
-    AnswerUpdate,
-    LookList,
-    PictureUpdate,
-    ProgressReport,
-    ExportResult,
-    VerificationResult,
-    Notice,
-)
-
-_Result = TypeVar("_Result")
 
 
 class Connections:
@@ -94,12 +69,11 @@ class Connections:
     ) -> None:
         self.session, self.store, self.report = session, store, report
         self.generations: dict[str, int] = {}
-        self._owner = SessionOwner[Client](_is_same_page)
         self._clients: set[Client] = set()
+        self._owner, self._observers = PageOwner(), Observers(self._clients)
         self.farewell = "the painter has ended; what was painted is kept"
-        self._worker = ThreadPoolExecutor(1, "lightpaint-session")
+        self._thread = SessionThread(self._check_open)
         self._is_closed = False
-        self._leaving: asyncio.Future[None] | None = None
         self._brush_up = asyncio.Event()  # set while no brush is down
         self._brush_up.set()
 
@@ -128,7 +102,7 @@ class Connections:
             client.release_events()
             client.send(Closing(reason="ended", text=self.farewell))
         await _wait_all([client.wait_sent() for client in self._clients])
-        await asyncio.to_thread(self._worker.shutdown, cancel_futures=True)
+        await self._thread.close()
 
     async def serve(self, client: Client) -> None:
         """Serve one client until it disconnects."""
@@ -157,21 +131,7 @@ class Connections:
 
     async def resource(self, name: str) -> npt.NDArray[Any]:
         """Return a picture of the session. Raises PaintError for an unknown name."""
-        return await self._run(self.session.resource, name)
-
-    async def _run(self, work: Callable[..., _Result], *arguments: Any) -> _Result:
-        """Run work in the session's thread, one at a time. Raises PaintError once closed."""
-        if self._is_closed:
-            raise PaintError(self.farewell)
-        loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(
-            self._worker, partial(self._run_while_open, work, *arguments)
-        )
-
-    def _run_while_open(self, work: Callable[..., _Result], *arguments: Any) -> _Result:
-        """Run work that is abandoned once the connections are closed."""
-        with cancellable(self._check_open):
-            return work(*arguments)
+        return await self._thread.run(self.session.resource, name)
 
     def _check_open(self) -> None:
         if self._is_closed:
@@ -184,7 +144,7 @@ class Connections:
             for message in answers:
                 self._update_generations(message)
                 if client is self._owner.page and not isinstance(message, SessionState):
-                    self._send_to_observers(message)
+                    self._observers.send(message)
             first, *further = answers or [Acknowledgement()]
             for seq in incoming.replies or (None,):
                 client.send(first, seq)
@@ -200,18 +160,19 @@ class Connections:
             if isinstance(incoming.request, Observe) or client.is_observer:
                 return await self._handle_observer(client, incoming.request)
             if incoming.asks_for_session:
-                await self._release_disconnected(client)
+                await self._owner.release_disconnected(client)
                 if not (incoming.takes_over or self._owner.is_free_for(client)):
-                    return [_taken_message("the painter is open in another tab")]
-                is_back = self._hand_over(client)
+                    return [taken_message("the painter is open in another tab")]
+                is_back = self._owner.hand_over(client)
+                self._brush_up.set()
                 client.withhold_events()
-                return [await self._run(partial(self.session.greet, is_back=is_back))]
+                return [await self._thread.run(partial(self.session.greet, is_back=is_back))]
             if self._owner.page is not client:
-                return [_taken_message("this tab does not have the session")]
+                return [taken_message("this tab does not have the session")]
             assert incoming.request is not None
             is_live = isinstance(incoming.request, LIVE_REQUESTS) and not incoming.request.is_final
             (self._brush_up.clear if is_live else self._brush_up.set)()
-            return await self._run(self.session.handle, incoming.request, incoming.arrays)
+            return await self._thread.run(self.session.handle, incoming.request, incoming.arrays)
         except LightpaintError as error:
             return [Failure(text=str(error), tone=error_tone(error))]
         except Exception as error:
@@ -227,25 +188,18 @@ class Connections:
         if isinstance(request, Observe):
             if client is self._owner.page:
                 raise PaintError("this client has the session: observe with a client of its own")
-            others = [other for other in self._clients if other.is_observer and other is not client]
-            if len(others) >= MAX_OBSERVERS:
-                raise PaintError(f"{MAX_OBSERVERS} observers are there already: close one of them")
-            client.is_observer = True
+            self._observers.admit(client)
             client.withhold_events()
             await self._brush_up.wait()
             client.withhold_events()  # the state includes earlier ones
-            return [await self._run(self.session.state)]
-        is_export = isinstance(request, Export) and request.run
-        if not (is_export or isinstance(request, Fetch | Propose)):
-            raise PaintError(
-                "an observer may fetch, export and propose: to paint, connect another client"
-            )
+            return [await self._thread.run(self.session.state)]
+        check_observer_request(request)
         await self._brush_up.wait()
-        answers = await self._run(self.session.handle, request, {})
+        answers = await self._thread.run(self.session.handle, request, {})
         if isinstance(request, Propose):
             notice = Notice(text=f"{request.name[:80]} was proposed: see the looks")
             for message in answers:
-                self._send_to_observers(message, but=client)
+                self._observers.send(message, but=client)
             if (page := self._owner.page) is not None:
                 for message in (*answers, notice):
                     page.send(message)
@@ -256,38 +210,10 @@ class Connections:
         with suppress(TimeoutError):
             await asyncio.wait_for(self._brush_up.wait(), REST_S)
 
-    def _send_to_observers(self, message: Message, but: Client | None = None) -> None:
-        """Send observers the events that concern them; newer events replace those that wait."""
-        event = message.answer if isinstance(message, CanvasPatch) else message
-        if isinstance(event, OBSERVED_EVENTS):
-            for client in self._clients:
-                if client.is_observer and client is not but:
-                    client.send(event)
-
-    async def _release_disconnected(self, client: Client) -> None:
-        """Take the session from another client that has disconnected, after all its requests."""
-        while (page := self._owner.page) not in (None, client) and page.is_disconnected:
-            await page.wait_answered()
-            self._owner.release(page)
-
-    def _hand_over(self, client: Client) -> bool:
-        """Give the session to `client`, and notify the client that had it.
-
-        Returns whether `client` had the session before, and no other since.
-        """
-        is_back, displaced = self._owner.give(client)
-        self._brush_up.set()
-        if displaced is not None and _is_same_page(displaced, client):
-            # The connection to it is lost.
-            self._leaving = asyncio.ensure_future(displaced.close(1001))
-        elif displaced is not None:
-            displaced.send(_taken_message("another tab has taken this session over"))
-        return is_back
-
     def _publish(self, message: Message) -> None:
         """Send an event of the session to its page and its observers."""
         self._update_generations(message)
-        self._send_to_observers(message)
+        self._observers.send(message)
         if self._owner.page is not None:
             self._owner.page.send(message)
 
@@ -309,15 +235,6 @@ async def _wait_all(waits: list[Coroutine[Any, Any, None]]) -> None:
         await asyncio.wait(tasks, timeout=CLOSING_S)
     for task in tasks:
         task.cancel()
-
-
-def _taken_message(text: str) -> Message:
-    return Closing(reason="taken", text=text)
-
-
-def _is_same_page(first: Client, second: Client) -> bool:
-    """Return whether two connections belong to one page, which reconnected."""
-    return first is second or (first.page != "" and first.page == second.page)
 
 
 async def picture_message(connections: Connections, name: str) -> Message:
