@@ -12,15 +12,12 @@ history takes no memory.
 """
 
 import sqlite3
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from threading import RLock
 
 from lightpaint.errors import OutputError, PaintError
-from lightpaint.paint.store.canvas_pixels import Pixels, Region
-from lightpaint.paint.store.compression import pack_patches, unpack_patch
+from lightpaint.paint.store.compression import pack_patches
 from lightpaint.paint.store.database import (
     DamagedError,
     check_pages,
@@ -28,32 +25,20 @@ from lightpaint.paint.store.database import (
     identify,
 )
 from lightpaint.paint.store.history_steps import Identity, Step, StoredLook
-from lightpaint.paint.store.lazy_arrays import (
-    LookArrays,
-    PackedArray,
-    PackedArrays,
-    StoredPatch,
-    pack_arrays,
-)
+from lightpaint.paint.store.lazy_arrays import LookArrays, pack_arrays
 from lightpaint.paint.store.session_rows import (
-    array_names,
-    array_row,
     delete_look,
     insert_look,
     insert_step,
     look_rows,
-    parse_place,
-    pixels_row,
     places_json,
     read_position,
     step_rows,
     to_json,
 )
+from lightpaint.paint.store.stored_arrays import DAMAGE_ERRORS, StoredArrays
 from lightpaint.paint.store.write_queue import WriteJob, WriteQueue
 from lightpaint.storage.json_records import strict_json
-
-#: Errors raised by damaged values.
-DAMAGE_ERRORS = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
 
 
 class Store:
@@ -76,8 +61,7 @@ class Store:
         self._looks: dict[int, StoredLook] = {}
         self._ids: list[int] = []  # of the steps; they only grow
         self._last = 0  # id of the last step there ever was
-        self._blobs: dict[int, tuple[bytes, bytes]] = {}  # pixels of steps that are not written
-        self._arrays: dict[int, PackedArrays] = {}  # the same of looks
+        self._arrays = StoredArrays(path, self._lock, lambda: self._database)
         self.remarks: list[str] = []
         try:
             self._open_file()
@@ -159,7 +143,7 @@ class Store:
             last_kept = self._ids[-1] if self._ids else 0
             self._last = number = self._last + 1
             if blobs is not None:
-                self._blobs[number] = blobs
+                self._arrays.keep_pixels(number, blobs)
             self.steps.append(self._make_step(number, step.kind, step.label, fields, places))
             self._ids.append(number)
             self.position += 1
@@ -190,9 +174,9 @@ class Store:
         with self._lock:
             fields, arrays = to_json(look.fields), look.arrays
             number, blobs = look.id, None
-            if not (isinstance(arrays, LookArrays) and arrays.matches(self, number)):
+            if not (isinstance(arrays, LookArrays) and arrays.matches(self._arrays, number)):
                 blobs = pack_arrays(arrays)
-                self._arrays[number] = blobs
+                self._arrays.keep_look(number, blobs)
             self._looks[number] = self._make_look(number, fields)
             self._enqueue(partial(insert_look, number=number, fields=fields, arrays=blobs))
 
@@ -201,15 +185,14 @@ class Store:
         with self._lock:
             if self._looks.pop(number, None) is None:
                 raise PaintError(f"no look {number}")
-            self._arrays.pop(number, None)
+            self._arrays.drop_look(number)
             self._enqueue(partial(delete_look, number=number))
 
     def flush(self) -> str | None:
         """Write the steps that are in memory only. Returns why that is not possible, or None."""
         with self._lock:
             if self._queue.flush(self.position) is None:
-                self._blobs.clear()
-                self._arrays.clear()
+                self._arrays.release_written()
             return self.unsaved
 
     def close(self) -> None:
@@ -246,64 +229,12 @@ class Store:
             if not isinstance(look.fields["name"], str):
                 raise TypeError("a look without a name")
 
-    def _make_step(
-        self, number: int, kind: str, label: str, fields: str, stored_places: str
-    ) -> Step:
-        stored = [parse_place(place) for place in strict_json(stored_places)]
-        places = [(place.region, place.marked) for place in stored]
-        patches = tuple(
-            StoredPatch(
-                place.view, place.layer, place.region, partial(self._read_pixels, number, places, k)
-            )
-            for k, place in enumerate(stored)
-        )
+    def _make_step(self, number: int, kind: str, label: str, fields: str, places: str) -> Step:
+        patches = self._arrays.patches(number, places)
         return Step(str(kind), str(label), strict_json(fields), patches)
 
-    def _read_pixels(
-        self, number: int, places: list[tuple[Region, bool]], k: int
-    ) -> tuple[Pixels, Pixels]:
-        """Return pixels before and after step `number`, at its place k. Raises PaintError if
-        damaged.
-        """
-        with self._lock:
-            blobs = self._blobs.get(number)
-            if blobs is None:
-                with self._as_damage():
-                    blobs = pixels_row(self._database, number)
-        if blobs is None:
-            raise PaintError(f"a step that was cut off: {number}")
-        with self._as_damage():
-            return unpack_patch(places, k, *blobs)
-
-    @contextmanager
-    def _as_damage(self) -> Iterator[None]:
-        """Raise errors of reading as DamagedError."""
-        try:
-            yield
-        except (sqlite3.Error, PaintError, *DAMAGE_ERRORS) as error:
-            raise damaged_error(self.path, error) from None
-
     def _make_look(self, number: int, fields: str) -> StoredLook:
-        return StoredLook(number, strict_json(fields), LookArrays(self, number))
-
-    def look_names(self, number: int) -> list[str]:
-        """Return the names of a look's arrays, in order."""
-        with self._lock:
-            if number in self._arrays:
-                return list(self._arrays[number])
-            with self._as_damage():
-                return array_names(self._database, number)
-
-    def look_array(self, number: int, name: str) -> PackedArray:
-        """Return one array of a look, and read no other. Raises KeyError if there is none."""
-        with self._lock:
-            if number in self._arrays:
-                return self._arrays[number][name]
-            with self._as_damage():
-                row = array_row(self._database, number, name)
-        if row is None:
-            raise KeyError(name)
-        return row
+        return StoredLook(number, strict_json(fields), LookArrays(self._arrays, number))
 
 
 def _recover(path: Path, identity: Identity | None, error: DamagedError | None) -> str:
