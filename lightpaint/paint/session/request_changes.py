@@ -1,4 +1,4 @@
-"""Changes of the requests for lights by messages of a page, checked against the lights."""
+"""Changes of the requests in effect by messages of a page, checked against the lights."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -6,7 +6,51 @@ from typing import Any
 from lightpaint.basis.lights import Lights
 from lightpaint.errors import PaintError
 from lightpaint.paint import protocol
-from lightpaint.paint.store.session_requests import SessionRequests
+from lightpaint.paint.store.session_requests import TITLES, SessionRequests
+
+#: Messages that change the requests in effect.
+RequestChange = (
+    protocol.ConstrainLight
+    | protocol.ConstrainLights
+    | protocol.MoveLights
+    | protocol.RemoveLight
+    | protocol.TieLights
+    | protocol.ChangeSettings
+)
+
+
+def changed_requests(
+    requests: SessionRequests, lights: Lights, message: RequestChange
+) -> tuple[str, SessionRequests]:
+    """Return the label of a change for undo, and the requests after it.
+
+    Raises LightpaintError if it is impossible.
+    """
+    match message:
+        case protocol.ConstrainLight():
+            return constrain_light(requests, lights, message)
+        case protocol.ConstrainLights():
+            changed = constrain_lights(requests, lights, message.constraints)
+            return ", ".join(message.constraints), changed
+        case protocol.MoveLights():
+            changed = move_lights(requests, lights, message.poses)
+            return f"move {', '.join(message.poses)}", changed
+        case protocol.RemoveLight():
+            return f"remove {message.name}", remove_light(requests, lights, message.name)
+        case protocol.TieLights():
+            return "tie", tie_lights(requests, lights, message.ties)
+        case protocol.ChangeSettings():
+            changed = requests.with_values(message.settings)
+            return ", ".join(TITLES[key] for key in message.settings), changed
+
+
+def previewed_requests(
+    requests: SessionRequests, lights: Lights, change: protocol.Preview
+) -> SessionRequests:
+    """Return the requests after a change that is to be previewed."""
+    requests = requests.with_values(change.settings)
+    requests = constrain_lights(requests, lights, change.constraints)
+    return requests if change.ties is None else tie_lights(requests, lights, change.ties)
 
 
 def constrain_light(

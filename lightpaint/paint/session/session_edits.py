@@ -1,0 +1,228 @@
+"""The edits of a session: paint, layers, requests and steps, each followed by the answer."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy.typing as npt
+
+from lightpaint.arrays import Doubles, Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.errors import LightpaintError, PaintError
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.paint import protocol
+from lightpaint.paint.layers.layer import PAINTING_ID
+from lightpaint.paint.layers.layer_stack import LayerStack
+from lightpaint.paint.layers.layered_paintings import LayeredPaintings
+from lightpaint.paint.session.history import Changes, History, restore
+from lightpaint.paint.session.live_answer import LiveAnswer, weights_by_name
+from lightpaint.paint.session.moved_lights import MovedLights, Placed, PlaneSource
+from lightpaint.paint.store.canvas_pixels import Pixels
+from lightpaint.paint.store.session_requests import SessionRequests
+from lightpaint.paint.store.store import Store
+from lightpaint.pipeline.job.settings import Settings
+
+
+class SessionEdits:
+    """The canvases, requests and steps of a session, and the answer that follows each change.
+
+    Args: as those of `Session`.
+
+    Attributes:
+        views: Canvas of each view.
+        live_answer: Requests, and the last answer.
+        history: The steps.
+        version: A number that grows with every change.
+        stroke: Number of the last stroke that arrived.
+    """
+
+    def __init__(
+        self,
+        bases: Sequence[Basis],
+        presents: Sequence[Floats],
+        store: Store,
+        *,
+        settings: Settings,
+        transform: ViewTransform,
+        constraints: Constraints,
+        plane_source: PlaneSource,
+    ) -> None:
+        self.version, self.stroke = 0, -1
+        try:
+            self.views, requests = restore(bases, presents, store)
+        except (LightpaintError, ArithmeticError, LookupError, TypeError, ValueError):
+            if not store.has_file:
+                raise
+            store.recover()
+            self.views, requests = restore(bases, presents, store)
+        self._moved_lights = MovedLights(plane_source, bases)
+        self._moved_lights.begin(requests.placed, self.views)
+        self.live_answer = LiveAnswer(
+            self.views.live,
+            requests,
+            settings=settings,
+            constraints=constraints,
+            transform=transform,
+            lights_of=lambda its: self._moved_lights.lights(its.placed),
+        )
+        self.history = History(store, self.views, self.live_answer)
+        self._update_answer()
+
+    @property
+    def bases(self) -> tuple[Basis, ...]:
+        """Bases of all views, with every light at its place in the scene."""
+        return self._moved_lights.bases
+
+    @property
+    def is_open(self) -> bool:
+        """True while a stroke or a slider is not finished."""
+        return self.live_answer.before_slider is not None or self.views.is_open
+
+    def check_places(self, placed: Placed) -> None:
+        """Raise LightpaintError for places that these lights cannot have."""
+        self._moved_lights.check(placed)
+
+    # Paint
+
+    def paint(self, request: protocol.Paint, arrays: Mapping[str, npt.NDArray[Any]]) -> None:
+        """Paint pixels of an open stroke, or of one that ends here and becomes a step."""
+        layers = self.views.layers
+        if request.properties is not None:
+            layers = layers.with_layers([request.properties])
+        layer = layers[request.layer if request.properties is None else request.properties.id]
+        pixels = self.views[request.view].check_pixels(layer, request.region, arrays)
+        if request.stroke != self.stroke:
+            # Keep a stroke whose end never arrived, as far as it got.
+            self.history.close_stroke("stroke")
+            self.stroke = request.stroke
+        self.views.open_layers(layers)
+        self.views.paint(request.view, layer.id, request.region, pixels)
+        if request.is_final:
+            try:
+                self.history.close_stroke(request.label)
+            except LightpaintError:
+                self.drop_stroke()
+                raise
+        self._update_answer()
+
+    def change_layers(self, request: protocol.ChangeLayers) -> None:
+        """Change layers, their order, or both. An unfinished change is open, like a stroke."""
+        layers = self.views.layers.with_layers(request.layers, request.order)
+        copies = {int(number): source for number, source in request.copies.items()}
+        for number, source in copies.items():
+            if layers[number].kind != self.views.layers[source].kind:
+                raise PaintError(f"layer {number} is no copy of layer {source}")
+            if number in self.views.layers.ids:
+                raise PaintError(f"layer {number} is there already")
+        if any(view.is_open for view in self.views):
+            self.history.close_stroke("stroke")
+        self.views.open_layers(layers)
+        for number, source in copies.items():
+            self.views.copy_layer(source, number)
+        if request.order is not None and PAINTING_ID not in request.order:
+            self.views.clear_painting()
+        if request.is_final:
+            self.history.close_stroke(request.label)
+        self._update_answer()
+
+    def drop_stroke(self) -> Changes:
+        """Drop the open stroke; return its views and regions."""
+        regions = self.views.drop()
+        self._update_answer()
+        return regions
+
+    # Steps
+
+    def move_step(self, by: int) -> Changes:
+        """Move back or forth by one step, and return its changes."""
+        if self.views.is_open:
+            self.history.close_stroke("stroke")
+            self._update_answer()
+        changes = self.history.move(by)
+        self._update_answer()
+        return changes
+
+    def append_requests(self, label: str, requests: SessionRequests) -> None:
+        """Set requests, as a step."""
+        self.history.append_requests(label, requests)
+        self._update_answer()
+
+    def replace_all(
+        self,
+        paintings: Mapping[int, Pixels],
+        requests: SessionRequests,
+        label: str,
+        weights: Doubles | None = None,
+        *,
+        names: Sequence[str] | None = None,
+        layers: LayeredPaintings | None = None,
+    ) -> Changes:
+        """Replace the paintings, by view, and the requests: one step.
+
+        weights: (n, 3), the answer that was kept with them, of lights with these names. It shows
+        until the exact one is found; without it the solve starts at the answer to the previous
+        painting. layers: those that come to these paintings; without them each painting becomes a
+        layer's pixels as it is.
+        """
+        self.reset_slider()
+        self._moved_lights.check(requests.placed)
+        self.live_answer.check(requests)
+        if self.views.is_open:
+            self.drop_stroke()
+        if layers is not None:
+            stack, patches = layers.patches(self.views)
+        elif paintings:
+            stack, patches = LayerStack(), self.views.replacement_patches(paintings)
+        else:
+            stack, patches = self.views.layers, ()
+        changes = self.history.replace_all(stack, patches, requests, label)
+        self._update_answer()
+        if weights is not None:
+            lights = self.views[0].basis.lights
+            self.live_answer.weights = weights_by_name(weights, names or lights.names, lights)
+        return changes
+
+    def move_slider(self, requests: SessionRequests) -> None:
+        """Set requests while a slider or a light moves; nothing is stored."""
+        self.live_answer.move_slider(requests)
+        self._update_answer()
+
+    def reset_slider(self) -> None:
+        """Reset a slider that still moves."""
+        if self.live_answer.reset_slider():
+            self._update_answer()
+
+    def close_open(self, *, with_stroke: bool) -> None:
+        """Reset an abandoned slider.
+
+        with_stroke: whether an open stroke becomes a step.
+        """
+        is_stroke = with_stroke and self.views.is_open
+        if is_stroke:  # stored before the solve, which may be abandoned
+            self.history.close_stroke("stroke")
+        if self.live_answer.reset_slider() or is_stroke:
+            self._update_answer()
+
+    # Planes
+
+    def improve(self, bases: Sequence[Basis], presents: Sequence[Floats]) -> None:
+        """Replace the bases by ones of more samples, with the same lights and sizes.
+
+        An open stroke stays open.
+        """
+        moved = self._moved_lights.improve(bases, self.live_answer.requests.placed)
+        self.views.improve(moved, presents)
+        self.live_answer.set_views(self.views.live)
+        self._update_answer()
+
+    def renew_planes(self, names: Sequence[str]) -> None:
+        """Take the planes of moved lights again after they have been rendered."""
+        self._moved_lights.renew(
+            names, self.live_answer.requests.placed, self.views, self.live_answer
+        )
+        self._update_answer()
+
+    def _update_answer(self) -> None:
+        self.version += 1
+        self._moved_lights.follow(self.live_answer.requests.placed, self.views, self.live_answer)
+        self.live_answer.solve()
