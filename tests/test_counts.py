@@ -150,7 +150,7 @@ def test_a_server_ends_while_its_session_is_at_work() -> None:
 
     async def serve_and_end() -> None:
         line, began = Connections(Slow(), None), threading.Event()  # type: ignore[arg-type]
-        work = asyncio.ensure_future(line._run(_without_end, began))
+        work = asyncio.ensure_future(line._thread.run(_without_end, began))
         await asyncio.to_thread(began.wait)
         await asyncio.wait_for(line.close(), 10)
         with pytest.raises(PaintError, match="the painter has ended"):

@@ -346,7 +346,7 @@ def test_doctor_fails_where_something_is_missing(tmp_path: Path) -> None:
 
 def test_resize_does_not_stretch(basis_file: Path, tmp_path: Path) -> None:
     write_rgb(tmp_path / "wide.exr", np.ones((64, 128, 3), np.float32))
-    assert "another shape" in refused(tmp_path, "solve", basis_file, "wide.exr", "--resize")
+    assert "another aspect ratio" in refused(tmp_path, "solve", basis_file, "wide.exr", "--resize")
 
 
 def test_scalar_variant_says_so_and_serves(tmp_path: Path) -> None:
