@@ -1,15 +1,15 @@
 """Columns of frozen paths: the light that plain renders have, at any place, by the same paths."""
 
+import json
+import subprocess
+import sys
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
-from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from renderer import write_room
+from renderer import REPOSITORY, write_room
 
 import lightpaint as lp
 from lightpaint.arrays import Floats
@@ -21,6 +21,9 @@ from lightpaint.scene.properties.pose import Site
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.surfaces import render_features
+
+#: Where kernels are counted.
+COUNT_KERNELS = REPOSITORY / "tests" / "frozen_path_kernels.py"
 
 #: Lights of the test room that no ray meets by chance.
 SEARCHED = ("bulb", "beam", "sun")
@@ -50,32 +53,11 @@ def test_columns_are_the_planes_of_a_basis(room: Scene) -> None:
         assert np.square(column - plane).sum() < 0.03 * np.square(plane).sum()  # noise
 
 
-def count_kernels(path: str, calls: tuple[str, ...]) -> list[int]:
-    """Return the number of kernels with each of these calls, for films of several sizes."""
-    room = load_scene(path)
-    import drjit as dr
-
-    kernels: dict[Any, str] = {}
-    with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
-        dr.kernel_history_clear()
-        for scene, hits, bounces in (room, 1, 1), (room, 16, 4), (room.reduced("1/2"), 4, 2):
-            columns = partial(FrozenPaths.columns, sites=sites(scene))
-            along_paths(scene, columns, first_hits=hits, bounces=bounces)
-        for kernel in dr.kernel_history([dr.KernelType.JIT]):
-            ir = kernel["ir"]
-            if kernel["size"] > 1:  # a single vertex is read in another way
-                kernels[kernel["hash"]] = ir if isinstance(ir, str) else ir.getvalue()
-    return [sum(f"Call: {call}" in ir for ir in kernels.values()) for call in calls]
-
-
 def test_vertices_of_all_paths_share_kernels(room: Scene) -> None:
-    """Each takes a second to compile: none is of a film, a number of paths or a bounce alone.
-
-    In a process of its own: what it compiled before may change the order of variables.
-    """
-    calls = ("BSDF::sample()", "BSDF::eval()")
-    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
-        assert pool.submit(count_kernels, str(room.path), calls).result() == [1, 1]
+    """Each takes a second to compile: none is of a film, a number of paths or a bounce alone."""
+    command = [sys.executable, str(COUNT_KERNELS), str(room.path), *SEARCHED]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert json.loads(done.stdout or "null") == [1, 1], done.stderr
 
 
 def test_a_search_refines_on_a_larger_film_than_it_compares_on(room: Scene) -> None:
