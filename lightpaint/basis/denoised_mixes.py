@@ -62,7 +62,7 @@ def denoise_present_look(basis: Basis, *, quality: Quality = "fast") -> Floats:
     return denoise_mix(basis, basis.present_weights, mixed=mixed, quality=quality)
 
 
-def denoise_plane(basis: Basis, k: int, *, factor: int = 1, quality: Quality = "fast") -> Floats:
+def denoise_plane(basis: Basis, k: int, *, factor: int = 1) -> Floats:
     """Return the image of light k at unit emission, denoised, (h, w, 3) float32.
 
     factor: as in `denoise_mix`.
@@ -70,7 +70,7 @@ def denoise_plane(basis: Basis, k: int, *, factor: int = 1, quality: Quality = "
     pictures = [basis.planes.plane(k)]
     if (parts := basis.indirect) is not None:
         pictures += [planes.plane(k) for planes in (basis.noise, parts.planes, parts.noise)]
-    return _denoise_pictures(basis, pictures, factor, quality)
+    return _denoise_pictures(basis, pictures, factor, "fast")
 
 
 def _denoise_pictures(

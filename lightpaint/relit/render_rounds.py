@@ -20,23 +20,21 @@ def refine_by_rendering(
     solution: Solution,
     *,
     rounds: int,
-    spp: int | None = None,
     seed: int = 0,
     progress: Progress = silent,
 ) -> Solution:
     """Render the scene under the solution's lighting and take a Newton step, `rounds` times.
 
-    views: scene and basis of each view in the solution. spp: samples per pixel of each render, on
-    the film of the basis; by default as many as the basis has. Every round uses random numbers that
-    neither the other rounds, the basis nor a verification uses.
+    views: scene and basis of each view in the solution; each render has the film and the samples of
+    that basis. Every round uses random numbers that neither the other rounds, the basis nor a
+    verification uses.
     """
     for k in range(rounds):
         mixed_bases = []
         for scene, basis in views:
             its_seed = pass_seed(view_seed(seed, scene.sensor), Stream.REFINEMENT, k)
             label = f"refinement {k + 1}"
-            samples = max(2, basis.origin.spp) if spp is None else spp
-            mixed_bases.append(_mixed(scene, basis, solution, samples, its_seed, label, progress))
+            mixed_bases.append(_mixed(scene, basis, solution, its_seed, label, progress))
         solution = refine(solution, joint_estimate(mixed_bases))
     return solution
 
@@ -45,18 +43,17 @@ def _mixed(
     scene: Scene,
     basis: Basis,
     solution: Solution,
-    spp: int,
     seed: int,
     label: str,
     progress: Progress,
 ) -> Estimate:
-    """Render one view of the solved scene at the size of its basis."""
+    """Render one view of the solved scene at the size and the samples of its basis."""
     height, width = basis.size
     with tempfile.TemporaryDirectory(prefix="lightpaint-") as folder:
         relit = relight(scene, solution.lighting, Path(folder) / "relit.xml")
         return render(
             relit.reduced(f"{width}x{height}"),
-            spp=spp,
+            spp=max(2, basis.origin.spp),
             seed=seed,
             stream=Stream.REFINEMENT,
             label=label,

@@ -15,7 +15,7 @@ import lightpaint as lp
 from lightpaint.arrays import Floats
 from lightpaint.errors import SceneError
 from lightpaint.images.pixel_blocks import block_mean
-from lightpaint.placement.paths.frozen_paths import FrozenPaths, falloff
+from lightpaint.placement.paths.frozen_paths import FrozenPaths
 from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.scene.properties.pose import Site
 from lightpaint.scene.scene import Scene
@@ -163,20 +163,21 @@ def test_light_falls_with_the_square_of_the_distance(room: Scene) -> None:
 
 
 def test_cones_are_those_of_mitsuba(room: Scene) -> None:
-    """A spot's own column is what `falloff` makes of one that shines all around."""
+    """A spot's own column is what its cone leaves of one that shines all around."""
     beam = room.light("beam").members[0].site
 
     def both(paths: FrozenPaths) -> tuple[Floats, Floats]:
-        added = paths.contributions(paths.direct, beam)
-        share = falloff(
-            paths.points(paths.direct),
-            beam,
-            np.array([beam.direction]),
-            np.array([[beam.cutoff, beam.beam]], dtype=float),
-        )[0]
-        return paths.direct_images([beam])[0], paths.image_of(
-            paths.direct, share[0][:, None] * added
-        )
+        vertices = paths.direct
+        away = paths.points(vertices).astype(float) - beam.position
+        cosine = away @ beam.direction / np.linalg.norm(away, axis=1)
+        angle = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+        # Linear in the angle, as Mitsuba documents it.
+        share = np.clip((beam.cutoff - angle) / (beam.cutoff - beam.beam), 0, 1)
+        light = share[:, None] * paths.contributions(vertices, beam)
+        pixels, starts = vertices.first_of_pixel
+        made = np.zeros((paths.size[0] * paths.size[1], 3))
+        made[pixels] = np.add.reduceat(light, starts, axis=0)
+        return paths.direct_images([beam])[0], made
 
     whole, made = along_paths(room, both, bounces=0)
     np.testing.assert_allclose(made, whole, atol=2e-4 * whole.max())  # single precision

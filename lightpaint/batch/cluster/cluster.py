@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-from lightpaint.batch.cluster.parcels import FileHashes, Parcel, pack, unpack
+from lightpaint.batch.cluster.parcels import FileHashes, pack, unpack
 from lightpaint.batch.cluster.workers import ANSWER_S, DASK_ERRORS, ClusterWorkers
 from lightpaint.batch.distribution.engine import LOST_TEXT, MAX_TRIES
 from lightpaint.batch.work.item_execution import is_disk_full
@@ -40,7 +40,6 @@ class _Assignment:
     """A work item assigned to a worker. since_s: when it became that worker's first."""
 
     item: WorkItem
-    parcel: Parcel
     worker: str
     future: Any
     since_s: float | None = None
@@ -156,7 +155,7 @@ class Cluster:
         self._workers.send_files(parcel, worker, common_files)
         key = f"{self._run}-{item.kind}-{item.name}-{secrets.token_hex(4)}"
         future = self._workers.submit(parcel, worker, key)
-        self._assignments.append(_Assignment(item, parcel, worker, future))
+        self._assignments.append(_Assignment(item, worker, future))
         self._start_clocks()
 
     def _start_clocks(self) -> None:

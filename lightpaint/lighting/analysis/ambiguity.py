@@ -24,13 +24,11 @@ MIN_PART = 0.05
 class Ambiguity:
     """Lights that can share their light among themselves in many equally good ways.
 
-    names: the lights. remainder: the part of their images that remains when they cancel: 1 − cos
-    of the angle between two; an eigenvalue for more. is_mix: whether a mix in some channel cancels;
-    otherwise all are alike in all channels.
+    names: the lights. is_mix: whether a mix in some channel cancels; otherwise all are alike in all
+    channels.
     """
 
     names: tuple[str, ...]
-    remainder: float
     is_mix: bool
 
     @property
@@ -87,29 +85,21 @@ def indistinguishable(
         else:
             home.append(i)
     ambiguities = [
-        Ambiguity(
-            tuple(names[i] for i in group),
-            max(0.0, 1 - min(_least_cosine(cosines, lit, group[0], i) for i in group[1:])),
-            is_mix=False,
-        )
+        Ambiguity(tuple(names[i] for i in group), is_mix=False)
         for group in groups
         if len(group) > 1
     ]
 
     # One light stands for each group. Other mixes may cancel; one channel suffices.
-    mixes: dict[tuple[str, ...], float] = {}
+    mixes: dict[tuple[str, ...], None] = {}
     for c in range(len(channels)):
         heads = np.array([group[0] for group in groups if lit[c, group[0]]], dtype=int)
         values, vectors = np.linalg.eigh(cosines[c][np.ix_(heads, heads)])
         for value, vector in zip(values, vectors.T, strict=True):
             if value <= alike:
                 part = np.abs(vector) > MIN_PART * np.abs(vector).max()
-                mixed = tuple(names[i] for i in heads[part].tolist())
-                mixes[mixed] = min(mixes.get(mixed, np.inf), max(0.0, float(value)))
-    return (
-        *ambiguities,
-        *(Ambiguity(mixed, remainder, is_mix=True) for mixed, remainder in mixes.items()),
-    )
+                mixes[tuple(names[i] for i in heads[part].tolist())] = None
+    return *ambiguities, *(Ambiguity(mixed, is_mix=True) for mixed in mixes)
 
 
 def _least_cosine(cosines: Doubles, lit: Bools, i: int, j: int) -> float:

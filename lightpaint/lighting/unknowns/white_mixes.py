@@ -53,8 +53,6 @@ def solve_on_locus(
     equations: NormalEquations,
     reduction: Reduction,
     start: Doubles,
-    *,
-    steps: int = MAX_STEPS,
     **options: Any,
 ) -> tuple[Reduction, ReducedOptimum]:
     """Solve as `solve_reduced` does, and choose the two whites of each light.
@@ -62,20 +60,17 @@ def solve_on_locus(
     Return the reduction with the whites that lights came to, and its optimum.
 
     start: (n, 3). A reduction whose lights still mix the ends of their ranges is solved like that
-    first; another one continues from the whites nearest to the start. steps: the most steps between
-    neighbours. options: of `solve_reduced`.
+    first; another one continues from the whites nearest to the start. options: of `solve_reduced`.
     """
     if not reduction.white_knobs:
-        return next_whites(equations, reduction, start, steps=steps, **options)
+        return next_whites(equations, reduction, start, **options)
     groups, weights = _groups(reduction), start
     if all(_is_whole(reduction, k) for k in reduction.white_knobs):
         weights = solve_reduced(equations, reduction, _snap(groups, start), **options).weights
     for width in WINDOW_WIDTHS:
         reduction = reduction.with_windows(_windows_about(groups, weights, width))
         weights = solve_reduced(equations, reduction, _snap(groups, weights), **options).weights
-    return next_whites(
-        equations, center_windows(reduction, weights, 1), weights, steps=steps, **options
-    )
+    return next_whites(equations, center_windows(reduction, weights, 1), weights, **options)
 
 
 def next_whites(
@@ -89,8 +84,8 @@ def next_whites(
 ) -> tuple[Reduction, ReducedOptimum]:
     """Solve for two whites of each light, and continue to their neighbours.
 
-    only: the knobs that move, if not all do. For the other arguments and the result see
-    `solve_on_locus`.
+    steps: the most steps between neighbours. only: the knobs that move, if not all do. For the
+    other arguments and the result see `solve_on_locus`.
     """
     groups = _groups(reduction, only)
     optimum = solve_reduced(equations, reduction, _snap(groups, start), **options)

@@ -40,14 +40,14 @@ class QuickPlanes:
     loaded: that scene, which has to stay loaded. features: of each pixel, with positions.
     """
 
-    def __init__(self, scene: Scene, loaded: Any, features: Features, *, seed: int = 0) -> None:
+    def __init__(self, scene: Scene, loaded: Any, features: Features) -> None:
         small = scene.reduced(f"1/{reduction_to(scene.film, CELLS)}")
         cells = _sampled(features, small.size)
         self.size = scene.size
         hits = isqrt(min(max(FIRST_HITS // prod(scene.size), 1), MOST_PER_PIXEL)) ** 2
         paths = min(max(PATHS // prod(small.size), 1), MOST_PER_PIXEL)
-        self._direct = FrozenPaths(scene, loaded, first_hits=hits, bounces=0, seed=seed)
-        scattered = FrozenPaths(small, loaded, first_hits=1, bounces=paths, seed=seed)
+        self._direct = FrozenPaths(scene, loaded, first_hits=hits, bounces=0)
+        scattered = FrozenPaths(small, loaded, first_hits=1, bounces=paths)
         self._indirect = scattered.filtered_along(cells)
         self._spread = _Spreading(features, cells)
         self._cell_albedo = np.maximum(cells.albedo, DARKEST).reshape(-1, 3)

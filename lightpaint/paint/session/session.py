@@ -54,7 +54,6 @@ class Session:
         settings: Defaults of settings that the session does not set.
         transform: View transform to paint through.
         constraints: On the lights, from before the session began.
-        name: Of the painting.
         plane_source: Makes the planes of moved lights; without one, no light can move.
 
     Attributes:
@@ -74,10 +73,9 @@ class Session:
         settings: Settings,
         transform: ViewTransform,
         constraints: Constraints | None = None,
-        name: str = "painting",
         plane_source: PlaneSource | None = None,
     ) -> None:
-        self.store, self.name, self.transform = store, name, transform
+        self.store, self.transform = store, transform
         self._edits = SessionEdits(
             bases,
             presents,
@@ -136,7 +134,7 @@ class Session:
 
         Solved elsewhere it has the same answer: a literal painting is light, painted over nothing.
         """
-        name = self.name if len(self.views) == 1 else f"{self.name} {self.views[view].name}"
+        name = "painting" if len(self.views) == 1 else f"painting {self.views[view].name}"
         is_sketch = not self.live_answer.fit.literal
         return self.views[view].target(name, self.transform, is_sketch=is_sketch)
 

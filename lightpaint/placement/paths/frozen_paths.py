@@ -154,10 +154,6 @@ class FrozenPaths:
         """Return contributions of `site` at the vertices, (v, 3); for a spot, without its cone."""
         return self._shone(vertices, [_Origin.of(site)])[0].light.T
 
-    def image_of(self, vertices: Vertices, contributions: Floats) -> Floats:
-        """Return sums of contributions (…, v, c) over pixels, (…, h · w, c) float32."""
-        return np.moveaxis(self._pixel_sums(vertices, np.moveaxis(contributions, -1, -2)), -2, -1)
-
     def points(self, vertices: Vertices) -> Floats:
         """Return the places of vertices, (v, 3)."""
         return vertices.points
@@ -262,21 +258,11 @@ def away_from(place: Sequence[float], points: Floats) -> Floats:
     return np.asarray(away)
 
 
-def falloff(points: Floats, site: Site, directions: Floats, cones: Floats) -> Floats:
-    """Return the share of its light that a spot at `site` sends to points, (d, c, v) float32.
-
-    points: (v, 3). directions: (d, 3) unit vectors; cones: (c, 2), cutoff and beam in degrees. As
-    Mitsuba's spot has it: 1 within the beam, linear in the angle to 0 at the cutoff.
-    """
-    away = away_from(site.position or (0.0, 0.0, 0.0), points)
-    cosine = np.clip(np.asarray(directions, np.float32) @ away.T, -1, 1)
-    angle = np.degrees(np.arccos(cosine))[:, None]
-    cutoff, beam = (np.asarray(cones, np.float32)[None, :, k, None] for k in range(2))
-    return np.asarray(np.clip((cutoff - angle) / np.maximum(cutoff - beam, 1e-6), 0, 1))
-
-
 def _share_in_cone(cosine: Floats, cutoff: float, beam: float) -> Floats:
-    """Return the share of a spot's light at cosines to its axis; see `falloff`. Angles: degrees."""
+    """Return the share of its light that a spot sends at cosines to its axis. Angles: degrees.
+
+    As Mitsuba's spot has it: 1 within the beam, linear in the angle to 0 at the cutoff.
+    """
     angle = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
     share = (np.float32(cutoff) - angle) / np.float32(max(cutoff - beam, 1e-6))
     return np.asarray(np.clip(share, 0, 1))

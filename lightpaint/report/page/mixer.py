@@ -56,7 +56,6 @@ def mixer_html(
     transform: ViewTransform | None = None,
     is_clean: bool = False,
     scene: str | None = None,
-    title: str = "Light mixer",
 ) -> str:
     """Return a section of HTML; a page with mixers needs `mixer_assets` after the last.
 
@@ -67,7 +66,6 @@ def mixer_html(
         transform: The view transform of the mix.
         is_clean: Whether to denoise planes.
         scene: For the command line; None without a scene to relight.
-        title: Heading.
     """
     shown = most_visible_lights(basis, lighting)
     size, planes = _shown_planes(basis, lighting, shown, is_clean=is_clean)
@@ -87,7 +85,7 @@ def mixer_html(
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     text = text.replace("<", "\\u003c")
     return (
-        f'<section class="mixer" hidden><h2>{title}</h2><p>{INTRODUCTION}</p>'
+        f'<section class="mixer" hidden><h2>Light mixer</h2><p>{INTRODUCTION}</p>'
         f'<script type="application/json">{text}</script></section>'
     )
 

@@ -11,7 +11,7 @@ import { decodeSrgb, encodeSrgb } from './view_transform.js';
 export { decodeSrgb as decode, encodeSrgb as encode };
 
 /** Temperatures for which the locus below is good, in kelvin. */
-export const KELVIN = { low: 1000, high: 15000 };
+const KELVIN = { low: 1000, high: 15000 };
 
 /** Neutral temperature of warmer and cooler gains. */
 const NEUTRAL_MIRED = 200;

@@ -18,7 +18,7 @@ import { GROUND, SQUARES, panes } from './view.js';
 
 /** Milliseconds of a live frame above which it is mixed at reduced size, and the number of values
  * (pixels times lights) that take about as long, for use before any timing. */
-export const BUDGET = 14;
+const BUDGET = 14;
 const MANY = 3e6;
 
 /** @implements {PictureView} @typedef {import("./view.js").PictureView} PictureView */

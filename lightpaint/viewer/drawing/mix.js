@@ -92,7 +92,7 @@ export class Mix {
  * @param {Float32Array} light @param {Term[]} terms @param {number} planeWidth width of the planes
  * @param {number} width of the light @param {number} step @param {boolean} fresh whether light
  * starts from black */
-export function addPlanes(light, terms, planeWidth, width, step, fresh) {
+function addPlanes(light, terms, planeWidth, width, step, fresh) {
   let isFresh = fresh;
   let next = 0;
   for (; next + 4 <= terms.length; next += 4) {

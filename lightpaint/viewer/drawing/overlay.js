@@ -43,7 +43,7 @@ export const LUMA = [0.2126, 0.7152, 0.0722];
 export const HATCH = { period: 8, thin: 4, strength: 0.55 };
 
 /** Return the false-colour band of a luminance, exposure included. @param {number} luminance */
-export function band(luminance) {
+function band(luminance) {
   const stops = Math.log2(Math.max(luminance, 1e-9) / GREY);
   return Math.min(BANDS.length - 1, Math.max(0, Math.floor(stops + 0.5) + 6));
 }

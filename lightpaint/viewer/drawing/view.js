@@ -74,7 +74,7 @@ export const DEFAULTS = Object.freeze({
  * middle: of what the picture was fitted into */
 
 /** Device pixels between two panes. */
-export const GAP = 4;
+const GAP = 4;
 
 /** Device pixels per picture pixel from which pixels are shown as squares. */
 export const SQUARES = 2;

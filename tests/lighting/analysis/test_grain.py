@@ -7,7 +7,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from lightpaint.lighting.analysis.diagnosis import diagnose
-from lightpaint.lighting.analysis.noise.painting_grain import grain
+from lightpaint.lighting.analysis.noise.painting_grain import channel_grain
 from lightpaint.lighting.solve import solve
 from lightpaint.report.diagnosis_sentences import error_sentences
 from lightpaint.target.target import Target
@@ -28,6 +28,11 @@ def _noise(kind: str) -> Any:
         "grey": lambda: np.repeat(rng.normal(size=(*SIZE, 1)), 3, axis=2),
     }[kind]()
     return made / made.std() * np.where(X < 60, 2, 1)[..., None]
+
+
+def grain(residual: Any, counted: Any) -> Any:
+    """The variance of a residual's noise, (h, w, 3)."""
+    return np.stack([channel_grain(residual[..., c], counted) for c in range(3)], axis=-1)
 
 
 def _painted(kind: str) -> Any:

@@ -240,18 +240,17 @@ def gradient_bias(solution: Solution, noise: Noise) -> tuple[Doubles, Doubles]:
     return weights, (1 - removed) * lack
 
 
-def denoised_matrix(
-    equations: NormalEquations, power: Doubles, *, max_share: float = MAX_NOISE_SHARE
-) -> Doubles:
+def denoised_matrix(equations: NormalEquations, power: Doubles) -> Doubles:
     """Return M without its noise, (3, n, n), positive semidefinite.
 
-    power: (3, n, n), N. The result is M − N, but in no direction less than 1 − `max_share` of M.
+    power: (3, n, n), N. The result is M − N, but in no direction less than 1 − MAX_NOISE_SHARE of
+    M.
     """
     denoised = np.empty_like(equations.M)
     for c in range(3):
         root, inverse = _roots(equations.M[c])
         values, vectors = eigh(inverse @ power[c] @ inverse.T)
-        values = np.clip(values, 0, max_share)
+        values = np.clip(values, 0, MAX_NOISE_SHARE)
         denoised[c] = equations.M[c] - root @ ((vectors * values) @ vectors.T) @ root.T
     return denoised
 

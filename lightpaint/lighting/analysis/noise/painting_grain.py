@@ -38,16 +38,11 @@ MAX_PEAK = 12.0
 MAX_RATIO, MAX_BLOCK_RATIO = 4.0, 6.0
 
 
-def grain(residual: Floats, counted: Bools) -> Doubles:
-    """Return the variance of a residual's noise, (h, w, 3) float64; 0 without noise.
-
-    residual: (h, w, 3). counted: (h, w), the pixels that count.
-    """
-    return np.stack([channel_grain(residual[..., c], counted) for c in range(3)], axis=-1)
-
-
 def channel_grain(residual: Floats, counted: Bools) -> Doubles:
-    """Return the variance of the noise of one channel, (h, w). Arguments: as in `grain`, (h, w)."""
+    """Return the variance of a residual's noise in one channel, (h, w) float64; 0 without noise.
+
+    residual: (h, w). counted: (h, w), the pixels that count.
+    """
     at_one, at_two = (_tap_variance(residual, counted, step) for step in (1, 2))
     if at_two[counted].sum() > MAX_RATIO * at_one[counted].sum():
         return at_one

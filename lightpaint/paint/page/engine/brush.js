@@ -10,11 +10,11 @@
  * @typedef {{size: number, hardness: number, flow: number}} Brush */
 
 /** Distance between stamps, as a part of the diameter. */
-export const SPACING = 0.12;
+const SPACING = 0.12;
 
 /** Return a stamp's coverage in [0, 1] at a distance from its centre, in radii.
  * @param {number} distance in pixels @param {number} radius @param {number} hardness */
-export function profile(distance, radius, hardness) {
+function profile(distance, radius, hardness) {
   // A hard edge is one pixel wide and centred on the radius, which preserves the area.
   const inner = hardness * Math.max(0, radius - 0.5);
   const outer = radius + 0.5 * hardness;

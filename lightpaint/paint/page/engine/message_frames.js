@@ -67,7 +67,7 @@ export function pictureOf(dtype, shape, buffer, offset = 0) {
 
 /** Element type of an array. Halves travel from session to page only.
  * @param {Data} data */
-export function dtypeOf(data) {
+function dtypeOf(data) {
   for (const [name, ArrayType] of Object.entries(DTYPES))
     if (name !== 'float16' && data instanceof ArrayType) return name;
   throw new Error('an array that no message holds');

@@ -41,7 +41,7 @@ export function openEngine(host, options = {}) {
   return new PictureEngine(host, { view });
 }
 
-export class PictureEngine extends Emitter {
+class PictureEngine extends Emitter {
   /** @param {Host} host @param {{view: 'gl' | 'cpu' | null}} options */
   constructor(host, { view }) {
     super();

@@ -18,7 +18,7 @@ import { wholeAdjustment } from './whole_adjustment.js';
  *   flow: number, importance: number, about?: 'spot' | 'object'}} ToolSettings */
 
 /** Screen pixels of a drag per stop and per mired. */
-export const DRAG = { stop: 80, mired: 1 };
+const DRAG = { stop: 80, mired: 1 };
 
 /** Largest change of a drag, in stops. */
 const MAX_STOPS = 8;

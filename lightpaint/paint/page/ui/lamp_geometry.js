@@ -65,7 +65,7 @@ export function seenTowards(camera, direction) {
 
 /** Return the camera ray of a pixel. @param {Camera} camera @param {number} x @param {number} y
  * @returns {{origin: Vector, way: Vector}} */
-export function rayAt({ origin, x_axis: xAxis, y_axis: yAxis, forward, is_parallel: isParallel }, x, y) {
+function rayAt({ origin, x_axis: xAxis, y_axis: yAxis, forward, is_parallel: isParallel }, x, y) {
   const shifted = plus(plus([0, 0, 0], xAxis, x), yAxis, y);
   return isParallel
     ? { origin: plus(origin, shifted), way: unit(forward) }
