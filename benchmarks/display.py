@@ -24,6 +24,7 @@ import numpy as np
 import lightpaint as lp
 from lightpaint.lighting.loss import warm_start
 from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.solve import loss_with_pull
 
 
 def main() -> None:
@@ -55,7 +56,7 @@ def main() -> None:
         )
         size = np.sqrt(basis.power)
         apart = np.abs(size * (found.weights - expected.weights)).max()
-        loss = loss_of(found) / loss_of(expected) - 1
+        loss = loss_with_pull(found) / loss_with_pull(expected) - 1
         asked = ("--view", view.name, "--exposure", str(view.stops))
         used, clock = command(options.basis, options.painting, *asked, repeats=options.repeats)
         rounds = [x.certificate.rounds for x in (found, expected)]
@@ -76,13 +77,6 @@ def timed(basis: lp.Basis, target: lp.Target, view: Any, *, sample: int) -> tupl
         return time.process_time() - start, solution
     finally:
         warm_start.MIN_SAMPLE = usual
-
-
-def loss_of(solution: Solution) -> float:
-    """What the solve made least: what is missed, and what pulls at the weights."""
-    problem, w = solution.problem, solution.weights
-    pull = 0.0 if problem.pull is None else float(problem.pull.objective(w).sum())
-    return float(problem.objective(w).sum()) + pull
 
 
 def command(basis: str, painting: str, *asked: str, repeats: int) -> tuple[float, float]:

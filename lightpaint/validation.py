@@ -29,6 +29,11 @@ def is_amount(value: float) -> bool:
     return 0 <= value <= BRIGHTEST
 
 
+def is_number(value: Any) -> bool:
+    """Return whether a value is an int or a float; a bool is an int to Python alone."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
 def check_fields(record: Any, expected: Mapping[str, Check]) -> None:
     """Raise LightpaintError for the first field of a dataclass that is not as expected.
 

@@ -22,6 +22,19 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.origin import Origin
 from lightpaint.images.formats.exr import write_rgb
 
+
+class SilentListener:
+    """A listener of a batch that hears nothing."""
+
+    def __call__(self, *_: Any) -> None: ...
+
+    def say(self, text: str) -> None: ...
+
+    note = say
+
+    def at_work(self, worker: str, what: str | None) -> None: ...
+
+
 #: Looks of every kind that needs no renderer.
 LOOKS = """
 [defaults]

@@ -33,6 +33,13 @@ LIGHTS = {
         </emitter>""",
 }
 
+#: A lamp of the kind and the colour of `bulb`.
+TWIN = LIGHTS["bulb"].replace('"bulb"', '"twin"').replace("-0.5", "0.6")
+#: A light that renders but that lightpaint cannot scale.
+SCREEN = """<shape type="rectangle" id="screen"><transform name="to_world"><scale value="0.4"/>
+    <rotate y="1" angle="90"/><translate x="-1" y="1"/></transform><emitter type="area">
+    <texture type="checkerboard" name="radiance"/></emitter></shape>"""
+
 ROOM = """<scene version="3.0.0">
     <default name="spp" value="16"/>
     <default name="width" value="24"/>

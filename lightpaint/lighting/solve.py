@@ -202,7 +202,7 @@ def _descend(
     solution = _descend_once(problem, start, reached, blocks, is_near=is_near)
     if not (problem.reduction.white_knobs or problem.reduction.gamut_knobs):
         return solution
-    count, value = solution.certificate.rounds, _total_loss(solution)
+    count, value = solution.certificate.rounds, loss_with_pull(solution)
     for _ in range(MAX_WHITE_STEPS):
         current = solution.problem
         equations = current.with_pull(current.solved)
@@ -212,7 +212,7 @@ def _descend(
         is_confined = reduction.gamut_knobs != current.reduction.gamut_knobs
         current = current.with_whites(reduction)
         nearer = _descend_once(current, optimum.weights, reached, blocks, is_near=True)
-        count, reached_loss = count + nearer.certificate.rounds, _total_loss(nearer)
+        count, reached_loss = count + nearer.certificate.rounds, loss_with_pull(nearer)
         # A light that left its gamut has to return, whatever that costs.
         if not is_confined and reached_loss > value * (1 - MIN_GAIN):
             break
@@ -220,7 +220,7 @@ def _descend(
     return solution.with_certificate_fields(rounds=count)
 
 
-def _total_loss(solution: Solution) -> float:
+def loss_with_pull(solution: Solution) -> float:
     """Return the loss with the pull on the weights."""
     problem, w = solution.problem, solution.weights
     pull = 0.0 if problem.pull is None else float(problem.pull.objective(w).sum())

@@ -8,9 +8,9 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import pytest
+from batches import SilentListener
 
 from lightpaint.batch.cluster.workers import ClusterWorkers
 from lightpaint.errors import BatchError
@@ -19,18 +19,6 @@ dask = pytest.importorskip("dask", reason="Dask")
 pytest.importorskip("distributed", reason="Dask's distributed")
 
 pytestmark = pytest.mark.skipif(shutil.which("openssl") is None, reason="no openssl")
-
-
-class Listens:
-    """Hears nothing that matters here."""
-
-    def __call__(self, *_: Any) -> None: ...
-
-    def say(self, text: str) -> None: ...
-
-    note = say
-
-    def at_work(self, worker: str, what: str | None) -> None: ...
 
 
 @dataclass
@@ -49,7 +37,7 @@ class Secured:
             for name, file in files.items()
         }
         with dask.config.set(named):
-            workers = ClusterWorkers(address, Listens(), "topic")  # type: ignore[arg-type]
+            workers = ClusterWorkers(address, SilentListener(), "topic")  # type: ignore[arg-type]
             try:
                 return workers.addresses
             finally:

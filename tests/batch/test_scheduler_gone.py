@@ -12,6 +12,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from batches import SilentListener
 
 from lightpaint.batch.cluster import workers
 from lightpaint.batch.cluster.cluster import Cluster
@@ -24,18 +25,6 @@ distributed = pytest.importorskip("distributed", reason="Dask's distributed")
 
 #: Seconds in which it is said: of a busy machine, too.
 SOON_S = 25.0
-
-
-class Listens:
-    """Hears nothing that matters here."""
-
-    def __call__(self, *_: Any) -> None: ...
-
-    def say(self, text: str) -> None: ...
-
-    note = say
-
-    def at_work(self, worker: str, what: str | None) -> None: ...
 
 
 @contextlib.contextmanager
@@ -71,7 +60,7 @@ def test_one_that_ends_while_it_is_reached(
     monkeypatch.setattr(workers, "GONE_S", 0.5)
     began_s = time.monotonic()
     with answering(said) as address, pytest.raises(BatchError) as refusal:
-        ClusterWorkers(address, Listens(), "topic")  # type: ignore[arg-type]
+        ClusterWorkers(address, SilentListener(), "topic")  # type: ignore[arg-type]
     assert time.monotonic() - began_s < SOON_S
     assert f"no scheduler answers at {address}" in str(refusal.value)
     assert "\n" not in str(refusal.value)
@@ -90,7 +79,7 @@ LATER: dict[str, Callable[[ClusterWorkers], object]] = {
 def test_one_that_ends_later(call: str, caplog: pytest.LogCaptureFixture) -> None:
     how = {"n_workers": 0, "processes": False, "protocol": "tcp://", "dashboard_address": None}
     with distributed.LocalCluster(**how) as cluster:
-        at = ClusterWorkers(cluster.scheduler_address, Listens(), "topic")  # type: ignore[arg-type]
+        at = ClusterWorkers(cluster.scheduler_address, SilentListener(), "topic")  # type: ignore[arg-type]
     caplog.clear()
     began_s = time.monotonic()
 
@@ -108,7 +97,7 @@ def test_one_that_ends_later(call: str, caplog: pytest.LogCaptureFixture) -> Non
 
 
 def test_what_a_worker_answers_that_is_no_answer_is_its_own_failure() -> None:
-    cluster = Cluster("tcp://127.0.0.1:1", Listens())  # type: ignore[arg-type]
+    cluster = Cluster("tcp://127.0.0.1:1", SilentListener())  # type: ignore[arg-type]
     item: Any = SimpleNamespace(name="look", kind="answer")
     for came, is_told in (
         (ItemResult("look", "answer", ""), False),
@@ -131,7 +120,7 @@ def test_what_a_worker_answers_that_is_no_answer_is_its_own_failure() -> None:
 
 
 def test_what_others_say_under_our_topic_is_passed_over() -> None:
-    cluster = Cluster("tcp://127.0.0.1:1", Listens())  # type: ignore[arg-type]
+    cluster = Cluster("tcp://127.0.0.1:1", SilentListener())  # type: ignore[arg-type]
     events = [{"item": "a", "worker": "w"}, {}, None, {"item": 1, "worker": "w"}, "text"]
     cluster._workers = SimpleNamespace(events=deque(events))  # type: ignore[assignment]
     cluster._read_events()

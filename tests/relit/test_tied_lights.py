@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from renderer import LIGHTS, mitsuba_render, one_pass, write_room
+from renderer import LIGHTS, SCREEN, TWIN, mitsuba_render, one_pass, write_room
 
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.errors import BasisError, LightingError, SceneError
@@ -22,10 +22,6 @@ from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.target import Target
 
-TWIN = LIGHTS["bulb"].replace('"bulb"', '"twin"').replace("-0.5", "0.6")
-SCREEN = """<shape type="rectangle" id="screen"><transform name="to_world"><scale value="0.4"/>
-    <rotate y="1" angle="90"/><translate x="-1" y="1"/></transform><emitter type="area">
-    <texture type="checkerboard" name="radiance"/></emitter></shape>"""
 SUNSKY = """<emitter type="sunsky" id="day"><float name="sun_scale" value="0.01"/>
     <float name="sky_scale" value="0.02"/>
     <vector name="sun_direction" x="0.3" y="0.8" z="0.6"/></emitter>"""

@@ -11,7 +11,7 @@ from lightpaint.colour.color import hex_to_rgb, kelvin_to_rgb, luminance
 from lightpaint.colour.white_range import WhiteRange, white_range
 from lightpaint.errors import ColorError, ConstraintError
 from lightpaint.files import one_line
-from lightpaint.validation import BRIGHTEST, MAX_NAME, MAX_PRIMARIES, is_amount
+from lightpaint.validation import BRIGHTEST, MAX_NAME, MAX_PRIMARIES, is_amount, is_number
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ def parse_level(value: Any, where: str, expected: str = "") -> Level:
         if not is_amount(number):
             raise ConstraintError(f"{where} is {value!r}: {expected}, of at most {BRIGHTEST:g}")
         return Level(number / 100, is_share=True) if text.endswith("%") else Level(number)
-    if _is_number(value) and is_amount(value):
+    if is_number(value) and is_amount(value):
         return Level(float(value))
     if _is_rgb(value):
         return Level(as_rgb(value))
@@ -144,9 +144,9 @@ def parse_whites(table: Mapping[str, Any], where: str) -> WhiteRange | None:
 
 def _parse_kelvins(value: Any, where: str) -> list[float]:
     """Return one temperature, or both ends of a range."""
-    ends = [value] if _is_number(value) else value
+    ends = [value] if is_number(value) else value
     is_range = isinstance(ends, Sequence) and not isinstance(ends, str) and len(ends) in (1, 2)
-    if not is_range or not all(map(_is_number, ends)) or sorted(ends) != list(ends):
+    if not is_range or not all(map(is_number, ends)) or sorted(ends) != list(ends):
         raise ConstraintError(
             f"{where} is {value!r}: expected a temperature, 3200, or a range from low to high, "
             "[2700, 6500]"
@@ -183,14 +183,14 @@ def _parse_kelvin(kelvin: float, duv: float, where: str) -> RGB:
 
 def _parse_duv(table: Mapping[str, Any], where: str) -> float:
     duv = table.get("duv", 0.0)
-    if not (_is_number(duv) and is_amount(abs(duv))):
+    if not (is_number(duv) and is_amount(abs(duv))):
         raise ConstraintError(f"{where}.duv is {duv!r}: expected a number like 0.003")
     return float(duv)
 
 
 def parse_strength(value: Any, where: str) -> float:
     """Return the strength of a pull."""
-    if not (_is_number(value) and is_amount(value)):
+    if not (is_number(value) and is_amount(value)):
         raise ConstraintError(f"{where} is {value!r}: expected a strength >= 0, like 0.1")
     return float(value)
 
@@ -216,12 +216,7 @@ def describe_constraint(key: str, value: Any) -> str:
 def _text(value: Any) -> str:
     if isinstance(value, Sequence) and not isinstance(value, str):
         return " ".join(map(_text, value))
-    return f"{value:g}" if _is_number(value) else str(value)
-
-
-def _is_number(value: Any) -> bool:
-    # bool is an int to Python, and no number to people.
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    return f"{value:g}" if is_number(value) else str(value)
 
 
 def _is_rgb(value: Any) -> bool:
@@ -229,5 +224,5 @@ def _is_rgb(value: Any) -> bool:
         isinstance(value, Sequence)
         and not isinstance(value, str)
         and len(value) == 3
-        and all(_is_number(v) and is_amount(v) for v in value)
+        and all(is_number(v) and is_amount(v) for v in value)
     )

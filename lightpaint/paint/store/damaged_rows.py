@@ -6,6 +6,9 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
+#: Errors raised by damaged pages, rows and values.
+DAMAGE_ERRORS = (sqlite3.Error, ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
+
 #: Maximum number of rows of a damaged table that are tried one by one.
 MAX_ROWS = 1_000_000
 

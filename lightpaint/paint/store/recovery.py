@@ -18,7 +18,14 @@ from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.files import flush
 from lightpaint.paint.store.compression import unpack, unpack_patch
-from lightpaint.paint.store.damaged_rows import Losses, Row, read_row, readable_rows, row_numbers
+from lightpaint.paint.store.damaged_rows import (
+    DAMAGE_ERRORS,
+    Losses,
+    Row,
+    read_row,
+    readable_rows,
+    row_numbers,
+)
 from lightpaint.paint.store.database import (
     APPLICATION,
     READ_VERSIONS,
@@ -33,11 +40,8 @@ from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.session_rows import parse_place
 from lightpaint.storage.json_records import read_record, strict_json
 
-#: Errors raised by damaged values.
-DAMAGE_ERRORS = (
-    *(sqlite3.Error, ArithmeticError, AttributeError, IndexError, LookupError),
-    *(LightpaintError, TypeError, ValueError),
-)
+#: Errors raised by rows that cannot be read, or that no session has.
+UNREADABLE_ERRORS = (AssertionError, LightpaintError, *DAMAGE_ERRORS)
 
 #: Bytes of a database's header, and of the longest file that is given its length again.
 HEADER_BYTES, MAX_RESTORED_BYTES = 100, 2**36
@@ -123,7 +127,7 @@ def _copy_readable(copy: Path, new: Path, path: Path, identity: Identity | None)
 
 
 def _read_identity(old: sqlite3.Connection) -> Identity | None:
-    with suppress(*DAMAGE_ERRORS):
+    with suppress(*UNREADABLE_ERRORS):
         [(text,)] = old.execute("SELECT value FROM about WHERE name = 'identity'")
         return read_record(Identity, strict_json(text))
     return None
@@ -131,7 +135,7 @@ def _read_identity(old: sqlite3.Connection) -> Identity | None:
 
 def _read_position(old: sqlite3.Connection, ids: Sequence[int]) -> int:
     """Return how many of the readable steps are done."""
-    with suppress(*DAMAGE_ERRORS):
+    with suppress(*UNREADABLE_ERRORS):
         [(position,)] = old.execute("SELECT value FROM about WHERE name = 'position'")
         numbers = [number for (number,) in readable_rows(old, "SELECT id FROM step ORDER BY id")]
         if 0 <= int(position) <= len(numbers):
@@ -151,7 +155,7 @@ def _read_steps(
         pixels = read_row(old, "SELECT before, change FROM pixels WHERE step = ?", number)
         try:
             _check_step(row, pixels, identity)
-        except DAMAGE_ERRORS:
+        except UNREADABLE_ERRORS:
             lost.names.append(str(number))
         else:
             assert row is not None
@@ -160,7 +164,7 @@ def _read_steps(
 
 
 def _check_step(row: Row | None, pixels: Row | None, identity: Identity | None) -> None:
-    """Raise one of DAMAGES unless the row is a valid step."""
+    """Raise one of UNREADABLE_ERRORS unless the row is a valid step."""
     if row is None:
         raise ValueError("no row")
     _, kind, label, fields, places = row
@@ -200,7 +204,7 @@ def _read_looks(old: sqlite3.Connection) -> tuple[list[tuple[Row, list[Row]]], L
             }:
                 raise ValueError("no picture")
             looks.append((row, arrays))
-        except (AssertionError, *DAMAGE_ERRORS):
+        except UNREADABLE_ERRORS:
             lost.names.append(name)
     return sorted(looks, key=lambda look: int(look[0][0])), lost
 
@@ -219,6 +223,6 @@ def _read_arrays(old: sqlite3.Connection, look: int) -> tuple[list[Row], set[str
                 raise ValueError("no such type")
             unpack(data, dtype, tuple(map(int, strict_json(shape))))
             arrays.append(array)
-        except (AssertionError, *DAMAGE_ERRORS):
+        except UNREADABLE_ERRORS:
             unreadable.add(str(name))
     return arrays, unreadable

@@ -18,6 +18,7 @@ from threading import RLock
 
 from lightpaint.errors import OutputError, PaintError
 from lightpaint.paint.store.compression import pack_patches
+from lightpaint.paint.store.damaged_rows import DAMAGE_ERRORS
 from lightpaint.paint.store.database import (
     DamagedError,
     check_pages,
@@ -36,7 +37,7 @@ from lightpaint.paint.store.session_rows import (
     step_rows,
     to_json,
 )
-from lightpaint.paint.store.stored_arrays import DAMAGE_ERRORS, StoredArrays
+from lightpaint.paint.store.stored_arrays import StoredArrays
 from lightpaint.paint.store.write_queue import WriteJob, WriteQueue
 from lightpaint.storage.json_records import strict_json
 
@@ -91,7 +92,7 @@ class Store:
         try:
             check_pages(self._database)
             self._read_all()
-        except (sqlite3.Error, *DAMAGE_ERRORS) as error:
+        except DAMAGE_ERRORS as error:
             self._database.close()
             raise damaged_error(self.path, error) from None
         except BaseException:

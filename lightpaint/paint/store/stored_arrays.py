@@ -10,13 +10,11 @@ from threading import RLock
 from lightpaint.errors import PaintError
 from lightpaint.paint.store.canvas_pixels import Pixels, Region
 from lightpaint.paint.store.compression import unpack_patch
+from lightpaint.paint.store.damaged_rows import DAMAGE_ERRORS
 from lightpaint.paint.store.database import damaged_error
 from lightpaint.paint.store.lazy_arrays import PackedArray, PackedArrays, StoredPatch
 from lightpaint.paint.store.session_rows import array_names, array_row, parse_place, pixels_row
 from lightpaint.storage.json_records import strict_json
-
-#: Errors raised by damaged values.
-DAMAGE_ERRORS = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
 
 
 class StoredArrays:
@@ -101,5 +99,5 @@ class StoredArrays:
         """Raise errors of reading as DamagedError."""
         try:
             yield
-        except (sqlite3.Error, PaintError, *DAMAGE_ERRORS) as error:
+        except (PaintError, *DAMAGE_ERRORS) as error:
             raise damaged_error(self._path, error) from None

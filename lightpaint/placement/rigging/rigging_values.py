@@ -11,7 +11,7 @@ from lightpaint.lighting.constraints.constraints import LightConstraint
 from lightpaint.lighting.constraints.values import check_keys
 from lightpaint.scene.lights.lights_file import MOVES
 from lightpaint.scene.properties.pose import FARTHEST
-from lightpaint.validation import MAX_LISTED, MAX_NAME
+from lightpaint.validation import MAX_LISTED, MAX_NAME, is_number
 
 #: Keys of permitted places; keys of a rail or surface.
 PLACE_KEYS = ("within", "box", "along", "on")
@@ -55,7 +55,7 @@ def check_on(table: Mapping[str, Any], where: str) -> None:
             raise ConstraintError(f"{where}.clear is for shapes: a rail hangs where its line is")
         return
     names_of(table["shapes"], f"{where}.shapes")
-    if "clear" in table and not (_is_number(table["clear"]) and 0 <= table["clear"] <= FARTHEST):
+    if "clear" in table and not (is_number(table["clear"]) and 0 <= table["clear"] <= FARTHEST):
         raise _wrong(f"{where}.clear", table["clear"], "the distance from the surface, like 0.1")
 
 
@@ -82,7 +82,7 @@ def check_new(table: Mapping[str, Any], where: str) -> None:
         names_of(table["on"], f"{where}.on")
     if "box" in table and not _is_segment(table["box"]):
         raise _wrong(f"{where}.box", table["box"], "two corners, [[x, y, z], [x, y, z]]")
-    if "apart" in table and not (_is_number(table["apart"]) and 0 <= table["apart"] <= FARTHEST):
+    if "apart" in table and not (is_number(table["apart"]) and 0 <= table["apart"] <= FARTHEST):
         raise _wrong(f"{where}.apart", table["apart"], "a distance >= 0, like 0.5")
     if not isinstance(table.get("in_view", True), bool):
         raise _wrong(f"{where}.in_view", table["in_view"], "true or false")
@@ -136,7 +136,7 @@ def names_of(value: Any, where: str) -> tuple[str, ...]:
 
 def _check_places(value: Any, where: str) -> None:
     """Raise ConstraintError unless it describes permitted places."""
-    if _is_number(value):
+    if is_number(value):
         value = {"within": value}
     if not isinstance(value, Mapping):
         raise _wrong(where, value, "a distance, like 1.0, or a table, { within = 1.0 }")
@@ -147,7 +147,7 @@ def _check_places(value: Any, where: str) -> None:
             f"{where} has {' and '.join(given_keys) or 'nothing'}: expected one of within, box, "
             "on, along and within"
         )
-    if "within" in value and not (_is_number(value["within"]) and 0 < value["within"] <= FARTHEST):
+    if "within" in value and not (is_number(value["within"]) and 0 < value["within"] <= FARTHEST):
         raise _wrong(f"{where}.within", value["within"], "a distance > 0, like 1.0")
     if "box" in value and not _is_segment(value["box"]):
         raise _wrong(f"{where}.box", value["box"], "two corners, [[x, y, z], [x, y, z]]")
@@ -160,11 +160,11 @@ def _check_places(value: Any, where: str) -> None:
 def _check_turns(table: Mapping[str, Any], where: str) -> None:
     """Raise ConstraintError for invalid values of `aim` and `cone`."""
     aim = table.get("aim", True)
-    if not isinstance(aim, bool) and not (_is_number(aim) and 0 < aim <= 180):
+    if not isinstance(aim, bool) and not (is_number(aim) and 0 < aim <= 180):
         raise _wrong(f"{where}.aim", aim, "degrees from 0 to 180, or true for any direction")
     if "cone" in table:
         cone = table["cone"]
-        is_pair = _is_list(cone, 2) and all(map(_is_number, cone))
+        is_pair = _is_list(cone, 2) and all(map(is_number, cone))
         if not (is_pair and 1 < cone[0] <= cone[1] < 90):
             raise _wrong(f"{where}.cone", cone, "two angles, from 1 to 90 degrees, like [10, 45]")
 
@@ -172,9 +172,9 @@ def _check_turns(table: Mapping[str, Any], where: str) -> None:
 def _check_size(value: Any, kind: str, where: str) -> None:
     if kind not in ("panel", ""):
         raise ConstraintError(f"{where} is for panels: a {kind} has no size")
-    sides = [value, value] if _is_number(value) else value
+    sides = [value, value] if is_number(value) else value
     if not (
-        _is_list(sides, 2) and all(map(_is_number, sides)) and 0 < sides[0] <= sides[1] <= FARTHEST
+        _is_list(sides, 2) and all(map(is_number, sides)) and 0 < sides[0] <= sides[1] <= FARTHEST
     ):
         raise _wrong(where, value, "the smallest and the largest side, like [0.3, 0.6]")
 
@@ -188,16 +188,11 @@ def _is_segment(value: Any) -> bool:
 
 
 def _is_point(value: Any) -> bool:
-    return _is_list(value, 3) and all(_is_number(x) and abs(x) <= FARTHEST for x in value)
+    return _is_list(value, 3) and all(is_number(x) and abs(x) <= FARTHEST for x in value)
 
 
 def _is_list(value: Any, count: int) -> bool:
     return isinstance(value, Sequence) and not isinstance(value, str) and len(value) == count
-
-
-def _is_number(value: Any) -> bool:
-    # bool is an int in Python, but no valid number here.
-    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _is_name(value: Any) -> bool:

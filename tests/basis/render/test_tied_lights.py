@@ -4,7 +4,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from renderer import LIGHTS, SAME_SAMPLES, mitsuba_render, one_pass, write_room
+from renderer import (
+    LIGHTS,
+    SAME_SAMPLES,
+    SCREEN,
+    TWIN,
+    mitsuba_render,
+    one_pass,
+    write_room,
+)
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.cached_render import obtain_basis
@@ -17,12 +25,6 @@ from lightpaint.scene.properties.emission import MULTIPLE
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
-#: A lamp of the kind and the colour of `bulb`.
-TWIN = LIGHTS["bulb"].replace('"bulb"', '"twin"').replace("-0.5", "0.6")
-#: A light that renders but that lightpaint cannot scale.
-SCREEN = """<shape type="rectangle" id="screen"><transform name="to_world"><scale value="0.4"/>
-    <rotate y="1" angle="90"/><translate x="-1" y="1"/></transform><emitter type="area">
-    <texture type="checkerboard" name="radiance"/></emitter></shape>"""
 SLOW = '<integrator type="volpathmis"><integer name="max_depth" value="5"/></integrator>'
 
 ROOM = "".join(LIGHTS.values()) + TWIN
