@@ -22,7 +22,7 @@ from lightpaint.paint.layers.layer_stack import LayerStack, stack_after
 from lightpaint.paint.session.look_library import LookLibrary
 from lightpaint.paint.session.picture_table import PictureTable
 from lightpaint.paint.store.canvas_pixels import Pixels
-from lightpaint.paint.store.store import MemoryStore, Store
+from lightpaint.paint.store.store import Store
 
 SIZE = SIZES[0]
 WHOLE = (0, SIZE[0], 0, SIZE[1])
@@ -228,23 +228,6 @@ def test_what_no_layer_can_be_is_refused_and_nothing_changes() -> None:
         hand.session.handle(protocol.ChangeLayers(layers=(Layer(2, "adjust"),)), {})
     hand.session.handle(protocol.Undo(), {})
     assert (hand.state(), len(hand.session.store.steps)) == (state, steps + 1)
-
-
-def test_a_session_from_before_there_were_layers_is_one_layer(tmp_path: Path) -> None:
-    session = session_on(MemoryStore(identity_of()))
-    image = np.full((4, 6, 3), 0.7, np.float32)
-    arrays = {"image": image, "importance": np.full((4, 6), 2, np.float32)}
-    session.handle(protocol.Paint(1, (2, 6, 3, 9), is_final=True), arrays)
-    [step] = session.store.steps
-    path = tmp_path / "session.db"
-    with Store.open(path, identity_of()) as store:
-        store.append(step)
-        store._database.execute("PRAGMA user_version = 2")
-    with Store.open(path, identity_of()) as store:
-        again = session_on(store)
-        assert again.views.layers == LayerStack((PAINTING,))
-        np.testing.assert_array_equal(again.views[0].image[2:6, 3:9], image)
-        assert again.views[0].painting.equals(session.views[0].painting)
 
 
 def test_killed_at_any_moment_the_layers_of_all_acknowledged_steps_are_there(

@@ -379,7 +379,7 @@ def _done(path: Path, statement: str) -> None:
         lambda path: path.write_bytes(b"junk" * 1000),
         lambda path: path.write_bytes(path.read_bytes()[:40_000]),
         lambda path: _done(path, "DROP TABLE step"),
-        lambda path: _done(path, "PRAGMA user_version=1"),
+        lambda path: _done(path, "PRAGMA user_version=2"),
         lambda path: _done(path, "PRAGMA user_version=9"),
         lambda path: _done(path, "PRAGMA application_id=9"),
     ],

@@ -21,9 +21,6 @@ from lightpaint.storage.json_records import read_record, strict_json
 #: "lpnt", which marks a file as a session, and the version of its tables.
 APPLICATION, VERSION = 0x6C706E74, 3
 
-#: Versions that are read: 2 has the same tables, without layers in its steps.
-READ_VERSIONS = (2, VERSION)
-
 #: Free pages (of 16 KiB) returned to the disk at a start: 64 MB, in a moment.
 VACUUM_PAGES = 4096
 
@@ -83,13 +80,11 @@ def _prepare(database: sqlite3.Connection, path: Path | None, identity: Identity
             database.execute(f"PRAGMA user_version = {VERSION}")
         elif application != APPLICATION:
             raise PaintError(f"{path} is no session of the painter: {START_AFRESH}")
-        elif version not in READ_VERSIONS:
+        elif version != VERSION:
             raise PaintError(
                 f"{path} was written by another version of lightpaint (format {version}, not "
                 f"{VERSION}): {START_AFRESH}"
             )
-        elif version != VERSION:
-            database.execute(f"PRAGMA user_version = {VERSION}")
         if identity is not None:
             _check_identity(database, path, identity)
             _store_identity(database, json.dumps(asdict(identity)))

@@ -28,7 +28,7 @@ from lightpaint.paint.store.damaged_rows import (
 )
 from lightpaint.paint.store.database import (
     APPLICATION,
-    READ_VERSIONS,
+    VERSION,
     damaged_error,
     free_name,
     open_database,
@@ -93,7 +93,7 @@ def _copy_readable(copy: Path, new: Path, path: Path, identity: Identity | None)
             old.execute("PRAGMA trusted_schema = OFF")
             [(application,)] = old.execute("PRAGMA application_id")
             [(version,)] = old.execute("PRAGMA user_version")
-            if application != APPLICATION or version not in READ_VERSIONS:
+            if application != APPLICATION or version != VERSION:
                 raise PaintError("not of this version")
             stored_identity = _read_identity(old) or identity
             steps, lost_steps = _read_steps(old, stored_identity)
