@@ -26,7 +26,7 @@ def _controller() -> ThreadpoolController:
 
 
 def one_thread() -> AbstractContextManager[object]:
-    """Limit BLAS to one thread within the block.
+    """Limit NumPy's BLAS to one thread within the block.
 
     On small arrays its threads wait for each other longer than they work, and the way they split a
     sum decides its last bits.
