@@ -45,6 +45,13 @@ def painter(crowded: Painter) -> Painter:
     )
     crowded.page.mouse.move(5, 5)
     crowded.still()
+    crowded.page.evaluate(
+        """() => {
+          for (const one of document.querySelectorAll('.lightpaint, .lightpaint *')) {
+            one.scrollTo(0, 0);
+          }
+        }"""
+    )
     return crowded
 
 
@@ -232,6 +239,18 @@ def test_numbers_stay_on_the_lines_of_their_units(painter: Painter) -> None:
     said = painter.page.locator(".truth").evaluate("(one) => one.textContent")
     assert said.count("\u00a0%") >= 5
     assert " %" not in said
+
+
+def test_lines_of_a_name_end_between_words(painter: Painter) -> None:
+    """A line that is seen alone, beside one that is scrolled away, is a part of the name."""
+    lines = painter.page.evaluate(
+        """() => [...document.querySelectorAll('.light .its-name')].map(
+          (name) => [...name.children].map((line) => line.textContent))"""
+    )
+    assert len(lines) == 69
+    for start, end in lines:
+        assert not end or (start + end).endswith(end)
+        assert not (start[-1:].isalnum() and end[:1].isalnum()), (start, end)
 
 
 def test_axe_finds_nothing_in_a_crowd(painter: Painter, axe: str) -> None:

@@ -143,9 +143,10 @@ export class LightRow extends Component {
   }
 }
 
-/** Return the end of a long name that always stays visible, since names of many lights differ
- * there: from its last separator on or, without one near the end, a fixed number of characters. */
-const END = /[^\p{L}\p{N}].{4,8}$/u;
+/** The end of a long name that always stays visible, since names of many lights differ there: whole
+ * words from a separator on or, without one near the end, a fixed number of characters. A part of a
+ * word would be no word of the name where the other line is scrolled away. */
+const END = /[^\p{L}\p{N}].{1,8}$/u;
 const END_LENGTH = 9;
 
 /** A name on up to two lines, truncated before its end.
