@@ -144,7 +144,7 @@ def strokes(count: int) -> None:
         )
         rng = np.random.default_rng(1)
         # The first answer builds the tiles.
-        weights = live.answer(basis.present_weights)
+        weights = live.answer(basis.current_weights)
         for kind in ("image", "importance"):
             updates, solves = [], []
             for _ in range(count):
@@ -182,11 +182,11 @@ def looks() -> None:
 
 
 def lights(n: int) -> tuple[BasisLight, ...]:
-    """Lights of some present emission."""
-    present = 0.2 + np.random.default_rng(n).random((n, 3))
+    """Lights of some current emission."""
+    current = 0.2 + np.random.default_rng(n).random((n, 3))
     return tuple(
         BasisLight(f"light {k}", "area", "radiance", "W/(m² sr)", tuple(map(float, rgb)))
-        for k, rgb in enumerate(present)
+        for k, rgb in enumerate(current)
     )
 
 

@@ -142,8 +142,8 @@ def make_target(kind: str, truth: Basis) -> Target:
         return lp.read_target(ROOT / "targets" / SHIPPED[kind][1])
     height, width = truth.size
     y, x = np.mgrid[:height, :width, :1][:2]
-    image = truth.present_look * (0.6 + 0.4 * (x > width / 2)) * np.array([1, 0.7, 0.3])
-    image = (image + 0.1 * truth.present_look.mean() * y / height).astype(np.float32)
+    image = truth.current_look * (0.6 + 0.4 * (x > width / 2)) * np.array([1, 0.7, 0.3])
+    image = (image + 0.1 * truth.current_look.mean() * y / height).astype(np.float32)
     return Target("painted", image, np.ones(truth.size, np.float32), everything=True)
 
 

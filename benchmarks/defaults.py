@@ -8,7 +8,7 @@ Seconds of the processor of whole processes, in turns with those of CHECKOUT, an
 - second: `lightpaint solve` of each painting of the gallery with the basis kept that the demo
   rendered, verification included; and how much of the light the verification checked: the share of
   lights in which it would probably have seen an error of 5 %.
-- first: a first picture with nothing kept and no kernel compiled: the fewest samples whose present
+- first: a first picture with nothing kept and no kernel compiled: the fewest samples whose current
   look, denoised, has a mean ΔE of 3 or less to a long render.
 - weights: the mean relative error of the lights' weights, each with its share of the picture, by
   the samples that the version's demo takes, and the mean ΔE of the denoised prediction to the long
@@ -67,10 +67,10 @@ from lightpaint.images.denoiser import denoised
 scene, spp, out = sys.argv[1:]
 basis = lp.render_basis(lp.load_scene(scene), spp=int(spp))
 try:
-    from lightpaint.basis.denoised_mixes import denoise_present_look
-    picture = denoise_present_look(basis)
+    from lightpaint.basis.denoised_mixes import denoise_current_look
+    picture = denoise_current_look(basis)
 except ImportError:  # an earlier version
-    picture = denoised(basis.present_look, basis.features)
+    picture = denoised(basis.current_look, basis.features)
 np.save(out, picture)
 """
 
@@ -201,7 +201,7 @@ def first(checkouts: dict[str, Path], place: Path, long_spp: int) -> None:
     # A picture of ordinary paths, so that it is nobody's own.
     truth = lp.render_basis(
         lp.load_scene(scene).reduced("1/2"), spp=long_spp // 4, seed=LONG_SEED
-    ).present_look
+    ).current_look
     found, notes = {}, []
     for which, at in checkouts.items():
         for spp in (2, 4, 8, 16, 32, 64):

@@ -5,7 +5,7 @@
                                 [--few 2 4]
     python benchmarks/intent.py --loosen [--scenes ...] [--styles ...] [--cases ...] [--first ...]
 
-A case means a lighting: the present one with one to three lights changed by 1 to 2.5 stops, up or
+A case means a lighting: the current one with one to three lights changed by 1 to 2.5 stops, up or
 down, most of them warmer or cooler, in a quarter of the cases everything else dimmed by 1 to 3
 stops. Painted is only part of what that would do, and not exactly: the look times 2^(log ratio),
 blurred, its strength wrong by a factor of 0.75 to 1.35, its hue off by 0.15 stops, with soft edges,
@@ -13,7 +13,7 @@ in 8 bits. Styles: `spot`, only the strongest part of the strongest region; `blo
 `all`, whatever changes clearly; `full`, the whole picture. Judged is the whole picture, painted or
 not: mean CIEDE2000 between the answer and what was meant, at the exposure of the painting.
 
-Harm is how much worse than a lighting with nothing painted a case is at most. `now` is the present
+Harm is how much worse than a lighting with nothing painted a case is at most. `now` is the current
 lighting; `unpainted` is what the same settings give with nothing painted. Only whites differ in it:
 somebody who asks for white lamps, of lamps that are none, has to lose their colours whatever he
 paints, and the line `nothing, white` shows what that alone costs.
@@ -101,7 +101,7 @@ class Case:
         assert transform is not None
         dark = 0.01 * self.current.mean()
         ratio = (self.target.image.astype(np.float64) + dark) / (self.current + dark)
-        look = denoised(few.present_look, few.features) * ratio
+        look = denoised(few.current_look, few.features) * ratio
         codes = np.round(255 * transform.encode(look)) / 255
         image = transform.decode(codes).astype(np.float32)
         return replace(self, target=replace(self.target, image=image, at_least=codes >= 1))
@@ -146,7 +146,7 @@ def main() -> None:
             for style in options.styles
         }
         head(cases)
-        nothing = judged_alike(cases, basis.mix(basis.present_weights))
+        nothing = judged_alike(cases, basis.mix(basis.current_weights))
         row("doing nothing", nothing, nothing, nothing)
         for setting in options.settings:
             own = judged_alike(cases, basis.mix(unpainted(basis, SETTINGS[setting])))
@@ -176,7 +176,7 @@ def main() -> None:
         lamps = {"lamps": [x for x in lamps if x is not None]}
         if lamps["lamps"]:
             head(lamps)
-            none = judged_alike(lamps, basis.present_look)
+            none = judged_alike(lamps, basis.current_look)
             row("doing nothing", none, none, none)
             for setting in options.settings:
                 own = judged_alike(lamps, basis.mix(unpainted(basis, SETTINGS[setting])))
@@ -233,16 +233,16 @@ def judged_alike(cases: Mapping[str, Sequence[Case]], image: np.ndarray) -> Erro
 
 def unpainted(basis: lp.Basis, settings: dict[str, Any]) -> np.ndarray:
     """Return the weights (n, 3) that the painter shows with these settings and nothing painted."""
-    view = LiveView(basis, np.zeros_like(basis.present_look), np.zeros(basis.size, np.float32))
+    view = LiveView(basis, np.zeros_like(basis.current_look), np.zeros(basis.size, np.float32))
     solver = LiveSolver([view], fit=lp.Fit(**settings), constraints=lp.Constraints())
-    return solver.answer(basis.present_weights)
+    return solver.answer(basis.current_weights)
 
 
 def as_light_groups(basis: lp.Basis) -> lp.Basis:
     """Return the lights' present pictures as another renderer's light groups would give them."""
     channels = {
         f"Light_{name}.{c}": np.ascontiguousarray(image[..., k])
-        for name, image in zip(basis.names, present_pictures(basis), strict=True)
+        for name, image in zip(basis.names, current_pictures(basis), strict=True)
         for k, c in enumerate("RGB")
     }
     header = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.ZIP_COMPRESSION}
@@ -252,9 +252,9 @@ def as_light_groups(basis: lp.Basis) -> lp.Basis:
         return lp.read_light_groups(path, pattern="Light_{name}").basis
 
 
-def present_pictures(basis: lp.Basis) -> np.ndarray:
-    """Return the picture of each light in the present lighting, (n, h, w, 3) float32."""
-    return (basis.images * basis.present_weights[:, None, None]).astype(np.float32)
+def current_pictures(basis: lp.Basis) -> np.ndarray:
+    """Return the picture of each light in the current lighting, (n, h, w, 3) float32."""
+    return (basis.images * basis.current_weights[:, None, None]).astype(np.float32)
 
 
 def answer(basis: lp.Basis, case: Case, settings: dict[str, Any]) -> np.ndarray:
@@ -277,7 +277,7 @@ def painted(
 
     is_clean: whether it is painted over the denoised look.
     """
-    current = basis.mix(basis.present_weights)
+    current = basis.mix(basis.current_weights)
     meant, ratio = next(
         (image, ratio)
         for image, ratio in intentions(basis, current, rng)
@@ -310,8 +310,8 @@ def painted(
 
 def over_lamp(basis: lp.Basis, rng: np.random.Generator) -> Case | None:
     """A stroke over a lamp in view and what is around it; None where no lamp is in view."""
-    current, seen = basis.present_look, basis.emitters_seen
-    whose = np.argmax(luminance(present_pictures(basis)), axis=0)
+    current, seen = basis.current_look, basis.emitters_seen
+    whose = np.argmax(luminance(current_pictures(basis)), axis=0)
     lamps = [k for k in np.unique(whose[seen]) if not basis.is_fixed[k]]
     if not lamps:
         return None
@@ -322,7 +322,7 @@ def over_lamp(basis: lp.Basis, rng: np.random.Generator) -> Case | None:
     away = np.hypot(y - rows[at], x - columns[at]) / basis.size[0]
     mask = gaussian_filter((away < rng.uniform(0.06, 0.2)).astype(float), basis.size[1] / 80)
     mask[mask < 0.02] = 0
-    weights = basis.present_weights.copy()
+    weights = basis.current_weights.copy()
     weights[k] *= 2 ** (rng.uniform(1, 2.5) * (1 if rng.random() < 0.75 else -1))
     tint = kelvin_to_rgb(rng.uniform(2400, 5000)) / kelvin_to_rgb(6500)
     weights[k] *= tint / luminance(tint)
@@ -352,12 +352,12 @@ def intentions(
     lights = np.flatnonzero(~basis.is_fixed)
     dark = 0.01 * current.mean()
     while True:
-        weights = basis.present_weights.copy()
+        weights = basis.current_weights.copy()
         if rng.random() < 0.25:
             weights[lights] *= 2 ** -rng.uniform(1, 3)
         for k in rng.choice(lights, size=rng.integers(1, 4), replace=False):
             stops = rng.choice([-1, 1]) * rng.uniform(1, 2.5)
-            weights[k] = basis.present_weights[k] * 2**stops
+            weights[k] = basis.current_weights[k] * 2**stops
             if rng.random() < 0.6:
                 tint = kelvin_to_rgb(rng.uniform(2800, 9500)) / kelvin_to_rgb(6500)
                 weights[k] *= tint / luminance(tint)

@@ -118,7 +118,7 @@ def write_files(folder: Path, count: int, size: tuple[int, int], noise: float) -
     """Write basis and painting into a folder."""
     basis = made_basis(count, size, noise)
     lp.write_basis(folder / "made.basis.exr", basis)
-    weights = basis.present_weights * np.random.default_rng(4).uniform(0, 2, (count, 3))
+    weights = basis.current_weights * np.random.default_rng(4).uniform(0, 2, (count, 3))
     painting = np.clip(basis.mix(weights), 0, 1)
     encoded = lp.ViewTransform("srgb").encode(painting)
     (folder / "painting.png").write_bytes(png_bytes((255 * encoded + 0.5).astype(np.uint8), {}))

@@ -150,7 +150,7 @@ def painting(basis: Basis, truth: npt.NDArray[np.float32]) -> Target:
 
     truth: planes, (n, h, w, 3), whose sum is that look.
     """
-    look = np.einsum("nhwc,nc->hwc", truth, basis.present_weights)
+    look = np.einsum("nhwc,nc->hwc", truth, basis.current_weights)
     y, x = (np.arange(size) / size for size in look.shape[:2])
     pool = np.square((x - 0.35) / 0.15) + np.square((y[:, None] - 0.6) / 0.25) < 1
     painted = look * (0.4 + 0.6 * x[:, None]) * (1.1, 1, 0.85)

@@ -193,12 +193,12 @@ def stroke_ms(
     light by `paint`, (3,).
     """
     height = basis.size[0]
-    image, importance = basis.present_look.copy(), np.zeros(basis.size, np.float32)
+    image, importance = basis.current_look.copy(), np.zeros(basis.size, np.float32)
     importance[: height // 2] = 0.5
     meant = resolve_fit(Settings(**fit), over_look=True, through_view=True)
     view = LiveView(basis, image, importance)
     live = LiveSolver([view], fit=meant, constraints=lp.Constraints.of(asked))
-    weights, times = live.answer(basis.present_weights), []
+    weights, times = live.answer(basis.current_weights), []
     for k in range(40):
         region = slice(8 + 3 * k, 72 + 3 * k), slice(8 + 5 * k, 72 + 5 * k)
         begin = time.perf_counter()

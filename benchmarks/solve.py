@@ -4,7 +4,7 @@
 
 First look: nothing is there yet; lightpaint renders its basis and solves. Second look: the
 same scene, a new painting; the basis is there. Adam optimises the same emissions against
-the same weighted squares through Mitsuba's `prb` integrator, starting from the present look,
+the same weighted squares through Mitsuba's `prb` integrator, starting from the current look,
 and is given the best of several step sizes. Both are judged by one reference: the objective
 under a basis of many more samples that neither has seen. Adam's time is that of the step at
 which it first reaches lightpaint's objective. Kernels are compiled before any clock starts.
@@ -116,7 +116,7 @@ def descend(
     limit_s: float,
     step_size: float,
 ) -> tuple[float, float]:
-    """One run of Adam over emissions relative to the present ones, clipped at 0."""
+    """One run of Adam over emissions relative to the current ones, clipped at 0."""
     import drjit as dr
     import mitsuba as mi
 
@@ -124,7 +124,7 @@ def descend(
     loaded = scene.load()
     parameters = mi.traverse(loaded)
     keys = {light.name: key_of(parameters, loaded, light.name) for light in scene.lights}
-    present = {x.name: mi.Color3f(*(max(v, 1e-3) for v in x.emission)) for x in scene.lights}
+    current = {x.name: mi.Color3f(*(max(v, 1e-3) for v in x.emission)) for x in scene.lights}
     integrator = mi.load_dict({"type": "prb", "max_depth": scene.integrator.max_depth})
     psi, weight = mi.TensorXf(squares.image), mi.TensorXf(squares.weight + 0 * squares.image)
     optimizer = mi.ad.Adam(lr=step_size)
@@ -136,7 +136,7 @@ def descend(
         start = time.perf_counter()
         for name, key in keys.items():
             optimizer[name] = dr.maximum(optimizer[name], 0)
-            parameters[key] = optimizer[name] * present[name]
+            parameters[key] = optimizer[name] * current[name]
         parameters.update()
         rendered = mi.render(
             loaded,
@@ -149,7 +149,7 @@ def descend(
         dr.backward(dr.sum(weight * dr.square(rendered - psi), axis=None))
         optimizer.step()
         weights = np.stack(
-            [np.array(dr.maximum(optimizer[n], 0) * present[n]).ravel() for n in basis.names]
+            [np.array(dr.maximum(optimizer[n], 0) * current[n]).ravel() for n in basis.names]
         )
         step += 1
         if step > 1:  # the first step compiled

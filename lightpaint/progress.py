@@ -31,7 +31,7 @@ class Listener(Progress, Protocol):
         """Record a finished stage and its resources, for verbose output."""
 
     def at_work(self, worker: str, task: str | None) -> None:
-        """Show the present task of one of several workers; None if it is idle."""
+        """Show the current task of one of several workers; None if it is idle."""
 
 
 class _Silent:

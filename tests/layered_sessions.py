@@ -42,8 +42,8 @@ def identity_of(views: int = 2) -> Identity:
 def session_on(store: Store, views: int = 2) -> Session:
     """A session on what a store holds."""
     bases = bases_of(views)
-    presents = [basis.present_look for basis in bases]
-    return Session(bases, presents, store, settings=Settings(), transform=lp.ViewTransform())
+    current_looks = [basis.current_look for basis in bases]
+    return Session(bases, current_looks, store, settings=Settings(), transform=lp.ViewTransform())
 
 
 def random_mask(rng: np.random.Generator, size: tuple[int, int]) -> npt.NDArray[np.float32]:

@@ -28,10 +28,10 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     small = room.read_text("utf-8").replace('value="24"', 'value="16"')
     room.write_text(small.replace('name="height" value="20"', 'name="height" value="16"'), "utf-8")
     basis = lp.render_basis(lp.load_scene(room), spp=4)
-    target = lp.Target.of(basis.mix(basis.present_weights * [[0.5], [2.0]]))
+    target = lp.Target.of(basis.mix(basis.current_weights * [[0.5], [2.0]]))
     lp.write_basis(folder / "room.basis.exr", basis)
     write_rgb(folder / "painting.exr", target.image)
-    lighting = lp.Lighting.present(basis)
+    lighting = lp.Lighting.current(basis)
     for name, emission in {"panel": (2.0, 1.5, 1.0), "bulb": (1.0, 1.2, 1.4)}.items():
         lighting = lighting.with_emission(name, emission)
     lp.write_lighting(folder / "lighting.json", lighting)

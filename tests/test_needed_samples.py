@@ -54,7 +54,7 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def painting(scene: Scene) -> Target:
     """Three lights dimmed, and a stroke that no mix reaches."""
     basis = render_basis(scene, spp=64, seed=7)
-    weights = basis.present_weights * np.array([1, 0.5, 2, 1, 0.7][: len(basis.names)])[:, None]
+    weights = basis.current_weights * np.array([1, 0.5, 2, 1, 0.7][: len(basis.names)])[:, None]
     image = basis.mix(weights)
     image[8:12, 4:12] *= np.float32([1.2, 1, 0.8])
     return Target("t", image, np.ones(basis.size, np.float32), everything=True)
@@ -149,6 +149,6 @@ def test_an_error_and_a_number_of_samples_are_refused(other: dict[str, Any]):
 
 def test_an_error_needs_a_scene(make_basis: Any, tmp_path: Path):
     basis = make_basis()
-    target = Target("t", basis.present_look, np.ones(basis.size, np.float32), everything=True)
+    target = Target("t", basis.current_look, np.ones(basis.size, np.float32), everything=True)
     with pytest.raises(LightpaintError, match="error"):
         paint_with_light(None, target, tmp_path, basis=basis, error=0.02)

@@ -31,7 +31,7 @@ def room(tmp_path: Path) -> Scene:
 
 def painted(room: Scene) -> lp.Target:
     """The room with its spot aimed elsewhere."""
-    goal = lp.render_basis(room.moved({"beam": AIMED}), spp=256, seed=2).present_look
+    goal = lp.render_basis(room.moved({"beam": AIMED}), spp=256, seed=2).current_look
     return lp.Target.of(goal)
 
 
@@ -101,7 +101,7 @@ def test_places_need_a_scene(room: Scene, tmp_path: Path) -> None:
     with pytest.raises(LightpaintError, match="lights can only move in their scene"):
         lp.paint_with_light(
             None,
-            lp.Target.of(basis.present_look),
+            lp.Target.of(basis.current_look),
             tmp_path / "answer",
             basis=basis,
             rigging=lp.Rigging.of({"beam": {"aim": 30}}),
@@ -112,7 +112,7 @@ def test_the_lights_file_of_the_scene_lets_lights_move(tmp_path: Path) -> None:
     path = write_room(tmp_path)
     write_bytes(tmp_path / "room.lights.toml", b"[light.beam]\naim = 40\n")
     scene = load_scene(path)
-    target = lp.Target.of(lp.render_basis(scene, spp=4).present_look)
+    target = lp.Target.of(lp.render_basis(scene, spp=4).current_look)
     job = lp.Job((scene,), (target,), tmp_path / "answer")
     assert [name for name, _, _ in job.all_rigging.lights] == ["beam"]
 
@@ -120,7 +120,7 @@ def test_the_lights_file_of_the_scene_lets_lights_move(tmp_path: Path) -> None:
 def test_a_job_is_sent_with_what_may_move(tmp_path: Path) -> None:
     path = write_room(tmp_path)
     scene = load_scene(path)
-    look = lp.render_basis(scene, spp=4).present_look
+    look = lp.render_basis(scene, spp=4).current_look
     write_rgb(tmp_path / "p.exr", look)
     rigging = lp.Rigging.of(
         {"beam": {"aim": 30, "move": {"on": "rail"}}},
@@ -140,9 +140,9 @@ def test_what_is_not_painted_is_held_at_the_look_before_the_move(
     """A basis with lights elsewhere is solved for the look that was painted over."""
     basis = lp.render_basis(room, spp=64, seed=1)
     moved = lp.render_basis(room.moved({"beam": AIMED}), spp=64, seed=1)
-    look, half = basis.present_look, basis.noise.mix(basis.present_weights)
+    look, half = basis.current_look, basis.noise.mix(basis.current_weights)
     held = replace(moved, former=Estimate(look, half))
-    assert np.array_equal(held.present_look, look)
+    assert np.array_equal(held.current_look, look)
     importance = np.zeros(basis.size, np.float32)
     importance[:2] = 1
     target = replace(lp.Target.of(look), importance=importance, everything=False)
@@ -174,7 +174,7 @@ LAMP = lp.NewEmitter("lamp", "point", lp.Pose(position=(0.5, 1.4, 0.6)), emissio
 def test_a_missing_lamp_is_added_with_its_constraint_and_written_behind_the_users_text(
     room: Scene, tmp_path: Path
 ) -> None:
-    goal = lp.render_basis(room.with_new_emitters([LAMP]), spp=256, seed=2).present_look
+    goal = lp.render_basis(room.with_new_emitters([LAMP]), spp=256, seed=2).current_look
     look = lp.paint_with_light(
         room,
         lp.Target.of(goal),
@@ -210,7 +210,7 @@ def test_two_views_place_a_light_together(tmp_path: Path) -> None:
     path = write_room(tmp_path, sensors=second)
     scenes = [load_scene(path, sensor=name) for name in ("camera", "side")]
     moved = [scene.moved({"beam": AIMED}) for scene in scenes]
-    targets = [lp.Target.of(lp.render_basis(x, spp=128, seed=2).present_look) for x in moved]
+    targets = [lp.Target.of(lp.render_basis(x, spp=128, seed=2).current_look) for x in moved]
     looks = lp.paint_with_light(
         scenes,
         targets,
@@ -275,7 +275,7 @@ def test_sums_alone_are_refused_where_lights_may_move(tmp_path: Path) -> None:
     path = write_room(tmp_path)
     write_bytes(tmp_path / "room.lights.toml", b"[light.beam]\naim = 40\n")
     scene = load_scene(path)
-    write_rgb(tmp_path / "p.exr", lp.render_basis(scene, spp=2).present_look)
+    write_rgb(tmp_path / "p.exr", lp.render_basis(scene, spp=2).current_look)
     look = 'scene = "room.xml"\npainting = "p.exr"\nwant = ["lights"]\n'
     settings = '[look.settings]\nspace = "linear"\nliteral = true\n'
     (tmp_path / "looks.toml").write_text(f"[[look]]\n{look}{settings}")
@@ -295,7 +295,7 @@ class _Stop:
 
 def test_an_interrupted_search_leaves_nothing_half_written(room: Scene, tmp_path: Path) -> None:
     small = room.reduced("1/2")
-    target = lp.Target.of(lp.render_basis(small.moved({"beam": AIMED}), spp=64).present_look)
+    target = lp.Target.of(lp.render_basis(small.moved({"beam": AIMED}), spp=64).current_look)
     how = {"rigging": lp.Rigging.of({"beam": {"aim": 60}}), "spp": 64, "hold": 0}
     how |= {"space": "linear", "verify": False, "report": False}
     with pytest.raises(KeyboardInterrupt):
@@ -309,7 +309,7 @@ def test_an_interrupted_search_leaves_nothing_half_written(room: Scene, tmp_path
 def test_samples_are_added_for_lights_where_they_hang_now(room: Scene, tmp_path: Path) -> None:
     """An error that is asked for is met with the lights moved, by a basis of where they are."""
     small = room.reduced("1/2")
-    target = lp.Target.of(lp.render_basis(small.moved({"beam": AIMED}), spp=64).present_look)
+    target = lp.Target.of(lp.render_basis(small.moved({"beam": AIMED}), spp=64).current_look)
     rigging = lp.Rigging.of({"beam": {"aim": 60}})
     how = {"space": "linear", "hold": 0, "verify": False, "report": False, "use_cache": False}
     look = lp.paint_with_light(small, target, tmp_path, rigging=rigging, error=0.1, **how)
@@ -324,7 +324,7 @@ def test_samples_are_added_for_lights_where_they_hang_now(room: Scene, tmp_path:
 
 def test_variations_hang_as_the_look_that_they_vary(room: Scene, tmp_path: Path) -> None:
     small = room.reduced("1/2")
-    seen = lp.render_basis(small.moved({"beam": AIMED}), spp=64).present_look
+    seen = lp.render_basis(small.moved({"beam": AIMED}), spp=64).current_look
     for name in ("one", "two"):
         write_rgb(tmp_path / f"{name}.exr", seen)
         seen = 0.5 * seen

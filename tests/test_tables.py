@@ -30,10 +30,10 @@ def test_rows_are_lights_and_numbers_are_those_of_the_objects() -> None:
     table = found.to_dataframe()
     np.testing.assert_array_equal(table[rgb], emission)
     np.testing.assert_array_equal(
-        table[["was_red", "was_green", "was_blue"]], basis.present_weights
+        table[["was_red", "was_green", "was_blue"]], basis.current_weights
     )
     np.testing.assert_allclose(table.y, luminance(emission))
-    stops = np.log2(luminance(emission[:2]) / luminance(basis.present_weights[:2]))
+    stops = np.log2(luminance(emission[:2]) / luminance(basis.current_weights[:2]))
     np.testing.assert_allclose(table.stops[:2], stops)
     assert table.stops["lamp 2"] < -20  # off, but for the rounding of the target
     # Numbers are numbers, known or not.

@@ -50,8 +50,8 @@ def test_an_untouched_template_solves_to_the_present_lighting(folder: Path):
     """The look is the basis's own sum in float32, so only its rounding is missed, 6e-8."""
     target = lp.read_target(folder / "template" / "template.exr", find=False)
     look = lp.paint_with_light(folder / "room.xml", target, folder / "b", spp=16)
-    weights, present = look.solution.weights, look.basis.present_weights
-    assert np.abs(weights - present).max() < 1e-5 * present.max()
+    weights, current = look.solution.weights, look.basis.current_weights
+    assert np.abs(weights - current).max() < 1e-5 * current.max()
     missed = look.basis.mix(weights).astype(np.float64) - target.image
     assert np.sqrt(np.square(missed).sum() / np.square(target.image).sum()) < 1e-6
     # The noise of the target is that of the basis, so there is none to be taken out.

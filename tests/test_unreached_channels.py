@@ -118,17 +118,17 @@ def test_people_see_neither_a_colour_nor_an_error(
     assert " K" not in row
     said = succeed(tmp_path, *solved, "--table", "full")
     [row] = [line for line in said.splitlines() if line.startswith("lamp")]
-    assert "0.2 (blue kept)" in row
+    assert "0.2 (blue unchanged)" in row
     assert "#" not in row
     [row] = [line for line in said.splitlines() if line.startswith("back")]
-    assert "(kept)" in row
+    assert "(unchanged)" in row
     assert "±" not in row
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert "no painted pixel shows the blue of lamp: kept as it is" in page
+    assert "no painted pixel shows the blue of lamp: left unchanged" in page
     [row] = [row for row in page.split("<tr>") if 'class="name">lamp' in row and "thumb" in row]
     assert "(0.2)" in row
     assert "background:" not in row
-    assert "blue kept" in row
+    assert "blue unchanged" in row
 
 
 def test_notebooks_and_tables_for_others_show_it(basis: lp.Basis, target: lp.Target):

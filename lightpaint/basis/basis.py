@@ -125,11 +125,11 @@ class Basis(Shown):
     def to_dataframe(self) -> Any:
         """Return a pandas.DataFrame with one row for each light, indexed by name.
 
-        red, green, blue: its present emission, linear Rec.709 in `unit`. mean: luminance of its
+        red, green, blue: its current emission, linear Rec.709 in `unit`. mean: luminance of its
         image at that emission, averaged over all pixels. Raises LightpaintError without pandas.
         """
         pixels = self.size[0] * self.size[1]
-        means = self.totals / pixels * self.present_weights
+        means = self.totals / pixels * self.current_weights
         rows = [
             light.to_row(float(luminance(mean)))
             for light, mean in zip(self.lights, means, strict=True)
@@ -140,7 +140,7 @@ class Basis(Shown):
         """Return an xarray.Dataset of the images and their noise, with lights by name.
 
         images, half_differences: (light, y, x, channel), the arrays of the properties, not copied.
-        present: (light, channel), weights of the present look. emitters_seen: (y, x). Raises
+        current: (light, channel), weights of the current look. emitters_seen: (y, x). Raises
         LightpaintError without xarray.
         """
         planes = ("light", "y", "x", "channel")
@@ -148,7 +148,7 @@ class Basis(Shown):
             {
                 "images": (planes, self.images),
                 "half_differences": (planes, self.half_differences),
-                "present": (("light", "channel"), self.present_weights),
+                "current": (("light", "channel"), self.current_weights),
                 "emitters_seen": (("y", "x"), self.emitters_seen),
             },
             coords={"light": list(self.names), "channel": list(CHANNELS)},
@@ -240,23 +240,23 @@ class Basis(Shown):
         return min(self.origin.halves) > 0 or bool(self.origin.each_light)
 
     @property
-    def present_weights(self) -> Doubles:
-        """Weights of the present scene, (n, 3)."""
-        return self.lights.present_weights
+    def current_weights(self) -> Doubles:
+        """Weights of the current scene, (n, 3)."""
+        return self.lights.current_weights
 
     @cached_property
-    def present_look(self) -> npt.NDArray[np.float32]:
+    def current_look(self) -> npt.NDArray[np.float32]:
         """The scene as it is now, (h, w, 3), or as it was before its lights were moved."""
         if self.former is not None:
             return read_only(self.former.image)
-        return read_only(self.mix(self.present_weights))
+        return read_only(self.mix(self.current_weights))
 
     @property
-    def present_noise(self) -> Floats:
-        """The half difference of `present_look`, (h, w, 3)."""
+    def current_noise(self) -> Floats:
+        """The half difference of `current_look`, (h, w, 3)."""
         if self.former is not None:
             return self.former.half_difference
-        return self.noise.mix(self.present_weights)
+        return self.noise.mix(self.current_weights)
 
     @cached_property
     def surface_filter(self) -> SurfaceFilter | None:

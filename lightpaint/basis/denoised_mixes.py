@@ -54,12 +54,12 @@ def denoise_mix(
     return _denoise_pictures(basis, pictures, factor, quality)
 
 
-def denoise_present_look(basis: Basis, *, quality: Quality = "fast") -> Floats:
-    """Return the scene in its present state, denoised, (h, w, 3) float32."""
-    mixed = basis.present_look
+def denoise_current_look(basis: Basis, *, quality: Quality = "fast") -> Floats:
+    """Return the scene in its current state, denoised, (h, w, 3) float32."""
+    mixed = basis.current_look
     if basis.former is not None:
         return denoised(mixed, basis.features, quality=quality)
-    return denoise_mix(basis, basis.present_weights, mixed=mixed, quality=quality)
+    return denoise_mix(basis, basis.current_weights, mixed=mixed, quality=quality)
 
 
 def denoise_plane(basis: Basis, k: int, *, factor: int = 1) -> Floats:

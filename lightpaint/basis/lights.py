@@ -20,7 +20,7 @@ class BasisLight:
     """A light in a basis.
 
     parameter, unit: parameter and unit that weights refer to (`radiance`, `W/(m² sr)`).
-    emission: its present RGB emission in the scene, in that unit.
+    emission: its current RGB emission in the scene, in that unit.
     form: its position and size as text.
     is_scalar: whether it can only be scaled as a whole, with one weight for all channels.
     is_fixed: whether its weight stays 1, whatever is painted.
@@ -48,7 +48,7 @@ class BasisLight:
         if not self.members:
             object.__setattr__(self, "members", (self.name,))
         if self.is_fixed and self.emission != (1, 1, 1):
-            raise BasisError(f"light {self.name!r} is kept, and its emission is not 1")
+            raise BasisError(f"light {self.name!r} is fixed, so its emission must be 1")
         if not all(map(is_amount, self.emission)):
             raise BasisError(
                 f"light {self.name!r} has the emission {list(self.emission)}: need three numbers "
@@ -76,7 +76,7 @@ class BasisLight:
 
     def __repr__(self) -> str:
         emission = " ".join(f"{v:.4g}" for v in self.emission)
-        note = ", kept" if self.is_fixed else ""
+        note = ", fixed" if self.is_fixed else ""
         description = " ".join(filter(None, (self.plugin, self.parameter, emission, self.unit)))
         return f"BasisLight({self.name!r}, {description}{note})"
 
@@ -132,8 +132,8 @@ class Lights(Sequence[BasisLight]):
         return tuple(light.name for light in self.records)
 
     @cached_property
-    def present_weights(self) -> Doubles:
-        """Weights of the present scene, (n, 3)."""
+    def current_weights(self) -> Doubles:
+        """Weights of the current scene, (n, 3)."""
         emission = [light.emission for light in self.records]
         return read_only(np.array(emission, dtype=np.float64).reshape(-1, 3))
 

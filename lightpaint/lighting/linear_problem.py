@@ -90,8 +90,7 @@ class LinearProblem:
 
     @property
     def pull_strength(self) -> float:
-        """Strength of the pull to the present, for light as bright as the view transform makes
-        it."""
+        """Strength of the pull to the current lighting, for light as bright as it is displayed."""
         return self.constraints.prefer_current * self.fit.brightness
 
     @property
@@ -103,10 +102,10 @@ class LinearProblem:
 
     @cached_property
     def pull(self) -> NormalEquations | None:
-        """The penalty for leaving the present, or its colours; None if there is none."""
+        """The penalty for leaving the current lighting, or its colours; None if there is none."""
         return weight_pull(
             self.power,
-            self.lights.present_weights,
+            self.lights.current_weights,
             self.fit,
             prefer_current=self.constraints.prefer_current,
             painted_share=self.painted_share,

@@ -62,7 +62,7 @@ def solve_linear(problem: _Problem, start: Doubles) -> LinearAnswer[_Problem]:
 def solve_reduction(
     problem: _Problem, start: Doubles, reached: Bools | None = None
 ) -> LinearAnswer[_Problem]:
-    """Solve the squares under the present reduction. reached: as in `make_answer`."""
+    """Solve the squares under the current reduction. reached: as in `make_answer`."""
     equations, method = problem.with_pull(problem.solved), problem.fit.method
     reduction, optimum = solve_on_locus(equations, problem.reduction, start, method=method)
     return make_answer(problem.with_whites(reduction), optimum, optimum.weights, equations, reached)

@@ -137,7 +137,7 @@ class Problem(LinearProblem):
             at_least_mask(views),
             fit.transform,
             painted=lambda: target_light(views),
-            current=lambda: whole.present_look,
+            current=lambda: whole.current_look,
         )
         reduction = reduce_lights(all_constraints, whole.lights, fit, gamuts_for(whole, views, fit))
         return cls(
@@ -149,7 +149,7 @@ class Problem(LinearProblem):
             constraints=all_constraints,
             reduction=reduction,
             full=reduction,
-            start=whole.present_weights if start is None else start,
+            start=whole.current_weights if start is None else start,
             fit=fit,
         )
 
@@ -277,7 +277,7 @@ def gamuts_for(basis: Basis, views: Views, fit: Fit) -> Gamuts | None:
         (view_basis, target.image, _color_importance(target))
         for view_basis, target in zip(views.bases, views.targets, strict=True)
     ]
-    return Gamuts(partial(PaintedLight.of, views_of_paint), basis.power, basis.present_weights)
+    return Gamuts(partial(PaintedLight.of, views_of_paint), basis.power, basis.current_weights)
 
 
 def _color_importance(target: Target) -> Floats:

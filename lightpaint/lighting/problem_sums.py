@@ -104,7 +104,7 @@ def summed_problem(
         reduction=reduction,
         full=reduction,
         fit=fit,
-        start=lights.present_weights,
+        start=lights.current_weights,
         scene_identity=scene_identity,
         spp=spp,
     )

@@ -16,7 +16,7 @@ HALF_ROUND_OFF, SINGLE_ROUND_OFF = 2.0**-11, 2.0**-24
 #: Roundings that may add up: those of the painting, the layers and the sum.
 ROUNDINGS = 4
 
-#: A light above this share of its present emission counts as on, however little it shows.
+#: A light above this share of its current emission counts as on, however little it shows.
 MAX_TRACE = 2.0**-11
 
 

@@ -134,7 +134,7 @@ class Solution(Shown):
     def to_xarray(self) -> Any:
         """Return an xarray.Dataset of the linear problem and its answer, with lights by name.
 
-        M: (channel, light, other), ⟨Φ_i, Φ_j⟩. b: (channel, light), ⟨Φ_i, Ψ⟩. weights, present:
+        M: (channel, light, other), ⟨Φ_i, Φ_j⟩. b: (channel, light), ⟨Φ_i, Ψ⟩. weights, current:
         (light, channel). Of one view also target, predicted: (y, x, channel), and importance:
         (y, x); of several, `views` has those of each. Where the loss is no squares of light, M, b
         and target are of the squares that stand for it at the answer. Raises LightpaintError
@@ -145,7 +145,7 @@ class Solution(Shown):
             "M": (("channel", "light", "other"), self.equations.M),
             "b": (("channel", "light"), self.equations.b),
             "weights": (lit, self.weights),
-            "present": (lit, basis.present_weights),
+            "current": (lit, basis.current_weights),
         }
         if len(self.problem.views) == 1:
             picture = ("y", "x", "channel")

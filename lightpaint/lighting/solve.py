@@ -20,7 +20,7 @@ from lightpaint.lighting.loss.lit_pixels import DeferredSquares, LitPixels
 from lightpaint.lighting.loss.pixel_bins import BinnedPixels, bin_pixels, block_side
 from lightpaint.lighting.loss.reweighting import Descent, WeightTerms, descend, total_loss
 from lightpaint.lighting.loss.warm_start import find_near_optimum
-from lightpaint.lighting.loss.weight_penalty import dimming_factors, pull_to_present
+from lightpaint.lighting.loss.weight_penalty import dimming_factors, pull_to_current
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
@@ -56,7 +56,7 @@ def solve(
         target: Of one view; or of several, in the same order.
         constraints: Constraints on the lights; they override those of the scene's lights file,
             which a rendered basis includes.
-        start: Lighting to begin with (the present one by default). A good guess saves sweeps; the
+        start: Lighting to begin with (the current one by default). A good guess saves sweeps; the
             answer is the same, except for lights that reach no painted pixel, which keep the start.
         resize: Whether to resample a target of the same shape as the basis, but of another size.
         **fit: Any option of `Fit`, by name: `unpainted=0.1` also holds unpainted pixels to the
@@ -97,7 +97,7 @@ def solution_of(problem: Problem, *, start: Doubles | None = None) -> Solution:
     solution = _solve_once(problem, begin, blocks)
     if not problem.keeps_color.any() or problem.fit.colors != "gentle":
         return solution
-    dimming = dimming_factors(problem.basis.present_weights, solution.weights)
+    dimming = dimming_factors(problem.basis.current_weights, solution.weights)
     if problem.dimming is not None or (dimming[problem.keeps_color] == 1).all():
         return solution
     dimmed = replace(solution.problem, dimming=dimming)
@@ -177,7 +177,7 @@ def _solve_squares(problem: Problem, start: Doubles) -> Solution:
 def _solve_under_reduction(
     problem: Problem, start: Doubles, reached: Bools | None = None
 ) -> Solution:
-    """Solve the squares under the present reduction. reached: as in `make_answer`."""
+    """Solve the squares under the current reduction. reached: as in `make_answer`."""
     return _solution(solve_reduction(problem, start, reached))
 
 
@@ -235,7 +235,7 @@ def _descend_once(
     *,
     is_near: bool = False,
 ) -> Solution:
-    """Descend to the least loss over the present reduction. For the arguments see `_descend`."""
+    """Descend to the least loss over the current reduction. For the arguments see `_descend`."""
     descent, optimum = _least_loss(problem, start, blocks, is_near=is_near)
     if blocks is not None:
         solved = _problem_of_blocks(problem, descent, blocks)
@@ -255,7 +255,7 @@ def _least_loss(
 ) -> tuple[Descent, ReducedOptimum]:
     """Return the descent to the least loss, and the optimum of its last linear problem.
 
-    The descent begins at `start`, or at the present weights where these lead lower.
+    The descent begins at `start`, or at the current weights where these lead lower.
     """
     basis, loss, pull, equations = problem.basis, problem.loss, problem.pull, problem.equations
     if blocks is not None:
@@ -279,22 +279,22 @@ def _least_loss(
         return descend(basis, loss, begin, weights_of, pull=pull, from_clipping=from_clipping)
 
     descent = descend_from(start)
-    present, lit = nearest_to_present(problem), LitPixels.of(basis, loss)
+    current, lit = nearest_to_current(problem), LitPixels.of(basis, loss)
 
     def loss_at(weights: Doubles) -> float:
         return total_loss(lit.pixels, WeightTerms(pull), weights, lit.predicted(weights))
 
-    if loss_at(descent.weights) > loss_at(present):
-        # A worse valley: from the present every step leads downhill.
-        descent = descend_from(present)
+    if loss_at(descent.weights) > loss_at(current):
+        # A worse valley: from the current lighting every step leads downhill.
+        descent = descend_from(current)
     return descent, best_of(descent.equations, descent.reweighting.at)
 
 
-def nearest_to_present(problem: Problem) -> Doubles:
-    """Return the weights (n, 3) nearest to the present ones that constraints allow."""
-    present = problem.basis.present_weights
-    pull = pull_to_present(problem.basis.power, present)
-    return solve_reduced(pull, problem.reduction, present).weights
+def nearest_to_current(problem: Problem) -> Doubles:
+    """Return the weights (n, 3) nearest to the current ones that constraints allow."""
+    current = problem.basis.current_weights
+    pull = pull_to_current(problem.basis.power, current)
+    return solve_reduced(pull, problem.reduction, current).weights
 
 
 def _problem_of_blocks(problem: Problem, descent: Descent, blocks: BinnedPixels) -> Problem:

@@ -201,7 +201,7 @@ def obtain_bases(subjects: Sequence[Subject], progress: Progress = silent) -> It
 
 def painting_transform(subjects: Sequence[Subject], bases: Sequence[Basis]) -> ViewTransform:
     """Return the chosen transform to paint through, or sRGB at an exposure that suits all views."""
-    looks = [basis.present_look for basis in bases]
+    looks = [basis.current_look for basis in bases]
     whole = looks[0] if len(looks) == 1 else np.concatenate([x.reshape(1, -1, 3) for x in looks], 1)
     return subjects[0].choice.over(ViewTransform("srgb", meter_exposure(whole, *bases)))
 

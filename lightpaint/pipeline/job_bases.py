@@ -123,7 +123,7 @@ def obtain_bases_of(job: Job, bases: list[Basis] | None, listen: Listener) -> li
     else:
         new_bases = list(bases)
         bases.clear()
-    # With the present requests of the lights file, even for bases from before it changed.
+    # With the current requests of the lights file, even for bases from before it changed.
     return [
         basis if view.scene is None else basis.with_requests(view.scene.requests)
         for basis, view in zip(new_bases, job.views, strict=True)

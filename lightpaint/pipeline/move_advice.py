@@ -82,7 +82,7 @@ def _pictures(
     small_scene = on_small_film(moved_scene, basis, PIXELS)
     factor = basis.size[0] // small_scene.size[0]
     picture_before = block_mean(basis.predict(solution.weights).image, factor)
-    look = block_mean(basis.present_look, factor), block_mean(basis.present_noise, factor)
+    look = block_mean(basis.current_look, factor), block_mean(basis.current_noise, factor)
     spp = min(MAX_SPP, SAMPLES // (small_scene.size[0] * small_scene.size[1]))
     small_basis = render_basis(small_scene, spp=spp, seed=job.settings.seed)
     small_basis = replace(small_basis, former=Estimate(*look))

@@ -127,4 +127,4 @@ def moved_basis(
         settings = replace(settings, spp=max(2, round(before.origin.mean_spp)))
     found = obtain(scene, settings, listen, before=before, render=render)
     # The look that was painted over, and that unpainted parts keep, is from before the move.
-    return replace(found, former=Estimate(before.present_look, before.present_noise))
+    return replace(found, former=Estimate(before.current_look, before.current_noise))

@@ -7,7 +7,7 @@ from pathlib import Path
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache
-from lightpaint.basis.denoised_mixes import denoise_plane, denoise_present_look
+from lightpaint.basis.denoised_mixes import denoise_current_look, denoise_plane
 from lightpaint.basis.exposure_meter import meter_exposure
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.integrators import why_not_one_pass
@@ -140,10 +140,10 @@ def look_of_basis(basis: Basis, path: Path, *, transform: ViewTransform | None =
 
 def _look_of_basis(basis: Basis) -> tuple[Floats, Floats | None, Features | None]:
     """Return the look; denoised, if its noise is known; and the features for that."""
-    look = basis.present_look
+    look = basis.current_look
     if not basis.knows_noise:
         return look, None, None
-    return look, denoise_present_look(basis, quality="high"), basis.features
+    return look, denoise_current_look(basis, quality="high"), basis.features
 
 
 def render_look(
@@ -197,12 +197,12 @@ def _basis_of(scene: Scene, settings: Settings, listen: Listener) -> Basis | Non
 def _look(
     scene: Scene, basis: Basis | None, settings: Settings, listen: Listener
 ) -> tuple[Floats, Floats, Features]:
-    """Return the present look, (h, w, 3) linear, the same denoised, and the features for that."""
+    """Return the current look, (h, w, 3) linear, the same denoised, and the features for that."""
     if basis is not None:
         features = basis.features or render_features(scene, seed=settings.seed)
         basis = replace(basis, features=features)
-        clean = denoise_present_look(basis, quality="high")
-        return basis.present_look, clean, features
+        clean = denoise_current_look(basis, quality="high")
+        return basis.current_look, clean, features
     image = render(
         scene,
         spp=settings.spp,
@@ -216,7 +216,7 @@ def _look(
 
 
 def _exposure(scene: Scene, basis: Basis | None, look: Floats) -> float:
-    """Return the exposure in stops at which to show the present scene."""
+    """Return the exposure in stops at which to show the current scene."""
     if basis is not None:
         return meter_exposure(look, basis)
     return choose_exposure(look, emitters_seen(scene))

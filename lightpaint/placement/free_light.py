@@ -37,7 +37,7 @@ LEAST_BEAM = 0.05
 
 @dataclass(frozen=True)
 class FreeLight:
-    """A light with its present site and its freedom.
+    """A light with its current site and its freedom.
 
     places: where it may hang; those of `freedom` if that has no surfaces. sides: smallest and
     largest side of a panel. has_free_beam: whether its beam varies independently; else it keeps its
@@ -114,7 +114,7 @@ class FreeLight:
         return site
 
     def some_places(self, count: int, rng: np.random.Generator) -> Floats:
-        """Return about `count` permitted places that are far apart, the present one first."""
+        """Return about `count` permitted places that are far apart, the current one first."""
         position = np.array(self.site.position, dtype=float)[None]
         if not self.freedom.slides or count < 2:
             return position
@@ -123,7 +123,7 @@ class FreeLight:
         return np.concatenate([position, far_apart(many, count - 1, start=position)])
 
     def directions(self, apart: float) -> Floats:
-        """Return permitted directions, about `apart` degrees apart, the present one first."""
+        """Return permitted directions, about `apart` degrees apart, the current one first."""
         if self.site.direction is None or not self.freedom.turn:
             return np.array(self.site.direction or (0.0, 0.0, 1.0))[None]
         count = max(8, round(4 * math.pi / math.radians(apart) ** 2))
@@ -131,13 +131,13 @@ class FreeLight:
         z, turn = 1 - 2 * k / count, math.pi * (1 + math.sqrt(5)) * k
         flat = np.sqrt(1 - z**2)
         sphere = np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
-        # The spiral's pole is the present direction, so that even a few directions are well placed.
+        # The spiral's pole is the current direction, so that even a few directions are well placed.
         sphere = sphere @ rotation_between((0.0, 0.0, 1.0), self.site.direction).T
         near = sphere @ np.array(self.site.direction) >= math.cos(math.radians(self.freedom.turn))
         return np.concatenate([np.array(self.site.direction)[None], sphere[near]])
 
     def cones(self, count: int = 4) -> Floats:
-        """Return permitted cones, (c, 2): cutoff and beam in degrees, the present one first."""
+        """Return permitted cones, (c, 2): cutoff and beam in degrees, the current one first."""
         now = (self.site.cutoff or 0.0, self.site.beam or 0.0)
         if self.freedom.cone is None:
             return np.array([now])
@@ -153,7 +153,7 @@ class FreeLight:
 
     @cached_property
     def _share(self) -> float:
-        """The present width of its beam, as a share of its cone."""
+        """The current width of its beam, as a share of its cone."""
         return (self.site.beam or 0.0) / (self.site.cutoff or 1.0)
 
     def _opened(self, site: Site, cutoff: float, share: float) -> Site:
@@ -166,7 +166,7 @@ class FreeLight:
 
 
 def places_of(freedom: Freedom, position: Doubles, surfaces: Places | None = None) -> Places:
-    """Return the places of a freedom. position: (3,), the present one. surfaces: of its shapes."""
+    """Return the places of a freedom. position: (3,), the current one. surfaces: of its shapes."""
     parts: list[Places] = [] if surfaces is None else [surfaces]
     if freedom.all_rails:
         parts.append(Rails(np.array(freedom.all_rails, dtype=float)))

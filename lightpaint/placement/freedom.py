@@ -82,7 +82,7 @@ class Freedom:
 
     @property
     def is_still(self) -> bool:
-        """True if it permits nothing but the present pose."""
+        """True if it permits nothing but the current pose."""
         return self == Freedom()
 
     @property

@@ -121,7 +121,7 @@ def free_light(scene: Scene, name: str, freedom: Freedom) -> FreeLight:
 def why_not_searched(light: Light) -> str:
     """Return why a light cannot be searched for, in words that follow its name; "" if it can."""
     if light.is_fixed:
-        return "is kept as it is"
+        return "is fixed"
     if len(light.members) > 1:
         return f"is a group of {len(light.members)} emitters"
     if light.plugin not in SEARCHED:

@@ -117,7 +117,7 @@ def _with_new_lights(
 
 
 def pull_with_more(solution: Solution, count: int) -> NormalEquations | None:
-    """Return the pull of the lights to their present emission, and none of `count` more."""
+    """Return the pull of the lights to their current emission, and none of `count` more."""
     if (pull := solution.problem.pull) is None:
         return None
     coupling = pull.coupling
@@ -141,6 +141,6 @@ def reduced_goal(problem: Problem, factor: int) -> tuple[Floats, Floats, Floats]
     goal = block_mean(squares.image * importance, factor) / total
     noise = np.zeros_like(goal)
     if squares.share.any():
-        shared = squares.share * problem.basis.present_noise
+        shared = squares.share * problem.basis.current_noise
         noise = block_mean(shared * importance, factor) / total
     return goal, weight * factor**2, noise

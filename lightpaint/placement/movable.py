@@ -1,4 +1,4 @@
-"""Lights that a search moves, and their present poses."""
+"""Lights that a search moves, and their current poses."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

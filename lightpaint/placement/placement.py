@@ -84,7 +84,7 @@ class Move:
             done.append(f"slid by {self.distance:.2g}")
         if self.new.cutoff is not None and self.new.cutoff != self.old.cutoff:
             done.append(f"cone {self.old.cutoff:.0f}° to {self.new.cutoff:.0f}°")
-        gain = f"{self.gain_share:.0%} of what was missed"
+        gain = f"{100 * self.gain_share:.0f} % of what was missed"
         return _with_advice(f"{self.name}: {', '.join(done)}: {gain}", self)
 
 
@@ -151,7 +151,7 @@ class AddedLight:
 
     def __str__(self) -> str:
         x, y, z = self.site.position or (0.0, 0.0, 0.0)
-        gain = f"{self.gain_share:.0%} of what was missed"
+        gain = f"{100 * self.gain_share:.0f} % of what was missed"
         text = f"{self.name}: a new {self.emitter.kind} at ({x:.2f}, {y:.2f}, {z:.2f}): {gain}"
         return _with_advice(text, self)
 

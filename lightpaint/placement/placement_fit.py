@@ -79,7 +79,7 @@ class Ranking:
 
 
 class PlacementFit:
-    """Goals on a small film, and the columns of all lights at their present places.
+    """Goals on a small film, and the columns of all lights at their current places.
 
     The loss is Σ D (r² − n²), where r is the residual and n its half difference: that of the goal,
     as far as it is the current look, less the mix of those of the columns.
@@ -253,7 +253,7 @@ def fit_of(
     those of the solutions that are for all lights. with_noise: whether columns have half
     differences.
     """
-    present = np.concatenate(
+    current = np.concatenate(
         [
             on_film
             for part in ("planes", "noise")[: 1 + with_noise]
@@ -261,9 +261,9 @@ def fit_of(
         ],
         axis=1,
     )
-    black = np.zeros((len(new), *present.shape[1:]), np.float32)
+    black = np.zeros((len(new), *current.shape[1:]), np.float32)
     goals = [goal_of(solution, views, sizes, new, constraints) for solution, views in looks]
-    return PlacementFit(np.concatenate([present, black]), goals)
+    return PlacementFit(np.concatenate([current, black]), goals)
 
 
 def _on_films(planes: Sequence[Planes], sizes: Sequence[tuple[int, int]]) -> Iterator[Floats]:

@@ -122,7 +122,7 @@ def target_picture(
 ) -> npt.NDArray[Any]:
     """Return the painting, laid over the dimmed current look by its importance.
 
-    current: (h, w, 3) linear, the present scene. Fully painted pixels are exactly the display
+    current: (h, w, 3) linear, the current scene. Fully painted pixels are exactly the display
     encoding of the target. finish: see `over_unpainted`.
     """
     share = painted_coverage(target, solution)

@@ -6,7 +6,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.denoised_mixes import denoise_mix, denoise_present_look
+from lightpaint.basis.denoised_mixes import denoise_current_look, denoise_mix
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.bands import LARGE_PICTURE, by_bands
 from lightpaint.images.denoiser import DENOISED_KEY, Features, denoised, denoiser_text
@@ -78,9 +78,9 @@ class CleanLooks:
         texts = denoiser_text(features, raw=raw)
         planes = cached_clean_planes(basis)
         if planes is None or basis.former is not None:
-            now = denoise_present_look(basis)
+            now = denoise_current_look(basis)
         else:
-            now = planes.present
+            now = planes.current
         if planes is None or not planes.is_whole:
             answer = denoise_mix(basis, weights, mixed=predicted)
         else:
@@ -90,8 +90,8 @@ class CleanLooks:
     @classmethod
     def raw(cls, basis: Basis, predicted: Floats, verified: Floats | None) -> "CleanLooks":
         """Make the looks as rendered."""
-        present = basis.present_look
-        return cls(present, predicted, verified, {})
+        current = basis.current_look
+        return cls(current, predicted, verified, {})
 
     def encoder(self, transform: ViewTransform) -> Encoder:
         """Return the encoder of a transform, which encodes each look once for all places."""

@@ -40,9 +40,9 @@ def error_sentences(
     instead of the sentences of `bound_sentences`.
     """
     d = diagnosis
-    if not (parts := error_shares(d)):
+    if not (parts := spoken_shares(d)):
         return [NO_ERROR]
-    # Kept lights have a separate bound below.
+    # Fixed lights have a separate bound below.
     lights = "the adjusted lights" if any(x.kind == "kept" for x in d.bounds) else "the lights"
     words = {
         "unreachable": f"is out of reach of any mix of {lights}{hold_clause(appearance)}",
@@ -53,13 +53,21 @@ def error_sentences(
         "noise": "is noise of the basis",
         "painting_noise": painting_noise_clause(d),
     }
-    percents = spoken_percents(parts.values())
-    shares = [f"{share} {words[part]}" for part, share in zip(parts, percents, strict=True)]
+    shares = [f"{share} {words[part]}" for part, share in parts.items()]
     sentences = [f"Of the difference (in energy), {', '.join(shares)}."]
     is_told = appearance is not None and appearance.place is not None  # by the headline
     if d.place is not None and not is_told and d.share(d.unreachable) >= MIN_SHARE:
         sentences.append(spoken_place(d.place))
     return [*sentences, *(bound_sentences(d, appearance) if holds is None else holds)]
+
+
+def spoken_shares(diagnosis: Diagnosis) -> dict[str, str]:
+    """Return the percentage of each part of the error that counts, the largest first.
+
+    Rounding is adjusted so that they add up; sentences and tables show these same numbers.
+    """
+    parts = error_shares(diagnosis)
+    return dict(zip(parts, spoken_percents(parts.values()), strict=True))
 
 
 def hold_clause(appearance: Appearance | None) -> str:
@@ -106,7 +114,7 @@ RELEASE_CLAUSES = {
 JOINT_RELEASE_CLAUSES = {
     "colors": "Lights keep their colours; {any_color}",
     "sparse": "The number of lights is limited; allowing more",
-    "prefer_current": "Lights are pulled towards their present setting; leaving them free",
+    "prefer_current": "Lights are pulled towards their current setting; leaving them free",
 }
 
 
@@ -161,7 +169,7 @@ def spoken_bound(bound: Bound, share: float) -> str:
             "miss."
         )
     effect = {
-        "kept": f"kept as it is; adjusting {it} too",
+        "kept": f"fixed; adjusting {it} too",
         "lock": f"locked; adjusting {it}",
         "off": f"switched off, as asked; switching {it} on",
         "left out": f"left out, since their number is limited; switching {it} on too",
@@ -175,7 +183,7 @@ def spoken_bound(bound: Bound, share: float) -> str:
 def spoken_hold(bound: Bound) -> str:
     """Return the bound in few words; for a light at zero, with the channels that feel it."""
     if bound.kind == "kept":
-        return "kept as it is"
+        return "fixed"
     if bound.kind != "zero":
         tint = f"; would have to be {bound.tint}" if bound.tint else ""
         return f"{bound.held_by}{tint}"

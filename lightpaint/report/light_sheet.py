@@ -94,12 +94,12 @@ def light_sheet(
 ) -> npt.NDArray[np.uint8]:
     """Draw each light alone, (H, W, 3) uint8 sRGB, denoised, with its name and share.
 
-    Each is at its present emission, or at a white one if it is off, with an exposure of its own:
+    Each is at its current emission, or at a white one if it is off, with an exposure of its own:
     brightness does not compare between pictures. Lights stand in their order; of more than MOST,
     those with the largest shares, and a line tells the share of the others. Below them is a plan of
     the room, and an elevation, with `lights`; up: the axis of the scene that is up.
     """
-    shares = energy_shares(basis, Lighting.present(basis))
+    shares = energy_shares(basis, Lighting.current(basis))
     shown_indices = sorted(np.argsort(-shares, kind="stable")[:MAX_LIGHTS].tolist())
     grid = _grid(len(shown_indices), basis.size)
     factor = max(1, min(basis.size[1] // grid.width, min(basis.size)))
@@ -134,7 +134,7 @@ def _cell(basis: Basis, k: int, share: float, factor: int) -> _Cell:
     """Draw the cell of light k. factor: of the picture's reduction, which averages much of the
     noise.
     """
-    light, weight = basis.lights[k], basis.present_weights[k]
+    light, weight = basis.lights[k], basis.current_weights[k]
     name = light.name if len(light.members) == 1 else f"{light.name} ({len(light.members)})"
     is_off = not weight.any()
     image = block_mean(np.float32(1 if is_off else weight) * basis.planes.plane(k), factor)

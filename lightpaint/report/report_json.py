@@ -201,7 +201,7 @@ def _lights(
     basis: Basis, solution: Solution, uncertainty: Uncertainty | None
 ) -> Mapping[str, dict[str, Any]]:
     lighting = solution.lighting
-    shares, before = (energy_shares(basis, x) for x in (lighting, Lighting.present(basis)))
+    shares, before = (energy_shares(basis, x) for x in (lighting, Lighting.current(basis)))
     by_name: dict[str, dict[str, Any]] = {}
     for k, (light, setting) in enumerate(zip(basis.lights, lighting.lights, strict=True)):
         # Only channels that reach something painted; the others are undetermined.

@@ -66,7 +66,7 @@ def partly_reached(lighting: Lighting) -> list[str]:
         if light.is_partly_reached:
             by_channels.setdefault(unreached_channels(light), []).append(light.name)
     return [
-        f"no painted pixel shows the {channels} of {some_of(names, room=200)}: kept as it is"
+        f"no painted pixel shows the {channels} of {some_of(names, room=200)}: left unchanged"
         for channels, names in by_channels.items()
     ]
 

@@ -23,7 +23,7 @@ MAX_UNSEEN_NAMES = 2
 
 #: Clauses on reasons that hold the lights back: for one light, and for several.
 REASON_CLAUSES: dict[str, tuple[str, str]] = {
-    "hold": ("unpainted parts are held near their present look",) * 2,
+    "hold": ("unpainted parts are held near their current look",) * 2,
     "colors": ("lights keep their colours",) * 2,
     "off": ("{} is switched off", "{} are switched off"),
     "lock": ("{} is locked", "{} are locked"),
@@ -31,7 +31,7 @@ REASON_CLAUSES: dict[str, tuple[str, str]] = {
     "colour": ("the colour of {} is limited", "the colours of {} are limited"),
     "tie": ("{} is tied to other lights", "{} are tied together"),
     "sparse": ("the number of lights is limited",) * 2,
-    "prefer_current": ("lights are pulled towards their present setting",) * 2,
+    "prefer_current": ("lights are pulled towards their current setting",) * 2,
     "views": ("view {} asks for different light", "views {} ask for different light"),
 }
 
@@ -87,14 +87,14 @@ def headline(appearance: Appearance) -> str:
     A cause is named only if it accounts for a third of the error.
     """
     addition = spoken_elsewhere(appearance.unpainted_change) if appearance.changes_unpainted else ""
-    present = f"{spoken_present(appearance)} " if appearance.is_worse else ""
-    return f"{present}{_paint_headline(appearance)} {addition}".rstrip()
+    current = f"{spoken_current(appearance)} " if appearance.is_worse else ""
+    return f"{current}{_paint_headline(appearance)} {addition}".rstrip()
 
 
-def spoken_present(appearance: Appearance) -> str:
-    """Say that the present lighting comes closer than the answer, and offer it."""
+def spoken_current(appearance: Appearance) -> str:
+    """Say that the current lighting comes closer than the answer, and offer it."""
     return (
-        "The present lighting comes closer to the paint (mean ΔE "
+        "The current lighting comes closer to the paint (mean ΔE "
         f"{appearance.requested_change:.1f}) than this answer ({appearance.delta_e:.1f}): keep the "
         "scene as it is."
     )

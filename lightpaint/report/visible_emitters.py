@@ -69,7 +69,7 @@ def _known_by_sight_alone(solution: Solution, ignored: Bools) -> list[str]:
     A bulb in a glass ball, say: many samples see it, and few paths find its light elsewhere.
     """
     # Noise may have solved it far too dim.
-    weights = np.maximum(solution.weights, solution.basis.present_weights)
+    weights = np.maximum(solution.weights, solution.basis.current_weights)
     brightest = _brightest_lights(solution.basis, weights, ignored)
     lights = solution.lighting.lights
     names = [lights[k].name for k in np.unique(brightest) if lights[k].untold]

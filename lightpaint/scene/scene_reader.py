@@ -64,7 +64,7 @@ def load_scene(
         ['panel', 'bulb']
         >>> lp.load_scene("room.xml", lights=["bulb"]).lights
         (Light('bulb', ...),
-         Light('rest', ..., kept))
+         Light('rest', ..., fixed))
     """
     backend = use_variant(variant)
     path = Path(path)

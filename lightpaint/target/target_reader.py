@@ -110,7 +110,7 @@ def read_over_look(
     """Return the painting at `path` if it was painted over `look`; None if it was not.
 
     For a painting that does not itself say what counts, and whose template is unknown. look: (h, w,
-    3) linear, the present look of a basis or of light groups. name: name of the look in messages.
+    3) linear, the current look of a basis or of light groups. name: name of the look in messages.
     layer, transform: as in `read_target`.
     """
     picture = read_picture(path, layer=layer, transform=transform)

@@ -90,7 +90,7 @@ class Sheet:
         return cls(canvas, room, canvas.image.copy(), albedo)
 
     def begin(self, tint: Color, stops: float, air: Color, *, share: float) -> None:
-        """Underpainting: the present light goes down, and an even air takes its place."""
+        """Underpainting: the current light goes down, and an even air takes its place."""
         self.canvas.glaze(Everywhere(), tint, stops=stops, say=0.3)
         self.canvas.wash(Everywhere(), self.albedo * air, opacity=share, say=0.0)
 

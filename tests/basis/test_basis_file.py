@@ -65,7 +65,7 @@ def test_there_and_back_is_exact(path: Path, basis: Basis):
     _assert_equal(back, basis)
     assert back.names == ("key", "Fülllicht 灯 №2", "back/rim.left")
     assert back.size == SIZE
-    np.testing.assert_array_equal(back.present_weights, [x.emission for x in basis.lights])
+    np.testing.assert_array_equal(back.current_weights, [x.emission for x in basis.lights])
 
 
 def _with_objects(basis: Basis) -> Basis:
@@ -295,8 +295,8 @@ def test_what_is_asked_often_is_computed_once(make_basis: Any) -> None:
     # Sums of 18,000 products in float64, in another order.
     np.testing.assert_allclose(basis.power, np.square(counted).sum(axis=(1, 2)), rtol=1e-12)
     np.testing.assert_allclose(basis.totals, images.sum(axis=(1, 2)), rtol=1e-12)
-    np.testing.assert_array_equal(basis.present_weights, [x.emission for x in basis.lights])
-    for kept in ("names", "present_weights", "is_fixed", "power", "totals"):
+    np.testing.assert_array_equal(basis.current_weights, [x.emission for x in basis.lights])
+    for kept in ("names", "current_weights", "is_fixed", "power", "totals"):
         assert getattr(basis, kept) is getattr(basis, kept)
         assert kept == "names" or not getattr(basis, kept).flags.writeable
     # Another basis has its own.

@@ -172,12 +172,12 @@ def test_planes_that_stand_in_keep_edges_of_direct_light(rng: np.random.Generato
     of squares of pixels.
     """
     basis, truth = two_lights(rng)
-    present = (truth[0] + truth[1]).astype(np.float32)
+    current = (truth[0] + truth[1]).astype(np.float32)
     error = {}
     for name, features in (("squares", None), ("surfaces", wall())):
-        rough = RoughPlanes(replace(basis, features=features), present)
+        rough = RoughPlanes(replace(basis, features=features), current)
         planes = [rough.plane(k) for k in range(2)]
-        np.testing.assert_allclose(sum(planes), present, rtol=1e-4)  # single precision
+        np.testing.assert_allclose(sum(planes), current, rtol=1e-4)  # single precision
         error[name] = np.mean([np.square(a - b).mean() for a, b in zip(planes, truth, strict=True)])
     assert error["surfaces"] < 0.2 * error["squares"]
 
@@ -187,11 +187,11 @@ def test_planes_that_stand_in_of_large_pictures_are_of_squares(
 ):
     """Averages along surfaces would take as long as the denoised planes that they stand in for."""
     basis, truth = two_lights(rng)
-    present = (truth[0] + truth[1]).astype(np.float32)
-    expected = RoughPlanes(basis, present).plane(0)
+    current = (truth[0] + truth[1]).astype(np.float32)
+    expected = RoughPlanes(basis, current).plane(0)
     with_surfaces = replace(basis, features=wall())
     monkeypatch.setattr("lightpaint.images.surface_filter.KEPT_PIXELS", 1)
-    np.testing.assert_array_equal(RoughPlanes(with_surfaces, present).plane(0), expected)
+    np.testing.assert_array_equal(RoughPlanes(with_surfaces, current).plane(0), expected)
 
 
 def test_without_indirect_light_all_of_it_is_denoised(make_basis: Any):

@@ -16,7 +16,7 @@ from lightpaint.basis.cache.denoised_planes import (
     read_denoised_planes,
     scale_of,
 )
-from lightpaint.basis.denoised_mixes import denoise_present_look
+from lightpaint.basis.denoised_mixes import denoise_current_look
 from lightpaint.images.denoiser import denoised, oidn_is_installed
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.pixel_blocks import block_mean
@@ -42,7 +42,7 @@ def test_their_sum_is_a_clean_picture_of_any_lighting(make_basis: Any):
     bound = sum(w * np.abs(x) for w, x in zip(weights, each, strict=True)) * 2.0**-11
     assert (np.abs(planes.mix(weights) - expected) <= bound + 1e-6 * expected.max()).all()
     np.testing.assert_allclose(planes.plane(1), each[1], rtol=2**-11, atol=each[1].max() * 2**-24)
-    np.testing.assert_array_equal(planes.present, planes.mix(basis.present_weights))
+    np.testing.assert_array_equal(planes.current, planes.mix(basis.current_weights))
 
 
 def test_made_once_for_the_same_pixels(make_basis: Any, monkeypatch: pytest.MonkeyPatch):
@@ -59,7 +59,7 @@ def test_made_once_for_the_same_pixels(make_basis: Any, monkeypatch: pytest.Monk
     assert first is not None
     assert again is not None
     np.testing.assert_array_equal(first.halves, again.halves)
-    # Other pixels, features or present emissions have others.
+    # Other pixels, features or current emissions have others.
     other = replace(basis, planes=basis.images * np.float32(1.5))
     assert read_denoised_planes(other) is None
     brighter = tuple(replace(x, emission=(2.0, 2.0, 2.0)) for x in basis.lights)
@@ -81,7 +81,7 @@ def test_means_over_blocks_are_denoised_and_kept_until_whole_planes_are(make_bas
     assert small is not None
     assert not small.is_whole
     assert small.halves.shape == (2, 24, 33, 3)
-    assert small.present.shape == (49, 66, 3)
+    assert small.current.shape == (49, 66, 3)
     features = basis.features and basis.features.reduced(2)
     expected = denoised(block_mean(basis.planes.plane(1), 2), features)
     np.testing.assert_allclose(
@@ -103,11 +103,11 @@ def test_means_over_blocks_are_denoised_and_kept_until_whole_planes_are(make_bas
 
 def test_the_look_before_lights_were_moved_is_not_kept_as_the_present_one(make_basis: Any):
     basis = make_basis(2, (24, 32))
-    before = 9 * basis.present_look
+    before = 9 * basis.current_look
     moved = replace(basis, former=Estimate(before, np.zeros_like(before)))
     planes = obtain_denoised_planes(moved, factor=2)
     assert planes is not None
-    np.testing.assert_array_equal(planes.present, denoise_present_look(basis))
+    np.testing.assert_array_equal(planes.current, denoise_current_look(basis))
 
 
 def test_a_folder_that_takes_nothing_is_no_obstacle(make_basis: Any, cache: Path):
@@ -149,12 +149,12 @@ def test_rough_planes_add_up_and_are_nearer_to_light_without_grain(make_basis: A
     light = light[..., None] * rng.uniform(0.2, 1, (2, 1, 1, 3))
     grainy = 3 * light * (rng.random(light.shape[:3]) < 1 / 3)[..., None]
     basis = make_basis(images=grainy, emission=[[1, 0.5, 0.2], [2, 3, 4]])
-    present = np.einsum("nhwc,nc->hwc", light, basis.present_weights).astype(np.float32)
-    rough = RoughPlanes(basis, present)
+    current = np.einsum("nhwc,nc->hwc", light, basis.current_weights).astype(np.float32)
+    rough = RoughPlanes(basis, current)
     planes = np.array([rough.plane(k) for k in range(2)])
     assert planes.dtype == np.float32
-    total = np.einsum("nhwc,nc->hwc", planes, basis.present_weights)
-    np.testing.assert_allclose(total, present, rtol=1e-5)  # single precision
+    total = np.einsum("nhwc,nc->hwc", planes, basis.current_weights)
+    np.testing.assert_allclose(total, current, rtol=1e-5)  # single precision
     grain, left = (np.sqrt(np.mean((its - light) ** 2)) for its in (basis.images, planes))
     assert left < grain / 5  # of 64 pixels each is a mean, and of the total nothing is left
 
@@ -166,11 +166,11 @@ def test_clean_blocks_bring_rough_planes_nearer_to_the_light(make_basis: Any):
     rng = np.random.default_rng(5)
     grainy = 3 * light * (rng.random(light.shape[:3]) < 1 / 3)[..., None]
     basis = make_basis(images=grainy, emission=[[1, 1, 1], [2, 3, 4]])
-    present = np.einsum("nhwc,nc->hwc", light, basis.present_weights).astype(np.float32)
+    current = np.einsum("nhwc,nc->hwc", light, basis.current_weights).astype(np.float32)
     small = np.stack([block_mean(plane, 2) for plane in light]).astype(np.float16)
-    blocks = DenoisedPlanes(small, np.ones(2), present)
+    blocks = DenoisedPlanes(small, np.ones(2), current)
     for k in range(2):
-        rough, better = (RoughPlanes(basis, present, x).plane(k) for x in (None, blocks))
+        rough, better = (RoughPlanes(basis, current, x).plane(k) for x in (None, blocks))
         off, left = (np.sqrt(np.mean((x - light[k]) ** 2)) for x in (rough, better))
         assert left < off / 2
         # Away from the shadow's edge, over which a gain is interpolated.

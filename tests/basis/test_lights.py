@@ -25,7 +25,7 @@ def test_it_is_a_sequence_in_one_order() -> None:
     lights = Lights((lamp("a"), lamp("b", 1.0, is_fixed=True), lamp("c", 2.0, is_scalar=True)))
     assert (len(lights), lights[1].name, [x.name for x in lights[1:]]) == (3, "b", ["b", "c"])
     assert lights.names == ("a", "b", "c")
-    assert lights.present_weights.tolist() == [[0.5] * 3, [1.0] * 3, [2.0] * 3]
+    assert lights.current_weights.tolist() == [[0.5] * 3, [1.0] * 3, [2.0] * 3]
     assert lights.is_fixed.tolist() == [False, True, False]
     assert lights.is_scalar.tolist() == [False, False, True]
     assert Lights.of(lights) is lights
@@ -35,7 +35,7 @@ def test_it_is_a_sequence_in_one_order() -> None:
 def test_nobody_changes_what_all_share() -> None:
     lights = Lights((lamp("a"),))
     with pytest.raises(ValueError, match="read-only"):
-        lights.present_weights[0] = 7
+        lights.current_weights[0] = 7
     with pytest.raises(dataclasses.FrozenInstanceError):
         lights.records = ()  # type: ignore[misc]
 

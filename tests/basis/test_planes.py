@@ -226,7 +226,7 @@ def test_a_fit_of_blocks_reads_strips_of_noisy_planes(
     rng = np.random.default_rng(10)
     images = rng.random((N, 128, 40, 3), np.float32)
     basis = make_basis(images=images, half_differences=rng.normal(0, 0.1, images.shape))
-    target = lp.Target.of(basis.present_look * np.float32(0.7))
+    target = lp.Target.of(basis.current_look * np.float32(0.7))
     fit = Fit(transform=lp.ViewTransform("srgb"))
     counted = CountedPlanes(images), CountedPlanes(basis.half_differences)
     monkeypatch.setattr(file_planes, "PICKED_MAX_BYTES", 0)

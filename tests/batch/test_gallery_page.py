@@ -175,7 +175,7 @@ def two_mixers(folder: Path) -> tuple[Path, dict[str, str]]:
         write_planes(folder, key, basis)
         lights = tuple(LightRow(one.name, 1.0, (1.0, 1.0, 1.0)) for one in basis.lights)
         (folder / name).mkdir()
-        write_lighting(folder / name / "lighting.json", Lighting.present(basis))
+        write_lighting(folder / name / "lighting.json", Lighting.current(basis))
         rows.append(SummaryRow(name, "done", "", name, lights=lights))
         names[name] = planes_name(folder, key)
     index = folder / "index.html"

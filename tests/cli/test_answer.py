@@ -25,7 +25,7 @@ from lightpaint.lighting.analysis.appearance.limiting_reasons import Loosening, 
 from lightpaint.lighting.answer.light_setting import LightSetting
 from lightpaint.lighting.constraints.constraints import Constraints
 
-PRESENT = [[0.5, 0.5, 0.5], [0.4, 0.3, 0.2], [0.2, 0.3, 0.4], [0, 0, 0]]
+CURRENT = [[0.5, 0.5, 0.5], [0.4, 0.3, 0.2], [0.2, 0.3, 0.4], [0, 0, 0]]
 WEIGHTS = np.array([[1, 1, 1], [0, 0, 0], [0.2, 0.3, 0.4], [0.6, 0.2, 0.1]], np.float32)
 NAMES = ("key", "a lamp with a name that goes on and on, as those of exporters do", "fill", "red")
 SOLVE = ("solve", "b.basis.exr", "p.exr", "-o", "out", "--no-correct-noise")
@@ -34,7 +34,7 @@ SOLVE = ("solve", "b.basis.exr", "p.exr", "-o", "out", "--no-correct-noise")
 @pytest.fixture
 def folder(tmp_path: Path, make_basis: Any) -> Path:
     """Four lights, and a painting that they make."""
-    basis = make_basis(4, (16, 20), names=NAMES, emission=PRESENT)
+    basis = make_basis(4, (16, 20), names=NAMES, emission=CURRENT)
     write_basis(tmp_path / "b.basis.exr", basis)
     write_rgb(tmp_path / "p.exr", basis.mix(WEIGHTS))
     return tmp_path
@@ -128,7 +128,7 @@ def test_of_many_lights_the_ten_that_matter_and_what_the_others_do(tmp_path: Pat
     shown = sum(float(re.findall(r"([\d.]+) %", row)[-1]) for row in rows)
     told = float(re.findall(r"together ([\d.]+) % of the picture", rest)[0])
     assert shown + told == pytest.approx(100, abs=1.2)
-    counts = re.findall(r"(\d+) (?:off|switched|kept|brighter|dimmer|as)", rest)
+    counts = re.findall(r"(\d+) (?:off|switched|fixed|brighter|dimmer|as)", rest)
     assert sum(map(int, counts)) == 292
 
 
@@ -175,12 +175,12 @@ def test_one_line_says_what_the_painting_leaves_open(tmp_path: Path, make_basis:
     assert done.returncode == 0, done.stderr
     [line] = [x for x in done.stderr.splitlines() if "leaves lights open" in x]
     for words in (
-        "the picture shows nothing of dark: kept as it is",
-        "no painted pixel sees right: kept as it is",
+        "the picture shows nothing of dark: left unchanged",
+        "no painted pixel sees right: left unchanged",
         "one and twin light the painted part alike",
     ):
         assert words in line
-    assert "kept as it is" not in done.stderr.replace(line, "")
+    assert "left unchanged" not in done.stderr.replace(line, "")
 
 
 def _setting(r: float, g: float, b: float) -> LightSetting:
@@ -202,7 +202,7 @@ def _setting(r: float, g: float, b: float) -> LightSetting:
 def test_what_became_of_a_light(now: Any, new: Any, said: str):
     light = BasisLight("x", "area", "radiance", "W/(m² sr)", now)
     assert change(light, _setting(*new)) == said
-    assert change(light, replace(_setting(*new), reached=(False,) * 3)) == "kept"
+    assert change(light, replace(_setting(*new), reached=(False,) * 3)) == "unchanged"
 
 
 @pytest.mark.parametrize(

@@ -44,8 +44,8 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def elsewhere(here: Path) -> Any:
     """What other programs get: of lights whose colour four samples do not tell, their own."""
-    present = {light.name: light.emission for light in load_scene(here / "room.xml").lights}
-    return with_own_colors(read_lighting(here / "look" / "lighting.json"), present)[0].emission
+    current = {light.name: light.emission for light in load_scene(here / "room.xml").lights}
+    return with_own_colors(read_lighting(here / "look" / "lighting.json"), current)[0].emission
 
 
 def test_a_patch_changes_the_lights_and_nothing_else(here: Path, tmp_path: Path) -> None:

@@ -184,7 +184,7 @@ def test_holes_are_taken_from_the_painting(tmp_path: Path):
     ],
 )
 def test_a_target_that_names_no_folder(tmp_path: Path, make_basis: Any, name: str):
-    lighting = Lighting.present(make_basis(2)).for_target(name)
+    lighting = Lighting.current(make_basis(2)).for_target(name)
     write_lighting(tmp_path / "l.json", lighting)
     write_lighting(tmp_path / "m.json", lighting.for_target("good"))
     if name:  # which is then called as its file is
@@ -203,7 +203,7 @@ def test_numbers_beyond_any_light_are_one_line(tmp_path: Path, make_basis: Any):
     write(
         tmp_path / "p.exr", ("rgb", channels("", pictures()[0][: basis.size[0], : basis.size[1]]))
     )
-    write_lighting(tmp_path / "l.json", Lighting.present(basis).for_target("x"))
+    write_lighting(tmp_path / "l.json", Lighting.current(basis).for_target("x"))
     data = json.loads((tmp_path / "l.json").read_text(encoding="utf-8"))
     room = write_room(tmp_path)
     for key in ("emission", "weight", "unit_flux", "standard_error"):

@@ -24,7 +24,7 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("room")
     scene = lp.load_scene(write_room(folder))
     turned = scene.moved({"beam": lp.Pose(target=(-0.6, 0, -0.3))})
-    write_rgb(folder / "p.exr", lp.render_basis(turned, spp=16).present_look)
+    write_rgb(folder / "p.exr", lp.render_basis(turned, spp=16).current_look)
     (folder / "room.lights.toml").write_text(LIGHTS_FILE, encoding="utf-8")
     return folder
 

@@ -44,7 +44,7 @@ def key_brighter(shot: Path) -> np.ndarray:
     """Return what the groups show with the key a stop up, painted where it does most."""
     basis = read_light_groups(shot).basis
     key = basis.image("key")
-    return basis.present_look + key * (key.mean(axis=-1) > 0.25)[..., None]
+    return basis.current_look + key * (key.mean(axis=-1) > 0.25)[..., None]
 
 
 def test_light_groups_are_painted_on_and_answered(shot: Path, tmp_path: Path):
@@ -56,7 +56,7 @@ def test_light_groups_are_painted_on_and_answered(shot: Path, tmp_path: Path):
     assert first in said
     basis = read_light_groups(shot).basis
     template = read_template(tmp_path / "template")
-    np.testing.assert_array_equal(template.image, basis.present_look)
+    np.testing.assert_array_equal(template.image, basis.current_look)
     assert template.transform == ViewTransform()
     names = {path.name for path in (tmp_path / "template" / "lights").iterdir()}
     assert names == {"key.png", "fill.png", "rim.png"}
@@ -92,7 +92,7 @@ def test_a_saved_basis_is_painted_on(shot: Path, tmp_path: Path):
     write_basis(tmp_path / "b.basis.exr", read_light_groups(shot).basis)
     succeed(tmp_path, "template", "b.basis.exr", "-o", "look.exr")
     [part] = read_parts(tmp_path / "look.exr")
-    np.testing.assert_array_equal(part.rgb(), read_light_groups(shot).basis.present_look)
+    np.testing.assert_array_equal(part.rgb(), read_light_groups(shot).basis.current_look)
     assert (tmp_path / "look.png").is_file()
 
 

@@ -112,7 +112,7 @@ def test_the_cache_and_solve(tmp_path: Path, make_basis: Any) -> None:
 
 
 def test_relight_of_names_that_steer(tmp_path: Path, make_basis: Any) -> None:
-    lighting = Lighting.present(make_basis(2, names=["a", BAD])).for_target("evening")
+    lighting = Lighting.current(make_basis(2, names=["a", BAD])).for_target("evening")
     write_lighting(tmp_path / "l.json", lighting)
     said = refused(tmp_path, "relight", write_room(tmp_path), "l.json")
     assert SHOWN in said
@@ -122,7 +122,7 @@ def test_relight_of_names_that_steer(tmp_path: Path, make_basis: Any) -> None:
 def test_thousands_of_names_are_not_repeated(tmp_path: Path, make_basis: Any) -> None:
     names = [f"light_{k}" for k in range(3000)]
     basis = make_basis(images=[[[[1.0] * 3]]] * 3000, names=names)
-    write_lighting(tmp_path / "l.json", Lighting.present(basis).for_target("evening"))
+    write_lighting(tmp_path / "l.json", Lighting.current(basis).for_target("evening"))
     said = refused(tmp_path, "relight", write_room(tmp_path), "l.json")
     assert "more that the scene does not have" in said
     assert len(said) < 1000

@@ -106,7 +106,7 @@ def test_a_render_is_closer_to_one_of_many_samples(tmp_path: Path):
         pytest.skip("pyoidn is not installed here")
     scene = load_scene(write_room(tmp_path), parameters={"width": "96"})
     few, many = (render_basis(scene, spp=spp, seed=seed) for spp, seed in ((8, 0), (512, 1)))
-    raw, truth = (basis.mix(basis.present_weights) for basis in (few, many))
+    raw, truth = (basis.mix(basis.current_weights) for basis in (few, many))
     noise = np.square(raw - truth).mean()
     for quality in ("fast", "high"):
         left = np.square(denoised(raw, few.features, quality=quality) - truth).mean()

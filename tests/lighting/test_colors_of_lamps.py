@@ -35,7 +35,7 @@ def _duv(basis: lp.Basis, target: lp.Target, **how: Any) -> np.ndarray:
 
 def _over_look(basis: lp.Basis, painted: dict[tuple[float, ...], Any]) -> lp.Target:
     """Colours of light on surfaces, in rectangles (top, bottom, left, right) of shares."""
-    image, weight = basis.present_look.copy(), np.zeros(basis.size, np.float32)
+    image, weight = basis.current_look.copy(), np.zeros(basis.size, np.float32)
     height, width = basis.size
     assert basis.features is not None
     for (top, bottom, left, right), light in painted.items():
@@ -48,7 +48,7 @@ def _over_look(basis: lp.Basis, painted: dict[tuple[float, ...], Any]) -> lp.Tar
         image,
         weight,
         everything=False,
-        transform=lp.ViewTransform("srgb", choose_exposure(basis.present_look)),
+        transform=lp.ViewTransform("srgb", choose_exposure(basis.current_look)),
         through_view=True,
         over_look=True,
     )
@@ -56,7 +56,7 @@ def _over_look(basis: lp.Basis, painted: dict[tuple[float, ...], Any]) -> lp.Tar
 
 @pytest.mark.parametrize("space", ["display", "linear"])
 def test_warm_light_on_the_vase_and_none_in_the_annex(gallery: lp.Basis, space: Any) -> None:
-    bright = 2 * float(gallery.present_look.mean())
+    bright = 2 * float(gallery.current_look.mean())
     vase, annex = (0.5, 0.63, 0.77, 0.83), (0.35, 0.6, 0.65, 0.75)
     warm = bright * kelvin_to_rgb(2700)
     duv = _duv(gallery, _over_look(gallery, {vase: warm, annex: np.zeros(3)}), space=space)
@@ -66,7 +66,7 @@ def test_warm_light_on_the_vase_and_none_in_the_annex(gallery: lp.Basis, space: 
 
 def test_white_light_on_a_wall_that_wood_reflects_on(gallery: lp.Basis) -> None:
     """It is redder than the lamps; one that makes up for that would be green."""
-    bright = 2 * float(gallery.present_look.mean())
+    bright = 2 * float(gallery.current_look.mean())
     left = (0.3, 0.45, 0.02, 0.25)
     for kelvin in (4000, 6500, 12_000):
         white = bright * kelvin_to_rgb(kelvin)
@@ -81,7 +81,7 @@ def test_a_whole_picture_that_is_asked_cooler_or_warmer(
     tint = kelvin_to_rgb(1e6 / (1e6 / 6504 + mired)) / kelvin_to_rgb(6504)
     target = lp.Target(
         "asked",
-        (gallery.present_look * tint * 2.0**stops).astype(np.float32),
+        (gallery.current_look * tint * 2.0**stops).astype(np.float32),
         np.ones(gallery.size, np.float32),
         everything=False,
         transform=lp.ViewTransform("srgb", 0),

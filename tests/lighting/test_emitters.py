@@ -33,8 +33,8 @@ def basis(make_basis: Any) -> Basis:
 
 
 def _painted(basis: Basis, where: Any, color: Any, *, times: bool = False) -> lp.Target:
-    """A stroke over the present look. times: whether it multiplies what is there."""
-    image = basis.present_look.copy()
+    """A stroke over the current look. times: whether it multiplies what is there."""
+    image = basis.current_look.copy()
     image[where] = image[where] * color if times else color
     counts = np.zeros(SIZE, np.float32)
     counts[where] = 1
@@ -49,7 +49,7 @@ def _lantern(basis: Basis, target: lp.Target, **fit: Any) -> tuple[float, float]
     live = LiveSolver(
         [view], fit=resolve_for_targets(lp.Fit(**fit), [target]), constraints=lp.Constraints()
     )
-    weights: Doubles = basis.present_weights
+    weights: Doubles = basis.current_weights
     for _ in range(8):
         weights = live.answer(weights)
     return float(exact[1].max()), float(weights[1].max())
@@ -135,7 +135,7 @@ def test_what_is_read_once_is_not_read_again(basis: Basis):
 def test_strokes_one_after_the_other_count_as_all_at_once(basis: Basis):
     """Also those beside an emitter, which change what the paint on it means."""
     rng = np.random.default_rng(2)
-    image, counts = basis.present_look.copy(), np.zeros(SIZE, np.float32)
+    image, counts = basis.current_look.copy(), np.zeros(SIZE, np.float32)
     view = LiveView(basis, image, counts)
     view.set_transform(lp.ViewTransform())
     view.film(lp.ViewTransform(), 100)
@@ -157,5 +157,5 @@ def test_strokes_one_after_the_other_count_as_all_at_once(basis: Basis):
 
 
 def test_nothing_painted_is_nothing_meant(basis: Basis):
-    look, none = basis.present_look, np.zeros(SIZE, np.float32)
+    look, none = basis.current_look, np.zeros(SIZE, np.float32)
     assert not find_glow_paint(look, none, look, basis.emitters_seen, None, dark=0.01).any()

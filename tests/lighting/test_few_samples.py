@@ -61,7 +61,7 @@ def _painting(basis: Basis, look: Any, wish: str) -> lp.Target:
         "a darker side": (look / 4, np.clip((0.4 - columns) / 0.1, 0, 1)),
         "nothing else": (look, np.ones(basis.size)),
     }[wish]
-    transform = lp.ViewTransform("srgb", choose_exposure(basis.present_look))
+    transform = lp.ViewTransform("srgb", choose_exposure(basis.current_look))
     return lp.Target(
         wish,
         np.asarray(image, np.float32),
@@ -78,7 +78,7 @@ def _live(basis: Basis, target: lp.Target) -> Any:
     live = LiveSolver(
         [view], fit=resolve_for_targets(lp.Fit(), [target]), constraints=lp.Constraints()
     )
-    return live.answer(live.answer(basis.present_weights))
+    return live.answer(live.answer(basis.current_weights))
 
 
 @pytest.mark.parametrize("name", list(FILMS))
@@ -87,14 +87,14 @@ def test_no_answer_is_worse_than_none(name: str):
     judge = render_basis(scene, spp=MANY, seed=MANY)
     wishes = ("all darker, a warm spot", "a warm spot", "a darker side", "nothing else")
     for (spp, few), wish in product(_few(scene).items(), wishes):
-        target = _painting(few, judge.present_look, wish)
+        target = _painting(few, judge.current_look, wish)
         problem = lp.Problem.of(judge, target)
 
         def missed(weights: Any, problem: lp.Problem = problem) -> float:
             return float(problem.objective(weights).sum())
 
-        asked = missed(np.zeros_like(judge.present_weights))
-        now = missed(judge.present_weights) * NOISE + 0.02 * asked
+        asked = missed(np.zeros_like(judge.current_weights))
+        now = missed(judge.current_weights) * NOISE + 0.02 * asked
         solution = lp.solve(few, target)
         answers = {
             "exact": solution.weights,
@@ -103,7 +103,7 @@ def test_no_answer_is_worse_than_none(name: str):
         }
         for kind, weights in answers.items():
             assert missed(weights) <= now, (name, spp, wish, kind)
-            ratio = weights.max(axis=1) / few.present_weights.max(axis=1)
+            ratio = weights.max(axis=1) / few.current_weights.max(axis=1)
             assert np.log2(ratio.max()) < MOST_STOPS, (name, spp, wish, kind)
 
 
@@ -120,7 +120,7 @@ def noisy(make_basis: Any) -> Basis:
 
 
 def _over(basis: Basis, times: float) -> lp.Target:
-    mean = basis.present_look.mean(axis=(0, 1))
+    mean = basis.current_look.mean(axis=(0, 1))
     look = np.broadcast_to(times * mean, (*basis.size, 3)).astype(np.float32)
     how: dict[str, Any] = {"through_view": True, "over_look": True}
     counts = np.ones(basis.size, np.float32)
@@ -146,7 +146,7 @@ def test_blocks_are_as_large_as_noise_asks(noisy: Basis):
 def test_noise_of_what_a_display_shows_moves_no_light(noisy: Basis):
     """Fitted pixel by pixel a display's curve would make up for it: 15 % here."""
     solution = lp.solve(noisy, _over(noisy, 0.25), colors="free")
-    shown = noisy.images.mean(axis=(1, 2)).T @ solution.weights / noisy.present_look.mean((0, 1))
+    shown = noisy.images.mean(axis=(1, 2)).T @ solution.weights / noisy.current_look.mean((0, 1))
     # Of 48 x 64 pixels in blocks of nine, the residual noise's bias.
     assert np.diag(shown) == pytest.approx(np.full(3, 0.25), rel=0.06)
     assert solution.problem.block_side == 3

@@ -28,7 +28,7 @@ def _with_kept(basis: lp.Basis) -> lp.Basis:
 
 @pytest.fixture
 def lighting(basis: lp.Basis) -> lp.Lighting:
-    return lp.Lighting.present(basis)
+    return lp.Lighting.current(basis)
 
 
 def test_a_lighting_is_a_mapping_of_names(basis: lp.Basis, lighting: lp.Lighting):
@@ -40,8 +40,8 @@ def test_a_lighting_is_a_mapping_of_names(basis: lp.Basis, lighting: lp.Lighting
     assert "lmap" not in lighting
     assert 3 not in lighting
     assert lighting.get("lmap") is None
-    assert lighting == lp.Lighting.present(basis)
-    assert hash(lighting) == hash(lp.Lighting.present(basis))
+    assert lighting == lp.Lighting.current(basis)
+    assert hash(lighting) == hash(lp.Lighting.current(basis))
     assert pickle.loads(pickle.dumps(lighting)) == lighting
 
 
@@ -89,14 +89,14 @@ def test_combine_takes_weights(basis: lp.Basis, given: Any, weights: Any):
         ({"lamp": None}, "light 'lamp': .*expected"),
         ({"lamp": -1}, "light 'lamp': a weight of -1: expected finite numbers >= 0"),
         ({"lamp": np.inf}, "light 'lamp': a weight of inf"),
-        ({"rest": 2}, "light 'rest' is kept as it is: its weight is 1"),
+        ({"rest": 2}, "light 'rest' is fixed: its weight is 1"),
         (
             [1, 1],
             r"3 lights: weights of the shape \(2,\): expected \(3,\) or \(3, 3\)",
         ),
         (np.ones((3, 4)), r"weights of the shape \(3, 4\)"),
         (1.0, r"weights of the shape \(\)"),
-        ([1, 2, 3], "light 'rest' is kept"),
+        ([1, 2, 3], "light 'rest' is fixed"),
         ([np.nan, 1, 1], "a weight of nan"),
         ("evening", "a lighting of 3 lights: weights of the type str"),
         (None, "a lighting of 3 lights"),

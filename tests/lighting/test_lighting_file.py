@@ -240,7 +240,7 @@ def test_what_a_light_consists_of_there_and_back(
         ({"members": "lamp"}, "members is a list"),
         ({"members": [1]}, "members is a list"),
         ({"is_fixed": 1}, "is_fixed is true or false"),
-        ({"is_fixed": True, "weight": [2, 1, 1], "emission": [1, 1, 1]}, "is kept as it is"),
+        ({"is_fixed": True, "weight": [2, 1, 1], "emission": [1, 1, 1]}, "is fixed"),
         ({"members": ["other"]}, "an emitter is in two lights"),
     ],
 )

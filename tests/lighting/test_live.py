@@ -33,10 +33,10 @@ class _Brush:
         rng = np.random.default_rng(seed)
         seen = np.zeros(size, bool)
         seen[2:5, 3:9] = True
-        present = np.random.default_rng(99).random((4, 3))
+        current = np.random.default_rng(99).random((4, 3))
         planes = rng.random((4, *size, 3)) ** 2
-        self.basis: Basis = make_basis(images=planes, emission=present, seen=seen)
-        self.image = self.basis.present_look.copy()
+        self.basis: Basis = make_basis(images=planes, emission=current, seen=seen)
+        self.image = self.basis.current_look.copy()
         self.importance = np.zeros(size, np.float32)
         self.view = LiveView(self.basis, self.image, self.importance)
 
@@ -100,7 +100,7 @@ def test_sums_under_a_brush_are_those_of_the_whole_problem(
     # ‖Ψ‖² is another constant: here paint and rest are two residuals of a pixel, there one.
     for name in ("M", "b"):
         found, expected = getattr(live, name), getattr(problem.equations, name)
-        # The present look, and 1 less what is painted, are in single precision.
+        # The current look, and 1 less what is painted, are in single precision.
         np.testing.assert_allclose(found, expected, rtol=2e-6, atol=2e-6 * np.abs(expected).max())
 
 
@@ -143,7 +143,7 @@ def test_the_answer_under_a_brush_is_that_of_a_solve(
     brushes = _painted(make_basis, 5, views, 0)
     meant = _meant([brush.target for brush in brushes], space="linear", **fit)
     live = LiveSolver([brush.view for brush in brushes], fit=meant, constraints=constraints)
-    rng, answer = np.random.default_rng(3), brushes[0].basis.present_weights
+    rng, answer = np.random.default_rng(3), brushes[0].basis.current_weights
     for _ in range(4):
         for brush in brushes:
             brush.stroke(rng)
@@ -159,7 +159,7 @@ def test_rounds_under_a_brush_come_to_the_answer_of_a_display(make_basis: Any) -
     [brush] = _painted(make_basis, 8, 1, 5)
     meant = _meant([brush.target], space="display", hold=1.0)
     live = LiveSolver([brush.view], fit=meant, constraints=Constraints())
-    answer = brush.basis.present_weights
+    answer = brush.basis.current_weights
     for _ in range(60):
         answer = live.answer(answer)
     problem = Problem.of(brush.basis, brush.target, fit=meant)
@@ -176,12 +176,12 @@ def test_planes_that_are_replaced_answer_as_if_they_had_been_there(
     brushes = _painted(make_basis, 5, views, 4)
     meant = _meant([brush.target for brush in brushes], space=space)
     live = LiveSolver([b.view for b in brushes], fit=meant, constraints=Constraints())
-    start = live.answer(brushes[0].basis.present_weights)
+    start = live.answer(brushes[0].basis.current_weights)
     fresh = []
     for brush in brushes:
         basis, rng = brush.basis, np.random.default_rng(3)
         plane = rng.random((*basis.size, 3)).astype(np.float32) ** 2
-        former = Estimate(basis.present_look, basis.present_noise)
+        former = Estimate(basis.current_look, basis.current_noise)
         moved = replace(
             basis, planes=MemoryPlanes(basis.images.copy()).replaced({1: plane}), former=former
         )

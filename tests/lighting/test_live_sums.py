@@ -21,7 +21,7 @@ def test_paint_and_rest_are_those_of_the_whole_picture(
     seen = np.zeros(SIZE, bool)
     seen[10:20, 30:50] = True
     basis = make_basis(4, SIZE, seen=seen)
-    image, importance = basis.present_look.copy(), np.zeros(SIZE, np.float32)
+    image, importance = basis.current_look.copy(), np.zeros(SIZE, np.float32)
     tiles = PaintedTiles(basis, image, importance)
     for top, left in ((0, 0), (12, 25), (30, 60), (12, 25)):
         region = slice(top, top + 12), slice(left, left + 17)
@@ -32,17 +32,17 @@ def test_paint_and_rest_are_those_of_the_whole_picture(
         made = tiles.equations(2.5)
         left_of_1 = np.where(seen, 0, np.maximum(1 - importance.astype(np.float64), 0))
         paint = NormalEquations.of(basis, image, importance)
-        rest = NormalEquations.of(basis, basis.present_look, left_of_1).scaled(2.5)
+        rest = NormalEquations.of(basis, basis.current_look, left_of_1).scaled(2.5)
         for name in ("M", "b", "target_norm2"):
             expected = getattr(paint, name) + getattr(rest, name)
-            # The present look, and what is left of 1, are in single precision.
+            # The current look, and what is left of 1, are in single precision.
             np.testing.assert_allclose(getattr(made, name), expected, rtol=1e-6)
 
 
 def test_what_was_painted_first_has_the_same_rest(make_basis: Any):
     rng = np.random.default_rng(4)
     basis = make_basis(3, SIZE)
-    image, importance = basis.present_look.copy(), np.zeros(SIZE, np.float32)
+    image, importance = basis.current_look.copy(), np.zeros(SIZE, np.float32)
     before = PaintedTiles(basis, image, importance)
     importance[5:25, 8:40] = rng.random((20, 32))
     before.update((slice(5, 25), slice(8, 40)), with_importance=True)

@@ -118,7 +118,7 @@ def test_a_third_loss_heeds_what_is_asked_of_lights(make_basis: Any) -> None:
     [basis], [target] = problem.views.bases, problem.views.targets
     asked = Problem.of(basis, target, constraints=locked, fit=problem.fit)
     held = solution_of(replace(asked, loss=problem.loss))
-    np.testing.assert_allclose(held.weights[1], basis.present_weights[1])
+    np.testing.assert_allclose(held.weights[1], basis.current_weights[1])
     assert problem.objective(held.weights).sum() > problem.objective(free.weights).sum()
 
 
@@ -166,7 +166,7 @@ def test_squares_that_are_made_on_request(
     basis = make_basis(images=rng.random((4, *size, 3), np.float32))
     if not kept:
         monkeypatch.setattr(loss_module, "MAX_KEPT_PIXELS", size[0])
-    target = Target.of(basis.present_look * np.float32(0.7), rng.random(size).round())
+    target = Target.of(basis.current_look * np.float32(0.7), rng.random(size).round())
     top = np.broadcast_to((rng.random(size) < 0.2)[..., None], (*size, 3))
     target = replace(target, at_least=top)
     transform = None if name is None else ViewTransform(name)

@@ -91,11 +91,11 @@ def test_what_is_not_painted_weighs_as_much_as_is_said(make_basis: Any):
 
 def test_an_untouched_look_is_met_by_the_present_lighting(make_basis: Any):
     basis = _basis(make_basis)
-    look = basis.mix(basis.present_weights)
+    look = basis.mix(basis.current_weights)
     for about in ({"over_look": True}, {"over_look": True, "through_view": True}):
         target = replace(_painted(basis, transform=lp.ViewTransform("srgb", -1.0)), image=look)
         solution = lp.solve(basis, replace(target, **about))
-        np.testing.assert_allclose(solution.weights, basis.present_weights, rtol=1e-4)
+        np.testing.assert_allclose(solution.weights, basis.current_weights, rtol=1e-4)
 
 
 def test_colors_are_pulled_as_the_formula_says(make_basis: Any, monkeypatch: pytest.MonkeyPatch):
@@ -107,9 +107,9 @@ def test_colors_are_pulled_as_the_formula_says(make_basis: Any, monkeypatch: pyt
     basis = _basis(make_basis)
     target = _painted(basis, over_look=True)
     solution = lp.solve(basis, target, hold=0)
-    D, present = target.importance.astype(float), basis.present_weights
+    D, current = target.importance.astype(float), basis.current_weights
     images = basis.images.astype(float)
-    colors = present / (present @ LUMINANCE)[:, None]
+    colors = current / (current @ LUMINANCE)[:, None]
     power = np.square(images).sum(axis=(1, 2))
 
     def cost(flat: np.ndarray) -> float:
@@ -119,14 +119,14 @@ def test_colors_are_pulled_as_the_formula_says(make_basis: Any, monkeypatch: pyt
         pull = (dimming[:, None] * power * hue**2).sum()
         return float((D[..., None] * missed**2).sum() + COLOR_PULL * D.mean() * pull)
 
-    bounds, dimming, start = [(0, None)] * present.size, np.ones(4), present.ravel()
+    bounds, dimming, start = [(0, None)] * current.size, np.ones(4), current.ravel()
     how = {"method": "L-BFGS-B", "options": {"ftol": 1e-15, "maxiter": 5000}}
     for _ in range(2):
         found = minimize(cost, start, bounds=bounds, **how)
         assert found.success
         before, start = dimming, found.x
         then = np.maximum(found.x.reshape(-1, 3) @ LUMINANCE, 1e-9)
-        dimming = np.clip(present @ LUMINANCE / then, 1, MAX_DIMMING)
+        dimming = np.clip(current @ LUMINANCE / then, 1, MAX_DIMMING)
     dimming = before
     assert dimming.max() > 1.5
     assert cost(solution.weights.ravel()) <= found.fun * (1 + 1e-7)
@@ -135,9 +135,9 @@ def test_colors_are_pulled_as_the_formula_says(make_basis: Any, monkeypatch: pyt
 
 
 def test_lamps_that_only_dim_cost_nothing(make_basis: Any):
-    """What the present colours can do is done exactly, however strong the pull."""
+    """What the current colours can do is done exactly, however strong the pull."""
     basis = _basis(make_basis)
-    dimmed = basis.present_weights * np.array([[0.2], [3.0], [0.0], [1.0]])
+    dimmed = basis.current_weights * np.array([[0.2], [3.0], [0.0], [1.0]])
     target = replace(lp.Target.of(basis.mix(dimmed).astype(np.float32)), over_look=True)
     np.testing.assert_allclose(lp.solve(basis, target).weights, dimmed, rtol=1e-5, atol=1e-6)
 
@@ -162,7 +162,7 @@ def test_white_is_what_kelvin_does(make_basis: Any):
     # What is asked of a light goes before.
     locked = lp.Constraints.of({"light 1": {"lock": True}})
     found = lp.solve(basis, target, colors="white", constraints=locked).weights
-    np.testing.assert_allclose(found[1], basis.present_weights[1])
+    np.testing.assert_allclose(found[1], basis.current_weights[1])
 
 
 def test_the_answer_says_how_it_was_found(make_basis: Any, tmp_path: Any):

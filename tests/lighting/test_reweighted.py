@@ -57,7 +57,7 @@ def _pictures(basis: Basis, w: Any) -> Any:
 def _hinge(basis: Basis, target: Target, unpainted: float) -> Any:
     """The objective by hand: squares, of which those of saturated paint only pull upwards."""
     a = target.importance[..., None].astype(np.float64)
-    current = basis.mix(basis.present_weights)
+    current = basis.mix(basis.current_weights)
 
     def value(w: Any) -> float:
         x = _pictures(basis, w)
@@ -71,7 +71,7 @@ def _hinge(basis: Basis, target: Target, unpainted: float) -> Any:
 def _displayed(basis: Basis, target: Target, transform: ViewTransform, unpainted: float) -> Any:
     a = target.importance[..., None].astype(np.float64)
     painted = transform.encode(target.image.astype(np.float64))
-    current = transform.encode(basis.mix(basis.present_weights).astype(np.float64))
+    current = transform.encode(basis.mix(basis.current_weights).astype(np.float64))
 
     def value(w: Any) -> float:
         x = transform.encode(_pictures(basis, w))
@@ -309,7 +309,7 @@ def test_constraints_hold_and_nothing_near_is_better(
 
     def value(w: Any) -> float:
         missed = float(solution.problem.loss.objective(_pictures(basis, w)).sum())
-        return missed + float((pull * np.square(w - basis.present_weights)).sum())
+        return missed + float((pull * np.square(w - basis.current_weights)).sum())
 
     assert value(w) <= value(plain) * (1 + 1e-9)
     if constraints.sparse:
@@ -331,9 +331,9 @@ def test_constraints_hold_and_nothing_near_is_better(
 def test_views_together_are_one_picture(make_basis: Any, transform: ViewTransform | None):
     """Two views, of which one alone has saturated paint, against one view of both pictures."""
     basis, image, importance = _random(make_basis, 1)
-    present = [light.emission for light in basis.lights]
+    current = [light.emission for light in basis.lights]
     first, second = (
-        make_basis(images=basis.images[:, rows], emission=present)
+        make_basis(images=basis.images[:, rows], emission=current)
         for rows in (slice(0, 5), slice(5, None))
     )
     at_least = image > 0.4

@@ -37,7 +37,7 @@ SIDE, SPP = 48, 4
 #: condition is at most 1e6.
 ROUND_OFF = 1e-9
 
-#: The same where pixels are held to the present look, which is a picture in float32.
+#: The same where pixels are held to the current look, which is a picture in float32.
 PICTURE_ROUND_OFF = 1e-6
 
 #: Where the gradient of the objective vanishes, in parts of b.
@@ -78,13 +78,13 @@ def _literal(basis: lp.Basis, target: lp.Target) -> tuple[Any, Any]:
 
 
 def _held(basis: lp.Basis, target: lp.Target) -> tuple[Any, Any]:
-    """The same with unpainted pixels held to the present look C: D + u and (D Ψ + u C) / (D + u).
+    """The same with unpainted pixels held to the current look C: D + u and (D Ψ + u C) / (D + u).
 
     All u together are HOLD times all D, and no u is more than 1 − D (docs/method.md, "Unpainted
     pixels").
     """
     psi, D = _literal(basis, target)
-    look = np.einsum("nc,nhwc->hwc", basis.present_weights, basis.images.astype(np.float64))
+    look = np.einsum("nc,nhwc->hwc", basis.current_weights, basis.images.astype(np.float64))
     free = np.where(basis.emitters_seen, 0, np.maximum(1 - D, 0))
     u = free * (min(HOLD * D.sum() / free.sum(), 1.0) if free.any() else 0.0)
     both = np.where(D + u > 0, D + u, 1)[..., None]
@@ -165,7 +165,7 @@ def test_constrained_lightings_are_those_of_quadprog(planes: Planes, name: str) 
     target = replace(_painting(name, basis), at_least=None)  # least squares, of every painting
     free = lp.solve(basis, target, literal=True)
     dark, limited = np.argsort(-free.weights.min(axis=1))[:2]  # two that are on
-    shown = (basis.present_weights * basis.totals).sum(axis=1)
+    shown = (basis.current_weights * basis.totals).sum(axis=1)
     locked = next(k for k in np.argsort(shown) if k not in (dark, limited))  # hardly in the way
     most = 0.5 * free.weights[limited]
     asked = {
@@ -179,7 +179,7 @@ def test_constrained_lightings_are_those_of_quadprog(planes: Planes, name: str) 
     for channel in range(3):
         A, y = _rows(basis, *_literal(basis, target), channel)
         lower, upper = np.zeros(n), np.full(n, np.inf)
-        lower[locked] = upper[locked] = basis.present_weights[locked, channel]
+        lower[locked] = upper[locked] = basis.current_weights[locked, channel]
         upper[dark], upper[limited] = 0, most[channel]
         others = least(A.T @ A, A.T @ y, lower=lower, upper=upper)
         _assert_close(weights[:, channel], others)

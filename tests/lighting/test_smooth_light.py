@@ -116,10 +116,10 @@ def test_what_follows_the_current_look_follows_its_average(rng: np.random.Genera
     basis = noisy_basis(rng)
     weight = np.zeros(SIZE)
     weight[0, 0] = 1e-9
-    target = Target.of(basis.present_look.astype(np.float32), weight)
+    target = Target.of(basis.current_look.astype(np.float32), weight)
     solution = solve(basis, target, unpainted=1.0)
     smooth = on_smooth_light(solution)
-    gradient = smooth.equations.gradient(smooth.basis.present_weights)
+    gradient = smooth.equations.gradient(smooth.basis.current_weights)
     assert np.abs(gradient).max() < 1e-5 * np.abs(smooth.equations.b).max()
 
 

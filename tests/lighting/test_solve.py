@@ -65,7 +65,7 @@ def test_one_residual_stands_for_two(make_basis: Any, unpainted: float):
     basis = make_basis(4, SIZE, seen=_seen())
     target = _random_target()
     image, importance = _weighted(basis, target, unpainted=unpainted)
-    current = basis.mix(basis.present_weights)
+    current = basis.mix(basis.current_weights)
     a = target.importance.astype(np.float64)
     rest = unpainted * np.where(basis.emitters_seen, 0, np.maximum(1 - a, 0))
 
@@ -140,7 +140,7 @@ def test_a_known_lighting_comes_back_from_a_painted_part(make_basis: Any):
 
 
 def test_the_unpainted_keeps_the_current_look(make_basis: Any):
-    """The more it weighs, the closer the answer comes to the present lighting."""
+    """The more it weighs, the closer the answer comes to the current lighting."""
     basis = make_basis(4, SIZE)
     painted = np.zeros(SIZE)
     painted[:6] = 1
@@ -148,7 +148,7 @@ def test_the_unpainted_keeps_the_current_look(make_basis: Any):
     distances = []
     for unpainted in (0.0, 0.1, 1.0, 10.0, 1e6):
         w = solve(basis, target, unpainted=unpainted).lighting.weights_for(basis)
-        distances.append(np.abs(w - basis.present_weights).max())
+        distances.append(np.abs(w - basis.current_weights).max())
     assert distances == sorted(distances, reverse=True)
     # What is left of the painted part's pull, a share of about 1e-6.
     assert distances[-1] < 1e-5 < distances[0]
@@ -177,7 +177,7 @@ def test_what_reaches_nothing_keeps_the_start(make_basis: Any, asked: Constraint
 
 
 def test_a_start_for_other_lights(make_basis: Any):
-    other = Lighting.present(make_basis(3, SIZE, names=["a", "b", "c"]))
+    other = Lighting.current(make_basis(3, SIZE, names=["a", "b", "c"]))
     with pytest.raises(LightingError, match="missing light 0"):
         solve(make_basis(3, SIZE), _random_target(), start=other)
 
@@ -219,10 +219,10 @@ def test_mixing_copies_no_basis(make_basis: Any):
     rng = np.random.default_rng(3)
     target = _target(rng.random((60, 80, 3)), rng.random((60, 80)))
     one = basis.images[0].nbytes
-    expected = np.einsum("nhwc,nc->hwc", basis.images.astype(np.float64), basis.present_weights)
+    expected = np.einsum("nhwc,nc->hwc", basis.images.astype(np.float64), basis.current_weights)
     tracemalloc.start()
     try:
-        mixed = basis.mix(basis.present_weights)
+        mixed = basis.mix(basis.current_weights)
         _, mixing = tracemalloc.get_traced_memory()
         tracemalloc.reset_peak()
         target_squares(basis, target, unpainted=1.0)
@@ -309,7 +309,7 @@ def test_what_is_kept_stays_through_any_painting(make_basis: Any) -> None:
     everything = solve(alone, _random_target())
     assert everything.certificate.converged
     assert (everything.lighting.weights_for(alone) == 1).all()
-    with pytest.raises(LightingError, match="kept as it is, so its emission must be 1 1 1"):
+    with pytest.raises(LightingError, match="fixed, so its emission must be 1 1 1"):
         black.with_emission(basis.names[0], (2, 2, 2))
 
 

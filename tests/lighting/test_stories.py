@@ -36,20 +36,20 @@ def _over(look: np.ndarray, factor: Any, where: Any) -> lp.Target:
 
 
 def _apart(basis: lp.Basis, solution: lp.Solution, where: Any) -> float:
-    """Mean ΔE from the present look."""
-    look, found = basis.mix(basis.present_weights), basis.mix(solution.weights)
+    """Mean ΔE from the current look."""
+    look, found = basis.mix(basis.current_weights), basis.mix(solution.weights)
     return float(delta_e(look, found)[where].mean())
 
 
 def _hue(basis: lp.Basis, solution: lp.Solution) -> float:
     """How far lamps are from their colour, of their brightness, all together."""
-    ratio = solution.weights / basis.present_weights
+    ratio = solution.weights / basis.current_weights
     return float(np.ptp(ratio, axis=1).sum() / ratio.max(axis=1).sum())
 
 
 def test_more_light_on_the_statue_leaves_the_room_alone(basis: lp.Basis):
     """One percent of the picture, two stops brighter: the room next door stays as it was."""
-    look = basis.mix(basis.present_weights)
+    look = basis.mix(basis.current_weights)
     target = _over(look, 2.5, (slice(15, 21), slice(9, 13)))
     elsewhere = (slice(None), slice(32, None))
     meant, literal = lp.solve(basis, target), lp.solve(basis, target, literal=True)
@@ -61,7 +61,7 @@ def test_more_light_on_the_statue_leaves_the_room_alone(basis: lp.Basis):
 
 
 def test_a_warm_stroke_makes_no_red_and_green_lamps(basis: lp.Basis):
-    look = basis.mix(basis.present_weights)
+    look = basis.mix(basis.current_weights)
     noise = np.random.default_rng(5).normal(0, 0.15, (*SIZE, 3))
     target = _over(look, np.array([1.5, 1.2, 0.9]) * 2**noise, (slice(4, 30), slice(2, 20)))
     meant, literal = lp.solve(basis, target), lp.solve(basis, target, literal=True)
@@ -70,7 +70,7 @@ def test_a_warm_stroke_makes_no_red_and_green_lamps(basis: lp.Basis):
 
 
 def test_an_untouched_look_changes_nothing(basis: lp.Basis):
-    look = basis.mix(basis.present_weights)
+    look = basis.mix(basis.current_weights)
     target = _over(look, 1.0, (slice(None), slice(0, 30)))
     # Codes of 8 bits are a percent or so of light.
     assert _apart(basis, lp.solve(basis, target), ...) < 0.2

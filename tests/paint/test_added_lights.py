@@ -29,10 +29,10 @@ def names(moving: Moving) -> tuple[str, ...]:
 
 @pytest.mark.parametrize("kind", ["spot", "point", "panel"])
 def test_an_added_light_has_the_plane_of_its_place(moving: Moving, kind: Any) -> None:
-    """At once about, and rendered soon; the other planes and the present look stay."""
+    """At once about, and rendered soon; the other planes and the current look stay."""
     session = moving.studio.session
     before = {name: moving.plane(name) for name in session.basis.names}
-    look = session.basis.present_look.copy()
+    look = session.basis.current_look.copy()
     state = added(moving, protocol.AddLight(kind, position=AIR))
     name = f"{kind}_1"
     assert [light.name for light in state.lights] == [*before, name]
@@ -49,7 +49,7 @@ def test_an_added_light_has_the_plane_of_its_place(moving: Moving, kind: Any) ->
         assert error < 0.15 * np.square(truth)[is_lit].sum()  # noise of few samples
     for other, plane in before.items():
         assert np.array_equal(moving.plane(other), plane)
-    assert np.array_equal(session.basis.present_look, look)
+    assert np.array_equal(session.basis.current_look, look)
     # It is seen: its part of the picture is a fifth, and three fifths are more than it may be.
     assert 0.1 < state.answer.lights[-1].share < 0.6
 
@@ -58,7 +58,7 @@ def test_the_painting_finds_a_light_that_is_missing(moving: Moving) -> None:
     """The painting is the look with one light more; the search shows what it tries."""
     there = lp.NewEmitter("lamp", "point", lp.Pose(position=(-0.2, 0.5, 0.7)), emission=(2, 2, 2))
     wanted = lp.render_basis(moving.scene.with_new_emitters([there]), spp=128, seed=5)
-    look = wanted.mix(wanted.present_weights)
+    look = wanted.mix(wanted.current_weights)
     whole = (0, look.shape[0], 0, look.shape[1])
     moving.send(
         protocol.Paint(0, whole, True), image=look, importance=np.ones(look.shape[:2], np.float32)

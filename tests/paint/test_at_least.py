@@ -62,7 +62,7 @@ def _clipped(basis: lp.Basis) -> lp.Target:
 def _session(basis: lp.Basis, store: Store | None = None) -> Session:
     return Session(
         [basis],
-        [basis.present_look],
+        [basis.current_look],
         store or MemoryStore(Identity.of([basis])),
         settings=Settings(**LINEAR),
         transform=lp.ViewTransform(),
@@ -142,7 +142,7 @@ def test_a_stroke_may_change_its_mind(basis: lp.Basis):
 
     _paint(session, 1, BRUSH, _corner, is_final=False)
     assert not _marks(session)[2:4, 3:12].any()
-    session.improve([basis], [basis.present_look])  # more samples come meanwhile
+    session.improve([basis], [basis.current_look])  # more samples come meanwhile
     assert not _marks(session)[2:4, 3:12].any()
     _paint(session, 1, BRUSH, back)
     expected = target.at_least.copy()
@@ -186,7 +186,7 @@ def test_any_sequence_is_a_rebuild_and_never_says_it_of_paint(done: Any):
                 case "drop":
                     session.handle(protocol.DropStroke(stroke), {})
                 case "improve":
-                    session.improve([basis], [basis.present_look])
+                    session.improve([basis], [basis.current_look])
                 case "set":
                     _set(session, target)
         except lp.LightpaintError:

@@ -24,7 +24,7 @@ def test_a_verifying_render_writes_nothing_beside_the_scene(tmp_path: Path) -> N
     path = write_room(tmp_path / "scene")
     subject = make_subject(SceneFile(str(path)), tmp_path / "s", settings=Settings(spp=4))
     basis = lp.render_basis(subject.loaded_scene, spp=4)
-    lighting = Lighting.of_weights(basis, 2 * basis.present_weights)
+    lighting = Lighting.of_weights(basis, 2 * basis.current_weights)
     there, seen = set(path.parent.iterdir()), []
 
     def hears(label: str, done: int, total: int, unit: str = "passes") -> None:
@@ -35,7 +35,7 @@ def test_a_verifying_render_writes_nothing_beside_the_scene(tmp_path: Path) -> N
     assert all(files == there for files in seen)
     # It may end when it can tell, before all four samples.
     assert "samples per pixel confirms it" in said
-    np.testing.assert_allclose(picture.mean(), 2 * basis.present_look.mean(), rtol=0.1)  # noise
+    np.testing.assert_allclose(picture.mean(), 2 * basis.current_look.mean(), rtol=0.1)  # noise
 
 
 @pytest.mark.parametrize("transform", [lp.ViewTransform("srgb", 1.5), lp.ViewTransform("agx")])

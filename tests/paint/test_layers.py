@@ -26,7 +26,7 @@ from lightpaint.paint.store.store import Store
 
 SIZE = SIZES[0]
 WHOLE = (0, SIZE[0], 0, SIZE[1])
-PRESENT = np.random.default_rng(1).uniform(0.1, 2, (*SIZE, 3)).astype(np.float32)
+CURRENT = np.random.default_rng(1).uniform(0.1, 2, (*SIZE, 3)).astype(np.float32)
 
 
 def pixels_of(coverage: Any, colour: Any = 0.0) -> LayerPixels:
@@ -42,7 +42,7 @@ def target_of(*layers: tuple[Layer, LayerPixels], region: Any = WHOLE) -> Pixels
         ShownLayer(layer, pixels, by)
         for (layer, pixels), by in zip(layers, accents(layers), strict=True)
     ]
-    return compose(kept, PRESENT, region)
+    return compose(kept, CURRENT, region)
 
 
 # What each layer does
@@ -52,8 +52,8 @@ def test_an_adjustment_scales_luminance_and_its_strength_counts_in_stops() -> No
     wish = Layer(1, "adjust", gain=2.0, tint=(1.2, 1.0, 0.8), strength=1.5)
     image, importance, _ = target_of((wish, pixels_of(1)))
     luminance = np.array([0.2126, 0.7152, 0.0722])
-    np.testing.assert_allclose(image @ luminance, 2**1.5 * (PRESENT @ luminance), rtol=1e-6)
-    ratio = image / PRESENT
+    np.testing.assert_allclose(image @ luminance, 2**1.5 * (CURRENT @ luminance), rtol=1e-6)
+    ratio = image / CURRENT
     np.testing.assert_allclose(ratio[..., 0] / ratio[..., 1], 1.2**1.5, rtol=1e-6)
     np.testing.assert_array_equal(importance, 1)
 
@@ -71,7 +71,7 @@ def test_two_adjustments_multiply_and_lie_relative_to_what_is_below() -> None:
 @pytest.mark.parametrize("strength", [0.25, 1.0, 2.0])
 def test_paint_mixes_by_coverage_and_strength_and_is_never_negative(strength: float) -> None:
     image = target_of((Layer(1, "paint", strength=strength), pixels_of(0.5, 0.0))).image
-    np.testing.assert_allclose(image, PRESENT * (1 - 0.5 * strength), rtol=1e-6, atol=1e-7)
+    np.testing.assert_allclose(image, CURRENT * (1 - 0.5 * strength), rtol=1e-6, atol=1e-7)
 
 
 def test_weighing_scales_importance_alone() -> None:
@@ -104,7 +104,7 @@ def test_a_small_wish_over_a_whole_one_counts_more_in_either_order() -> None:
 def test_what_covers_nothing_is_not_painted() -> None:
     layer = (Layer(1, "paint"), pixels_of(5e-4, 9.0))
     image, importance, _ = target_of(layer)
-    np.testing.assert_array_equal(image, PRESENT)
+    np.testing.assert_array_equal(image, CURRENT)
     assert not importance.any()
 
 
@@ -161,7 +161,7 @@ def test_whatever_the_hand_did_the_target_is_that_of_the_layers_built_afresh(see
         for layer, pixels in pairs:
             pixels.put(view.full_region, view.layer(layer.id).part(view.full_region))
         shown = [ShownLayer(*pair, by) for pair, by in zip(pairs, accents(pairs), strict=True)]
-        assert view.painting.equals(compose(shown, view.present, view.full_region))
+        assert view.painting.equals(compose(shown, view.current, view.full_region))
     # Opened again it is the same, and undo and redo lead through all of it.
     again = session_on(session.store)
     assert again.views.layers == session.views.layers

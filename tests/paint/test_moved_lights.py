@@ -27,10 +27,10 @@ BALL = (0.3, 0.3, 0.2)
 
 
 def test_a_moved_light_has_the_plane_of_its_place(moving: Moving) -> None:
-    """At once about, and rendered soon; the other planes and the present look stay."""
+    """At once about, and rendered soon; the other planes and the current look stay."""
     session = moving.studio.session
     before = {name: moving.plane(name) for name in session.basis.names}
-    look = session.basis.present_look.copy()
+    look = session.basis.current_look.copy()
     moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}, is_final=False))
     quick = moving.plane("bulb")
     moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}))
@@ -44,7 +44,7 @@ def test_a_moved_light_has_the_plane_of_its_place(moving: Moving) -> None:
     for name in session.basis.names:
         if name != "bulb":
             assert np.array_equal(moving.plane(name), before[name])
-    assert np.array_equal(session.basis.present_look, look)
+    assert np.array_equal(session.basis.current_look, look)
 
 
 def test_a_receiver_with_a_lock_may_change_the_session_while_it_is_sent_planes(
@@ -240,7 +240,7 @@ def test_lights_that_may_move_come_closer_in_one_step(dim: Moving) -> None:
     there = (-0.1, 1.2, 0.6)
     moved = moving.scene.moved({"bulb": lp.Pose(position=there)})
     wanted = lp.render_basis(moved, spp=256, seed=5)
-    look = wanted.mix(wanted.present_weights)
+    look = wanted.mix(wanted.current_weights)
     whole = (0, look.shape[0], 0, look.shape[1])
     moving.send(
         protocol.Paint(0, whole, True), image=look, importance=np.ones(look.shape[:2], np.float32)
@@ -277,9 +277,9 @@ def test_what_cannot_be_placed_is_said(moving: Moving) -> None:
 def test_what_comes_no_closer_to_the_eye_is_not_done(
     dim: Moving, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The painting is the present look: every move is a step away, whatever a search says."""
+    """The painting is the current look: every move is a step away, whatever a search says."""
     session = dim.studio.session
-    look = session.basis.present_look.copy()
+    look = session.basis.current_look.copy()
     whole = (0, look.shape[0], 0, look.shape[1])
     dim.send(
         protocol.Paint(0, whole, True), image=look, importance=np.ones(look.shape[:2], np.float32)

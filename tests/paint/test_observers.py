@@ -409,7 +409,7 @@ def looks(make_basis: Any) -> tuple[Session, LookLibrary]:
     basis = make_basis(3)
     session = Session(
         [basis],
-        [basis.present_look],
+        [basis.current_look],
         MemoryStore(Identity.of([basis])),
         settings=Settings(),
         transform=lp.ViewTransform(),

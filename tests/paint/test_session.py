@@ -82,7 +82,7 @@ def several(bases: list[lp.Basis], store: MemoryStore | None = None, **how: Any)
     """The same, of several views."""
     return Session(
         bases,
-        [basis.present_look for basis in bases],
+        [basis.current_look for basis in bases],
         store or MemoryStore(Identity.of(bases)),
         settings=Settings(**how),
         transform=lp.ViewTransform(),
@@ -223,11 +223,11 @@ def test_undo_goes_through_views_in_order():
 
 def test_nothing_painted_leaves_lights_as_they_are(basis: lp.Basis):
     session = session_of(basis)
-    np.testing.assert_allclose(session.weights, basis.present_weights)
+    np.testing.assert_allclose(session.weights, basis.current_weights)
     [answer] = session.handle(protocol.ConstrainLight(0, {"lock": 2.0}), {})
     weights = answer.arrays["weights"]
     np.testing.assert_allclose(weights[0], [2.0, 2.0, 2.0])
-    np.testing.assert_allclose(weights[1:], basis.present_weights[1:])
+    np.testing.assert_allclose(weights[1:], basis.current_weights[1:])
 
 
 REGION = st.tuples(
@@ -293,7 +293,7 @@ def test_any_sequence_equals_a_rebuild(actions: list[Any]):
         np.testing.assert_array_equal(one.image, other.image)
         np.testing.assert_array_equal(one.importance, other.importance)
         unpainted = one.importance == 0
-        assert (one.image[unpainted] == basis.present_look[unpainted]).all()
+        assert (one.image[unpainted] == basis.current_look[unpainted]).all()
     assert session.requests == again.requests
     assert session.snapshot().constraints == again.snapshot().constraints
     assert session.snapshot().settings == again.snapshot().settings
@@ -302,9 +302,9 @@ def test_any_sequence_equals_a_rebuild(actions: list[Any]):
     while store.position:
         session.handle(protocol.Undo(), {})
     for view, basis in zip(session.views, bases, strict=True):
-        np.testing.assert_array_equal(view.image, basis.present_look)
+        np.testing.assert_array_equal(view.image, basis.current_look)
         assert not view.importance.any()
-    np.testing.assert_allclose(session.weights, bases[0].present_weights, rtol=1e-9)
+    np.testing.assert_allclose(session.weights, bases[0].current_weights, rtol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -565,7 +565,7 @@ def test_a_painting_is_reached_though_a_look_is_damaged(tmp_path: Path, make_bas
         _done(path, damage)
     with Store.open(path, IDENTITY) as store:
         about: dict[str, Any] = {"settings": Settings(), "transform": ViewTransform("srgb")}
-        session = Session([basis], [basis.present_look], store, **about)
+        session = Session([basis], [basis.current_look], store, **about)
         importance = session.views[0].pixels(session.views[0].full_region).importance
         np.testing.assert_array_equal(importance[:, 0], [1] * 4 + [0] * 4 + [1] * 4)
         found = LookLibrary(session, PictureTable())

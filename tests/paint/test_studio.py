@@ -338,8 +338,8 @@ def test_denoised_planes_come_later_and_keep_the_light(
         assert f"clean/{k}" in first["resources"]
         same = (one.studio.resource(f"clean/{k}") for one in (heard, again))
         np.testing.assert_array_equal(*same)
-    presents = (one.studio.session.views[0].present for one in (heard, again))
-    np.testing.assert_array_equal(*presents)
+    current_looks = (one.studio.session.views[0].current for one in (heard, again))
+    np.testing.assert_array_equal(*current_looks)
     assert read_denoised_planes(replace(basis, planes=2 * basis.images)) is None
     for one in (heard, again):
         one.studio.close()
@@ -350,7 +350,7 @@ def test_kept_pictures_that_are_damaged_are_made_again(
 ):
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path))
     scales = np.ones(len(basis.lights))
-    clean = DenoisedPlanes(basis.images.astype(np.float16), scales, basis.present_look)
+    clean = DenoisedPlanes(basis.images.astype(np.float16), scales, basis.current_look)
     assert read_denoised_planes(basis) is None
     assert cache_denoised_planes(basis, clean)
     [path] = tmp_path.iterdir()
@@ -559,7 +559,7 @@ def test_letting_go_gradually_is_judged_on_the_whole_picture(heard: IncomingMess
         heard.exact()
         session = heard.studio.session
         view = session.views[0]
-        look, mixed = (view.basis.mix(x) for x in (view.basis.present_weights, session.weights))
+        look, mixed = (view.basis.mix(x) for x in (view.basis.current_weights, session.weights))
         changed.append(np.abs(look - mixed)[view.importance == 0].mean())
     assert changed[0] < changed[1]
 

@@ -37,7 +37,7 @@ PLACE = Place((1, 1), 0.9, (0, 0, 8, 8), (0.4, 0.4, 0.4), (0.1, 0.1, 0.1), "floo
             18.0,
             {"reasons": (HOLD,)},
             "A first step (10 %). Brighter light on the floor is missing: unpainted parts are "
-            "held near their present look. Paint more or loosen the hold.",
+            "held near their current look. Paint more or loosen the hold.",
         ),
         (
             10.0,
@@ -60,15 +60,15 @@ PLACE = Place((1, 1), 0.9, (0, 0, 8, 8), (0.4, 0.4, 0.4), (0.1, 0.1, 0.1), "floo
         (
             23.0,
             {"reasons": (HOLD,)},
-            "Farther from the paint than the present lighting, which undo brings back. Brighter "
-            "light on the floor is missing: unpainted parts are held near their present look. "
+            "Farther from the paint than the current lighting, which undo brings back. Brighter "
+            "light on the floor is missing: unpainted parts are held near their current look. "
             "Paint more or loosen the hold.",
         ),
         (
             20.0,
             {"reasons": (HOLD,)},
-            "No closer than the present lighting. Brighter light on the floor is missing: "
-            "unpainted parts are held near their present look. Paint more or loosen the hold.",
+            "No closer than the current lighting. Brighter light on the floor is missing: "
+            "unpainted parts are held near their current look. Paint more or loosen the hold.",
         ),
         (
             14.0,
@@ -188,6 +188,6 @@ def test_why_it_is_not_closer_is_said_to_who_paints(make_basis: Any, colors: Any
 def test_lamps_that_became_white_are_not_called_the_present_lighting(is_asked: bool):
     said = unpainted_text(is_asked=is_asked, is_white=True)
     assert "nearest to its colour" in said
-    assert "present lighting" not in said
+    assert "current lighting" not in said
     plain = unpainted_text(is_asked=is_asked, is_white=False)
-    assert ("present lighting" in plain) != is_asked
+    assert ("current lighting" in plain) != is_asked

@@ -233,11 +233,11 @@ def test_the_first_answer_to_an_untouched_target_is_the_present(
     told: list[Any] = []
     painter.observe(lambda change: told.append(change.new), "lighting")
     counts = np.ones(SIZE, np.float32)
-    painter.target = lp.Target("t", basis.present_look.copy(), counts, False, **how)
+    painter.target = lp.Target("t", basis.current_look.copy(), counts, False, **how)
     assert painter.solution is not None
     for lighting in (*told, painter.lighting):
         weights = lighting.weights_for(basis)
-        np.testing.assert_allclose(weights, basis.present_weights, atol=1e-6)
+        np.testing.assert_allclose(weights, basis.current_weights, atol=1e-6)
 
 
 def test_two_threads_may_tell_at_once(

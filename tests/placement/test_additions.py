@@ -110,7 +110,7 @@ def test_preferring_the_current_look_draws_the_lights_there_are(make_basis: Any)
     basis, added, target = _problem(make_basis, 6)
     solution = solve(basis, target, constraints=Constraints.of(prefer_current=1e6))
     [found] = find_additions(Candidates.of(basis, solution, added), count=1)
-    np.testing.assert_allclose(found.weights[:3], basis.present_weights, rtol=1e-3)
+    np.testing.assert_allclose(found.weights[:3], basis.current_weights, rtol=1e-3)
     assert found.weights[3].min() > 0.5
 
 

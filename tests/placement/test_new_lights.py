@@ -29,7 +29,7 @@ def basis(room: Scene) -> lp.Basis:
 
 
 def solved(basis: lp.Basis, painted: Scene) -> lp.Solution:
-    goal = lp.render_basis(painted, spp=256, seed=2).present_look
+    goal = lp.render_basis(painted, spp=256, seed=2).current_look
     return lp.solve(basis, lp.Target.of(goal), space="linear", hold=0)
 
 
@@ -252,7 +252,7 @@ def test_pairs_that_mean_nothing(lights: Any, mirror: Any, words: str) -> None:
 def test_what_cannot_be_placed(
     room: Scene, basis: lp.Basis, arguments: dict[str, Any], words: str
 ) -> None:
-    solution = lp.solve(basis, lp.Target.of(basis.present_look), space="linear", hold=0)
+    solution = lp.solve(basis, lp.Target.of(basis.current_look), space="linear", hold=0)
     with pytest.raises(SceneError, match=words):
         lp.place(room, basis, solution, **arguments)
 
@@ -260,6 +260,6 @@ def test_what_cannot_be_placed(
 def test_a_camera_that_sees_nothing(basis: lp.Basis, tmp_path: Path) -> None:
     path = write_room(tmp_path)
     path.write_text(path.read_text().replace('target="0 0.8 0"', 'target="0 0.8 9"'))
-    solution = lp.solve(basis, lp.Target.of(basis.present_look), space="linear", hold=0)
+    solution = lp.solve(basis, lp.Target.of(basis.current_look), space="linear", hold=0)
     with pytest.raises(SceneError, match="sees nothing that light falls on"):
         lp.place(load_scene(path), basis, solution, new=[lp.NewLights("point")])

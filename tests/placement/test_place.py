@@ -28,7 +28,7 @@ def placed(
 ) -> lp.Placement:
     """The placement for a picture of `painted`, which another seed rendered."""
     basis = lp.render_basis(room, spp=256, seed=1)
-    goal = lp.render_basis(painted, spp=256, seed=2).present_look
+    goal = lp.render_basis(painted, spp=256, seed=2).current_look
     solution = lp.solve(basis, lp.Target.of(goal), space="linear", hold=0)
     return lp.place(room, basis, solution, freedoms, seed=seed)
 

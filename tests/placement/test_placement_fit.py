@@ -41,10 +41,10 @@ def test_a_noisy_true_column_misses_less_than_a_clean_false_one() -> None:
 
 def test_noise_that_goal_and_column_share_is_none_of_the_residual() -> None:
     """Where a picture is held to the current look, which is a sum of the columns themselves."""
-    present = column(TRUE, 0.2)
-    image, half = present[0, :PIXELS], present[0, PIXELS:]
+    current = column(TRUE, 0.2)
+    image, half = current[0, :PIXELS], current[0, PIXELS:]
     fit = fit_to(2.0 * image, 2.0 * half)
-    fitted = fit.fitted(present)
+    fitted = fit.fitted(current)
     assert fitted.weights == pytest.approx(np.full((1, 3), 2.0), rel=1e-6)
     assert abs(fitted.missed) < 1e-6 * fit.norm2
     other = fit.fitted(column(TRUE, 0.2))

@@ -48,9 +48,9 @@ def _target(image: Any) -> Target:
     return Target("painted", image.astype(np.float32), ones, everything=True)
 
 
-def _present(path: Path, *, seed: int = 1) -> Any:
+def _current(path: Path, *, seed: int = 1) -> Any:
     basis = render_basis(load_scene(path), spp=SPP, seed=seed)
-    return basis.mix(basis.present_weights)
+    return basis.mix(basis.current_weights)
 
 
 def _solved(path: Path, target: Target) -> tuple[Scene, Basis, Solution]:
@@ -81,7 +81,7 @@ def missing(
         extra = emitter_xml("extra", hidden, INTENSITY)
         room = write_room(tmp_path_factory.mktemp("painted"), lights=LIT + extra, wall=PLASTIC)
         scene, basis = lacking
-        target = _target(_present(room))
+        target = _target(_current(room))
         solution = solve(basis, target)
         return target, solution, suggest_lights(scene, basis, solution)
 
@@ -146,7 +146,7 @@ def test_the_ring_is_where_the_light_is_seen(tmp_path: Path, missing: Any):
     ball = f"""<shape type="sphere"><point name="center" x="{x}" y="{y}" z="{z}"/>
         <float name="radius" value="0.03"/><emitter type="area"><rgb name="radiance"
         value="1000 1000 1000"/></emitter></shape>"""
-    image = _present(write_room(tmp_path, lights=ball))
+    image = _current(write_room(tmp_path, lights=ball))
     row, column = np.unravel_index(int(image.sum(axis=-1).argmax()), image.shape[:2])
     assert first.seen_at is not None
     # Within the pixel beside it.
@@ -156,7 +156,7 @@ def test_the_ring_is_where_the_light_is_seen(tmp_path: Path, missing: Any):
 
 def test_where_the_lights_can_do_it_none_is_named(small_room: Scene, small_room_basis: Any):
     basis = small_room_basis(spp=64)
-    exact = _target(basis.mix(0.5 * basis.present_weights))
+    exact = _target(basis.mix(0.5 * basis.current_weights))
     assert suggest_lights(small_room, basis, solve(basis, exact)) == ()
 
 
@@ -166,7 +166,7 @@ def test_noise_is_not_taken_for_a_lack_of_light(
 ):
     """Few samples, of basis and painting: much is missed, and no light would help."""
     basis, painted = small_room_basis(spp=4), small_room_basis(spp=4, seed=seed)
-    solution = solve(basis, _target(painted.mix(painted.present_weights)))
+    solution = solve(basis, _target(painted.mix(painted.current_weights)))
     missed = sum(solution.certificate.objective) / solution.equations.target_norm2.sum()
     assert missed > 0.01**2  # else it would not look at all
     assert suggest_lights(small_room, basis, solution) == ()
@@ -199,7 +199,7 @@ def test_other_cameras(tmp_path: Path, sensor: str):
     painted = render_basis(load_scene(extra, sensor="other"), spp=64, seed=1)
     scene = load_scene(path, sensor="other")
     basis = render_basis(scene, spp=64)
-    solution = solve(basis, _target(painted.mix(painted.present_weights)))
+    solution = solve(basis, _target(painted.mix(painted.current_weights)))
     found = suggest_lights(scene, basis, solution, count=1)
     assert found[0].gain_share > 0.5
     assert (found[0].seen_at is None) == (sensor == "orthographic")
@@ -222,7 +222,7 @@ def test_a_camera_that_sees_nothing_but_the_sky(tmp_path: Path):
 
 def test_a_basis_of_a_smaller_film_than_the_scene(tmp_path: Path):
     lights = LIGHTS["sky"]
-    target = _target(_present(write_room(tmp_path, lights=lights + EXTRA, name="extra.xml")))
+    target = _target(_current(write_room(tmp_path, lights=lights + EXTRA, name="extra.xml")))
     scene = load_scene(write_room(tmp_path, lights=lights))
     basis = render_basis(scene.reduced("1/2"), spp=SPP)
     solution = solve(basis, target)
@@ -239,7 +239,7 @@ def test_a_basis_of_a_smaller_film_than_the_scene(tmp_path: Path):
 def test_names_that_are_taken_are_not_given(tmp_path: Path):
     taken = LIGHTS["sky"].replace('"sky"', '"suggested_1"')
     taken += LIGHTS["bulb"].replace('"bulb"', '"candidate_1"')
-    target = _target(_present(write_room(tmp_path, lights=taken + EXTRA, name="extra.xml")))
+    target = _target(_current(write_room(tmp_path, lights=taken + EXTRA, name="extra.xml")))
     [first] = suggest_lights(*_solved(write_room(tmp_path, lights=taken), target), count=1)
     assert first.name == "suggested_2"
     assert ElementTree.fromstring(first.xml).attrib == {"type": "point", "id": "suggested_2"}

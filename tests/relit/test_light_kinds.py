@@ -118,7 +118,7 @@ def test_grey_multiples_are_the_relit_render_at_the_same_seed(
     basis = render_basis(scene, spp=2)
     light = scene.light("it")
     emission = (factor * light.emission[0],) * 3
-    lighting = Lighting.present(basis).with_emission("it", emission)
+    lighting = Lighting.current(basis).with_emission("it", emission)
     relit = relight(scene, lighting, assets / "out" / "relit.xml")
     planes = one_pass(scene, seed=4, spp=16)
     mixed = np.einsum("nhwc,nc->hwc", planes, lighting.weights_for(basis))
@@ -132,7 +132,7 @@ def test_predicted_is_the_relit_render(assets: Path, kind: str) -> None:
     xml, scaling = KINDS[kind]
     scene = load_scene(write_room(assets, lights=xml + LIGHTS["bulb"]))
     basis = render_basis(scene, spp=256)
-    lighting = Lighting.present(basis)
+    lighting = Lighting.current(basis)
     for emission in ((0.5, 1.5, 2.0), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)):
         asked = (emission[0],) * 3 if scaling is Scaling.FACTORS else emission
         changed = lighting.with_emission("it", asked).with_emission("bulb", (0.3, 0.2, 0.1))
@@ -146,7 +146,7 @@ def test_known_multiples_come_back(assets: Path, kind: str) -> None:
     scene = load_scene(write_room(assets, lights=xml + LIGHTS["bulb"]))
     basis = render_basis(scene, spp=32)
     asked = (1.7,) * 3 if scaling is Scaling.FACTORS else (0.5, 0.0, 2.0)
-    lighting = Lighting.present(basis).with_emission("it", asked)
+    lighting = Lighting.current(basis).with_emission("it", asked)
     target = Target("t", combine(basis, lighting).image, np.ones(basis.size, np.float32), False)
     solution = solve(basis, target)
     # The target is float32.
@@ -196,7 +196,7 @@ def test_a_shared_texture_is_left_alone(assets: Path) -> None:
         <ref name="radiance" id="t"/></emitter></shape>"""
     lights = lights.replace('name="radiance"><string', "><string")
     scene = load_scene(write_room(assets, lights=lights + LIGHTS["bulb"]))
-    lighting = Lighting.present(render_basis(scene, spp=2))
+    lighting = Lighting.current(render_basis(scene, spp=2))
     relight(scene, lighting.with_emission("it", (0, 0, 0)), assets / "out" / "relit.xml")
     with pytest.raises(SceneError, match="by reference"):
         relight(scene, lighting.with_emission("it", (1, 2, 3)), assets / "x" / "relit.xml")
@@ -209,11 +209,11 @@ def test_images_of_lights_with_nearly_the_same_name_stay_apart(assets: Path) -> 
     )
     scene = load_scene(write_room(assets, lights=screens))
     basis = render_basis(scene, spp=64)
-    lighting = Lighting.present(basis).with_emission("key 1", (1, 2, 3))
+    lighting = Lighting.current(basis).with_emission("key 1", (1, 2, 3))
     lighting = lighting.with_emission("key/1", (3, 1, 0.5))
     relit = relight(scene, lighting, assets / "out" / "a.xml")
     predicted = combine(basis, lighting)
-    other = Lighting.present(basis).with_emission("key 1", (9, 1, 1))
+    other = Lighting.current(basis).with_emission("key 1", (9, 1, 1))
     relight(scene, other, assets / "out" / "b.xml")
     assert len(list((assets / "out").glob("*.exr"))) == 3
     assert verify(predicted, relit, spp=64).agrees
@@ -227,11 +227,11 @@ def test_what_is_hit_by_chance_is_not_sampled_though_all_else_is_off(assets: Pat
     its = {x.name: settings[x.node].sampling_weight for x in scene.emitters}
     assert its == {"it": 0, "bulb": 1}
     basis = render_basis(scene, spp=256)
-    alone = Lighting.present(basis).with_emission("bulb", (0.0, 0.0, 0.0))
+    alone = Lighting.current(basis).with_emission("bulb", (0.0, 0.0, 0.0))
     relit = relight(scene, alone, assets / "out" / "relit.xml")
     assert {x.name: x.sampling_weight for x in relit.emitters} == {"it": 0, "bulb": 1}
     assert verify(combine(basis, alone), relit, spp=256).agrees
     # And where it is all there is, Mitsuba has to sample it.
     only = load_scene(write_room(assets, lights=KINDS["painted mesh"][0]))
-    relit = relight(only, Lighting.present(render_basis(only, spp=2)), assets / "2" / "relit.xml")
+    relit = relight(only, Lighting.current(render_basis(only, spp=2)), assets / "2" / "relit.xml")
     assert [x.sampling_weight for x in relit.emitters] == [1]

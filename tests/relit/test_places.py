@@ -34,9 +34,9 @@ def room(tmp_path: Path) -> Scene:
 
 
 def answer_of(scene: Scene) -> lp.Lighting:
-    """The present lighting, with the places of the scene."""
+    """The current lighting, with the places of the scene."""
     basis = lp.render_basis(scene, spp=2)
-    return with_places(lp.Lighting.present(basis), scene)
+    return with_places(lp.Lighting.current(basis), scene)
 
 
 def test_a_file_has_the_places_of_its_answer(room: Scene, tmp_path: Path) -> None:

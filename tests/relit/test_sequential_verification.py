@@ -106,7 +106,7 @@ def test_it_ends_at_once_where_they_disagree():
 def test_it_never_takes_more_samples_than_its_budget(tmp_path: Path, spp: int):
     scene = load_scene(write_room(tmp_path, lights=LIGHTS["panel"] + LIGHTS["sky"]))
     basis = render_basis(scene, spp=4, seed=0)
-    lighting = Lighting.of_weights(basis, basis.present_weights)
+    lighting = Lighting.of_weights(basis, basis.current_weights)
     relit = relight(scene, lighting, tmp_path / "relit.xml")
     found = verify_in_stages(combine(basis, lighting), relit, basis, lighting, spp=spp)
     assert found.spp is not None
@@ -117,7 +117,7 @@ def test_it_never_takes_more_samples_than_its_budget(tmp_path: Path, spp: int):
 def test_it_stops_early_and_still_finds_what_is_wrong(tmp_path: Path):
     scene = load_scene(write_room(tmp_path, lights=LIGHTS["panel"] + LIGHTS["sky"]))
     basis = render_basis(scene, spp=256, seed=0)
-    lighting = Lighting.of_weights(basis, basis.present_weights)
+    lighting = Lighting.of_weights(basis, basis.current_weights)
     relit = relight(scene, lighting, tmp_path / "relit.xml")
     predicted = combine(basis, lighting)
     right = verify_in_stages(predicted, relit, basis, lighting, spp=1024)

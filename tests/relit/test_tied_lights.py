@@ -47,7 +47,7 @@ def scene(request: pytest.FixtureRequest, tmp_path: Path) -> Scene:
 
 def some_lighting(scene: Scene, *, spp: int = 2) -> Lighting:
     """Weights that no light has now."""
-    lighting = Lighting.present(render_basis(scene, spp=spp))
+    lighting = Lighting.current(render_basis(scene, spp=spp))
     for k, light in enumerate(scene.lights):
         if not light.is_fixed:
             rgb = (0.5 + k, 0.5 + k, 0.5 + k) if light.is_scalar else (0.5 + k, 1.5, 2.0)
@@ -113,14 +113,14 @@ def test_the_corridor_end_to_end(tmp_path: Path) -> None:
     first = load_scene(path, groups={"pair": ["bulb", "twin"]}, lights=["pair"])
     basis = render_basis(first, spp=32)
     target = Target(
-        "t", 2 * combine(basis, Lighting.present(basis)).image, np.ones(basis.size), False
+        "t", 2 * combine(basis, Lighting.current(basis)).image, np.ones(basis.size), False
     )
     choice = {"groups": {"pair": ["bulb", "twin"]}, "lights": ["pair"]}
     look = paint_with_light(path, target, tmp_path / "out", spp=32, **choice)  # type: ignore[arg-type]
     assert look.verification is not None
     assert look.verification.agrees
     assert look.lighting.fixed == {"rest"}
-    assert "kept as it is" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "<td>fixed" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     # Twice the light, though only a part of it may change.
     assert min(look.lighting.emission["pair"]) > max(first.light("pair").emission)
     with pytest.raises(BasisError, match="load it with the same lights and groups"):
@@ -130,7 +130,7 @@ def test_the_corridor_end_to_end(tmp_path: Path) -> None:
 def test_all_off_but_what_is_kept_still_renders(tmp_path: Path) -> None:
     scene = load_scene(write_room(tmp_path, lights=INDOORS), lights=["bulb"])
     basis = render_basis(scene, spp=64)
-    lighting = Lighting.present(basis).with_emission("bulb", (0, 0, 0))
+    lighting = Lighting.current(basis).with_emission("bulb", (0, 0, 0))
     relit = relight(scene, lighting, tmp_path / "out" / "relit.xml")
     assert {e.name: e.sampling_weight for e in relit.emitters}["bulb"] == 0
     assert verify(combine(basis, lighting), relit, spp=64).agrees

@@ -45,7 +45,7 @@ def _look(make_basis: Any, *, scale: float = 1.0, name: str = "dusk") -> dict[st
     """A painting of random colours over the left half, its answer, and a noisy second render."""
     rng = np.random.default_rng(7)
     basis = make_basis(3, SIZE, emission=[[0.3, 0.2, 0.1]] * 3)
-    basis = make_basis(images=scale * basis.images, emission=basis.present_weights)
+    basis = make_basis(images=scale * basis.images, emission=basis.current_weights)
     importance = np.zeros(SIZE, np.float32)
     importance[:, :16] = 1
     image = (scale * rng.random((*SIZE, 3))).astype(np.float32)
@@ -202,7 +202,7 @@ def test_another_size_is_refused(make_basis: Any):
 def test_what_is_not_painted_is_grey_and_not_the_paintings(make_basis: Any):
     look = _look(make_basis)
     target, solution = look["target"], look["solution"]
-    current = combine(look["basis"], Lighting.present(look["basis"])).image
+    current = combine(look["basis"], Lighting.current(look["basis"])).image
     picture = target_picture(target, solution, current, transform=ViewTransform())
     right = picture[:, 16:]
     assert np.ptp(right, axis=-1).max() == 0

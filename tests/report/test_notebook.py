@@ -88,7 +88,7 @@ def test_pages_are_small_and_show_what_matters(many: Look):
     assert f"and {MANY - 10} more" in page
     assert "closest there is" in page
     # Those that change the picture most.
-    moved = np.abs(many.solution.weights - many.basis.present_weights) * many.basis.totals
+    moved = np.abs(many.solution.weights - many.basis.current_weights) * many.basis.totals
     first = many.basis.names[int(np.argmax(moved @ [0.2126, 0.7152, 0.0722]))]
     assert f">{first}<" in page
 

@@ -128,7 +128,7 @@ def test_nothing_is_loaded_from_anywhere(make_basis: Any):
 def test_pictures_are_the_display_encoded_images(make_basis: Any):
     result = _result(make_basis)
     looks = _looks(Page(report_page(**result)))
-    current = combine(result["basis"], Lighting.present(result["basis"])).image
+    current = combine(result["basis"], Lighting.current(result["basis"])).image
     assert list(looks) == ["now", "painting", "answer", "render"]
     for name, image in (
         ("now", current),
@@ -348,7 +348,7 @@ def test_energy_shares_equal_the_plain_sum(make_basis: Any):
 
 def test_energy_shares_sum_to_one(make_basis: Any):
     basis = make_basis(7)
-    shares = energy_shares(basis, Lighting.present(basis))
+    shares = energy_shares(basis, Lighting.current(basis))
     assert shares.dtype == np.float64
     assert shares.shape == (7,)
     assert shares.sum() == pytest.approx(1, rel=1e-12)

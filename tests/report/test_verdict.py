@@ -65,7 +65,7 @@ def _seen(missed: float, asked: float = 20.0, **about: Any) -> Appearance:
         (
             _seen(2.8, 3.0, reasons=(Reason("hold"),)),
             "Constraints keep the lights from this: in the middle the paint is "
-            "brighter than the lights make it; unpainted parts are held near their present look.",
+            "brighter than the lights make it; unpainted parts are held near their current look.",
         ),
         (
             _seen(5.0, reasons=(Reason("colors"), Reason("lock", ("lamp",)))),
@@ -226,7 +226,7 @@ def test_one_number_everywhere(tmp_path: Path, make_basis: Any):
 
 def test_what_a_render_would_have_missed_is_said(make_basis: BasisFactory):
     basis = make_basis()
-    solution = solve(basis, Target.of(basis.present_look))
+    solution = solve(basis, Target.of(basis.current_look))
     predicted = combine(basis, solution.lighting)
     checked = compare(predicted, predicted)
     for power, said in (
@@ -245,8 +245,8 @@ def test_what_a_render_would_have_missed_is_said(make_basis: BasisFactory):
 def test_an_answer_that_is_worse_than_the_present_says_so_first():
     worse = _seen(3.6, 3.4, local_lights=("lamp",))
     assert headline(worse).startswith(
-        "The present lighting comes closer to the paint (mean ΔE 3.4) than this answer (3.6): "
+        "The current lighting comes closer to the paint (mean ΔE 3.4) than this answer (3.6): "
         "keep the scene as it is. "
     )
     # What nobody reads is no difference.
-    assert not headline(_seen(3.42, 3.4, local_lights=("lamp",))).startswith("The present lighting")
+    assert not headline(_seen(3.42, 3.4, local_lights=("lamp",))).startswith("The current lighting")

@@ -213,8 +213,8 @@ def test_a_small_pixel_is_the_mean_of_its_block(
     part = render(small, spp=4096, stream=Stream.VERIFICATION)
     basis = render_basis(small, spp=4096)
     assert basis.size == whole.size
-    now = basis.mix(basis.present_weights)
-    weights = basis.present_weights.astype(np.float32)[:, None, None, :]
+    now = basis.mix(basis.current_weights)
+    weights = basis.current_weights.astype(np.float32)[:, None, None, :]
     noise = {
         "a render": np.square(part.half_difference, dtype=np.float64),
         "the basis": np.square((basis.half_differences * weights).sum(axis=0), dtype=np.float64),

@@ -30,7 +30,7 @@ def identities(scene: Scene) -> dict[str, str]:
     return dict(zip([x.name for x in scene.lights], scene.light_identities, strict=True))
 
 
-def present(scene: Scene) -> Lighting:
+def current(scene: Scene) -> Lighting:
     """The lighting of the scene as it is."""
     basis = lp.render_basis(scene.reduced("1/2"), spp=2)
     return Lighting.of_weights(basis.lights, np.array([x.emission for x in scene.lights]))
@@ -68,7 +68,7 @@ def test_back_and_forth_is_the_same_place(room: Scene, name: str) -> None:
 
 def test_the_file_written_is_the_scene_in_memory(room: Scene, tmp_path: Path) -> None:
     moved = room.moved({**POSES, "panel": lp.Pose(position=(0.1, 1.5, 0), target=(0, 0, 0.2))})
-    relit = lp.relight(moved, present(moved), tmp_path / "out" / "relit.xml")
+    relit = lp.relight(moved, current(moved), tmp_path / "out" / "relit.xml")
     assert relit.light_identities == moved.light_identities
     assert relit.unlit_content == moved.unlit_content
 
@@ -78,7 +78,7 @@ def test_plain_mitsuba_renders_it_as_the_basis_predicts(room: Scene, tmp_path: P
     import mitsuba as mi
 
     moved = room.moved({**POSES, "panel": lp.Pose(position=(0.1, 1.5, 0), target=(0, 0, 0.2))})
-    lighting = present(moved)
+    lighting = current(moved)
     path = tmp_path / "out" / "relit.xml"
     relit = lp.relight(moved, lighting, path)
     basis = lp.render_basis(moved, spp=1024)

@@ -26,7 +26,7 @@ def room(tmp_path: Path) -> Scene:
 
 def relit(scene: Scene, path: Path) -> Scene:
     basis = lp.render_basis(scene, spp=4, seed=1)
-    return lp.relight(scene, lp.Lighting.of_weights(basis, basis.present_weights), path)
+    return lp.relight(scene, lp.Lighting.of_weights(basis, basis.current_weights), path)
 
 
 def test_a_written_scene_has_the_new_lights_of_memory(room: Scene, tmp_path: Path) -> None:

@@ -63,7 +63,7 @@ def basis(make_basis: Callable[..., lp.Basis]) -> lp.Basis:
 def folder(basis: lp.Basis, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Holds the template: the wall as it is, and a lamp in view that is brighter than white."""
     folder = tmp_path_factory.mktemp("programs")
-    image = np.asarray(lp.combine(basis, lp.Lighting.present(basis)).image).copy()
+    image = np.asarray(lp.combine(basis, lp.Lighting.current(basis)).image).copy()
     image[120:136, 12:28] = 3, 2.5, 2
     write_template(
         folder / "template",

@@ -129,7 +129,7 @@ def _starting_planes(
 ) -> Basis | None:
     """Return the planes to which a render adds samples; None to start from scratch.
 
-    cached: the basis of the scene in its present state. goal_spp: None for a time budget, whose
+    cached: the basis of the scene in its current state. goal_spp: None for a time budget, whose
     samples are added to any. The other arguments are those of `obtain_basis`.
     """
     lacks_samples = goal_spp is None or cached is None or cached.origin.spp < goal_spp
@@ -229,7 +229,7 @@ def top_up_basis(
 
 
 def check_same_view(scene: Scene, basis: Basis) -> None:
-    """Raise BasisError unless `basis` was made from `scene` in its present state, through its
+    """Raise BasisError unless `basis` was made from `scene` in its current state, through its
     sensor.
     """
     origin, sensor = basis.origin, scene.sensor_names[scene.sensor]

@@ -21,7 +21,7 @@ from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache
 from lightpaint.basis.cache.cache_folder import DENOISED_SUFFIX, is_own
-from lightpaint.basis.denoised_mixes import denoise_plane, denoise_present_look, share_of_clean
+from lightpaint.basis.denoised_mixes import denoise_current_look, denoise_plane, share_of_clean
 from lightpaint.basis.planes import mix
 from lightpaint.errors import LightpaintError
 from lightpaint.files import replacing
@@ -61,24 +61,24 @@ class DenoisedPlanes:
     """Denoised planes, for display.
 
     halves: (n, h, w, 3) float16, linear, at unit emission divided by `scales`; h and w are smaller
-    if they are means over blocks of pixels. scales: (n,), powers of 2. present: (h, w, 3) float32,
-    the scene in its present state: the sum of the planes, or the denoised sum if that was shown
+    if they are means over blocks of pixels. scales: (n,), powers of 2. current: (h, w, 3) float32,
+    the scene in its current state: the sum of the planes, or the denoised sum if that was shown
     first, so that a painter continues from the picture on screen.
     """
 
     halves: Halves
     scales: Doubles
-    present: Floats
+    current: Floats
 
     @classmethod
     def of(cls, basis: Basis, halves: Halves, scales: Doubles) -> "DenoisedPlanes":
-        """Return the planes together with their sum for the present scene."""
-        return cls(halves, scales, _mixed(halves, scales, basis.present_weights))
+        """Return the planes together with their sum for the current scene."""
+        return cls(halves, scales, _mixed(halves, scales, basis.current_weights))
 
     @property
     def is_whole(self) -> bool:
         """True if the planes have all pixels; False if they are means over blocks."""
-        return self.halves.shape[1:] == self.present.shape
+        return self.halves.shape[1:] == self.current.shape
 
     def mix(self, weights: Doubles) -> Floats:
         """Return Σ w_i of the planes, (h, w, 3) float32. weights: (n, 3)."""
@@ -88,7 +88,7 @@ class DenoisedPlanes:
         """Return the same light in the scales of another basis of the same lights."""
         scales = np.array([scale_of(plane) for plane in basis.planes])
         halves = np.stack([as_halves(self.plane(k), x) for k, x in enumerate(scales)])
-        return DenoisedPlanes(halves, scales, self.present)
+        return DenoisedPlanes(halves, scales, self.current)
 
     def plane(self, k: int) -> Floats:
         """Return the plane of light k at unit emission, (h, w, 3) float32."""
@@ -98,25 +98,25 @@ class DenoisedPlanes:
 class RoughPlanes:
     """Planes without most of the noise, available at once, while denoising takes seconds.
 
-    A rough plane is the denoised picture of the present scene times the share of the light in it,
+    A rough plane is the denoised picture of the current scene times the share of the light in it,
     so the planes add up to that picture. The shares are computed from light that is averaged along
     surfaces; direct light is averaged only as far as its noise in that picture demands. If surfaces
     are unknown, or the picture is too large for that to be quick, shares are computed over square
     blocks of pixels, and shadows become soft.
 
-    present: (h, w, 3) float32, the denoised picture of the present scene. small: denoised planes of
+    current: (h, w, 3) float32, the denoised picture of the current scene. small: denoised planes of
     blocks of pixels, as a report page stores them; rough planes then match their light in each
     block.
     """
 
-    def __init__(self, basis: Basis, present: Floats, small: DenoisedPlanes | None = None) -> None:
-        self.basis, self.present, self._small = basis, present, small
+    def __init__(self, basis: Basis, current: Floats, small: DenoisedPlanes | None = None) -> None:
+        self.basis, self.current, self._small = basis, current, small
 
     def plane(self, k: int) -> Floats:
         """Return the plane of light k at unit emission, (h, w, 3) float32; 0 where the scene is
         black.
         """
-        rough = self._share_of_present(k)
+        rough = self._share_of_current(k)
         if self._small is None:
             return rough
         small = self._small.plane(k)
@@ -129,18 +129,18 @@ class RoughPlanes:
         gain = np.clip((target_mean + floor) / (mean_here + floor), 0, MAX_BLOCK_GAIN)
         return np.asarray(rough * gain, np.float32)
 
-    def _share_of_present(self, k: int) -> Floats:
+    def _share_of_current(self, k: int) -> Floats:
         parts = self.basis.indirect
         indirect = None if parts is None else parts.planes.plane(k)
         smoothed, total = self._averaged(self.basis.planes.plane(k), indirect), self._total
         share = np.divide(smoothed, total, out=np.zeros_like(smoothed), where=total > 0)
-        return self.present * resampled(share, self.basis.size)
+        return self.current * resampled(share, self.basis.size)
 
     @cached_property
     def _total(self) -> Floats:
-        parts, weights = self.basis.indirect, self.basis.present_weights
+        parts, weights = self.basis.indirect, self.basis.current_weights
         indirect = None if parts is None else parts.planes.mix(weights)
-        return self._averaged(self.basis.present_look, indirect)
+        return self._averaged(self.basis.current_look, indirect)
 
     def _averaged(self, picture: Floats, indirect: Floats | None) -> Floats:
         """Return a smoothed picture. This is linear: a sum of pictures becomes the sum of their
@@ -157,10 +157,10 @@ class RoughPlanes:
     @cached_property
     def _share_of_smooth(self) -> Floats:
         """Share of the smoothed picture in direct light, (h, w, 1)."""
-        basis, weights = self.basis, self.basis.present_weights
+        basis, weights = self.basis, self.basis.current_weights
         assert basis.indirect is not None
         assert basis.surface_filter is not None
-        direct = basis.present_look - basis.indirect.planes.mix(weights)
+        direct = basis.current_look - basis.indirect.planes.mix(weights)
         noise = basis.noise.mix(weights) - basis.indirect.noise.mix(weights)
         return share_of_clean(direct, noise, basis.surface_filter(direct))
 
@@ -194,7 +194,7 @@ def obtain_denoised_planes(basis: Basis, *, factor: int = 1) -> DenoisedPlanes |
         if factor == 1:
             planes = DenoisedPlanes.of(basis, *denoised)
         else:
-            planes = DenoisedPlanes(*denoised, denoise_present_look(replace(basis, former=None)))
+            planes = DenoisedPlanes(*denoised, denoise_current_look(replace(basis, former=None)))
         cache_denoised_planes(basis, planes)
     return planes
 
@@ -220,7 +220,7 @@ def read_denoised_planes(basis: Basis, *, factor: int = 1) -> DenoisedPlanes | N
             if str(file_arrays["made_of"]) != _content_key(basis):
                 return None
             planes = DenoisedPlanes(*(file_arrays[name] for name in ARRAY_NAMES))
-        arrays = [getattr(planes, name) for name in ARRAY_NAMES]
+        arrays: list[Any] = [planes.halves, planes.scales, planes.current]
         n, of_halves = len(basis.lights), [_shape(basis)]
         if factor > 1:
             of_halves.append((n, *blocks_in(basis.size, factor), 3))
@@ -238,7 +238,8 @@ def cache_denoised_planes(basis: Basis, planes: DenoisedPlanes) -> bool:
         path = cache.companion_path(basis, DENOISED_SUFFIX)
         with replacing(path) as place, place.open("wb") as file:
             made_of = np.array(_content_key(basis))
-            parts: dict[str, Any] = {name: getattr(planes, name) for name in ARRAY_NAMES}
+            arrays = (planes.halves, planes.scales, planes.current)
+            parts: dict[str, Any] = dict(zip(ARRAY_NAMES, arrays, strict=True))
             np.savez(file, made_of=made_of, **parts)
     except (OSError, LightpaintError):
         return False
@@ -260,7 +261,7 @@ def _shape(basis: Basis) -> tuple[int, int, int, int]:
 
 def _content_key(basis: Basis) -> str:
     """Return a hash of everything that the denoised planes depend on."""
-    other_inputs: list[Floats] = [basis.present_weights]
+    other_inputs: list[Floats] = [basis.current_weights]
     if basis.features is not None:
         other_inputs += [basis.features.albedo, basis.features.normal]
 

@@ -79,7 +79,7 @@ def gather_planes(
 
     Lights without a cached plane are black and have no samples. Returns None if no plane is found.
 
-    cached: the basis of the scene in its present state, returned itself if no other basis adds to
+    cached: the basis of the scene in its current state, returned itself if no other basis adds to
     it. spp: samples per pixel beyond which a plane is good enough; None to take as many as
     possible. before: a basis of the scene in another state, with the same seed and film, whose
     planes are used as well. use_cache: False to use no other planes.

@@ -47,7 +47,7 @@ def describe_sum(
         return f"the groups add up to the beauty (to {deviation:.1g} of its light)", False
     text = (
         f"the groups lack {share_text(missing)} of the light of the beauty: "
-        f"the missing part is kept as it is, as the light {name}"
+        f"the missing part becomes the fixed light {name}"
     )
     if truly_exceeding > WARNING_EXCESS:
         warning = (

@@ -224,7 +224,7 @@ def _remarks_on_black(lights: Mapping[str, RenderLayer], missing: float | None) 
     black = [name for name, layer in lights.items() if not layer.image.any()]
     if not black:
         return []
-    text = f"the file holds nothing of {some_names(black)}: black in every pixel, so kept as it is"
+    text = f"the file holds nothing of {some_names(black)}: black in every pixel, so fixed"
     if missing is None or missing <= NEGLIGIBLE_SHARE:
         return [f"{text}; is the light off, or the group renamed?"]
     return [

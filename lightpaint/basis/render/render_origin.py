@@ -22,7 +22,7 @@ FINISHED, UNFINISHED = (1, 1), (0, 0)
 
 
 def is_of(scene: Scene, basis: Basis, seed: int) -> bool:
-    """Return True if `basis` was made from `scene` in its present state, with its sensor, film and
+    """Return True if `basis` was made from `scene` in its current state, with its sensor, film and
     `seed`.
     """
     start_origin = basis.origin

@@ -40,7 +40,7 @@ MAX_FULL_LIGHTS, SHORT_LIST_LIGHTS = 16, 10
 #: Width of a name in a table that fits 80 columns with a swatch.
 NAME_WIDTH = 30
 
-#: Share of its present emission at which a light counts as off.
+#: Share of its current emission at which a light counts as off.
 OFF_SHARE = 2.0**-10
 
 #: Largest distance from Planck's locus of a colour that is shown as a temperature.
@@ -136,9 +136,9 @@ def undetermined_remark(look: Look) -> str:
     dark = [name for name in unreached if not look.basis.image(name).any()]
     notes = []
     if dark:
-        notes.append(f"the picture shows nothing of {some_names(dark)}: kept as it is")
+        notes.append(f"the picture shows nothing of {some_names(dark)}: left unchanged")
     if appearance := [name for name in unreached if name not in dark]:
-        notes.append(f"no painted pixel sees {some_names(appearance)}: kept as it is")
+        notes.append(f"no painted pixel sees {some_names(appearance)}: left unchanged")
     notes += partly_reached(look.lighting)
     notes += [ambiguity.sentence for ambiguity in look.analysis.ambiguities]
     return f"the painting leaves lights open: {some_of(notes, joint='; ')}" if notes else ""
@@ -146,13 +146,13 @@ def undetermined_remark(look: Look) -> str:
 
 def _show_short(look: Look) -> None:
     """Print a row for each important light, in 80 columns, and a summary of the others."""
-    lights, present_lights = look.lighting.lights, look.basis.lights
+    lights, current_lights = look.lighting.lights, look.basis.lights
     shares = energy_shares(look.basis, look.lighting)
     errors = spoken_errors(look.uncertainty, len(shares))
     important = _important_lights(look)
     table, swatches = terminal.table("light", "stops", "colour", "±", "share"), []
     for k in important:
-        change_text = change(present_lights[k], lights[k])
+        change_text = change(current_lights[k], lights[k])
         is_off = change_text == "off"
         swatches.append(None if is_off else _color(look, lights[k]))
         table.row(
@@ -177,7 +177,7 @@ def _important_lights(look: Look) -> list[int]:
     weights = look.solution.weights
     if len(weights) <= MAX_FULL_LIGHTS:
         return list(range(len(weights)))
-    change_size = np.abs(weights - look.basis.present_weights)
+    change_size = np.abs(weights - look.basis.current_weights)
     power = (change_size + weights) * look.basis.totals @ LUMINANCE
     return sorted(np.argsort(-power, kind="stable")[:SHORT_LIST_LIGHTS].tolist())
 
@@ -188,10 +188,10 @@ def _other_lights_text(look: Look, other_indices: list[int]) -> str:
     counts = {
         "off": light_changes.count("off"),
         "switched on": light_changes.count("on"),
-        "kept": light_changes.count("kept"),
+        "fixed": light_changes.count("fixed"),
         "brighter": sum(x.startswith("+") for x in light_changes),
         "dimmer": sum(x.startswith("−") for x in light_changes),
-        "as they were": light_changes.count("0.0"),
+        "as they were": light_changes.count("0.0") + light_changes.count("unchanged"),
     }
     text = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
     share = energy_shares(look.basis, look.lighting)[other_indices].sum()
@@ -201,8 +201,10 @@ def _other_lights_text(look: Look, other_indices: list[int]) -> str:
 
 def change(light: BasisLight, setting: LightSetting) -> str:
     """Return the change of a light in stops of luminance, `on` or `off`."""
-    if light.is_fixed or not any(setting.reached):
-        return "kept"
+    if light.is_fixed:
+        return "fixed"
+    if not any(setting.reached):
+        return "unchanged"
     before, after = (float(luminance(np.array(x.emission))) for x in (light, setting))
     if after <= OFF_SHARE * before:
         return "off"
@@ -241,15 +243,15 @@ def _show_all(look: Look) -> None:
     columns = ["constraint (* limits it)"] if has_constraints else []
     table = terminal.table(*headings, *amounts, *columns)
     errors = spoken_errors(look.uncertainty, len(shares))
-    for k, (light, present_light) in enumerate(
+    for k, (light, current_light) in enumerate(
         zip(look.lighting.lights, look.basis.lights, strict=True)
     ):
         appearance = look.lighting.photometry(light)
         table.row(
             light.name,
             light.plugin,
-            "" if light.is_fixed else terminal.numbers(present_light.emission),
-            "kept" if light.is_fixed else _emission_text(light),
+            "" if light.is_fixed else terminal.numbers(current_light.emission),
+            "fixed" if light.is_fixed else _emission_text(light),
             errors[k],
             "" if light.is_fixed else light.unit,
             f"{100 * shares[k]:.1f} %",
@@ -266,5 +268,5 @@ def _emission_text(light: LightSetting) -> str:
     emission_text = terminal.numbers(light.emission)
     if all(light.reached):
         return emission_text
-    note = f"{unreached_channels(light)} kept" if any(light.reached) else "kept"
+    note = f"{unreached_channels(light)} unchanged" if any(light.reached) else "unchanged"
     return f"{emission_text} ({note})"

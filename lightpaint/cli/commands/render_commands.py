@@ -73,7 +73,7 @@ def basis(*, scene: SceneFile, output: Path, settings: Settings) -> CommandOutco
             listen.say(remark)
         basis_on_film = obtain(scene_on_film, settings, listen)
     write_basis(output, basis_on_film)
-    note = " and what is kept" if basis_on_film.is_fixed.any() else ""
+    note = " and the fixed light" if basis_on_film.is_fixed.any() else ""
     count = int((~basis_on_film.is_fixed).sum())
     terminal.write(f"{output}: {count} lights{note}, {basis_on_film.origin.spp} samples per pixel")
     return CommandOutcome(lambda: documents.basis_document(output, basis_on_film))

@@ -35,7 +35,7 @@ def add_constraints(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group(
         "constraints",
         "NAME is a light, a group or a pattern; all options may be repeated. LEVEL is a "
-        "luminance like 2.5, a share of the present one like 40%, or r,g,b. COLOR is #ffaa66, "
+        "luminance like 2.5, a share of the current one like 40%, or r,g,b. COLOR is #ffaa66, "
         "3200K or r,g,b.",
     )
 
@@ -57,7 +57,7 @@ def add_constraints(parser: argparse.ArgumentParser) -> None:
         "--tie",
         "A,B,...",
         arguments.names_of,
-        "put these lights on one dimmer, with their present colours",
+        "put these lights on one dimmer, with their current colours",
     )
     add(
         "--color",
@@ -87,7 +87,7 @@ def add_constraints(parser: argparse.ArgumentParser) -> None:
         type=arguments.number(may_be_zero=True),
         default=0.0,
         metavar="STRENGTH",
-        help="prefer the present lighting with this strength, like 0.01: lights that the painting"
+        help="prefer the current lighting with this strength, like 0.01: lights that the painting"
         " does not determine then stay as they are (default: %(default)s)",
     )
     group.add_argument(

@@ -215,8 +215,8 @@ def add_server(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--new",
         action="store_true",
-        help="start a new session, and keep the present one under another name (default: continue"
-        " the present one)",
+        help="start a new session, and keep the current one under another name (default: continue"
+        " the current one)",
     )
     parser.add_argument(
         "--port",

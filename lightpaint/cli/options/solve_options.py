@@ -92,7 +92,7 @@ def add_fit(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--colors",
         choices=("free", "gentle", "white"),
-        help="colours that lights may take. free: any; gentle: their present ones, unless the "
+        help="colours that lights may take. free: any; gentle: their current ones, unless the "
         "painting needs others; white: 2200 to 9000 K (default: gentle if the current look "
         "was painted over, or painted through a view, else free)",
     )
@@ -222,5 +222,5 @@ def add_tolerances(parser: argparse.ArgumentParser) -> None:
         type=arguments.number(" as a share", may_be_zero=True, maximum=1),
         metavar="SHARE",
         help="exit with 1 if the answer realises less than this share of the painted change, 0 to"
-        " 1: 1 − its mean ΔE / the mean ΔE of the present scene",
+        " 1: 1 − its mean ΔE / the mean ΔE of the current scene",
     )

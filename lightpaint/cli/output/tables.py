@@ -25,7 +25,7 @@ def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
     for light in scene.lights:
         is_single = light.member_names == (light.name,) and not light.is_fixed
         if not is_single:
-            state = "kept as it is" if light.is_fixed else terminal.numbers(light.emission)
+            state = "fixed" if light.is_fixed else terminal.numbers(light.emission)
             unit = "" if light.is_fixed else light.unit
             count = f"{len(light.members)} emitter{'s' if len(light.members) > 1 else ''}"
             whole = photometry_of(light, cd_per_unit)

@@ -181,7 +181,7 @@ class TerminalListener:
         self._bars.update(self._tasks[label], completed=done, total=total)
 
     def at_work(self, worker: str, task: str | None) -> None:
-        """Show the present task of a worker; None if it is idle."""
+        """Show the current task of a worker; None if it is idle."""
         if self._bars is None:
             return
         if task is None:

@@ -1,4 +1,4 @@
-"""The bounds that hold the lights of an answer: zero, being kept, and constraints.
+"""The bounds that hold the lights of an answer: zero, being fixed, and constraints.
 
 The multipliers are those of the solver's own certificate.
 """

@@ -198,7 +198,7 @@ def _compromise(solution: Solution) -> float:
 
 
 def unbounded_weights(solution: Solution) -> Doubles:
-    """Return the closest weights (n, 3) of any sign; kept lights stay at 1."""
+    """Return the closest weights (n, 3) of any sign; fixed lights stay at 1."""
     equations, weights = solution.equations, solution.weights
     whole = equations.full_matrix
     for columns in all_columns(solution):

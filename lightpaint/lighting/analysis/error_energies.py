@@ -45,7 +45,7 @@ class ErrorEnergies:
             image, mixed = solution.image[rows].astype(np.float64), predicted[rows]
             missed = image - mixed
             unreachable = missed - forbidden[rows]
-            # This excludes noise that the painting shares, where it equals the present look.
+            # This excludes noise that the painting shares, where it equals the current look.
             noise = residuals.noise(slice(rows.start * width, rows.stop * width))
             uncounted = np.maximum(1 - importance, 0)
             # Black target pixels have no colour to miss.

@@ -19,13 +19,13 @@ class Bound:
 
     held_by: the constraint in few words (`LightSetting.constraint`); else the kind.
     gain: decrease of the objective, all channels together, if only this bound were released. A
-    kept, locked, limited, coloured or tied light may then have any emission >= 0, an unselected
+    fixed, locked, limited, coloured or tied light may then have any emission >= 0, an unselected
     light any that its constraints allow, and a light at zero negative emission. A pull towards the
-    present is kept; it is not part of the objective, so the gain may be negative. multiplier:
-    derivative of the objective by the bound: >= 0 at a lower limit, such as zero, and <= 0 at an
-    upper one, such as `off`. Three channels per `emission`; one number per `luminance` of the
-    emission; per unit of a `dimmer`, 1 being the present, one number for each tied light moved
-    separately, or one for all.
+    current lighting stays; it is not part of the objective, so the gain may be negative.
+    multiplier: derivative of the objective by the bound: >= 0 at a lower limit, such as zero, and
+    <= 0 at an upper one, such as `off`. Three channels per `emission`; one number per `luminance`
+    of the emission; per unit of a `dimmer`, 1 being the current level, one number for each tied
+    light moved separately, or one for all.
     tint: the side of its range of white to which the light would go.
     """
 

@@ -24,7 +24,7 @@ class Certificate:
         sweeps: Gauss–Seidel sweeps per channel; 0 if Newton steps sufficed.
         converged: Whether the KKT residual is within the tolerance.
         unreached: Lights that reach no weighted pixel. They keep the start of the solve, or the
-            nearest emission under their constraints: the present one, if no start was given.
+            nearest emission under their constraints: the current one, if no start was given.
         curve: If only some lights may be on, numbers of lights and the relative residual, √(Σ_c
             E_c / Σ_c ‖Ψ_c‖²), of the best ones.
         bounds: Bounds that hold single lights, from a diagnosis, the largest gain first.
@@ -37,7 +37,7 @@ class Certificate:
         noise_removed: Share of the noise that was removed from the equations.
         delta_e: Mean CIEDE2000 between the prediction and the painting, over the paint.
         delta_e_noise: The part of it that noise explains.
-        delta_e_asked: `delta_e` of the present scene: the change that the painting asks for.
+        delta_e_asked: `delta_e` of the current scene: the change that the painting asks for.
         software: The software that computed it, if known.
         basis_spp: Samples per pixel of the basis, of the first of several views; None if unknown.
 

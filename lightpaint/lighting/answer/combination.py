@@ -63,7 +63,7 @@ def _weights(basis: Basis, values: Mapping[str, Any] | npt.ArrayLike) -> Doubles
         whole = _numbers(values, f"a lighting of {n} lights", ((n,), (n, 3)))
         weights = np.broadcast_to(whole.reshape(n, -1), (n, 3)).copy()
     for k in np.flatnonzero(basis.is_fixed & (weights != 1).any(axis=1)):
-        raise LightingError(f"light {names[k]!r} is kept as it is: its weight is 1")
+        raise LightingError(f"light {names[k]!r} is fixed: its weight is 1")
     return weights
 
 

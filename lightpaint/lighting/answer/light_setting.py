@@ -64,8 +64,7 @@ class LightSetting:
                 )
             if self.is_fixed and rgb != (1, 1, 1):
                 raise LightingError(
-                    f"light {self.name!r} is kept as it is, so its {name} must be 1 1 1, "
-                    f"not {list(rgb)}"
+                    f"light {self.name!r} is fixed, so its {name} must be 1 1 1, not {list(rgb)}"
                 )
         if self.unit_flux and not all(map(is_amount, self.unit_flux)):
             raise LightingError(

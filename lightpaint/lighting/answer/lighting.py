@@ -245,9 +245,9 @@ class Lighting(Shown, Mapping[str, LightSetting]):
 
     @classmethod
     @keywords()
-    def present(cls, basis: Basis) -> "Lighting":
-        """Return the present lighting of the scene."""
-        return cls.of_weights(basis, basis.present_weights)
+    def current(cls, basis: Basis) -> "Lighting":
+        """Return the current lighting of the scene."""
+        return cls.of_weights(basis, basis.current_weights)
 
     def weights_for(self, lights: Basis | Lights) -> Doubles:
         """Return weights (n, 3) in the order of `lights`, which may be those of a basis.

@@ -124,7 +124,7 @@ class Constraints:
         lights: Name or pattern, its keys and values, and the name of their source in errors. Later
             entries replace contradictory ones; `of` puts patterns before names.
         ties: Lights on one dimmer.
-        prefer_current: Strength of the pull towards the present lighting. At 1 a change of a light
+        prefer_current: Strength of the pull towards the current lighting. At 1 a change of a light
             costs as much as its effect on the whole picture, painted or not.
         sparse: Maximum number of lights that may be on.
 

@@ -65,7 +65,7 @@ def _without_moves(light: Any, source: str) -> Any:
 
 
 def _pull_strength(keys: Mapping[str, Any], source: str) -> Any:
-    """Return the strength of the pull to the present, also from its older keys.
+    """Return the strength of the pull to the current lighting, also from its older keys.
 
     Files had `prefer = { current = 0.01 }` or `prefer = 0.01` before `prefer_current`.
     """

@@ -69,8 +69,8 @@ def _luminance(level: Level, light: BasisLight, constraint: LightConstraint) -> 
     now = float(luminance(np.array(light.emission)))
     if now == 0:
         raise ConstraintError(
-            f"{constraint.where}.limits has {level} of the present, and {light.name!r} is off at "
-            "present: give a number"
+            f"{constraint.where}.limits has {level} of the current luminance, but "
+            f"{light.name!r} is currently off: give a number"
         )
     return level.amount * now
 

@@ -16,7 +16,7 @@ from lightpaint.validation import BRIGHTEST, MAX_NAME, MAX_PRIMARIES, is_amount,
 
 @dataclass(frozen=True)
 class Level:
-    """A brightness: a luminance, an RGB emission, or a share of the present luminance."""
+    """A brightness: a luminance, an RGB emission, or a share of the current luminance."""
 
     amount: float | RGB
     is_share: bool = False
@@ -29,7 +29,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Lock:
-    """An emission that is not solved for. color: of luminance 1. None keeps the present value."""
+    """An emission that is not solved for. color: of luminance 1. None keeps the current value."""
 
     level: Level | None = None
     color: RGB | None = None

@@ -29,7 +29,7 @@ from lightpaint.lighting.loss.painting import unpainted_weight
 from lightpaint.lighting.loss.pixel_bins import block_side
 from lightpaint.lighting.loss.weight_penalty import (
     dimming_factors,
-    pull_to_present,
+    pull_to_current,
     strengthen,
     weight_pull,
 )
@@ -54,7 +54,7 @@ WHITE_WIDTH = 8
 #: Painted pixels that determine the colours lights may take, about.
 GAMUT_PIXELS = 2**8
 
-#: Views, with the pulls to the present and to its colours.
+#: Views, with the pulls to the current lighting and to its colours.
 _Pulls = tuple[tuple[LiveView, ...], NormalEquations | None, NormalEquations | None]
 
 
@@ -109,7 +109,7 @@ class LiveSolver:
     def answer(self, start: Doubles, *, while_moving: bool = False) -> Doubles:
         """Return the best weights (n, 3), from the last ones.
 
-        Before anything is painted, lights keep their present weights, within the constraints.
+        Before anything is painted, lights keep their current weights, within the constraints.
 
         while_moving: whether a light is being moved. Sums over tiles would have to be recomputed
         for each of its places, so linear light, too, is averaged to a few thousand pixels.
@@ -133,7 +133,7 @@ class LiveSolver:
 
         if self.mode == "linear" and not while_moving:
             equations = reduce(add, (x.tiles().equations(unpainted) for x in views))
-            pull = self._pull(views, self._basis.present_weights)
+            pull = self._pull(views, self._basis.current_weights)
             weights = best(equations, start)
             if self._fit.colors != "gentle":
                 return weights
@@ -144,7 +144,7 @@ class LiveSolver:
         pull = self._pull(views, start)
         films = self._joint_films(views)
         pixels = films.pixels(unpainted, self._fit.transform)
-        # After a change of the painting the last answer may be worse than the present lighting.
+        # After a change of the painting the last answer may be worse than the current lighting.
         starts = allowed(start), self._unpainted_answer()
         return films.improve(pixels, starts, best, pull, allowed)
 
@@ -164,7 +164,7 @@ class LiveSolver:
         confined = self._within
         if confined.gamuts is None or self._gamuts_of != views:
             painted = partial(PaintedLight.of, [x.painting for x in views], max_pixels=GAMUT_PIXELS)
-            gamuts = Gamuts(painted, _power(views), self._basis.present_weights)
+            gamuts = Gamuts(painted, _power(views), self._basis.current_weights)
             confined, self._gamuts_of = self._reduction.with_gamuts(gamuts), views
         else:
             confined.gamuts.refresh()
@@ -192,12 +192,12 @@ class LiveSolver:
         if self._pulls is None or self._pulls[0] != views:
             power = _power(views)
             keeps_color = self._reduction.is_free & power.any(axis=1)
-            present, prefer = self._basis.present_weights, self._constraints.prefer_current
+            current, prefer = self._basis.current_weights, self._constraints.prefer_current
 
             def pull_to(prefer: float, share: float) -> NormalEquations | None:
                 return weight_pull(
                     power,
-                    present,
+                    current,
                     self._fit,
                     prefer_current=prefer,
                     painted_share=share,
@@ -205,14 +205,14 @@ class LiveSolver:
                 )
 
             self._pulls = views, pull_to(prefer, 0.0), pull_to(0.0, 1.0)
-        _, to_present, to_colors = self._pulls
+        _, to_current, to_colors = self._pulls
         if to_colors is None:
-            return to_present
+            return to_current
         # The total importance, relative to the number of pixels.
         pixels = sum(view.pixels for view in views)
         to_colors = to_colors.scaled(sum(float(view.counts[0]) for view in views) / pixels)
-        to_colors = strengthen(to_colors, dimming_factors(self._basis.present_weights, before))
-        return to_colors if to_present is None else to_present + to_colors
+        to_colors = strengthen(to_colors, dimming_factors(self._basis.current_weights, before))
+        return to_colors if to_current is None else to_current + to_colors
 
     def _joint_films(self, views: tuple[LiveView, ...]) -> Films:
         if self._films is None or self._films[0] != views:
@@ -234,8 +234,8 @@ def _power(views: Sequence[LiveView]) -> Doubles:
 
 
 def unpainted_weights(views: Sequence[LiveView], reduction: Reduction) -> Doubles:
-    """Return the weights (n, 3) nearest to the present ones that constraints allow."""
-    return _nearest(views[0].basis.present_weights, views, reduction)
+    """Return the weights (n, 3) nearest to the current ones that constraints allow."""
+    return _nearest(views[0].basis.current_weights, views, reduction)
 
 
 def _nearest(weights: Doubles, views: Sequence[LiveView], reduction: Reduction) -> Doubles:
@@ -245,4 +245,4 @@ def _nearest(weights: Doubles, views: Sequence[LiveView], reduction: Reduction) 
     """
     weights = snap_to_whites(reduction, weights)
     reduction = center_windows(reduction, weights)
-    return solve_reduced(pull_to_present(_power(views), weights), reduction, weights).weights
+    return solve_reduced(pull_to_current(_power(views), weights), reduction, weights).weights

@@ -32,10 +32,10 @@ class PaintedTiles:
 
     def __init__(self, basis: Basis, image: Floats, importance: Floats) -> None:
         self._importance, self._seen = importance, basis.emitters_seen
-        self._present, self._is_moved = basis.present_weights, basis.former is not None
+        self._current_weights, self._is_moved = basis.current_weights, basis.former is not None
         self._paint = TiledEquations(basis.planes, image, importance)
         self._unpainted = np.where(basis.emitters_seen, np.float32(0), np.float32(1))
-        rest = basis.planes, basis.present_look, self._unpainted
+        rest = basis.planes, basis.current_look, self._unpainted
         self._rest = TiledEquations(*rest, twin=self._paint)
         self._whole = self._rest.base.copy()
         everything = slice(0, len(importance)), slice(0, importance.shape[1])
@@ -59,7 +59,7 @@ class PaintedTiles:
         counted = self._importance[pixels] + self._unpainted[pixels]
         expected = np.where(self._seen[pixels], np.float32(0), np.float32(1))
         if np.abs(counted - expected).max(initial=0) <= IMPORTANCE_ROUND_OFF:
-            self._rest.update_as_complement(region, self._whole, self._paint, self._present)
+            self._rest.update_as_complement(region, self._whole, self._paint, self._current_weights)
         else:
             self._rest.update(region)
 
@@ -109,7 +109,7 @@ class SmallFilm:
         # float32 suffices for averages, and sums of it take half the time.
         planes = small.reshape(len(small), -1, 3).transpose(2, 0, 1)
         self.rows = np.ascontiguousarray(planes, np.float32)
-        self._current = _planes(self._average(basis.present_look))
+        self._current = _planes(self._average(basis.current_look))
         self._painted = self._current.copy()
         self._transform: ViewTransform | None = None
         self._seen_painted = self._seen_current = self._current

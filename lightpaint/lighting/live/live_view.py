@@ -28,7 +28,7 @@ class LiveView:
     def __init__(self, basis: Basis, image: Floats, importance: Floats) -> None:
         self.basis, self._image, self._importance = basis, image, importance
         self._counted = importance.copy()
-        self._dark = dark_threshold(basis.present_look, basis.emitters_seen)
+        self._dark = dark_threshold(basis.current_look, basis.emitters_seen)
         self._transform: ViewTransform | None = None
         self._read((slice(0, len(importance)), slice(0, importance.shape[1])))
         self._sums = np.zeros((len(importance), -(-importance.shape[1] // SEGMENT_PIXELS), 2))
@@ -113,7 +113,7 @@ class LiveView:
         glows = find_glow_paint(
             self._image[affected],
             importance,
-            self.basis.present_look[affected],
+            self.basis.current_look[affected],
             self.basis.emitters_seen[affected],
             self._transform,
             dark=self._dark,

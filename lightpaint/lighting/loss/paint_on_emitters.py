@@ -57,7 +57,7 @@ def find_glow_paint(
 ) -> Bools:
     """Return where emitters are painted that need no less light, (h, w).
 
-    image: (h, w, 3) linear, the painting; importance: (h, w); look: (h, w, 3) linear, the present
+    image: (h, w, 3) linear, the painting; importance: (h, w); look: (h, w, 3) linear, the current
     one; seen: (h, w), where an emitter is. transform: that shows both; None for light itself. dark:
     see `dark_threshold`, of the whole picture, of which these arrays may be a part.
     """

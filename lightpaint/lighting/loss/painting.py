@@ -23,7 +23,7 @@ def literal_squares(
     """Return the literal squares of a painting, or of a part of its pixels.
 
     image: (h, w, 3); importance: (h, w), a; seen: (h, w), where the camera sees an emitter;
-    current: (h, w, 3), the present look, needed only for unpainted > 0, the weight that holds
+    current: (h, w, 3), the current look, needed only for unpainted > 0, the weight that holds
     unpainted pixels to it. A pixel then minimises a ‖Ψ − x‖² + unpainted (1 − a) ‖current − x‖²,
     which is one residual of weight a + unpainted (1 − a) against the weighted mean of both images.
     """
@@ -77,19 +77,19 @@ def resolve_emitter_paint(target: Target, basis: Basis, fit: Fit) -> Target:
     glows = find_glow_paint(
         target.image,
         target.importance,
-        basis.present_look,
+        basis.current_look,
         basis.emitters_seen,
         fit.transform,
-        dark=dark_threshold(basis.present_look, basis.emitters_seen),
+        dark=dark_threshold(basis.current_look, basis.emitters_seen),
     )[..., None]
     at_least = glows if target.at_least is None else target.at_least | glows
     mask = np.broadcast_to(at_least, target.image.shape) if glows.any() else target.at_least
     return replace(target, at_least=mask, reads_emitters=False)
 
 
-def present_look(basis: Basis, unpainted: float) -> Floats | None:
+def current_look(basis: Basis, unpainted: float) -> Floats | None:
     """Return the look (h, w, 3) that holds unpainted pixels; None if it does not."""
-    return basis.present_look if unpainted > 0 else None
+    return basis.current_look if unpainted > 0 else None
 
 
 def target_squares(basis: Basis, target: Target, *, unpainted: float = 0.0) -> Squares:
@@ -99,7 +99,7 @@ def target_squares(basis: Basis, target: Target, *, unpainted: float = 0.0) -> S
         counted.image,
         counted.importance,
         seen=basis.emitters_seen,
-        current=present_look(basis, unpainted),
+        current=current_look(basis, unpainted),
         unpainted=unpainted,
     )
 
@@ -153,7 +153,7 @@ def choose_loss(
 ) -> Loss:
     """Choose the loss; return `literal` itself if it is equal.
 
-    at_least: (h, w, 3), where brighter is as good. painted, current: return Ψ and the present look,
+    at_least: (h, w, 3), where brighter is as good. painted, current: return Ψ and the current look,
     if needed.
     """
     if transform is None and not (at_least.any() and at_least[literal.weight[..., 0] > 0].any()):

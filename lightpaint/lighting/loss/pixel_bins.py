@@ -3,7 +3,7 @@
 The mean display value of a noisy pixel differs from the display value of its mean light, since the
 curve of the display is bent, and steepest in the dark. A fit of noisy pixels makes up for that with
 light that nobody painted, and a lamp that shows only in stray pixels may get any weight. The remedy
-is the average of a block: many more samples of nearly the same light. The noise of the present
+is the average of a block: many more samples of nearly the same light. The noise of the current
 look, as the display shows it, determines the size of blocks.
 """
 
@@ -24,10 +24,10 @@ from lightpaint.images.pixel_blocks import block_sums, enlarged
 from lightpaint.lighting.joined_views import Views
 from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.loss import Cut, Loss
-from lightpaint.lighting.loss.weight_penalty import pull_to_present
+from lightpaint.lighting.loss.weight_penalty import pull_to_current
 from lightpaint.lighting.normal_equations import NormalEquations
 
-#: Largest RMS noise of the present look, relative to the display's range, at which single pixels
+#: Largest RMS noise of the current look, relative to the display's range, at which single pixels
 #: are fitted: that of some 32 samples per pixel on the shipped scenes (docs/benchmarks.md).
 NOISY_DISPLAY = 0.035
 
@@ -36,7 +36,7 @@ BLOCK_SIDES, MIN_BLOCKS = (1, 2, 3, 4, 6, 8), 16
 #: Pixels that suffice to measure the noise of a picture, and rows of a strip of them.
 NOISE_PIXELS, STRIP_ROWS = 2**16, 24
 
-#: Strength of the pull to the present in proportion to the noise of a light.
+#: Strength of the pull to the current lighting in proportion to the noise of a light.
 PRIOR_STRENGTH = 0.1
 
 
@@ -56,9 +56,9 @@ class BinnedPixels:
 
     @cached_property
     def equations(self) -> NormalEquations:
-        """The linear problem at the present lighting, with the importance of all pixels of a
+        """The linear problem at the current lighting, with the importance of all pixels of a
         block."""
-        goal = self.loss.goal(self.basis.present_look)
+        goal = self.loss.goal(self.basis.current_look)
         return NormalEquations.of(self.basis, goal, self.loss.importance[..., None])
 
     @cached_property
@@ -67,23 +67,23 @@ class BinnedPixels:
         `PRIOR_STRENGTH`.
 
         Samples determine a light as far as its power exceeds its noise; for a light that is all
-        noise the present is the best guess. M contains N anyway, where it pulls towards 0.
+        noise the current lighting is the best guess. M contains N anyway, where it pulls towards 0.
         """
-        present = self.basis.present_weights
-        present_picture = LitPixels.whole(self.basis, self.loss).predicted(present)
-        _, weight = self.loss.pixels.squares(present_picture, from_clipping=False)
-        power = np.zeros(present.shape)
+        current = self.basis.current_weights
+        current_picture = LitPixels.whole(self.basis, self.loss).predicted(current)
+        _, weight = self.loss.pixels.squares(current_picture, from_clipping=False)
+        power = np.zeros(current.shape)
         for start in range(0, weight.shape[1], BLOCK_PIXELS):
             where = slice(start, start + BLOCK_PIXELS)
             halves = self.basis.noise.pixels(where).astype(np.float64)
             power += np.einsum("cp,npc->nc", weight[:, where], np.square(halves))
-        return pull_to_present(PRIOR_STRENGTH * power, present)
+        return pull_to_current(PRIOR_STRENGTH * power, current)
 
 
 def block_side(bases: Sequence[Basis], transform: ViewTransform | None) -> int:
     """Return the side, in pixels, of blocks whose noise is small on a display; 1 for no blocks.
 
-    The noise is that of the present look, not of the painting, so that no stroke changes the
+    The noise is that of the current look, not of the painting, so that no stroke changes the
     problem elsewhere. The side is 1 for unknown noise, and in linear light, where the equations
     are corrected for noise.
     """
@@ -102,14 +102,14 @@ def block_side(bases: Sequence[Basis], transform: ViewTransform | None) -> int:
 
 
 def _strips(basis: Basis) -> tuple[Floats, Floats, Bools]:
-    """Return the present look of enough of a picture, its half difference, and the pixels of
+    """Return the current look of enough of a picture, its half difference, and the pixels of
     emitters.
 
     The strips, of whole blocks of any side, are spread over the picture.
     """
     step = max(1, basis.emitters_seen.size // NOISE_PIXELS)
     rows = np.flatnonzero(np.arange(basis.size[0]) // STRIP_ROWS % step == 0)
-    weights = basis.present_weights
+    weights = basis.current_weights
     pixels = np.flatnonzero(np.repeat(np.isin(np.arange(basis.size[0]), rows), basis.size[1]))
     picture = (len(rows), basis.size[1], 3)
     look, half = (

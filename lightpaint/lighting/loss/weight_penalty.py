@@ -11,7 +11,7 @@ from lightpaint.colour.color import LUMINANCE, luminance
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.normal_equations import NormalEquations
 
-#: Strength of the pull to the present colours: the share of a hue's effect on the picture that
+#: Strength of the pull to the current colours: the share of a hue's effect on the picture that
 #: counts as an error, scaled by the share of painted pixels.
 COLOR_PULL = 1.5
 
@@ -21,7 +21,7 @@ MAX_DIMMING = 100.0
 
 def weight_pull(
     power: Doubles,
-    present: Doubles,
+    current: Doubles,
     fit: Fit,
     *,
     prefer_current: float,
@@ -31,56 +31,55 @@ def weight_pull(
 ) -> NormalEquations | None:
     """Return the sum of all pulls on the weights; None without any.
 
-    power, present: (n, 3), ‖Φᵢ‖² of the lights' pictures, and their present weights.
+    power, current: (n, 3), ‖Φᵢ‖² of the lights' pictures, and their current weights.
     prefer_current: see `Constraints`. painted_share: total importance relative to the number of
-    pixels, which scales the pull to the present colours. keeps_color: (n,), lights to which that
+    pixels, which scales the pull to the current colours. keeps_color: (n,), lights to which that
     pull applies.
     dimming: (n,), see `dimming_factors`; None if no light is known to be dim.
     """
     gentle = COLOR_PULL * fit.brightness * painted_share if fit.colors == "gentle" else 0.0
     added = (
-        [pull_to_present(prefer_current * fit.brightness * power, present)]
+        [pull_to_current(prefer_current * fit.brightness * power, current)]
         if prefer_current
         else []
     )
     if gentle:
         dim = 1.0 if dimming is None else dimming[:, None]
-        added.append(pull_to_colors(gentle * dim * power, present, keeps_color))
+        added.append(pull_to_colors(gentle * dim * power, current, keeps_color))
     return None if not added else added[0] if len(added) == 1 else added[0] + added[1]
 
 
-def dimming_factors(present: Doubles, weights: Doubles) -> Doubles:
-    """Return the factor (n,) by which weights (n, 3) are dimmer than the present; 1 where they are
-    not.
+def dimming_factors(current: Doubles, weights: Doubles) -> Doubles:
+    """Return the factor (n,) by which weights (n, 3) are dimmer than the current ones, or 1.
 
     The pull to a light's colour is quadratic in its light, and would vanish for a dim light. This
     factor makes it linear.
     """
-    now, after = (np.asarray(luminance(x), np.float64) for x in (present, weights))
+    now, after = (np.asarray(luminance(x), np.float64) for x in (current, weights))
     least = np.where(now > 0, now / MAX_DIMMING, 1)
     return np.clip(now / np.maximum(after, least), 1, MAX_DIMMING)
 
 
-def pull_to_present(power: Doubles, present: Doubles) -> NormalEquations:
+def pull_to_current(power: Doubles, current: Doubles) -> NormalEquations:
     """Return the pull Σᵢ powerᵢ (wᵢ − presentᵢ)²; both (n, 3), power s ‖Φᵢ‖² for a strength s.
 
     The scale is absolute: it does not depend on the painting.
     """
     M = np.einsum("ic,ij->cij", power, np.eye(len(power)))
-    return NormalEquations(M, (power * present).T, (power * present**2).sum(axis=0))
+    return NormalEquations(M, (power * current).T, (power * current**2).sum(axis=0))
 
 
-def pull_to_colors(power: Doubles, present: Doubles, lights: Bools) -> NormalEquations:
-    """Return the pull s Σᵢ ‖Φᵢ (wᵢ − Y(wᵢ) cᵢ)‖² of `lights`, (n,), to their present colours.
+def pull_to_colors(power: Doubles, current: Doubles, lights: Bools) -> NormalEquations:
+    """Return the pull s Σᵢ ‖Φᵢ (wᵢ − Y(wᵢ) cᵢ)‖² of `lights`, (n,), to their current colours.
 
-    power: (n, 3), s ‖Φᵢ‖². cᵢ is the present emission at luminance 1, white for a light that is
+    power: (n, 3), s ‖Φᵢ‖². cᵢ is the current emission at luminance 1, white for a light that is
     off. Dimming costs nothing; a change of hue costs its effect in each channel.
     """
     n = len(power)
     M, across = np.zeros((3, n, n)), np.zeros((n, 3, 3))
     for k in np.flatnonzero(lights):
-        now = float(luminance(present[k]))
-        color = present[k] / now if now > 0 else np.ones(3)
+        now = float(luminance(current[k]))
+        color = current[k] / now if now > 0 else np.ones(3)
         hue = np.eye(3) - np.outer(color, LUMINANCE)
         across[k] = hue.T @ (power[k, :, None] * hue)
         M[:, k, k] = np.diag(across[k])

@@ -122,13 +122,13 @@ class Gamuts:
     The painting's part is computed only for a lamp that leaves its own colour and whites: most
     never do, and under the brush each answer would wait for it.
 
-    light: samples the painted pixels; call `refresh` after strokes. power, present: (n, 3), ‖Φᵢ‖²
-    of the lamps' pictures, and their present weights.
+    light: samples the painted pixels; call `refresh` after strokes. power, current: (n, 3), ‖Φᵢ‖²
+    of the lamps' pictures, and their current weights.
     """
 
-    def __init__(self, light: Callable[[], PaintedLight], power: Doubles, present: Doubles) -> None:
-        self._light, self._power, self._present = light, power, present
-        self._own = np.where(luminance(present)[:, None] > 0, present, 1.0)
+    def __init__(self, light: Callable[[], PaintedLight], power: Doubles, current: Doubles) -> None:
+        self._light, self._power, self._current = light, power, current
+        self._own = np.where(luminance(current)[:, None] > 0, current, 1.0)
         # Its own colour is within its gamut, and not at the edge of it.
         own_reach = chromaticity(self._own) @ DIRECTIONS.T
         lamps, whites = (reach_of(white_range(*k).colors) for k in (LAMP_KELVINS, ALL_KELVINS))
@@ -146,7 +146,7 @@ class Gamuts:
     def __getitem__(self, light: int) -> ColorHull:
         if light not in self._gamuts:
             if self._needed is None:
-                self._needed = _NeededLight.of(self._light(), self._power, self._present)
+                self._needed = _NeededLight.of(self._light(), self._power, self._current)
             own_reach, needed = self._reach[light], self._needed.reach(light)
             margin = np.clip(2 * (needed - own_reach + WHITE_MARGIN), WHITE_MARGIN, PAINTED_MARGIN)
             reach = np.maximum(own_reach, needed + margin)
@@ -188,13 +188,13 @@ class _NeededLight:
     share: Doubles
 
     @classmethod
-    def of(cls, light: PaintedLight, power: Doubles, present: Doubles) -> "_NeededLight":
-        """Compute it for lamps with these ‖Φᵢ‖² and present weights, (n, 3); one that is off is
+    def of(cls, light: PaintedLight, power: Doubles, current: Doubles) -> "_NeededLight":
+        """Compute it for lamps with these ‖Φᵢ‖² and current weights, (n, 3); one that is off is
         faint.
         """
-        size, now = np.sqrt(power.sum(axis=1)), np.asarray(luminance(present))
+        size, now = np.sqrt(power.sum(axis=1)), np.asarray(luminance(current))
         faint = FAINT_BRIGHTNESS * (now * size).mean() / np.where(size > 0, size, np.inf)
-        lamps = np.where(now[:, None] > 0, present / np.where(now > 0, now, 1)[:, None], 1.0)
+        lamps = np.where(now[:, None] > 0, current / np.where(now > 0, now, 1)[:, None], 1.0)
         lit = (np.maximum(now, faint)[:, None] * lamps)[:, None] * light.rows
         look, brightness = lit.sum(axis=0), np.asarray(luminance(light.image))
         dark = DARK_SHARE * np.percentile(luminance(look), 95) if len(look) else 0.0

@@ -40,7 +40,7 @@ class Knob:
 
     limit: coefficients, minimum and maximum of a limited sum over its unknowns.
     whites: the range of white of a light that keeps to one. window: the two of these
-    that its two unknowns mix at present (white_mixes.py).
+    that its two unknowns currently mix (white_mixes.py).
     gamut: the gamut that confines the light, if it would leave it otherwise: all of it, or the part
     towards one `side` (gamut_bounds.py).
     """
@@ -147,7 +147,7 @@ def tied_knob(
     lights: Sequence[BasisLight],
     constraints: Sequence[LightConstraint | None],
 ) -> Knob:
-    """Make the knob of lights on one dimmer; at 1 they have their present luminances.
+    """Make the knob of lights on one dimmer; at 1 they have their current luminances.
 
     A fixed member fixes the dimmer: the unknown's limits meet.
     """
@@ -160,7 +160,8 @@ def tied_knob(
     if lower > upper * (1 + ROUND_OFF):
         raise ConstraintError(
             f"{tie.where}: what is asked of {names} cannot be had on one dimmer: one light "
-            f"asks for at least {lower:.4g} times the present, another for at most {upper:.4g}"
+            f"asks for at least {lower:.4g} times its current luminance, another "
+            f"for at most {upper:.4g}"
         )
     return Knob(tuple(members), (Unknown(tuple(columns), min(lower, upper), upper),))
 
@@ -169,15 +170,15 @@ def _tied_direction(
     tie: Tie, names: str, light: BasisLight, constraint: LightConstraint
 ) -> tuple[Doubles, float, float]:
     """Return the emission (3,) of a tied light at dimmer 1, and the limits of the dimmer for it."""
-    present = np.array(light.emission)
+    current = np.array(light.emission)
     if constraint.primaries and len(constraint.primaries) > 1:
         raise ConstraintError(
             f"{constraint.where} asks for {constraint.label}, and {light.name!r} is on the "
             f"dimmer of {names}: a tied light has one color; leave it out of the tie"
         )
-    if not present.any():
+    if not current.any():
         raise ConstraintError(
-            f"{tie.where}: {light.name!r} is off at present, so nothing says how bright it is "
+            f"{tie.where}: {light.name!r} is currently off, so nothing says how bright it is "
             f"beside the others of {names}: give it an emission, or leave it out"
         )
     color = tie.color or (constraint.primaries[0] if constraint.primaries else None)
@@ -186,7 +187,7 @@ def _tied_direction(
             f"{constraint.where or tie.where} asks for a colour, and {light.name!r} can only be "
             "dimmed as a whole"
         )
-    direction = present if color is None else np.array(color) * float(luminance(present))
+    direction = current if color is None else np.array(color) * float(luminance(current))
     check_grey(constraint, light)
     least, most = dimmer_limits(constraint, direction, light)
     if constraint.is_fixed:
@@ -195,14 +196,14 @@ def _tied_direction(
             if constraint.lock is None
             else locked_emission(light, constraint.lock, constraint.where)
         )
-        least = most = float(luminance(emission) / luminance(present))
+        least = most = float(luminance(emission) / luminance(current))
         direction = emission / most if most > 0 else direction
     return direction, least, most
 
 
 def locked_emission(light: BasisLight, lock: Lock, where: str) -> Doubles:
     """Return the emission (3,) that `lock` asks for."""
-    present = np.array(light.emission)
+    current = np.array(light.emission)
     level = lock.level
     if light.is_scalar and lock.color is not None:
         raise ConstraintError(
@@ -215,10 +216,10 @@ def locked_emission(light: BasisLight, lock: Lock, where: str) -> Doubles:
                 "give one number"
             )
         return np.array(level.amount)
-    now = float(luminance(present))
-    color = present / now if lock.color is None and now > 0 else np.array(lock.color or (1, 1, 1))
+    now = float(luminance(current))
+    color = current / now if lock.color is None and now > 0 else np.array(lock.color or (1, 1, 1))
     if level is None and lock.color is None:
-        return present
+        return current
     amount = now
     if level is not None:
         assert not isinstance(level.amount, tuple)

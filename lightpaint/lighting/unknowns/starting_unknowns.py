@@ -25,16 +25,16 @@ def nearest_unknowns(reduction: Reduction, start: Doubles, reached: Bools) -> Do
     x = np.zeros(len(reduction.unknowns))
     for kind in reduction.knob_groups:
         low, high = reduction.lower[kind.places], reduction.upper[kind.places]
-        present = start[kind.lights].reshape(len(low), -1)
+        current = start[kind.lights].reshape(len(low), -1)
         if kind.is_free:
-            x[kind.places] = np.minimum(np.maximum(present, low), high)
+            x[kind.places] = np.minimum(np.maximum(current, low), high)
             continue
-        right_side = np.einsum("kue,ke->ku", kind.columns, present)
+        right_side = np.einsum("kue,ke->ku", kind.columns, current)
         if kind.is_orthogonal:
             values = right_side / np.square(kind.columns).sum(axis=2)
         else:
             squares = np.matmul(kind.columns, kind.columns.swapaxes(1, 2))
-            values = _solve_mixes(kind.columns, present)
+            values = _solve_mixes(kind.columns, current)
             violated = np.flatnonzero(~((values >= low) & (values <= high)).all(axis=1))
             if violated.size:
                 low_out, high_out = low[violated], high[violated]

@@ -193,7 +193,7 @@ def _better_windows(
 ) -> Windows:
     """Return windows of the lights that would gain by other whites; none where no light would.
 
-    First all that move to the next white, none of which has to give up its present mix; only
+    First all that move to the next white, none of which has to give up its current mix; only
     then the one light that gains most by a jump.
     """
     gradient = equations.gradient(optimum.weights)

@@ -31,13 +31,13 @@ class Canvas:
 
     Attributes:
         basis: The planes of its lights.
-        present: (h, w, 3) linear, the present look, denoised: it shows where nothing is painted.
+        current: (h, w, 3) linear, the current look, denoised: it shows where nothing is painted.
         painting: The target; `at_least` is None while no pixel is marked.
         live: The sums that follow the target.
     """
 
     def __init__(
-        self, view: int, basis: Basis, present: Floats, layers: LayerStack, steps: Sequence[Step]
+        self, view: int, basis: Basis, current: Floats, layers: LayerStack, steps: Sequence[Step]
     ) -> None:
         self.view = view
         self._open_strokes: dict[int, OpenStroke] = {}
@@ -47,12 +47,12 @@ class Canvas:
             for number in layers.ids
         }
         self._shown = self._with_accents(layers)
-        self.improve(basis, present)
+        self.improve(basis, current)
 
-    def improve(self, basis: Basis, present: Floats) -> None:
+    def improve(self, basis: Basis, current: Floats) -> None:
         """Replace the basis by one of more samples; open strokes stay open."""
-        self.basis, self.present = basis, np.asarray(present, np.float32)
-        self.painting = compose(self._shown, self.present, self.full_region)
+        self.basis, self.current = basis, np.asarray(current, np.float32)
+        self.painting = compose(self._shown, self.current, self.full_region)
         self.live = LiveView(basis, self.image, self.importance)
 
     def replace_lights(self, basis: Basis) -> None:
@@ -63,14 +63,14 @@ class Canvas:
     def replace_planes(self, basis: Basis, lights: Collection[int]) -> None:
         """Continue with a basis in which the planes of some lights, by number, were replaced.
 
-        The present look stays as it was before these lights moved.
+        The current look stays as it was before these lights moved.
         """
         self.basis = basis
         self.live.replace_planes(basis, lights)
 
     @property
     def image(self) -> npt.NDArray[np.float32]:
-        """(h, w, 3) linear; where nothing is painted, the present look."""
+        """(h, w, 3) linear; where nothing is painted, the current look."""
         return self.painting.image
 
     @property
@@ -189,7 +189,7 @@ class Canvas:
         if is_empty(region):
             return
         area = slices(region)
-        image, importance, at_least = compose(self._shown, self.present, region)
+        image, importance, at_least = compose(self._shown, self.current, region)
         self.image[area] = image
         is_same_importance = np.array_equal(self.importance[area], importance)
         self.importance[area] = importance

@@ -27,18 +27,18 @@ class Canvases:
     A stroke changes one view, a look all of them.
 
     Attributes:
-        layers: The present layers.
+        layers: The current layers.
         next_layer: The first id that no layer has had.
     """
 
     def __init__(
-        self, bases: Sequence[Basis], presents: Sequence[Floats], steps: Sequence[Step]
+        self, bases: Sequence[Basis], current_looks: Sequence[Floats], steps: Sequence[Step]
     ) -> None:
         self.layers = self._layers_at_rest = stack_after(steps)
         self.next_layer = next_layer_id(steps)
         self._canvases = tuple(
-            Canvas(k, basis, present, self.layers, steps)
-            for k, (basis, present) in enumerate(zip(bases, presents, strict=True))
+            Canvas(k, basis, current, self.layers, steps)
+            for k, (basis, current) in enumerate(zip(bases, current_looks, strict=True))
         )
 
     def __len__(self) -> int:
@@ -53,10 +53,10 @@ class Canvases:
             raise PaintError(f"no view {view}: there are {len(self)}")
         return self._canvases[view]
 
-    def improve(self, bases: Sequence[Basis], presents: Sequence[Floats]) -> None:
+    def improve(self, bases: Sequence[Basis], current_looks: Sequence[Floats]) -> None:
         """Improve each canvas."""
-        for view, basis, present in zip(self, bases, presents, strict=True):
-            view.improve(basis, present)
+        for view, basis, current in zip(self, bases, current_looks, strict=True):
+            view.improve(basis, current)
 
     def replace_lights(self, bases: Sequence[Basis]) -> None:
         """Continue with bases of other lights."""

@@ -58,12 +58,12 @@ def accents(layers: Sequence[tuple[Layer, LayerPixels]]) -> list[float]:
     ]
 
 
-def compose(layers: Sequence[ShownLayer], present: Floats, region: Region) -> Pixels:
+def compose(layers: Sequence[ShownLayer], current: Floats, region: Region) -> Pixels:
     """Return the target in a region.
 
-    layers: the visible ones, the lowest first. present: (h, w, 3) linear, the present look.
+    layers: the visible ones, the lowest first. current: (h, w, 3) linear, the current look.
     """
-    light = np.array(present[slices(region)], np.float32)
+    light = np.array(current[slices(region)], np.float32)
     result = Pixels(light, np.zeros(light.shape[:2], np.float32))
     for shown in layers:
         if shown.pixels.overlaps(region):

@@ -71,7 +71,7 @@ class LayerStack:
     ) -> "LayerStack":
         """Return the stack with other layers of these ids; new ones lie on top.
 
-        order: the ids of all layers that stay, the lowest first; None for the present order. Raises
+        order: the ids of all layers that stay, the lowest first; None for the current order. Raises
         PaintError for an unknown id.
         """
         by_id = {layer.id: layer for layer in (*self.layers, *changed)}

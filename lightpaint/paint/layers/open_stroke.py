@@ -34,7 +34,7 @@ class OpenStroke:
         self.region = enclosing([self.region, region])
 
     def pixels_before(self, layer: LayerPixels) -> Pixels:
-        """Return the pixels in `region` before the stroke. layer: the present one."""
+        """Return the pixels in `region` before the stroke. layer: the current one."""
         before = layer.copy()
         for square, pixels in self._before.items():
             before.put(square, pixels)

@@ -178,7 +178,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
     @property
     def solution(self) -> Solution | None:
-        """Exact answer to the present paintings, with its analysis; None if nothing is painted.
+        """Exact answer to the current paintings, with its analysis; None if nothing is painted.
 
         Raises LightpaintError.
         """

@@ -141,7 +141,7 @@ def notebook_advice() -> Iterator[None]:
 
 def _pixels_to_load(session: Session, view: int, target: Target | None) -> Pixels:
     if target is None:
-        return Pixels.unpainted(session.views[view].present)
+        return Pixels.unpainted(session.views[view].current)
     canvas = session.views[view]
     return _pixels_of(
         resolve_importance(target, canvas.basis.emitters_seen, session.live_answer.fit.emitters)

@@ -94,7 +94,7 @@ class SessionState(EditState, Message, kind="state"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class AnswerUpdate(EditState, Findings, Message, kind="answer"):
-    """The present lights: the answer to paint and requests, unasked once the exact answer is found,
+    """The current lights: the answer to paint and requests, unasked once the exact answer is found,
     and again with its analysis.
 
     version: grows with every change of the session. stroke: number of the last stroke that arrived.

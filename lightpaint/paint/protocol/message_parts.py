@@ -138,7 +138,7 @@ class TableInfo:
 
 @dataclass(frozen=True)
 class SampleCount:
-    """Samples per pixel: of the present basis, and of the final one."""
+    """Samples per pixel: of the current basis, and of the final one."""
 
     spp: int
     target_spp: int
@@ -180,7 +180,7 @@ class Advice:
 
 @dataclass(frozen=True)
 class Closeness:
-    """Closeness of an answer in one view. delta_e_present: ΔE of the present look."""
+    """Closeness of an answer in one view. delta_e_present: ΔE of the current look."""
 
     headline: str
     help: Advice | None
@@ -193,7 +193,7 @@ class Closeness:
 class LightAnswer:
     """The answer for one light.
 
-    stops: relative to its present emission; null if it is, or was, off. kelvin: null for a colour
+    stops: relative to its current emission; null if it is, or was, off. kelvin: null for a colour
     that is not white. share: of the light in the picture. error: its uncertainty, in words.
     is_constrained: whether a constraint limits it. is_unreached: whether no paint depends on it.
     """

@@ -45,7 +45,7 @@ class ChangeLayers(Message, kind="change_layers"):
     """A change of layers, their properties or their order: one step. Answered by `answer`.
 
     layers: new or changed ones; new ones lie on top. order: ids of all that stay, the lowest first;
-    null for the present order. copies: ids of the originals by the id of each copy, which is among
+    null for the current order. copies: ids of the originals by the id of each copy, which is among
     `layers`. is_final: whether it becomes a step; false while a slider moves. label: its name for
     undo.
     """
@@ -127,7 +127,7 @@ class Propose(Message, kind="propose"):
     """Propose a lighting to the painter: it becomes a look with each light locked at the proposed
     level, and replaces an earlier proposal of that name. Answered by `looks`.
 
-    lights: emission by name of light; other lights keep that of the present answer.
+    lights: emission by name of light; other lights keep that of the current answer.
     """
 
     name: str

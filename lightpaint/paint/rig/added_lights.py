@@ -27,7 +27,7 @@ CLEARANCE, PANEL_SIDE, BEFORE_NEXT = 0.02, 0.08, 0.5
 #: Cone of a spot that is hung by hand, in degrees.
 CUTOFF, BEAM = 30.0, 20.0
 
-#: Luminance of a new light in the picture, relative to the present look.
+#: Luminance of a new light in the picture, relative to the current look.
 FIRST_SHARE = 0.25
 
 
@@ -113,13 +113,13 @@ def hung_at(name: str, kind: str, place: Doubles, direction: Doubles, extent: fl
     return new_emitter(name, values)
 
 
-def with_level(emitter: NewEmitter, alone: float, present: float) -> NewEmitter:
+def with_level(emitter: NewEmitter, alone: float, current: float) -> NewEmitter:
     """Return a new light bright enough to be visible beside the others.
 
-    alone: mean luminance of the picture with it alone at unit emission. present: the same of the
-    present look.
+    alone: mean luminance of the picture with it alone at unit emission. current: the same of the
+    current look.
     """
-    level = FIRST_SHARE * present / alone if alone > 0 and present > 0 else 1.0
+    level = FIRST_SHARE * current / alone if alone > 0 and current > 0 else 1.0
     level = float(f"{level:.2g}")
     emission: RGB = (level, level, level)
     return replace(emitter, emission=emission)

@@ -278,7 +278,7 @@ class LampRig:
     def pointed(self, request: PointLight, name: str, values: Mapping[str, Any]) -> dict[str, Any]:
         """Return the change of a light's pose by a pointing request.
 
-        values: its present pose or, for an added light, all its properties.
+        values: its current pose or, for an added light, all its properties.
         """
         with in_this_thread():
             return self._pointing(request, name, self.site(name, values))

@@ -116,10 +116,10 @@ class LightMover:
         emitter = self.rig.hung(request, name)
         planes = self.rig.quick_planes(session.bases, name, values_of(emitter))
         alone = mean(float((plane.totals @ LUMINANCE)[0]) for plane in planes)
-        present = mean(
-            float((x.totals * x.present_weights).sum(axis=0) @ LUMINANCE) for x in session.bases
+        current = mean(
+            float((x.totals * x.current_weights).sum(axis=0) @ LUMINANCE) for x in session.bases
         )
-        return name, values_of(with_level(emitter, alone, present))
+        return name, values_of(with_level(emitter, alone, current))
 
     def follow(self, send: Callable[[Message], None]) -> bool:
         """Show the planes of newly moved lights, and render them once they rest.
@@ -204,7 +204,7 @@ class LightMover:
         self._offer(session, list(session.requests.placed), is_dragged=False)
 
     def _offer(self, session: Session, names: Sequence[str], *, is_dragged: bool) -> PictureUpdate:
-        """Offer the present pictures of lights, and return the messages that announce them."""
+        """Offer the current pictures of lights, and return the messages that announce them."""
         pictures, offered = self._host.pictures, []
         clean = None if is_dragged else self._host.denoised(session.bases)
         for view, unmoved in zip(session.views, session.bases, strict=True):

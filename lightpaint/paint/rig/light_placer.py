@@ -48,7 +48,7 @@ class PlacerHost(Protocol):
     subjects: tuple[Subject, ...]
 
     def snapshot(self) -> SessionSnapshot:
-        """Return the present paintings and requests."""
+        """Return the current paintings and requests."""
 
     def hang_lights(self, label: str, placed: Placed, *, before: Placed) -> bool:
         """Move lights and add others, by name, in one step, and notify pages.

@@ -59,7 +59,7 @@ def with_planes_of(basis: Basis, moved: Mapping[int, Basis], *, in_memory: bool)
         emitters_seen=np.any(
             [basis.emitters_seen, *(x.emitters_seen for x in moved.values())], axis=0
         ),
-        former=Estimate(basis.present_look, basis.present_noise),
+        former=Estimate(basis.current_look, basis.current_noise),
         guide_table=None,
         sums=None,
         origin=replace(basis.origin, is_composed=True),

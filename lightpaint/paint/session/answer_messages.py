@@ -14,21 +14,24 @@ from lightpaint.lighting.analysis.analysis import Analysis
 from lightpaint.lighting.analysis.appearance.appearance import INVISIBLE, Appearance
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
-from lightpaint.lighting.analysis.diagnosis import error_shares
 from lightpaint.paint.protocol import Advice, Closeness, Findings, LightAnswer, LightInfo
-from lightpaint.report.diagnosis_sentences import NO_ERROR, bound_sentences, hold_clause
+from lightpaint.report.diagnosis_sentences import (
+    NO_ERROR,
+    bound_sentences,
+    hold_clause,
+    spoken_shares,
+)
 from lightpaint.report.phrases import (
     spoken_amount,
     spoken_changed,
     spoken_part,
     spoken_percent,
-    spoken_percents,
     spoken_place,
 )
 from lightpaint.report.uncertainty_sentences import spoken_errors
 from lightpaint.report.verdict import headline, spoken_missing, spoken_reason
 
-#: Distance from Planck's locus up to which a colour is called white, and part of the present light
+#: Distance from Planck's locus up to which a colour is called white, and part of the current light
 #: under which one is off.
 WHITE, OFF = 0.02, 1e-4
 
@@ -42,11 +45,11 @@ PROGRESS_PHRASES = (
     (0.0, "A first step"),
 )
 
-#: Phrase for an answer that is no closer to the paint than the present look.
-NO_CLOSER_TEXT = "No closer than the present lighting"
+#: Phrase for an answer that is no closer to the paint than the current look.
+NO_CLOSER_TEXT = "No closer than the current lighting"
 
 #: Phrase for an answer that is farther from the paint.
-WORSE_TEXT = "Farther from the paint than the present lighting, which undo brings back"
+WORSE_TEXT = "Farther from the paint than the current lighting, which undo brings back"
 
 #: Kinds of advice on what limits the answer; a page has a button for each.
 ADVICE_TEXTS: dict[str, str] = {
@@ -108,18 +111,18 @@ def _shares(lit: Doubles) -> tuple[float, ...]:
 
 def _light_answer(light: BasisLight, weight: Doubles, share: float) -> LightAnswer:
     colour = photometry(as_rgb(weight), unit=light.unit)
-    present, answered = (
+    current, answered = (
         float(luminance(np.asarray(x, np.float64))) for x in (light.emission, weight)
     )
     is_white = colour.kelvin is not None and colour.duv is not None and abs(colour.duv) <= WHITE
     return LightAnswer(
         emission=as_rgb(weight),
-        stops=float(np.log2(answered / present))
-        if present > 0 and answered > OFF * present
+        stops=float(np.log2(answered / current))
+        if current > 0 and answered > OFF * current
         else None,
         kelvin=colour.kelvin if is_white else None,
         swatch=colour.hex or rgb_to_hex(np.asarray(light.emission, np.float64)),
-        is_on=answered > OFF * present,
+        is_on=answered > OFF * current,
         share=share,
     )
 
@@ -181,7 +184,7 @@ def unpainted_text(*, is_asked: bool, is_white: bool) -> str:
 
     is_asked: whether there are constraints. is_white: whether all lights have to be white.
     """
-    stay = "the answer is the present lighting"
+    stay = "the answer is the current lighting"
     if is_white:
         stay = "every light has the white nearest to its colour, at the same brightness"
     if is_asked:
@@ -234,15 +237,14 @@ def why_not_closer(analysis: Analysis) -> list[str]:
     `sketch_headline`, below the pictures, has the place of the largest error.
     """
     appearance, diagnosis = analysis.appearance, analysis.diagnosis
-    if not (parts := error_shares(diagnosis)):
+    if not (parts := spoken_shares(diagnosis)):
         return [NO_ERROR]
     problem = analysis.solution.problem
     words = MISS_TEXTS | (
         CONSTRAINED_MISS_TEXTS if problem.is_constrained or problem.fit.colors != "free" else {}
     )
     words |= {"unreachable": MISS_TEXTS["unreachable"] + hold_clause(appearance)}
-    percents = spoken_percents(parts.values())
-    shares = [f"{share} {words[part]}" for part, share in zip(parts, percents, strict=True)]
+    shares = [f"{share} {words[part]}" for part, share in parts.items()]
     sentences = [f"Of the difference (large errors count most), {', '.join(shares)}."]
     if appearance.place is None and diagnosis.place is not None:
         sentences.append(spoken_place(diagnosis.place))

@@ -58,7 +58,7 @@ def unpainted_headline(live_answer: LiveAnswer) -> str:
     """Return the headline while nothing is painted."""
     is_white = live_answer.fit.colors == "white"
     # Constraints from before the session count, too.
-    is_other = not np.allclose(live_answer.weights, live_answer.basis.present_weights)
+    is_other = not np.allclose(live_answer.weights, live_answer.basis.current_weights)
     is_asked = bool(live_answer.requests.lights) or (is_other and not is_white)
     return unpainted_text(is_asked=is_asked, is_white=is_white)
 

@@ -105,11 +105,11 @@ class History:
 
 
 def restore(
-    bases: Sequence[Basis], presents: Sequence[Floats], store: Store
+    bases: Sequence[Basis], current_looks: Sequence[Floats], store: Store
 ) -> tuple[Canvases, SessionRequests]:
     """Return the canvases and the requests after the steps of the store."""
     applied = store.steps[: store.position]
     states = [step.fields["after"] for step in applied if "after" in step.fields]
     requests = SessionRequests.of(states[-1]) if states else SessionRequests()
     requests.constraints()
-    return Canvases(bases, presents, applied), requests
+    return Canvases(bases, current_looks, applied), requests

@@ -43,12 +43,12 @@ class LiveAnswer:
         self.requests, self._lights_of = requests, lights_of
         self.before_slider: SessionRequests | None = None
         self._basis = views[0].basis
-        self.weights = self._basis.present_weights
+        self.weights = self._basis.current_weights
         self._settings, self._base_constraints, self._transform = settings, constraints, transform
         self.set_views(views)
 
     def set_views(self, views: Sequence[LiveView]) -> None:
-        """Continue with these views; new lights start at their present emission."""
+        """Continue with these views; new lights start at their current emission."""
         before, self._basis = self._basis, views[0].basis
         if before.names != self._basis.names:
             self.weights = weights_by_name(self.weights, before.names, self._basis.lights)
@@ -118,7 +118,7 @@ class LiveAnswer:
         return True
 
     def solve(self) -> None:
-        """Solve for the weights, with the present paint."""
+        """Solve for the weights, with the current paint."""
         is_moving = (
             self.before_slider is not None and self.before_slider.poses != self.requests.poses
         )
@@ -138,9 +138,9 @@ class LiveAnswer:
 def weights_by_name(weights: Doubles, names: Sequence[str], lights: Lights) -> Doubles:
     """Return weights (n, 3) of `lights` from those of lights with these names.
 
-    Other lights start at their present emission.
+    Other lights start at their current emission.
     """
-    made = np.array(lights.present_weights)
+    made = np.array(lights.current_weights)
     there = dict(zip(names, weights, strict=True))
     for k, light in enumerate(lights):
         if light.name in there:

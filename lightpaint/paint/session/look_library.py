@@ -114,7 +114,7 @@ class LookLibrary:
         return (*self._session.bases[0].names, *_requests(look).added)
 
     def _weights(self, look: StoredLook) -> Doubles:
-        """Return the weights of a look, (n, 3), for the present lights.
+        """Return the weights of a look, (n, 3), for the current lights.
 
         Lights that it does not have are off.
         """
@@ -122,7 +122,7 @@ class LookLibrary:
         return self._in_order(np.asarray(look.arrays["weights"]), requests)
 
     def _in_order(self, weights: Doubles, requests: SessionRequests) -> Doubles:
-        """Return weights of the present lights from weights of the lights under other requests."""
+        """Return weights of the current lights from weights of the lights under other requests."""
         names = (*self._session.bases[0].names, *requests.added)
         there = dict(zip(names, weights, strict=True))
         return np.array([there.get(name, (0.0, 0.0, 0.0)) for name in self._session.basis.names])
@@ -139,7 +139,7 @@ class LookLibrary:
                 )
                 paintings.append(Pixels(image, importance, marks))
             else:
-                paintings.append(Pixels.unpainted(view.present))
+                paintings.append(Pixels.unpainted(view.current))
         return paintings
 
     def _current_look(self, name: str) -> StoredLook:
@@ -149,7 +149,7 @@ class LookLibrary:
         return self._with_layers(look)
 
     def _with_layers(self, look: StoredLook) -> StoredLook:
-        """Return a look of the present painting, with its layers; a plain painting has none."""
+        """Return a look of the current painting, with its layers; a plain painting has none."""
         if self._session.views.layers == LayerStack():
             return look
         layers, pixels = LayeredPaintings.of(self._session.views).as_fields()
@@ -192,7 +192,7 @@ class LookLibrary:
         return replace(SessionRequests(locks), poses=requests.poses, added=requests.added)
 
     def _proposed_look(self, message: Propose) -> StoredLook:
-        """Return a look of the present painting with a proposed lighting."""
+        """Return a look of the current painting with a proposed lighting."""
         name, session = self._clean_name(message.name), self._session
         weights, lights = session.weights.copy(), session.basis.lights
         names = list(session.basis.names)
@@ -203,7 +203,7 @@ class LookLibrary:
                 )
             basis_light = lights[names.index(light)]
             if basis_light.is_fixed:
-                raise PaintError(f"{light} is kept as it is: leave it out of the proposal")
+                raise PaintError(f"{light} is fixed: leave it out of the proposal")
             if not all(math.isfinite(x) and x >= 0 for x in emission):
                 raise PaintError(f"{light} is proposed at {list(emission)}: expected numbers >= 0")
             if basis_light.is_scalar and len(set(emission)) > 1:

@@ -70,7 +70,7 @@ def constrain_lights(
     _check_names(asked, lights)
     for name, constraints in asked.items():
         if lights[lights.names.index(name)].is_fixed:
-            raise PaintError(f"{name} is kept as it is, and cannot be asked for anything")
+            raise PaintError(f"{name} is fixed, so it takes no constraint")
         requests = requests.with_light(name, constraints)
     return requests
 

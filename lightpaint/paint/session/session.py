@@ -49,7 +49,7 @@ class Session:
 
     Args:
         bases: Planes of the lights in each view, which may get better (`improve`).
-        presents: (h, w, 3) linear, the present look of each, denoised: the empty canvas.
+        presents: (h, w, 3) linear, the current look of each, denoised: the empty canvas.
         store: Keeps steps and looks.
         settings: Defaults of settings that the session does not set.
         transform: View transform to paint through.
@@ -67,7 +67,7 @@ class Session:
     def __init__(
         self,
         bases: Sequence[Basis],
-        presents: Sequence[Floats],
+        current_looks: Sequence[Floats],
         store: Store,
         *,
         settings: Settings,
@@ -78,7 +78,7 @@ class Session:
         self.store, self.transform = store, transform
         self._edits = SessionEdits(
             bases,
-            presents,
+            current_looks,
             store,
             settings=settings,
             transform=transform,
@@ -194,7 +194,7 @@ class Session:
         raise PaintError(f"a session has no answer to {type(message).__name__}")
 
     def answer_update(self, **fields_of_answer: Any) -> AnswerUpdate:
-        """Return the present weights, with further fields, while the brush is down."""
+        """Return the current weights, with further fields, while the brush is down."""
         fields = {"stroke": self.stroke, "exact": False, "version": self.version}
         mode, weights = self.live_answer.mode, self.weights
         return AnswerUpdate(**{**fields, "mode": mode, "weights": weights, **fields_of_answer})
@@ -233,12 +233,12 @@ class Session:
         """Steps that can be undone, and requests in effect: the fields of `EditState`."""
         return edit_state(self._edits.history, self.live_answer, self.views)
 
-    def improve(self, bases: Sequence[Basis], presents: Sequence[Floats]) -> None:
+    def improve(self, bases: Sequence[Basis], current_looks: Sequence[Floats]) -> None:
         """Replace the bases by ones of more samples, with the same lights and sizes.
 
         An open stroke stays open.
         """
-        self._edits.improve(bases, presents)
+        self._edits.improve(bases, current_looks)
 
     def renew_planes(self, names: Sequence[str]) -> None:
         """Take the planes of moved lights again after they have been rendered."""

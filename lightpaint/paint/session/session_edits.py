@@ -39,7 +39,7 @@ class SessionEdits:
     def __init__(
         self,
         bases: Sequence[Basis],
-        presents: Sequence[Floats],
+        current_looks: Sequence[Floats],
         store: Store,
         *,
         settings: Settings,
@@ -49,12 +49,12 @@ class SessionEdits:
     ) -> None:
         self.version, self.stroke = 0, -1
         try:
-            self.views, requests = restore(bases, presents, store)
+            self.views, requests = restore(bases, current_looks, store)
         except (LightpaintError, ArithmeticError, LookupError, TypeError, ValueError):
             if not store.has_file:
                 raise
             store.recover()
-            self.views, requests = restore(bases, presents, store)
+            self.views, requests = restore(bases, current_looks, store)
         self._moved_lights = MovedLights(plane_source, bases)
         self._moved_lights.begin(requests.placed, self.views)
         self.live_answer = LiveAnswer(
@@ -205,13 +205,13 @@ class SessionEdits:
 
     # Planes
 
-    def improve(self, bases: Sequence[Basis], presents: Sequence[Floats]) -> None:
+    def improve(self, bases: Sequence[Basis], current_looks: Sequence[Floats]) -> None:
         """Replace the bases by ones of more samples, with the same lights and sizes.
 
         An open stroke stays open.
         """
         moved = self._moved_lights.improve(bases, self.live_answer.requests.placed)
-        self.views.improve(moved, presents)
+        self.views.improve(moved, current_looks)
         self.live_answer.set_views(self.views.live)
         self._update_answer()
 

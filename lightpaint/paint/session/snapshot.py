@@ -113,7 +113,7 @@ class SessionSnapshot:
     def preview(
         self, weights: Doubles, view: int = 0, *, clean: DenoisedPlanes | None = None
     ) -> "ChangePreview":
-        """Return a preview in a view: the answer to these requests beside present weights, (n, 3).
+        """Return a preview in a view: the answer to these requests beside current weights, (n, 3).
 
         If the view is not painted, the text is about another one. clean: denoised planes of the
         view, for its pictures.

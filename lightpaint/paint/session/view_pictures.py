@@ -42,8 +42,8 @@ def offer_view(
     def offer(name: str, make: Any) -> None:
         table.offer(name_in_view(name, view.view), make)
 
-    rough = RoughPlanes(basis, view.present, small)
-    is_lit = bool(view.present.any())
+    rough = RoughPlanes(basis, view.current, small)
+    is_lit = bool(view.current.any())
     for k in range(len(basis.lights)):
         offer(f"plane/{k}", partial(_plane, basis, k))
         name = name_in_view(f"clean/{k}", view.view)
@@ -55,8 +55,8 @@ def offer_view(
             table.withdraw(name)
             name = name_in_view(f"plane/{k}", view.view)
         offer(f"thumb/{k}", partial(_thumbnail, table, name, basis))
-    offer("present", lambda: as_halves(view.present))
-    offer("look", lambda: picture_table.display_thumbnail(view.present, transform))
+    offer("present", lambda: as_halves(view.current))
+    offer("look", lambda: picture_table.display_thumbnail(view.current, transform))
     offer("painting", lambda: view.image.copy())
     offer("importance", lambda: view.importance.copy())
     if basis.features is not None:

@@ -51,7 +51,7 @@ class JobHost(Protocol):
     def snapshot_and_lighting(
         self, requests: SessionRequests | None = None
     ) -> tuple[SessionSnapshot, Lighting]:
-        """Return the present paintings and requests, and the last answer.
+        """Return the current paintings and requests, and the last answer.
 
         requests: replace those of the session, if given.
         """
@@ -159,7 +159,7 @@ class BackgroundJobs:
     def _exact_answer(
         self, check: Callable[[], None]
     ) -> tuple[tuple[Subject, ...], SessionSnapshot, Lighting]:
-        """Return the subjects with their present lights, the paintings, and the exact answer.
+        """Return the subjects with their current lights, the paintings, and the exact answer.
 
         check: raises to stop.
         """

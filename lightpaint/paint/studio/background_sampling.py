@@ -35,7 +35,7 @@ class SamplingHost(Protocol):
         """Continue the session with these bases."""
 
     def denoise_planes(self) -> None:
-        """Denoise the planes of the present bases, where that is not done yet."""
+        """Denoise the planes of the current bases, where that is not done yet."""
 
     def publish(self, message: Message) -> None:
         """Send a message to pages."""

@@ -13,7 +13,7 @@ from lightpaint.basis.cache.denoised_planes import (
     denoise_to_halves,
     read_denoised_planes,
 )
-from lightpaint.basis.denoised_mixes import denoise_present_look
+from lightpaint.basis.denoised_mixes import denoise_current_look
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.session.picture_table import Picture, plane_thumbnail
 from lightpaint.paint.session.session import Session
@@ -56,18 +56,18 @@ class PlaneDenoiser:
         self._small: dict[int, _ViewPlanes] = {}  # of blocks of pixels, as pages of results have
 
     def load_cached(self, bases: Sequence[Basis]) -> list[Floats]:
-        """Load cached planes. Returns the present look of each view, denoised."""
-        presents = []
+        """Load cached planes. Returns the current look of each view, denoised."""
+        current_looks = []
         for k, basis in enumerate(bases):
             factor = page_reduction(basis, len(basis.lights))
             cached = read_denoised_planes(basis, factor=factor) if self._use_cache else None
             if cached is None:
-                presents.append(denoise_present_look(basis))
+                current_looks.append(denoise_current_look(basis))
             else:
-                presents.append(cached.present)
+                current_looks.append(cached.current)
                 kept = self._by_view if cached.is_whole else self._small
                 kept[k] = _ViewPlanes(basis, cached, is_cached=True)
-        return presents
+        return current_looks
 
     def planes_for(self, bases: Sequence[Basis]) -> list[DenoisedPlanes | None]:
         """Return each view's denoised planes, of fewer samples if need be; None if it has none."""
@@ -99,7 +99,7 @@ class PlaneDenoiser:
             np.empty((len(basis.lights), *basis.size, 3), np.float16),
             np.ones(len(basis.lights)),
         )
-        planes = DenoisedPlanes(halves, scales, view.present)
+        planes = DenoisedPlanes(halves, scales, view.current)
         for k in range(len(basis.lights)):
             if not self._is_needed() or session.bases[view.view] is not basis:
                 return

@@ -94,7 +94,7 @@ def answer_png(basis: Basis, lighting: Lighting, transform: ViewTransform) -> by
 def _write_report(
     subjects: Sequence[Subject], snapshot: SessionSnapshot, progress: Progress
 ) -> list[Path]:
-    """Run `solve` on the present paintings; return the reports."""
+    """Run `solve` on the current paintings; return the reports."""
     answer = subjects[0].folder / ANSWER_FOLDER
     settings = replace(snapshot.settings, force=True)
     painted_subjects = [subjects[k] for k in snapshot.painted_views]

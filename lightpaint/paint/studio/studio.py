@@ -249,7 +249,7 @@ class Studio:
         return True
 
     def snapshot(self) -> SessionSnapshot:
-        """Return the present paintings and requests. Raises PaintError before there is a basis."""
+        """Return the current paintings and requests. Raises PaintError before there is a basis."""
         with self._lock:
             return self.session.snapshot()
 
@@ -370,22 +370,22 @@ class Studio:
                 self.on_failure(error)  # type: ignore[misc]
 
     def denoise_planes(self) -> None:
-        """Denoise the planes of the present bases, where that is not done yet, and keep them."""
+        """Denoise the planes of the current bases, where that is not done yet, and keep them."""
         self._denoiser.denoise(self.session)
         self._denoiser.write_cache()
 
     def use_bases(self, bases: Sequence[Basis]) -> None:
         """Continue the session with these bases."""
-        presents = self._denoiser.load_cached(bases)
+        current_looks = self._denoiser.load_cached(bases)
         clean_planes = self._denoiser.planes_for(bases)
         small_planes = self._denoiser.small_planes_for(bases)
         with self._lock:
             if not self.is_open:
                 raise StoppedError
             if self._session is None:
-                self._session, self._looks = self._make_session(bases, presents)
+                self._session, self._looks = self._make_session(bases, current_looks)
             else:
-                self._session.improve(bases, presents)
+                self._session.improve(bases, current_looks)
             session = self._session
             of_views = session.views, bases, clean_planes, small_planes
             for view, basis, clean, small in zip(*of_views, strict=True):
@@ -398,14 +398,14 @@ class Studio:
         self._exact_answers.notify()
 
     def _make_session(
-        self, bases: Sequence[Basis], presents: Sequence[Floats]
+        self, bases: Sequence[Basis], current_looks: Sequence[Floats]
     ) -> tuple[Session, LookLibrary]:
         """Return the session of the first bases, and its looks. Raises LightpaintError."""
         store = self._open_store(Identity.of(bases))
         try:
             session = Session(
                 bases,
-                presents,
+                current_looks,
                 store,
                 settings=self.subjects[0].settings,
                 transform=painting_transform(self.subjects, bases),

@@ -208,7 +208,7 @@ class Job:
     @staticmethod
     @keywords()
     def from_json(text: str) -> "Job":
-        """Return the job that `to_json` wrote, with the present files on this machine.
+        """Return the job that `to_json` wrote, with the files as they are on this machine.
 
         Raises LightpaintError for invalid text, and for a job that cannot run here.
         """
@@ -299,4 +299,4 @@ def _over_look(source: Target | Painting, target: Target, basis: Basis) -> Targe
     """Return `target`, read as painted over the look of `basis` if it was."""
     if not isinstance(source, Painting):
         return target
-    return source.over(basis.present_look, f"the look of {basis.origin.scene}") or target
+    return source.over(basis.current_look, f"the look of {basis.origin.scene}") or target

@@ -120,7 +120,7 @@ class Painting(ReadOnce):
     def over(self, look: Floats, name: str) -> Target | None:
         """Return the target if it was painted over that look and nothing else marks the paint.
 
-        look: (h, w, 3) linear, the present look of a basis or light groups called `name`.
+        look: (h, w, 3) linear, the current look of a basis or light groups called `name`.
         """
         target = self.content
         if not (self.find and target.everything) or self.template or self.paint != "look":

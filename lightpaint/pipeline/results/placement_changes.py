@@ -39,7 +39,7 @@ def _change_of(change: Move | AddedLight) -> LightChange:
 
 
 def spoken_change(change: Move | AddedLight) -> str:
-    """Return a light's change and gain: `spot_knot turned by 12°, slid 0.6: a fifth …`."""
+    """Return a light's change and gain: `spot_knot turned by 12°, slid by 0.6: a fifth …`."""
     if isinstance(change, Move):
         phrase = spoken_move(change)
     else:
@@ -52,7 +52,7 @@ def spoken_change(change: Move | AddedLight) -> str:
 
 
 def spoken_move(move: Move) -> str:
-    """Return a light's change with its errors: `turned by 12° ± 1°, slid 0.6 ± 0.05`."""
+    """Return a light's change with its errors: `turned by 12° ± 1°, slid by 0.6 ± 0.05`."""
     phrases = []
     if move.turn >= 0.5:
         error = f" ± {move.turn_error:.1g}°" if (move.turn_error or 0) >= LEAST_TURN_ERROR else ""
@@ -60,7 +60,7 @@ def spoken_move(move: Move) -> str:
     if move.distance > 0:
         is_told = (move.place_error or 0) >= LEAST_SHARE * move.distance
         error = f" ± {move.place_error:.1g}" if is_told else ""
-        phrases.append(f"slid {move.distance:.2g}{error}")
+        phrases.append(f"slid by {move.distance:.2g}{error}")
     if move.new.cutoff is not None and move.new.cutoff != move.old.cutoff:
         phrases.append(f"its cone ends at {move.new.cutoff:.0f}° (was {move.old.cutoff:.0f}°)")
     return ", ".join(phrases)

@@ -123,7 +123,7 @@ class PoseSearch:
         return self.fit.fitted(with_columns(others.fitted.columns, by_column([movable], columns)))
 
     def _places(self, others: Arrangement, movable: Movable) -> Floats:
-        """Return trial places of a light: free ones, and its present one."""
+        """Return trial places of a light: free ones, and its current one."""
         light = movable.light
         if light.site.position is None or not light.freedom.slides:
             return light.some_places(1, self._rng)

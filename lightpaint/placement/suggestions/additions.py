@@ -1,6 +1,6 @@
 """The gain of each candidate light as an additional column of the basis.
 
-Each candidate joins the present lights, the problem is solved again under the same constraints, and
+Each candidate joins the current lights, the problem is solved again under the same constraints, and
 the errors are compared. Some of many candidates seem to help by noise alone. So weights are solved
 with one half of the samples and errors measured with the other, and vice versa: fitted noise does
 not repeat.
@@ -58,7 +58,7 @@ def find_additions(
     """Find at most `count` lights to add, each with the largest gain given those before it.
 
     least: the smallest gain. surely: whether a gain has to exceed the noise, with all doubt in
-    favour of the present lights; if not, candidates that only seem to help are returned, too, for a
+    favour of the current lights; if not, candidates that only seem to help are returned, too, for a
     closer search. The search ends at the first failure.
     too_near: (m, m), pairs of candidates that exclude each other.
     """

@@ -49,7 +49,7 @@ BESIDE = 5
 #: samples of a pass.
 PIXELS, VALUES, SAMPLES = 2**14, 2**24, 2**19
 
-#: RMS error below which the present lights reproduce the painting.
+#: RMS error below which the current lights reproduce the painting.
 NOTHING_MISSED = 0.01
 
 #: Smallest gain, as a share of the error, that is worth a light.

@@ -14,7 +14,7 @@ UNBOUNDED = 1.0
 
 
 def with_own_colors(
-    lighting: Lighting, present: Mapping[str, RGB]
+    lighting: Lighting, current: Mapping[str, RGB]
 ) -> tuple[Lighting, tuple[str, ...]]:
     """Return the lighting for other programs, and the names of lights that differ from the answer.
 
@@ -23,20 +23,20 @@ def with_own_colors(
     intervals of all channels at some brightness, it keeps that colour, at its solved brightness or
     at the nearest one that fits. Colours with a constraint are kept.
 
-    present: emission in the scene by light name, in the same units.
+    current: emission in the scene by light name, in the same units.
     """
     names = []
     for light in lighting.lights:
-        rgb = _own_color(light, present[light.name])
+        rgb = _own_color(light, current[light.name])
         if rgb is not None:
             names.append(light.name)
             lighting = lighting.with_emission(light.name, rgb)
     return lighting, tuple(names)
 
 
-def _own_color(light: LightSetting, present: RGB) -> RGB | None:
+def _own_color(light: LightSetting, current: RGB) -> RGB | None:
     """Return the emission in the scene's colour; None if the painting determines another colour."""
-    color, solved_emission = np.array(present, np.float64), np.array(light.emission, np.float64)
+    color, solved_emission = np.array(current, np.float64), np.array(light.emission, np.float64)
     ends = light.interval
     if (
         light.is_fixed
@@ -59,7 +59,7 @@ def _own_color(light: LightSetting, present: RGB) -> RGB | None:
         atol=1e-6 * color.max() * solved_emission.max(),
     ):
         return None  # it has that colour already
-    # The range of factors for the present emission that fits all channels.
+    # The range of factors for the current emission that fits all channels.
     lowest, highest = 0.0, np.inf
     for (low, high), value in zip(ends_known, color, strict=True):
         if value == 0:

@@ -75,7 +75,7 @@ class Conversion:
     def frame(self, place: EmitterPlace, old_axes: Doubles | None = None) -> Doubles:
         """Return the axes x, y and z of a light in the program, as rows of (3, 3).
 
-        old_axes: its present axes there, whose lengths and roll are kept; None for a new light.
+        old_axes: its current axes there, whose lengths and roll are kept; None for a new light.
         """
         if place.direction is None:
             return np.eye(3) if old_axes is None else old_axes
@@ -88,20 +88,20 @@ class Conversion:
 
 
 def conversion_of(
-    places: Sequence[EmitterPlace], rotations: Sequence[Doubles], present: Mapping[str, Doubles]
+    places: Sequence[EmitterPlace], rotations: Sequence[Doubles], current: Mapping[str, Doubles]
 ) -> Conversion:
     """Return the conversion with the rotation that matches most lights; of equals the first.
 
-    present: positions of the lights in the program, by name.
+    current: positions of the lights in the program, by name.
     """
     places_known = [
         x for place in places for x in (old_position(place), place.position) if x is not None
     ]
     size = float(np.abs(places_known).max(initial=0.0))
     pairs = [
-        (old_place, present[place.name])
+        (old_place, current[place.name])
         for place in places
-        if place.name in present and (old_place := old_position(place)) is not None
+        if place.name in current and (old_place := old_position(place)) is not None
     ]
     conversions = [Conversion(rotation, size) for rotation in rotations]
     counts = [sum(way.is_at(a, b) for a, b in pairs) for way in conversions]

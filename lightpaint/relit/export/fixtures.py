@@ -66,7 +66,7 @@ class Fixture:
     """A light with its setting.
 
     red, green, blue: linear emission in `unit`. y: its luminance. lumen, luminous: None unless the
-    lighting has an absolute scale. kelvin, duv, hex: None if undefined. dmx: None for kept lights.
+    lighting has an absolute scale. kelvin, duv, hex: None if undefined. dmx: None for fixed lights.
     emitters: its emitters in the scene. place: place of the emitter, if it has only one and the
     place is known.
     """

@@ -67,7 +67,7 @@ def _placed(places: Sequence[EmitterPlace], up: Position) -> dict[str, str]:
     """Return the places in the form of the script, in the scene's axes."""
     rotations = axis_conversions(up, UP)
     own_conversion = conversion_of(places, [np.eye(3)], {})
-    present = {place.name: old for place in places if (old := old_position(place)) is not None}
+    current = {place.name: old for place in places if (old := old_position(place)) is not None}
     moved_places, new_places = {}, {}
     for place in filter(is_changed, places):
         cone = _cone(place) if has_new_cone(place) else None
@@ -78,7 +78,7 @@ def _placed(places: Sequence[EmitterPlace], up: Position) -> dict[str, str]:
             moved_places[place.name] = (place.position, place.direction, cone)
     return {
         "rotations": repr([np.round(rotation, 12).tolist() for rotation in rotations]),
-        "present": _table(present),
+        "present": _table(current),
         "same_place": repr(SAME_PLACE * own_conversion.size),
         "moved": _table(moved_places),
         "added": _table(new_places),

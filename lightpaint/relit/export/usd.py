@@ -64,7 +64,7 @@ def usd_overrides(
 
     Args:
         emitters: Name, Mitsuba's parameter and emission of each adjusted emitter; the parameter is
-            "" for a multiple of the present emission, which is left to the user.
+            "" for a multiple of the current emission, which is left to the user.
         stage: A USD file with lights of these names, which becomes a sublayer. Without it, lights
             are prims below /lights.
         folder: The folder of the layer.

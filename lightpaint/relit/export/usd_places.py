@@ -134,7 +134,7 @@ class UsdPlaces:
         return not expected or any(self._conversion.is_at(x, point) for x in expected)
 
     def _place(self, path: str, place: EmitterPlace, old: Doubles | None) -> None:
-        """Write transform and cone of a prim. old: (4, 4), its present transform to the world."""
+        """Write transform and cone of a prim. old: (4, 4), its current transform to the world."""
         world = np.eye(4)
         world[:3, :3] = self._conversion.frame(place, None if old is None else old[:3, :3])
         if place.position is not None:

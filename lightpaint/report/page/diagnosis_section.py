@@ -22,7 +22,7 @@ from lightpaint.report.answer_pictures import (
     over_unpainted,
     round_up,
 )
-from lightpaint.report.diagnosis_sentences import error_sentences, spoken_hold
+from lightpaint.report.diagnosis_sentences import error_sentences, spoken_hold, spoken_shares
 from lightpaint.report.measures import brightness, energy_shares, relative_errors
 from lightpaint.report.page.figures import PagePicture, figure, signed_scale
 from lightpaint.report.page.html import breakable_name, fold, name_list, row, share_cell, table
@@ -130,15 +130,20 @@ def _shares(diagnosis: Diagnosis) -> str:
     d = diagnosis
     by_what = "by zero or by the constraints" if d.is_constrained else "needs light below zero"
     parts = [
-        ("out of reach of any mix", d.unreachable),
-        (f"forbidden: {by_what}", d.forbidden),
-        *([("noise of the basis", d.noise)] if d.noise > 0 else []),
-        *([("noise of the painting", d.painting_noise)] if d.painting_noise > 0 else []),
+        ("unreachable", "out of reach of any mix", d.unreachable),
+        ("forbidden", f"forbidden: {by_what}", d.forbidden),
     ]
-    if d.compromise > 0:
-        parts.insert(2, ("given up for the other views", d.compromise))
-    shares = [(label, d.share(part)) for label, part in parts]
-    rows = [row(label, share_cell(spoken_percent(x), x)) for label, x in shares]
+    optional_parts = [
+        ("compromise", "given up for the other views", d.compromise),
+        ("noise", "noise of the basis", d.noise),
+        ("painting_noise", "noise of the painting", d.painting_noise),
+    ]
+    parts += [part for part in optional_parts if part[2] > 0]
+    percents = spoken_shares(d)
+    rows = [
+        row(label, share_cell(percents.get(key, spoken_percent(d.share(energy))), d.share(energy)))
+        for key, label, energy in parts
+    ]
     if d.ignored > 0:
         times = d.ignored / d.total if d.total > 0 else np.inf
         text = f"{times:.2g} times as much" if np.isfinite(times) else "all"
@@ -224,7 +229,7 @@ def _bounds(diagnosis: Diagnosis) -> str:
     meaning = (
         "<p>Gain: how much of the difference would go if this limit alone were removed. It is a"
         " share of everything that counts, including the unpainted parts that are held. A light"
-        " that is kept, locked, limited or tied could then have any emission. A light that is "
+        " that is fixed, locked, limited or tied could then have any emission. A light that is "
         "off for no other reason would go below zero and take light away, which hints at other "
         "lights that spill where they should not.</p><p>Slope: the change of the objective, per"
         " unit, if the limit were raised a little.</p>"
@@ -245,4 +250,4 @@ def _bound_words(bound: Bound) -> str:
 def _multiplier(bound: Bound) -> str:
     numbers = [f"{value:+.3g}".replace("-", "−") if value else "0" for value in bound.multiplier]
     per = {"emission": "unit of R, G, B", "luminance": "unit of luminance"}
-    return f"{', '.join(numbers)} <small>per {per.get(bound.per, 'present brightness')}</small>"
+    return f"{', '.join(numbers)} <small>per {per.get(bound.per, 'current brightness')}</small>"

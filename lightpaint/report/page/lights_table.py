@@ -165,10 +165,10 @@ def change(light: BasisLight, setting: LightSetting) -> str:
     anything.
     """
     if light.is_fixed:
-        return "kept as it is"
+        return "fixed"
     if not any(setting.reached):
         return "unchanged: reaches nothing painted"
-    note = f"<small>{unreached_channels(setting)} kept: reaches nothing painted</small>"
+    note = f"<small>{unreached_channels(setting)} unchanged: reaches nothing painted</small>"
     return _changed(light, setting) + (note if setting.is_partly_reached else "")
 
 
@@ -229,9 +229,9 @@ def _rgb(emission: RGB, reached: Sequence[bool] = ALL_REACHED) -> str:
 
 
 def largest_shares(basis: Basis, lighting: Lighting) -> Doubles:
-    """Return the larger of the present and the solved share of each light, (n,)."""
-    present_shares = energy_shares(basis, Lighting.present(basis))
-    return np.maximum(energy_shares(basis, lighting), present_shares)
+    """Return the larger of the current and the solved share of each light, (n,)."""
+    current_shares = energy_shares(basis, Lighting.current(basis))
+    return np.maximum(energy_shares(basis, lighting), current_shares)
 
 
 def most_visible_lights(basis: Basis, lighting: Lighting) -> Indices:

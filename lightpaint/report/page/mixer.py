@@ -99,13 +99,13 @@ def mixer_assets() -> str:
 def _shown_planes(
     basis: Basis, lighting: Lighting, shown: Indices, *, is_clean: bool
 ) -> tuple[list[int], list[dict[str, Any]]]:
-    """Return size and planes of each light; then of all others, in the answer and at present."""
+    """Return size and planes of each light; then of all others, in the answer and in the scene."""
     other_indices = np.setdiff1d(np.arange(len(basis.lights)), shown)
     if not other_indices.size:
         return planes_for_page(basis, is_clean=is_clean)
     looks = [
         np.where(np.isin(np.arange(len(x)), other_indices)[:, None], x, 0)
-        for x in (lighting.weights_for(basis), basis.present_weights)
+        for x in (lighting.weights_for(basis), basis.current_weights)
     ]
     return _compact_planes(basis, shown, looks, is_clean=is_clean)
 
@@ -195,7 +195,7 @@ def _rest(basis: Basis, lighting: Lighting, shown: Indices) -> dict[str, Any] | 
     return {
         "label": f"{len(other_indices)} more lights together",
         "answer": by_name(lighting.weights_for(basis)),
-        "present": by_name(basis.present_weights),
+        "present": by_name(basis.current_weights),
     }
 
 

@@ -80,7 +80,7 @@ def lighting_html(lighting: Lighting) -> str:
     def row(k: int) -> Sequence[str]:
         light = lighting.lights[k]
         light_photometry = lighting.photometry(light)
-        constraint = "kept" if light.is_fixed else light.constraint
+        constraint = "fixed" if light.is_fixed else light.constraint
         constraint = ", ".join(filter(None, (constraint, UNTOLD_HERE if light.untold else "")))
         colour, output = (
             _swatch(light.emission, light_photometry),
@@ -114,7 +114,7 @@ def solution_html(solution: Solution) -> str:
         now, new = _rgb(light.emission), _rgb(setting.emission)
         return light.name, colour, now, new, change_text, setting.constraint
 
-    change_size = np.abs(solution.weights - basis.present_weights) * basis.totals @ LUMINANCE
+    change_size = np.abs(solution.weights - basis.current_weights) * basis.totals @ LUMINANCE
     headings = ("light", "colour", "now", "new", "change", "asked")
     return f"<p>{escape(str(solution.certificate))}</p>" + _table(headings, row, change_size)
 
@@ -156,7 +156,7 @@ def look_html(
 @png_of.register
 def basis_png(basis: Basis) -> bytes:
     """Return a contact sheet of each light alone, at exposures of their own."""
-    power = (basis.present_weights * basis.totals) @ LUMINANCE
+    power = (basis.current_weights * basis.totals) @ LUMINANCE
     chosen = _largest_indices(power, MAX_PICTURES)
     pictures = [
         _wide(thumbnail(basis.planes.plane(k), basis.emitters_seen, is_clean=True)[0])

@@ -38,7 +38,7 @@ _GENERATED_ID = re.compile(r"(__)?elm__\d+|_(unnamed|arg)_\d+")
 class Emitter:
     """An emitter of a scene.
 
-    kind: how it is scaled; None if lightpaint cannot scale it. emission: present linear RGB
+    kind: how it is scaled; None if lightpaint cannot scale it. emission: current linear RGB
     emission in the unit of `kind`; 1 if that is a multiple. file, offset: position of its element:
     index into Scene.files, byte offset of its `<`. obstacle: why it cannot be adjusted, phrased to
     follow its name; "" if it can. unit_flux: watts per channel at an emission of 1; None if that is

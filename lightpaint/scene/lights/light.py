@@ -27,7 +27,7 @@ class Light:
 
     parameter, unit: what a weight means. With the unit MULTIPLE the weight multiplies each member's
     own emission; with any other unit it is the emission of each member.
-    emission: present RGB emission in `unit`.
+    emission: current RGB emission in `unit`.
     is_scalar: whether it has one weight for all channels instead of three. is_fixed: whether it is
     the light of all emitters that stay as they are, with weight 1. is_found: whether its members
     were grouped automatically because they are many, similar and unnamed.
@@ -44,7 +44,7 @@ class Light:
 
     def __repr__(self) -> str:
         emission = " ".join(f"{v:.4g}" for v in self.emission)
-        note = ", kept" if self.is_fixed else ""
+        note = ", fixed" if self.is_fixed else ""
         count_text = "" if len(self.members) == 1 else f", {len(self.members)} emitters"
         description = f"{self.plugin} {self.parameter} {emission} {self.unit}"
         return f"Light({self.name!r}, {description}{count_text}{note})"
@@ -186,7 +186,7 @@ def settings_for(
             settings |= {m.node: _setting(m, rgb) for m in light.members}
         elif tuple(rgb) != AS_AUTHORED:
             raise SceneError(
-                f"the kept light can be loaded black or unchanged, not multiplied by {rgb}"
+                f"the fixed light can be loaded black or unchanged, not multiplied by {rgb}"
             )
     sampling_weights = {emitter.node: emitter.sampling_weight for emitter in emitters}
     if not any(

@@ -152,7 +152,7 @@ def _matrix(parameters: Any) -> Doubles:
 class Motion:
     """The motion that gives a light a pose: a rigid transform, and the new cone.
 
-    matrix: (4, 4), maps present points of the light to new ones. site: the new site. target: the
+    matrix: (4, 4), maps current points of the light to new ones. site: the new site. target: the
     point it aims at, if one was given. changes_cone: whether the cone changes.
     """
 

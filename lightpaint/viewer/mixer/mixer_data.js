@@ -9,7 +9,7 @@ import { unpacked } from './packed_picture.js';
 
 /** lights: those with their own plane, in the order of the planes. shown: indices of those with
  * sliders; the others stay as in the look. rest: all other lights together, as in the answer and as
- * at present: two more planes. lighting: the answer's file.
+ * in the scene: two more planes. lighting: the answer's file.
  * @typedef {{size: [number, number], planes: Compact[], lights: Light[], shown?: number[],
  *   rest: {label: string, answer: Record<string, RGB>, present: Record<string, RGB>} | null,
  *   kelvins: [number, RGB][], transform: {stops: number, low: number, high: number,

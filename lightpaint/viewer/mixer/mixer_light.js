@@ -8,7 +8,7 @@ import { createElement, createSlider } from './page_elements.js';
  * @typedef {{name: string, unit: string, isFixed: boolean, isScalar: boolean, isRest?: boolean,
  *   present: RGB, answer: RGB, kelvin: {present: number | null, answer: number | null}}} Light */
 
-/** Ends of the dimmer, in stops from the present; the left one is off. */
+/** Ends of the dimmer, in stops from the current level; the left one is off. */
 const [DARKEST, BRIGHTEST] = [-8, 6];
 
 /** @param {ArrayLike<number>} rgb */

@@ -134,7 +134,7 @@ def test_of_a_group_without_a_pixel_nobody_is_told_to_paint_it(tmp_path: Path):
     _plain(tmp_path / "p.exr", 0.5 * a + b)
     done = run(tmp_path, "solve", "a.exr", "p.exr")
     assert done.returncode == 0
-    assert "the picture shows nothing of old: kept as it is" in done.stderr
+    assert "the picture shows nothing of old: left unchanged" in done.stderr
     assert "of the light of the beauty is in no group" in done.stderr
     assert "paint where it shines" not in done.stderr
     rows = (tmp_path / "p" / "lights.csv").read_text().splitlines()

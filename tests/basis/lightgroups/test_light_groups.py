@@ -53,7 +53,7 @@ def test_groups_that_add_up(tmp_path: Path, written: Writer):
     assert not basis.is_fixed.any()
     assert groups.missing is not None
     assert groups.missing < FLOAT32
-    assert (basis.present_weights == 1).all()
+    assert (basis.current_weights == 1).all()
     assert {light.unit for light in basis.lights} == {"× as rendered"}
     assert any("add up to the beauty" in remark for remark in groups.remarks)
     assert not any("WARNING" in remark for remark in groups.remarks)
@@ -98,7 +98,7 @@ def test_groups_brighter_than_the_beauty_are_a_warning(tmp_path: Path):
     assert groups.exceeding is not None
     assert groups.exceeding > 0.1
     assert any("WARNING" in remark and "clamped" in remark for remark in groups.remarks)
-    total = groups.basis.mix(groups.basis.present_weights)
+    total = groups.basis.mix(groups.basis.current_weights)
     np.testing.assert_allclose(total, layers["ViewLayer.Combined"], atol=10 * FLOAT32)
 
 
@@ -154,7 +154,7 @@ def test_messages_call_the_rest_by_its_name(tmp_path: Path):
     groups = read_light_groups(
         interleaved(tmp_path / "a.exr", {"RGBA_rest": image, "RGBA": 2 * image})
     )
-    assert any("kept as it is, as the light rest_" in x for x in groups.remarks)
+    assert any("becomes the fixed light rest_" in x for x in groups.remarks)
     layers = {"RGBA_rest": 2 * image, "RGBA": image}
     groups = read_light_groups(interleaved(tmp_path / "a.exr", layers))
     assert any("which the light rest_ subtracts" in x for x in groups.remarks)
@@ -412,7 +412,7 @@ def test_a_file_of_cycles(tmp_path: Path):
     # Of groups that the renderer adds in float32.
     assert groups.missing + groups.exceeding < 1e-6
     assert groups.beauty is not None
-    whole = basis.mix(basis.present_weights)
+    whole = basis.mix(basis.current_weights)
     np.testing.assert_allclose(whole, groups.beauty.image, rtol=1e-5, atol=1e-6)
     wanted = np.random.default_rng(0).uniform(0, 3, (6, 3))
     wanted[2] = 0

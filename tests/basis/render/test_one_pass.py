@@ -201,9 +201,9 @@ def test_point_light_over_a_plane_has_its_closed_form(tmp_path: Path) -> None:
 
 def test_the_present_look_comes_back_from_present_weights(small_room: Scene) -> None:
     planes = one_pass(small_room, seed=9, spp=16)
-    present = np.array([light.emission for light in small_room.lights])
+    current = np.array([light.emission for light in small_room.lights])
     rendered = mitsuba_render(small_room, seed=9, spp=16)
-    mixed = np.einsum("nhwc,nc->hwc", planes, present)
+    mixed = np.einsum("nhwc,nc->hwc", planes, current)
     assert np.abs(mixed - rendered).max() <= 1e-5 * rendered.max()
 
 
@@ -402,7 +402,7 @@ def test_planes_of_the_scenes_that_come_along_add_up_to_their_render(name: str, 
     scene = load_scene(REPOSITORY / "scenes" / name / "scene.xml").reduced(size)
     basis = render_basis(scene, spp=128)
     rendered = render(scene, spp=256, stream=Stream.VERIFICATION)
-    weights = basis.present_weights.astype(np.float32)[:, None, None, :]
+    weights = basis.current_weights.astype(np.float32)[:, None, None, :]
     gap = (basis.images * weights).sum(axis=0, dtype=np.float64) - rendered.image
     noise = np.square((basis.half_differences * weights).sum(axis=0), dtype=np.float64)
     noise += np.square(rendered.half_difference, dtype=np.float64)

@@ -44,11 +44,11 @@ def test_a_tied_plane_is_the_sum_of_its_members_and_the_rest_that_of_the_others(
     tied = load_scene(path, groups=TIED, lights=["pair", "mix"])
     assert [light.name for light in tied.lights] == ["mix", "pair", "rest"]
     single = planes_by_name(alone, seed=3)
-    present = {e.name: single[e.name] * np.float32(e.emission) for e in alone.emitters}
+    current = {e.name: single[e.name] * np.float32(e.emission) for e in alone.emitters}
     wanted = {
         "pair": single["bulb"] + single["twin"],  # of one colour, so per unit of it
-        "mix": present["panel"] + present["sun"],  # as authored
-        "rest": present["beam"] + present["sky"],
+        "mix": current["panel"] + current["sun"],  # as authored
+        "rest": current["beam"] + current["sky"],
     }
     found = planes_by_name(tied, seed=3)
     for name, plane in wanted.items():

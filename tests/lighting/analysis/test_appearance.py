@@ -45,7 +45,7 @@ def _over(look: Any, where: Any, color: Any, *, alpha: float = 1.0) -> Target:
 
 
 def _look(basis: Any) -> Any:
-    return basis.mix(basis.present_weights)
+    return basis.mix(basis.current_weights)
 
 
 def test_the_mean_is_over_the_paint_weighted_and_against_the_paint(make_basis: Any):
@@ -241,7 +241,7 @@ def test_what_becomes_of_the_rest_is_seen(make_basis: Any):
     solution = solve(basis, target, hold=0.0, constraints=Constraints.of({"left": {"off": True}}))
     appearance = compare_appearance(solution)
     mixed = solution.basis.mix(solution.weights)
-    start = basis.present_weights * np.array([0, 1, 1, 1])[:, None]
+    start = basis.current_weights * np.array([0, 1, 1, 1])[:, None]
     before = basis.mix(start)
     worst = max(float(delta_e(mixed[0, x], before[0, x])) for x in (12, 24, 36))
     assert appearance.unpainted_change is not None
@@ -399,7 +399,7 @@ def test_words_do_not_depend_on_how_finely_it_is_rendered(make_basis: Any):
     basis = _left_and_right(make_basis)
     target = _over(_look(basis), (slice(None), slice(0, 24)), 0.5)
     large = make_basis(
-        images=np.kron(basis.images, np.ones((1, 16, 16, 1))), emission=basis.present_weights
+        images=np.kron(basis.images, np.ones((1, 16, 16, 1))), emission=basis.current_weights
     )
     painted = replace(
         target,

@@ -164,11 +164,11 @@ def test_the_look_that_is_kept_has_the_noise_of_the_prediction(make_basis: Any):
     noise[0, :, 9:] = np.random.default_rng(3).normal(0, 0.3, (SIZE[0], 9, 3))
     basis = make_basis(images=np.ones((1, *SIZE, 3)) + noise, half_differences=noise)
     left = np.broadcast_to(np.arange(SIZE[1]) < 9, SIZE)
-    brighter = np.broadcast_to(1.5 * basis.present_weights[0], (*SIZE, 3))
+    brighter = np.broadcast_to(1.5 * basis.current_weights[0], (*SIZE, 3))
     target = replace(_target(brighter, left), over_look=True)
     solution = solve(basis, target, unpainted=1.0, space="linear")
     found = diagnose(solution)
-    moved = solution.weights[0] - basis.present_weights[0]
+    moved = solution.weights[0] - basis.current_weights[0]
     assert moved.min() > 0
     # The residual on the right is (now − w) Φ, whose half difference is (now − w) h, not w h.
     expected = np.square(moved * noise[0, :, 9:]).sum()

@@ -33,7 +33,7 @@ def studio(make_basis: Any) -> tuple[Any, Target]:
         names=names,
         emission=[[0.1] * 3] * 3,
     )
-    image, importance = basis.present_look.copy(), np.zeros(SIZE, np.float32)
+    image, importance = basis.current_look.copy(), np.zeros(SIZE, np.float32)
     importance[:, :60] = 1
     image[:, :60] *= rng.lognormal(0.9, 0.2, (SIZE[0], 60, 1)) * [0.6, 1, 0.6]
     target = Target.of(image.astype(np.float32), importance, name="painting")

@@ -24,7 +24,7 @@ def room(tmp_path: Path) -> Path:
 
 
 def _target(basis: lp.Basis) -> lp.Target:
-    return lp.Target.of(0.7 * basis.mix(basis.present_weights))
+    return lp.Target.of(0.7 * basis.mix(basis.current_weights))
 
 
 def _emission(solution: lp.Solution, name: str) -> Any:

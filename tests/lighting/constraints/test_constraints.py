@@ -50,7 +50,7 @@ def _solved(basis: Any, target: Target, **asked: Any) -> tuple[Any, float, Any]:
     return w, float(((A @ w.ravel() - y) ** 2).sum()), solution
 
 
-def _present(basis: Any) -> Any:
+def _current(basis: Any) -> Any:
     return np.array([light.emission for light in basis.lights])
 
 
@@ -139,11 +139,11 @@ def test_a_range_of_white_is_as_good_as_the_best_of_its_pieces(make_basis: Any, 
 def test_limits_of_luminance(make_basis: Any, seed: int) -> None:
     basis, target = _problem(make_basis, seed)
     A, y = stacked(basis, target)
-    present = float(_present(basis)[1] @ LUMINANCE)
+    current = float(_current(basis)[1] @ LUMINANCE)
     whites = list(pairwise(white_range(2700, 6500).colors))
     for limits, lowest, most in (
         ({"max": 0.2}, 0.0, 0.2),
-        ({"max": "40%"}, 0.0, 0.4 * present),
+        ({"max": "40%"}, 0.0, 0.4 * current),
         ({"min": 0.5, "max": 0.9}, 0.5, 0.9),
     ):
         for extra, mixes in (({}, [np.eye(3)]), ({"kelvin": [2700, 6500]}, whites)):
@@ -162,7 +162,7 @@ def test_limits_of_luminance(make_basis: Any, seed: int) -> None:
 def test_ties_locks_and_off(make_basis: Any, seed: int) -> None:
     basis, target = _problem(make_basis, seed)
     A, y = stacked(basis, target)
-    now = _present(basis)
+    now = _current(basis)
     # One dimmer: the columns of both, as they shine now, are one.
     w, mine, _ = _solved(basis, target, tie=["l0", "l2"])
     C = np.zeros((12, 7))
@@ -188,7 +188,7 @@ def test_ties_locks_and_off(make_basis: Any, seed: int) -> None:
 def test_the_pull_to_the_present(make_basis: Any, seed: int) -> None:
     basis, target = _problem(make_basis, seed, scalar=(2,))
     A, y = stacked(basis, target)
-    now, strength = _present(basis), 0.05
+    now, strength = _current(basis), 0.05
     power = np.square(basis.images, dtype=np.float64).sum(axis=(1, 2))
     root = np.sqrt(strength * power).ravel()
     rows, aims = np.vstack([A, np.diag(root)]), np.concatenate([y, root * now.ravel()])
@@ -205,7 +205,7 @@ def _feasible(rng: Any, basis: Any, answer: Any) -> Any:
     """
     whites = white_range(2700, 5000)
     [place] = np.floor(whites.places(answer[[2]]) - 1e-9).clip(0)
-    now, w = _present(basis), rng.exponential(1, (7, 3))
+    now, w = _current(basis), rng.exponential(1, (7, 3))
     w[0] = now[0]
     w[1] = rng.exponential() * kelvin_to_rgb(3200)
     w[1] *= min(1, 0.3 / (w[1] @ LUMINANCE))
@@ -354,7 +354,7 @@ def test_what_stands_later_and_names_go_before(make_basis: Any) -> None:
     both = below.and_then(Constraints.of({"l*": {"lock": True}}, sparse=2))
     assert both.sparse == 2
     w = solve(basis, target, constraints=replace(both, sparse=None)).lighting.weights_for(basis)
-    np.testing.assert_array_equal(w, _present(basis))
+    np.testing.assert_array_equal(w, _current(basis))
     again = below.and_then(Constraints.of({"l2": {"off": False}}))
     assert solve(basis, target, constraints=again).lighting.weights_for(basis)[2].any()
 
@@ -446,8 +446,8 @@ def test_wishes_for_all_lights_that_mean_nothing(asked: Any, words: str) -> None
         ({"light": {"sky": {"lock": "3200K"}}}, "'sky' can only be dimmed"),
         ({"light": {"sky": {"limits": {"max": [1, 2, 3]}}}}, "'sky' can only be dimmed"),
         ({"tie": [{"lights": ["sky", "lamp_1"], "color": "3200K"}]}, "'sky' can only be dimmed"),
-        ({"light": {"dark": {"limits": {"max": "40%"}}}}, "'dark' is off at present"),
-        ({"tie": ["dark", "lamp_1"]}, "'dark' is off at present"),
+        ({"light": {"dark": {"limits": {"max": "40%"}}}}, "'dark' is currently off"),
+        ({"tie": ["dark", "lamp_1"]}, "'dark' is currently off"),
         ({"tie": ["lamp_1"]}, "is one light: a tie has at least two"),
         ({"tie": [["lamp_1", "sky"], ["lamp_*"]]}, "'lamp_1' is in two ties"),
         ({"tie": ["lamp_*"], "light": {"lamp_1": {"kelvin": [2700, 5000]}}}, "is on the dimmer"),
@@ -500,7 +500,7 @@ def test_wishes_that_do_not_fit_the_lights(make_basis: Any, asked: Any, words: s
 
 def test_ties_of_lights_with_colours_and_limits(make_basis: Any) -> None:
     basis, target = _problem(make_basis, 8)
-    now = _present(basis) @ LUMINANCE
+    now = _current(basis) @ LUMINANCE
     w, _, _ = _solved(
         basis,
         target,
@@ -516,7 +516,7 @@ def test_ties_of_lights_with_colours_and_limits(make_basis: Any) -> None:
 def test_who_holds_a_light_holds_its_dimmer(make_basis: Any) -> None:
     """As if each of the lights on it had been held, at the same share of the present."""
     basis, target = _problem(make_basis, 8)
-    now, tie = _present(basis), [["l0", "l1"]]
+    now, tie = _current(basis), [["l0", "l1"]]
     level = 0.3 * float(now[0] @ LUMINANCE)
     warm = (level * kelvin_to_rgb(3200)).tolist()
     for lock, first, share in (
@@ -557,7 +557,7 @@ def test_the_best_few_lights(make_basis: Any, seed: int) -> None:
     basis, target = _problem(make_basis, seed, 6)
     A, y = stacked(basis, target)
     w0 = np.zeros((6, 3))
-    w0[5] = _present(basis)[5]
+    w0[5] = _current(basis)[5]
     w, mine, solution = _solved(basis, target, sparse=2, light={"l5": {"lock": True}})
     on = np.flatnonzero(w[:5].any(axis=1))
     assert len(on) <= 2

@@ -134,15 +134,15 @@ def test_a_light_beyond_its_whites_says_to_which_side(make_basis: Any) -> None:
 @pytest.mark.parametrize("space", ["linear", "display"])
 def test_under_the_brush_all_lights_are_white(make_basis: Any, space: Any) -> None:
     basis = make_basis(4, SIZE, seed=5)
-    view = LiveView(basis, image := basis.present_look.copy(), weight := np.zeros(SIZE, np.float32))
+    view = LiveView(basis, image := basis.current_look.copy(), weight := np.zeros(SIZE, np.float32))
     fit = resolve_for_targets(
         lp.Fit(colors="white", space=space, hold=0.3), [_asked_through(basis)]
     )
     live = LiveSolver([view], fit=fit, constraints=lp.Constraints())
-    answer = live.answer(basis.present_weights)
-    present = basis.present_weights
-    np.testing.assert_allclose(luminance(answer), luminance(present), rtol=1e-9)
-    _are_nearest(answer, present)
+    answer = live.answer(basis.current_weights)
+    current = basis.current_weights
+    np.testing.assert_allclose(luminance(answer), luminance(current), rtol=1e-9)
+    _are_nearest(answer, current)
     rng = np.random.default_rng(1)
     for _ in range(12):
         top, left = rng.integers(0, 6, 2)
@@ -163,12 +163,12 @@ def test_under_the_brush_all_lights_are_white(make_basis: Any, space: Any) -> No
 
 def _asked_through(basis: lp.Basis) -> lp.Target:
     one = np.ones(SIZE, np.float32)
-    return lp.Target("t", basis.present_look, one, False, through_view=True, over_look=True)
+    return lp.Target("t", basis.current_look, one, False, through_view=True, over_look=True)
 
 
-def _are_nearest(answer: Any, present: Any) -> None:
+def _are_nearest(answer: Any, current: Any) -> None:
     """Whether each light has the white at its own temperature."""
-    for w, now in zip(answer, present, strict=True):
+    for w, now in zip(answer, current, strict=True):
         kelvin, duv = cct_and_duv(w)  # type: ignore[misc]
         assert abs(duv) < SEEN
         if (found := cct_and_duv(now)) is not None:

@@ -45,7 +45,7 @@ def _room(make_basis: Any, seed: int) -> lp.Basis:
 
 
 def _painting(basis: lp.Basis, tint: Any, *, brighter: float = 1.7) -> tuple[Any, Any]:
-    image, weight = basis.present_look.copy(), np.zeros(SIZE, np.float32)
+    image, weight = basis.current_look.copy(), np.zeros(SIZE, np.float32)
     image[PAINTED] *= brighter * tint
     image[BLACK] = 0
     weight[PAINTED] = weight[BLACK] = 1
@@ -114,12 +114,12 @@ def test_a_red_lamp_keeps_nobody_from_painting_green(make_basis: Any) -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_nor_under_the_brush(make_basis: Any, seed: int, space: Any) -> None:
     basis = _room(make_basis, seed)
-    image, weight = basis.present_look.copy(), np.zeros(SIZE, np.float32)
+    image, weight = basis.current_look.copy(), np.zeros(SIZE, np.float32)
     view = LiveView(basis, image, weight)
     fit = resolve_for_targets(lp.Fit(space=space), [_target(*_painting(basis, WARM))])
     live = LiveSolver([view], fit=fit, constraints=lp.Constraints())
     painted, whole = _painting(basis, WARM)
-    answer = basis.present_weights
+    answer = basis.current_weights
     for region in (PAINTED, BLACK):
         for row in range(region[0].start, region[0].stop):
             its = slice(row, row + 1), region[1]
@@ -134,8 +134,8 @@ def test_gamuts_are_no_wider_than_what_is_painted(make_basis: Any) -> None:
     target = _target(*_painting(basis, WARM))
     gamuts = problem.Problem.of(basis, target).full.gamuts
     assert gamuts is not None
-    allowed = np.vstack([white_range(2200, 9000).colors, WARM * basis.present_weights])
-    allowed = np.vstack([allowed, basis.present_weights, WARM * np.eye(3).sum(axis=0)])
+    allowed = np.vstack([white_range(2200, 9000).colors, WARM * basis.current_weights])
+    allowed = np.vstack([allowed, basis.current_weights, WARM * np.eye(3).sum(axis=0)])
     reach = (chromaticity(allowed) @ DIRECTIONS.T).max(axis=0)
     for gamut in (gamuts[k] for k in range(len(basis.lights))):
         # What several lamps mix that have other colours is between these.

@@ -27,16 +27,16 @@ def _problem(make_basis: Any, seed: int, n: int = 5) -> tuple[NormalEquations, R
     basis = make_basis(n, SIZE, seed=seed, emission=rng.uniform(0.5, 1, (n, 3)).tolist())
     wanted = basis.mix(rng.exponential(1, (n, 3)) * (1, 1, 0.3)).astype(np.float32)
     weight = rng.random(SIZE).astype(np.float32)
-    present = basis.present_weights
+    current = basis.current_weights
     gamuts = Gamuts(
         # The look is what is painted: no colours but their own, and whites.
-        lambda: PaintedLight.of([(basis, basis.present_look, weight)]),
+        lambda: PaintedLight.of([(basis, basis.current_look, weight)]),
         basis.power,
-        present,
+        current,
     )
     reduction = reduce_lights(lp.Constraints(), basis.lights, lp.Fit(colors="gentle"), gamuts)
     equations = NormalEquations.of(basis, wanted, weight)
-    return equations, reduction, present
+    return equations, reduction, current
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -45,12 +45,12 @@ def test_sides_lead_to_the_optimum_over_whole_gamuts(
 ) -> None:
     """That of mixes of all corners, which is certified."""
     monkeypatch.setattr(gamut_bounds, "MAX_TURNS", 60)
-    equations, reduction, present = _problem(make_basis, seed)
-    whole, best = next_whites(equations, reduction, present)
+    equations, reduction, current = _problem(make_basis, seed)
+    whole, best = next_whites(equations, reduction, current)
     assert best.converged
     assert whole.confined_knobs  # else there is nothing to keep within anything
-    kept, weights = solve_near_sides(equations, reduction, present, method="polished")
-    assert not (reduction.gamuts or Gamuts).lights_outside(weights, np.arange(len(present)))  # type: ignore[arg-type]
+    kept, weights = solve_near_sides(equations, reduction, current, method="polished")
+    assert not (reduction.gamuts or Gamuts).lights_outside(weights, np.arange(len(current)))  # type: ignore[arg-type]
     value, least = (equations.objective(w).sum() for w in (weights, best.weights))
     round_off = 1e-9 * equations.target_norm2.sum()
     assert value == pytest.approx(least, abs=round_off)
@@ -61,10 +61,10 @@ def test_sides_lead_to_the_optimum_over_whole_gamuts(
 
 
 def test_gamuts_of_another_painting_are_heeded(make_basis: Any) -> None:
-    equations, reduction, present = _problem(make_basis, 1)
+    equations, reduction, current = _problem(make_basis, 1)
     gamuts = reduction.gamuts
     assert gamuts is not None
-    kept, before = solve_near_sides(equations, reduction, present, method="polished")
+    kept, before = solve_near_sides(equations, reduction, current, method="polished")
     k = kept.confined_knobs[0]
     gamuts.refresh()
     same, _ = solve_near_sides(equations, kept, before, method="polished")
@@ -82,8 +82,8 @@ def test_gamuts_of_another_painting_are_heeded(make_basis: Any) -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_mixes_of_three_colours_are_found_again(make_basis: Any, seed: int) -> None:
     """The x of an emission that three colours make are those that it was made with."""
-    equations, reduction, present = _problem(make_basis, seed)
-    kept, weights = solve_near_sides(equations, reduction, present, method="polished")
+    equations, reduction, current = _problem(make_basis, seed)
+    kept, weights = solve_near_sides(equations, reduction, current, method="polished")
     found = solve_reduced(equations, kept, weights)
-    x = nearest_unknowns(kept, kept.weights(found.x), np.ones(len(present), bool))
+    x = nearest_unknowns(kept, kept.weights(found.x), np.ones(len(current), bool))
     np.testing.assert_allclose(kept.weights(x), kept.weights(found.x), rtol=1e-9, atol=1e-12)

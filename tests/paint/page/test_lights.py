@@ -17,9 +17,9 @@ def test_a_light_is_moved_by_hand_and_freed(painter: Painter) -> None:
     asked = painter.said("constrain_light")
     assert asked[-1]["light"] == 0
     assert asked[-1]["is_final"] is True
-    present = painter.page.evaluate("() => window.painter.store.value.lights[0].present")
+    current = painter.page.evaluate("() => window.painter.store.value.lights[0].present")
     lock = asked[-1]["constraints"]["lock"]
-    assert lock == pytest.approx([x * 2 for x in present], rel=1e-6)  # 20 steps of a twentieth
+    assert lock == pytest.approx([x * 2 for x in current], rel=1e-6)  # 20 steps of a twentieth
     painter.button("Unlock key").click()
     assert newest(painter) == {}
     painter.slide("key, stops from now", "Home")
@@ -27,7 +27,7 @@ def test_a_light_is_moved_by_hand_and_freed(painter: Painter) -> None:
 
 
 def test_a_level_is_typed_in_stops_or_percent(painter: Painter) -> None:
-    present = painter.page.evaluate("() => window.painter.store.value.lights[0].present")
+    current = painter.page.evaluate("() => window.painter.store.value.lights[0].present")
 
     def lock() -> Any:
         return newest(painter)["lock"]
@@ -44,7 +44,7 @@ def test_a_level_is_typed_in_stops_or_percent(painter: Painter) -> None:
         ("-9 st", 2**-9),  # beyond the left end of the slider
     ):
         painter.type("key, level", text)
-        assert lock() == pytest.approx([factor * x for x in present], rel=1e-6)
+        assert lock() == pytest.approx([factor * x for x in current], rel=1e-6)
     count = len(painter.said("constrain_light"))
     for text in ("bright", "-3 %", "21 st", "12", "80", "-200"):
         painter.type("key, level", text)
@@ -60,7 +60,7 @@ def test_a_level_is_typed_in_stops_or_percent(painter: Painter) -> None:
     level = painter.page.get_by_role("textbox", name="key, level")
     assert level.input_value() == "\u22129.0 st"
     level.press("ArrowUp")
-    assert lock() == pytest.approx([2**-8.9 * x for x in present], rel=1e-6)
+    assert lock() == pytest.approx([2**-8.9 * x for x in current], rel=1e-6)
     painter.type("key, level", "off")
     count = len(painter.said("constrain_light"))
     level.press("ArrowDown")  # there is nothing below it
@@ -74,8 +74,8 @@ def test_a_light_is_held_at_what_is_typed_in_any_unit(painter: Painter) -> None:
     painter.page.get_by_role("button", name="key", exact=True).click()
     panel = painter.page.get_by_role("group", name="Constraints on key")
     panel.get_by_role("button", name="Locked", exact=True).click()
-    present = painter.page.evaluate("() => window.painter.store.value.lights[0].present")
-    level = sum(a * b for a, b in zip((0.2126, 0.7152, 0.0722), present, strict=True))
+    current = painter.page.evaluate("() => window.painter.store.value.lights[0].present")
+    level = sum(a * b for a, b in zip((0.2126, 0.7152, 0.0722), current, strict=True))
     for unit, text, factor in (
         ("stops", "-1.5", 2**-1.5),
         ("share", "40", 0.4),
@@ -86,7 +86,7 @@ def test_a_light_is_held_at_what_is_typed_in_any_unit(painter: Painter) -> None:
         painter.choose("Unit", unit)
         painter.type("Locked at", text)
         lock = newest(painter)["lock"]
-        assert lock == pytest.approx([factor * x for x in present], rel=1e-6)
+        assert lock == pytest.approx([factor * x for x in current], rel=1e-6)
 
 
 def test_of_a_light_that_is_off_there_are_no_percent(painter: Painter) -> None:
@@ -214,7 +214,7 @@ def test_what_a_light_may_do(painter: Painter) -> None:
     painter.page.evaluate("() => painter.session.constrainLight(0, { color: '3200K' })")
     colour = painter.page.get_by_role("combobox", name="Colour", exact=True)
     colour.select_option("any")
-    panel.get_by_text("lights keep their present colours").wait_for()
+    panel.get_by_text("lights keep their current colours").wait_for()
     assert colour.count() == 0
     assert group.locator(".light").count() == 2
     group.get_by_role("button", name="key and cove, tied").first.click()  # it folds
@@ -299,16 +299,16 @@ def test_a_light_says_its_unit_in_its_tip_and_keeps_its_height_while_it_is_sough
 
 def test_a_light_that_hardly_shines_is_turned_up_in_its_own_colour(painter: Painter) -> None:
     """Nobody has seen the blue that the solve has left it."""
-    present = painter.page.evaluate("() => window.painter.store.value.lights[0].present")
+    current = painter.page.evaluate("() => window.painter.store.value.lights[0].present")
     dark = "(rgb) => painter.store.set(({ weights }) => ({ weights: [rgb, ...weights.slice(1)] }))"
-    painter.page.evaluate(dark, [0, 0, present[2] / 100])
+    painter.page.evaluate(dark, [0, 0, current[2] / 100])
     painter.type("key, level", "-1")
-    assert newest(painter)["lock"] == pytest.approx([x / 2 for x in present])
-    painter.page.evaluate(dark, [0, 0, 5 * present[2]])  # this one everybody has
+    assert newest(painter)["lock"] == pytest.approx([x / 2 for x in current])
+    painter.page.evaluate(dark, [0, 0, 5 * current[2]])  # this one everybody has
     painter.type("key, level", "-1")
     red, green, blue = newest(painter)["lock"]
     assert (red, green) == (0, 0)
-    assert blue > present[2]
+    assert blue > current[2]
 
 
 def test_on_its_way_through_the_dark_a_light_keeps_its_colour(painter: Painter) -> None:
@@ -472,11 +472,11 @@ def test_what_is_off_is_not_turned_up_by_turning_it_down(painter: Painter) -> No
     level.press("ArrowDown")
     assert max(newest(painter)["lock"]) == 0
     level.press("ArrowUp")
-    lock, present = (
+    lock, current = (
         newest(painter)["lock"],
         painter.ui("lights")[0]["present"],
     )
-    assert lock == pytest.approx([x * 2**-7.9 for x in present], rel=1e-6)
+    assert lock == pytest.approx([x * 2**-7.9 for x in current], rel=1e-6)
 
 
 def test_levels_far_below_one_are_not_off(painter: Painter) -> None:

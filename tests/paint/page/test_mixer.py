@@ -136,7 +136,7 @@ def test_sliders_solo_and_mute_show_the_sum_of_the_planes(make_basis: Any, opene
     weights = answer.copy()
     # From the present by stops; the colour stays.
     y = np.array([0.2126, 0.7152, 0.0722])
-    weights[1] *= 2**1.5 * (basis.present_weights[1] @ y) / (answer[1] @ y)
+    weights[1] *= 2**1.5 * (basis.current_weights[1] @ y) / (answer[1] @ y)
     move(page, 1, 0, 1.5)
     check(page, codes(basis, weights, transform))
     rows = page.locator(".mixer-light")
@@ -147,9 +147,9 @@ def test_sliders_solo_and_mute_show_the_sum_of_the_planes(make_basis: Any, opene
     rows.nth(0).get_by_text("M", exact=True).click()
     check(page, codes(basis, np.where(np.arange(3)[:, None] == 0, 0, weights), transform))
     page.get_by_text("Reset to now").click()
-    check(page, codes(basis, basis.present_weights, transform))
+    check(page, codes(basis, basis.current_weights, transform))
     move(page, 0, 0, -8)
-    dark = basis.present_weights.copy()
+    dark = basis.current_weights.copy()
     dark[0] = 0
     check(page, codes(basis, dark, transform))
     page.get_by_text("Reset to answer").click()
@@ -243,7 +243,7 @@ def test_what_is_copied_is_read(make_basis: Any, opened: Any, tmp_path: Path) ->
     # As the answer has them to the last bit, but for the one that was moved.
     np.testing.assert_array_equal(weights[:2], answer[:2])
     level = weights[2] @ [0.2126, 0.7152, 0.0722]
-    now = basis.present_weights[2] @ [0.2126, 0.7152, 0.0722]
+    now = basis.current_weights[2] @ [0.2126, 0.7152, 0.0722]
     assert level == pytest.approx(now / 2, rel=1e-9)
     assert lighting.certificate is None
     page.get_by_text("Copy command").click()
@@ -259,11 +259,11 @@ def test_of_hundreds_of_lights_the_rest_is_one(make_basis: Any, opened: Any) -> 
     assert page.locator(".mixer-light").count() == ROWS_SHOWN + 1
     check(page, codes(basis, answer, transform))
     page.get_by_text("Reset to now").click()
-    check(page, codes(basis, basis.present_weights, transform))
+    check(page, codes(basis, basis.current_weights, transform))
     data = json.loads(page.locator(".mixer script").inner_text())
     assert len(data["rest"]["answer"]) == 60 - ROWS_SHOWN
     rest = [basis.names.index(name) for name in data["rest"]["present"]]
-    weights = basis.present_weights.copy()
+    weights = basis.current_weights.copy()
     weights[rest] *= 2
     move(page, ROWS_SHOWN, 0, 1)
     check(page, codes(basis, weights, transform))
@@ -304,7 +304,7 @@ def test_without_scripts_a_report_is_as_it_was(
 def test_twelve_lights_of_noise_can_be_mailed(make_basis: Any) -> None:
     """Independent noise in every pixel is the worst there is to compress."""
     basis = make_basis(12, (360, 640))
-    page = mixer_html(basis, Lighting.present(basis))
+    page = mixer_html(basis, Lighting.current(basis))
     assert len(page) + len(mixer_assets()) < 6_000_000
 
 

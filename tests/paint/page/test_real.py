@@ -36,7 +36,7 @@ H, W, N = 54, 96, 3
 #: What goes wrong in the page and is none of its: a picture that a test reads has to be waited for.
 OURS = "ReadPixels"
 
-UNPAINTED = "Nothing is painted: the answer is the present lighting."
+UNPAINTED = "Nothing is painted: the answer is the current lighting."
 
 PAINTER = "document.getElementById('lightpaint').painter"
 
@@ -284,7 +284,7 @@ def test_what_is_painted_and_answered_is_on_the_screen(
     me.drag(me.at(60, 10), me.at(70, 10), hold=True)
     me.press("Control+z").page.mouse.up()
     me.still()
-    assert me.seen(70, 10) == me.code(served.studio.session.views[0].present[10, 70]).tolist()
+    assert me.seen(70, 10) == me.code(served.studio.session.views[0].current[10, 70]).tolist()
     me.press("Control+Shift+Z").still("brush")
     np.testing.assert_allclose(me.seen(30, 10), me.code(me.paint), atol=1)
     fill_and_ask(me)
@@ -503,7 +503,7 @@ def test_a_second_tab_takes_over_and_the_first_takes_back(served: Served, opened
     second.page.get_by_text("another tab has taken this session over").wait_for(state="attached")
     first.ready()
     np.testing.assert_allclose(first.seen(70, 40), first.code(first.paint), atol=1)
-    now = served.studio.session.views[0].present[5, 15]
+    now = served.studio.session.views[0].current[5, 15]
     np.testing.assert_allclose(first.seen(15, 5), first.code(now), atol=1)
 
 
@@ -525,7 +525,7 @@ def test_a_stroke_that_was_taken_over_lies_over_nothing(served: Served, opened: 
     first.ready()
     assert served.steps == ["stroke", "brush"]
     np.testing.assert_allclose(first.seen(15, 5), first.code(second.paint), atol=1)
-    now = served.studio.session.views[0].present[5, 58]
+    now = served.studio.session.views[0].current[5, 58]
     np.testing.assert_allclose(first.seen(58, 5), first.code(now), atol=1)
 
 
@@ -609,7 +609,7 @@ def test_two_views_are_painted_and_have_one_answer(two: Served, opened: Any) -> 
     me.press("Control+z")
     until(lambda: me.look("return engine.mirror.view") == 0, "the first view is shown")
     me.ready().still()
-    np.testing.assert_allclose(me.seen(30, 10), me.code(views[0].present[10, 30]), atol=1)
+    np.testing.assert_allclose(me.seen(30, 10), me.code(views[0].current[10, 30]), atol=1)
     me.press("Control+Shift+Z", "Control+Shift+Z").still("brush", "brush")
     until(lambda: me.look("return engine.mirror.view") == 1, "the other view is shown")
     me.ready()
@@ -678,7 +678,7 @@ def test_one_waits_for_the_first_picture_and_paints_while_it_gets_better(
         np.testing.assert_allclose(me.seen(70, 40, 1), me.answered(70, 40), atol=1)
         me.press("Control+z").still()
         np.testing.assert_allclose(
-            me.seen(30, 20), me.code(session.views[0].present[20, 30]), atol=1
+            me.seen(30, 20), me.code(session.views[0].current[20, 30]), atol=1
         )
     finally:
         for event in folder.events:

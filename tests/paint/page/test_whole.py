@@ -221,7 +221,7 @@ def test_a_sentence_with_its_button_is_whole(painter: Painter) -> None:
         """async () => {
           const { HELP } = await import('/fake/crowd.js');
           window.painter.store.set({
-            headline: 'Farther from the paint than the present lighting, which undo brings back, '
+            headline: 'Farther from the paint than the current lighting, which undo brings back, '
               + 'and changes the back wall by ΔE 6.2. Brighter light on the annex is missing: '
               + 'annex_window is switched off.',
             help: HELP, deltaE: 23, deltaPresent: 6.9, isJudged: true,

@@ -25,8 +25,8 @@ def light(emission: Any, interval: Any, **about: Any) -> Lighting:
     return Lighting((its,))
 
 
-def own(lighting: Lighting, present: Any = OWN) -> tuple[Any, tuple[str, ...]]:
-    made, names = with_own_colors(lighting, {"window": present})
+def own(lighting: Lighting, current: Any = OWN) -> tuple[Any, tuple[str, ...]]:
+    made, names = with_own_colors(lighting, {"window": current})
     return np.array(made["window"].emission), names
 
 
@@ -50,19 +50,19 @@ def test_what_the_painting_tells_stays() -> None:
         assert (rgb.tolist(), names) == ([0, 0, 4], ())
     wide = ((0.0, 2.0), (0.0, 1.5), (0.2, 22.0))
     assert own(light(blue, wide, constraint="color #0000ff"))[1] == ()
-    assert own(light(blue, wide), present=(0, 0, 0))[1] == ()
+    assert own(light(blue, wide), current=(0, 0, 0))[1] == ()
     assert own(light((6, 5, 4), ((0, 20), (0, 20), (0, 20))))[1] == ()  # its own already
 
 
 @given(THREE, THREE, THREE, THREE)
 def test_what_it_gets_lies_between_the_ends_in_its_own_colour(
-    emission: Any, present: Any, below: Any, above: Any
+    emission: Any, current: Any, below: Any, above: Any
 ) -> None:
     found = np.array(emission)
     low, high = np.maximum(found - below, 0), found + above
-    rgb, names = own(light(emission, tuple(zip(low, high, strict=True))), present=present)
+    rgb, names = own(light(emission, tuple(zip(low, high, strict=True))), current=current)
     assume(names)
     assert max(high - low) > UNBOUNDED * found.max()
     assert (rgb >= low * (1 - 1e-9)).all()
     assert (rgb <= high * (1 + 1e-9)).all()
-    np.testing.assert_allclose(rgb * present[0], np.array(present) * rgb[0], rtol=1e-9)
+    np.testing.assert_allclose(rgb * current[0], np.array(current) * rgb[0], rtol=1e-9)

@@ -515,7 +515,7 @@ def test_cells_are_no_formulas_and_names_come_back(name: str) -> None:
 
 def test_the_table_of_names_that_are_formulas(tmp_path: Path, make_basis: Any) -> None:
     groups = replace(_groups(tmp_path), basis=make_basis(len(FORMULAS), names=FORMULAS))
-    lighting = Lighting.present(groups.basis)
+    lighting = Lighting.current(groups.basis)
     text = lights_table(groups, lighting)
     # However a reader ends its lines, and where it reads none but what is quoted as one.
     for lines in (io.StringIO(text, newline=""), io.StringIO(text.replace("\n", "\r\n"), "")):

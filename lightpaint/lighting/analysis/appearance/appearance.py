@@ -67,7 +67,7 @@ class Appearance:
     Attributes:
         delta_e: Of the prediction, with its noise.
         noise: The part of it that noise explains; 0 for unknown noise.
-        requested_change: Of the present scene: the change that the painting asks for.
+        requested_change: Of the current scene: the change that the painting asks for.
         place: The place with most of the error, and its object; None without error, and of several
             views.
         is_spot: Whether the error in that place is visible at a glance.
@@ -80,7 +80,7 @@ class Appearance:
         error_shares: Shares of the error of the fit that no light can change: `unreachable`,
             `forbidden`, `noise`, `painting_noise`, and `compromise` of several views. Empty if not
             computed.
-        unpainted_change: The change of the rest, for a painting over the present look.
+        unpainted_change: The change of the rest, for a painting over the current look.
 
     Examples:
         >>> appearance = lp.compare_appearance(lp.solve(basis, target))
@@ -160,7 +160,7 @@ class Appearance:
 
     @property
     def is_worse(self) -> bool:
-        """True if the present scene is closer to the paint, by the numbers that reports give."""
+        """True if the current scene is closer to the paint, by the numbers that reports give."""
         return round(self.delta_e, 1) > round(self.requested_change, 1)
 
     @property
@@ -182,7 +182,7 @@ class Appearance:
 
     @property
     def is_far(self) -> bool:
-        """True if it looks like another picture, or still like the present one.
+        """True if it looks like another picture, or still like the current one.
 
         Not if more than half of the requested change is achieved.
         """
@@ -209,7 +209,7 @@ def compare_appearance(
     predicted = predicted or solution.basis.predict(solution.weights)
     look = PaintComparison.of_problem(problem)
     light, grain = look.pixels(predicted.image), look.pixels(predicted.half_difference)
-    now = look.pixels(problem.basis.present_look)
+    now = look.pixels(problem.basis.current_look)
     with_noise, missed = block_differences(look, light, grain)
     delta_e, error = (
         float(np.average(x, weights=look.block_weights)) for x in (with_noise, missed)
@@ -268,10 +268,10 @@ def _unpainted_change(
     if not target.over_look or target.everything:
         return None
     kinds = ConstraintsByLight.of(solution.problem.constraints, basis.lights).kinds()
-    before = basis.present_weights.copy()
+    before = basis.current_weights.copy()
     for kind in FIXING_KINDS:
         fixed_lights = list(kinds.get(kind, ()))
         before[fixed_lights] = solution.weights[fixed_lights]
-    is_present = np.array_equal(before, basis.present_weights)
-    now = basis.present_look if is_present else basis.mix(before)
+    is_current = np.array_equal(before, basis.current_weights)
+    now = basis.current_look if is_current else basis.mix(before)
     return unpainted_change(look, basis, target.importance > 0, now, predicted.image)

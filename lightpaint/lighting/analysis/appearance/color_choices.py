@@ -1,4 +1,4 @@
-"""The answers with each choice of `colors`, for comparison with the present one.
+"""The answers with each choice of `colors`, for comparison with the current one.
 
 In linear light they have the answer's own equations. For a loss that is not linear all choices,
 also the answer's, are solved over a sample of its pixels, so that errors of the sample cancel.
@@ -57,7 +57,7 @@ class ColorChoice:
         delta_e: Mean CIEDE2000 over the paint, as in `Appearance`, with noise.
         light: The light whose hue differs most from the answer's, as far as the picture shows it;
             "" if none does, and for the answer itself.
-        before, color: The emission of that light in the answer, or at present if it is off, and
+        before, color: The emission of that light in the answer, or in the scene if it is off, and
             with this choice, at luminance 1; its weights, if only these are known.
         weights: (n, 3), in the order of the basis, from a sample of the pixels.
 
@@ -121,7 +121,7 @@ def _solver(solution: Solution) -> Callable[[Problem], Doubles]:
         weights = single_solver(problem)
         if problem.fit.colors != "gentle" or problem.dimming is not None:
             return weights
-        dimming = dimming_factors(problem.basis.present_weights, weights)
+        dimming = dimming_factors(problem.basis.current_weights, weights)
         return single_solver(replace(problem, dimming=dimming))
 
     return best
@@ -203,8 +203,8 @@ def _largest_hue_change(view: Solution, hue: Doubles, weights: Doubles) -> tuple
     """Return the light whose change of hue changes the picture most, and its colours; "" for
     none.
     """
-    # A light that was off gets its present hue, or white.
-    for other in (view.basis.present_weights, np.ones_like(hue)):
+    # A light that was off gets its current hue, or white.
+    for other in (view.basis.current_weights, np.ones_like(hue)):
         hue = np.where(luminance(hue)[:, None] > 0, hue, other)
     hue = hue / luminance(hue)[:, None]
     size, bright = np.sqrt(view.basis.power), luminance(weights)

@@ -57,7 +57,7 @@ class Loosening:
     Attributes:
         hold: Its strength; 0 if no weaker one does.
         share: The share of the error over the paint that it removes, measured with all pixels.
-        unpainted_change: Its change of unpainted pixels, compared with the present answer.
+        unpainted_change: Its change of unpainted pixels, compared with the current answer.
     """
 
     hold: float
@@ -106,7 +106,7 @@ def reasons_of(solution: Solution) -> tuple[Reason, ...]:
     the gain of all, they are joint: first the one without which the others gain least.
     """
     sample = PixelSample.of(solution)
-    if not sample.groups or sample.present_error <= 0:
+    if not sample.groups or sample.current_error <= 0:
         return ()
     everything = sample.share(sample.groups)
     if everything < MIN_SHARE:

@@ -122,7 +122,7 @@ class PixelSample:
         return np.asarray(gradient / np.where(power > 0, power, 1))
 
     @cached_property
-    def present_error(self) -> float:
+    def current_error(self) -> float:
         """Loss of the answer over the painted pixels."""
         return self.cost(self.weights)
 
@@ -133,7 +133,7 @@ class PixelSample:
 
     def share_of(self, weights: Doubles) -> float:
         """Return the share of the error that these weights (n, 3) avoid."""
-        return 1 - self.cost(weights) / self.present_error
+        return 1 - self.cost(weights) / self.current_error
 
     def share(self, without: Collection[LimitGroup], views: Sequence[int] | None = None) -> float:
         """Return that share for the best weights without some groups of reasons.
@@ -177,7 +177,7 @@ class PixelSample:
     ) -> Doubles:
         """Solve for the best weights, (n, 3), without some groups of reasons.
 
-        views: those to release with the group `views`. constraints, hold: instead of the present
+        views: those to release with the group `views`. constraints, hold: instead of the current
         ones.
         """
         released = set(views) if "views" in without else set()

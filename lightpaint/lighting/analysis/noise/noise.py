@@ -161,7 +161,7 @@ class NoisyPixels:
         weight, share = (x.reshape(-1, x.shape[2]) for x in (squares.weight, squares.share))
         # The pull, λ ‖Φᵢ‖² (presentᵢ − wᵢ), is as noisy as the images that it is measured by: of a
         # pixel it adds Φᵢ hᵢ times this.
-        pulled = 2 * problem.pull_strength * (basis.present_weights - weights)
+        pulled = 2 * problem.pull_strength * (basis.current_weights - weights)
         unseen = ~basis.emitters_seen.ravel()
         counted = np.flatnonzero((solution.importance.ravel() > 0) | (unseen & pulled.any()))
         residuals = Residuals.of(solution)
@@ -219,9 +219,9 @@ class NoisyPixels:
         if sums is None:
             return np.asarray(rows)
         sums.power[c] += (D * h) @ h.T
-        if self.residuals.present is not None:
+        if self.residuals.current is not None:
             shared = D * self.share[pixels, c % self.share.shape[1]]
-            sums.target_noise[c] += h @ (shared * self.residuals.present[pixels, c])
+            sums.target_noise[c] += h @ (shared * self.residuals.current[pixels, c])
         return np.asarray(rows)
 
 

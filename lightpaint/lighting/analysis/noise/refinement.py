@@ -1,6 +1,6 @@
-"""A better answer from an independent render of the present one: a Newton step.
+"""A better answer from an independent render of the current one: a Newton step.
 
-The noise of the basis biases M and with it the weights. A render V of the mix at the present
+The noise of the basis biases M and with it the weights. A render V of the mix at the current
 weights has noise of its own, which is independent of the basis, so ⟨Φ, Ψ − V⟩ is the gradient
 without that bias; the noisy M only determines the length of the step. V may be noisier than the
 basis, which is rendered with more care than a plain picture: the half differences of both determine

@@ -14,7 +14,7 @@ class Residuals:
 
     The noise is Σ w_i h_i minus the part that Ψ shares where it equals the current look.
 
-    image: (p, 3), Ψ. predicted: (p, 3), Σ w_i Φ_i. half: (p, 3), Σ w_i h_i. present: (p, 3), noise
+    image: (p, 3), Ψ. predicted: (p, 3), Σ w_i Φ_i. half: (p, 3), Σ w_i h_i. current: (p, 3), noise
     of the current look; None where nothing follows it. share: (p, 1) or (p, 3), as far as it does;
     None where `half` has that already.
     """
@@ -22,7 +22,7 @@ class Residuals:
     image: Floats
     predicted: Floats
     half: Floats
-    present: Floats | None
+    current: Floats | None
     share: Floats | None
 
     @classmethod
@@ -30,15 +30,15 @@ class Residuals:
         """Return the residuals of a solution."""
         basis, weights, problem = solution.basis, solution.weights, solution.problem
         predicted, r, share = basis.predict(weights), problem.refinement, problem.squares.share
-        half, present = predicted.half_difference, None
+        half, current = predicted.half_difference, None
         if share.any():
-            present = basis.present_noise.reshape(-1, 3)
+            current = basis.current_noise.reshape(-1, 3)
         if r is not None:
             half = r.noise + basis.noise.mix(weights - r.before)
         image, mixed, half = (x.reshape(-1, 3) for x in (solution.image, predicted.image, half))
-        is_shared = present is not None and r is None
+        is_shared = current is not None and r is None
         shared = share.reshape(-1, share.shape[2]) if is_shared else None
-        return cls(image, mixed, half, present, shared)
+        return cls(image, mixed, half, current, shared)
 
     def residual(self, pixels: slice | Indices) -> Doubles:
         """Return Ψ − Σ w_i Φ_i of some pixels, (p, 3)."""
@@ -47,6 +47,6 @@ class Residuals:
     def noise(self, pixels: slice | Indices) -> Doubles:
         """Return the half difference of the prediction at some pixels, (p, 3)."""
         half = self.half[pixels].astype(np.float64)
-        if self.present is None or self.share is None:
+        if self.current is None or self.share is None:
             return half
-        return half - self.share[pixels] * self.present[pixels]
+        return half - self.share[pixels] * self.current[pixels]

@@ -30,7 +30,7 @@ FLOOR = 0.3
 class SampleDemand:
     """The worth of further samples in each pixel of a view.
 
-    variance: (h, w) float64, contribution of a pixel with its present samples to the squared error,
+    variance: (h, w) float64, contribution of a pixel with its current samples to the squared error,
     averaged over neighbours. density: (h, w), ideal number of samples, up to a factor.
     """
 

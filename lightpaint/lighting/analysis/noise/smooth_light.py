@@ -50,7 +50,7 @@ def on_smooth_light(solution: Solution) -> Solution:
     basis, problem = solution.basis, solution.problem
     smooth, _ = joint_basis([_smooth(view) for view in problem.views.bases])
     # A goal that is the current look is averaged alike.
-    moved = problem.squares.share * (smooth.present_look - basis.present_look)
+    moved = problem.squares.share * (smooth.current_look - basis.current_look)
     squares = replace(problem.squares, image=problem.squares.image + moved)
     equations = NormalEquations.of(smooth, squares.image, squares.weight)
     return replace(

@@ -90,7 +90,7 @@ def error_bars(solution: Solution) -> Uncertainty | None:
     None if the noise of the basis is unknown, which is not the same as none. After reweighting they
     are of the last linear problem.
 
-    Kept or locked lights have an error of 0; that of lights which reach nothing is unknown. Noise
+    Fixed or locked lights have an error of 0; that of lights which reach nothing is unknown. Noise
     may have pushed a weight to 0 or to a limit: it has an interval on one side (weight_spread.py).
 
     Args:

@@ -110,7 +110,7 @@ def solve_for(solution: Solution, equations: NormalEquations) -> Doubles:
 def all_columns(solution: Solution) -> Iterator[Doubles]:
     """Yield the effect of every unknown on the weights, (3 n, k), for each independent problem.
 
-    Without constraints: only kept lights stay.
+    Without constraints: only fixed lights stay.
     """
     lights = np.flatnonzero(~solution.basis.is_fixed)
     scalar = np.array([light.is_scalar for light in solution.basis.lights], dtype=bool)

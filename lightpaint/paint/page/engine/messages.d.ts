@@ -159,7 +159,7 @@ export interface TableInfo {
 }
 
 /**
- * Samples per pixel: of the present basis, and of the final one.
+ * Samples per pixel: of the current basis, and of the final one.
  */
 export interface SampleCount {
   spp: number;
@@ -200,7 +200,7 @@ export interface Advice {
 }
 
 /**
- * Closeness of an answer in one view. delta_e_present: ΔE of the present look.
+ * Closeness of an answer in one view. delta_e_present: ΔE of the current look.
  */
 export interface Closeness {
   headline: string;
@@ -213,7 +213,7 @@ export interface Closeness {
 /**
  * The answer for one light.
  *
- * stops: relative to its present emission; null if it is, or was, off. kelvin: null for a colour
+ * stops: relative to its current emission; null if it is, or was, off. kelvin: null for a colour
  * that is not white. share: of the light in the picture. error: its uncertainty, in words.
  * is_constrained: whether a constraint limits it. is_unreached: whether no paint depends on it.
  */
@@ -329,7 +329,7 @@ export interface SessionPending {
 }
 
 /**
- * The present lights: the answer to paint and requests, unasked once the exact answer is found,
+ * The current lights: the answer to paint and requests, unasked once the exact answer is found,
  * and again with its analysis.
  *
  * version: grows with every change of the session. stroke: number of the last stroke that arrived.
@@ -639,7 +639,7 @@ export interface Paint {
  * A change of layers, their properties or their order: one step. Answered by `answer`.
  *
  * layers: new or changed ones; new ones lie on top. order: ids of all that stay, the lowest first;
- * null for the present order. copies: ids of the originals by the id of each copy, which is among
+ * null for the current order. copies: ids of the originals by the id of each copy, which is among
  * `layers`. is_final: whether it becomes a step; false while a slider moves. label: its name for
  * undo.
  */
@@ -901,7 +901,7 @@ export interface Observe {
  * Propose a lighting to the painter: it becomes a look with each light locked at the proposed
  * level, and replaces an earlier proposal of that name. Answered by `looks`.
  *
- * lights: emission by name of light; other lights keep that of the present answer.
+ * lights: emission by name of light; other lights keep that of the current answer.
  */
 export interface Propose {
   name: string;

@@ -36,7 +36,7 @@ const MAX_HALF = 65504;
 
 export class PaintCanvas {
   /** @param {[height: number, width: number]} size @param {Uint16Array} present
-   * (h, w, 3) halves: the present look */
+   * (h, w, 3) halves: the current look */
   constructor([height, width], present) {
     this.height = height;
     this.width = width;
@@ -168,7 +168,7 @@ export class PaintCanvas {
       });
   }
 
-  /** Set a new present look, from a better basis. It shows wherever nothing is painted.
+  /** Set a new current look, from a better basis. It shows wherever nothing is painted.
    * @param {Uint16Array} present */
   setPresent(present) {
     this.present = present;

@@ -32,7 +32,7 @@ export class Screen {
     this.isLive = false;
     /** Whether a brush is down; slow work waits until it is lifted. */
     this.isHeld = false;
-    /** Whether the solution equals the present look. */
+    /** Whether the solution equals the current look. */
     this.isPresent = false;
     /** @type {ReturnType<typeof setTimeout> | undefined} */
     this.rest = undefined;

@@ -40,7 +40,7 @@ export function sizes({ size, views = [{ size }] }) {
   return String(views.map((/** @type {any} */ view) => view.size));
 }
 
-/** Return whether the present look is among the pictures shown. @param {Show | null} show */
+/** Return whether the current look is among the pictures shown. @param {Show | null} show */
 export function showsPresent(show) {
   return show?.left === 'present' || show?.right === 'present';
 }

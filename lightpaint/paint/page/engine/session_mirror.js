@@ -43,13 +43,13 @@ export class SessionMirror {
     /** @type {Show | null} */
     this.shown = null;
     this.weights = new Float64Array();
-    /** Whether lights have moved since the present look. */
+    /** Whether lights have moved since the current look. */
     this.isMoved = false;
     /** Revision of the session in its last message. */
     this.version = -1;
     /** @type {import("../../../viewer/drawing/view_transform.js").Lut} */
     this.lut = SRGB;
-    /** Whether the present look exists, and whether the view has it. */
+    /** Whether the current look exists, and whether the view has it. */
     this.knowsPresent = false;
     this.hasPresent = false;
     /** Number of times that the session has sent the canvas. */
@@ -287,7 +287,7 @@ export class SessionMirror {
     this.stand(weights);
   }
 
-  /** Unchanged lights give the present look, which arrives before the planes and is denoised.
+  /** Unchanged lights give the current look, which arrives before the planes and is denoised.
    * @param {Float64Array} weights */
   stand(weights) {
     const { screen, canvas, state, shown } = this;
@@ -302,7 +302,7 @@ export class SessionMirror {
     if (screen.isPresent !== this.hasPresent && canvas) this.showPresent();
   }
 
-  /** Give the view the present look while it is shown. */
+  /** Give the view the current look while it is shown. */
   showPresent() {
     const { screen, canvas, shown } = this;
     const isShown = screen.isPresent || showsPresent(shown);

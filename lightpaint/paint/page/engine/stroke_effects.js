@@ -10,7 +10,7 @@ import { VALUES } from '../../../viewer/drawing/half_floats.js';
 /**
  * The effect of a stroke. paint: the pixel becomes a colour, or light of that colour on its albedo.
  * Surfaces without diffuse reflection, such as a flame, ignore light and keep their pixels. erase:
- * the pixel shows the present look again, unpainted; in a picture that was adjusted as a whole, it
+ * the pixel shows the current look again, unpainted; in a picture that was adjusted as a whole, it
  * shows that adjustment. weigh: its importance is multiplied by `times`; an unpainted pixel keeps
  * its look, with the importance of a stroke. adjust: its luminance is multiplied by `gain` and its
  * colour by `tint`.

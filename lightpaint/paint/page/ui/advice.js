@@ -95,7 +95,7 @@ export function AdviceButton({ ui, app }) {
     act=${() => app.session.preview(titleOf(help, name), change)} />`;
 }
 
-/** The button that lets lights move, where their present places come no closer.
+/** The button that lets lights move, where their current places come no closer.
  * @param {{ui: Ui, app: App}} props */
 export function MoveButton({ ui, app }) {
   if (!ui.state?.can_render || ui.placing) return null;

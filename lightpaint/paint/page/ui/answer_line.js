@@ -13,7 +13,7 @@ import { exposureOf } from './ui_state.js';
 /** @typedef {import("./shortcuts.js").App} App */
 
 const DELTA_E =
-  'Mean colour difference from the painting (ΔE 2000), and what it was with the present lighting. 1 is just visible, 5 is obvious.';
+  'Mean colour difference from the painting (ΔE 2000), and what it was with the current lighting. 1 is just visible, 5 is obvious.';
 
 const STATES = {
   live: 'A quick answer while you paint. The exact one follows.',

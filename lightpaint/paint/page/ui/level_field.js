@@ -12,21 +12,21 @@ import { asTyped, stopsText } from './format.js';
 export const DARKEST = -8;
 export const BRIGHTEST = 6;
 
-/** Return the reference of a level: the present luminance, or one unit for a light that is off.
+/** Return the reference of a level: the current luminance, or one unit for a light that is off.
  * @param {Light} light */
 export const nowOf = (light) => luminance(light.present) || 1;
 
-/** Return whether percentages make sense, since the light is on at present. @param {Light} light */
+/** Return whether percentages make sense, since the light is currently on. @param {Light} light */
 export const isOnNow = (light) => luminance(light.present) > 0;
 
-/** Return stops from the present; null for off. @param {RGB} rgb @param {Light} light
+/** Return stops from the current level; null for off. @param {RGB} rgb @param {Light} light
  * @returns {number | null} */
 export function stopsOf(rgb, light) {
   const level = luminance(rgb);
   return level > 0 ? Math.log2(level / nowOf(light)) : null;
 }
 
-/** Stops from the present below which the colour of a light is invisible. */
+/** Stops from the current level below which the colour of a light is invisible. */
 const UNSEEN = -6;
 
 /** Return the same colour at another level. For a nearly dark light, whose solved colour is
@@ -40,7 +40,7 @@ export function atLevel(rgb, light, level) {
   return /** @type {RGB} */ (base.map((x) => x * factor));
 }
 
-/** Parse typed text: stops (`+1.5`, `-2 st`), percent of the present (`80 %`), `as now`, `off`. A
+/** Parse typed text: stops (`+1.5`, `-2 st`), percent of the current level (`80 %`), `as now`, `off`. A
  * plain number means stops if it is unambiguous.
  * @param {string} text @param {Light} light @returns {number | null} a level; null for what is none */
 function levelOf(text, light) {

@@ -49,7 +49,7 @@ export function LightConstraints(props) {
       html`<${LevelLimits} ...${props} />
       ${
         tied && colourOf(constraints) === 'any'
-          ? html`<p class="faint">Tied lights keep their present colours.</p>`
+          ? html`<p class="faint">Tied lights keep their current colours.</p>`
           : !light.is_scalar && html`<${ColourConstraint} ...${props} />`
       }`
     }
@@ -102,7 +102,7 @@ const unitsOf = (light) => [
   { value: 'value', label: light.unit || 'value' },
 ];
 
-/** The white that a light is locked to, at its present brightness.
+/** The white that a light is locked to, at its current brightness.
  * @param {import("./light_row.js").Props} props */
 function LockedColour({ k, app, rgb }) {
   const level = luminance(rgb);
@@ -169,7 +169,7 @@ function LevelLimits({ k, light, app, constraints = {} }) {
   </div>`;
 }
 
-/** A limit as in a lights file: a luminance, a share of the present like '40%', or a colour.
+/** A limit as in a lights file: a luminance, a share of the current one like '40%', or a colour.
  * @param {any} level @param {import("./ui_state.js").Light} light @param {string} unit
  * @returns {any} a number, in percent where `unit` is 'share'; null for none */
 function amount(level, light, unit) {

@@ -216,7 +216,7 @@ function notes({ light, lit, constraints = {}, tied }) {
 /** @param {number} stops */
 const clamp = (stops) => Math.min(BRIGHTEST, Math.max(DARKEST, stops));
 
-/** Return the same colour at a number of stops from the present; the left end is off.
+/** Return the same colour at a number of stops from the current level; the left end is off.
  * @param {RGB} rgb @param {Light} light @param {number} stops @returns {RGB} */
 function moved(rgb, light, stops) {
   return atLevel(rgb, light, stops <= DARKEST ? 0 : nowOf(light) * 2 ** stops);

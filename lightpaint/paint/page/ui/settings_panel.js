@@ -24,7 +24,7 @@ const COLOURS = [
 ];
 const HOLDS = [
   { value: 'auto', label: 'Automatic', tip: AUTO },
-  { value: 'hold', label: 'Hold', tip: 'They stay near their present look' },
+  { value: 'hold', label: 'Hold', tip: 'They stay near their current look' },
   { value: 'go', label: 'Ignore', tip: 'They may change freely: only the paint counts' },
 ];
 const PAINT_READINGS = [
@@ -148,7 +148,7 @@ function Row({ title, says, children }) {
     <div class="row">${children}</div><p class="faint">${says}</p></section>`;
 }
 
-/** The present value, and whether it follows from the painting. @param {boolean} isAuto
+/** The current value, and whether it follows from the painting. @param {boolean} isAuto
  * @param {string | undefined} text */
 function withSource(isAuto, text = '') {
   return isAuto && text ? `Now: ${text}` : text.charAt(0).toUpperCase() + text.slice(1);
@@ -159,5 +159,5 @@ function describeHold(hold) {
   if (hold === undefined || hold === null) return '';
   if (!hold) return 'free to change';
   const weight = hold === 1 ? 'the same weight as' : `${number(hold)} times the weight of`;
-  return `held near their present look, with ${weight} the paint`;
+  return `held near their current look, with ${weight} the paint`;
 }

@@ -15,7 +15,7 @@ export const TOOLS = [
     label: 'Eraser',
     icon: 'eraser',
     keys: 'E',
-    tip: 'Eraser: remove paint. Unpainted parts stay near their present look.',
+    tip: 'Eraser: remove paint. Unpainted parts stay near their current look.',
   },
   {
     tool: 'weight',
@@ -44,7 +44,7 @@ export const TOOLS = [
 
 const HINTS = /** @type {Record<Tool, string>} */ ({
   brush: 'Drag on the painting. Shift-click paints a line, Alt-click picks a colour.',
-  eraser: 'Removes paint. Unpainted parts stay near their present look.',
+  eraser: 'Removes paint. Unpainted parts stay near their current look.',
   weight: 'Paint where the answer must match best. Above 1× an area counts more, below 1× less.',
   pick: 'Click either picture: the light there becomes the paint.',
   fill: 'Click an object to paint all of it.',

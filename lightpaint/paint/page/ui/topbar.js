@@ -99,7 +99,7 @@ function Compare({ ui, app }) {
   const choices = [
     { value: 'painting solution', label: 'Painting | Answer' },
     { value: 'present solution', label: 'Now | Answer' },
-    { value: 'present painting', label: 'Now | Painting' },
+    { value: 'current painting', label: 'Now | Painting' },
     ...(ui.verified ? [{ value: 'solution verified', label: 'Answer | Render' }] : []),
     ...(ui.mix ? [{ value: 'looks', label: 'Two looks' }] : []),
   ];

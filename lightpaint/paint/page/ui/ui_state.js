@@ -51,7 +51,7 @@ import { ofKelvin } from './paint_colour.js';
  * @property {Advice | null} help what the headline advises
  * @property {Preview | null} preview of a change that is looked at before it is made
  * @property {number | null} deltaE
- * @property {number | null} deltaPresent the same of the present lighting: how much was asked for
+ * @property {number | null} deltaPresent the same of the current lighting: how much was asked for
  * @property {string[]} sentences
  * @property {boolean} isLive the last answer is the quick one, of a stroke in progress
  * @property {boolean} isJudged whether what is said of the answer is of the last one
@@ -69,7 +69,7 @@ import { ofKelvin } from './paint_colour.js';
  * @property {Progress | null} sampling how near the lights are to the precision that was asked for,
  *   while samples are added
  * @property {{positions: Record<string, number[]>, directions: Record<string, number[]>} | null} trial
- *   places that a search tries at present, by name of light
+ *   places that a search tries now, by name of light
  * @property {{type: NewKind, where: string, count: number}} adding the light to add: where it hangs is
  *   "click", "anywhere", or the name of a rail, surface or shape
  * @property {Record<string, number[]>} ghosts places of lights before a search has moved them, by name

@@ -13,7 +13,7 @@ const named = (k) =>
 
 export const HEADLINE =
   `About half way (46 %), and changes the annex by ΔE 12. Slightly brighter light on the ` +
-  `${OBJECT} is missing: unpainted parts are held near their present look. Paint more or loosen the hold.`;
+  `${OBJECT} is missing: unpainted parts are held near their current look. Paint more or loosen the hold.`;
 
 export const LONGEST =
   `35 % of the way, at the cost of the ${OBJECT} (ΔE 49). Darker and bluer shade on the ${OBJECT} ` +
@@ -41,7 +41,7 @@ const VERIFIED =
 
 export const TOAST =
   `“twelve” may be stops or percent: type the unit, too (12 st, 80 %). ${named(7)} is held at its ` +
-  'present level, and its limits stay as they were before this was typed.';
+  'current level, and its limits stay as they were before this was typed.';
 
 /** What is done by hand, in every manner. @param {number} k @param {number[]} present */
 function constraintsOf(k, present) {

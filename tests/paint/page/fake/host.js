@@ -152,7 +152,7 @@ export class FakeHost {
     return {
       headline: this.steps.length
         ? 'Close to what was painted; the floor stays too dark.'
-        : 'The present lighting.',
+        : 'The current lighting.',
       delta_e: this.steps.length ? 2.31 : 0,
       sentences: ['3 lights changed by more than a stop.', 'The key light does most of it.'],
       lights: this.weights.map((rgb, k) => ({
