@@ -1,4 +1,4 @@
-"""Groups and kept lights through the whole corridor: solve, file, relit scene, render."""
+"""Groups and fixed lights through the whole corridor: solve, file, relit scene, render."""
 
 import json
 import re
@@ -120,7 +120,9 @@ def test_the_corridor_end_to_end(tmp_path: Path) -> None:
     assert look.verification is not None
     assert look.verification.agrees
     assert look.lighting.fixed == {"rest"}
-    assert "<td>fixed" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert '<td class="change">fixed' in (tmp_path / "out" / "report.html").read_text(
+        encoding="utf-8"
+    )
     # Twice the light, though only a part of it may change.
     assert min(look.lighting.emission["pair"]) > max(first.light("pair").emission)
     with pytest.raises(BasisError, match="load it with the same lights and groups"):

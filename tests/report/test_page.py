@@ -229,7 +229,7 @@ def test_lights_in_order_with_what_happens_to_them(make_basis: Any):
     body = "".join(t for open_tags, t in page.texts if "region" not in open_tags)
     rows = re.split("key|fill|back", page.text("tbody").split("red")[0])[1:]
     assert len(rows) == 3
-    assert "back" in body.partition("Reach nothing painted, so kept")[2]
+    assert "back" in body.partition("Reach nothing painted, so unchanged")[2]
     key, fill, back = rows
     assert result["solution"].lighting.lights[1].emission == (0, 0, 0)
     assert "×1.5" in key

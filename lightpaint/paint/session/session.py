@@ -49,7 +49,7 @@ class Session:
 
     Args:
         bases: Planes of the lights in each view, which may get better (`improve`).
-        presents: (h, w, 3) linear, the current look of each, denoised: the empty canvas.
+        current_looks: (h, w, 3) linear, the current look of each, denoised: the empty canvas.
         store: Keeps steps and looks.
         settings: Defaults of settings that the session does not set.
         transform: View transform to paint through.

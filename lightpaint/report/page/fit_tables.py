@@ -126,7 +126,7 @@ def render_table(
         if light.is_fixed:
             entries.append(("Kept as they are", name_list(light.members)))
     if q.unreached:
-        entries.append(("Reach nothing painted, so kept", name_list(q.unreached)))
+        entries.append(("Reach nothing painted, so unchanged", name_list(q.unreached)))
     for channels in partly_reached(solution.lighting):
         entries.append(("Reach nothing painted in a channel", channels))
     if target.not_finite:
