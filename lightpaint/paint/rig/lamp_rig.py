@@ -4,7 +4,7 @@ import json
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from threading import RLock
 from typing import Any
 
@@ -14,25 +14,14 @@ from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import Lights
 from lightpaint.errors import PaintError, SceneError
-from lightpaint.paint.protocol import AddLight, PointLight
 from lightpaint.paint.rig.added_lights import (
     POSE_KEYS,
-    hung_at,
-    hung_before,
     light_of_new,
     new_emitter,
     site_of_new,
 )
-from lightpaint.paint.rig.cameras import (
-    FirstHit,
-    camera_of,
-    first_hit,
-    free_length,
-    in_this_thread,
-    up_axis,
-)
+from lightpaint.paint.rig.cameras import in_this_thread
 from lightpaint.paint.rig.moved_bases import one_light_basis, with_planes_of
-from lightpaint.paint.rig.pointing import aimed, with_highlight, with_shadow
 from lightpaint.paint.rig.quick_planes import QuickPlanes
 from lightpaint.paint.session.moved_lights import Placed, added_names
 from lightpaint.paint.subject import Subject
@@ -40,7 +29,6 @@ from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.lights_to_place import why_not_searched
 from lightpaint.placement.rigging.rigged_lights import freedoms_of, surfaces_of
 from lightpaint.placement.rigging.rigging import Rigging, rigging_of
-from lightpaint.scene.lights.new_emitter import NewEmitter
 from lightpaint.scene.properties.pose import Pose, Site, motion_of
 from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.scene.scene import Scene
@@ -273,65 +261,12 @@ class LampRig:
             while len(self._rendered) > MAX_RENDERED:
                 self._rendered.popitem(last=False)
 
-    # Places in the picture
-
-    def pointed(self, request: PointLight, name: str, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the change of a light's pose by a pointing request.
-
-        values: its current pose or, for an added light, all its properties.
-        """
-        with in_this_thread():
-            return self._pointing(request, name, self.site(name, values))
-
-    def hung(self, request: AddLight, name: str) -> NewEmitter:
-        """Return a new light at a requested place. Raises PaintError if none can hang there.
-
-        Its emission is set later.
-        """
-        if self.scene.has_media:
-            raise PaintError("no light can be added to a scene with fog or the like")
-        view, extent = self.view(request.view), self.extent
-        if request.position is not None:
-            down = np.zeros(3)
-            down[up_axis([camera_of(view.scene, view.loaded)])] = -1.0
-            try:
-                place = Pose(position=request.position).position  # type: ignore[arg-type]
-            except SceneError as error:
-                raise PaintError(f"{name}: {error}") from None
-            return hung_at(name, request.type, np.array(place), down, extent)
-        if request.pixel is None:
-            raise PaintError("a new light needs a place: click on a surface, or in the plan")
-        with in_this_thread():
-            hit = self._hit(view, request.pixel)
-            return hung_before(name, request.type, hit, extent, partial(free_length, view.loaded))
-
-    def _pointing(self, request: PointLight, name: str, site: Site) -> dict[str, Any]:
-        view = self.view(request.view)
-        hit = self._hit(view, request.pixel)
-        length = partial(free_length, view.loaded)
-        if request.mode == "aim":
-            return aimed(name, site, hit)
-        if request.mode == "highlight":
-            return with_highlight(name, site, hit, length)
-        if request.edge is None:
-            raise PaintError("a shadow needs two places: the edge that casts it, and where it ends")
-        return with_shadow(name, site, self._hit(view, request.edge), hit, length)
-
     def view(self, number: int) -> RigView:
         """Return a view of the open rig. Raises PaintError if there is none."""
         assert self.views is not None
         if number >= len(self.views):
             raise PaintError(f"no view {number}: there are {len(self.views)}")
         return self.views[number]
-
-    def _hit(self, view: RigView, pixel: tuple[float, float]) -> FirstHit:
-        height, width = view.scene.size
-        if not (0 <= pixel[0] < width and 0 <= pixel[1] < height):
-            raise PaintError(f"the place {list(pixel)} is outside the picture, {width}x{height}")
-        hit = first_hit(view.scene, view.loaded, pixel)
-        if hit is None:
-            raise PaintError("nothing is seen there: click on a surface")
-        return hit
 
 
 def _pose(name: str, values: Mapping[str, Any]) -> Pose:

@@ -28,6 +28,7 @@ from lightpaint.paint.protocol import (
 )
 from lightpaint.paint.rig.added_lights import free_name, values_of, with_level
 from lightpaint.paint.rig.lamp_rig import LampRig
+from lightpaint.paint.rig.picture_places import emitter_at_place, pose_change
 from lightpaint.paint.rig.rig_state import rig_state
 from lightpaint.paint.session.moved_lights import Placed, added_names
 from lightpaint.paint.session.picture_table import Picture, PictureTable, plane_thumbnail
@@ -104,7 +105,7 @@ class LightMover:
         name = (
             session.basis.names[request.light] if request.light < len(session.basis.names) else ""
         )
-        pose = self.rig.pointed(request, name, session.requests.placed.get(name, {}))
+        pose = pose_change(self.rig, request, name, session.requests.placed.get(name, {}))
         return MoveLights({name: pose}, request.is_final)
 
     def hang(self, request: AddLight) -> tuple[str, dict[str, Any]]:
@@ -113,7 +114,7 @@ class LightMover:
         self.rig.open(session.bases)
         taken = {*session.basis.names, *(x.name for x in self.rig.scene.emitters)}
         name = free_name(request.type, taken)
-        emitter = self.rig.hung(request, name)
+        emitter = emitter_at_place(self.rig, request, name)
         planes = self.rig.quick_planes(session.bases, name, values_of(emitter))
         alone = mean(float((plane.totals @ LUMINANCE)[0]) for plane in planes)
         current = mean(
