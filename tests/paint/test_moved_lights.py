@@ -63,8 +63,8 @@ def test_a_receiver_with_a_lock_may_change_the_session_while_it_is_sent_planes(
         moving.wait(lambda: not studio.rig.unrendered(studio.session.requests.placed))
         for _ in range(10):  # meanwhile a thread offers what it has rendered
             time.sleep(0.1)
-            assert studio._lock.acquire(timeout=5)
-            studio._lock.release()
+            assert studio._access.lock.acquire(timeout=5)
+            studio._access.lock.release()
     moving.rendered()
 
 

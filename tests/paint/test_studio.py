@@ -25,12 +25,13 @@ from lightpaint.cli.commands.paint_command import command_for_paintings
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.paint import protocol, subject
 from lightpaint.paint.protocol import Message
+from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.session import picture_table
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store import write_queue
 from lightpaint.paint.store.store import Store
-from lightpaint.paint.studio import plane_denoiser, session_exports, studio
+from lightpaint.paint.studio import plane_denoiser, session_bases, session_exports
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject
 
@@ -243,7 +244,7 @@ def test_denoised_planes_of_few_samples_do_until_there_are_better_ones(
         return real(its, k)
 
     monkeypatch.setattr(plane_denoiser, "denoise_to_halves", denoise_to_halves)
-    monkeypatch.setattr(studio, "obtain_bases", lambda *_: iter([[basis], [better]]))
+    monkeypatch.setattr(session_bases, "obtain_bases", lambda *_: iter([[basis], [better]]))
     heard = IncomingMessage(tmp_path, basis)
     assert is_taken.wait(30)
     assert len(cleaned) == len(basis.lights)
@@ -280,25 +281,25 @@ def test_what_is_said_comes_in_the_order_in_which_it_came_about(
     """Else a page forgets a picture that another thread made while all there is was told."""
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
     goes_on, is_telling, better = threading.Event(), threading.Event(), replace(basis)
-    tell = Studio.publish
+    tell = Publisher.publish
 
     def obtain_bases(*_: Any) -> Iterator[list[lp.Basis]]:
         yield [basis]
         assert goes_on.wait(30)
         yield [better]
 
-    def slow(self: Studio, message: Message | None) -> None:
+    def slow(self: Publisher, message: Message | None) -> None:
         if message is not None and message.kind == "state" and goes_on.is_set():
             is_telling.set()
             time.sleep(0.2)
         tell(self, message)
 
-    monkeypatch.setattr(Studio, "publish", slow)
-    monkeypatch.setattr(studio, "obtain_bases", obtain_bases)
+    monkeypatch.setattr(Publisher, "publish", slow)
+    monkeypatch.setattr(session_bases, "obtain_bases", obtain_bases)
     heard = IncomingMessage(tmp_path, basis)
     goes_on.set()
     assert is_telling.wait(30)
-    heard.studio.publish_picture("verified", np.zeros((*SIZE, 3), np.float16))
+    heard.studio.publisher.publish_picture("verified", np.zeros((*SIZE, 3), np.float16))
     heard.wait(lambda _: sum(m.kind == "state" for m in heard.messages) == 2)
     heard.wait(lambda m: m.kind == "renewed" and "verified" in m.fields["resources"])
     known: dict[str, int] = {}
@@ -481,9 +482,9 @@ def test_why_it_is_not_closer(heard: IncomingMessage, monkeypatch: pytest.Monkey
     copied: list[str] = []  # by which threads all pixels were, for which strokes wait
     snapshot = Session.snapshot
 
-    def copies(session: Session) -> SessionSnapshot:
+    def copies(session: Session, requests: Any = None) -> SessionSnapshot:
         copied.append(threading.current_thread().name)
-        return snapshot(session)
+        return snapshot(session, requests)
 
     monkeypatch.setattr(Session, "snapshot", copies)
 

@@ -30,7 +30,7 @@ from lightpaint.paint.store import write_queue
 from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.store import Store
-from lightpaint.paint.studio import studio
+from lightpaint.paint.studio import session_bases
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.pipeline.job.settings import Settings, SettingsByName
@@ -472,7 +472,7 @@ class Rendered:
         scene: Any = SimpleNamespace(spp=4, size=basis.size)
         subject = Subject("room.xml", folder, scene=scene, settings=Settings(use_cache=False))
         monkeypatch.setattr(widget_arguments, "widget_subjects", lambda *_, **__: (subject,))
-        monkeypatch.setattr(studio, "obtain_bases", self._bases)
+        monkeypatch.setattr(session_bases, "obtain_bases", self._bases)
 
     def _bases(self, *_: Any) -> Iterator[list[lp.Basis]]:
         self.goes_on.wait(30)
@@ -505,9 +505,9 @@ def test_messages_about_a_basis_come_while_nobody_holds_the_session(
     forward, was_free = studio.on_message, []
 
     def is_free() -> bool:
-        got = studio._lock.acquire(timeout=20)
+        got = studio._access.lock.acquire(timeout=20)
         if got:
-            studio._lock.release()
+            studio._access.lock.release()
         return got
 
     def receive(message: Any) -> None:

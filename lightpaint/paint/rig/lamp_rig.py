@@ -57,12 +57,13 @@ class LampRig:
     in the scene.
 
     Attributes:
+        subjects: The views to be painted.
         views: The views of the loaded scene; None before it is loaded.
         bounds: Corners of a box around the visible scene; None if unknown.
     """
 
     def __init__(self, subjects: Sequence[Subject]) -> None:
-        self._subjects = tuple(subjects)
+        self.subjects = tuple(subjects)
         self._lock = RLock()
         self.views: tuple[RigView, ...] | None = None
         self._rendered = OrderedDict[PoseKey, list[Basis]]()
@@ -72,9 +73,9 @@ class LampRig:
     @property
     def scene(self) -> Scene:
         """The scene of the first view. Raises PaintError without one."""
-        if self._subjects[0].scene is None:
+        if self.subjects[0].scene is None:
             raise PaintError("there is no scene to render: its lights cannot be moved")
-        return self._subjects[0].loaded_scene
+        return self.subjects[0].loaded_scene
 
     @property
     def freedoms(self) -> Mapping[str, Freedom]:
@@ -109,7 +110,7 @@ class LampRig:
         with self._lock:
             if self.views is None:
                 with in_this_thread():
-                    self.views = tuple(map(self._open_view, self._subjects, bases))
+                    self.views = tuple(map(self._open_view, self.subjects, bases))
 
     def _open_view(self, subject: Subject, basis: Basis) -> RigView:
         scene = subject.loaded_scene
@@ -168,7 +169,7 @@ class LampRig:
 
     def moved_scene(self, placed: Placed, view: int = 0) -> Scene:
         """Return the scene of a view with lights moved and added."""
-        scene, added = self._subjects[view].loaded_scene, added_names(placed)
+        scene, added = self.subjects[view].loaded_scene, added_names(placed)
         named = {name: _pose(name, its) for name, its in placed.items() if name not in added}
         scene = scene.moved(named) if named else scene
         emitters = [new_emitter(name, placed[name]) for name in added]
@@ -244,7 +245,7 @@ class LampRig:
             check()
 
         light_bases = []
-        for k, (subject, basis) in enumerate(zip(self._subjects, bases, strict=True)):
+        for k, (subject, basis) in enumerate(zip(self.subjects, bases, strict=True)):
             scene = self.moved_scene({name: values}, k).only([name])
             with MITSUBA.low_priority():
                 light_bases.append(

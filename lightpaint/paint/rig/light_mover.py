@@ -3,7 +3,7 @@
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from statistics import mean
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -26,51 +26,46 @@ from lightpaint.paint.protocol import (
     PointLight,
     TaskStarted,
 )
+from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.rig.added_lights import free_name, values_of, with_level
 from lightpaint.paint.rig.lamp_rig import LampRig
 from lightpaint.paint.rig.picture_places import emitter_at_place, pose_change
 from lightpaint.paint.rig.rig_state import rig_state
 from lightpaint.paint.session.moved_lights import Placed, added_names
-from lightpaint.paint.session.picture_table import Picture, PictureTable, plane_thumbnail
+from lightpaint.paint.session.picture_table import Picture, plane_thumbnail
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.view_pictures import plane_scale
+from lightpaint.paint.session_access import SessionAccess
 from lightpaint.paint.store.history_steps import name_in_view
-
-
-class MoverHost(Protocol):
-    """The part of the studio that moved lights use."""
-
-    pictures: PictureTable
-
-    @property
-    def session(self) -> Session:
-        """The session. Raises PaintError before there is a basis."""
-
-    def publish_made(self, make: Callable[[], Message | None]) -> None:
-        """Make a message while no other thread changes the session, and send it afterwards."""
-
-    def publish(self, message: Message | None) -> None:
-        """Send a message to pages."""
-
-    def denoised(self, bases: Sequence[Basis]) -> Sequence[DenoisedPlanes | None]:
-        """Return the denoised planes of the bases without moves, for each view."""
-
-    def planes_rendered(self) -> None:
-        """Note that rendered planes have replaced quick ones."""
 
 
 class LightMover:
     """Moves lights of a session for its studio.
 
-    Attributes:
+    Args:
+        access: The session.
+        publisher: Sends messages and pictures to pages.
         rig: The lights and their places, and the source of their planes.
+        threads: Runs background work.
+        clean_planes: Returns the denoised planes of bases; None for each that has none yet.
+        on_rendered: Called after rendered planes have replaced quick ones.
     """
 
-    def __init__(self, host: MoverHost, rig: LampRig, threads: BackgroundThreads) -> None:
-        self.rig, self._host, self._threads = rig, host, threads
+    def __init__(
+        self,
+        access: SessionAccess,
+        publisher: Publisher,
+        rig: LampRig,
+        threads: BackgroundThreads,
+        *,
+        clean_planes: Callable[[Sequence[Basis]], Sequence[DenoisedPlanes | None]],
+        on_rendered: Callable[[], None],
+    ) -> None:
+        self.rig, self._access, self._publisher, self._threads = rig, access, publisher, threads
+        self._clean_planes, self._on_rendered = clean_planes, on_rendered
         self._shows_rig, self._shown = False, dict[str, Mapping[str, Any]]()
         self._dragged = set[str]()  # lights being dragged
-        self._work = LatestWork(self._render, host.publish)
+        self._work = LatestWork(self._render, publisher.publish)
         self._is_working, self._is_open = False, True
 
     def stop(self) -> None:
@@ -85,22 +80,22 @@ class LightMover:
         return [TaskStarted(task="rig")]
 
     def _open_rig(self) -> None:
-        self.rig.open(self._host.session.bases)
+        self.rig.open(self._access.session.bases)
         self._publish_rig()
 
     def _publish_rig(self) -> None:
         for message in self.rig_messages():
-            self._host.publish(message)
+            self._publisher.publish(message)
 
     def rig_messages(self) -> list[Message]:
         """Return the places of lights, if pages have requested them."""
         if not (self._shows_rig and self.rig.is_open):
             return []
-        return [rig_state(self.rig, self._host.session.requests.placed)]
+        return [rig_state(self.rig, self._access.session.requests.placed)]
 
     def move_of(self, request: PointLight) -> MoveLights:
         """Return the move that a pointing request implies. Raises LightpaintError."""
-        session = self._host.session
+        session = self._access.session
         self.rig.open(session.bases)
         name = (
             session.basis.names[request.light] if request.light < len(session.basis.names) else ""
@@ -110,7 +105,7 @@ class LightMover:
 
     def hang(self, request: AddLight) -> tuple[str, dict[str, Any]]:
         """Return name and values of the light that a request adds. Raises PaintError."""
-        session = self._host.session
+        session = self._access.session
         self.rig.open(session.bases)
         taken = {*session.basis.names, *(x.name for x in self.rig.scene.emitters)}
         name = free_name(request.type, taken)
@@ -128,7 +123,7 @@ class LightMover:
         send: receives the messages about them. Returns whether lights were added or removed, so
         that pages need the whole state.
         """
-        session = self._host.session
+        session = self._access.session
         placed, shown = session.requests.placed, self._shown
         is_dragged = session.is_open
         names = {name for name in {*placed, *shown} if placed.get(name) != shown.get(name)}
@@ -154,7 +149,7 @@ class LightMover:
 
     def render_behind(self) -> None:
         """Replace quick planes by rendered ones, in the background."""
-        placed = self._host.session.requests.placed
+        placed = self._access.session.requests.placed
         if not placed:
             return
         if not self._is_working:
@@ -164,10 +159,9 @@ class LightMover:
 
     def _render(self, placed: Placed) -> None:
         """Replace the quick planes of these lights by rendered ones, unless the lights move."""
-        host = self._host
 
         def check() -> None:
-            if not self._is_open or host.session.requests.placed != placed:
+            if not self._is_open or self._access.session.requests.placed != placed:
                 raise StoppedError
 
         try:
@@ -178,19 +172,19 @@ class LightMover:
         except StoppedError:
             pass
         except LightpaintError as error:  # the next move is rendered again
-            host.publish(Notice(text=str(error), tone="warn"))
+            self._publisher.publish(Notice(text=str(error), tone="warn"))
 
     def finish(self, placed: Placed, check: Callable[[], None]) -> None:
         """Replace the quick planes of these lights by rendered ones. check: raises to stop."""
         for name in self.rig.unrendered(placed):
             check()
-            self.rig.render(self._host.session.bases, name, placed[name], check)
-            self._host.publish_made(partial(self._renew, name, placed[name]))
-            self._host.planes_rendered()
+            self.rig.render(self._access.session.bases, name, placed[name], check)
+            self._publisher.publish_made(partial(self._renew, name, placed[name]))
+            self._on_rendered()
 
     def _renew(self, name: str, values: Mapping[str, Any]) -> PictureUpdate | None:
         """Give the session the rendered planes of a light, unless it has moved on."""
-        session = self._host.session
+        session = self._access.session
         if session.requests.placed.get(name) != values:
             return None
         session.renew_planes([name])
@@ -206,8 +200,8 @@ class LightMover:
 
     def _offer(self, session: Session, names: Sequence[str], *, is_dragged: bool) -> PictureUpdate:
         """Offer the current pictures of lights, and return the messages that announce them."""
-        pictures, offered = self._host.pictures, []
-        clean = None if is_dragged else self._host.denoised(session.bases)
+        pictures, offered = self._publisher.pictures, []
+        clean = None if is_dragged else self._clean_planes(session.bases)
         for view, unmoved in zip(session.views, session.bases, strict=True):
             for name in names:
                 k = view.basis.names.index(name)
@@ -234,7 +228,9 @@ class LightMover:
 
     def _denoise(self, name: str) -> None:
         """Replace the picture of a rendered plane by a denoised one."""
-        for view, unmoved in zip(self._host.session.views, self._host.session.bases, strict=True):
+        for view, unmoved in zip(
+            self._access.session.views, self._access.session.bases, strict=True
+        ):
             basis = view.basis
             if name not in basis.names:
                 return
@@ -242,7 +238,7 @@ class LightMover:
             scale = plane_scale(unmoved, k)
             halves, own = denoise_to_halves(basis, k)
             picture = as_halves(halves.astype("float32") * own, scale)
-            self._host.publish_made(partial(self._put_denoised, view, basis, k, picture))
+            self._publisher.publish_made(partial(self._put_denoised, view, basis, k, picture))
 
     def _put_denoised(
         self, view: Canvas, basis: Basis, k: int, picture: Picture
@@ -250,7 +246,7 @@ class LightMover:
         """Put the denoised picture of a plane of `basis`, unless the view has other planes now."""
         if view.basis.planes is not basis.planes:
             return None
-        table, resources = self._host.pictures, {}
+        table, resources = self._publisher.pictures, {}
         thumbnail = plane_thumbnail(picture.astype("float32"), basis.emitters_seen)
         for name, new_picture in ((f"clean/{k}", picture), (f"thumb/{k}", thumbnail)):
             full = name_in_view(name, view.view)

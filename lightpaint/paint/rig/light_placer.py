@@ -3,9 +3,8 @@
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
-from lightpaint.basis.basis import Basis
 from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.paint.background_threads import BackgroundThreads, StoppedError
 from lightpaint.paint.protocol import (
@@ -15,13 +14,14 @@ from lightpaint.paint.protocol import (
     TaskStarted,
     TrialPlaces,
 )
+from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.rig.added_lights import free_name, values_of
 from lightpaint.paint.rig.lamp_rig import LampRig
 from lightpaint.paint.rig.moved_subjects import of_moved_scenes
 from lightpaint.paint.session.moved_lights import Placed
 from lightpaint.paint.session.snapshot import SessionSnapshot
+from lightpaint.paint.session_access import SessionAccess
 from lightpaint.paint.store.session_requests import HOLD_KEYS
-from lightpaint.paint.subject import Subject
 from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.new_lights import NewLights
 from lightpaint.placement.place import place
@@ -42,36 +42,23 @@ MAX_NEW = 4
 WATCH_S = 0.15
 
 
-class PlacerHost(Protocol):
-    """The part of the studio that a search for places uses."""
-
-    subjects: tuple[Subject, ...]
-
-    def snapshot(self) -> SessionSnapshot:
-        """Return the current paintings and requests."""
-
-    def hang_lights(self, label: str, placed: Placed, *, before: Placed) -> bool:
-        """Move lights and add others, by name, in one step, and notify pages.
-
-        before: their expected places; returns False, and changes nothing, if these have changed.
-        """
-
-    @property
-    def unmoved_bases(self) -> tuple[Basis, ...]:
-        """Bases of all views, with every light at its place in the scene."""
-
-    def publish(self, message: Message | None) -> None:
-        """Send a message to pages."""
-
-    def report_progress(self, label: str, done: int, total: int, unit: str = "passes") -> None:
-        """Report progress of a task. Raises StoppedError once its result is no longer wanted."""
-
-
 class LightPlacer:
-    """Places the lights of a session by its painting, and adds others."""
+    """Places the lights of a session by its painting, and adds others.
 
-    def __init__(self, host: PlacerHost, rig: LampRig, threads: BackgroundThreads) -> None:
-        self._host, self._rig, self._threads = host, rig, threads
+    hang_lights: moves lights and adds others in one step, given its label, their places by name,
+    and the places of before; returns False, and changes nothing, if these have changed since.
+    """
+
+    def __init__(
+        self,
+        access: SessionAccess,
+        publisher: Publisher,
+        rig: LampRig,
+        threads: BackgroundThreads,
+        hang_lights: Callable[[str, Placed, Placed], bool],
+    ) -> None:
+        self._access, self._publisher, self._rig, self._threads = access, publisher, rig, threads
+        self._hang_lights = hang_lights
         self._request: PlaceLights | None = None
 
     def handle(self, request: PlaceLights) -> list[Message]:
@@ -82,7 +69,7 @@ class LightPlacer:
         if not request.run:
             self._request = None
             return [TaskStarted(task="stop")]
-        snapshot = self._host.snapshot()
+        snapshot = self._access.snapshot()
         if not snapshot.painted_views:
             raise PaintError("nothing is painted yet: paint first, then let lights move")
         if request.new_type is not None:
@@ -159,7 +146,7 @@ class LightPlacer:
             self._publish(f"No light was {_done(request)}: {reason}.")
             return
         label = f"{'move' if request.new_type is None else 'add'} {', '.join(placed)}"
-        if not self._host.hang_lights(label, placed, before=snapshot.requests.placed):
+        if not self._hang_lights(label, placed, snapshot.requests.placed):
             self._publish(f"No light was {_done(request)}: somebody moved lights meanwhile.")
             return
         summary = "; ".join(map(str, (*placement.moves, *placement.additions)))
@@ -173,7 +160,7 @@ class LightPlacer:
         moves = {name: x for name, x in placed.items() if "kind" not in x or name in added}
         new = {name: x for name, x in placed.items() if name not in moves}
         requests = snapshot.requests.with_poses(moves).with_added(new)
-        bases = self._rig.bases(self._host.unmoved_bases, requests.placed)
+        bases = self._rig.bases(self._access.session.bases, requests.placed)
         differences = []
         for its in (snapshot, replace(snapshot, bases=tuple(bases))):
             solution = its.solution()
@@ -182,7 +169,7 @@ class LightPlacer:
         return differences[0], differences[1]
 
     def _publish(self, text: str, names: tuple[str, ...] = ()) -> None:
-        self._host.publish(PlacingResult(text=text, names=names))
+        self._publisher.publish(PlacingResult(text=text, names=names))
 
     def _searched(
         self, request: PlaceLights, check: Callable[[], None]
@@ -192,7 +179,7 @@ class LightPlacer:
         def report(label: str, done: int, total: int, unit: str = "passes") -> None:
             del label, unit
             check()
-            self._host.report_progress("place", done, total, "steps")
+            self._publisher.report_progress("place", done, total, "steps")
 
         last_s = 0.0
 
@@ -201,15 +188,15 @@ class LightPlacer:
             check()
             if (now_s := time.monotonic()) > last_s + WATCH_S:
                 last_s = now_s
-                self._host.publish(_trial(sites))
+                self._publisher.publish(_trial(sites))
 
-        snapshot = self._host.snapshot()
+        snapshot = self._access.snapshot()
         self._rig.open(snapshot.bases)
         if request.new_type is None:
             freedoms, new = self._freedoms(snapshot), []
         else:
             freedoms, new = {}, [self._new_lights(request, snapshot)]
-        subjects, moved = of_moved_scenes(self._host.subjects, snapshot, self._rig)
+        subjects, moved = of_moved_scenes(snapshot, self._rig)
         views = moved.painted_views
         moved = replace(
             moved,

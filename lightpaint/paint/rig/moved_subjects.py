@@ -1,6 +1,5 @@
 """The subjects of a session with moved lights, for its exports and verification."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 from lightpaint.paint.rig.lamp_rig import LampRig
@@ -9,12 +8,12 @@ from lightpaint.paint.subject import Subject
 
 
 def of_moved_scenes(
-    subjects: Sequence[Subject], snapshot: SessionSnapshot, rig: LampRig
+    snapshot: SessionSnapshot, rig: LampRig
 ) -> tuple[tuple[Subject, ...], SessionSnapshot]:
     """Return subjects and snapshot with scenes whose lights have their places in the session."""
-    placed = snapshot.requests.placed
+    placed, subjects = snapshot.requests.placed, rig.subjects
     if not placed:
-        return tuple(subjects), snapshot
+        return subjects, snapshot
     scenes = [rig.moved_scene(placed, k) for k in range(len(subjects))]
     moved = tuple(replace(x, scene=scene) for x, scene in zip(subjects, scenes, strict=True))
     bases = tuple(

@@ -28,7 +28,7 @@ def pose_change(
 ) -> dict[str, Any]:
     """Return the change of a light's pose that a pointing request implies. The rig is open.
 
-    values: the light's present pose or, for an added light, all its properties. Raises
+    values: the light's current pose or, for an added light, all its properties. Raises
     LightpaintError for a light that cannot move, or for a place that it cannot reach.
     """
     with in_this_thread():

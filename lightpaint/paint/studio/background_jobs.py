@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from threading import Lock
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.denoised_planes import DenoisedPlanes, as_halves
@@ -24,10 +24,11 @@ from lightpaint.paint.protocol import (
     TaskStopped,
     VerificationResult,
 )
-from lightpaint.paint.rig.lamp_rig import LampRig
+from lightpaint.paint.publisher import Publisher
+from lightpaint.paint.rig.light_mover import LightMover
 from lightpaint.paint.rig.moved_subjects import of_moved_scenes
-from lightpaint.paint.session.picture_table import Picture
 from lightpaint.paint.session.snapshot import SessionSnapshot
+from lightpaint.paint.session_access import SessionAccess
 from lightpaint.paint.store.history_steps import name_in_view
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.subject import Subject, painting_path
@@ -37,43 +38,6 @@ from lightpaint.progress import Progress, cancellable
 TaskName = Literal["export", "verify", "explain"]
 
 JobRequest = protocol.Export | protocol.Verify | protocol.Explain
-
-
-class JobHost(Protocol):
-    """The studio, as its background jobs see it."""
-
-    subjects: tuple[Subject, ...]
-
-    @property
-    def version(self) -> int:
-        """Number that grows with every change of the paintings and requests."""
-
-    def snapshot_and_lighting(
-        self, requests: SessionRequests | None = None
-    ) -> tuple[SessionSnapshot, Lighting]:
-        """Return the current paintings and requests, and the last answer.
-
-        requests: replace those of the session, if given.
-        """
-
-    @property
-    def rig(self) -> LampRig:
-        """The lights and their places."""
-
-    def finish_planes(self, check: Callable[[], None]) -> None:
-        """Replace the quick planes of moved lights by rendered ones. check: raises to stop."""
-
-    def clean_planes(self, bases: Sequence[Basis]) -> Sequence[DenoisedPlanes | None]:
-        """Return the denoised planes of these bases; None for each that has none yet."""
-
-    def publish_picture(self, name: str, picture: Picture) -> None:
-        """Store a picture and tell pages that there is a new one."""
-
-    def publish(self, message: Message) -> None:
-        """Send a message to pages."""
-
-    def report_progress(self, label: str, done: int, total: int, unit: str = "passes") -> None:
-        """Report progress of a task. Raises StoppedError once its result is no longer wanted."""
 
 
 def _absolute_names(files: Iterable[Path]) -> tuple[str, ...]:
@@ -86,10 +50,23 @@ class BackgroundJobs:
 
     One job writes at a time, and one verifies. A later verification replaces an earlier one, since
     the answer may have changed by then.
+
+    mover: has the lights that the session has moved. clean_planes: returns the denoised planes of
+    bases; None for each that has none yet.
     """
 
-    def __init__(self, host: JobHost, threads: BackgroundThreads) -> None:
-        self._host, self._threads = host, threads
+    def __init__(
+        self,
+        access: SessionAccess,
+        publisher: Publisher,
+        mover: LightMover,
+        threads: BackgroundThreads,
+        *,
+        clean_planes: Callable[[Sequence[Basis]], Sequence[DenoisedPlanes | None]],
+    ) -> None:
+        self._access, self._publisher, self._threads = access, publisher, threads
+        self._mover, self._clean_planes = mover, clean_planes
+        self._subjects = mover.rig.subjects
         self._write_lock, self._render_lock = Lock(), Lock()
         self._verifications: dict[
             int, tuple[int, VerificationResult]
@@ -138,7 +115,7 @@ class BackgroundJobs:
         """Return the command that solves exported paintings to the same answer; "" if none."""
         if requests.placed:
             return ""  # which cannot express them
-        subject = self._host.subjects[0]
+        subject = self._subjects[0]
         paths = {sensor: str(painting_path(subject.folder, sensor)) for sensor in sensors}
         return subject.command(paths, requests) if paths else ""
 
@@ -151,10 +128,9 @@ class BackgroundJobs:
         )
 
     def _subject(self, view: int) -> Subject:
-        subjects = self._host.subjects
-        if view >= len(subjects):
-            raise PaintError(f"no view {view}: there are {len(subjects)}")
-        return subjects[view]
+        if view >= len(self._subjects):
+            raise PaintError(f"no view {view}: there are {len(self._subjects)}")
+        return self._subjects[view]
 
     def _exact_answer(
         self, check: Callable[[], None]
@@ -163,10 +139,10 @@ class BackgroundJobs:
 
         check: raises to stop.
         """
-        self._host.finish_planes(check)
-        snapshot, lighting = self._host.snapshot_and_lighting()
+        self._mover.finish(self._access.session.requests.placed, check)
+        snapshot, lighting = self._access.snapshot_and_lighting()
         is_moved = bool(snapshot.requests.placed)
-        subjects, snapshot = of_moved_scenes(self._host.subjects, snapshot, self._host.rig)
+        subjects, snapshot = of_moved_scenes(snapshot, self._mover.rig)
         solution = snapshot.solution()
         if solution is not None:
             lighting = with_findings(solution, analyse(solution)).lighting
@@ -190,7 +166,7 @@ class BackgroundJobs:
         def report(label: str, done: int, total: int, unit: str = "passes") -> None:
             del label  # a page does not show the steps of an export
             check()
-            self._host.report_progress("export", done, total, unit)
+            self._publisher.report_progress("export", done, total, unit)
 
         files: list[Path] = []
         try:
@@ -204,7 +180,7 @@ class BackgroundJobs:
         except StoppedError:
             if self._stop_count != stop_count:
                 result = ExportResult(files=_absolute_names(files), command="", is_stopped=True)
-                self._host.publish(result)
+                self._publisher.publish(result)
             return
         # The command names only paintings that this export wrote: older files may differ.
         needs_painting, is_painted = (
@@ -217,7 +193,7 @@ class BackgroundJobs:
             command=self.solve_command(sensors, snapshot.requests),
             is_unpainted=needs_painting and not is_painted,
         )
-        self._host.publish(result)
+        self._publisher.publish(result)
 
     def _run_verify(self, request: protocol.Verify) -> None:
         def check() -> None:
@@ -231,7 +207,7 @@ class BackgroundJobs:
                 self._render_and_compare(request.view, check)
         except StoppedError:
             if self._verify_request is None:  # otherwise a page would wait for the next one
-                self._host.publish(TaskStopped(task="verify"))
+                self._publisher.publish(TaskStopped(task="verify"))
 
     def _render_and_compare(self, view: int, check: Callable[[], None]) -> None:
         """Render the answer in a view and compare. check: raises StoppedError after a stop."""
@@ -239,7 +215,7 @@ class BackgroundJobs:
 
         def report(label: str, done: int, total: int, unit: str = "passes") -> None:
             check()
-            self._host.report_progress(label, done, total, unit)
+            self._publisher.report_progress(label, done, total, unit)
 
         subjects, snapshot, lighting = self._exact_answer(check)
         progress: Progress = report
@@ -247,11 +223,11 @@ class BackgroundJobs:
             subjects[view], snapshot.bases[view], lighting, progress
         )
         check()
-        self._host.publish_picture(name_in_view("verified", view), as_halves(picture))
-        is_old = self._host.version != snapshot.version
+        self._publisher.publish_picture(name_in_view("verified", view), as_halves(picture))
+        is_old = self._access.version != snapshot.version
         result = VerificationResult(agrees=agrees, text=text, view=view, is_old=is_old)
         self._verifications[view] = snapshot.version, result
-        self._host.publish(result)
+        self._publisher.publish(result)
 
     def _run_preview(self, request: protocol.Preview, requests: SessionRequests) -> None:
         def check() -> None:
@@ -259,12 +235,12 @@ class BackgroundJobs:
                 raise StoppedError
 
         with suppress(StoppedError), cancellable(check):
-            proposed, lighting = self._host.snapshot_and_lighting(requests)
+            proposed, lighting = self._access.snapshot_and_lighting(requests)
             weights = lighting.weights_for(proposed.bases[0])
-            clean = self._host.clean_planes(proposed.bases)[request.view]
+            clean = self._clean_planes(proposed.bases)[request.view]
             preview = proposed.preview(weights, request.view, clean=clean)
             check()
-            is_old = self._host.version != proposed.version
+            is_old = self._access.version != proposed.version
             result = PreviewResult(
                 number=request.number,
                 view=request.view,
@@ -274,13 +250,13 @@ class BackgroundJobs:
                 before=preview.before,
                 after=preview.after,
             )
-            self._host.publish(result)
+            self._publisher.publish(result)
 
     def _run_explain(self, request: protocol.Explain) -> None:
-        snapshot, _ = self._host.snapshot_and_lighting()
+        snapshot, _ = self._access.snapshot_and_lighting()
         sentences, picture = snapshot.explain(request.view)
-        self._host.publish_picture(name_in_view("beyond", request.view), picture)
-        is_old = self._host.version != snapshot.version
-        self._host.publish(
+        self._publisher.publish_picture(name_in_view("beyond", request.view), picture)
+        is_old = self._access.version != snapshot.version
+        self._publisher.publish(
             Explanation(sentences=tuple(sentences), view=request.view, is_old=is_old)
         )

@@ -1,13 +1,15 @@
 """Samples that are added in the background, where the newest paint needs them."""
 
 from collections.abc import Callable, Sequence
-from typing import Protocol
 
 from lightpaint.basis.basis import Basis
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint.background_threads import LatestWork
-from lightpaint.paint.protocol import Message, ProgressReport
+from lightpaint.paint.protocol import ProgressReport
+from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.session.snapshot import SessionSnapshot
+from lightpaint.paint.session_access import SessionAccess
+from lightpaint.paint.studio.session_bases import SessionBases
 from lightpaint.paint.subject import Subject
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.properties.film import MAX_SPP
@@ -17,46 +19,27 @@ from lightpaint.scene.runtime.render_lock import MITSUBA
 SAMPLING = "sampling"
 
 
-class SamplingHost(Protocol):
-    """The part of the studio that background sampling uses."""
-
-    subjects: tuple[Subject, ...]
-    is_open: bool
-
-    @property
-    def has_scenes(self) -> bool:
-        """True if there are scenes, and not only bases."""
-
-    @property
-    def version(self) -> int:
-        """Number that grows with every change of the paintings and requests."""
-
-    def use_bases(self, bases: Sequence[Basis]) -> None:
-        """Continue the session with these bases."""
-
-    def denoise_planes(self) -> None:
-        """Denoise the planes of the current bases, where that is not done yet."""
-
-    def publish(self, message: Message) -> None:
-        """Send a message to pages."""
-
-    def report_progress(self, label: str, done: int, total: int, unit: str = "passes") -> None:
-        """Report how far a task is. Raises StoppedError once the studio is closed."""
-
-
 class BackgroundSampling:
     """A thread's loop that adds samples after each exact answer, until the brush moves."""
 
-    def __init__(self, host: SamplingHost) -> None:
-        self._host = host
-        self._loop = LatestWork(self._add, host.publish)
+    def __init__(
+        self,
+        subjects: Sequence[Subject],
+        access: SessionAccess,
+        bases: SessionBases,
+        publisher: Publisher,
+    ) -> None:
+        self._subjects, self._access = subjects, access
+        self._bases, self._publisher = bases, publisher
+        self._loop = LatestWork(self._add, publisher.publish)
         self._is_reported = False  # whether pages show that samples are added
         self.stop = self._loop.stop
 
     @property
     def is_wanted(self) -> bool:
         """True if the settings say how sure the lights are to be."""
-        return self._host.has_scenes and self._host.subjects[0].settings.error is not None
+        first = self._subjects[0]
+        return first.scene is not None and first.settings.error is not None
 
     def run(self) -> None:
         """Add samples until `stop`, if they are wanted."""
@@ -73,13 +56,13 @@ class BackgroundSampling:
         snapshot, solution = answer
 
         def is_outdated() -> bool:
-            return not self._host.is_open or self._host.version != snapshot.version
+            return not self._publisher.is_open or self._access.version != snapshot.version
 
         # Samples are of the scene, in which no light is moved.
         bases = None
         if not (is_outdated() or snapshot.requests.placed):
             bases = add_round(
-                self._host.subjects,
+                self._subjects,
                 snapshot,
                 solution,
                 is_enough=is_outdated,
@@ -88,15 +71,15 @@ class BackgroundSampling:
         # After a round the next exact answer says whether another one follows.
         if self._is_reported and (bases is None or is_outdated()):
             self._is_reported = False
-            self._host.publish(ProgressReport(task=SAMPLING, done=1, total=1, unit=""))
+            self._publisher.publish(ProgressReport(task=SAMPLING, done=1, total=1, unit=""))
         if bases is not None:
-            self._host.use_bases(bases)
+            self._bases.use(bases)
         elif not (is_outdated() or snapshot.requests.placed):
-            self._host.denoise_planes()
+            self._bases.denoise()
 
     def _report(self, label: str, done: int, total: int, unit: str = "passes") -> None:
         self._is_reported = True
-        self._host.report_progress(label, done, total, unit)
+        self._publisher.report_progress(label, done, total, unit)
 
 
 def add_round(

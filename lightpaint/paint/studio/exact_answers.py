@@ -2,15 +2,16 @@
 
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Protocol
 
 from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint.background_threads import ExactSolveLoop
-from lightpaint.paint.protocol import AnswerUpdate, Findings, Message
+from lightpaint.paint.protocol import AnswerUpdate, Findings
+from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.session.answer_messages import judge
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.snapshot import SessionSnapshot
+from lightpaint.paint.session_access import SessionAccess
 from lightpaint.progress import cancellable
 
 
@@ -23,21 +24,6 @@ def raise_outdated() -> None:
     raise OutdatedError
 
 
-class AnswerHost(Protocol):
-    """The studio, as its exact answers see it."""
-
-    is_open: bool
-
-    def session_at_rest(self) -> tuple[Session, SessionSnapshot] | None:
-        """Return session and snapshot; None before there is a basis and while a stroke is open."""
-
-    def publish_made(self, make: Callable[[], Message | None]) -> None:
-        """Make a message under the lock and send it, in the order in which messages were made."""
-
-    def publish(self, message: Message) -> None:
-        """Send a message to pages."""
-
-
 class ExactAnswers:
     """The exact answers of one studio's session.
 
@@ -45,11 +31,14 @@ class ExactAnswers:
     """
 
     def __init__(
-        self, host: AnswerHost, solved: Callable[[SessionSnapshot, Solution], None]
+        self,
+        access: SessionAccess,
+        publisher: Publisher,
+        solved: Callable[[SessionSnapshot, Solution], None],
     ) -> None:
-        self._host, self._solved = host, solved
+        self._access, self._publisher, self._solved = access, publisher, solved
         self._last: AnswerUpdate | None = None
-        self._loop = ExactSolveLoop(self._solve, host.publish)
+        self._loop = ExactSolveLoop(self._solve, publisher.publish)
         self.run, self.stop, self.notify = self._loop.run, self._loop.stop, self._loop.notify
 
     def findings_of(self, session: Session) -> Findings:
@@ -61,13 +50,13 @@ class ExactAnswers:
 
     def _solve(self) -> None:
         """Publish the exact answer, then its analysis."""
-        at_rest = self._host.session_at_rest()
-        if at_rest is None:
+        snapshot = self._access.snapshot_at_rest()
+        if snapshot is None:
             return
-        session, snapshot = at_rest
+        session = self._access.session
 
         def check() -> None:
-            if snapshot.version != session.version or not self._host.is_open:
+            if snapshot.version != session.version or not self._publisher.is_open:
                 raise OutdatedError
 
         # The next stroke cancels this solve, so that it gets the processors at once.
@@ -87,4 +76,4 @@ class ExactAnswers:
             self._last = message or self._last
             return message
 
-        self._host.publish_made(remember)
+        self._publisher.publish_made(remember)

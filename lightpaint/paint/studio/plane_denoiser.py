@@ -76,6 +76,15 @@ class PlaneDenoiser:
             for k, basis in enumerate(bases)
         ]
 
+    def clean_planes(self, bases: Sequence[Basis]) -> Sequence[DenoisedPlanes | None]:
+        """Return the denoised planes of these bases; None for each that has none yet.
+
+        Bases with moved lights have none.
+        """
+        if any(basis.former is not None for basis in bases):
+            return [None] * len(bases)
+        return self.planes_for(bases)
+
     def small_planes_for(self, bases: Sequence[Basis]) -> list[DenoisedPlanes | None]:
         """Return each view's denoised planes of blocks of pixels, which a result has left."""
         small = [self._small.get(k) for k in range(len(bases))]

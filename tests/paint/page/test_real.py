@@ -113,7 +113,7 @@ class Person:
         until(lambda: self.look(at_rest), "strokes are not answered")
 
         def is_exact() -> bool:
-            with studio._lock:
+            with studio._access.lock:
                 session = studio.session
                 known = studio.state().fields["answer"]
                 weights = session.weights.tolist()
