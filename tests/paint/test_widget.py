@@ -66,7 +66,7 @@ class Noted(comm.base_comm.BaseComm):  # type: ignore[misc,name-defined]
 @pytest.fixture(autouse=True)
 def line(monkeypatch: pytest.MonkeyPatch) -> None:
     """Widgets have such a line, where no kernel runs; nor any loop, as Playwright leaves one."""
-    monkeypatch.setattr("lightpaint.paint.notebook.kernel_thread._running_loop", lambda: None)
+    monkeypatch.setattr("lightpaint.paint.notebook.widget_views._running_loop", lambda: None)
     noted = type("Line", (Noted,), {"messages": [], "synced": {}})
     monkeypatch.setattr(comm, "create_comm", lambda *_, **how: noted(**how))
 
@@ -256,7 +256,7 @@ def test_two_threads_may_tell_at_once(
         time.sleep(pause_s)  # one begins, and ends, before the other
         weights = np.full((3, 3), pause_s)
         asked = lp.Constraints.of({"key": {"lock": pause_s}})
-        painter._sync_traits(
+        painter._session_traits.update(
             {"lighting": lp.Lighting.of_weights(basis, weights), "constraints": asked}
         )
 
@@ -287,7 +287,7 @@ def test_what_is_told_is_of_one_time(
     before = painter._studio.session.weights.copy()
     monkeypatch.setattr(painter._studio, "snapshot_and_lighting", lambda: painted_on(now))
     monkeypatch.setattr(painter._studio, "snapshot", lambda: painted_on(snapshot))
-    told = painter._current_values()
+    told = painter._session_traits.current_values()
     assert told["target"] is None
     assert not np.allclose(painter._studio.session.weights, before)
     np.testing.assert_array_equal(told["lighting"].weights_for(basis), before)
@@ -695,7 +695,7 @@ def test_callbacks_come_in_the_thread_of_the_kernel(
 
     async def cell() -> None:
         loop = asyncio.get_running_loop()
-        monkeypatch.setattr("lightpaint.paint.notebook.kernel_thread._running_loop", lambda: loop)
+        monkeypatch.setattr("lightpaint.paint.notebook.widget_views._running_loop", lambda: loop)
         painter = open_()
         page = Page(painter)
         page.say("hello", version=protocol.VERSION)

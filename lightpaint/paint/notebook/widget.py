@@ -5,7 +5,6 @@ Without a loop, as in a script, they send them themselves.
 """
 
 import atexit
-import traceback
 from collections.abc import Mapping, Sequence
 from functools import partial
 from inspect import signature
@@ -19,9 +18,7 @@ from lightpaint.lighting.analysis.analysis import analyse, with_findings
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
-from lightpaint.paint.background_threads import error_text
 from lightpaint.paint.notebook import widget_arguments
-from lightpaint.paint.notebook.kernel_thread import KernelThread
 from lightpaint.paint.notebook.painter_files import (
     claim_file,
     open_store,
@@ -30,8 +27,8 @@ from lightpaint.paint.notebook.painter_files import (
     widget_script,
     widget_style,
 )
-from lightpaint.paint.notebook.pending_values import PendingValues
-from lightpaint.paint.notebook.widget_views import WidgetViews
+from lightpaint.paint.notebook.session_traits import SessionTraits
+from lightpaint.paint.notebook.widget_views import KernelThread, WidgetViews
 from lightpaint.paint.protocol import AnswerUpdate, Message, Notice, SessionState
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.pipeline.job.settings import SettingsByName
@@ -121,7 +118,6 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
     ) -> None:
         self._lock, self._ready = RLock(), Event()
         self._is_closed = False
-        self._pending = PendingValues(self._lock, self._apply_late, self._warn)
         self._solved: tuple[int, Solution | None] | None = None
         self._kernel = KernelThread()
         subjects = widget_arguments.widget_subjects(
@@ -138,6 +134,9 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             claim_file(path, self)
         self._studio = Studio(subjects, partial(open_store, path))
         self._views = WidgetViews(self._studio, self._lock, self._send_to_pages)
+        self._session_traits = SessionTraits(
+            self, self._studio, self._lock, send=self._views.send, warn=self._warn
+        )
         self._failed = ""
         widget_layout = (
             layout
@@ -162,11 +161,10 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             self._ready.wait()
             if self._failed:
                 raise PaintError(self._failed)
-            self._sync_traits()
+            self._session_traits.update()
         if target is not None:
-            self._set_when_ready(
-                "targets" if widget_arguments.is_per_view(target) else "target", target
-            )
+            name = "targets" if widget_arguments.is_per_view(target) else "target"
+            self._session_traits.assign_when_ready(name, target)
 
     def __repr__(self) -> str:
         first, *further = self._studio.subjects
@@ -231,29 +229,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         """Apply a value that a cell sets, or raise its error there; apply a callback's later."""
         if self._is_closed:
             raise PaintError(f"painter.{name} cannot be set: it is closed; make another lp.Painter")
-        with self._lock:  # another thread may be notifying observers
-            arguments = widget_arguments.LOADERS[name](self._studio.session, value)
-            if self._pending.is_notifying:
-                self._pending.add(name, value)
-            else:
-                self._apply(arguments)
-
-    def _apply(self, arguments: widget_arguments.LoadArguments) -> None:
-        """Load paintings and requests into the session. Raises LightpaintError if refused."""
-        paintings, requests, _ = arguments
-        if not paintings and requests == self._studio.session.requests:
-            return  # it would be a step without a change
-        for message in self._studio.load(*arguments):
-            self._views.send(message)
-        self._sync_traits()
-
-    def _apply_late(self, name: str, value: Any) -> None:
-        """Apply a value that was set earlier; show an error, since its cell has ended."""
-        try:
-            self._apply(widget_arguments.LOADERS[name](self._studio.session, value))
-        except Exception as error:
-            traceback.print_exc()
-            self._warn(f"painter.{name} was not set: {error_text(error, at_length=False)}")
+        self._session_traits.assign(name, value)
 
     # Notifications
 
@@ -280,31 +256,6 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
     def _warn(self, text: str) -> None:
         self._views.send(Notice(text=text, tone="warn"))
-
-    def _current_values(self) -> dict[str, Any]:
-        """Return the values of all live traits; a value that has not changed is the same object.
-
-        An exact answer arrives twice, the second time with its analysis.
-        """
-        snapshot, lighting = self._studio.snapshot_and_lighting()
-        targets = snapshot.targets
-        name = " + ".join(target.name for target in snapshot.painted_targets)
-        if widget_arguments.same_paintings(targets, self.targets):
-            targets = self.targets
-        lighting = lighting.for_target(name)
-        return {
-            "target": targets[0],
-            "targets": targets,
-            "lighting": self.lighting if lighting == self.lighting else lighting,
-            "constraints": snapshot.requests.constraints(),
-        }
-
-    def _sync_traits(self, new: dict[str, Any] | None = None) -> None:
-        """Set the live traits to the session's values."""
-        with self._pending.notifying():
-            for name, value in (new or self._current_values()).items():
-                if value is not getattr(self, name):
-                    self.set_trait(name, value)
 
     def _lighting(self) -> Lighting:
         """Return the exact answer, or the requested lighting if nothing is painted."""
@@ -335,15 +286,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
     def _forward(self, message: Message) -> None:
         self._views.send(message)
         if isinstance(message, SessionState) or _is_exact(message):
-            self._sync_traits()
-
-    def _set_when_ready(self, name: str, value: Any) -> None:
-        """Set a trait now, or once the first basis is there. Raises LightpaintError if now."""
-        with self._lock:
-            if self._studio.store is None:
-                self._pending.add(name, value)
-            else:
-                setattr(self, name, value)
+            self._session_traits.update()
 
 
 #: Arguments of a painter other than settings.

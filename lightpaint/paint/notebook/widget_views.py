@@ -1,5 +1,7 @@
-"""The views of one painter in a notebook: ownership of the session, and routing of messages."""
+"""The views of one painter in a notebook: which has the session, and how messages reach them."""
 
+import asyncio
+import contextvars
 from collections.abc import Callable
 from threading import RLock
 from typing import Any
@@ -59,3 +61,29 @@ class WidgetViews:
         """Send a message to the page that has the session, or to `page`."""
         address = {"page": self._owner.page if page is None else page}
         self._send(message.content(reply) | address, message.buffers())
+
+
+class KernelThread:
+    """The thread of a notebook's kernel, which sends the messages of all threads.
+
+    It is known by the event loop and context of the cell that runs now; without a loop, as in a
+    script, each thread sends its own.
+    """
+
+    def __init__(self) -> None:
+        self._loop = _running_loop()
+        self._context = contextvars.copy_context()
+
+    def call(self, act: Callable[[], None]) -> None:
+        """Call `act` soon in the loop, in its context; at once without a loop."""
+        if self._loop is None:
+            act()
+        elif not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(act, context=self._context)
+
+
+def _running_loop() -> asyncio.AbstractEventLoop | None:
+    try:
+        return asyncio.get_running_loop()
+    except RuntimeError:
+        return None
