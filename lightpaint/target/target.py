@@ -1,6 +1,5 @@
 """A painting prepared for the solve: linear pixels with their weights."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,12 +11,9 @@ from lightpaint.colour.color import luminance
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.display_text import Shown
 from lightpaint.errors import SizeError, TargetError
-from lightpaint.images.pixel_blocks import block_mean, whole_factor
-from lightpaint.images.resampling import resampled
+from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.keywords import keywords
-
-#: Margin above one half by which a share prevails, beyond float32 rounding.
-TIE = 1e-5
+from lightpaint.target.target_pixels import TargetPixels
 
 #: Negative luminance that resampling leaves beside bright edges, as a share of the brightest.
 NEGATIVE = 1e-3
@@ -189,27 +185,11 @@ class Target(Shown):
         """
         if size == self.size:
             return self
-        weighted = np.dstack([self.image * self.importance[..., None], self.importance])
-        *rgb, importance = np.moveaxis(resampled(weighted, size), -1, 0)
-        image = np.dstack(rgb) / np.where(importance > 0, importance, 1)[..., None]
-        return replace(
-            self,
-            image=image,
-            importance=importance,
-            at_least=self._at_least(lambda planes: resampled(planes, size)),
-            full_size_share=self.painted_share,
-        )
+        return self._with_pixels(self._pixels.resampled(size))
 
     def cropped(self, height: int, width: int) -> "Target":
         """Return the top left part of the target, of this size."""
-        part = (slice(height), slice(width))
-        return replace(
-            self,
-            image=self.image[part],
-            importance=self.importance[part],
-            at_least=None if self.at_least is None else self.at_least[part],
-            full_size_share=self.painted_share,
-        )
+        return self._with_pixels(self._pixels.cropped(height, width))
 
     def reduced(self, factor: int) -> "Target":
         """Return the target averaged over blocks of factor × factor pixels, weighted by importance.
@@ -219,16 +199,15 @@ class Target(Shown):
         """
         if factor == 1:
             return self
-        importance = block_mean(self.importance, factor)
-        weighted = block_mean(self.image * self.importance[..., None].astype(np.float64), factor)
-        image = weighted / np.where(importance > 0, importance, 1)[..., None]
-        return replace(
-            self,
-            image=image.astype(np.float32),
-            importance=importance,
-            at_least=self._at_least(lambda planes: block_mean(planes, factor)),
-            full_size_share=self.painted_share,
-        )
+        return self._with_pixels(self._pixels.averaged(factor))
+
+    @property
+    def _pixels(self) -> TargetPixels:
+        return TargetPixels(self.image, self.importance, self.at_least)
+
+    def _with_pixels(self, pixels: TargetPixels) -> "Target":
+        """Return the target with its pixels at another size."""
+        return replace(self, **pixels._asdict(), full_size_share=self.painted_share)
 
     def without(self, holes: npt.NDArray[np.bool_]) -> "Target":
         """Return the target with importance 0 in the pixels `holes`, (h, w), which the basis
@@ -242,22 +221,6 @@ class Target(Shown):
             importance=np.where(holes, np.float32(0), self.importance),
             not_finite=self.not_finite + int(lost_mask.sum()),
         )
-
-    def _at_least(self, mean: Callable[[Floats], Floats]) -> npt.NDArray[np.bool_] | None:
-        """Return `at_least` at another size, whose pixels are the `mean` of these.
-
-        Light brighter than such a mean is acceptable if most of its pixels mean "at least", or if
-        it contains part of a patch that does: then the excess lies in the patch, since a lamp
-        outshines its surroundings. Single pixels are texture: there, light brighter than the mean
-        would exceed the exact pixels between them.
-        """
-        if self.at_least is None:
-            return None
-        importance = self.importance[..., None]
-        share = mean(self.at_least * importance)
-        prevails = share > (0.5 + TIE) * mean(importance)
-        patch = _patches(self.at_least) & (importance > 0)
-        return np.asarray(prevails | (mean(patch.astype(np.float32)) > 0))
 
     def fitted_to(self, size: tuple[int, int], *, resize: bool) -> "Target":
         """Return the target at `size` (height, width) of the basis.
@@ -303,20 +266,3 @@ def share_of(importance: Floats) -> float:
 def spoken_share(share: float) -> str:
     """Return a share of the pixels as text with three digits, such as `63.7 %`."""
     return f"{100 * share:.3g} %"
-
-
-def _patches(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Return `mask` (h, w, n) without parts narrower than three pixels: its opening by 3 × 3."""
-    core = ~_grown(~mask)
-    return _grown(core) & mask
-
-
-def _grown(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Return whether each pixel or one of its eight neighbours is set."""
-    for axis in (0, 1):
-        lines = np.moveaxis(mask, axis, 0)
-        grown = lines.copy()
-        grown[1:] |= lines[:-1]
-        grown[:-1] |= lines[1:]
-        mask = np.moveaxis(grown, 0, axis)
-    return mask
