@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from lightpaint.arrays import Position
 from lightpaint.basis.lights import BasisLight
 from lightpaint.errors import NoPlaceError, SceneError
 from lightpaint.placement.free_light import FreeLight, places_of
@@ -17,6 +18,7 @@ from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.placement.space.free_space import as_position
 from lightpaint.placement.space.permitted_places import BoxOfPlaces, Places
 from lightpaint.placement.space.surface_places import places_on
+from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.lights.light import Light, free_names
 from lightpaint.scene.lights.new_emitter import PLUGIN_OF, NewKind
 from lightpaint.scene.properties.emission import MULTIPLE, PLUGINS
@@ -143,12 +145,17 @@ def _places(
 ) -> Places | None:
     if site.position is None:
         return None
-    surfaces = None
-    if freedom.surfaces is not None:
-        surfaces = places_on(
-            scene, paths.loaded, freedom.surfaces, paths.space, clear=freedom.clear, seed=seed
-        )
+    surfaces = _surfaces(scene, freedom, paths, seed)
     return places_of(freedom, np.array(site.position, dtype=float), surfaces)
+
+
+def _surfaces(scene: Scene, freedom: Freedom, paths: SearchPaths, seed: int) -> Places | None:
+    """Return the places on the surfaces of a freedom; None if it has none."""
+    if freedom.surfaces is None:
+        return None
+    return places_on(
+        scene, paths.loaded, freedom.surfaces, paths.space, clear=freedom.clear, seed=seed
+    )
 
 
 def followers_of(
@@ -184,53 +191,72 @@ def _kind_like(scene: Scene, name: str) -> NewKind:
 
 def _template(scene: Scene, light: NewLight, paths: SearchPaths, seed: int) -> FreeLight:
     """Return a light of a group, at some place of its freedom."""
-    group, space = light.group, paths.space
-    rng = np.random.default_rng(seed)
-    freedom = group.freedom
-    if not freedom.slides:
-        if not len(space.places):
-            raise NoPlaceError(f"{scene.path} has no free place that sees anything of the picture")
-        low, high = space.places.min(axis=0), space.places.max(axis=0)
-        freedom = replace(freedom, box=(as_position(low), as_position(high)))
-        places: Places = BoxOfPlaces(low, high, space.places)
+    group = light.group
+    freedom, places = _freedom_of_new(scene, group.freedom, paths, seed)
+    position = _first_position(light, freedom, places, paths, seed)
+    if light.kind == "point":
+        return FreeLight(light.name, Site(position), freedom, places)
+    model = None if group.like is None else scene.light(group.like).members[0]
+    freedom = replace(freedom, aim=freedom.aim or True)
+    if light.kind == "panel":
+        sides = _panel_sides(group, model, paths.space.spread)
+        panel = PanelSite(position, _first_direction(model), side=math.sqrt(math.prod(sides)))
+        return FreeLight(light.name, panel, freedom, places, sides if sides[1] > sides[0] else None)
+    if model is not None:
+        cutoff, beam = model.site.cutoff or 0.0, model.site.beam or 0.0
     else:
-        surfaces = None
-        if freedom.surfaces is not None:
-            surfaces = places_on(
-                scene, paths.loaded, freedom.surfaces, space, clear=freedom.clear, seed=seed
-            )
-        places = places_of(freedom, np.zeros(3), surfaces)
-    tested = places.random(TESTED, rng)
+        cone = freedom.cone or NEW_CONE
+        freedom = replace(freedom, cone=cone)
+        cutoff = math.sqrt(cone[0] * cone[1])
+        beam = FIRST_BEAM * cutoff
+    spot = Site(position, _first_direction(model), cutoff=cutoff, beam=beam)
+    return FreeLight(light.name, spot, freedom, places, has_free_beam=model is None)
+
+
+def _freedom_of_new(
+    scene: Scene, freedom: Freedom, paths: SearchPaths, seed: int
+) -> tuple[Freedom, Places]:
+    """Return the freedom of new lights with their places: all free space, unless it says where.
+
+    Raises NoPlaceError if there is no free space.
+    """
+    space = paths.space
+    if freedom.slides:
+        return freedom, places_of(freedom, np.zeros(3), _surfaces(scene, freedom, paths, seed))
+    if not len(space.places):
+        raise NoPlaceError(f"{scene.path} has no free place that sees anything of the picture")
+    low, high = space.places.min(axis=0), space.places.max(axis=0)
+    freedom = replace(freedom, box=(as_position(low), as_position(high)))
+    return freedom, BoxOfPlaces(low, high, space.places)
+
+
+def _first_position(
+    light: NewLight, freedom: Freedom, places: Places, paths: SearchPaths, seed: int
+) -> Position:
+    """Return a free place that a new light may have. Raises NoPlaceError if none is found."""
+    tested = places.random(TESTED, np.random.default_rng(seed))
     is_free = paths.usable(tested, None if freedom.clear is None else 0.9 * freedom.clear)
-    if not group.in_view:
+    if not light.group.in_view:
         is_free &= ~paths.in_view(tested)
     if not is_free.any():
         raise NoPlaceError(
             f"new light {light.name!r} has no free place that sees anything of the picture: give "
             "it more freedom"
         )
-    site = Site(as_position(tested[int(np.argmax(is_free))]))
-    if light.kind == "point":
-        return FreeLight(light.name, site, freedom, places)
-    like = None if group.like is None else scene.light(group.like).members[0]
-    down = (0.0, -1.0, 0.0)
-    direction = down if like is None or like.site.direction is None else like.site.direction
-    freedom = replace(freedom, aim=freedom.aim or True)
-    if light.kind == "panel":
-        low_side, high_side = group.size or (SIDES[0] * space.spread, SIDES[1] * space.spread)
-        if group.size is None and like is not None and like.unit_flux is not None:
-            low_side = high_side = math.sqrt(like.unit_flux / math.pi)
-        side = math.sqrt(low_side * high_side)
-        panel = PanelSite(site.position, direction, side=side)
-        sides = (low_side, high_side) if high_side > low_side else None
-        return FreeLight(light.name, panel, freedom, places, sides)
-    if like is not None:
-        cutoff, beam = like.site.cutoff or 0.0, like.site.beam or 0.0
-    else:
-        freedom = replace(freedom, cone=freedom.cone or NEW_CONE)
-        assert freedom.cone is not None
-        cutoff = math.sqrt(freedom.cone[0] * freedom.cone[1])
-        beam = FIRST_BEAM * cutoff
-    site = replace(site, direction=direction, cutoff=cutoff, beam=beam)
-    has_free_beam = like is None and freedom.cone is not None
-    return FreeLight(light.name, site, freedom, places, has_free_beam=has_free_beam)
+    return as_position(tested[int(np.argmax(is_free))])
+
+
+def _first_direction(model: Emitter | None) -> Position:
+    """Return the direction of the light that new ones are like, or else downwards."""
+    direction = None if model is None else model.site.direction
+    return (0.0, -1.0, 0.0) if direction is None else direction
+
+
+def _panel_sides(group: NewLights, model: Emitter | None, spread: float) -> tuple[float, float]:
+    """Return the smallest and largest side of new panels. spread: that of visible points."""
+    if group.size is not None:
+        return group.size
+    if model is not None and model.unit_flux is not None:
+        side = math.sqrt(model.unit_flux / math.pi)
+        return side, side
+    return SIDES[0] * spread, SIDES[1] * spread
