@@ -6,13 +6,12 @@ with one half of the samples and errors measured with the other, and vice versa:
 not repeat.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from lightpaint.arrays import Doubles, Floats, Indices
+from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.planes import mix
 from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.analysis.noise.noise import denoised_matrix, pseudo_inverse
@@ -53,7 +52,7 @@ def find_additions(
     count: int,
     least: float = 0.0,
     surely: bool = True,
-    too_near: npt.NDArray[np.bool_] | None = None,
+    too_near: Bools | None = None,
 ) -> list[Addition]:
     """Find at most `count` lights to add, each with the largest gain given those before it.
 
@@ -69,26 +68,19 @@ def find_additions(
     left = np.ones(candidates.count, dtype=bool)
     before, picture = _missed(folds, chosen), candidates.picture(whole.weights(chosen))
     while len(chosen) < count and left.any():
-        estimates = np.where(left, whole.estimated_gains(chosen), -1)
-        tried = [int(k) for k in np.argsort(-estimates)[:SOLVED] if left[k]]
+        tried = _most_promising(whole, chosen, left)
+        gains = {k: before - _missed(folds, [*chosen, k]) for k in tried}
         # Compared with the best case for the lights without it.
         doubt = max(before - whole.objective(chosen), 0.0)
-        gains = {k: before - _missed(folds, [*chosen, k]) for k in tried}
-        order = sorted(tried, key=lambda k: -gains[k])
-        worth = [k for k in order if gains[k] - doubt > max(least, 0)]
-        errors = SURE if surely else 1.0
-        best = next(
-            (k for k in worth if gains[k] - doubt >= errors * _standard_error(folds, [*chosen, k])),
-            None,
-        )
+        best = _best_beyond_noise(folds, chosen, gains, doubt, least=least, surely=surely)
         if best is not None:
             gains[best] -= doubt
             before -= doubt
-        elif surely or chosen or gains[order[0]] <= 0:
-            break
         else:
+            best = max(gains, key=lambda k: gains[k])
+            if surely or chosen or gains[best] <= 0:
+                break
             # Nothing stands out yet: search closer around the largest gain.
-            best = order[0]
         chosen.append(best)
         before -= gains[best]
         weights = whole.weights(chosen)
@@ -99,6 +91,33 @@ def find_additions(
         if too_near is not None:
             left &= ~too_near[best]
     return additions
+
+
+def _most_promising(whole: "_Solver", chosen: Sequence[int], left: Bools) -> list[int]:
+    """Return the candidates with the largest estimated gains, of those that are `left`, (m,)."""
+    estimates = np.where(left, whole.estimated_gains(chosen), -1)
+    return [int(k) for k in np.argsort(-estimates)[:SOLVED] if left[k]]
+
+
+def _best_beyond_noise(
+    folds: "Sequence[_Fold]",
+    chosen: Sequence[int],
+    gains: Mapping[int, float],
+    doubt: float,
+    *,
+    least: float,
+    surely: bool,
+) -> int | None:
+    """Return the candidate with the largest gain that is no noise; None if all may be noise.
+
+    doubt: how much the error without it may be smaller than measured.
+    """
+    errors = SURE if surely else 1.0
+    for k in sorted(gains, key=lambda k: -gains[k]):
+        gain = gains[k] - doubt
+        if gain > max(least, 0) and gain >= errors * _standard_error(folds, [*chosen, k]):
+            return k
+    return None
 
 
 class _Solver:
