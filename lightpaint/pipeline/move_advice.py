@@ -15,7 +15,8 @@ from lightpaint.lighting.solve import solution_of
 from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.lights_to_place import free_light
-from lightpaint.placement.place import on_small_film, place
+from lightpaint.placement.place import place
+from lightpaint.placement.search_views import on_small_film
 from lightpaint.placement.suggestions.suggestion import MoveSuggestion
 from lightpaint.progress import Listener
 from lightpaint.scene.scene import Scene

@@ -8,8 +8,7 @@ import numpy as np
 
 from lightpaint.arrays import as_rgb
 from lightpaint.basis.basis import Basis
-from lightpaint.errors import NoPlaceError, SceneError
-from lightpaint.images.pixel_blocks import whole_factor
+from lightpaint.errors import NoPlaceError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
@@ -31,16 +30,12 @@ from lightpaint.placement.search.judgement import Found, Growth, PlacementJudge,
 from lightpaint.placement.search.new_light_search import NewLightSearch
 from lightpaint.placement.search.pose_rules import PoseRules
 from lightpaint.placement.search.pose_search import TURNS, PoseSearch
+from lightpaint.placement.search_views import check_looks, check_views, films_of
 from lightpaint.placement.space.free_space import as_position, pixels_of
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.lights.new_emitter import NewEmitter
-from lightpaint.scene.properties.film import reduction_to
 from lightpaint.scene.properties.pose import Pose, Site
 from lightpaint.scene.scene import Scene
-
-#: Number of pixels of the small films, on which all places are compared, and of the larger films
-#: for the last steps; of all views together, if possible.
-PIXELS, FINE_PIXELS = 2**12, 2**14
 
 #: Steps of all lights together along many paths.
 STEPS = 12
@@ -96,16 +91,14 @@ def place(
         >>> {move.name for move in placement.moves} <= {"bulb"}
         True
     """
-    views = _views(scenes, bases)
-    looks = _looks(solution, [its for _, its in views])
-    scene, basis = views[0]
+    views = check_views(scenes, bases)
+    scene, view_bases = views[0][0], [basis for _, basis in views]
+    looks = check_looks(solution, view_bases)
     freedoms = freedoms or {}
     for name, freedom in freedoms.items():
         free_light(scene, name, freedom)
-    lights = new_lights_of(scene, new)
-    large = [on_small_film(x, its, FINE_PIXELS // len(views)) for x, its in views]
-    small = [reduced_film(x, PIXELS // len(views)) for x in large]
-    names = [light.name for light in basis.lights]
+    lights, names = new_lights_of(scene, new), [light.name for light in view_bases[0].lights]
+    small, large = films_of(views)
 
     def search(loaded: Any) -> _Result:
         paths = SearchPaths(small, large, loaded, seed=seed)
@@ -115,7 +108,7 @@ def place(
         slots = new_movables_of(scene, lights, len(names), paths, seed=seed)
         coarse, fine = (
             fit_of(
-                [its for _, its in views],
+                view_bases,
                 looks,
                 [x.size for x in films],
                 [light.as_basis_light for light in lights],
@@ -129,12 +122,7 @@ def place(
             poses.steps.watch = lambda its: watch(_sites_by_name(its, names))
         judge = PlacementJudge(fine, poses.steps.on(fine), paths)
         found = _searched(poses, judge, movables, slots, progress)
-        errors = judge.errors(found.arrangement)
-        order = _additions(found)
-        growth = judge.growth(found.arrangement, order) if order else []
-        places = [x.position or (0.0, 0.0, 0.0) for x in found.arrangement.sites]
-        seen = pixels_of(large[0], loaded, np.array(places, dtype=float).reshape(-1, 3))
-        return _Result(found, errors, seen, growth, paths.space.spread or 1.0, large[0].size)
+        return _Result.of(found, judge, paths, large[0])
 
     result = large[0].while_loaded(search, views=large[1:])
     return _placement([x for x, _ in views], result, lights, len(names))
@@ -154,6 +142,20 @@ class _Result:
     growth: list[Growth]
     spread: float
     size: tuple[int, int]
+
+    @classmethod
+    def of(cls, found: Found, judge: PlacementJudge, paths: SearchPaths, view: Scene) -> "_Result":
+        """Return what was found, with what the first view says about it."""
+        order, sites = _additions(found), found.arrangement.sites
+        places = [site.position or (0.0, 0.0, 0.0) for site in sites]
+        return cls(
+            found,
+            judge.errors(found.arrangement),
+            pixels_of(view, paths.loaded, np.array(places, dtype=float).reshape(-1, 3)),
+            judge.growth(found.arrangement, order) if order else [],
+            paths.space.spread or 1.0,
+            view.size,
+        )
 
     def is_hardly_visible(self, k: int) -> bool:
         """Return whether the picture says little about the place of movable `k`."""
@@ -252,62 +254,3 @@ def _emitter(light: NewLight, site: Site, weight: Any) -> NewEmitter:
     pose = Pose(position=as_position(place), target=target, cutoff=site.cutoff, beam=site.beam)
     size = (site.side, site.side) if isinstance(site, PanelSite) else None
     return NewEmitter(light.name, light.kind, pose, size, as_rgb(weight))
-
-
-def _views(
-    scenes: Scene | Sequence[Scene], bases: Basis | Sequence[Basis]
-) -> list[tuple[Scene, Basis]]:
-    """Return the checked views. Raises SceneError unless they are of one scene."""
-    all_scenes = [scenes] if isinstance(scenes, Scene) else list(scenes)
-    all_bases = [bases] if isinstance(bases, Basis) else list(bases)
-    if not all_scenes or len(all_scenes) != len(all_bases):
-        raise SceneError(
-            f"{len(all_scenes)} scenes and {len(all_bases)} bases: give one of each for every view"
-        )
-    first = all_scenes[0]
-    for other in all_scenes[1:]:
-        if (other.path, other.parameters) != (first.path, first.parameters):
-            raise SceneError(
-                f"{first.path} and {other.path} are two scenes: views differ in the sensor alone"
-            )
-    return list(zip(all_scenes, all_bases, strict=True))
-
-
-def _looks(
-    solution: Solution | Sequence[Solution], bases: Sequence[Basis]
-) -> list[tuple[Solution, list[int]]]:
-    """Return each solution, and the places of its views among `bases`."""
-    if isinstance(solution, Solution):
-        return [(solution, list(range(len(bases))))]
-    known = [(basis.origin.sensor, basis.size) for basis in bases]
-    looks = []
-    for its in solution:
-        views = [(basis.origin.sensor, basis.size) for basis in its.problem.views.bases]
-        if missing := [sensor for sensor, size in views if (sensor, size) not in known]:
-            raise SceneError(
-                f"a look is through the sensor {missing[0]!r}, and no basis is, on its film: give "
-                "the bases of all views"
-            )
-        looks.append((its, [known.index(view) for view in views]))
-    if not looks:
-        raise SceneError("no look to place lights for: give a solution")
-    return looks
-
-
-def on_small_film(scene: Scene, basis: Basis, pixels: int) -> Scene:
-    """Return `scene` on a film whose pixels are blocks of those of `basis`, `pixels` or fewer.
-
-    Raises SceneError if the basis is of another film.
-    """
-    (height, width), (mine_h, mine_w) = scene.size, basis.size
-    if whole_factor(scene.size, basis.size) is None:
-        raise SceneError(
-            f"the basis is {mine_w}x{mine_h}, whose pixels are no blocks of those of the film "
-            f"of {scene.path}, {width}x{height}: make it again"
-        )
-    return reduced_film(scene.reduced(f"{mine_w}x{mine_h}"), pixels)
-
-
-def reduced_film(scene: Scene, pixels: int) -> Scene:
-    """Return `scene` on a film of at most `pixels`, if possible without incomplete blocks."""
-    return scene.reduced(f"1/{reduction_to(scene.film, pixels)}")

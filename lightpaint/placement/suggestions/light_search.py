@@ -17,7 +17,7 @@ from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.solution import Solution
-from lightpaint.placement.place import on_small_film
+from lightpaint.placement.search_views import on_small_film
 from lightpaint.placement.space.free_space import (
     FreeSpace,
     as_position,
