@@ -25,8 +25,10 @@ def crowd(browser: Any, site: Any) -> Iterator[Painter]:
     page.on("pageerror", lambda error: wrong.append(str(error)))
     page.goto(f"{site.url}/fake/index.html?crowd&lights=69&size=48x27")
     page.wait_for_selector(".lightpaint .tag")
+    painter = Painter(page)
+    painter.still()  # what comes after the first marks belongs to how it begins
     page.evaluate("() => { window.first = window.painter.store.value; }")
-    yield Painter(page)
+    yield painter
     page.close()
     assert not wrong
 
