@@ -166,9 +166,7 @@ class Basis(Shown):
         return self.lights.names
 
     def image(self, name: str) -> Floats:
-        """Return the image of the light called `name`, (h, w, 3). Raises BasisError if there is no
-        such light.
-        """
+        """Return the image of a light by name, (h, w, 3). Raises BasisError if there is none."""
         if name not in self.names:
             raise BasisError(f"no light {name!r} in the basis: it has {some_names(self.names)}")
         return self.planes.plane(self.names.index(name))
@@ -190,8 +188,7 @@ class Basis(Shown):
         emitters_seen: Bools,
         former: Estimate | None = None,
     ) -> "Basis":
-        """Return a basis of the same lights on other pixels: a selection, or those of several
-        views.
+        """Return a basis of the same lights on other pixels: some, or those of several views.
 
         Parts that describe the pixels as one image are dropped. Parameters are the attributes.
         """
@@ -216,11 +213,9 @@ class Basis(Shown):
 
     def with_requests(self, requests: SceneRequests) -> "Basis":
         """Return this basis with other requests for its lights."""
-        return (
-            self
-            if self.requests == requests
-            else replace(self, lights=self.lights.with_requests(requests))
-        )
+        if self.requests == requests:
+            return self
+        return replace(self, lights=self.lights.with_requests(requests))
 
     @property
     def requests(self) -> SceneRequests:
@@ -234,9 +229,7 @@ class Basis(Shown):
 
     @property
     def knows_noise(self) -> bool:
-        """True if `half_differences` estimate the noise; False if the number of samples is
-        unknown.
-        """
+        """True if `half_differences` estimate the noise, since the number of samples is known."""
         return min(self.origin.halves) > 0 or bool(self.origin.each_light)
 
     @property
@@ -260,9 +253,7 @@ class Basis(Shown):
 
     @cached_property
     def surface_filter(self) -> SurfaceFilter | None:
-        """The filter that averages light along visible surfaces; None if the surfaces are
-        unknown.
-        """
+        """The filter that averages light along visible surfaces; None if these are unknown."""
         if self.features is None or self.features.position is None:
             return None
         return SurfaceFilter(self.features)
@@ -274,9 +265,7 @@ class Basis(Shown):
 
     @cached_property
     def power(self) -> Doubles:
-        """‖Φᵢ‖² over the picture, (n, 3) float64; pixels in which an emitter is seen do not
-        count.
-        """
+        """‖Φᵢ‖² over the pixels in which no emitter is seen, (n, 3) float64."""
         return read_only(self._power_and_totals[0])
 
     @cached_property
@@ -298,9 +287,7 @@ class Basis(Shown):
         vars(self)["_power_and_totals"] = power, totals  # where cached_property stores its value
 
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
-        """Return the image Σ w_i Φ_i, (h, w, 3) float32. weights: (n, 3) in the order of the
-        lights.
-        """
+        """Return the image Σ w_i Φ_i, (h, w, 3) float32. weights: (n, 3), as lights are ordered."""
         return self.planes.mix(weights)
 
     def predict(self, weights: Doubles) -> Estimate:
