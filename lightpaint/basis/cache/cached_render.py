@@ -79,43 +79,47 @@ def obtain_basis(
     """
     if exact_spp and time_s is not None:
         raise SceneError("exact_spp=True goes with a number of samples, not with time_s=...")
+    goal_spp = None if time_s is not None else scene.spp if spp is None else spp
+    options = dict[str, Any](time_s=time_s, seed=seed, progress=progress)
     if not use_cache:
-        start, options = None, dict[str, Any](time_s=time_s, seed=seed, progress=progress)
+        start = None
         if before is not None:
             options["keep"] = lambda basis: False
             start = gather_planes(scene, None, spp=spp, seed=seed, before=before, use_cache=False)
-        goal = None if time_s is not None else scene.spp if spp is None else spp
-        return as_stored(_completed(scene, start, spp=goal, render=render, options=options))
-    cached = cache.find(scene.identity, scene.sensor_names[scene.sensor], seed, scene.size)
-    if cached is not None and not is_of(scene, cached, seed):
-        cached = None
-    goal_spp = None if time_s is not None else scene.spp if spp is None else spp
+        return as_stored(_completed(scene, start, spp=goal_spp, render=render, options=options))
+    cached = _cached_basis(scene, seed)
     start = _starting_planes(
         scene, cached, goal_spp=goal_spp, seed=seed, exact_spp=exact_spp, before=before
     )
     is_composed = start is not None and start.origin.is_composed
 
     def keep(basis: Basis) -> bool:
-        return (cached is None or basis.origin.mean_spp >= cached.origin.mean_spp) and cache.keep(
-            _marked(basis, is_composed=is_composed)
-        )
+        is_best = cached is None or basis.origin.mean_spp >= cached.origin.mean_spp
+        return is_best and cache.keep(_marked(basis, is_composed=is_composed))
 
     if start is not None:
         # A basis cached by an earlier version may know less about the same lights.
         start = replace(start, lights=basis_lights(scene), source=str(scene.path))
-        sufficient_entries = [
-            sum(counts[:2]) >= (1 if goal_spp is None else goal_spp) for counts in counts_of(start)
-        ]
-        if 0 < sum(sufficient_entries) < len(sufficient_entries):
-            report_reuse(sum(sufficient_entries), len(sufficient_entries))
-    options = dict[str, Any](
-        time_s=time_s, seed=seed, keep=keep, is_final=is_final, progress=progress
-    )
+        _report_reused(start, goal_spp, report_reuse)
+    options |= {"keep": keep, "is_final": is_final}
     basis = _completed(scene, start, spp=goal_spp, render=render, options=options)
     if basis is start:
         return basis
-    basis = _marked(basis, is_composed=is_composed)
-    return _as_from_cache(scene, basis, keep)
+    return _as_from_cache(scene, _marked(basis, is_composed=is_composed), keep)
+
+
+def _cached_basis(scene: Scene, seed: int) -> Basis | None:
+    """Return the cached basis of the scene in its present state, if there is one."""
+    cached = cache.find(scene.identity, scene.sensor_names[scene.sensor], seed, scene.size)
+    return cached if cached is not None and is_of(scene, cached, seed) else None
+
+
+def _report_reused(start: Basis, goal_spp: int | None, report_reuse: ReuseReport) -> None:
+    """Report how many lights need no more samples, if some do and others do not."""
+    least = 1 if goal_spp is None else goal_spp
+    is_sufficient = [sum(counts[:2]) >= least for counts in counts_of(start)]
+    if 0 < sum(is_sufficient) < len(is_sufficient):
+        report_reuse(sum(is_sufficient), len(is_sufficient))
 
 
 def _starting_planes(

@@ -84,45 +84,64 @@ def gather_planes(
     possible. before: a basis of the scene in another state, with the same seed and film, whose
     planes are used as well. use_cache: False to use no other planes.
     """
-    identities = scene.light_identities
-    planes: list[KeptPlane | None] = [None] * len(identities)
-    if cached is not None:
-        planes = [KeptPlane(cached, i) for i in range(len(identities))]
+    best = BestPlanes(scene.light_identities, cached)
     if before is not None:
-        planes = [
-            _better_sampled(plane, before, identity)
-            for plane, identity in zip(planes, identities, strict=True)
+        best.take_from(before)
+    entries = cache.entries() if use_cache else []
+    candidates = [entry for entry in entries if _is_like(entry, scene, seed)]
+    while candidates:
+        entry = max(candidates, key=lambda entry: best.gain(entry, spp))
+        if best.gain(entry, spp) == 0:
+            break
+        candidates.remove(entry)
+        if (other := cache.read(entry)) is not None:
+            best.take_from(other)
+    sources = best.bases
+    if not sources or sources == [cached]:
+        return cached
+    return _compose_basis(scene, seed, best.planes, _emitters_seen_in(scene, sources))
+
+
+class BestPlanes:
+    """The plane with the most samples that was found for each light; None where there is none.
+
+    identities: those of the planes, in the order of the lights. cached: a basis of all of them.
+    """
+
+    def __init__(self, identities: Sequence[str], cached: Basis | None) -> None:
+        self._identities = identities
+        self.planes: list[KeptPlane | None] = [
+            None if cached is None else KeptPlane(cached, i) for i in range(len(identities))
         ]
 
-    def gain(entry: cache.Entry) -> int:
+    def take_from(self, other: Basis) -> None:
+        """Replace planes by those of `other` that have more samples."""
+        self.planes = [
+            _better_sampled(plane, other, identity)
+            for plane, identity in zip(self.planes, self._identities, strict=True)
+        ]
+
+    def gain(self, entry: cache.Entry, spp: int | None) -> int:
+        """Return the number of samples per pixel that the planes of `entry` would add.
+
+        spp: the number beyond which a plane is good enough.
+        """
         assert entry.origin is not None
         cached_spp = entry.origin.spp if spp is None else min(entry.origin.spp, spp)
         covered = (
             plane
-            for name, plane in zip(identities, planes, strict=True)
-            if name in entry.identities
+            for identity, plane in zip(self._identities, self.planes, strict=True)
+            if identity in entry.identities
         )
         return sum(
             max(0, cached_spp - (0 if plane is None else sum(plane.counts[:2])))
             for plane in covered
         )
 
-    entries = cache.entries() if use_cache else []
-    candidates = [entry for entry in entries if _is_like(entry, scene, seed)]
-    while candidates:
-        best_entry = max(candidates, key=gain)
-        if gain(best_entry) == 0:
-            break
-        candidates.remove(best_entry)
-        if (other := cache.read(best_entry)) is not None:
-            planes = [
-                _better_sampled(plane, other, identity)
-                for plane, identity in zip(planes, identities, strict=True)
-            ]
-    sources = {id(plane.basis): plane.basis for plane in planes if plane is not None}
-    if not sources or [*sources.values()] == [cached]:
-        return cached
-    return _compose_basis(scene, seed, planes, _emitters_seen_in(scene, [*sources.values()]))
+    @property
+    def bases(self) -> list[Basis]:
+        """The bases that hold them, each once."""
+        return [*{id(x.basis): x.basis for x in self.planes if x is not None}.values()]
 
 
 def least_sampled_lights(basis: Basis, spp: int | None) -> tuple[list[str], int | None]:

@@ -1,7 +1,7 @@
 """Reads basis files: completely into memory or, if large, row by row on request."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -51,6 +51,44 @@ MAX_BYTES = 2**36
 
 #: Exceptions raised by a header with unexpected content.
 _HEADER_ERRORS = (AttributeError, LookupError, OverflowError, TypeError, ValueError)
+
+
+@dataclass(frozen=True)
+class _Parts:
+    """The parts of a basis file, whether its pixels are in memory or not.
+
+    head: attributes of the first part. texts: attributes of each light's part. channel_readers:
+    functions that read the channels of each light's part. others: parts of no light.
+    planes: function of an order of the parts and an index into `PLANE_CHANNELS` that returns those
+    planes. has_indirect: whether the parts have planes of indirect light.
+    """
+
+    head: Mapping[str, str]
+    texts: Sequence[Mapping[str, str]]
+    channel_readers: Sequence[Callable[[], Channels]]
+    others: Sequence[ExrPart]
+    planes: Callable[[Sequence[int], int], Planes]
+    has_indirect: bool
+
+    def read_records(self) -> tuple[list[BasisLight], Origin, Checksums | None]:
+        """Read lights, origin and checksums. Raises BasisError or one of _HEADER_ERRORS."""
+        lights = [
+            read_record(BasisLight, strict_json(attributes[LIGHT_KEY])) for attributes in self.texts
+        ]
+        origin = read_record(Origin, strict_json(self.head[ORIGIN_KEY]))
+        text = self.head.get(CHECKSUMS_KEY)
+        return lights, origin, None if text is None else Checksums.of_text(text)
+
+    def check_pixels(self, lights: Sequence[BasisLight], checksums: Checksums | None) -> None:
+        """Raise BasisError if a light's pixels are not finite or do not match their checksum."""
+        names = LIGHT_CHANNELS | INDIRECT_CHANNELS if self.has_indirect else LIGHT_CHANNELS
+        for light, texts, read in zip(lights, self.texts, self.channel_readers, strict=True):
+            channels = read()  # one light at a time, since together they may exceed memory
+            if not all(np.isfinite(channels[name]).all() for name in names):
+                raise BasisError("holds values that are not finite: make it again")
+            if checksums is not None:
+                its_text = checked_text(texts)
+                check(checksums.lights[light.name], f"light {light.name!r}", its_text, channels)
 
 
 @keywords()
@@ -160,7 +198,9 @@ def _basis_of_parts(parts: Sequence[ExrPart], head: Mapping[str, str]) -> Basis:
     channel_readers = [partial(getattr, part, "channels") for part in light_parts]
     has_indirect = all(p.channels.keys() >= INDIRECT_CHANNELS for p in light_parts)
     texts = [p.attributes for p in light_parts]
-    return _checked_basis(texts, channel_readers, others, head, planes, has_indirect=has_indirect)
+    return _checked_basis(
+        _Parts(head, texts, channel_readers, others, planes, has_indirect=has_indirect)
+    )
 
 
 def _basis_of_rows(file: RowFile, head: Mapping[str, str]) -> Basis | None:
@@ -189,68 +229,43 @@ def _basis_of_rows(file: RowFile, head: Mapping[str, str]) -> Basis | None:
     others = [part(p) for p in file.parts if LIGHT_KEY not in p.texts]
     has_indirect = all({*p.channels} >= INDIRECT_CHANNELS for p in light_parts)
     texts = [p.texts for p in light_parts]
-    return _checked_basis(texts, channel_readers, others, head, planes, has_indirect=has_indirect)
+    return _checked_basis(
+        _Parts(head, texts, channel_readers, others, planes, has_indirect=has_indirect)
+    )
 
 
-def _checked_basis(
-    texts: Sequence[Mapping[str, str]],
-    channel_readers: Sequence[Callable[[], Channels]],
-    others: Sequence[ExrPart],
-    head: Mapping[str, str],
-    planes: Callable[[Sequence[int], int], Planes],
-    *,
-    has_indirect: bool,
-) -> Basis:
-    """Return the basis of a file after checking it.
-
-    texts: attributes of each light's part. channel_readers: functions that read the channels of
-    each light's part. planes: function of an order of the parts and an index into `PLANE_CHANNELS`
-    that returns those planes. has_indirect: whether the parts have planes of indirect light.
-    """
-    seen_masks = [p.in_display_window().channels["Y"] for p in others if "Y" in p.channels]
-    if not texts or not seen_masks:
+def _checked_basis(parts: _Parts) -> Basis:
+    """Return the basis of a file after checking it."""
+    masks = [p.in_display_window().channels["Y"] for p in parts.others if "Y" in p.channels]
+    if not parts.texts or not masks:
         raise BasisError("has lost parts of its basis: make it again with lightpaint basis")
     try:
-        lights = [
-            read_record(BasisLight, strict_json(attributes[LIGHT_KEY])) for attributes in texts
-        ]
-        origin = read_record(Origin, strict_json(head[ORIGIN_KEY]))
-        checksums = None
-        if CHECKSUMS_KEY in head:
-            checksums = Checksums.of_text(head[CHECKSUMS_KEY])
+        lights, origin, checksums = parts.read_records()
     except (BasisError, ImageError) as error:
         raise BasisError(f"is a damaged basis: {one_line(str(error))}") from error
-    order = list(range(len(texts)))
+    order = list(range(len(lights)))
     if checksums is not None:
         order = checksums.in_order([light.name for light in lights])
-        check(checksums.origin, "origin", head[ORIGIN_KEY], {})
+        check(checksums.origin, "origin", parts.head[ORIGIN_KEY], {})
+    planes = parts.planes
     try:
         images, noise = planes(order, 0), planes(order, 1)
         basis = Basis(
             lights=Lights(tuple(lights[k] for k in order)),
             planes=images,
             noise=noise,
-            emitters_seen=seen_masks[0] > 0,
+            emitters_seen=masks[0] > 0,
             origin=origin,
-            indirect=IndirectLight(planes(order, 2), planes(order, 3)) if has_indirect else None,
-            **fields_of_others(others, checksums, images.size),
+            indirect=IndirectLight(planes(order, 2), planes(order, 3))
+            if parts.has_indirect
+            else None,
+            **fields_of_others(parts.others, checksums, images.size),
         )
     except (BasisError, ImageError) as error:
         raise BasisError(f"is a damaged basis: {one_line(str(error))}") from error
-    for light, attributes, read in zip(lights, texts, channel_readers, strict=True):
-        channels = read()  # one light at a time, since together they may exceed memory
-        names = LIGHT_CHANNELS | INDIRECT_CHANNELS if has_indirect else LIGHT_CHANNELS
-        if not all(np.isfinite(channels[name]).all() for name in names):
-            raise BasisError("holds values that are not finite: make it again")
-        if checksums is not None:
-            check(
-                checksums.lights[light.name],
-                f"light {light.name!r}",
-                checked_text(attributes),
-                channels,
-            )
+    parts.check_pixels(lights, checksums)
     if checksums is not None:
-        check(checksums.seen, "mask of seen emitters", "", {"Y": seen_masks[0]})
+        check(checksums.seen, "mask of seen emitters", "", {"Y": masks[0]})
     return basis
 
 

@@ -74,15 +74,10 @@ def render_basis(
         >>> lp.render_basis(lp.load_scene("room.xml"), spp=4)
         Basis(2 lights, 16x16, 4 spp, of room.xml: panel, bulb)
     """
-    height, width = scene.size
     if spp is not None and time_s is not None:
         raise SceneError("give a number of samples or a time to render for, not both")
     budget = Budget(scene.spp if spp is None else spp, time_s, until_spp)
-    if len(scene.lights) * height * width * 3 >= 2**32:
-        raise SceneError(
-            f"{len(scene.lights)} lights at {width}x{height} are more than one basis can hold: "
-            "use resolution=... or fewer lights"
-        )
+    _check_size(scene)
     check_memory(scene, in_bands=renders_in_bands(scene, start))
     if start is not None and not is_of(scene, start, seed):
         raise BasisError("the basis to continue was made from another scene, sensor, film or seed")
@@ -92,12 +87,9 @@ def render_basis(
     if start is not None and start.origin.method != method:
         # It cannot be continued, but must not be replaced by a basis with fewer samples either.
         start, keep = None, None
-    if start is not None and method == ONE_PASS and start.origin.each_light:
-        raise BasisError(
-            "the lights of the basis to continue have unequal numbers of samples, and one pass "
-            "adds the same number to each: render the others first, with scene.only([...])"
-        )
-    has_first_hits = start is not None and not (start.features is None or start.objects is None)
+    if start is not None and method == ONE_PASS:
+        _check_equal_samples(start)
+    has_first_hits = start is not None and _has_first_hits(start)
     arguments = scene, budget, seed, start, Keeper(keep), progress
     with render_errors(scene.path):
         if method == ONE_PASS:
@@ -109,6 +101,25 @@ def render_basis(
     if start is not None and has_first_hits:
         rendered = replace(rendered, features=start.features, objects=start.objects)
     return with_first_hits(rendered, scene, seed)
+
+
+def _check_size(scene: Scene) -> None:
+    """Raise SceneError if a basis of `scene` would have more values than its file can count."""
+    height, width = scene.size
+    if len(scene.lights) * height * width * 3 >= 2**32:
+        raise SceneError(
+            f"{len(scene.lights)} lights at {width}x{height} are more than one basis can hold: "
+            "use resolution=... or fewer lights"
+        )
+
+
+def _check_equal_samples(start: Basis) -> None:
+    """Raise BasisError if one pass cannot continue `start`."""
+    if start.origin.each_light:
+        raise BasisError(
+            "the lights of the basis to continue have unequal numbers of samples, and one pass "
+            "adds the same number to each: render the others first, with scene.only([...])"
+        )
 
 
 def render_planes_only(scene: Scene, *, spp: int, seed: int) -> Basis:
@@ -124,10 +135,14 @@ def with_first_hits(basis: Basis, scene: Scene, seed: int, *, loaded: Any = None
 
     loaded: the loaded `scene`, if available.
     """
-    if basis.features is not None and basis.objects is not None:
+    if _has_first_hits(basis):
         return basis
     features, objects = render_first_hits(scene, seed=seed, loaded=loaded)
     return replace(basis, features=features, objects=objects)
+
+
+def _has_first_hits(basis: Basis) -> bool:
+    return basis.features is not None and basis.objects is not None
 
 
 @MITSUBA.acquired()
@@ -146,63 +161,83 @@ def _render_together(
 
     needs_first_hits: whether to render features and objects while the scene is loaded.
     """
-    from lightpaint.basis.render.tracer.one_pass import Tracer
-
-    begun = done = 0 if start is None else start.origin.halves[0]
-    guide_table = None if start is None else start.guide_table
-    tracer = Tracer(scene, view_seed(seed, scene.sensor), guide_table)
-    before = None if start is None else start.sums
-    rest = start if before is None else None  # the samples that are not in the initial sums
-    film: WholeFilm | BandedFilm
-    film = (BandedFilm if renders_in_bands(scene, start) else WholeFilm)(tracer, done, before)
-
-    def basis(*, is_last: bool = False, is_finished: bool = False) -> Basis:
-        seen = film.seen()
-        if start is not None:
-            seen |= start.emitters_seen
-        of_render = scene, seed, seen, done, tracer.guide_table
-        if isinstance(film, BandedFilm):
-            sums = None if is_finished else (film.sums.array[0], film.sums.array[1])
-            pairs = film.planes(done)
-            return basis_of_planes(pairs, *of_render, is_finished=is_finished, sums=sums)
-        halves = film.sums(is_last=is_last)
-        return basis_of_sums(
-            scene, seed, halves, seen, done, tracer.guide_table, start=rest, is_finished=is_finished
-        )
-
+    render = _OnePassRender(scene, seed, start)
     try:
-        with tracing() as let_others_through:
-            for spp in steps(film.band_pixels, budget, done, progress):
-                if not tracer.is_trained:
-                    train(tracer, let_others_through)
-                film.add(done, spp, let_others_through)
-                done += spp
-                keeper.now_and_then(basis)
-        rendered = basis(is_last=True, is_finished=is_final)
+        render.spend(budget, keeper, progress)
+        rendered = render.basis(is_last=True, is_finished=is_final)
     except KeyboardInterrupt:
         if keeper.keep is None:
             raise
-        if ahead := film.ahead:
-            with tracing() as let_others_through:
-                film.add(done, ahead, let_others_through)
-            done += ahead
-        if done == begun == 0:
+        render.even_out()
+        if render.done == 0:
             raise Interrupted("too early for anything to be kept") from None
-        if not keeper.keep(basis(is_last=True)):
+        if not keeper.keep(render.basis(is_last=True)):
             raise
         budget_text = "" if budget.time_s is not None else f" of {budget.spp}"
         raise Interrupted(
-            f"{2 * done}{budget_text} samples per pixel are kept; run the same command to continue"
+            f"{2 * render.done}{budget_text} samples per pixel are kept; run the same command to "
+            "continue"
         ) from None
     else:
-        return (
-            with_first_hits(rendered, scene, seed, loaded=tracer.loaded)
-            if needs_first_hits
-            else rendered
-        )
+        if needs_first_hits:
+            return with_first_hits(rendered, scene, seed, loaded=render.tracer.loaded)
+        return rendered
     finally:
-        tracer.close()
+        render.tracer.close()
         gc.collect()
+
+
+class _OnePassRender:
+    """A render of all lights by one path tracer, and the samples that it has so far.
+
+    start: the basis that it continues.
+    """
+
+    def __init__(self, scene: Scene, seed: int, start: Basis | None) -> None:
+        from lightpaint.basis.render.tracer.one_pass import Tracer
+
+        self._scene, self._seed, self._start = scene, seed, start
+        #: Number of samples per pixel of each half.
+        self.done = 0 if start is None else start.origin.halves[0]
+        guide_table = None if start is None else start.guide_table
+        self.tracer = Tracer(scene, view_seed(seed, scene.sensor), guide_table)
+        sums = None if start is None else start.sums
+        # The samples that are not in the initial sums.
+        self._rest = start if sums is None else None
+        film_type = BandedFilm if renders_in_bands(scene, start) else WholeFilm
+        self._film: WholeFilm | BandedFilm = film_type(self.tracer, self.done, sums)
+
+    def spend(self, budget: Budget, keeper: Keeper, progress: Progress) -> None:
+        """Add samples step by step until `budget` is spent."""
+        with tracing() as let_others_through:
+            for spp in steps(self._film.band_pixels, budget, self.done, progress):
+                if not self.tracer.is_trained:
+                    train(self.tracer, let_others_through)
+                self._film.add(self.done, spp, let_others_through)
+                self.done += spp
+                keeper.now_and_then(self.basis)
+
+    def even_out(self) -> None:
+        """Complete the step that an interrupt left unfinished in some pixels."""
+        if ahead := self._film.ahead:
+            with tracing() as let_others_through:
+                self._film.add(self.done, ahead, let_others_through)
+            self.done += ahead
+
+    def basis(self, *, is_last: bool = False, is_finished: bool = False) -> Basis:
+        """Return the basis of the samples so far. is_last: whether to release the sums."""
+        scene, seed, film, table = self._scene, self._seed, self._film, self.tracer.guide_table
+        seen = film.seen()
+        if self._start is not None:
+            seen |= self._start.emitters_seen
+        if isinstance(film, BandedFilm):
+            of_render = scene, seed, seen, self.done, table
+            sums = None if is_finished else (film.sums.array[0], film.sums.array[1])
+            pairs = film.planes(self.done)
+            return basis_of_planes(pairs, *of_render, is_finished=is_finished, sums=sums)
+        halves, start = film.sums(is_last=is_last), self._rest
+        of_sums = scene, seed, halves, seen, self.done, table
+        return basis_of_sums(*of_sums, start=start, is_finished=is_finished)
 
 
 @MITSUBA.acquired()

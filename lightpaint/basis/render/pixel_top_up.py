@@ -109,10 +109,8 @@ def top_up(
     """
     if basis.origin.method != ONE_PASS or not is_of(scene, basis, basis.origin.seed):
         raise BasisError("the basis to top up is not a one-pass basis of this scene and film")
-    extra = np.zeros(basis.size, np.intp) if basis.extra is None else basis.extra.copy()
     sums = _PlaneSums(scene, basis)
     batches = list(pixel_batches(counts, 2 * plane_count(scene)))
-    guide_table = basis.guide_table
     with (
         nullcontext(tracers) if tracers is not None else kept_loaded() as kept_tracers,
         render_errors(scene.path),
@@ -122,28 +120,38 @@ def top_up(
                 tracer = kept_tracers.of(scene, basis)
                 if batches and not tracer.is_trained:
                     train(tracer, let_others_through)
-                guide_table = tracer.guide_table
+                sums.guide_table = tracer.guide_table
                 progress("top-up", 0, len(batches))
                 for k, pixels in enumerate(batches):
                     if is_enough():
                         break
-                    first, spp = (x.ravel()[pixels] for x in (extra, counts))
-                    halves = []
-                    for half in range(2):
-                        planes = tracer.pixel_planes(pixels.size)
-                        tracer.top_up(planes, half, pixels, first, spp)
-                        halves.append(planes.sums())
-                        let_others_through()
-                    sums.add(pixels, halves, first, spp)
-                    extra.ravel()[pixels] += spp
+                    first, spp = (x.ravel()[pixels] for x in (sums.extra, counts))
+                    halves = _trace_halves(tracer, pixels, first, spp, let_others_through)
+                    sums.add(pixels, halves, spp)
                     progress("top-up", k + 1, len(batches))
         except KeyboardInterrupt:
-            if keep is None or not keep(sums.basis(extra, guide_table)):
+            if keep is None or not keep(sums.basis()):
                 raise
             raise Interrupted(
                 "the samples so far are kept; run the same command to continue"
             ) from None
-    return sums.basis(extra, guide_table)
+    return sums.basis()
+
+
+def _trace_halves(
+    tracer: "Tracer", pixels: Indices, first: Indices, spp: Indices, pause: Callable[[], None]
+) -> list[Floats]:
+    """Return the undivided sums of new samples of both halves, (n or 2n, 1, p, 3).
+
+    first, spp: as in `Tracer.top_up`. pause: called after each half.
+    """
+    halves = []
+    for half in range(2):
+        planes = tracer.pixel_planes(pixels.size)
+        tracer.top_up(planes, half, pixels, first, spp)
+        halves.append(planes.sums())
+        pause()
+    return halves
 
 
 def pixel_batches(counts: Indices, planes: int) -> Iterator[Indices]:
@@ -171,10 +179,16 @@ def pixel_batches(counts: Indices, planes: int) -> Iterator[Indices]:
 
 
 class _PlaneSums:
-    """Images and half differences of a basis, to which samples of selected pixels are added."""
+    """Images and half differences of a basis, to which samples of selected pixels are added.
+
+    extra: (h, w), number of samples of each half that were added to a pixel. guide_table: the table
+    by which emitters are chosen.
+    """
 
     def __init__(self, scene: Scene, basis: Basis) -> None:
         self._basis, self._lights = basis, len(scene.lights)
+        self.extra = np.zeros(basis.size, np.intp) if basis.extra is None else basis.extra.copy()
+        self.guide_table = basis.guide_table
         self._is_split = basis.indirect is not None and has_indirect_planes(scene)
         self._all = [basis.planes.array().copy(), basis.noise.array().copy()]
         if self._is_split and basis.indirect is not None:
@@ -182,11 +196,9 @@ class _PlaneSums:
                 planes.array().copy() for planes in (basis.indirect.planes, basis.indirect.noise)
             ]
 
-    def add(self, pixels: Indices, halves: list[Floats], first: Indices, spp: Indices) -> None:
-        """Add undivided sums of both halves, (n or 2n, 1, p, 3). first, spp: as in
-        `Tracer.top_up`.
-        """
-        n = self._lights
+    def add(self, pixels: Indices, halves: list[Floats], spp: Indices) -> None:
+        """Add undivided sums of `spp` samples of both halves, (n or 2n, 1, p, 3)."""
+        n, first = self._lights, self.extra.ravel()[pixels]
         indirect = [half[n:] for half in halves]
         totals = [half[:n] for half in halves]
         for total, part in zip(totals, indirect, strict=True):
@@ -207,6 +219,7 @@ class _PlaneSums:
                     pair, mean_and_half_difference(light_halves, new), strict=True
                 ):
                     flat(plane)[k, pixels] = updated[0, 0]
+        self.extra.ravel()[pixels] += spp
 
     def _half_spp(self) -> list[tuple[int, int]]:
         """Return the number of uniform samples in both halves for each light."""
@@ -215,18 +228,18 @@ class _PlaneSums:
             return [counts[:2] for counts in origin.each_light]
         return [origin.halves] * self._lights
 
-    def basis(self, extra: Indices, guide_table: Floats | None) -> Basis:
+    def basis(self) -> Basis:
         """Return the basis with all added samples."""
         planes: list[Planes] = [as_planes(x) for x in self._all]
-        mean = 2 * float(extra.mean(dtype=np.float64))
+        mean = 2 * float(self.extra.mean(dtype=np.float64))
         return replace(
             self._basis,
             planes=planes[0],
             noise=planes[1],
             indirect=IndirectLight(planes[2], planes[3]) if self._is_split else None,
-            extra=extra if mean else None,
+            extra=self.extra if mean else None,
             origin=replace(self._basis.origin, extra_spp=mean),
-            guide_table=guide_table,
+            guide_table=self.guide_table,
             sums=None,
         )
 
