@@ -1,6 +1,6 @@
 """Reads a Mitsuba scene and chooses the lights to adjust."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from lightpaint.errors import SceneError
@@ -8,9 +8,10 @@ from lightpaint.file_reading import file_length
 from lightpaint.keywords import keywords
 from lightpaint.scene.checks.old_scenes import explain_old_scene
 from lightpaint.scene.checks.xml_limits import MAX_XML
-from lightpaint.scene.lights.emitters import check_emitters
+from lightpaint.scene.lights.emitters import Emitter, check_emitters
+from lightpaint.scene.lights.light import Light
 from lightpaint.scene.lights.light_choice import choose_lights
-from lightpaint.scene.lights.lights_file import lights_file_for
+from lightpaint.scene.lights.lights_file import LightsFile, lights_file_for
 from lightpaint.scene.properties.film import check_film, sensor_index
 from lightpaint.scene.properties.integrator import IntegratorChoice
 from lightpaint.scene.runtime.mitsuba_errors import mitsuba_errors
@@ -68,35 +69,45 @@ def load_scene(
     """
     backend = use_variant(variant)
     path = Path(path)
-    file_length(path, "scene file", SceneError, limit=MAX_XML)
-    if path.suffix.lower() in (".exr", ".json", ".png"):
-        raise SceneError(f"{path} is not a scene: this command takes a Mitsuba XML first")
+    _check_file(path)
     values = {key: str(value) for key, value in (parameters or {}).items()}
     instead = None if integrator is None else IntegratorChoice.of(integrator)
     with explain_old_scene(path), mitsuba_errors(path):
         parsed = ParsedScene(path, values, backend.variant, instead)
     index = sensor_index(sensor, parsed.sensor_names, path)
-    selection = lights_file_for(path, lights_file, beside_scene=use_lights_file).with_more(
-        lights, groups
-    )
+    selection = lights_file_for(path, lights_file, beside_scene=use_lights_file)
+    selection = selection.with_more(lights, groups)
     with explain_old_scene(path), mitsuba_errors(path):
         facts = inspect_scene(parsed, index)
     check_film(path, facts["film"], facts["spp"])
-    emitters = facts["emitters"]
-    check_emitters(path, emitters)
+    check_emitters(path, facts["emitters"])
     return Scene(
         path=path,
         parameters=values,
-        lights=choose_lights(
-            emitters,
-            scene=str(path),
-            lights=selection.lights,
-            groups=selection.groups,
-            group_alike=group_alike and selection.group_alike,
-            named=selection.requests.names,
-        ),
+        lights=_select_lights(path, facts["emitters"], selection, group_alike=group_alike),
         lights_file=selection.path,
         requests=selection.requests,
         parsed=parsed,
         **facts,
     )
+
+
+def _select_lights(
+    path: Path, emitters: Sequence[Emitter], selection: LightsFile, *, group_alike: bool
+) -> tuple[Light, ...]:
+    """Return the lights that a lights file selects. group_alike: unless it disables this."""
+    return choose_lights(
+        emitters,
+        scene=str(path),
+        lights=selection.lights,
+        groups=selection.groups,
+        group_alike=group_alike and selection.group_alike,
+        named=selection.requests.names,
+    )
+
+
+def _check_file(path: Path) -> None:
+    """Raise SceneError for a missing or long file, and for a picture or a lighting."""
+    file_length(path, "scene file", SceneError, limit=MAX_XML)
+    if path.suffix.lower() in (".exr", ".json", ".png"):
+        raise SceneError(f"{path} is not a scene: this command takes a Mitsuba XML first")

@@ -51,16 +51,7 @@ class ParsedScene:
         self.resolver = mi.FileResolver(mi.file_resolver())
         self.resolver.prepend(str(path.resolve().parent))
         with self._resolving(), mitsuba_errors(path):
-            check_xml(path, parameters, mi.file_resolver())
-            self.state = mi.parser.parse_file(self.config, str(path), **parameters)
-            # Reading a property marks it as used, and Mitsuba reports unused ones: so check copies.
-            check_nodes(path, mi.parser.ParserState(self.state))
-            mi.parser.transform_all(self.config, self.state)
-            check_required(path, mi.parser.ParserState(self.state))
-            has_exr = check_assets(path, mi.parser.ParserState(self.state), self.resolver)
-            # An exception about a damaged offset table in Mitsuba's OpenEXR reader sometimes ends
-            # the process if it is thrown in one of several threads.
-            self.config.parallel = self.config.parallel and not has_exr
+            self.state = self._parse()
         if self.state.nodes[0].props.plugin_name() != "scene":
             raise SceneError(f"{path} is not a scene: its root element must be <scene>")
         self.files = tuple(Path(str(f)) for f in self.state.files)
@@ -69,23 +60,32 @@ class ParsedScene:
             check_plugins(self.state, self.resolver)
         kinds = mi.ObjectType
         self.emitter_nodes = self._nodes_of(kinds.Emitter)
+        self.shape_of = self._shapes_by_child(kinds.Emitter)
+        self.parent_of = self._shapes_by_child(kinds.Shape)
         self.sensor_nodes = self.children_of(0, kinds.Sensor)
         self.sensor_names = tuple(
             self.state.nodes[k].props.id() or f"sensor_{i}" for i, k in enumerate(self.sensor_nodes)
         )
-        self.shape_of = {
-            child: shape
-            for shape in self._nodes_of(kinds.Shape)
-            for child in self.children_of(shape, kinds.Emitter)
-        }
-        self.parent_of = {
-            child: shape
-            for shape in self._nodes_of(kinds.Shape)
-            for child in self.children_of(shape, kinds.Shape)
-        }
         self.names = self._name_lights()
         #: Parameters changed by `with_motions`, as XML: node → name → element.
         self.moved: dict[int, dict[str, str]] = {}
+
+    def _parse(self) -> Any:
+        """Return the parsed form of the XML, after checking it and the files that it refers to."""
+        import mitsuba as mi
+
+        path, parser = self.path, mi.parser
+        check_xml(path, self.parameters, mi.file_resolver())
+        state = parser.parse_file(self.config, str(path), **self.parameters)
+        # Reading a property marks it as used, and Mitsuba reports unused ones: so check copies.
+        check_nodes(path, parser.ParserState(state))
+        parser.transform_all(self.config, state)
+        check_required(path, parser.ParserState(state))
+        has_exr = check_assets(path, parser.ParserState(state), self.resolver)
+        # An exception about a damaged offset table in Mitsuba's OpenEXR reader sometimes ends the
+        # process if it is thrown in one of several threads.
+        self.config.parallel = self.config.parallel and not has_exr
+        return state
 
     def _replace_integrator(
         self, instead: IntegratorChoice | None
@@ -102,6 +102,16 @@ class ParsedScene:
 
     def _nodes_of(self, kind: Any) -> list[int]:
         return [k for k, node in enumerate(self.state.nodes) if node.type == kind]
+
+    def _shapes_by_child(self, kind: Any) -> dict[int, int]:
+        """Return the shape of each node of this kind that is inside a shape."""
+        import mitsuba as mi
+
+        return {
+            child: shape
+            for shape in self._nodes_of(mi.ObjectType.Shape)
+            for child in self.children_of(shape, kind)
+        }
 
     def children_of(self, parent: int, kind: Any = None) -> list[int]:
         """Return the nodes inside a node, or referenced by it. kind: restricts them to this

@@ -58,22 +58,7 @@ def read_bitmap(path: Path, kind: str) -> Bitmap:
     """
     if path.stat().st_size > MAX_FILE:
         raise ImageError("is too long to be a picture")
-    shown: str | None = None
-    profile: Profile | None = None
-    transparency = True
-    if kind == "png":
-        with path.open("rb") as file:
-            longest = longest_png(file.read(PNG_HEAD))
-        if path.stat().st_size > longest:
-            raise ImageError(
-                f"is {path.stat().st_size} bytes long, and a PNG of its size has at most "
-                f"{longest}: save it again"
-            )
-        shown, profile = read_png_head(path)
-    elif kind == "psd":
-        transparency = check_psd(path, max_pixels=MAX_PIXELS)
-    elif kind == "tiff":
-        check_tiff(path)
+    head = _read_head(path, kind)
     with silenced():
         spec, pixels = _decoded(path, kind)
     if kind == "tiff":
@@ -81,11 +66,10 @@ def read_bitmap(path: Path, kind: str) -> Bitmap:
     if kind == "jpeg" and spec.getattribute("jpeg:ColorSpace") == "CMYK":
         raise ImageError("holds CMYK: convert it to RGB and export it again")
     icc = spec.getattribute("ICCProfile")
-    if icc is not None:
-        profile = read_icc(np.asarray(icc, np.uint8).tobytes())
+    profile = head.profile if icc is None else read_icc(np.asarray(icc, np.uint8).tobytes())
     pixels = _upright(pixels, int(spec.get_int_attribute("Orientation", 1)))
     alpha = _alpha(spec, pixels)
-    if alpha is not None and not transparency:
+    if alpha is not None and not head.has_transparency:
         raise ImageError(
             "has an extra channel that is not transparency: delete it, or export a PNG"
         )
@@ -100,8 +84,39 @@ def read_bitmap(path: Path, kind: str) -> Bitmap:
         codes=_largest(pixels.dtype) if integer else None,
         profile=profile,
         lossy=kind == "jpeg" or spec.get_int_attribute("tiff:Compression", 1) in (6, 7, 34887),
-        shown=shown,
+        shown=head.shown,
     )
+
+
+@dataclass(frozen=True)
+class _Head:
+    """Facts that OpenImageIO does not tell. shown, profile: as in `Bitmap`, from a PNG.
+
+    has_transparency: False if an extra channel of a PSD is not transparency.
+    """
+
+    shown: str | None = None
+    profile: Profile | None = None
+    has_transparency: bool = True
+
+
+def _read_head(path: Path, kind: str) -> _Head:
+    """Check a file before it is decoded, and read what the decoder skips."""
+    match kind:
+        case "png":
+            with path.open("rb") as file:
+                longest = longest_png(file.read(PNG_HEAD))
+            if path.stat().st_size > longest:
+                raise ImageError(
+                    f"is {path.stat().st_size} bytes long, and a PNG of its size has at most "
+                    f"{longest}: save it again"
+                )
+            return _Head(*read_png_head(path))
+        case "psd":
+            return _Head(has_transparency=check_psd(path, max_pixels=MAX_PIXELS))
+        case "tiff":
+            check_tiff(path)
+    return _Head()
 
 
 def _decoded(path: Path, kind: str) -> tuple[Any, npt.NDArray[Any]]:
