@@ -176,11 +176,7 @@ def _solve_together(
     scale = np.where(active, 1 / root, 0)
     M, b = (M * scale[:, :, None]) * scale[:, None, :], b * scale
     low, high = lower[:, rows] * root, upper[:, rows] * root
-    size = np.abs(b).max(axis=1)
-    if low.any():
-        pull = np.matmul(M, np.clip(0, low, high)[:, :, None])[:, :, 0]
-        size = np.maximum(size, np.abs(pull).max(axis=1))
-    size = np.where(asks, size, 1)
+    size = np.where(asks, _gradient_sizes(M, b, low, high), 1)
     begin = np.where(active, np.minimum(np.maximum(start[:, rows] * root, low), high), 0)
     with one_thread():
         x, residuals, steps, is_singular = clipped_newton(
@@ -198,6 +194,15 @@ def _solve_together(
         c: Optimum(answers[c], multipliers[c], NO_CAPS, float(residuals[c]), 0, steps, tolerance)
         for c in np.flatnonzero(asks & (residuals <= tolerance)).tolist()
     }
+
+
+def _gradient_sizes(M: Doubles, b: Doubles, low: Doubles, high: Doubles) -> Doubles:
+    """Return the largest entry, (c,), of each problem's b and of M x at the bounds nearest to 0."""
+    sizes = np.abs(b).max(axis=1)
+    if low.any():
+        pull = np.matmul(M, np.clip(0, low, high)[:, :, None])[:, :, 0]
+        sizes = np.maximum(sizes, np.abs(pull).max(axis=1))
+    return np.asarray(sizes)
 
 
 def _solve_polished(

@@ -75,31 +75,44 @@ def indistinguishable(
     lit = power > UNREACHED_POWER * power.max(initial=0)
     scale = np.where(lit, 1 / np.sqrt(np.where(lit, power, 1)), 0)
     cosines = channels * scale[:, :, None] * scale[:, None, :]
-    reached = np.flatnonzero(lit.any(axis=0))
 
+    groups = _alike_groups(cosines, lit, alike)
+    alike_lights = (
+        Ambiguity(tuple(names[i] for i in group), is_mix=False)
+        for group in groups
+        if len(group) > 1
+    )
+    # One light stands for each group. Other mixes may cancel; one channel suffices.
+    heads = [group[0] for group in groups]
+    mixes = (tuple(names[i] for i in mix) for mix in _cancelling_mixes(cosines, lit, heads, alike))
+    return *alike_lights, *(Ambiguity(mixed, is_mix=True) for mixed in mixes)
+
+
+def _alike_groups(cosines: Doubles, lit: Bools, alike: float) -> list[list[int]]:
+    """Return the lights that reach something, in groups with images like that of the first."""
     groups: list[list[int]] = []
-    for i in reached.tolist():
+    for i in np.flatnonzero(lit.any(axis=0)).tolist():
         home = next((g for g in groups if _least_cosine(cosines, lit, g[0], i) > 1 - alike), None)
         if home is None:
             groups.append([i])
         else:
             home.append(i)
-    ambiguities = [
-        Ambiguity(tuple(names[i] for i in group), is_mix=False)
-        for group in groups
-        if len(group) > 1
-    ]
+    return groups
 
-    # One light stands for each group. Other mixes may cancel; one channel suffices.
-    mixes: dict[tuple[str, ...], None] = {}
-    for c in range(len(channels)):
-        heads = np.array([group[0] for group in groups if lit[c, group[0]]], dtype=int)
-        values, vectors = np.linalg.eigh(cosines[c][np.ix_(heads, heads)])
+
+def _cancelling_mixes(
+    cosines: Doubles, lit: Bools, heads: Sequence[int], alike: float
+) -> list[tuple[int, ...]]:
+    """Return the mixes of the lights `heads` that cancel in some channel, each once."""
+    mixes: dict[tuple[int, ...], None] = {}
+    for c in range(len(cosines)):
+        lit_heads = np.array([head for head in heads if lit[c, head]], dtype=int)
+        values, vectors = np.linalg.eigh(cosines[c][np.ix_(lit_heads, lit_heads)])
         for value, vector in zip(values, vectors.T, strict=True):
             if value <= alike:
                 part = np.abs(vector) > MIN_PART * np.abs(vector).max()
-                mixes[tuple(names[i] for i in heads[part].tolist())] = None
-    return *ambiguities, *(Ambiguity(mixed, is_mix=True) for mixed in mixes)
+                mixes[tuple(lit_heads[part].tolist())] = None
+    return list(mixes)
 
 
 def _least_cosine(cosines: Doubles, lit: Bools, i: int, j: int) -> float:

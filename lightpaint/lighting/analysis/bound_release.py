@@ -43,27 +43,16 @@ def bounds_of(solution: Solution) -> tuple[tuple[Bound, ...], int]:
     equations = problem.with_pull(problem.solved)
     answer = _bounded_answer(solution, equations)
     least = MIN_GAIN * float(solution.equations.target_norm2.sum())
-    active = [
-        active_bound for active_bound in find_active_bounds(answer) if active_bound.estimate > least
-    ]
-    active.sort(key=lambda active_bound: -active_bound.estimate)
+    active = [bound for bound in find_active_bounds(answer) if bound.estimate > least]
+    active.sort(key=lambda bound: -bound.estimate)
     before, bounds = _relative_objective(problem.solved, answer.w), []
     size = len(answer.reduction.unknowns) // len(answer.reduction.channel_groups)
-    for active_bound in active[
-        : min(max(MAX_UNKNOWNS // max(size, 1), MIN_RELEASED), MAX_RELEASED)
-    ]:
-        reduction, x = _release(answer, active_bound)
-        if (
-            active_bound.kind == "left out"
-            and reduction.knobs[active_bound.knob].whites is not None
-        ):
-            freed = next_whites(equations, reduction, answer.w, only=[active_bound.knob])[1]
-        else:
-            freed = solve_reduced(equations, reduction, answer.w, x=x)
-        gain = before - _relative_objective(problem.solved, freed.weights)
+    count = min(max(MAX_UNKNOWNS // max(size, 1), MIN_RELEASED), MAX_RELEASED)
+    for active_bound in active[:count]:
+        freed = _freed_weights(equations, answer, active_bound)
+        gain = before - _relative_objective(problem.solved, freed)
         if problem.pull is None:
             gain = max(gain, 0.0)  # except for round-off
-        tint = _tint(answer, active_bound, freed.weights)
         names = tuple(solution.basis.names[k] for k in active_bound.lights)
         label = answer.full.labels[active_bound.lights[0]]
         held_by = active_bound.kind if active_bound.kind in ("zero", "kept", "left out") else label
@@ -75,10 +64,20 @@ def bounds_of(solution: Solution) -> tuple[tuple[Bound, ...], int]:
                 gain,
                 active_bound.multiplier,
                 active_bound.per,
-                tint,
+                _tint(answer, active_bound, freed),
             )
         )
     return tuple(sorted(bounds, key=lambda bound: -bound.gain)), len(active) - len(bounds)
+
+
+def _freed_weights(
+    equations: NormalEquations, answer: BoundedAnswer, bound: ActiveBound
+) -> Doubles:
+    """Solve without one bound; return the weights, (n, 3)."""
+    reduction, x = _release(answer, bound)
+    if bound.kind == "left out" and reduction.knobs[bound.knob].whites is not None:
+        return next_whites(equations, reduction, answer.w, only=[bound.knob])[1].weights
+    return solve_reduced(equations, reduction, answer.w, x=x).weights
 
 
 def _bounded_answer(solution: Solution, equations: NormalEquations) -> BoundedAnswer:

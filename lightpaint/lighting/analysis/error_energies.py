@@ -47,9 +47,7 @@ class ErrorEnergies:
             unreachable = missed - forbidden[rows]
             # This excludes noise that the painting shares, where it equals the current look.
             noise = residuals.noise(slice(rows.start * width, rows.stop * width))
-            uncounted = np.maximum(1 - importance, 0)
-            # Black target pixels have no colour to miss.
-            uncounted = np.where(np.any(target.image[rows] > 0, axis=-1), uncounted, 0)
+            uncounted = _uncounted(importance, target.image[rows])
             outside = target.image[rows].astype(np.float64) - mixed
             is_linear = solution.problem.is_linear
             residual = outside if is_linear else loss.cut(lambda x: x[rows]).residual(mixed)
@@ -68,6 +66,12 @@ class ErrorEnergies:
         energies = np.sum(parallel_map(sums, bands_of(predicted.shape)), axis=0).tolist()
         total, out_of_reach, noise, ignored, painted = energies
         return cls(total, out_of_reach, noise, ignored, painted)
+
+
+def _uncounted(importance: Doubles, image: Floats) -> Doubles:
+    """Return the share of pixels, (h, w), that does not count, in which `image` has a colour."""
+    # Black target pixels have no colour to miss.
+    return np.where(np.any(image > 0, axis=-1), np.maximum(1 - importance, 0), 0)
 
 
 def grain_power(solution: Solution, unreachable: Doubles) -> float:

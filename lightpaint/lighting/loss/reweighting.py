@@ -167,37 +167,72 @@ def run_rounds(
     value = total_loss(pixels, terms, w, x)
     count = 0
     while True:
-        image, weight = pixels.squares(x, from_clipping=from_clipping)
-        equations = lit.equations(image, weight)
-        best = solve(terms.tilted(equations), w)
+        round_ = _Round.of(lit, terms, w, x, solve, from_clipping=from_clipping)
         count += 1
-        ahead = lit.predicted(best)
-        step = relative_change(equations, w, best)
-        fall = 2 * lit.slope(image, weight, x, ahead) + terms.fall(w, best)
-        if pixels.has_pieces:
-            # A problem that is exact along the whole step has the same optimum as the true one.
-            done = pixels.has_same_squares(x, ahead)
-        else:
-            done = step <= until or fall <= MIN_FALL * value
-        part, reached = 1.0, total_loss(pixels, terms, best, ahead)
+        done = round_.has_converged(pixels, x, value, until)
+        part, reached = 1.0, total_loss(pixels, terms, round_.best, round_.ahead)
         is_worse = reached > value * (1 + ROUND_OFF)
         if is_worse or from_clipping or not done:
-            steps = (w, best), (x, ahead)
-            part, reached = _line_search(pixels, terms, *steps, value, reached, fall)
+            steps = (w, round_.best), (x, round_.ahead)
+            part, reached = _line_search(pixels, terms, *steps, value, reached, round_.fall)
         if from_clipping and (done or part == 0):
             from_clipping = False
             if part == 0:
-                del image, weight, ahead
+                del round_
                 continue
             done = False
         if done or part == 0 or count >= MAX_ROUNDS:
-            small = done or (part == 0 and fall <= FLAT_FALL * value)
-            weights = interpolate(w, best, part) if is_worse else best
-            return RoundsResult(
-                weights, w, x, from_clipping, image, weight, equations, count, step, small
-            )
-        w, x, value = interpolate(w, best, part), interpolate(x, ahead, part), reached
-        del image, weight, ahead  # else they would coexist with the next ones
+            small = done or (part == 0 and round_.fall <= FLAT_FALL * value)
+            weights = interpolate(w, round_.best, part) if is_worse else round_.best
+            squares = round_.image, round_.weight, round_.equations
+            return RoundsResult(weights, w, x, from_clipping, *squares, count, round_.step, small)
+        w, x = interpolate(w, round_.best, part), interpolate(x, round_.ahead, part)
+        value = reached
+        del round_  # else its pictures would coexist with the next ones
+
+
+@dataclass(frozen=True)
+class _Round:
+    """The squares at some weights w and their picture x, and the step to their optimum.
+
+    image, weight: the squares, (3, p). best: (n, 3), the optimum; ahead: (3, p), its picture.
+    step: see `Reweighting`. fall: the initial slope of the loss on the way there.
+    """
+
+    image: Doubles
+    weight: Doubles
+    equations: NormalEquations
+    best: Doubles
+    ahead: Doubles
+    step: float
+    fall: float
+
+    @classmethod
+    def of(
+        cls,
+        lit: LitPixels,
+        terms: WeightTerms,
+        w: Doubles,
+        x: Doubles,
+        solve: Solver,
+        *,
+        from_clipping: bool,
+    ) -> "_Round":
+        """Make the squares, and solve for their optimum."""
+        image, weight = lit.pixels.squares(x, from_clipping=from_clipping)
+        equations = lit.equations(image, weight)
+        best = solve(terms.tilted(equations), w)
+        ahead = lit.predicted(best)
+        step = relative_change(equations, w, best)
+        fall = 2 * lit.slope(image, weight, x, ahead) + terms.fall(w, best)
+        return cls(image, weight, equations, best, ahead, step, fall)
+
+    def has_converged(self, pixels: PixelLoss, x: Doubles, value: float, until: float) -> bool:
+        """Return whether its step from picture x, with loss `value`, ends the rounds."""
+        if pixels.has_pieces:
+            # A problem that is exact along the whole step has the same optimum as the true one.
+            return pixels.has_same_squares(x, self.ahead)
+        return self.step <= until or self.fall <= MIN_FALL * value
 
 
 def relative_change(equations: NormalEquations, w: Doubles, best: Doubles) -> float:

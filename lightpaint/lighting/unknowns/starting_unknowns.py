@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from lightpaint.arrays import Bools, Doubles
+from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.lighting.algebra.optimum import minimise, minimise_each
 from lightpaint.lighting.algebra.quadratic import Cap, clip_to_sums
 from lightpaint.lighting.unknowns.knobs import Knob
 from lightpaint.lighting.unknowns.reduction import Reduction
+from lightpaint.lighting.unknowns.unknown_blocks import KnobGroup, LimitedKnobs
 
 #: Determinant of the colours that a light mixes, relative to their size, below which they are too
 #: alike.
@@ -23,47 +24,54 @@ def nearest_unknowns(reduction: Reduction, start: Doubles, reached: Bools) -> Do
     reached: (n,). For a light that reaches something, a luminance at its limit is good enough.
     """
     x = np.zeros(len(reduction.unknowns))
-    for kind in reduction.knob_groups:
-        low, high = reduction.lower[kind.places], reduction.upper[kind.places]
-        current = start[kind.lights].reshape(len(low), -1)
-        if kind.is_free:
-            x[kind.places] = np.minimum(np.maximum(current, low), high)
-            continue
-        right_side = np.einsum("kue,ke->ku", kind.columns, current)
-        if kind.is_orthogonal:
-            values = right_side / np.square(kind.columns).sum(axis=2)
-        else:
-            squares = np.matmul(kind.columns, kind.columns.swapaxes(1, 2))
-            values = _solve_mixes(kind.columns, current)
-            violated = np.flatnonzero(~((values >= low) & (values <= high)).all(axis=1))
-            if violated.size:
-                low_out, high_out = low[violated], high[violated]
-                optima = minimise_each(
-                    squares[violated],
-                    right_side[violated],
-                    lower=low_out,
-                    upper=high_out,
-                    start=np.clip(0, low_out, high_out),
-                )
-                values[violated] = np.stack([optimum.x for optimum in optima])
-        x[kind.places] = _snap_to_bounds(values, low, high)
+    for group in reduction.knob_groups:
+        bounds = reduction.lower[group.places], reduction.upper[group.places]
+        x[group.places] = _nearest_in_group(group, start, *bounds)
     for stack in reduction.limited_knobs:
-        a, values, now = (
-            stack.coefficients,
-            stack.unknowns,
-            (stack.coefficients * x[stack.unknowns]).sum(axis=1),
-        )
-        right_side = np.minimum(np.maximum(now, stack.lower), stack.upper)
-        violated = now != right_side
-        low, high = reduction.lower[values[violated]], reduction.upper[values[violated]]
-        x[values[violated]] = clip_to_sums(
-            a[violated], x[values[violated]], low, high, right_side[violated]
-        )
-        for k in stack.knobs[violated]:
+        for k in _clip_to_limits(x, reduction, stack):
             knob = reduction.knobs[k]
             if not (knob.is_free or reached[knob.lights[0]]):
                 x[list(reduction.places[k])] = _nearest_limited(knob, start)
     return x
+
+
+def _nearest_in_group(group: KnobGroup, start: Doubles, low: Doubles, high: Doubles) -> Doubles:
+    """Return the x of knobs, (k, u), between bounds (k, u), whose emissions are nearest to
+    `start`.
+    """
+    current = start[group.lights].reshape(len(low), -1)
+    if group.is_free:
+        return np.asarray(np.minimum(np.maximum(current, low), high))
+    right_side = np.einsum("kue,ke->ku", group.columns, current)
+    if group.is_orthogonal:
+        values = right_side / np.square(group.columns).sum(axis=2)
+        return _snap_to_bounds(values, low, high)
+    squares = np.matmul(group.columns, group.columns.swapaxes(1, 2))
+    values = _solve_mixes(group.columns, current)
+    violated = np.flatnonzero(~((values >= low) & (values <= high)).all(axis=1))
+    if violated.size:
+        low_out, high_out = low[violated], high[violated]
+        optima = minimise_each(
+            squares[violated],
+            right_side[violated],
+            lower=low_out,
+            upper=high_out,
+            start=np.clip(0, low_out, high_out),
+        )
+        values[violated] = np.stack([optimum.x for optimum in optima])
+    return _snap_to_bounds(values, low, high)
+
+
+def _clip_to_limits(x: Doubles, reduction: Reduction, stack: LimitedKnobs) -> Indices:
+    """Move the x of knobs into their limits, in place; return the knobs that were beyond them."""
+    a, places = stack.coefficients, stack.unknowns
+    now = (a * x[places]).sum(axis=1)
+    nearest = np.minimum(np.maximum(now, stack.lower), stack.upper)
+    violated = now != nearest
+    out = places[violated]
+    low, high = reduction.lower[out], reduction.upper[out]
+    x[out] = clip_to_sums(a[violated], x[out], low, high, nearest[violated])
+    return np.asarray(stack.knobs[violated])
 
 
 def _solve_mixes(columns: Doubles, emission: Doubles) -> Doubles:

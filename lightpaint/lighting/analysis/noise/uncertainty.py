@@ -15,6 +15,7 @@ from lightpaint.display_text import short_repr
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95
 from lightpaint.lighting.analysis.noise.noise import (
+    Noise,
     denoised_matrix,
     gradient_bias,
     noise_sums,
@@ -104,36 +105,29 @@ def error_bars(solution: Solution) -> Uncertainty | None:
     problem, weights = solution.problem, solution.weights
     if not problem.basis.knows_noise:
         return None
-    equations, solved = problem.equations, problem.solved
     noise = noise_sums(solution)
-    corrected = denoised_matrix(equations, noise.power)
-    before, lacking = gradient_bias(solution, noise)
-    step = solved.b - np.einsum("cij,jc->ci", solved.M, before) + lacking
-    right = np.einsum("cij,jc->ci", corrected, before) + step
-    unbiased = NormalEquations(corrected, right, equations.target_norm2)
+    step = _GradientStep.of(solution, noise)
+    unbiased = step.equations(denoised_matrix(problem.equations, noise.power))
     bias = np.asarray(solve_for(solution, unbiased) - weights)
 
     # Curvature without bias. A render of the mix shows all of an earlier error, of which a step by
     # the noisy M leaves a part; the unbiased answer, which determines the interval, has the scatter
     # of its own M.
-    scatters = solved if problem.refinement is None else unbiased
+    scatters = problem.solved if problem.refinement is None else unbiased
     free, exits, excess = weight_spread(solution, noise, scatters, unbiased, weights + bias)
     moved = np.zeros(weights.shape)
     doubts = noise_doubts(solution, noise.power)
     if doubts.any():
-        weak = weakest_matrix(solution, noise.power, doubts, corrected)
+        weak = weakest_matrix(solution, noise.power, doubts, unbiased.M)
         # A step from a render of the mix depends on M alone.
-        if problem.refinement is not None:
-            right = np.einsum("cij,jc->ci", weak, before) + step
-        weak_equations = NormalEquations(weak, right, equations.target_norm2)
+        is_refined = problem.refinement is not None
+        weak_equations = step.equations(weak) if is_refined else replace(unbiased, M=weak)
         far = solve_for(solution, weak_equations)
         free, exits, _ = weight_spread(solution, noise, weak_equations, weak_equations, far)
         moved = far - weights - bias
     sides, wide = (
         [_root(x, exit_, moved) for exit_ in exits] for x in (free, free * noise.widening)
     )
-    by_channel = excess.reshape(3, -1).sum(axis=1)
-    by_channel += np.einsum("ic,cij,jc->c", bias, equations.M, bias)
     is_determined = np.where(solution.reached, 1, np.nan)
     interval = _interval(solution, bias * is_determined, wide)
     return Uncertainty(
@@ -143,10 +137,42 @@ def error_bars(solution: Solution) -> Uncertainty | None:
         interval,
         noise.objective_error,
         noise.objective_noise,
-        by_channel,
+        _excess_by_channel(excess, bias, problem.equations.M),
         solution.norm2,
         ((doubts >= 0.5) | noise.is_hidden).any(axis=1) & _is_wide(weights, interval),
     )
+
+
+@dataclass(frozen=True)
+class _GradientStep:
+    """The gradient at some weights without its error by noise, and the equations that have it.
+
+    before: those weights, (n, 3). step: (3, n), b − M w there. target_norm2: (3,).
+    """
+
+    before: Doubles
+    step: Doubles
+    target_norm2: Doubles
+
+    @classmethod
+    def of(cls, solution: Solution, noise: Noise) -> "_GradientStep":
+        """Return the step that the solve of `solution` takes without noise."""
+        problem = solution.problem
+        before, lacking = gradient_bias(solution, noise)
+        step = problem.solved.b - np.einsum("cij,jc->ci", problem.solved.M, before) + lacking
+        return cls(before, step, problem.equations.target_norm2)
+
+    def equations(self, M: Doubles) -> NormalEquations:
+        """Return the equations that take this step with another M, (3, n, n)."""
+        b = np.einsum("cij,jc->ci", M, self.before) + self.step
+        return NormalEquations(M, b, self.target_norm2)
+
+
+def _excess_by_channel(excess: Doubles, bias: Doubles, M: Doubles) -> Doubles:
+    """Return the expected excess of the objective by scatter and bias, (3,)."""
+    by_channel = excess.reshape(3, -1).sum(axis=1)
+    by_channel += np.einsum("ic,cij,jc->c", bias, M, bias)
+    return np.asarray(by_channel)
 
 
 def _root(*parts: Doubles) -> Doubles:
