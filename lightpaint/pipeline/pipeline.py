@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.basis import Basis
@@ -118,8 +119,8 @@ def _finish_view(
 ) -> Look:
     """Predict, verify and report a view; return its look."""
     settings, scene, solution = job.settings, view.scene, analysis.solution
-    listen.note("analysed, and the lighting written")
     basis = solution.basis
+    listen.note("analysed, and the lighting written")
     folder = answer.path / view.folder.relative_to(job.folder)
     folder.mkdir(exist_ok=True)
     predicted = basis.predict(solution.weights)
@@ -129,12 +130,7 @@ def _finish_view(
         budget = _budget(settings, basis, relit)
         if view is job.views[0]:
             _remark_on_parameters(relit, listen)
-    spp, size = basis.origin.spp, basis.size
-    if budget is not None:
-        spp, size = budget.spp, budget.scene.size
-    write_predicted(
-        folder / "predicted.exr", predicted, origin=basis.origin, spp=spp, size=size, scene=relit
-    )
+    _write_prediction(folder, predicted, basis, budget, relit)
     if budget is not None and settings.verify:
         verification = _verify(settings, predicted, budget, solution, listen)
         write_estimate(folder / "verified.exr", verification.verified, {})
@@ -157,6 +153,21 @@ def _finish_view(
     for remark in look.remarks:
         listen.say(remark if len(job.views) == 1 else f"{view.folder.name}: {remark}")
     return look
+
+
+def _write_prediction(
+    folder: Path,
+    predicted: Estimate,
+    basis: Basis,
+    budget: VerificationBudget | None,
+    relit: Scene | None,
+) -> None:
+    """Write predicted.exr for a verification with this budget, or else like the basis."""
+    spp, size = basis.origin.spp, basis.size
+    if budget is not None:
+        spp, size = budget.spp, budget.scene.size
+    file = folder / "predicted.exr"
+    write_predicted(file, predicted, origin=basis.origin, spp=spp, size=size, scene=relit)
 
 
 def _remark_on_parameters(relit: Scene, listen: Listener) -> None:

@@ -1,9 +1,10 @@
 """The formats in which an answer can be exported: their requirements, and their texts."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from lightpaint.arrays import RGB
 from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError, OutputError
@@ -132,31 +133,38 @@ def _writer_of(
         return lambda: scene_script(
             lighting.target, name, emitters, places=lighting.places, up=lighting.up
         )
+    return lambda: _usd_layer(lighting, source, emitters, folder, listen)
 
-    def overrides() -> str:
-        comment = f"lightpaint: the lights of {name} as solved for {lighting.target}"
-        overridden = usd_overrides(
-            emitters,
-            source.stage,
-            folder,
-            places=lighting.places,
-            up=lighting.up,
-            about=comment,
+
+def _usd_layer(
+    lighting: Lighting,
+    source: Source,
+    emitters: Sequence[tuple[str, str, RGB]],
+    folder: Path,
+    listen: Listener,
+) -> str:
+    """Return a layer of USD with these emitters, and say which of them its stage lacks."""
+    assert source.scene is not None
+    name = source.scene.files[0].name
+    overridden = usd_overrides(
+        emitters,
+        source.stage,
+        folder,
+        places=lighting.places,
+        up=lighting.up,
+        about=f"lightpaint: the lights of {name} as solved for {lighting.target}",
+    )
+    stage_name = source.stage or "USD"
+    if overridden.left:
+        listen.say(
+            f"{stage_name} has no single light for {some_names(overridden.left)}: set it by hand"
         )
-        stage_name = source.stage or "USD"
-        if overridden.left:
-            listen.say(
-                f"{stage_name} has no single light for {some_names(overridden.left)}: set it "
-                "by hand"
-            )
-        if overridden.unplaced:
-            listen.say(
-                f"{stage_name} has {some_names(overridden.unplaced)} elsewhere than the scene, or "
-                "as a mesh: place it by hand"
-            )
-        return overridden.text
-
-    return overrides
+    if overridden.unplaced:
+        listen.say(
+            f"{stage_name} has {some_names(overridden.unplaced)} elsewhere than the scene, or "
+            "as a mesh: place it by hand"
+        )
+    return overridden.text
 
 
 def _of_groups(

@@ -1,7 +1,7 @@
 """The files of a relit scene: its XML, edited copies of includes, and scaled images."""
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -46,36 +46,8 @@ def relit_files(
     Raises OutputError if one of them would replace a file of the scene itself.
     """
     root = scene.files[0]
-    edits = {root.resolve(): _Edits(root)}
-    settings = dict(settings_of(scene, emission))
-    unchanged = [emitter for emitter in scene.emitters if emitter not in settings]
-    sampled = _sampled_emitters(settings, unchanged)
-    added = {x.name: x for x in scene.added}
-    new_lines: list[str] = []
-    for emitter in scene.emitters:
-        if emitter.name in added:
-            rgb = settings.pop(emitter, emitter.emission)
-            new_lines += added[emitter.name].lines(rgb, is_sampled=emitter in sampled)
-    unchanged = [emitter for emitter in unchanged if emitter.name not in added]
-    edits[root.resolve()].added = new_lines
-    for emitter, rgb in settings.items():
-        file = scene.files[emitter.file]
-        setting = (emitter, rgb, _sampling_weight(emitter, is_sampled=emitter in sampled))
-        edits_of_file = edits.setdefault(file.resolve(), _Edits(file)).settings
-        if emitter.offset in edits_of_file and edits_of_file[emitter.offset][1:] != setting[1:]:
-            raise _included_twice(file, edits_of_file[emitter.offset][0], emitter)
-        edits_of_file[emitter.offset] = setting
-    for emitter in unchanged:
-        file = scene.files[emitter.file]
-        edits_of_file = edits.get(file.resolve(), _Edits(file)).settings
-        if emitter.offset in edits_of_file:
-            raise _included_twice(file, edits_of_file[emitter.offset][0], emitter)
-
-    _edit_integrators(scene, edits)
-    for file, offset, children in scene.moved_elements:
-        edits.setdefault(file.resolve(), _Edits(file)).moved[offset] = children
     contents: dict[Path, bytes | Floats] = {}
-    for edit in edits.values():
+    for edit in _edits_of(scene, emission).values():
         is_root = edit.original == root
         target = path if is_root else path.parent / _place_of_include(edit.original, root)
         content, images = _edit(edit, target.parent, scene, path.stem)
@@ -88,6 +60,52 @@ def relit_files(
             f"{in_the_way[0]} belongs to the scene itself: write the relit scene to another folder"
         )
     return contents
+
+
+def _edits_of(scene: Scene, emission: Mapping[str, RGB]) -> dict[Path, _Edits]:
+    """Return the edits of each file, by its resolved path; the root comes first."""
+    root = scene.files[0]
+    edits = {root.resolve(): _Edits(root)}
+    settings = dict(settings_of(scene, emission))
+    unchanged = [emitter for emitter in scene.emitters if emitter not in settings]
+    sampled = _sampled_emitters(settings, unchanged)
+    added = {x.name: x for x in scene.added}
+    for emitter in scene.emitters:
+        if emitter.name in added:
+            rgb = settings.pop(emitter, emitter.emission)
+            lines = added[emitter.name].lines(rgb, is_sampled=emitter in sampled)
+            edits[root.resolve()].added += lines
+    unchanged = [emitter for emitter in unchanged if emitter.name not in added]
+    _edit_emitters(scene, edits, settings, unchanged, sampled)
+    _edit_integrators(scene, edits)
+    for file, offset, children in scene.moved_elements:
+        edits.setdefault(file.resolve(), _Edits(file)).moved[offset] = children
+    return edits
+
+
+def _edit_emitters(
+    scene: Scene,
+    edits: dict[Path, _Edits],
+    settings: Mapping[Emitter, RGB],
+    unchanged: Iterable[Emitter],
+    sampled: Collection[Emitter],
+) -> None:
+    """Add edits of the emitters of a scene's files.
+
+    Raises SceneError if one element, included twice, would need two settings, or one and none.
+    """
+    for emitter, rgb in settings.items():
+        file = scene.files[emitter.file]
+        setting = (emitter, rgb, _sampling_weight(emitter, is_sampled=emitter in sampled))
+        edits_of_file = edits.setdefault(file.resolve(), _Edits(file)).settings
+        if emitter.offset in edits_of_file and edits_of_file[emitter.offset][1:] != setting[1:]:
+            raise _included_twice(file, edits_of_file[emitter.offset][0], emitter)
+        edits_of_file[emitter.offset] = setting
+    for emitter in unchanged:
+        file = scene.files[emitter.file]
+        edits_of_file = edits.get(file.resolve(), _Edits(file)).settings
+        if emitter.offset in edits_of_file:
+            raise _included_twice(file, edits_of_file[emitter.offset][0], emitter)
 
 
 def _edit_integrators(scene: Scene, edits: dict[Path, _Edits]) -> None:

@@ -81,13 +81,7 @@ def report_numbers(
         "command": command,
         "basis": _basis(basis),
         "painting": _painting(target, solution),
-        "view": {
-            "name": transform.name,
-            "stops": transform.stops,
-            "brighter_than_white": brighter_than_white(predicted.image, transform),
-            "residual_limit": residual.limit,
-            "residual_pixels": 2 * residual.radius + 1,
-        },
+        "view": _view(predicted, transform, residual),
         "seen": _appearance(appearance or compare_appearance(solution, predicted)),
         "meant": fit_options(solution),
         "colors": {choice.colors: _choice(choice) for choice in color_choices} or None,
@@ -126,6 +120,16 @@ def _painting(target: Target, solution: Solution) -> dict[str, Any]:
         "importance_mean": float(importance.mean()),
         "importance_max": float(importance.max()),
         "not_finite": target.not_finite,
+    }
+
+
+def _view(predicted: Estimate, transform: ViewTransform, residual: Residual) -> dict[str, Any]:
+    return {
+        "name": transform.name,
+        "stops": transform.stops,
+        "brighter_than_white": brighter_than_white(predicted.image, transform),
+        "residual_limit": residual.limit,
+        "residual_pixels": 2 * residual.radius + 1,
     }
 
 

@@ -120,16 +120,11 @@ def write_template(
     None skips a file. lights: by name, (h', w', 3) linear, the image of each light alone. texts:
     texts for the headers of pictures, by SHOWN and LIGHTS.
     """
-    all_texts, mattes = texts or {}, mattes or {}
+    texts, mattes = texts or {}, mattes or {}
     matte_files = [f"{MATTES}/{name}.png" for name in file_names(mattes)]
     light_files = [f"{LIGHTS}/{name}.png" for name in file_names(lights)]
-    arrays = {
-        ALBEDO: template.albedo,
-        CLEAN: template.clean,
-        NORMALS: normals,
-        DEPTH: depth,
-    }
-    optional = [name for name, image in arrays.items() if image is not None]
+    images = {ALBEDO: template.albedo, CLEAN: template.clean, NORMALS: normals, DEPTH: depth}
+    optional = {name: image for name, image in images.items() if image is not None}
     written_names = [LIGHT_FILE, SHOWN_FILE, *optional, RECORD_FILE, *matte_files, *light_files]
     with staged(folder, earlier_files(folder)) as stage:
         write_look(
@@ -137,22 +132,19 @@ def write_template(
             template.image,
             template.transform,
             clean=template.clean,
-            texts=all_texts.get(SHOWN_FILE),
+            texts=texts.get(SHOWN_FILE),
         )
-        if template.clean is not None:
-            write_rgb(stage / CLEAN, template.clean, attributes=all_texts.get(SHOWN_FILE))
-        if template.albedo is not None:
-            write_rgb(stage / ALBEDO, template.albedo)
-        if normals is not None:
-            write_rgb(stage / NORMALS, normals)
-        if depth is not None:
-            write_parts(stage / DEPTH, [ExrPart("depth", {"Y": depth.astype(np.float32)})])
+        for name, image in optional.items():
+            if name == DEPTH:
+                write_parts(stage / DEPTH, [ExrPart("depth", {"Y": image.astype(np.float32)})])
+            else:
+                attributes = texts.get(SHOWN_FILE) if name == CLEAN else None
+                write_rgb(stage / name, image, attributes=attributes)
         for file, matte in zip(matte_files, mattes.values(), strict=True):
             write_bytes(stage / file, png_bytes(to_8_bit(matte)))
         for file, look in zip(light_files, lights.values(), strict=True):
-            write_bytes(
-                stage / file, _thumbnail(look, template.transform.name, all_texts.get(LIGHTS))
-            )
+            thumbnail = _thumbnail(look, template.transform.name, texts.get(LIGHTS))
+            write_bytes(stage / file, thumbnail)
         write_text(stage / RECORD_FILE, _record_text(template, written_names))
     return [folder / name for name in written_names]
 

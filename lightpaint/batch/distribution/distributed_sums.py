@@ -82,6 +82,13 @@ def _render_sums(
             "files": source_files,
         }
         items.append(SumsOfRows(f"rows {k}", expected_s=expected_s, **options))
+    total = _add_in_order(items, engine, listen)
+    spool.drop()
+    return total
+
+
+def _add_in_order(items: Sequence[SumsOfRows], engine: Engine, listen: Listener) -> list[Sums]:
+    """Run items; return the sums of all rows. Raises BasisError if an item failed."""
     results: dict[str, list[Sums]] = {}
     total: list[Sums] = []
     remaining_items = iter(items)
@@ -97,7 +104,6 @@ def _render_sums(
             next_sums = results.pop(item.name)
             total = [a + b for a, b in zip(total, next_sums, strict=True)] if total else next_sums
             item = next(remaining_items, None)
-    spool.drop()
     return total
 
 
