@@ -37,10 +37,7 @@ OUT_OF_MEMORY_TEXT = (
 def run_command(arguments: Sequence[str] | None, received: Sequence[int]) -> int:
     """Run one command and return the exit code. received: the signals that have arrived."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    for stream in (sys.stdout, sys.stderr):
-        # A terminal without a character shows a substitute instead of failing.
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")
+    _substitute_characters()
     parser = command_parser()
     if "_ARGCOMPLETE" in os.environ:  # a shell asks for completions
         from lightpaint.cli.options.completion import complete
@@ -76,6 +73,13 @@ def run_command(arguments: Sequence[str] | None, received: Sequence[int]) -> int
             return _report(options.command, error, words)
     lines.err(f"lightpaint {options.command}: interrupted{hint}")
     return 130
+
+
+def _substitute_characters() -> None:
+    """Make a terminal without a character show a substitute instead of failing."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
 
 
 @contextmanager

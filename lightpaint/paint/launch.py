@@ -75,13 +75,8 @@ def _serve_session(
         server = Server(studio, session_file.store, listening=listening, say=say)
         session_file.server = server
         connection_file = ConnectionFile(path.parent, server.connection)
-
-        def write_connection() -> None:  # called once this painter has locked the session
-            try:
-                connection_file.write()
-            except OutputError as error:
-                say(str(error))
-
+        # Called once this painter has locked the session.
+        write_connection = partial(_write_if_possible, connection_file, say)
         try:
             if session_file.store is None:
                 session_file.on_store_opened = write_connection
@@ -100,6 +95,14 @@ def _serve_session(
             raise studio.failure
     finally:
         _close(studio, session_file.store)
+
+
+def _write_if_possible(file: "ConnectionFile", say: Callable[[str], None]) -> None:
+    """Write the connection file; say if that fails, since pages can paint without it."""
+    try:
+        file.write()
+    except OutputError as error:
+        say(str(error))
 
 
 class ConnectionFile:

@@ -41,11 +41,7 @@ def batch(
 ) -> CommandOutcome:
     """Run `lightpaint batch looks.toml -o DIR`, or `--init SCENE PAINTING...`."""
     if is_first:
-        manifest_file = output or Path("looks.toml")
-        write_starter_manifest(manifest_file, paths[0], paths[1:], force=force)
-        terminal.write(f"{manifest_file}: {len(paths) - 1} looks; run them with")
-        terminal.write(f"lightpaint batch {shlex.quote(str(manifest_file))}")
-        return CommandOutcome(lambda: {"manifest": str(manifest_file), "looks": len(paths) - 1})
+        return _write_first_manifest(output or Path("looks.toml"), paths[0], paths[1:], force=force)
     if form is not None and len(paths) != 2:
         raise BatchError("the folder of the job is missing: give looks.toml --export openjd DIR")
     if form is None and len(paths) > 1:
@@ -59,15 +55,37 @@ def batch(
         return _show_plan(plan_)
     if form is not None:
         return _export(plan_, Path(paths[1]), force=force)
+    _say_remarks(plan_)
+    note = _log(log)
+    note(f"{command}: {len(plan_.chosen_looks)} looks")
+    outcome = _run(plan_, run_options, note)
+    note(f"done {len(outcome.done)}, failed {len(outcome.failed)}")
+    return _outcome(plan_, outcome)
+
+
+def _write_first_manifest(
+    path: Path, scene: str, paintings: list[str], *, force: bool
+) -> CommandOutcome:
+    """Write a first manifest, and print how to run it."""
+    write_starter_manifest(path, scene, paintings, force=force)
+    terminal.write(f"{path}: {len(paintings)} looks; run them with")
+    terminal.write(f"lightpaint batch {shlex.quote(str(path))}")
+    return CommandOutcome(lambda: {"manifest": str(path), "looks": len(paintings)})
+
+
+def _say_remarks(plan_: Plan) -> None:
+    """Say the remarks of a plan and of its looks, each once."""
     of_looks = (x for look in plan_.chosen_looks for x in look.remarks)
     remarks = list(dict.fromkeys((*plan_.remarks, *of_looks)))
     for remark in remarks[:MAX_LISTED]:
         terminal.say(remark)
     if len(remarks) > MAX_LISTED:
         terminal.say(f"and {len(remarks) - MAX_LISTED} more remarks, each when its look is done")
+
+
+def _run(plan_: Plan, run_options: RunOptions, note: Callable[[str], Any]) -> BatchOutcome:
+    """Run a plan, and say which look is done. note: adds a line to the log."""
     listen = terminal.TerminalListener()
-    note = _log(log)
-    note(f"{command}: {len(plan_.chosen_looks)} looks")
 
     def on_step(look: PlannedLook, result: ItemResult) -> None:
         name, left = f"{look.entry.name}: {result.kind}", time_left(result)
@@ -81,9 +99,7 @@ def batch(
         return "" if result.left_s is None else f", {spoken_time(result.left_s)} left"
 
     with listen:
-        outcome = run_batch(plan_, run_options, listen, on_step=on_step)
-    note(f"done {len(outcome.done)}, failed {len(outcome.failed)}")
-    return _outcome(plan_, outcome)
+        return run_batch(plan_, run_options, listen, on_step=on_step)
 
 
 def _export(plan_: Plan, folder: Path, *, force: bool) -> CommandOutcome:

@@ -23,6 +23,7 @@ from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
 if TYPE_CHECKING:
     from lightpaint.paint.server.server import Server
     from lightpaint.paint.store.session_requests import SessionRequests
+    from lightpaint.paint.subject import Subject
 
 #: The risk of an address that others can reach.
 RISK = (
@@ -53,7 +54,6 @@ def paint(
 ) -> CommandOutcome:
     """Run `lightpaint paint SCENE|BASIS|LIGHTS`, for one view or several."""
     # The server and the session file import much that no other command needs.
-    from lightpaint.paint.launch import paint_in_browser
     from lightpaint.paint.server.server import check_installed
     from lightpaint.paint.subject_factory import make_subjects
 
@@ -72,15 +72,28 @@ def paint(
         # `solve` takes only one basis, which has one view.
         **({} if len(sources) > 1 and isinstance(sources[0], BasisFile) else {"command": command}),
     )
-    subject = subjects[0]
-    if subject.groups is not None:
-        for remark in subject.groups.remarks:
+    if (groups := subjects[0].groups) is not None:
+        for remark in groups.remarks:
             terminal.say(remark)
-    addresses = []
+    return _serve(subjects, new=new, host=host, port=port, with_browser=with_browser)
+
+
+def _serve(
+    subjects: Sequence["Subject"],
+    *,
+    new: bool,
+    host: str | None,
+    port: int | None,
+    with_browser: bool,
+) -> CommandOutcome:
+    """Serve the painter until its end."""
+    from lightpaint.paint.launch import paint_in_browser
+
+    name, folder, addresses = subjects[0].name, subjects[0].folder, []
 
     def on_open(server: "Server") -> None:
         addresses.append(server.url)
-        _announce(server, subject.name, folder, is_reachable=host is not None)
+        _announce(server, name, folder, is_reachable=host is not None)
         if with_browser and _has_browser():
             # Some browsers block the process that starts them.
             urls = (server.one_time_url(),)

@@ -4,13 +4,14 @@ from collections.abc import Sequence
 from shlex import quote
 from typing import TYPE_CHECKING, Any
 
+from lightpaint.basis.basis import Basis
 from lightpaint.cli.commands.answer_text import Table, show_look, spoken_settings
 from lightpaint.cli.output import documents, tables, terminal
 from lightpaint.cli.output.output_mode import CommandOutcome
 from lightpaint.cli.tolerances import Tolerances
 from lightpaint.display_text import some_of
 from lightpaint.errors import LOOK_ERRORS
-from lightpaint.pipeline.job.job import Job
+from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.pipeline import run
 from lightpaint.pipeline.results.results import Look
 from lightpaint.placement.placement_record import PlacementRecord, record_of
@@ -35,45 +36,71 @@ def solve(
 
     look_set: the set of looks, if there are several.
     """
-    listen, results, shortfalls, bases = terminal.TerminalListener(), [], [], None
-    placement_record: PlacementRecord | None = None
+    listen, shared = terminal.TerminalListener(), _SharedWork()
+    results: list[tuple[Job, PaintedView, Look]] = []
     # The remarks of all jobs come before the first one runs; the listener drops repeats.
     for remark in (remark for job in jobs for remark in job.remarks):
         listen.say(remark)
     for job in jobs:
         listen.note(f"files read; {spoken_settings(job.fit)}")
-        if (
-            look_set is not None
-            and job.folder in look_set.variation_names
-            and placement_record is not None
-        ):
-            job = job.with_placement(placement_record)
-        elif placement_record is not None:
-            # The basis is that of lights which another painting moved.
-            bases, placement_record = None, None
+        is_variation = look_set is not None and job.folder in look_set.variation_names
+        job = shared.prepare(job, is_variation=is_variation)
         try:
             with listen:
-                looks = run(job, listen, bases=None if bases is None else list(bases))
-            # Several paintings of one scene share its basis, and variations the places of lights.
-            bases = [look.basis for look in looks]
-            if (placement := looks[0].placement) is not None and not placement.is_empty:
-                placement_record = record_of(placement)
+                looks = run(job, listen, bases=None if shared.bases is None else [*shared.bases])
+            shared.take_from(looks)
             if look_set is not None:
-                look_set.finish_look(job, looks[0].lighting, bases)
+                look_set.finish_look(job, looks[0].lighting, [look.basis for look in looks])
         except LOOK_ERRORS as error:
             if look_set is None or not look_set.continues_after(job, error):
                 raise
             continue
         _show(job, looks, table)
-        for view, look in zip(job.views, looks, strict=True):
-            results.append((job, view, look))
-            shortfalls += [
-                f"{view.folder} {x}" for x in tolerances.shortfalls(look.analysis.appearance)
-            ]
+        results += [(job, view, look) for view, look in zip(job.views, looks, strict=True)]
     if look_set is not None:
-        look_set.show(bases or [])
+        look_set.show(shared.bases or [])
     if jobs and not jobs[0].scenes and jobs[0].groups is None:
         terminal.say("solved from a saved basis, without a render: lightpaint relight makes one")
+    return _outcome(results, tolerances, look_set)
+
+
+class _SharedWork:
+    """Results that the jobs of one command share: several paintings of one scene its bases, and
+    variations the places of lights.
+    """
+
+    def __init__(self) -> None:
+        self.bases: list[Basis] | None = None
+        self._placement: PlacementRecord | None = None
+
+    def prepare(self, job: Job, *, is_variation: bool) -> Job:
+        """Return the next job: a variation has the places that were found for its original."""
+        if self._placement is None:
+            return job
+        if is_variation:
+            return job.with_placement(self._placement)
+        # The bases are those of lights which another painting moved.
+        self.bases, self._placement = None, None
+        return job
+
+    def take_from(self, looks: Sequence[Look]) -> None:
+        """Keep the results of a job for those that follow."""
+        self.bases = [look.basis for look in looks]
+        if (placement := looks[0].placement) is not None and not placement.is_empty:
+            self._placement = record_of(placement)
+
+
+def _outcome(
+    results: Sequence[tuple[Job, PaintedView, Look]],
+    tolerances: Tolerances,
+    look_set: "LookSet | None",
+) -> CommandOutcome:
+    """Print the requirements that are not met, and return the results for programs."""
+    shortfalls = [
+        f"{view.folder} {text}"
+        for _, view, look in results
+        for text in tolerances.shortfalls(look.analysis.appearance)
+    ]
     if shortfalls:
         terminal.complain("solve", some_of(shortfalls, joint="; "))
     variations = [] if look_set is None else look_set.shifted_looks
@@ -82,10 +109,8 @@ def solve(
         results_document = {"results": [documents.result_document(*x, tolerances) for x in results]}
         return results_document | ({"variations": variations} if variations else {})
 
-    return CommandOutcome(
-        document,
-        1 if shortfalls or (look_set is not None and look_set.failures) else 0,
-    )
+    has_failures = look_set is not None and look_set.failures
+    return CommandOutcome(document, 1 if shortfalls or has_failures else 0)
 
 
 def _show(job: Job, looks: Sequence[Look], table: Table) -> None:

@@ -36,26 +36,12 @@ def values_of(options: Namespace, words: Sequence[str]) -> dict[str, Any]:
     output = Path(values["output"]) if values.get("output") else None
     match options.command:
         case "lights":
-            is_drawn = output is not None or not (options.no_sheet or options.as_json)
-            return {
-                "scene": scene_of(options),
-                "cd_per_unit": options.cd_per_unit,
-                "sheet": (output or Path("lights.png")) if is_drawn else None,
-                "is_named": output is not None,
-                "force": options.force,
-            }
+            return _lights_arguments(options, output)
         case "basis":
             output = output or Path(Path(options.scene).stem + ".basis.exr")
             return {"scene": scene_of(options), "output": output, "settings": settings}
         case "template":
-            output, transform = output or Path("template"), transform_of(options)
-            return {
-                "source": source_of_template(options),
-                "output": output,
-                "transform": None if transform.is_open else transform.over(None),
-                "settings": settings,
-                "force": options.force,
-            }
+            return _template_arguments(options, output or Path("template"), settings)
         case "demo":
             output = output or Path("lightpaint-demo")
             return {"folder": output, "variant": options.variant, "settings": settings}
@@ -64,15 +50,7 @@ def values_of(options: Namespace, words: Sequence[str]) -> dict[str, Any]:
         case "batch":
             return _batch_arguments(options)
         case "export":
-            return {
-                "lighting": Path(options.lighting),
-                "forms": options.to,
-                "scene": scene_to_export(options),
-                "groups": GroupsFile(options.groups, options.pattern) if options.groups else None,
-                "stage": Path(options.stage) if options.stage else None,
-                "output": output,
-                "force": options.force,
-            }
+            return _export_arguments(options, output)
         case "paint":
             return _paint_arguments(options, settings, words)
         case "relight":
@@ -86,6 +64,43 @@ def values_of(options: Namespace, words: Sequence[str]) -> dict[str, Any]:
             return {"action": options.action, "names": options.names}
         case _:
             return {"variant": options.variant}
+
+
+def _lights_arguments(options: Namespace, output: Path | None) -> dict[str, Any]:
+    """Return the arguments of `lights`."""
+    is_drawn = output is not None or not (options.no_sheet or options.as_json)
+    return {
+        "scene": scene_of(options),
+        "cd_per_unit": options.cd_per_unit,
+        "sheet": (output or Path("lights.png")) if is_drawn else None,
+        "is_named": output is not None,
+        "force": options.force,
+    }
+
+
+def _template_arguments(options: Namespace, output: Path, settings: Settings) -> dict[str, Any]:
+    """Return the arguments of `template`."""
+    transform = transform_of(options)
+    return {
+        "source": source_of_template(options),
+        "output": output,
+        "transform": None if transform.is_open else transform.over(None),
+        "settings": settings,
+        "force": options.force,
+    }
+
+
+def _export_arguments(options: Namespace, output: Path | None) -> dict[str, Any]:
+    """Return the arguments of `export`."""
+    return {
+        "lighting": Path(options.lighting),
+        "forms": options.to,
+        "scene": scene_to_export(options),
+        "groups": GroupsFile(options.groups, options.pattern) if options.groups else None,
+        "stage": Path(options.stage) if options.stage else None,
+        "output": output,
+        "force": options.force,
+    }
 
 
 def _solve_arguments(options: Namespace, settings: Settings) -> dict[str, Any]:

@@ -6,11 +6,12 @@ from typing import Any
 
 from lightpaint.cli.options import arguments
 
+#: Adds an option which may be repeated: its flag, metavar, type and help.
+AddOption = Callable[[str, str, Callable[[str], Any], str], None]
 
-def _repeated(
-    group: argparse._ArgumentGroup, dests: Mapping[str, str]
-) -> Callable[[str, str, Callable[[str], Any], str], None]:
-    """Return a function that adds an option which may be repeated: its flag, metavar, type, help.
+
+def _repeated(group: argparse._ArgumentGroup, dests: Mapping[str, str]) -> AddOption:
+    """Return a function that adds options to `group`.
 
     dests: attributes of options that are not named after their flag.
     """
@@ -40,7 +41,15 @@ def add_constraints(parser: argparse.ArgumentParser) -> None:
     )
 
     add = _repeated(group, {"--limit": "limits"})
+    _add_levels(add)
+    _add_colors(group, add)
+    parser.set_defaults(duv=[])
+    add("--off", "NAME", str, "switch the light off")
+    _add_preferences(group)
 
+
+def _add_levels(add: AddOption) -> None:
+    """Add the constraints on brightness."""
     add(
         "--lock",
         "NAME[=LEVEL]",
@@ -59,6 +68,10 @@ def add_constraints(parser: argparse.ArgumentParser) -> None:
         arguments.names_of,
         "put these lights on one dimmer, with their current colours",
     )
+
+
+def _add_colors(group: argparse._ArgumentGroup, add: AddOption) -> None:
+    """Add the constraints on colour."""
     add(
         "--color",
         "NAME=COLOR",
@@ -74,14 +87,16 @@ def add_constraints(parser: argparse.ArgumentParser) -> None:
         help="keep the light white, between these temperatures or at one; duv is the distance "
         "from the black-body locus, like 0.003, positive towards green (default: on it)",
     )
-    parser.set_defaults(duv=[])
     add(
         "--primaries",
         "NAME=COLOR,...",
         arguments.primaries,
         "restrict the light to colours that a fixture with these LEDs can mix",
     )
-    add("--off", "NAME", str, "switch the light off")
+
+
+def _add_preferences(group: argparse._ArgumentGroup) -> None:
+    """Add the options that choose among good answers, for all lights at once."""
     group.add_argument(
         "--prefer-current",
         type=arguments.number(may_be_zero=True),

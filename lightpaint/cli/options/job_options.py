@@ -15,7 +15,7 @@ from lightpaint.files import check_files, is_name, is_utf_8, one_line
 from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
 from lightpaint.lighting.constraints.constraints_file import read_constraints
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.job.sources import Painting
+from lightpaint.pipeline.job.sources import Painting, SceneFile
 from lightpaint.placement.rigging.rigging import Rigging
 from lightpaint.scene.lights.lights_file import MOVES
 
@@ -58,23 +58,13 @@ def jobs_of(
     if basis is not None and options.lights_file:
         constraints = read_constraints(options.lights_file).and_then(constraints)
     if options.views:
-        if options.sensor:
-            raise TargetError("-s cannot be used with --target, which names the sensors")
-        scenes = tuple(scene_of(options, sensor=sensor) for sensor, _ in options.views)
-        folder = Path(options.output or Path(paths[0]).stem)
-        if options.output and options.variations:
-            folder /= Path(paths[0]).stem
+        scenes, folder = _scenes_of_views(options), _folder_of_views(options, paths)
         job_fields: dict[str, Any] = {"by_sensor": True, "rigging": rigging}
         return [Job(scenes, tuple(paintings), folder, None, constraints, settings, **job_fields)]
     # One scene, loaded once for all jobs.
     source = () if basis is not None else (scene_of(options),)
-    output = options.output and Path(options.output)
-    names = [Path(path).stem for path in paths]
-    # A painting with variations beside it is several looks.
-    is_several = bool(options.variations) and len(names) == 1 and output
-    folders = [output / names[0]] if is_several else folders_of(output, names)
     jobs = []
-    for painting, folder in zip(paintings, folders, strict=True):
+    for painting, folder in zip(paintings, _folders_of_looks(options, paths), strict=True):
         try:
             job = Job(source, (painting,), folder, basis, constraints, settings, rigging=rigging)
             jobs.append(job)
@@ -86,6 +76,30 @@ def jobs_of(
         for job in jobs:  # if no scene has read it
             check_files(job.results.files, [Path(options.lights_file)])
     return jobs
+
+
+def _scenes_of_views(options: Namespace) -> tuple[SceneFile, ...]:
+    """Return the scene through the sensor of each view. Raises TargetError for an option -s."""
+    if options.sensor:
+        raise TargetError("-s cannot be used with --target, which names the sensors")
+    return tuple(scene_of(options, sensor=sensor) for sensor, _ in options.views)
+
+
+def _folder_of_views(options: Namespace, paths: Sequence[str]) -> Path:
+    """Return the folder for the answer to the views at `paths`, below that of variations."""
+    folder = Path(options.output or Path(paths[0]).stem)
+    if options.output and options.variations:
+        folder /= Path(paths[0]).stem
+    return folder
+
+
+def _folders_of_looks(options: Namespace, paths: Sequence[str]) -> list[Path]:
+    """Return a folder for the answer to each painting."""
+    output = options.output and Path(options.output)
+    names = [Path(path).stem for path in paths]
+    # A painting with variations beside it is several looks.
+    is_several = bool(options.variations) and len(names) == 1 and output
+    return [output / names[0]] if is_several else folders_of(output, names)
 
 
 def _paintings_of(options: Namespace, paths: list[str]) -> list[Painting]:

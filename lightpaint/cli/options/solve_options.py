@@ -35,6 +35,19 @@ def add_paintings(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--layer", metavar="NAME", help="layer, part or view to read from an EXR")
     default = "that of the template or the picture, else"
     add_view_transform(parser, f"{default} srgb", f"{default} 0")
+    _add_template(parser)
+    parser.add_argument(
+        "--paint",
+        choices=("look", "light"),
+        default="look",
+        help="what painted colours mean. look: the colour of the surface as the picture shows it;"
+        " light: the light that falls on it, which lightpaint multiplies by the surface's "
+        "albedo (default: %(default)s)",
+    )
+
+
+def _add_template(parser: argparse.ArgumentParser) -> None:
+    """Add the options for the template that was painted over."""
     parser.add_argument(
         "--template",
         metavar="DIR",
@@ -46,14 +59,6 @@ def add_paintings(parser: argparse.ArgumentParser) -> None:
         dest="find_template",
         action="store_false",
         help="do not look for a template",
-    )
-    parser.add_argument(
-        "--paint",
-        choices=("look", "light"),
-        default="look",
-        help="what painted colours mean. look: the colour of the surface as the picture shows it;"
-        " light: the light that falls on it, which lightpaint multiplies by the surface's "
-        "albedo (default: %(default)s)",
     )
 
 
@@ -113,41 +118,13 @@ def add_fit(parser: argparse.ArgumentParser) -> None:
 def add_method(parser: argparse.ArgumentParser) -> None:
     """Add the options for how a painting is solved."""
     add_fit(parser)
-    parser.add_argument(
-        "--unpainted",
-        type=arguments.number(may_be_zero=True),
-        default=0.0,
-        metavar="W",
-        help="weight of each unpainted pixel, instead of --hold (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--emitters",
-        choices=("auto", "count", "skip"),
-        default="auto",
-        help="whether painted pixels that show an emitter count. auto: only if alpha, mask or "
-        "template mark them as painted; count: always, which fits emitters to their painted "
-        "brightness; skip: never (default: %(default)s)",
-    )
+    _add_counted_pixels(parser)
     parser.add_argument(
         "--resize",
         action="store_true",
         help="resample a target whose size differs from the basis (default: refuse it)",
     )
-    parser.add_argument(
-        "--correct-noise",
-        dest="noise_correction",
-        action=argparse.BooleanOptionalAction,
-        help="subtract the power of the noise from the equations as far as that helps, so that "
-        "the answer is closer to one from many samples (default: if the noise is known)",
-    )
-    parser.add_argument(
-        "--refine",
-        type=arguments.at_least(0, maximum=100),
-        default=0,
-        metavar="K",
-        help="render the solved scene K times, with as many samples as the basis, and improve the"
-        " answer each time (default: %(default)s)",
-    )
+    _add_noise_reduction(parser)
     parser.add_argument(
         "--method",
         choices=("polished", "gauss-seidel"),
@@ -164,6 +141,44 @@ def add_method(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="suggest up to N (3) new point lights that would help most, with XML to paste, and "
         "the best turn of one spot of the scene; takes about half a minute",
+    )
+
+
+def _add_counted_pixels(parser: argparse.ArgumentParser) -> None:
+    """Add the options for how much pixels count that nobody painted, or that show an emitter."""
+    parser.add_argument(
+        "--unpainted",
+        type=arguments.number(may_be_zero=True),
+        default=0.0,
+        metavar="W",
+        help="weight of each unpainted pixel, instead of --hold (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--emitters",
+        choices=("auto", "count", "skip"),
+        default="auto",
+        help="whether painted pixels that show an emitter count. auto: only if alpha, mask or "
+        "template mark them as painted; count: always, which fits emitters to their painted "
+        "brightness; skip: never (default: %(default)s)",
+    )
+
+
+def _add_noise_reduction(parser: argparse.ArgumentParser) -> None:
+    """Add the options against the noise of the basis in the answer."""
+    parser.add_argument(
+        "--correct-noise",
+        dest="noise_correction",
+        action=argparse.BooleanOptionalAction,
+        help="subtract the power of the noise from the equations as far as that helps, so that "
+        "the answer is closer to one from many samples (default: if the noise is known)",
+    )
+    parser.add_argument(
+        "--refine",
+        type=arguments.at_least(0, maximum=100),
+        default=0,
+        metavar="K",
+        help="render the solved scene K times, with as many samples as the basis, and improve the"
+        " answer each time (default: %(default)s)",
     )
 
 

@@ -60,27 +60,10 @@ def page_app(
         return Response(file.content, headers={"content-type": file.kind})
 
     async def data(request: "Request") -> "Response":
-        name, generation = request.path_params["name"], request.query_params.get("g")
         if is_program(request.scope):
             await connections.wait_for_rest()
-        before = connections.generations.get(name)
-        try:
-            picture = await picture_message(connections, name)
-        except PaintError as error:
-            return Response(str(error), 404, media_type="text/plain")
-        [description], [content] = picture.content()["buffers"], picture.buffers()
-        headers = {
-            "content-type": "application/octet-stream",
-            "x-dtype": description["dtype"],
-            "x-shape": ",".join(map(str, description["shape"])),
-        }
-        if generation is not None and generation == str(before) == str(
-            connections.generations.get(name)
-        ):
-            # Another launch has another key, and other pictures.
-            caching = "private, max-age=31536000, immutable"
-            headers |= {"cache-control": caching, "vary": "Authorization"}
-        return Response(content, headers=headers)
+        name, generation = request.path_params["name"], request.query_params.get("g")
+        return await _picture_response(connections, name, generation)
 
     async def live(websocket: "WebSocket") -> None:
         # A program may offer no subprotocol, and then gets none in the answer.
@@ -99,6 +82,31 @@ def page_app(
         Route("/{path:path}", page),
     ]
     return Starlette(routes=routes, lifespan=lifespan)
+
+
+async def _picture_response(
+    connections: Connections, name: str, generation: str | None
+) -> "Response":
+    """Return the pixels of a picture, which a page may keep if it asked for this generation."""
+    from starlette.responses import Response
+
+    before = connections.generations.get(name)
+    try:
+        picture = await picture_message(connections, name)
+    except PaintError as error:
+        return Response(str(error), 404, media_type="text/plain")
+    [description], [content] = picture.content()["buffers"], picture.buffers()
+    headers = {
+        "content-type": "application/octet-stream",
+        "x-dtype": description["dtype"],
+        "x-shape": ",".join(map(str, description["shape"])),
+    }
+    after = connections.generations.get(name)
+    if generation is not None and generation == str(before) == str(after):
+        # Another launch has another key, and other pictures.
+        caching = "private, max-age=31536000, immutable"
+        headers |= {"cache-control": caching, "vary": "Authorization"}
+    return Response(content, headers=headers)
 
 
 class Server:
