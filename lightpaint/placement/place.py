@@ -120,7 +120,7 @@ def place(
         poses = PoseSearch(coarse, paths, PoseRules(paths), seed=seed)
         if watch is not None:
             poses.steps.watch = lambda its: watch(_sites_by_name(its, names))
-        judge = PlacementJudge(fine, poses.steps.on(fine), paths)
+        judge = PlacementJudge(fine, poses.steps.with_fit(fine), paths)
         found = _searched(poses, judge, movables, slots, progress)
         return _Result.of(found, judge, paths, large[0])
 

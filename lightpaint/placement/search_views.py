@@ -48,7 +48,7 @@ def check_looks(
         views = [(basis.origin.sensor, basis.size) for basis in its.problem.views.bases]
         if missing := [sensor for sensor, size in views if (sensor, size) not in known]:
             raise SceneError(
-                f"a look is through the sensor {missing[0]!r}, and no basis is, on its film: give "
+                f"a look is through the sensor {missing[0]!r}, but no basis of its size is: give "
                 "the bases of all views"
             )
         looks.append((its, [known.index(view) for view in views]))
@@ -74,7 +74,7 @@ def on_small_film(scene: Scene, basis: Basis, pixels: int) -> Scene:
     (height, width), (mine_h, mine_w) = scene.size, basis.size
     if whole_factor(scene.size, basis.size) is None:
         raise SceneError(
-            f"the basis is {mine_w}x{mine_h}, whose pixels are no blocks of those of the film "
+            f"the basis is {mine_w}x{mine_h}, whose pixels are not blocks of those of the film "
             f"of {scene.path}, {width}x{height}: make it again"
         )
     return reduced_film(scene.reduced(f"{mine_w}x{mine_h}"), pixels)

@@ -3,7 +3,7 @@
 A file from a paint program was rounded to its format, and perhaps compressed; pixels that differ by
 more are paint. Faint paint counts less, so a soft brush leaves a soft importance.
 
-The rounding tolerance is that of 8 bits for all formats, because a file does not tell the history
+The rounding tolerance is that of 8 bits for all formats, because a file does not record the history
 of its pixels: GIMP writes half floats into a float EXR, and 16-bit PNGs from 8-bit layers, and
 profiles are converted back and forth. So a painting counts the same in every format.
 """
@@ -40,9 +40,9 @@ LOSSY_RADIUS, LOSSY, SHARP_RADIUS = 4, 2.5 / 255, 1
 
 def painted_where(path: Path, picture: Picture, template: Template) -> npt.NDArray[np.float32]:
     """Return the paint in each pixel, (h, w): 0 if `picture` equals `template` up to rounding, 1 if
-    it surely does not.
+    it certainly does not.
 
-    path: the file of the picture, which tells its compression. Pixels that it does not store are
+    path: the file of the picture, for its compression settings. Pixels that it does not store are
     unpainted. Raises SizeError if the two differ in size.
     """
     if picture.size != template.size:

@@ -125,7 +125,7 @@ WRONG: dict[str, tuple[str, tuple[str, ...]]] = {
     "an unknown paint": (FIRST + 'paint = "oil"\n', ("paint is 'oil'", "'light'")),
     "a name with a slash": (
         HEAD + LOOK_PARAMETER + 'name = "a/b"\n',
-        ("'a/b' is no name for a folder",),
+        ("'a/b' cannot be the name of a folder",),
     ),
     "a name twice": (
         FIRST + LOOK_PARAMETER + 'name = "one"\n',

@@ -170,4 +170,4 @@ def test_from_the_listing_to_the_relit_scene(tmp_path: Path) -> None:
     # The basis that is kept is found again.
     assert "kept from an earlier run" in run(tmp_path, "basis", room, *small).stderr
     told = refused(tmp_path, "solve", room, "p.exr", *small, "--lock", "area_3")
-    assert "'area_3' is part of the light 'glass': ask it of that" in told
+    assert "'area_3' is part of the light 'glass': constrain that light" in told

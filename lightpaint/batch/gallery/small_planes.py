@@ -83,7 +83,7 @@ def read_planes(path: Path) -> dict[str, Any]:
 
 
 def drop_planes(folder: Path, used_names: Collection[str]) -> None:
-    """Delete small planes that no look uses. used_names: of the others."""
+    """Delete small planes that no look uses. used_names: names of those to keep."""
     for path in (folder / THUMBNAILS).glob(f"*{SUFFIX}"):
         if path.name.removesuffix(SUFFIX) not in used_names:
             path.unlink(missing_ok=True)

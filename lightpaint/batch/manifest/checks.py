@@ -157,7 +157,7 @@ def check_sequence(mistakes: Mistakes, table: Table) -> None:
             label, f"{missing_keys[0]} is missing: give name, through and frames (or sensors)"
         )
     if "name" in values and not is_name(values["name"]):
-        mistakes.add(label, f"{values['name']!r} is no name for a folder: say name = ...")
+        mistakes.add(label, f"{values['name']!r} cannot be the name of a folder: set name = ...")
     if len(values.get("through", "..")) < 2 and not table.has("sensors"):
         mistakes.add(label, f"through is {values['through']}: expected at least two names of looks")
     if path is not None and frames not in (None, len(path)):

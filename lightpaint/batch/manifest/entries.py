@@ -182,7 +182,7 @@ def _table_looks(
         check_handover(mistakes, label, entry.handover, example)
     for name in {x.name for x in looks} or {entry.name} - {""}:
         if not is_name(name):
-            mistakes.add(label, f"{name!r} is no name for a folder: say name = ...")
+            mistakes.add(label, f"{name!r} cannot be the name of a folder: set name = ...")
     if len(mistakes.lines) == mistakes_before and not table.unclear_keys:
         return looks, None
     return [], example

@@ -40,18 +40,18 @@ def _check_names(manifest: Manifest, looks: Sequence[LookEntry]) -> None:
         if is_reserved(look.name):
             manifest.mistakes.add(
                 look.label,
-                f"a look cannot be called {look.name!r}, where the batch has files of its own: "
-                "say name = ...",
+                f"a look cannot be called {look.name!r}, the name of a file of the batch itself: "
+                "set name = ...",
             )
     for names_of_folder in name_clashes(look.name for look in looks):
         labels = some_names(
             dict.fromkeys(x.label for x in looks if x.name in names_of_folder), " and "
         )
         names = " and ".join(map(repr, names_of_folder))
-        text = f"more than one look would be called {names}: say name = ... in one of them"
+        text = f"more than one look would be called {names}: set name = ... in one of them"
         if len(names_of_folder) > 1:
             text = (
-                f"{names} would be one folder on disks that do not tell case: say name = ... "
+                f"{names} would be one folder on disks that ignore case: set name = ... "
                 "in one of them"
             )
         manifest.mistakes.add(labels, text)
@@ -96,9 +96,11 @@ def _check_ends(
     if any(_view_key(end, path) != _view_key(ends[0], path) for end in ends):
         mistakes.add(label, "through: its looks are of different scenes, sensors or bases")
     elif path and not ends[0].scenes:
-        mistakes.add(label, "sensors: its looks are of no scene, which other sensors could see")
+        mistakes.add(label, "sensors: its looks have no scene that other sensors could see")
     elif not path and any(end.by_sensor for end in ends):
-        mistakes.add(label, "through: a look of several views has no one picture: take single ones")
+        mistakes.add(
+            label, "through: a look of several views has several pictures: name looks of one view"
+        )
 
 
 def _may_become(name: str, entry: LookEntry) -> bool:

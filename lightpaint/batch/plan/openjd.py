@@ -143,7 +143,7 @@ def _pattern(look: PlannedLook) -> str:
     """Return a pattern that only this look's name matches. Raises BatchError if there is none."""
     name = look.entry.name
     if "{{" in name or len(escape(name)) > MAX_VALUE_LENGTH:
-        raise BatchError(f"look {name!r} cannot be named in a job: say name = ...")
+        raise BatchError(f"look {name!r} cannot be named in a job: set name = ...")
     return escape(name)
 
 

@@ -82,7 +82,7 @@ class LightSetting:
         if not all(e is None or is_amount(e) for e in errors):
             raise LightingError(
                 f"light {self.name!r} has the standard error {list(errors)}: need three numbers "
-                f"from 0 to {BRIGHTEST:g}, or null where nothing tells"
+                f"from 0 to {BRIGHTEST:g}, or null where it is unknown"
             )
         for ends in filter(None, self.interval or ()):
             if not 0 <= ends[0] <= ends[1] <= BRIGHTEST:

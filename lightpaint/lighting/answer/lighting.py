@@ -158,7 +158,7 @@ class Lighting(Shown, Mapping[str, LightSetting]):
     def to_xarray(self) -> Any:
         """Return an xarray.Dataset: emission, weight and error, (light, channel).
 
-        error: standard error of the emission, NaN where nothing tells. Raises LightpaintError
+        error: standard error of the emission, NaN where unknown. Raises LightpaintError
         without xarray.
         """
         errors = [light.standard_error or (None, None, None) for light in self.lights]

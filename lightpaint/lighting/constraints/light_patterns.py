@@ -72,12 +72,12 @@ def _match_lights(
             if only_keeps:
                 return []  # which a fixed light does anyway
             raise ConstraintError(
-                f"{where}: {name!r} is not among the lights to adjust, and stays as it is: "
-                "choose it with lights=..., or ask nothing of it"
+                f"{where}: {name!r} is fixed, since it is not among the lights to adjust: choose "
+                "it with lights=..., or remove its constraint"
             )
         if name not in names:
             raise ConstraintError(
-                f"{where}: {name!r} is part of the light {light.name!r}: ask it of that"
+                f"{where}: {name!r} is part of the light {light.name!r}: constrain that light"
             )
     matching = fnmatchcase if is_pattern(name) else str.__eq__
     matches = [k for k, x in enumerate(lights) if not x.is_fixed and matching(x.name, name)]

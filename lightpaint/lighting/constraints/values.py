@@ -164,13 +164,15 @@ def parse_color(value: Any, where: str, *, duv: float = 0.0) -> RGB:
         elif _is_rgb(value):
             rgb = np.array(value, dtype=np.float64)
         else:
-            raise ColorError(f"{value!r} is no colour")
+            raise ColorError(f"{value!r} is not a colour")
     except (ColorError, ValueError):
         raise ConstraintError(
             f"{where} is {value!r}: expected a colour like #ffaa66, 3200K or three numbers >= 0"
         ) from None
     if not rgb.any():
-        raise ConstraintError(f"{where} is {value!r}, black, which is no colour of light: say off")
+        raise ConstraintError(
+            f"{where} is {value!r}, black, which is not a colour of light: use off"
+        )
     return as_rgb(rgb / luminance(rgb))
 
 

@@ -159,9 +159,9 @@ def tied_knob(
         columns.append((k, direction))
     if lower > upper * (1 + ROUND_OFF):
         raise ConstraintError(
-            f"{tie.where}: what is asked of {names} cannot be had on one dimmer: one light "
-            f"asks for at least {lower:.4g} times its current luminance, another "
-            f"for at most {upper:.4g}"
+            f"{tie.where}: {names} share a dimmer, but one needs at least {lower:.4g} times its "
+            f"current luminance and another allows at most {upper:.4g}: change these limits, or "
+            "leave one out"
         )
     return Knob(tuple(members), (Unknown(tuple(columns), min(lower, upper), upper),))
 

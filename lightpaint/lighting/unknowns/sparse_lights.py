@@ -69,8 +69,8 @@ def choose_knobs(
     always_on = frozenset(k for k, knob in enumerate(reduction.knobs) if _is_on(knob))
     if len(always_on) > count:
         raise ConstraintError(
-            f"sparse is {count}, but {len(always_on)} lights have a lower limit above 0: allow as "
-            "many"
+            f"sparse is {count}, but {len(always_on)} lights have a lower limit above 0: allow at "
+            "least as many"
         )
     trials, chosen, path = _Trials(problems, reduction), always_on, [always_on] if always_on else []
     while len(chosen) < len(reduction.knobs) and len(chosen) < count + EXTRA_SIZES:

@@ -213,7 +213,7 @@ class LookLibrary:
         same = [look for look in proposals if look.fields["name"] == name]
         if not same and len(proposals) >= MAX_PROPOSALS:
             raise PaintError(
-                f"{len(proposals)} proposals are there already: let who paints drop some"
+                f"{len(proposals)} proposals exist: the person who paints has to delete some"
             )
         paintings = [view.pixels(view.full_region) for view in session.views]
         look_ = self._with_layers(

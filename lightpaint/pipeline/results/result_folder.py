@@ -1,4 +1,4 @@
-"""The folder of results: the painting of its answer, and which files may be replaced."""
+"""The folder of results: which painting it answers, and which files may be replaced."""
 
 import json
 import os

@@ -26,9 +26,9 @@ from lightpaint.scene.surfaces import loaded_features
 COARSE_SAMPLES = ((1, 0), (9, 2))
 
 #: Approximate number of first hits on a larger film, in each of two halves, to refine and judge
-#: candidates and to measure the spread of places; the largest grid of them per pixel; and continued
-#: paths for each.
-FINE_HITS, FINE_SIDES, GOING_ON = 2**17, (3, 6), 2 / 9
+#: candidates and to measure the spread of places; the smallest and largest side of their grid in a
+#: pixel; and the share of them that continue as paths.
+FINE_HITS, FINE_SIDES, CONTINUED_SHARE = 2**17, (3, 6), 2 / 9
 
 #: Number of independent sets of paths per view.
 SETS = 10
@@ -148,7 +148,7 @@ class SearchPaths:
     def _fine(self, k: int) -> ViewPaths:
         pixels = sum(math.prod(view.size) for view in self._large)
         side = round(float(np.clip(math.sqrt(FINE_HITS / pixels), *FINE_SIDES)))
-        samples = side**2, max(1, round(GOING_ON * side**2))
+        samples = side**2, max(1, round(CONTINUED_SHARE * side**2))
         halves = [self._made(2 * k + j, self._large, self._features, samples) for j in range(2)]
         return ViewPaths(*halves)
 

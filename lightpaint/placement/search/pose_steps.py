@@ -12,7 +12,7 @@ from lightpaint.placement.placement_fit import Fitted, PlacementFit, with_column
 from lightpaint.scene.properties.pose import Site
 
 #: Largest step of a number, relative to its finite difference.
-TRUST = 6.0
+MAX_STEP = 6.0
 
 #: Ridge of the first step, relative to the diagonal; its growth after a trial that failed, and
 #: shrinkage after one that helped; its minimum; and the trials of a step.
@@ -24,7 +24,7 @@ RIDGE, RIDGE_GROWTH, RIDGE_SHRINK, LEAST_RIDGE, TRIALS = 1e-2, 6.0, 4.0, 1e-5, 5
 FIRST_STEP, LAST_SHARE, SHORTER, MUCH_SHORTER = 0.04, 0.15, 0.6, 0.4
 
 #: Decrease, as a share of the error, below which a step counts as no progress.
-HARDLY = 1e-4
+MIN_PROGRESS = 1e-4
 
 
 class PoseSteps:
@@ -51,7 +51,7 @@ class PoseSteps:
         self.first_step = FIRST_STEP * spread
         self._unit = spread / 3
 
-    def on(self, fit: PlacementFit) -> "PoseSteps":
+    def with_fit(self, fit: PlacementFit) -> "PoseSteps":
         """Return the same steps for a fit on another film."""
         steps = PoseSteps(fit, self._spread, self._permits)
         steps.watch = self.watch
@@ -90,11 +90,11 @@ class PoseSteps:
             self.watch(arrangement)
             progress()
             share = 1 - arrangement.missed / max(before, 1e-300)
-            if share < HARDLY and step <= last:
+            if share < MIN_PROGRESS and step <= last:
                 break
-            if share < HARDLY:
+            if share < MIN_PROGRESS:
                 ridge = RIDGE
-            step = max((MUCH_SHORTER if share < HARDLY else SHORTER) * step, last)
+            step = max((MUCH_SHORTER if share < MIN_PROGRESS else SHORTER) * step, last)
         return arrangement
 
     def step(
@@ -122,7 +122,7 @@ class PoseSteps:
         diagonal = np.diag(matrix) + 1e-9 * np.trace(matrix) + 1e-300
         for _ in range(TRIALS):
             change = np.linalg.solve(matrix + ridge * np.diag(diagonal), gradient)
-            change = change.clip(-TRUST * step, TRUST * step)
+            change = change.clip(-MAX_STEP * step, MAX_STEP * step)
             sites = list(arrangement.sites)
             for k, scale in scales.items():
                 own = change[[q for q, (owner, _) in enumerate(numbers) if owner == k]]

@@ -16,7 +16,7 @@
  * @typedef {null | 'missed' | 'beyond' | 'falsecolor' | 'importance'} Overlay */
 
 /**
- * What is drawn. * left, right: the pictures. layout: side by side (or stacked, if they are larger
+ * What is drawn. left, right: the pictures. layout: side by side (or stacked, if they are larger
  * so), the left one in front up to the wipe, or one alone (blink: 'left' or 'right'). zoom: 1 fits.
  * pan: offset of the centre, in picture pixels. stops: exposure. live: whether more frames follow
  * soon, so that speed matters more than sharpness.
@@ -62,7 +62,7 @@ export const DEFAULTS = Object.freeze({
  *   (n, 3) light of each plane at a pixel, at unit emission
  * @property {(kind: Kind, x: number, y: number) => [number, number, number]} lightAt
  *   linear light of a picture at a pixel
- * @property {() => boolean} lost whether all that was set is gone, and is to be set again
+ * @property {() => boolean} lost whether the context lost all that was set, so that it has to be set again
  * @property {() => number} memory bytes held for pictures
  * @property {() => void} close
  */

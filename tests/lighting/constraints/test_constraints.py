@@ -385,7 +385,7 @@ def test_the_answer_file_says_what_held_a_light(make_basis: Any, tmp_path: Any) 
         ({"lock": "#fff #000"}, "expected .* a colour and a level"),
         ({"color": "3200"}, "color is '3200': expected a colour like #ffaa66, 3200K"),
         ({"color": "#xyz"}, "color is '#xyz': expected"),
-        ({"color": [0, 0, 0]}, "black, which is no colour of light: say off"),
+        ({"color": [0, 0, 0]}, "black, which is not a colour of light: use off"),
         ({"color": [1, -1, 1]}, "color is .*: expected"),
         ({"kelvin": [6500, 2700]}, r"kelvin is \[6500, 2700\]: expected"),
         ({"kelvin": 500}, "kelvin: a colour temperature of 500 K"),
@@ -459,11 +459,11 @@ def test_wishes_for_all_lights_that_mean_nothing(asked: Any, words: str) -> None
                     "lamp_2": {"limits": {"min": "50%"}},
                 },
             },
-            "asked of lamp_1, lamp_2 cannot be had on one dimmer",
+            "lamp_1, lamp_2 share a dimmer, but one needs",
         ),
         (
             {"tie": ["lamp_*"], "light": {"lamp_1": {"lock": True}, "lamp_2": {"off": True}}},
-            "asked of lamp_1, lamp_2 cannot be had on one dimmer",
+            "lamp_1, lamp_2 share a dimmer, but one needs",
         ),
         (
             {"light": {"lamp_1": {"limits": {"min": [9, 9, 9], "max": 3}}}},

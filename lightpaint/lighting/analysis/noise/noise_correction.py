@@ -22,8 +22,8 @@ from lightpaint.lighting.normal_equations import NormalEquations, block_diagonal
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solve_again
 
-#: Share of the error that the prediction's own noise makes against any other picture. With less,
-#: the target is a sum of the basis itself, whose noise is the same and cancels.
+#: Error, as a share of what the prediction's noise alone adds, below which a target counts as a sum
+#: of the basis itself: the noise of both is then the same, and cancels.
 SAME_NOISE_SHARE = 1e-4
 
 #: Steps of the share of noise to remove from M.
@@ -34,7 +34,7 @@ SHARE_STEPS = 8
 def correct_noise(solution: Solution, *, share: float | None = None) -> Solution:
     """Solve the equations without a share of the noise power in M and b.
 
-    With many lights, the equations are of light averaged along surfaces (smooth_light.py).
+    With many lights, the equations use light averaged along surfaces (smooth_light.py).
     A fit of blocks of pixels has already averaged most of the noise; its solution stays as it is.
     If squares stand for another loss, the share is lowered until this loss falls, too: far from the
     answer the squares do not represent it.
@@ -55,7 +55,7 @@ def correct_noise(solution: Solution, *, share: float | None = None) -> Solution
     basis = solution.basis
     if not basis.knows_noise:
         raise BasisError(
-            f"{basis.origin.scene} says nothing of its noise, so that none can be corrected: "
+            f"the noise of {basis.origin.scene} is unknown, so it cannot be corrected: "
             "use noise_correction=False, and denoise the layers or render them with more samples"
         )
     if solution.problem.block_side > 1:
@@ -108,7 +108,7 @@ def _loss(solution: Solution, removed: NormalEquations) -> float:
 def _best_share(
     solution: Solution, equations: NormalEquations, noise: Noise, least: Doubles
 ) -> float:
-    """Return the share s with the least expected excess of the objective, in steps of SHARES.
+    """Return the share s with the least expected excess of the objective, of SHARE_STEPS steps.
 
     The remaining bias costs (1 − s)² δᵀMδ, and the scatter costs tr(M Cov(w)), which grows as
     M_s = M − s N becomes smaller. equations: M and b with all noise, least: M without it.

@@ -56,8 +56,8 @@ def refine(solution: Solution, mixed: Estimate) -> Solution:
     basis, problem, w = solution.basis, solution.problem, solution.weights
     if not basis.knows_noise:
         raise BasisError(
-            f"{basis.origin.scene} says nothing of its noise, so that a render of the mix cannot "
-            "be weighed against it: use refine=0"
+            f"the noise of {basis.origin.scene} is unknown, so a render of the mix cannot be "
+            "weighed against it: use refine=0"
         )
     if mixed.size != basis.size:
         raise SizeError(
