@@ -91,7 +91,7 @@ def say_changes(placement: Placement | PlacementRecord, listen: Listener) -> Non
     for change in changes:
         listen.say(f"{prefix}{spoken_change(change)}")
     if not changes:
-        reason = "no change is surely worth a hundredth of what is missed"
+        reason = "no change reliably removes a hundredth of the error"
         listen.say(f"{prefix}no light is moved: {reason}")
 
 

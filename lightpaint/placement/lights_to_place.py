@@ -169,8 +169,8 @@ def followers_of(
         one, other = (_site(scene, name) for name in pair.lights)
         if scene.light(first).plugin != scene.light(second).plugin:
             raise SceneError(f"{first!r} and {second!r} are of two kinds: they are no pair")
-        if again := named & {first, second}:
-            raise SceneError(f"light {min(again)!r} is in two pairs: it has one mirror image")
+        if repeated := named & {first, second}:
+            raise SceneError(f"light {min(repeated)!r} is in two pairs: it has one mirror image")
         named |= {first, second}
         if first not in freedoms:
             raise SceneError(f"{first!r} leads a pair and has no freedom: give it one")

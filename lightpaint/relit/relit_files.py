@@ -110,9 +110,9 @@ def _edit_emitters(
 
 def _edit_integrators(scene: Scene, edits: dict[Path, _Edits]) -> None:
     """Add edits that replace the scene's own integrator by the one it was loaded with."""
-    if scene.instead is None:
+    if scene.integrator_choice is None:
         return
-    text = scene.instead.xml
+    text = scene.integrator_choice.xml
     for file, offset in scene.replaced_integrators:
         edits.setdefault(file.resolve(), _Edits(file)).integrators[offset] = text
         text = ""  # one is enough

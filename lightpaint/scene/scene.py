@@ -57,7 +57,7 @@ class Scene(SceneFiles, Shown):
         sensor_names: Ids of all sensors.
         spp: The scene's own number of samples per pixel.
         integrator: The parameters of its integrator.
-        instead: The integrator that replaces the scene's own, or None.
+        integrator_choice: The integrator that replaces the scene's own, or None.
         has_media: Whether it has participating media, such as fog.
         has_null: Whether it has null surfaces, which let rays pass unchanged.
         emitters: All emitters.
@@ -88,7 +88,7 @@ class Scene(SceneFiles, Shown):
     sensor_names: tuple[str, ...]
     spp: int
     integrator: Integrator
-    instead: IntegratorChoice | None
+    integrator_choice: IntegratorChoice | None
     has_media: bool
     has_null: bool
     emitters: tuple[Emitter, ...]

@@ -33,7 +33,7 @@ def inspect_scene(parsed: ParsedScene, sensor: int) -> dict[str, Any]:
         **facts,
         "sensor_names": parsed.sensor_names,
         "integrator": parsed.integrator(),
-        "instead": parsed.instead,
+        "integrator_choice": parsed.integrator_choice,
         "has_media": parsed.has_media(),
         "files": parsed.files,
         "content": parsed.content(sensor),

@@ -71,9 +71,9 @@ def load_scene(
     path = Path(path)
     _check_file(path)
     values = {key: str(value) for key, value in (parameters or {}).items()}
-    instead = None if integrator is None else IntegratorChoice.of(integrator)
+    integrator_choice = None if integrator is None else IntegratorChoice.of(integrator)
     with explain_old_scene(path), mitsuba_errors(path):
-        parsed = ParsedScene(path, values, backend.variant, instead)
+        parsed = ParsedScene(path, values, backend.variant, integrator_choice)
     index = sensor_index(sensor, parsed.sensor_names, path)
     selection = lights_file_for(path, lights_file, beside_scene=use_lights_file)
     selection = selection.with_more(lights, groups)

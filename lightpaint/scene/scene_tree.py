@@ -38,9 +38,9 @@ class ParsedScene:
         path: Path,
         parameters: Mapping[str, str],
         variant: str,
-        instead: IntegratorChoice | None = None,
+        integrator_choice: IntegratorChoice | None = None,
     ) -> None:
-        """Parse the XML. instead: an integrator that replaces the scene's own."""
+        """Parse the XML. integrator_choice: an integrator that replaces the scene's own."""
         import mitsuba as mi
 
         self.path = path
@@ -55,8 +55,8 @@ class ParsedScene:
         if self.state.nodes[0].props.plugin_name() != "scene":
             raise SceneError(f"{path} is not a scene: its root element must be <scene>")
         self.files = tuple(Path(str(f)) for f in self.state.files)
-        self.instead, self.replaced = self._replace_integrator(instead)
-        with mitsuba_errors(path, self.instead):
+        self.integrator_choice, self.replaced = self._replace_integrator(integrator_choice)
+        with mitsuba_errors(path, self.integrator_choice):
             check_plugins(self.state, self.resolver)
         kinds = mi.ObjectType
         self.emitter_nodes = self._nodes_of(kinds.Emitter)
@@ -88,17 +88,17 @@ class ParsedScene:
         return state
 
     def _replace_integrator(
-        self, instead: IntegratorChoice | None
+        self, integrator_choice: IntegratorChoice | None
     ) -> tuple[IntegratorChoice | None, tuple[tuple[int, int], ...]]:
         """Replace the integrator. Returns the choice, and the positions of the replaced elements:
         file index, byte offset.
         """
-        if instead is None:
+        if integrator_choice is None:
             return None, ()
         nodes = [self.state.nodes[k] for k in integrator_nodes(self.state)]
         # The parser's offset is just after the `<`.
         places = tuple((int(node.file_index), int(node.offset) - 1) for node in nodes)
-        return replace_integrator(self.state, instead), places
+        return replace_integrator(self.state, integrator_choice), places
 
     def _nodes_of(self, kind: Any) -> list[int]:
         return [k for k, node in enumerate(self.state.nodes) if node.type == kind]
@@ -168,7 +168,7 @@ class ParsedScene:
                 ):
                     del props[key]
             props["film"] = film.load()
-        with self._resolving(), mitsuba_errors(self.path, self.instead):
+        with self._resolving(), mitsuba_errors(self.path, self.integrator_choice):
             scene = mi.parser.instantiate(self.config, state)
         make_normals_reproducible(scene)
         return scene
@@ -221,8 +221,8 @@ class ParsedScene:
                 while data := file.read(2**24):
                     digest.update(data)
         digest.update(repr((sorted(self.parameters.items()), sensor)).encode())
-        if self.instead is not None:
-            digest.update(str(self.instead).encode())
+        if self.integrator_choice is not None:
+            digest.update(str(self.integrator_choice).encode())
         return digest.hexdigest()[:32]
 
     def assets(self) -> Iterator[Path]:
@@ -270,8 +270,8 @@ def relocated_path(path: Path, old: Path, new: Path) -> Path:
     """Return `path` after the folder `old` was moved to `new`, without passing through `old`."""
     if ".." not in path.parts and path.is_relative_to(old):
         return new / path.relative_to(old)
-    real, gone = Path(os.path.realpath(path)), Path(os.path.realpath(old))
-    if real.is_relative_to(gone):
-        return Path(os.path.realpath(new)) / real.relative_to(gone)
+    real, old_real = Path(os.path.realpath(path)), Path(os.path.realpath(old))
+    if real.is_relative_to(old_real):
+        return Path(os.path.realpath(new)) / real.relative_to(old_real)
     # The path may lead through the old folder.
-    return real if gone.name in path.parts else path
+    return real if old_real.name in path.parts else path

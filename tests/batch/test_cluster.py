@@ -293,7 +293,7 @@ def test_a_worker_that_hangs_and_one_without_memory_are_replaced(
     (workers.slow / "memory-third").touch()
 
     def free(text: str) -> None:
-        if text.startswith("part 2: ") and " takes over " in text:
+        if text.startswith("part 2: ") and " takes more than " in text:
             (workers.slow / "wait-part 2").unlink()
 
     hears = Hears(free)

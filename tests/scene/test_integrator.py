@@ -91,7 +91,7 @@ def test_it_is_loaded_and_the_relit_scene_has_it(tmp_path: Path, written: str) -
     assert (seen.plugin, seen.max_depth, seen.rr_depth) == ("path", depth, 4)
     relit = lp.relight(scene, _lighting(scene), tmp_path / "relit" / "relit.xml")
     assert relit.integrator == seen
-    assert relit.instead is None  # it is its own now
+    assert relit.integrator_choice is None  # it is its own now
     _loads_in_plain_mitsuba(tmp_path / "relit" / "relit.xml")
     # What is not in the place of the integrator is untouched.
     assert (tmp_path / "relit" / "parts" / "of.xml").exists() == (written == "included")

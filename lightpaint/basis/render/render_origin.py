@@ -88,7 +88,7 @@ def origin_of(
         method=method,
         halves=halves,
         passes=passes,
-        integrator="" if scene.instead is None else str(scene.instead),
+        integrator="" if scene.integrator_choice is None else str(scene.integrator_choice),
     )
 
 

@@ -269,7 +269,7 @@ class Cluster:
             if assignment.since_s is None or time.monotonic() - assignment.since_s < limit_s:
                 continue
             name = item_label(assignment.item)
-            self._listen.say(f"{name}: worker {assignment.worker} takes over {limit_s:.0f} s")
+            self._listen.say(f"{name}: worker {assignment.worker} takes more than {limit_s:.0f} s")
             self._take_back(
                 [x for x in self._assignments if x.worker == assignment.worker], queue, try_counts
             )

@@ -64,9 +64,9 @@ def camera_of(scene: Scene, loaded: Any) -> Camera | None:
 
 def _crossing(origin: Doubles, direction: Doubles) -> Doubles:
     """Return the point nearest to all rays, which begin at a plane before the eye."""
-    beside = np.eye(3) - direction[:, :, None] * direction[:, None, :]
+    across = np.eye(3) - direction[:, :, None] * direction[:, None, :]
     crossing: Doubles = np.linalg.solve(
-        beside.sum(axis=0), (beside @ origin[..., None]).sum(axis=0)
+        across.sum(axis=0), (across @ origin[..., None]).sum(axis=0)
     )
     return crossing[:, 0]
 

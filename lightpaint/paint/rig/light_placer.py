@@ -134,7 +134,7 @@ class LightPlacer:
             self._publish(f"No light was {_done(request)}: {error}")
             return
         if not placed:
-            reason = "none is surely worth a hundredth of what is missing"
+            reason = "none reliably removes a hundredth of the error"
             self._publish(f"No light was {_done(request)}: {reason}.")
             return
         if after >= before:

@@ -140,9 +140,9 @@ def weights_by_name(weights: Doubles, names: Sequence[str], lights: Lights) -> D
 
     Other lights start at their current emission.
     """
-    made = np.array(lights.current_weights)
-    there = dict(zip(names, weights, strict=True))
+    new_weights = np.array(lights.current_weights)
+    weight_by_name = dict(zip(names, weights, strict=True))
     for k, light in enumerate(lights):
-        if light.name in there:
-            made[k] = there[light.name]
-    return made
+        if light.name in weight_by_name:
+            new_weights[k] = weight_by_name[light.name]
+    return new_weights

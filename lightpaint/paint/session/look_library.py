@@ -124,8 +124,10 @@ class LookLibrary:
     def _in_order(self, weights: Doubles, requests: SessionRequests) -> Doubles:
         """Return weights of the current lights from weights of the lights under other requests."""
         names = (*self._session.bases[0].names, *requests.added)
-        there = dict(zip(names, weights, strict=True))
-        return np.array([there.get(name, (0.0, 0.0, 0.0)) for name in self._session.basis.names])
+        weight_by_name = dict(zip(names, weights, strict=True))
+        return np.array(
+            [weight_by_name.get(name, (0.0, 0.0, 0.0)) for name in self._session.basis.names]
+        )
 
     def _paintings(self, look: StoredLook) -> list[Pixels]:
         """Return the paintings of all views; a view that was added later is unpainted."""

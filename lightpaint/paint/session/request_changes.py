@@ -64,11 +64,11 @@ def constrain_light(
 
 
 def constrain_lights(
-    requests: SessionRequests, lights: Lights, asked: Mapping[str, Mapping[str, Any]]
+    requests: SessionRequests, lights: Lights, requested: Mapping[str, Mapping[str, Any]]
 ) -> SessionRequests:
     """Return the requests with those on some lights replaced, by their names."""
-    _check_names(asked, lights)
-    for name, constraints in asked.items():
+    _check_names(requested, lights)
+    for name, constraints in requested.items():
         if lights[lights.names.index(name)].is_fixed:
             raise PaintError(f"{name} is fixed, so it takes no constraint")
         requests = requests.with_light(name, constraints)

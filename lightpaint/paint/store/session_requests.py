@@ -76,13 +76,13 @@ class SessionRequests:
         added = {name: {**light, **self.poses.get(name, {})} for name, light in self.added.items()}
         return moved | added
 
-    def with_light(self, name: str, asked: Mapping[str, Any]) -> "SessionRequests":
+    def with_light(self, name: str, requested: Mapping[str, Any]) -> "SessionRequests":
         """Return these requests with all those on one light replaced.
 
         Holding a light holds all on its dimmer; earlier holds of these are dropped.
         """
         tied = next((names for names in self.ties if name in names), ())
-        lights = {**self.lights, name: asked}
+        lights = {**self.lights, name: requested}
         return replace(self, lights=_hold_once(lights, (name, *tied)))
 
     def with_poses(self, poses: Mapping[str, Mapping[str, Any]]) -> "SessionRequests":

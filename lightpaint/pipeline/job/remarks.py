@@ -26,8 +26,10 @@ def remarks_of_scene(scene: Scene, *, is_rendered: bool = True) -> list[str]:
         for x in scene.lights
         if x.is_found
     ]
-    if scene.instead is not None:
-        remarks.append(f"rendered with {scene.instead} instead of the scene's own integrator")
+    if scene.integrator_choice is not None:
+        remarks.append(
+            f"rendered with {scene.integrator_choice} instead of the scene's own integrator"
+        )
     if obstacles := [f"{x.name!r} {x.obstacle}" for x in scene.emitters if x.obstacle]:
         remarks.append(f"not adjusted: {some_names(obstacles, '; ')}")
     # Python code gets the same text as a warning.

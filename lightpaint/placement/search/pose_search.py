@@ -99,8 +99,8 @@ class PoseSearch:
             places = self._places(others, movable)
             ranked = best_poses(direct.gains(movable.light, places), COMPARED)
             if len(places) > 1:
-                beside = self._places_beside(others, movable, places, ranked)
-                nearer = best_poses(direct.gains(movable.light, beside), COMPARED // 2)
+                nearby = self._places_beside(others, movable, places, ranked)
+                nearer = best_poses(direct.gains(movable.light, nearby), COMPARED // 2)
                 # Some from each ranking, since direct light overrates places close to a hit.
                 ranked = [*ranked[: COMPARED - len(nearer)], *nearer]
             poses += [(gain, site, j) for gain, site in ranked]
@@ -150,14 +150,14 @@ class PoseSearch:
             place = np.array(site.position, dtype=float)
             if all(np.abs(place - other).max() > 0 for other in best) and len(best) < BESIDE:
                 best.append(place)
-        around = []
+        neighbours = []
         for place in best:
             away = np.linalg.norm(places - place, axis=1)
             radius = float(np.min(away[away > 0], initial=self.spread))
             off = self._rng.normal(size=(AROUND, 3))
             off *= radius * self._rng.random((AROUND, 1)) / np.linalg.norm(off, axis=1)[:, None]
-            around += [movable.light.places.nearest(place + x) for x in off]
-        candidates = np.array(around, dtype=float).reshape(-1, 3)
+            neighbours += [movable.light.places.nearest(place + x) for x in off]
+        candidates = np.array(neighbours, dtype=float).reshape(-1, 3)
         return candidates[self._is_permitted(others, movable, candidates)]
 
     def _is_permitted(self, others: Arrangement, movable: Movable, places: Floats) -> Bools:

@@ -207,9 +207,9 @@ def is_clear(loaded: Any, places: Floats, distance: float) -> Bools:
     k = np.arange(AROUND) + 0.5
     z, angle = 1 - 2 * k / AROUND, np.pi * (1 + np.sqrt(5)) * k
     ring = np.sqrt(1 - z * z)
-    around = np.stack([ring * np.cos(angle), ring * np.sin(angle), z], axis=1)
+    ring_directions = np.stack([ring * np.cos(angle), ring * np.sin(angle), z], axis=1)
     start = np.repeat(places, AROUND, axis=0)
-    towards = np.tile(around, (len(places), 1))
+    towards = np.tile(ring_directions, (len(places), 1))
     ray = mi.Ray3f(
         mi.Point3f(start.T.astype(np.float32)), mi.Vector3f(towards.T.astype(np.float32))
     )

@@ -17,7 +17,7 @@ const DELTA_E =
 
 const STATES = {
   live: 'A quick answer while you paint. The exact one follows.',
-  analysing: 'The lights are solved. The sentence still describes the answer before.',
+  analysing: 'The lights are solved. The sentence still describes the previous answer.',
   'answer not shown': 'The sentence describes the answer, which is neither of the looks compared.',
 };
 
