@@ -137,17 +137,17 @@ WRONG: dict[str, tuple[str, tuple[str, ...]]] = {
     ),
     "a name of the journal": (
         HEAD + LOOK_PARAMETER + 'name = "Journal.JSONL"\n',
-        ("files of its own",),
+        ("a file of the batch itself",),
     ),
     "a name of a summary": (
         HEAD + LOOK_PARAMETER + 'name = "summary.csv"\n',
-        ("files of its own",),
+        ("a file of the batch itself",),
     ),
     "a name of the small pictures": (
         HEAD + LOOK_PARAMETER + 'name = "thumbnails"\n',
-        ("look 'thumbnails'", "files of its own"),
+        ("look 'thumbnails'", "a file of the batch itself"),
     ),
-    "a hidden name": (HEAD + LOOK_PARAMETER + 'name = ".cache"\n', ("files of its own",)),
+    "a hidden name": (HEAD + LOOK_PARAMETER + 'name = ".cache"\n', ("a file of the batch itself",)),
     "a name that differs in case": (
         FIRST + LOOK_PARAMETER + 'name = "One"\n',
         ("look 'one' and look 'One'", "'one' and 'One' would be one folder", "case"),
@@ -178,7 +178,7 @@ WRONG: dict[str, tuple[str, tuple[str, ...]]] = {
     ),
     "a path through a basis": (
         SEQUENCE + 'through = ["one"]\nsensors = ["a", "b"]\n',
-        ("sequence 'seq'", "of no scene"),
+        ("sequence 'seq'", "have no scene"),
     ),
     "a sequence that is solved": (
         SEQUENCE + 'through = ["one", "two"]\nframes = 4\nwant = ["solve"]\n',
@@ -210,7 +210,7 @@ SEVERAL: dict[str, tuple[str, list[str]]] = {
     ),
     "a missing file hides none, and no name": (
         HEAD + '[[look]]\npainting = "gone.exr"\nmask = "m.png"\nname = "a/b"\nview = "acres"\n',
-        ["painting: no such file", "mask: no such file", "'a/b' is no name", "acres"],
+        ["painting: no such file", "mask: no such file", "'a/b' cannot be the name", "acres"],
     ),
     "defaults with a mistake hide no look's, and are told once": (
         HEAD + "exposre = 1\n[defaults.settings]\nholds = 1\n"
@@ -236,11 +236,11 @@ SEVERAL: dict[str, tuple[str, list[str]]] = {
     ),
     "a path of one sensor through a basis": (
         SEQUENCE + 'through = ["one"]\nsensors = ["a"]\n',
-        ["sensors has one", "of no scene"],
+        ["sensors has one", "have no scene"],
     ),
     "a path of other frames through a basis": (
         SEQUENCE + 'through = ["one"]\nsensors = ["a", "b"]\nframes = 3\n',
-        ["3 frames of 2 sensors", "of no scene"],
+        ["3 frames of 2 sensors", "have no scene"],
     ),
 }
 

@@ -462,6 +462,6 @@ def test_a_proposal_that_cannot_be_is_refused(looks: tuple[Session, LookLibrary]
     assert its.infos() == ()
     for k in range(MAX_PROPOSALS):
         its.handle(Propose(f"look {k}", {}))
-    with pytest.raises(PaintError, match="are there already"):
+    with pytest.raises(PaintError, match="proposals exist"):
         its.handle(Propose("one more", {}))
     its.handle(Propose("look 0", {}))
