@@ -127,8 +127,8 @@ class SessionTraits:
         if self._pending:
             self._pending = []
             self._warn(
-                "callbacks of the painter set something again whenever they are told of what they "
-                "have set: the last of it was not set"
+                "callbacks of the painter set something again each time that they are called: the "
+                "last values were not set"
             )
 
     def _apply_late(self, name: str, value: Any) -> None:
