@@ -90,7 +90,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
 
 
-def run_all(manifest: str, folder: str, workers: int = 1) -> None:
+def run_whole_batch(manifest: str, folder: str, workers: int = 1) -> None:
     """Do what is left of a batch, as a process of its own may."""
     from lightpaint.batch.plan.planner import plan
     from lightpaint.batch.run import run_batch
@@ -99,7 +99,7 @@ def run_all(manifest: str, folder: str, workers: int = 1) -> None:
     run_batch(plan(manifest, folder), RunOptions(workers))
 
 
-def processes() -> Any:
+def process_context() -> Any:
     """Processes that begin with all modules loaded, and none of this one's threads."""
     made = multiprocessing.get_context("forkserver")
     made.set_forkserver_preload(
@@ -108,9 +108,11 @@ def processes() -> Any:
     return made
 
 
-def killed(manifest: Path, folder: Path, after_s: float, workers: int = 1) -> int:
+def kill_batch(manifest: Path, folder: Path, after_s: float, workers: int = 1) -> int:
     """Begin a batch, kill it so much later, and return its exit code: 0 where it was done."""
-    process = processes().Process(target=run_all, args=(str(manifest), str(folder), workers))
+    process = process_context().Process(
+        target=run_whole_batch, args=(str(manifest), str(folder), workers)
+    )
     process.start()
     process.join(after_s)
     process.kill()
@@ -129,11 +131,11 @@ def _main() -> int:
     with tempfile.TemporaryDirectory() as here:
         manifest, end, kills, batches = write_batch(Path(here)), Path(here) / "end", 0, 0
         begun_s = time.monotonic()
-        run_all(str(manifest), str(end))
+        run_whole_batch(str(manifest), str(end))
         run_s, expected = time.monotonic() - begun_s, contents(end)
         while kills < given.kills:
             folder, batches = Path(here) / f"{batches}", batches + 1
-            while killed(manifest, folder, chance.uniform(0, run_s)):
+            while kill_batch(manifest, folder, chance.uniform(0, run_s)):
                 kills += 1
             wrong += contents(folder) != expected
     print(f"{kills} kills over {batches} batches; {wrong} ended otherwise than undisturbed")

@@ -62,7 +62,7 @@ def succeed(folder: Path, *arguments: object, by: Runner = run, **variables: str
     return done.stdout
 
 
-def refused(folder: Path, *arguments: object, by: Runner = run) -> str:
+def run_refused(folder: Path, *arguments: object, by: Runner = run) -> str:
     """The one line a user gets for a mistake; nothing may be left in `folder`."""
     before = sorted(p for p in folder.rglob("*"))
     done = by(folder, *arguments)

@@ -23,7 +23,7 @@ class Reader:
         if self.kind == "picture":
             from lightpaint.images.picture import read_picture
 
-            return Seen(read_picture(path))
+            return ComparablePicture(read_picture(path))
         if self.kind == "mask":
             from lightpaint.images.picture import read_mask
 
@@ -100,7 +100,7 @@ class Reader:
         return False
 
 
-class Seen:
+class ComparablePicture:
     """A picture, equal to another of which all the same is known."""
 
     def __init__(self, picture: Any) -> None:
@@ -113,7 +113,7 @@ class Seen:
         )
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Seen) and self.known == other.known
+        return isinstance(other, ComparablePicture) and self.known == other.known
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -167,7 +167,7 @@ def _second_opinion(path: Path, picture: Any) -> str:
     from lightpaint.images.picture import file_kind
 
     try:
-        theirs = _theirs(path, file_kind(path))
+        theirs = _read_elsewhere(path, file_kind(path))
     except Exception:
         return "alone"
     if theirs.ndim == 2:
@@ -195,7 +195,7 @@ def _second_opinion(path: Path, picture: Any) -> str:
     return "agreed" if miss <= close else f"disputed by {miss:g}"
 
 
-def _theirs(path: Path, kind: str) -> Any:
+def _read_elsewhere(path: Path, kind: str) -> Any:
     """Pixels by a reader that is not ours, (h, w) or (h, w, n)."""
     import numpy as np
 

@@ -49,12 +49,12 @@ class Case:
     content: bytes | None = None
 
 
-def turned(content: bytes, at: int, bit: int) -> bytes:
+def flip_bit(content: bytes, at: int, bit: int) -> bytes:
     """`content` with one bit turned."""
     return content[:at] + bytes([content[at] ^ 1 << bit]) + content[at + 1 :]
 
 
-def damaged(file: str, content: bytes, seed: int, flips: int, lies: int) -> Iterator[Case]:
+def damage(file: str, content: bytes, seed: int, flips: int, lies: int) -> Iterator[Case]:
     """Cut at 250 places and near the end, bits turned, numbers made to lie."""
     rng = random.Random(seed)
     step = max(1, len(content) // 250)
@@ -63,7 +63,7 @@ def damaged(file: str, content: bytes, seed: int, flips: int, lies: int) -> Iter
     for k in range(flips):
         # Every other one in the head, where the structure is.
         at = rng.randrange(min(400, len(content)) if k % 2 else len(content))
-        yield Case(file, f"flip at {at}", turned(content, at, rng.randrange(8)))
+        yield Case(file, f"flip at {at}", flip_bit(content, at, rng.randrange(8)))
     for _ in range(lies):
         at = rng.randrange(min(600, len(content)))
         lie = struct.pack(rng.choice("<>") + rng.choice("HI"), 0)
@@ -90,23 +90,23 @@ def outcomes(
     return results
 
 
-def wrong(results: Iterable[tuple[Case, str]], right: Sequence[str] = FINE) -> list[str]:
+def wrong_outcomes(results: Iterable[tuple[Case, str]], right: Sequence[str] = FINE) -> list[str]:
     """What ended in any other way."""
     return [f"{case.file}, {case.done}: {said}" for case, said in results if said not in right]
 
 
-def cut_and_read(results: Iterable[tuple[Case, str]]) -> list[tuple[Case, str]]:
+def read_despite_cut(results: Iterable[tuple[Case, str]]) -> list[tuple[Case, str]]:
     """What was cut off, and read as if something were left of it."""
     return [(c, s) for c, s in results if c.done.startswith("cut") and s not in ("same", "refused")]
 
 
-def clear(error: BaseException, path: Path, longest: int = 2500) -> bool:
+def is_legible(error: BaseException, path: Path, longest: int = 2500) -> bool:
     """Whether an error is one line, no longer than can be read, that names the file once."""
     text = str(error)
-    return named_once(text, path) and text.isprintable() and len(text) < longest
+    return is_named_once(text, path) and text.isprintable() and len(text) < longest
 
 
-def named_once(text: str, path: Path) -> bool:
+def is_named_once(text: str, path: Path) -> bool:
     """Whether a message names the file once, or another beside it instead.
 
     A template is a folder, and named as that or as a file in it, not as both. What a scene refers
@@ -122,7 +122,7 @@ def attempt(read: Callable[[Path], Any], path: Path, error: type[Exception]) -> 
     try:
         return read(path)
     except error as refusal:
-        if not clear(refusal, path):
+        if not is_legible(refusal, path):
             raise AssertionError(f"unclear: {refusal}") from refusal
         return None
 
@@ -164,18 +164,20 @@ def _read_all(folder: Path) -> None:
         if case.content is not None:
             path.write_bytes(case.content)
         signal.alarm(10 * SECONDS)
-        out.write(_said(reader, path, known.get(case.file)) + "\n")
+        out.write(_describe_outcome(reader, path, known.get(case.file)) + "\n")
         out.flush()
     gc.unfreeze()
 
 
-def _said(reader: Reader, path: Path, known: Any) -> str:
+def _describe_outcome(reader: Reader, path: Path, known: Any) -> str:
     began = time.process_time()  # however busy the machine is
     try:
         read = reader.read(path)
     except LightpaintError as error:
         # Pictures are refused for less than scenes may be.
-        is_clear = clear(error, path, 600) if reader.kind == "picture" else clear(error, path)
+        is_clear = (
+            is_legible(error, path, 600) if reader.kind == "picture" else is_legible(error, path)
+        )
         said = "refused" if is_clear else f"unclear: {str(error)!r}"
     except BaseException as error:
         return f"{type(error).__name__}: {str(error)[:200]!r}"

@@ -53,7 +53,7 @@ await fetch('/tried', { method: 'POST', body: JSON.stringify(tried) });
 </script><body>"""
 
 
-class Neighbour:
+class ForeignServer:
     """On a port of its own.
 
     Attributes:

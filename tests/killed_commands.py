@@ -157,12 +157,12 @@ def contents(folder: Path) -> dict[str, bytes]:
     }
 
 
-def after(seconds: float) -> Callable[[Stage], None]:
+def wait_for_seconds(seconds: float) -> Callable[[Stage], None]:
     """Wait so long."""
     return lambda _: time.sleep(seconds)
 
 
-def when_staging(seconds: float) -> Callable[[Stage], None]:
+def wait_for_staging(seconds: float) -> Callable[[Stage], None]:
     """Wait until the new result is on its way, and then so long."""
 
     def wait(stage: Stage) -> None:
@@ -174,7 +174,7 @@ def when_staging(seconds: float) -> Callable[[Stage], None]:
     return wait
 
 
-def when_staged(stage: Stage) -> None:
+def wait_for_record(stage: Stage) -> None:
     """Wait until the new result is there or about to be: its record is written last."""
     end_s = time.monotonic() + 60
     while time.monotonic() < end_s:
@@ -189,10 +189,10 @@ def when_staged(stage: Stage) -> None:
 def moments(stage: Stage, chance: random.Random) -> Iterator[tuple[str, Callable[[Stage], None]]]:
     """Without end: at any time, and around the time when the new result appears."""
     while True:
-        yield "any", after(chance.uniform(0, 1.05 * stage.run_s))
-        yield "staging", when_staging(chance.uniform(0, 0.5 * stage.run_s))
-        yield "any", after(chance.uniform(0, 1.05 * stage.run_s))
-        yield "staged", when_staged
+        yield "any", wait_for_seconds(chance.uniform(0, 1.05 * stage.run_s))
+        yield "staging", wait_for_staging(chance.uniform(0, 0.5 * stage.run_s))
+        yield "any", wait_for_seconds(chance.uniform(0, 1.05 * stage.run_s))
+        yield "staged", wait_for_record
 
 
 def _main() -> int:

@@ -39,7 +39,7 @@ def identity_of(views: int = 2) -> Identity:
     return Identity.of(bases_of(views))
 
 
-def session_on(store: Store, views: int = 2) -> Session:
+def open_session(store: Store, views: int = 2) -> Session:
     """A session on what a store holds."""
     bases = bases_of(views)
     current_looks = [basis.current_look for basis in bases]
@@ -55,12 +55,12 @@ def random_mask(rng: np.random.Generator, size: tuple[int, int]) -> npt.NDArray[
     return mask.astype(np.float32)
 
 
-class Hand:
+class RandomEditor:
     """Random strokes and changes of layers in a session. states: after each step that is done."""
 
     def __init__(self, seed: int, store: Store | None = None, views: int = 2) -> None:
         self.rng = np.random.default_rng(seed)
-        self.session = session_on(store or MemoryStore(identity_of(views)), views)
+        self.session = open_session(store or MemoryStore(identity_of(views)), views)
         self.strokes = 0
         self.states = [self.state()]
 
@@ -183,7 +183,7 @@ class Hand:
 def main() -> None:
     """Work in a session file until somebody ends this process; say each step that is kept."""
     with Store.open(Path(sys.argv[1]), identity_of()) as store:
-        hand = Hand(7, store)
+        hand = RandomEditor(7, store)
         while True:
             hand.act(with_undo=False)
             print(store.position, flush=True)

@@ -12,7 +12,7 @@ from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.target.target import Target
 
 
-def stacked(basis: Any, target: Target) -> tuple[Any, Any]:
+def stack_rows(basis: Any, target: Target) -> tuple[Any, Any]:
     """(pixels · 3, n · 3) matrix A and vector y with the objective ‖A w − y‖²."""
     n = len(basis.lights)
     root = np.sqrt(target.importance.astype(np.float64)).ravel()

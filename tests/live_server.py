@@ -27,7 +27,7 @@ PATIENCE_S = 60.0
 LARGE = np.zeros((2048, 2048, 4), np.float32)
 
 
-class Serving:
+class RunningServer:
     """A session served on a port of its own, and what that has ended in."""
 
     def __init__(self) -> None:
@@ -78,7 +78,7 @@ class Serving:
 class Page:
     """A page's end of the socket, byte by byte."""
 
-    def __init__(self, serving: Serving) -> None:
+    def __init__(self, serving: RunningServer) -> None:
         self.connection = serving.connection()
         here = serving.here
         self.protocol = ClientProtocol(
@@ -119,7 +119,7 @@ class Page:
         self.connection.sendall(b"".join(self.protocol.data_to_send()))
 
 
-def until(is_so: Callable[[], object], what: str) -> None:
+def wait_until(is_so: Callable[[], object], what: str) -> None:
     """Wait for it, as long as anything takes on a busy machine."""
     end = time.monotonic() + PATIENCE_S
     while not is_so():
@@ -127,7 +127,7 @@ def until(is_so: Callable[[], object], what: str) -> None:
         time.sleep(0.01)
 
 
-def in_a_loop(trial: Callable[[], Coroutine[Any, Any, None]]) -> None:
+def run_in_loop(trial: Callable[[], Coroutine[Any, Any, None]]) -> None:
     """Run a trial in another thread: where other tests have a browser open, this one has a loop."""
     with ThreadPoolExecutor(1) as threads:
         threads.submit(lambda: asyncio.run(asyncio.wait_for(trial(), 20))).result()

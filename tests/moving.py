@@ -18,7 +18,7 @@ from lightpaint.placement.space.free_space import pixels_of
 from lightpaint.scene.scene_reader import load_scene
 
 
-class Moving:
+class MovingStudio:
     """A studio of the test room, and all that it says."""
 
     def __init__(self, folder: Path, lights: str | None = None) -> None:
@@ -51,7 +51,7 @@ class Moving:
     def plane(self, name: str) -> Any:
         return np.array(self.studio.session.basis.planes.plane(self.light(name)))
 
-    def rendered(self) -> "Moving":
+    def rendered(self) -> "MovingStudio":
         """Wait until all planes are rendered ones."""
         session, rig = self.studio.session, self.studio.rig
 
@@ -70,7 +70,7 @@ class Moving:
         self.studio.wait()
 
 
-def stroke(moving: Moving, number: int = 0) -> None:
+def stroke(moving: MovingStudio, number: int = 0) -> None:
     region = (2, 9, 2, 9)
     moving.send(
         protocol.Paint(number, region, True),
@@ -79,12 +79,12 @@ def stroke(moving: Moving, number: int = 0) -> None:
     )
 
 
-def opened_rig(moving: Moving) -> Any:
+def opened_rig(moving: MovingStudio) -> Any:
     moving.send(protocol.ShowRig())
     return moving.wait(lambda: next((m for m in moving.messages if m.kind == "rig"), None))
 
 
-def pixel_of(moving: Moving, point: Any) -> tuple[float, float]:
+def pixel_of(moving: MovingStudio, point: Any) -> tuple[float, float]:
     """Where the camera of the scene itself sees a point."""
 
     def seen(loaded: Any) -> Any:
@@ -95,7 +95,7 @@ def pixel_of(moving: Moving, point: Any) -> tuple[float, float]:
     return x * width, y * height
 
 
-def exact(moving: Moving) -> Any:
+def exact_answer(moving: MovingStudio) -> Any:
     """The exact answer to what was done last, and what is said of it."""
 
     def is_it(fields: Any) -> bool:
@@ -108,7 +108,7 @@ def exact(moving: Moving) -> Any:
     )
 
 
-def placed(moving: Moving) -> Any:
+def place_lights(moving: MovingStudio) -> Any:
     return moving.wait(
         lambda: next((m.fields for m in moving.messages if m.kind == "placed"), None), 200
     )

@@ -14,6 +14,6 @@ def seeds(few: int, many: int) -> Iterable[Any]:
     ]
 
 
-def at_night(*values: Any) -> Any:
+def nightly(*values: Any) -> Any:
     """Return a parameter, or several for one test, that only `./check --all` tries."""
     return pytest.param(*values, marks=pytest.mark.nightly)

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command import refused
-from live_server import in_a_loop
+from command import run_refused
+from live_server import run_in_loop
 
 import lightpaint as lp
 from lightpaint.batch.manifest.manifest import read_manifest
@@ -130,7 +130,7 @@ def test_samples_and_suggestions_have_an_end(tmp_path: Path) -> None:
             Settings(**{key: most + 1})
     for option in ("--spp", "--verify-spp", "--suggest"):
         given = (option, str(10**30), "r.xml", "a.png")
-        assert "at most" in refused(tmp_path, "solve", *given)
+        assert "at most" in run_refused(tmp_path, "solve", *given)
 
 
 # Work that is given up
@@ -156,7 +156,7 @@ def test_a_server_ends_while_its_session_is_at_work() -> None:
         with pytest.raises(PaintError, match="the painter has ended"):
             await work
 
-    in_a_loop(serve_and_end)
+    run_in_loop(serve_and_end)
 
 
 def test_ctrl_c_waits_for_no_job_beside() -> None:

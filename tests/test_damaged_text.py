@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from damage_readers import Reader, contents, contents_of_json
-from damaged_files import Case, attempt, clear, outcomes, turned, wrong
+from damaged_files import Case, attempt, flip_bit, is_legible, outcomes, wrong_outcomes
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -101,7 +101,7 @@ def _damaged(content: bytes, file: str, seed: int) -> Iterator[Case]:
         yield Case(file, f"cut at {end}", content[:end])
     for _ in range(400):
         at, bit = rng.randrange(len(content)), rng.randrange(8)
-        yield Case(file, f"bit {bit} of byte {at}", turned(content, at, bit))
+        yield Case(file, f"bit {bit} of byte {at}", flip_bit(content, at, bit))
     starts = [i for i in range(1, len(content)) if content[i - 1 : i] in b' :=[,{"\n']
     for odd in ODD:
         for at in rng.sample(starts, min(8, len(starts))):
@@ -128,7 +128,7 @@ def test_damage(tmp_path: Path, lighting: Path, lights: Path, kind: str) -> None
     content = whole.read_bytes()
     cases = list(_damaged(content, whole.name, 1))
     results = outcomes(kind, {whole.name: content}, cases, tmp_path)
-    assert wrong(results) == []
+    assert wrong_outcomes(results) == []
     assert len(results) > 800
     # The harness is not blind: both come about, and what is cut is never read as whole.
     said = [said for _, said in results]
@@ -273,7 +273,7 @@ def test_what_is_no_file_is_not_read(tmp_path: Path, reader: Any) -> None:
         path.symlink_to(target)
         with pytest.raises(error) as caught:
             read(path)
-        assert clear(caught.value, path) or target in str(caught.value)
+        assert is_legible(caught.value, path) or target in str(caught.value)
         path.unlink()
     os.mkfifo(path)  # which opening would wait at for ever
     with pytest.raises(error, match="is a device or a pipe"):

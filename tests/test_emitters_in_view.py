@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command import refused, run, succeed
+from command import run, run_refused, succeed
 
 import lightpaint as lp
 from lightpaint.images.formats.exr import ExrPart, rgb_channels, write_parts
@@ -132,7 +132,7 @@ def test_light_groups_know_of_no_emitters(tmp_path: Path, image: Any):
     channels = rgb_channels(image)
     write_parts(tmp_path / "g.exr", [ExrPart("ViewLayer.Combined_key", channels)])
     write_parts(tmp_path / "t.exr", [ExrPart("", channels)])
-    said = refused(tmp_path, "solve", "g.exr", "t.exr", "--emitters", "count")
+    said = run_refused(tmp_path, "solve", "g.exr", "t.exr", "--emitters", "count")
     assert "--emitters" in said
 
 

@@ -37,7 +37,7 @@ SIDE = """<sensor type="perspective" id="side"><transform name="to_world">
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, make_basis: Any) -> Path:
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, make_basis: Any) -> Path:
     """A folder with a basis, light groups, paintings of them and a mask."""
     monkeypatch.chdir(tmp_path)
     basis = make_basis(3)
@@ -66,7 +66,7 @@ def _from_basis(**how: Any) -> Job:
     return Job((), folder=Path("out"), **how)
 
 
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("folder")
 def test_a_painting_in_the_folder_of_the_lights(tmp_path: Path):
     (tmp_path / "lights").mkdir()
     for name, image in zip(("key", "fill"), pictures(2), strict=True):
@@ -84,7 +84,7 @@ def test_a_painting_in_the_folder_of_the_lights(tmp_path: Path):
     assert back.leave_out == (str(painting),)
 
 
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("folder")
 def test_a_path_that_nuke_would_evaluate_is_told_before_the_solve(tmp_path: Path):
     path = (tmp_path / "groups.exr").rename(tmp_path / "take #2.exr")
     job = _from_basis(basis=GroupsFile(str(path)), targets=(Painting("g.exr"),))
@@ -99,7 +99,7 @@ ASKED = Constraints.of(
 )
 
 
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize(
     "how",
     [
@@ -128,15 +128,15 @@ def test_a_round_trip_is_the_same_job(how: Any):
     assert again != _from_basis(**{**how, "settings": settings})
 
 
-def test_a_job_in_another_process_gives_the_same_answer(here: Path):
+def test_a_job_in_another_process_gives_the_same_answer(folder: Path):
     job = _from_basis(constraints=Constraints.of({"light 0": {"limits": {"max": "40%"}}}))
     [look] = run(job)
-    mine = (here / "out" / "lighting.json").read_bytes()
-    (here / "job.json").write_text(job.to_json(), encoding="utf-8")
-    (here / "out" / "lighting.json").unlink()
+    mine = (folder / "out" / "lighting.json").read_bytes()
+    (folder / "job.json").write_text(job.to_json(), encoding="utf-8")
+    (folder / "out" / "lighting.json").unlink()
     code = "import sys, lightpaint as lp; lp.run(lp.Job.from_json(open('job.json').read()))"
-    subprocess.run([sys.executable, "-c", code], cwd=here, check=True, env={**os.environ})
-    assert (here / "out" / "lighting.json").read_bytes() == mine
+    subprocess.run([sys.executable, "-c", code], cwd=folder, check=True, env={**os.environ})
+    assert (folder / "out" / "lighting.json").read_bytes() == mine
     assert look.lighting.lights[0].constraint == "limits 0 to 40%"
 
 
@@ -153,7 +153,7 @@ def test_a_job_of_a_scene_is_sent_with_all_that_was_said(room: Path, tmp_path: P
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("folder")
 def test_a_job_in_memory_says_why_it_cannot_be_sent(make_basis: Any):
     basis = make_basis(3)
     for what, how in {
@@ -167,7 +167,7 @@ def test_a_job_in_memory_says_why_it_cannot_be_sent(make_basis: Any):
         assert job != _from_basis(**how)
 
 
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("folder")
 def test_what_is_no_job_is_refused_in_one_line():
     good = json.loads(_from_basis().to_json())
     for bad in (
@@ -196,7 +196,7 @@ def test_what_is_no_job_is_refused_in_one_line():
         Job.from_json(json.dumps({**good, "settings": {**good["settings"], "spp": 1}}))
 
 
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize(
     ("how", "error", "says"),
     [
@@ -282,7 +282,7 @@ def test_the_lights_file_beside_a_scene_holds_and_is_replaced(room: Path, tmp_pa
     assert f"lights and groups as in {beside}" in job.remarks
 
 
-def test_remarks_say_what_was_done_to_a_painting(here: Path, make_basis: Any):
+def test_remarks_say_what_was_done_to_a_painting(folder: Path, make_basis: Any):
     basis = make_basis(3)
     large = np.repeat(np.repeat(basis.images[0], 2, 0), 2, 1)
     target = Target(
@@ -304,12 +304,12 @@ def test_remarks_say_what_was_done_to_a_painting(here: Path, make_basis: Any):
     )
     quiet = _from_basis(targets=(target,), settings=Settings(resize=True, space="display"))
     assert quiet.remarks == job.remarks[2:]
-    groups = read_light_groups(here / "groups.exr")
+    groups = read_light_groups(folder / "groups.exr")
     job = _from_basis(basis=groups, targets=(Painting("g.exr"),))
     assert job.remarks[: len(groups.remarks)] == groups.remarks
 
 
-def test_one_listener_hears_work_and_remarks(here: Path):
+def test_one_listener_hears_work_and_remarks(folder: Path):
     class Ear:
         def __init__(self) -> None:
             self.heard: list[str] = []

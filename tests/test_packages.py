@@ -13,7 +13,7 @@ from importlib.metadata import PackageNotFoundError, requires
 from pathlib import Path
 
 import pytest
-from command import refused, run
+from command import run, run_refused
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 from renderer import REPOSITORY
@@ -94,7 +94,7 @@ def test_the_demo_does_not_write_over_what_is_there(tmp_path: Path):
     assert demo == lp.write_demo(tmp_path / "lightpaint-demo")
     assert demo.painting.read_bytes() == shipped("targets/gallery/evening.exr")
     demo.scene.write_text("<scene/>", "utf-8")
-    assert "differs from the demo" in refused(tmp_path, "demo")
+    assert "differs from the demo" in run_refused(tmp_path, "demo")
     assert demo.scene.read_text("utf-8") == "<scene/>"
     (tmp_path / "file").write_text("mine", "utf-8")
     assert "cannot write" in run(tmp_path, "demo", "-o", "file").stderr

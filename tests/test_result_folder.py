@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command import refused, run, succeed
+from command import run, run_refused, succeed
 from light_groups import interleaved, pictures
 from renderer import LIGHTS, write_room
 
@@ -24,7 +24,7 @@ SOLVE = ("solve", "a.basis.exr")
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, make_basis: Any) -> Path:
+def work_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, make_basis: Any) -> Path:
     """A folder with a basis, and two paintings of one name."""
     basis = make_basis(3)
     write_basis(tmp_path / "a.basis.exr", basis)
@@ -35,8 +35,8 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, make_basis: Any) -> Pa
 
 
 @pytest.fixture
-def room(here: Path) -> Path:
-    return write_room(here, lights=LIGHTS["panel"] + LIGHTS["bulb"])
+def room(work_folder: Path) -> Path:
+    return write_room(work_folder, lights=LIGHTS["panel"] + LIGHTS["bulb"])
 
 
 @pytest.fixture
@@ -65,25 +65,25 @@ def contents(folder: Path) -> dict[str, bytes]:
     }
 
 
-def test_a_painting_in_the_result_folder_is_not_written_over(here: Path) -> None:
+def test_a_painting_in_the_result_folder_is_not_written_over(work_folder: Path) -> None:
     """Under whatever name, with whatever force."""
-    succeed(here, *SOLVE, "gallery/evening.exr")
-    painting = here / "evening" / "predicted.exr"
-    before = contents(here)
-    os.link(painting, here / "hard.exr")
-    (here / "symbolic.exr").symlink_to(painting)
+    succeed(work_folder, *SOLVE, "gallery/evening.exr")
+    painting = work_folder / "evening" / "predicted.exr"
+    before = contents(work_folder)
+    os.link(painting, work_folder / "hard.exr")
+    (work_folder / "symbolic.exr").symlink_to(painting)
     for name in ("evening/predicted.exr", "hard.exr", "symbolic.exr", "gallery/../evening/x.exr"):
         if name.endswith("x.exr"):
-            painting.rename(here / "evening" / "x.exr")
-            (here / "evening" / "report.html").unlink()
-            (here / "evening" / "report.html").symlink_to("x.exr")
+            painting.rename(work_folder / "evening" / "x.exr")
+            (work_folder / "evening" / "report.html").unlink()
+            (work_folder / "evening" / "report.html").symlink_to("x.exr")
         for how in ([], ["--force"]):
-            line = refused(here, *SOLVE, name, "-o", "evening", *how)
+            line = run_refused(work_folder, *SOLVE, name, "-o", "evening", *how)
             assert "is an input of this command" in line
             assert line.endswith("(-o)")
-    (here / "evening" / "x.exr").rename(painting)
-    (here / "evening" / "report.html").unlink()
-    left = contents(here)
+    (work_folder / "evening" / "x.exr").rename(painting)
+    (work_folder / "evening" / "report.html").unlink()
+    left = contents(work_folder)
     assert {name: left[name] for name in before if name != "evening/report.html"} == {
         name: data for name, data in before.items() if name != "evening/report.html"
     }
@@ -94,115 +94,117 @@ def test_a_painting_in_the_result_folder_is_not_written_over(here: Path) -> None
     [("lighting.json", "--lights-file"), ("comparison.png", "--mask"), ("predicted.exr", "")],
 )
 def test_what_goes_with_a_painting_is_not_written_over_either(
-    here: Path, where: str, option: str
+    work_folder: Path, where: str, option: str
 ) -> None:
-    file = here / "out" / where
+    file = work_folder / "out" / where
     file.parent.mkdir()
     arguments: list[object] = [*SOLVE, "gallery/evening.exr", option, f"out/{where}"]
     if where == "predicted.exr":
-        (here / "a.basis.exr").rename(file)
+        (work_folder / "a.basis.exr").rename(file)
         arguments = ["solve", "out/predicted.exr", "gallery/evening.exr"]
     elif where == "comparison.png":
         file.write_bytes(png_bytes(np.full((12, 10, 3), 255, np.uint8)))
     else:
         file.write_text("[light.'light 0']\noff = true\n", encoding="utf-8")
-    line = refused(here, *arguments, "-o", "out", "--force")
+    line = run_refused(work_folder, *arguments, "-o", "out", "--force")
     assert f"out/{where} is an input of this command" in line
 
 
-def test_light_groups_are_not_written_over(here: Path) -> None:
+def test_light_groups_are_not_written_over(work_folder: Path) -> None:
     layers = {f"RGBA_{name}": x for name, x in zip("abc", pictures(), strict=True)}
-    interleaved(here / "relit.exr", layers)
-    write_rgb(here / "p.exr", pictures()[0])
-    assert "relit.exr is an input" in refused(
-        here, "solve", "relit.exr", "p.exr", "-o", ".", "--force"
+    interleaved(work_folder / "relit.exr", layers)
+    write_rgb(work_folder / "p.exr", pictures()[0])
+    assert "relit.exr is an input" in run_refused(
+        work_folder, "solve", "relit.exr", "p.exr", "-o", ".", "--force"
     )
-    (here / "groups").mkdir()
-    (here / "relit.exr").rename(here / "groups" / "relit.exr")
-    line = refused(here, "solve", "groups", "p.exr", "-o", "groups", "--force")
+    (work_folder / "groups").mkdir()
+    (work_folder / "relit.exr").rename(work_folder / "groups" / "relit.exr")
+    line = run_refused(work_folder, "solve", "groups", "p.exr", "-o", "groups", "--force")
     assert "groups/relit.exr is an input" in line
 
 
 @pytest.mark.usefixtures("no_render")
-def test_a_scene_is_not_written_over(here: Path, room: Path) -> None:
-    write_rgb(here / "p.exr", np.ones((20, 24, 3), np.float32))
-    room.rename(here / "relit.xml")
+def test_a_scene_is_not_written_over(work_folder: Path, room: Path) -> None:
+    write_rgb(work_folder / "p.exr", np.ones((20, 24, 3), np.float32))
+    room.rename(work_folder / "relit.xml")
     for command in (
         ("solve", "relit.xml", "p.exr", "-o", "."),
         ("basis", "relit.xml", "-o", "relit.exr"),
     ):
         if command[0] == "basis":
-            os.link(here / "relit.xml", here / "relit.exr")
-        line = refused(here, *command)
+            os.link(work_folder / "relit.xml", work_folder / "relit.exr")
+        line = run_refused(work_folder, *command)
         assert "relit.xml belongs to the scene" in line or "relit.exr is an input" in line
     sky = LIGHTS["panel"] + (
         '<emitter type="envmap" id="sky"><string name="filename" value="albedo.exr"/></emitter>'
     )
-    write_room(here, lights=sky)
-    write_rgb(here / "albedo.exr", np.ones((4, 8, 3), np.float32))
-    line = refused(here, "template", "room.xml", "-o", ".", "--force")
+    write_room(work_folder, lights=sky)
+    write_rgb(work_folder / "albedo.exr", np.ones((4, 8, 3), np.float32))
+    line = run_refused(work_folder, "template", "room.xml", "-o", ".", "--force")
     assert "albedo.exr is an input of this command" in line
-    line = refused(here, "template", "room.xml", "-o", "albedo.exr", "--force")
+    line = run_refused(work_folder, "template", "room.xml", "-o", "albedo.exr", "--force")
     assert "albedo.exr is an input of this command" in line
-    os.link(here / "albedo.exr", here / "verified.exr")
-    line = refused(here, "solve", "room.xml", "p.exr", "-o", ".", "--force")
+    os.link(work_folder / "albedo.exr", work_folder / "verified.exr")
+    line = run_refused(work_folder, "solve", "room.xml", "p.exr", "-o", ".", "--force")
     assert "verified.exr is an input of this command" in line
 
 
-def test_earlier_results_are_kept_unless_they_answer_the_same_painting(here: Path) -> None:
-    succeed(here, *SOLVE, "gallery/evening.exr")
-    (here / "evening" / "notes.txt").write_text("mine", encoding="utf-8")
-    before = contents(here / "evening")
-    line = refused(here, *SOLVE, "template/evening.exr")
+def test_earlier_results_are_kept_unless_they_answer_the_same_painting(work_folder: Path) -> None:
+    succeed(work_folder, *SOLVE, "gallery/evening.exr")
+    (work_folder / "evening" / "notes.txt").write_text("mine", encoding="utf-8")
+    before = contents(work_folder / "evening")
+    line = run_refused(work_folder, *SOLVE, "template/evening.exr")
     assert line == (
         "lightpaint solve: evening holds the answer to gallery/evening.exr, not to "
         "template/evening.exr: name another folder (-o), or replace it (--force)"
     )
-    assert contents(here / "evening") == before
+    assert contents(work_folder / "evening") == before
     # A designer paints on, in the same file.
-    os.replace(here / "template" / "evening.exr", here / "gallery" / "evening.exr")
-    succeed(here, *SOLVE, "./template/../gallery/evening.exr", "--off", "light 0")
-    after = contents(here / "evening")
+    os.replace(work_folder / "template" / "evening.exr", work_folder / "gallery" / "evening.exr")
+    succeed(work_folder, *SOLVE, "./template/../gallery/evening.exr", "--off", "light 0")
+    after = contents(work_folder / "evening")
     assert after["lighting.json"] != before["lighting.json"]
     assert after["notes.txt"] == b"mine"
     # Also where the whole has been moved.
-    (here / "moved").mkdir()
+    (work_folder / "moved").mkdir()
     for name in ("evening", "gallery", "a.basis.exr"):
-        (here / name).rename(here / "moved" / name)
-    succeed(here / "moved", *SOLVE, "gallery/evening.exr")
+        (work_folder / name).rename(work_folder / "moved" / name)
+    succeed(work_folder / "moved", *SOLVE, "gallery/evening.exr")
 
 
-def test_force_replaces_whatever_it_was(here: Path) -> None:
-    succeed(here, *SOLVE, "gallery/evening.exr")
-    (here / "evening" / "notes.txt").write_text("mine", encoding="utf-8")
-    succeed(here, *SOLVE, "template/evening.exr", "--force")
-    assert (here / "evening" / "notes.txt").is_file()
-    assert json.loads((here / "evening" / RECORD).read_text())["answers"] == [
+def test_force_replaces_whatever_it_was(work_folder: Path) -> None:
+    succeed(work_folder, *SOLVE, "gallery/evening.exr")
+    (work_folder / "evening" / "notes.txt").write_text("mine", encoding="utf-8")
+    succeed(work_folder, *SOLVE, "template/evening.exr", "--force")
+    assert (work_folder / "evening" / "notes.txt").is_file()
+    assert json.loads((work_folder / "evening" / RECORD).read_text())["answers"] == [
         "../template/evening.exr"
     ]
-    succeed(here, *SOLVE, "template/evening.exr")
+    succeed(work_folder, *SOLVE, "template/evening.exr")
 
 
-def test_two_paintings_of_one_name_in_one_command(here: Path) -> None:
-    line = refused(here, *SOLVE, "template/evening.exr", "gallery/evening.exr", "-o", "out")
+def test_two_paintings_of_one_name_in_one_command(work_folder: Path) -> None:
+    line = run_refused(
+        work_folder, *SOLVE, "template/evening.exr", "gallery/evening.exr", "-o", "out"
+    )
     assert "results would overwrite each other in evening: run those" in line
 
 
-def test_jobs_that_were_born_before_the_other_was_run(here: Path) -> None:
+def test_jobs_that_were_born_before_the_other_was_run(work_folder: Path) -> None:
     jobs = [
         lp.Job((), (lp.Painting(f"{name}/evening.exr"),), Path("out"), BasisFile("a.basis.exr"))
         for name in ("template", "gallery")
     ]
     lp.run(jobs[0])
-    before = contents(here / "out")
+    before = contents(work_folder / "out")
     with pytest.raises(OutputError, match=r"holds the answer to template/evening\.exr"):
         lp.run(jobs[1])
-    assert contents(here / "out") == before
+    assert contents(work_folder / "out") == before
     lp.run(jobs[0])
 
 
 def test_what_comes_to_the_folder_during_a_run_is_kept(
-    here: Path, monkeypatch: pytest.MonkeyPatch
+    work_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Two of one name at once, as `xargs -P` starts them."""
     from lightpaint.pipeline import pipeline
@@ -222,40 +224,42 @@ def test_what_comes_to_the_folder_during_a_run_is_kept(
         patch.setattr(pipeline, "analyse", meanwhile)
         with pytest.raises(OutputError, match=r"holds the answer to gallery/evening\.exr"):
             lp.run(job)
-    assert json.loads((here / "out" / RECORD).read_text())["answers"] == ["../gallery/evening.exr"]
-    assert [path.name for path in here.glob(".*")] == []
+    assert json.loads((work_folder / "out" / RECORD).read_text())["answers"] == [
+        "../gallery/evening.exr"
+    ]
+    assert [path.name for path in work_folder.glob(".*")] == []
 
 
-def test_results_of_an_older_version_say_nothing_of_whose_they_are(here: Path) -> None:
-    succeed(here, *SOLVE, "gallery/evening.exr")
-    (here / "evening" / RECORD).unlink()
-    (here / "evening" / "relit.xml").write_text("earlier", encoding="utf-8")
-    line = refused(here, *SOLVE, "gallery/evening.exr")
+def test_results_of_an_older_version_say_nothing_of_whose_they_are(work_folder: Path) -> None:
+    succeed(work_folder, *SOLVE, "gallery/evening.exr")
+    (work_folder / "evening" / RECORD).unlink()
+    (work_folder / "evening" / "relit.xml").write_text("earlier", encoding="utf-8")
+    line = run_refused(work_folder, *SOLVE, "gallery/evening.exr")
     assert "evening holds results of an older lightpaint, which do not name their" in line
     assert line.endswith("name another folder (-o), or replace it (--force)")
-    succeed(here, *SOLVE, "gallery/evening.exr", "--force")
-    assert not (here / "evening" / "relit.xml").exists()
-    succeed(here, *SOLVE, "gallery/evening.exr")
+    succeed(work_folder, *SOLVE, "gallery/evening.exr", "--force")
+    assert not (work_folder / "evening" / "relit.xml").exists()
+    succeed(work_folder, *SOLVE, "gallery/evening.exr")
 
 
 @pytest.mark.parametrize("name", ["report.html", "lighting.json", RECORD])
-def test_somebody_else_s_files_are_kept(here: Path, name: str) -> None:
-    (here / "out").mkdir()
-    (here / "out" / name).write_text("{}", encoding="utf-8")
-    line = refused(here, *SOLVE, "gallery/evening.exr", "-o", "out")
+def test_somebody_else_s_files_are_kept(work_folder: Path, name: str) -> None:
+    (work_folder / "out").mkdir()
+    (work_folder / "out" / name).write_text("{}", encoding="utf-8")
+    line = run_refused(work_folder, *SOLVE, "gallery/evening.exr", "-o", "out")
     assert ("an older lightpaint" if name == "lighting.json" else "not a result of") in line
-    assert (here / "out" / name).read_text() == "{}"
+    assert (work_folder / "out" / name).read_text() == "{}"
 
 
 @pytest.mark.parametrize("name", ["lighting.json", "report.html"])
-def test_what_was_changed_by_hand_is_kept(here: Path, name: str) -> None:
-    succeed(here, *SOLVE, "gallery/evening.exr")
-    with (here / "evening" / name).open("a", encoding="utf-8") as file:
+def test_what_was_changed_by_hand_is_kept(work_folder: Path, name: str) -> None:
+    succeed(work_folder, *SOLVE, "gallery/evening.exr")
+    with (work_folder / "evening" / name).open("a", encoding="utf-8") as file:
         file.write("\n")
-    line = refused(here, *SOLVE, "gallery/evening.exr")
+    line = run_refused(work_folder, *SOLVE, "gallery/evening.exr")
     assert f"evening/{name} was changed since lightpaint wrote it" in line
-    (here / "evening" / name).unlink()
-    succeed(here, *SOLVE, "gallery/evening.exr")
+    (work_folder / "evening" / name).unlink()
+    succeed(work_folder, *SOLVE, "gallery/evening.exr")
 
 
 @pytest.mark.parametrize(
@@ -267,18 +271,18 @@ def test_what_was_changed_by_hand_is_kept(here: Path, name: str) -> None:
         {"format": "another"},
     ],
 )
-def test_a_damaged_record_is_none(here: Path, damage: dict[str, Any]) -> None:
-    succeed(here, *SOLVE, "gallery/evening.exr")
-    path = here / "evening" / RECORD
+def test_a_damaged_record_is_none(work_folder: Path, damage: dict[str, Any]) -> None:
+    succeed(work_folder, *SOLVE, "gallery/evening.exr")
+    path = work_folder / "evening" / RECORD
     record = json.loads(path.read_text(encoding="utf-8"))
     path.write_text(json.dumps(record | damage), encoding="utf-8")
-    line = refused(here, *SOLVE, "gallery/evening.exr")
+    line = run_refused(work_folder, *SOLVE, "gallery/evening.exr")
     assert "do not name their painting" in line
-    succeed(here, *SOLVE, "gallery/evening.exr", "--force")
-    assert (here / "gallery" / "evening.exr").is_file()
+    succeed(work_folder, *SOLVE, "gallery/evening.exr", "--force")
+    assert (work_folder / "gallery" / "evening.exr").is_file()
 
 
-def test_targets_in_memory_go_by_their_names(here: Path, make_basis: Any) -> None:
+def test_targets_in_memory_go_by_their_names(work_folder: Path, make_basis: Any) -> None:
     basis = make_basis(3)
     target = lp.Target.of(basis.images[0], name="key")
     lp.paint_with_light(None, target, "out", basis=basis)
@@ -293,37 +297,37 @@ def test_targets_in_memory_go_by_their_names(here: Path, make_basis: Any) -> Non
     lp.paint_with_light(None, "gallery/evening.exr", "read", basis=basis)
 
 
-def test_relight_keeps_what_is_not_its_own(here: Path, room: Path) -> None:
+def test_relight_keeps_what_is_not_its_own(work_folder: Path, room: Path) -> None:
     def relight(*how: object) -> Any:
-        return run(here, "relight", "room.xml", *how, "--spp", 2)
+        return run(work_folder, "relight", "room.xml", *how, "--spp", 2)
 
     scene = lp.load_scene(room)
-    write_rgb(here / "look.exr", np.ones((20, 24, 3), np.float32))
+    write_rgb(work_folder / "look.exr", np.ones((20, 24, 3), np.float32))
     lp.paint_with_light(scene, "look.exr", "look", spp=2)
     # Edited by hand, as the documents say, and relit where it lies.
-    lighting = here / "look" / "lighting.json"
+    lighting = work_folder / "look" / "lighting.json"
     lighting.write_text(lighting.read_text() + "\n", encoding="utf-8")
     assert relight("look/lighting.json").returncode == 0
     assert relight("look/lighting.json").returncode == 0
     names = {"relit.xml", "relit.exr", "relit.png", "report.html", "lighting.json"}
-    assert names <= contents(here / "look").keys()
-    line = refused(here, "solve", "room.xml", "look.exr", "--spp", 2)
+    assert names <= contents(work_folder / "look").keys()
+    line = run_refused(work_folder, "solve", "room.xml", "look.exr", "--spp", 2)
     assert "look/lighting.json was changed" in line
 
     # Another of that name does not meet it, and what is read is not written over.
-    (here / "other").mkdir()
-    (here / "other" / "lighting.json").write_bytes(lighting.read_bytes())
-    before = contents(here)
+    (work_folder / "other").mkdir()
+    (work_folder / "other" / "lighting.json").write_bytes(lighting.read_bytes())
+    before = contents(work_folder)
     done = relight("other/lighting.json")
     assert done.returncode == 2
     assert "look holds the answer to look.exr, not to other/lighting.json" in done.stderr
     done = relight("other/lighting.json", "look/lighting.json")
     assert "results would overwrite each other in look: run those" in done.stderr
-    os.link(lighting, here / "other" / "relit.png")
+    os.link(lighting, work_folder / "other" / "relit.png")
     done = relight("look/lighting.json", "-o", "other", "--force")
     assert "other/relit.png is an input of this command" in done.stderr
-    (here / "other" / "relit.png").unlink()
-    assert contents(here) == before
+    (work_folder / "other" / "relit.png").unlink()
+    assert contents(work_folder) == before
 
     assert relight("other/lighting.json", "-o", "new").returncode == 0
     assert relight("other/lighting.json", "-o", "new").returncode == 0
@@ -331,12 +335,14 @@ def test_relight_keeps_what_is_not_its_own(here: Path, room: Path) -> None:
     assert "new holds the answer to other/lighting.json, not to look/lighting.json" in done.stderr
     # What replaces a solve's results leaves none of them behind.
     assert relight("other/lighting.json", "-o", "look", "--force").returncode == 0
-    assert contents(here / "look").keys() == {"relit.xml", "relit.exr", "relit.png", RECORD}
+    assert contents(work_folder / "look").keys() == {"relit.xml", "relit.exr", "relit.png", RECORD}
 
 
-def test_what_can_be_seen_after_a_run_can_be_rendered_and_relit(here: Path, room: Path) -> None:
+def test_what_can_be_seen_after_a_run_can_be_rendered_and_relit(
+    work_folder: Path, room: Path
+) -> None:
     """Also where the scene lies in the folder itself, and the relit one is written there."""
-    write_rgb(here / "p.exr", np.ones((20, 24, 3), np.float32))
+    write_rgb(work_folder / "p.exr", np.ones((20, 24, 3), np.float32))
     for folder in ("out", "."):
         look = lp.paint_with_light(lp.load_scene("room.xml"), "p.exr", folder, spp=2)
         assert look.relit is not None
@@ -346,10 +352,10 @@ def test_what_can_be_seen_after_a_run_can_be_rendered_and_relit(here: Path, room
         assert again.light("panel").emission == pytest.approx(look.lighting.emission["panel"])
         way = f'<path value="{os.path.relpath(".", folder)}"/>'
         assert way in (Path(folder) / "relit.xml").read_text(encoding="utf-8")
-        assert run(here, "verify", folder).returncode == 0
+        assert run(work_folder, "verify", folder).returncode == 0
 
 
-def test_views_that_are_not_painted_any_more_go(here: Path, make_basis: Any) -> None:
+def test_views_that_are_not_painted_any_more_go(work_folder: Path, make_basis: Any) -> None:
     from lightpaint.pipeline.results.result_folder import ResultFolder
 
     both = ResultFolder(Path("out"), (Path("out/a/x"), Path("out/b/x")), (), ("a", "b"))
@@ -367,17 +373,17 @@ def test_views_that_are_not_painted_any_more_go(here: Path, make_basis: Any) -> 
     with forced.filled() as stage:
         (stage / "a").mkdir()
         (stage / "a" / "x").touch()
-    assert contents(here / "out").keys() == {"a/x", RECORD}
-    assert not (here / "out" / "b").exists()
+    assert contents(work_folder / "out").keys() == {"a/x", RECORD}
+    assert not (work_folder / "out" / "b").exists()
 
 
 @pytest.mark.usefixtures("no_render")
 def test_a_folder_where_a_result_should_go_is_said_before_it_renders(
-    here: Path, room: Path
+    work_folder: Path, room: Path
 ) -> None:
-    write_rgb(here / "p.exr", np.ones((20, 24, 3), np.float32))
+    write_rgb(work_folder / "p.exr", np.ones((20, 24, 3), np.float32))
     for folder in ("out/predicted.exr", "out/relit.png", "x.exr", "y.png", "t/albedo.exr"):
-        (here / folder).mkdir(parents=True)
+        (work_folder / folder).mkdir(parents=True)
     lp.write_lighting("l.json", replace(_lighting(room), target="out"))
     for command, file in (
         (("solve", "room.xml", "p.exr", "-o", "out"), "out/predicted.exr"),
@@ -387,17 +393,19 @@ def test_a_folder_where_a_result_should_go_is_said_before_it_renders(
         (("template", "room.xml", "-o", "y.exr"), "y.png"),
         (("template", "room.xml", "-o", "t"), "t/albedo.exr"),
     ):
-        line = refused(here, *command)
+        line = run_refused(work_folder, *command)
         assert f"{file} is a folder, but a file is to be written there" in line
 
 
 @pytest.mark.usefixtures("no_render")
-def test_places_that_are_not_utf_8_are_said_before_it_renders(here: Path, room: Path) -> None:
+def test_places_that_are_not_utf_8_are_said_before_it_renders(
+    work_folder: Path, room: Path
+) -> None:
     name = os.fsdecode(b"evening\xff")
-    write_rgb(here / "p.exr", np.ones((20, 24, 3), np.float32))
+    write_rgb(work_folder / "p.exr", np.ones((20, 24, 3), np.float32))
     for ending in ("png", "exr"):
-        os.link(here / "p.exr", here / f"{name}.{ending}")
-        line = refused(here, *SOLVE, f"{name}.{ending}")
+        os.link(work_folder / "p.exr", work_folder / f"{name}.{ending}")
+        line = run_refused(work_folder, *SOLVE, f"{name}.{ending}")
         assert f"evening\\udcff.{ending} is a name that is not UTF-8: rename the file" in line
     lp.write_lighting("l.json", _lighting(room))
     for command in (
@@ -407,7 +415,7 @@ def test_places_that_are_not_utf_8_are_said_before_it_renders(here: Path, room: 
         ("template", "room.xml", "-o", name),
         ("template", "room.xml", "-o", f"{name}.exr"),
     ):
-        line = refused(here, *command)
+        line = run_refused(work_folder, *command)
         assert "evening\\udcff" in line
         assert "is not UTF-8: choose another (-o)" in line
 
@@ -420,22 +428,22 @@ def _lighting(room: Path) -> lp.Lighting:
 
 
 @pytest.mark.usefixtures("no_render")
-def test_a_template_keeps_what_is_there(here: Path, room: Path) -> None:
-    (here / "mattes").mkdir()
+def test_a_template_keeps_what_is_there(work_folder: Path, room: Path) -> None:
+    (work_folder / "mattes").mkdir()
     for name in ("mattes/mine.png", "depth.exr"):
-        (here / name).write_text("mine", encoding="utf-8")
-        line = refused(here, "template", "room.xml", "-o", ".")
+        (work_folder / name).write_text("mine", encoding="utf-8")
+        line = run_refused(work_folder, "template", "room.xml", "-o", ".")
         assert f"{name} exists and may have been painted on" in line
-        (here / name).unlink()
+        (work_folder / name).unlink()
 
 
-def test_a_forced_template_leaves_what_is_not_its_own(here: Path, room: Path) -> None:
+def test_a_forced_template_leaves_what_is_not_its_own(work_folder: Path, room: Path) -> None:
     how = ("template", "room.xml", "--spp", 2)
-    succeed(here, *how)
-    (here / "template" / "mattes" / "mine.png").write_text("mine", encoding="utf-8")
-    assert (here / "template" / "evening.exr").is_file()
-    succeed(here, *how, "--force")
-    assert (here / "template" / "mattes" / "mine.png").is_file()
-    assert (here / "template" / "evening.exr").is_file()
-    about = json.loads((here / "template" / "template.json").read_text(encoding="utf-8"))
-    assert all((here / "template" / name).is_file() for name in about["files"])
+    succeed(work_folder, *how)
+    (work_folder / "template" / "mattes" / "mine.png").write_text("mine", encoding="utf-8")
+    assert (work_folder / "template" / "evening.exr").is_file()
+    succeed(work_folder, *how, "--force")
+    assert (work_folder / "template" / "mattes" / "mine.png").is_file()
+    assert (work_folder / "template" / "evening.exr").is_file()
+    about = json.loads((work_folder / "template" / "template.json").read_text(encoding="utf-8"))
+    assert all((work_folder / "template" / name).is_file() for name in about["files"])

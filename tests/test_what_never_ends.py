@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command import refused
+from command import run_refused
 from renderer import write_room
 
 from lightpaint import file_reading
@@ -109,7 +109,7 @@ def each_with_some(paths: Sequence[str]) -> list[Any]:
 def test_every_path_of_a_command(folder: Path, command: str, kind: str) -> None:
     line, ending = COMMANDS[command]
     made(folder / f"x{ending}", kind)
-    said = refused(folder, *line.replace("X", f"x{ending}").split())
+    said = run_refused(folder, *line.replace("X", f"x{ending}").split())
     assert f"x{ending}" in said
     # A folder may hold light groups, too.
     others = ("EXR", ".exr file") if kind == "folder" else ("holds no light groups",)
@@ -136,7 +136,7 @@ def test_every_file_of_a_scene(folder: Path, element: str, kind: str) -> None:
     text = room.read_text(encoding="utf-8")
     element = element.replace("X", f"x{ending}")
     room.write_text(text.replace("</scene>", f"{element}</scene>"), encoding="utf-8")
-    said = refused(folder, "lights", room)
+    said = run_refused(folder, "lights", room)
     assert f"x{ending}" in said
     assert REQUESTS[kind] in said
 
@@ -145,7 +145,7 @@ def test_beside_the_scene_and_in_a_template(folder: Path) -> None:
     (folder / "room.lights.toml").symlink_to("/proc/kmsg")
     (folder / "template").mkdir()
     (folder / "template" / "template.json").symlink_to("/proc/kmsg")
-    said = refused(folder, "solve", "b.basis.exr", "painting.exr", "-o", "out")
+    said = run_refused(folder, "solve", "b.basis.exr", "painting.exr", "-o", "out")
     assert "template.json" in said
 
 

@@ -68,7 +68,7 @@ def test_there_and_back_is_exact(path: Path, basis: Basis):
     np.testing.assert_array_equal(back.current_weights, [x.emission for x in basis.lights])
 
 
-def _with_objects(basis: Basis) -> Basis:
+def _add_objects(basis: Basis) -> Basis:
     """More of them than half floats can number, one without a name, many of the same."""
     index = np.random.default_rng(4).integers(-1, 5000, SIZE, np.int32)
     names = ("", "Säule <b>\n", *["column"] * 4998)
@@ -76,7 +76,7 @@ def _with_objects(basis: Basis) -> Basis:
 
 
 def test_objects_there_and_back(tmp_path: Path, basis: Basis):
-    basis = _with_objects(basis)
+    basis = _add_objects(basis)
     assert basis.objects is not None
     write_basis(tmp_path / "a.basis.exr", basis)
     back = read_basis(tmp_path / "a.basis.exr")
@@ -92,7 +92,7 @@ def test_objects_there_and_back(tmp_path: Path, basis: Basis):
 @pytest.mark.parametrize("what", ["index", "names"])
 def test_objects_that_are_not_as_they_were_are_left_out(tmp_path: Path, basis: Basis, what: str):
     path = tmp_path / "a.basis.exr"
-    write_basis(path, _with_objects(basis))
+    write_basis(path, _add_objects(basis))
     parts = read_parts(path)
     k = next(k for k, part in enumerate(parts) if OBJECTS_KEY in part.attributes)
     if what == "index":
@@ -140,14 +140,17 @@ def test_parts_in_another_order(path: Path, basis: Basis):
     write_parts(path, [seen, *reversed(lights)])
     _assert_equal(read_basis(path), basis)
     # Where there are no checksums, as in files from before there were any, the parts' is all.
-    parts = [replace(p, attributes=_without(p.attributes, CHECKSUMS_KEY)) for p in read_parts(path)]
+    parts = [
+        replace(p, attributes=_drop_attribute(p.attributes, CHECKSUMS_KEY))
+        for p in read_parts(path)
+    ]
     write_parts(path, parts)
     back = read_basis(path)
     assert back.names == basis.names[::-1]
     np.testing.assert_array_equal(back.images, basis.images[::-1])
 
 
-def _without(attributes: Mapping[str, str], key: str) -> dict[str, str]:
+def _drop_attribute(attributes: Mapping[str, str], key: str) -> dict[str, str]:
     return {k: v for k, v in attributes.items() if k != key}
 
 

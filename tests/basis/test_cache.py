@@ -78,7 +78,7 @@ def test_what_was_just_rendered_is_as_from_its_file(scene: Scene, use_cache: boo
     assert (fresh.images != rendered.images).any()  # rounded
     if not use_cache:
         obtain_basis(scene, spp=16)
-    again = _kept()[0]
+    again = _cached_bases()[0]
     for name in ("images", "half_differences"):
         assert getattr(again, name).tobytes() == getattr(fresh, name).tobytes()
 
@@ -96,7 +96,7 @@ def test_what_is_large_is_read_from_its_file_as_soon_as_it_is_kept(
     assert large.images.tobytes() == expected.images.tobytes()
 
 
-def _said(scene: Scene, **settings: object) -> tuple[Basis, list[str]]:
+def _obtain_basis(scene: Scene, **settings: object) -> tuple[Basis, list[str]]:
     """The basis that a job with these settings obtains, and what it says."""
     said: list[str] = []
 
@@ -111,7 +111,7 @@ def _said(scene: Scene, **settings: object) -> tuple[Basis, list[str]]:
 
 def test_what_is_kept_beyond_what_is_asked_for_is_said(scene: Scene) -> None:
     obtain_basis(scene, spp=32)
-    basis, said = _said(scene, spp=16)
+    basis, said = _obtain_basis(scene, spp=16)
     assert basis.origin.spp == 32
     assert said == [
         "basis of 32 samples per pixel kept from an earlier run: more than the 16 requested, so "
@@ -119,14 +119,14 @@ def test_what_is_kept_beyond_what_is_asked_for_is_said(scene: Scene) -> None:
     ]
     # One more than an odd number makes the halves equal, and is no news.
     for spp in (31, 32):
-        assert "renders it again" in "".join(_said(scene, spp=spp)[1])
+        assert "renders it again" in "".join(_obtain_basis(scene, spp=spp)[1])
 
 
 def test_exactly_what_is_asked_for_whatever_is_kept(scene: Scene) -> None:
     fresh = obtain_basis(scene, spp=16, use_cache=False)
     obtain_basis(scene, spp=32)
     before = [entry.path.read_bytes() for entry in cache.entries()]
-    exact, said = _said(scene, spp=16, exact_spp=True)
+    exact, said = _obtain_basis(scene, spp=16, exact_spp=True)
     assert said == []
     same_basis(exact, fresh)
     # The one with more samples is not thrown away.
@@ -163,7 +163,7 @@ def test_the_first_samples_of_what_is_asked_for_are_gone_on_with(
 
         with pytest.raises(Interrupted):
             obtain_basis(scene, spp=64, exact_spp=True, progress=press_ctrl_c)
-        [unfinished] = _kept()
+        [unfinished] = _cached_bases()
         exact = replace(unfinished, sums=cache.sums_of(unfinished))
         assert is_on_the_way(scene, exact, 64)
         assert not is_on_the_way(scene, unfinished, 64)
@@ -181,7 +181,7 @@ def sums_files() -> list[Path]:
     return list(cache_folder.folder().glob(f"*{SUMS_SUFFIX}"))
 
 
-def _killed(scene: Scene, spp: int, after: int) -> None:
+def _render_and_kill(scene: Scene, spp: int, after: int) -> None:
     """Render in a process that is killed once that many steps are done, all of them kept."""
     code = f"""
 import os, signal, sys
@@ -200,8 +200,8 @@ obtain_basis(lp.load_scene({str(scene.path)!r}), spp={spp}, progress=kill)
 
 def test_a_render_that_was_killed_goes_on_to_the_bits_of_one(scene: Scene) -> None:
     whole = obtain_basis(scene, spp=64, use_cache=False)
-    _killed(scene, 64, 3)
-    [kept] = _kept()
+    _render_and_kill(scene, 64, 3)
+    [kept] = _cached_bases()
     assert 0 < kept.origin.spp < 64
     log: list[int] = []
     assert_equal_bits(obtain_basis(scene, spp=64, progress=passes(log)), whole)
@@ -239,7 +239,7 @@ def test_sums_go_with_their_basis(scene: Scene) -> None:
     assert not sums_files()
 
 
-def _kept() -> list[Basis]:
+def _cached_bases() -> list[Basis]:
     return [read_basis(entry.path) for entry in cache.entries()]
 
 
@@ -253,16 +253,16 @@ def test_exact_samples_and_a_time_go_ill_together(scene: Scene) -> None:
 def test_a_basis_of_blocks_says_when_it_takes_more(tmp_path: Path) -> None:
     path = write_room(tmp_path, integrator='<integrator type="volpathmis"/>', lights=LIGHTS["bulb"])
     small = load_scene(path).reduced("1/3")
-    assert _said(small, spp=4)[1] == [
+    assert _obtain_basis(small, spp=4)[1] == [
         "basis of 18 samples per pixel, not 4: a block needs a sample in each pixel for each half"
     ]
     # No fewer can be had.
     again = (
         "basis of 18 samples per pixel kept from an earlier run (use_cache=False renders it again)"
     )
-    assert _said(small, spp=4)[1] == [again]
-    assert _said(small, spp=36)[1] == []
-    assert "more than the 4 requested" in _said(small, spp=4)[1][0]
+    assert _obtain_basis(small, spp=4)[1] == [again]
+    assert _obtain_basis(small, spp=36)[1] == []
+    assert "more than the 4 requested" in _obtain_basis(small, spp=4)[1][0]
 
 
 def test_another_scene_sensor_or_seed_is_another_basis(scene: Scene, tmp_path: Path) -> None:

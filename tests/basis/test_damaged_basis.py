@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from damaged_files import Case, cut_and_read, damaged, outcomes, turned, wrong
+from damaged_files import Case, damage, flip_bit, outcomes, read_despite_cut, wrong_outcomes
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache
@@ -40,12 +40,12 @@ def path(tmp_path: Path, basis: Basis) -> Path:
 
 def _cases(content: bytes, name: str) -> Iterator[Case]:
     """Cut and turned everywhere, and with numbers that lie in all of the header."""
-    yield from damaged(name, content, 1, 300, 300)
+    yield from damage(name, content, 1, 300, 300)
     head = content.rfind(b"lightpaint") + 600
     rng = random.Random(2)
     for _ in range(300):
         at, bit = rng.randrange(min(head, len(content))), rng.randrange(8)
-        yield Case(name, f"bit {bit} of byte {at}", turned(content, at, bit))
+        yield Case(name, f"bit {bit} of byte {at}", flip_bit(content, at, bit))
 
 
 def test_damage_of_bytes(path: Path, tmp_path: Path) -> None:
@@ -53,7 +53,7 @@ def test_damage_of_bytes(path: Path, tmp_path: Path) -> None:
     cases = list(_cases(content, path.name))
     results = outcomes("basis", {path.name: content}, cases, tmp_path)
     # With checksums nothing but what was written is ever read.
-    assert wrong(results, ("same", "refused")) == []
+    assert wrong_outcomes(results, ("same", "refused")) == []
     assert len(results) > 1000
     assert sum(said == "same" for _, said in results) > 10
 
@@ -67,13 +67,13 @@ def test_damage_of_light_groups(tmp_path: Path) -> None:
     }
     write_parts(tmp_path / "a.exr", [ExrPart("ViewLayer", channels)])
     content = (tmp_path / "a.exr").read_bytes()
-    cases = list(damaged("a.exr", content, 3, 150, 150))
+    cases = list(damage("a.exr", content, 3, 150, 150))
     results = outcomes("groups", {"a.exr": content}, cases, tmp_path)
-    assert wrong(results) == []
-    assert cut_and_read(results) == []
+    assert wrong_outcomes(results) == []
+    assert read_despite_cut(results) == []
 
 
-def _edited(name: str) -> Callable[[list[ExrPart]], list[ExrPart]]:
+def _edit(name: str) -> Callable[[list[ExrPart]], list[ExrPart]]:
     def edit(parts: list[ExrPart]) -> list[ExrPart]:
         if name == "one dropped":
             return [parts[0], *parts[2:]]
@@ -135,7 +135,7 @@ def _edited(name: str) -> Callable[[list[ExrPart]], list[ExrPart]]:
     ],
 )
 def test_what_another_program_changed(path: Path, name: str, words: str) -> None:
-    write_parts(path, _edited(name)(read_parts(path)))
+    write_parts(path, _edit(name)(read_parts(path)))
     with pytest.raises((BasisError, ImageError), match=words) as caught:
         read_basis(path)
     assert str(path) in str(caught.value)

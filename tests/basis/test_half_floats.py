@@ -40,7 +40,7 @@ def plane(noise: float, *, seed: int = 1, light: float = 1.0) -> tuple[np.ndarra
     return (smooth + grain[0]).astype(np.float32), grain[1].astype(np.float32)
 
 
-def relative(image: np.ndarray, encoding: PlaneEncoding) -> float:
+def relative_noise(image: np.ndarray, encoding: PlaneEncoding) -> float:
     return float((np.abs(encoding.decoded(encoding.encoded(image)) - image) / np.abs(image)).max())
 
 
@@ -77,7 +77,7 @@ def test_noisy_planes_are_halves_and_clean_ones_are_not() -> None:
         assert (its.kind, its.scale, of_noise.scale) == (kind, 1, 1)
         assert of_noise.kind == HALF
         # Round to nearest, of 11 binary digits.
-        assert relative(image, its) <= (2**-11 if kind == HALF else 0)
+        assert relative_noise(image, its) <= (2**-11 if kind == HALF else 0)
 
 
 def test_rounding_is_hidden_in_the_noise_of_every_tile() -> None:
@@ -102,7 +102,7 @@ def test_what_half_floats_do_not_reach_is_scaled(light: float) -> None:
     assert its.kind == of_noise.kind == HALF
     assert its.scale != 1
     assert np.log2(its.scale) % 1 == 0
-    assert relative(image, its) <= 2**-11
+    assert relative_noise(image, its) <= 2**-11
 
 
 def test_a_range_beyond_half_floats_is_float() -> None:

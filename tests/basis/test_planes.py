@@ -100,7 +100,7 @@ def test_planes_of_several_views_lie_behind_each_other(images: np.ndarray) -> No
     check_alike(first, images)
 
 
-def written(
+def write_planes(
     path: Path, make_basis: Any, *, smooth: bool = False, size: tuple[int, int] = (67, 90)
 ) -> lp.Basis:
     rng = np.random.default_rng(5)
@@ -128,7 +128,7 @@ def test_planes_of_a_file_are_those_in_memory(
     room: int,
 ) -> None:
     path = tmp_path / "it.basis.exr"
-    basis = written(path, make_basis, smooth=smooth, size=size)
+    basis = write_planes(path, make_basis, smooth=smooth, size=size)
     monkeypatch.setattr(basis_file, "SINGLES_MAX_BYTES", 0)
     in_memory = lp.read_basis(path)
     assert isinstance(in_memory.planes, EncodedPlanes)
@@ -327,7 +327,7 @@ def test_a_chunk_of_a_packed_file_is_unpacked_once_for_a_walk(
     tmp_path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "it.basis.exr"
-    written(path, make_basis, smooth=True, size=PLAIN)
+    write_planes(path, make_basis, smooth=True, size=PLAIN)
     monkeypatch.setattr(basis_file, "IN_MEMORY_MAX_BYTES", 0)
     planes = lp.read_basis(path).planes
     unpacked = []
@@ -350,7 +350,7 @@ def test_a_basis_in_a_file_is_solved_as_one_in_memory(
     tmp_path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch, how: dict[str, Any]
 ) -> None:
     path = tmp_path / "it.basis.exr"
-    basis = written(path, make_basis)
+    basis = write_planes(path, make_basis)
     image = basis.mix(np.full((N, 3), 0.7)) + np.float32(0.1)
     target = lp.Target.of(image, (np.arange(67) > 20)[:, None] * np.ones((67, 90), np.float32))
     expected = lp.solve(basis, target, **how)
@@ -371,7 +371,7 @@ def test_a_large_file_that_was_changed_says_so(
     tmp_path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "it.basis.exr"
-    written(path, make_basis, size=PLAIN)
+    write_planes(path, make_basis, size=PLAIN)
     monkeypatch.setattr(basis_file, "IN_MEMORY_MAX_BYTES", 0)
     data = bytearray(path.read_bytes())
     data[len(data) // 3] ^= 1

@@ -51,11 +51,11 @@ def folder(tmp_path: Path) -> Path:
     return place
 
 
-def asking(folder: Path, **more: Any) -> str:
+def key_of_facts(folder: Path, **more: Any) -> str:
     return facts_key({"path": str(folder / "hall.xml"), **more})
 
 
-def kept(scene: Scene, make_basis: Any) -> Basis:
+def keep_basis(scene: Scene, make_basis: Any) -> Basis:
     """A made-up basis of it, in the cache."""
     made = make_basis(len(scene.lights), scene.size)
     origin = replace(made.origin, scene_identity=scene.identity, sensor=scene.sensor_names[0])
@@ -78,8 +78,8 @@ def test_another_version_of_any_module_that_reads_scenes_is_another_key() -> Non
 def test_it_is_what_the_scene_would_have_told(folder: Path, make_basis: Any) -> None:
     (folder / "hall.lights.toml").write_text('[light.lamp]\nmax = 3.0\nkelvin = "2700..4000"\n')
     scene = load_scene(folder / "hall.xml")
-    basis = kept(scene, make_basis)
-    key, later_s = asking(folder), time.time() + LATER_S
+    basis = keep_basis(scene, make_basis)
+    key, later_s = key_of_facts(folder), time.time() + LATER_S
     assert recall_facts(key) is None
     assert remember_facts(key, scene, basis, remarks=["one"], began_s=later_s)
     found = recall_facts(key)
@@ -99,7 +99,7 @@ def test_it_is_what_the_scene_would_have_told(folder: Path, make_basis: Any) -> 
     assert [x.name for x in cache_folder.folder().iterdir()] == [cache_folder.TAG]
 
 
-def same_bytes(path: Path) -> None:
+def rewrite_same_bytes(path: Path) -> None:
     """Write it anew as it was, at the time at which it was."""
     its = path.stat()
     data = bytearray(path.read_bytes())
@@ -108,7 +108,7 @@ def same_bytes(path: Path) -> None:
     os.utime(path, ns=(its.st_atime_ns, its.st_mtime_ns))
 
 
-def appears(path: Path) -> None:
+def create_file(path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text("<!-- -->")
 
@@ -116,10 +116,10 @@ def appears(path: Path) -> None:
 CHANGES: dict[str, Callable[[Path], object]] = {
     "the scene": lambda at: (at / "hall.xml").write_text(SCENE.format(more="<!-- -->")),
     "an include": lambda at: (at / "parts/lamp.xml").write_text(LAMP.replace("lamp", "bulb")),
-    "a texture of the same size and time": lambda at: same_bytes(at / "textures/wood.png"),
+    "a texture of the same size and time": lambda at: rewrite_same_bytes(at / "textures/wood.png"),
     "a texture that is gone": lambda at: (at / "textures/wood.png").unlink(),
-    "another texture that would be found": lambda at: appears(at / "parts/textures/wood.png"),
-    "an include in another place": lambda at: appears(at / "parts/parts/lamp.xml"),
+    "another texture that would be found": lambda at: create_file(at / "parts/textures/wood.png"),
+    "an include in another place": lambda at: create_file(at / "parts/parts/lamp.xml"),
     "a lights file": lambda at: (at / "hall.lights.toml").write_text("group_alike = false\n"),
 }
 
@@ -129,8 +129,8 @@ def test_nothing_is_known_once_a_file_is_another(
     folder: Path, make_basis: Any, change: Callable[[Path], object]
 ) -> None:
     scene = load_scene(folder / "hall.xml")
-    key, later_s = asking(folder), time.time() + LATER_S
-    assert remember_facts(key, scene, kept(scene, make_basis), remarks=(), began_s=later_s)
+    key, later_s = key_of_facts(folder), time.time() + LATER_S
+    assert remember_facts(key, scene, keep_basis(scene, make_basis), remarks=(), began_s=later_s)
     assert recall_facts(key) is not None
     change(folder)
     assert recall_facts(key) is None
@@ -140,16 +140,16 @@ def test_nor_where_it_is_asked_for_otherwise(
     folder: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     scene = load_scene(folder / "hall.xml")
-    key, later_s = asking(folder), time.time() + LATER_S
-    assert remember_facts(key, scene, kept(scene, make_basis), remarks=(), began_s=later_s)
+    key, later_s = key_of_facts(folder), time.time() + LATER_S
+    assert remember_facts(key, scene, keep_basis(scene, make_basis), remarks=(), began_s=later_s)
     for more in ({"sensor": 1}, {"parameters": {"a": "1"}}, {"resolution": "1/2"}, {"lights": []}):
-        assert recall_facts(asking(folder, **more)) is None
+        assert recall_facts(key_of_facts(folder, **more)) is None
     monkeypatch.setattr(scene_facts, "_code_version", lambda: "another version")
-    assert recall_facts(asking(folder)) is None
+    assert recall_facts(key_of_facts(folder)) is None
     monkeypatch.undo()
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
     monkeypatch.chdir(folder)  # where relative names are looked for, too
-    assert asking(folder) != key
+    assert key_of_facts(folder) != key
     # A process that has loaded scenes may look for files elsewhere.
     assert recall_facts(key) is None
     monkeypatch.setattr(scene_facts, "sys", SimpleNamespace(modules={}, version=sys.version))
@@ -158,7 +158,7 @@ def test_nor_where_it_is_asked_for_otherwise(
 
 def test_what_is_in_doubt_is_not_kept(folder: Path, make_basis: Any) -> None:
     scene = load_scene(folder / "hall.xml")
-    basis, key = kept(scene, make_basis), asking(folder)
+    basis, key = keep_basis(scene, make_basis), key_of_facts(folder)
     later_s = time.time() + LATER_S
     # Its files were written just before they were read.
     assert not remember_facts(key, scene, basis, remarks=(), began_s=time.time())
@@ -172,15 +172,15 @@ def test_what_is_in_doubt_is_not_kept(folder: Path, make_basis: Any) -> None:
         (folder / "hall.xml").write_text(SCENE.format(more=more))
         scene = load_scene(folder / "hall.xml")
         assert not remember_facts(
-            key, scene, kept(scene, make_basis), remarks=(), began_s=time.time() + LATER_S
+            key, scene, keep_basis(scene, make_basis), remarks=(), began_s=time.time() + LATER_S
         )
     assert recall_facts(key) is None
 
 
 def test_what_is_damaged_is_not_believed(folder: Path, make_basis: Any) -> None:
     scene = load_scene(folder / "hall.xml")
-    key, later_s = asking(folder), time.time() + LATER_S
-    assert remember_facts(key, scene, kept(scene, make_basis), remarks=(), began_s=later_s)
+    key, later_s = key_of_facts(folder), time.time() + LATER_S
+    assert remember_facts(key, scene, keep_basis(scene, make_basis), remarks=(), began_s=later_s)
     [path] = cache_folder.folder().glob("*.known.json")
     text = path.read_text("utf-8")
     for damage in ("", "[]", text[:-9], text.replace('"spp"', '"ssp"'), text.replace("lamp", "[")):

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from batches import LOOKS, NAMES, contents, killed, run_all, small_basis, write_batch
+from batches import LOOKS, NAMES, contents, kill_batch, run_whole_batch, small_basis, write_batch
 from command import run, succeed
 
 from lightpaint.batch.distribution import engine
@@ -35,16 +35,16 @@ from lightpaint.progress import Interrupted, silent
 
 
 @pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, bytes]]:
+def reference_batch(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, bytes]]:
     """A manifest, and what its batch leaves."""
     here = tmp_path_factory.mktemp("batch")
     manifest = write_batch(here)
-    run_all(str(manifest), str(here / "out"))
+    run_whole_batch(str(manifest), str(here / "out"))
     return manifest, contents(here / "out")
 
 
 @pytest.fixture
-def here(tmp_path: Path) -> Path:
+def batch_folder(tmp_path: Path) -> Path:
     write_batch(tmp_path)
     return tmp_path
 
@@ -54,9 +54,9 @@ def run_item(here: Path, **how: Any) -> Any:
 
 
 def test_every_look_is_what_solve_makes_of_it(
-    undisturbed: tuple[Path, dict[str, bytes]], tmp_path: Path
+    reference_batch: tuple[Path, dict[str, bytes]], tmp_path: Path
 ) -> None:
-    manifest, found = undisturbed
+    manifest, found = reference_batch
     assert {name.split("/")[0] for name in found if "/" in name} == {*NAMES, "thumbnails"}
     assert {*FILES, "journal.jsonl"} == {name for name in found if "/" not in name}
     # No look can lie where any of it goes.
@@ -80,122 +80,122 @@ def test_every_look_is_what_solve_makes_of_it(
 
 
 def test_a_sequence_begins_and_ends_with_its_looks(
-    undisturbed: tuple[Path, dict[str, bytes]],
+    reference_batch: tuple[Path, dict[str, bytes]],
 ) -> None:
-    out = undisturbed[0].parent / "out"
+    out = reference_batch[0].parent / "out"
     lights = {name: read_lighting(out / name / "lighting.json").emission for name in NAMES}
     assert lights["dusk-0"] == lights["p0"]
     assert lights["dusk-2"] == lights["third"]
     assert lights["p0"] != lights["p0-warmer"] != lights["dusk-1"]
 
 
-def test_a_second_run_does_nothing_and_a_change_only_what_hangs_on_it(here: Path) -> None:
-    assert run_item(here).done == [x for x in NAMES if not do_last(x)] + [
-        x for x in NAMES if do_last(x)
+def test_a_second_run_does_nothing_and_a_change_only_what_hangs_on_it(batch_folder: Path) -> None:
+    assert run_item(batch_folder).done == [x for x in NAMES if not is_derived(x)] + [
+        x for x in NAMES if is_derived(x)
     ]
-    before = contents(here / "out")
-    outcome = run_item(here)
+    before = contents(batch_folder / "out")
+    outcome = run_item(batch_folder)
     assert (outcome.done, sorted(outcome.skipped)) == ([], sorted(NAMES))
-    assert contents(here / "out") == before
+    assert contents(batch_folder / "out") == before
     # Another painting under the same name.
-    write_rgb(here / "p1.exr", 0.5 * small_basis().images.sum(axis=0))
-    outcome = run_item(here)
+    write_rgb(batch_folder / "p1.exr", 0.5 * small_basis().images.sum(axis=0))
+    outcome = run_item(batch_folder)
     assert sorted(outcome.done) == ["p1", "p1-warmer", "p1-white-only"]
     # A result that is lost, and what is made of it stays: it would come out the same.
-    (here / "out" / "third" / "predicted.exr").unlink()
-    assert run_item(here).done == ["third"]
+    (batch_folder / "out" / "third" / "predicted.exr").unlink()
+    assert run_item(batch_folder).done == ["third"]
     # And one that is asked for otherwise.
     text = LOOKS.replace('painting = "p2.exr"', 'painting = "p2.exr"\nsettings = { hold = 0.1 }')
-    (here / "looks.toml").write_text(text, encoding="utf-8")
-    assert sorted(run_item(here).done) == ["dusk-0", "dusk-1", "dusk-2", "third"]
+    (batch_folder / "looks.toml").write_text(text, encoding="utf-8")
+    assert sorted(run_item(batch_folder).done) == ["dusk-0", "dusk-1", "dusk-2", "third"]
 
 
-def do_last(name: str) -> bool:
+def is_derived(name: str) -> bool:
     """Whether a look is made of others."""
     return "warmer" in name or "dusk" in name
 
 
-def test_a_project_that_was_moved_is_done_still(here: Path) -> None:
-    run_item(here)
-    moved = here.parent / f"{here.name}-moved"
-    here.rename(moved)
+def test_a_project_that_was_moved_is_done_still(batch_folder: Path) -> None:
+    run_item(batch_folder)
+    moved = batch_folder.parent / f"{batch_folder.name}-moved"
+    batch_folder.rename(moved)
     assert run_item(moved).done == []
 
 
-def test_a_damaged_journal_is_said_and_its_look_done_again(here: Path) -> None:
+def test_a_damaged_journal_is_said_and_its_look_done_again(batch_folder: Path) -> None:
     command = ("batch", "looks.toml", "-o", "out")
-    run(here, *command)
-    before = contents(here / "out")
+    run(batch_folder, *command)
+    before = contents(batch_folder / "out")
     rows = before["journal.jsonl"].split(b"\n")
     [which] = (k for k, row in enumerate(rows) if b'"third"' in row)
     rows[which] = rows[which].replace(b"done", b"d\xffne")
-    (here / "out" / "journal.jsonl").write_bytes(b"\n".join(rows))
-    done = run(here, *command)
+    (batch_folder / "out" / "journal.jsonl").write_bytes(b"\n".join(rows))
+    done = run(batch_folder, *command)
     assert done.returncode == 0, done.stderr
     assert (
         "journal.jsonl has a line that cannot be read: its step will be done again" in done.stderr
     )
     assert "third: answer done" in done.stderr
     assert "p0: answer done" not in done.stderr
-    assert contents(here / "out") == before
-    assert "journal" not in run(here, *command).stderr
+    assert contents(batch_folder / "out") == before
+    assert "journal" not in run(batch_folder, *command).stderr
 
 
-def test_only_some(here: Path) -> None:
-    some = plan(here / "looks.toml", here / "out").select("dusk-1")
+def test_only_some(batch_folder: Path) -> None:
+    some = plan(batch_folder / "looks.toml", batch_folder / "out").select("dusk-1")
     outcome = run_batch(some)
     assert outcome.done == ["p0", "third", "dusk-1"]
     assert [row.state for row in outcome.rows].count("waiting") == 7
-    assert len(run_item(here).done) == 7
+    assert len(run_item(batch_folder).done) == 7
     with pytest.raises(BatchError, match="no look matches"):
         some.select("x*")
 
 
-def test_one_bad_painting_fails_alone(here: Path) -> None:
-    (here / "p1.exr").write_bytes(b"no picture")
-    done = run(here, "batch", "looks.toml", "-o", "out", "--log", "log.txt")
+def test_one_bad_painting_fails_alone(batch_folder: Path) -> None:
+    (batch_folder / "p1.exr").write_bytes(b"no picture")
+    done = run(batch_folder, "batch", "looks.toml", "-o", "out", "--log", "log.txt")
     assert done.returncode == 1
     complaints = [x for x in done.stderr.splitlines() if x.startswith("lightpaint batch: ")]
     assert [x.split()[2] for x in complaints] == ["p1:", "p1-warmer:", "p1-white-only:"]
     assert "10 looks: 3 failed" in done.stdout
-    told = json.loads((here / "out" / "summary.json").read_text())
+    told = json.loads((batch_folder / "out" / "summary.json").read_text())
     assert [look["look"] for look in told["looks"]][:3] == ["p1", "p1-warmer", "p1-white-only"]
     assert "p1.exr" in told["looks"][0]["why"]
     assert (told["done"], told["failed"]) == (7, 3)
-    log = (here / "log.txt").read_text().splitlines()
+    log = (batch_folder / "log.txt").read_text().splitlines()
     assert sum("failed: " in line for line in log) == 3
     assert all(line[:4].isdigit() for line in log)
     # Mended, it is done, and nothing else is.
-    write_rgb(here / "p1.exr", small_basis().images.sum(axis=0))
-    told = json.loads(succeed(here, "batch", "looks.toml", "-o", "out", "-q", "--json"))
+    write_rgb(batch_folder / "p1.exr", small_basis().images.sum(axis=0))
+    told = json.loads(succeed(batch_folder, "batch", "looks.toml", "-o", "out", "-q", "--json"))
     assert (told["done"], told["failed"]) == (10, 0)
     # Or nothing is begun.
-    (here / "p1.exr").write_bytes(b"no picture")
-    done = run(here, "batch", "looks.toml", "-o", "other", "--stop-early", "-q")
+    (batch_folder / "p1.exr").write_bytes(b"no picture")
+    done = run(batch_folder, "batch", "looks.toml", "-o", "other", "--stop-early", "-q")
     assert done.returncode == 1
-    assert not (here / "other" / "p0").exists()
+    assert not (batch_folder / "other" / "p0").exists()
 
 
-def test_what_was_changed_by_hand_is_kept(here: Path) -> None:
-    run_item(here)
-    (here / "out" / "p0" / "lighting.json").write_text("mine", encoding="utf-8")
-    outcome = run_item(here)
+def test_what_was_changed_by_hand_is_kept(batch_folder: Path) -> None:
+    run_item(batch_folder)
+    (batch_folder / "out" / "p0" / "lighting.json").write_text("mine", encoding="utf-8")
+    outcome = run_item(batch_folder)
     assert "was changed since lightpaint wrote it" in outcome.failed["p0"]
-    assert (here / "out" / "p0" / "lighting.json").read_text() == "mine"
-    assert run(here, "batch", "looks.toml", "-o", "out", "--force", "-q").returncode == 0
+    assert (batch_folder / "out" / "p0" / "lighting.json").read_text() == "mine"
+    assert run(batch_folder, "batch", "looks.toml", "-o", "out", "--force", "-q").returncode == 0
 
 
-def test_a_plan_is_only_told(here: Path) -> None:
-    output = succeed(here, "batch", "looks.toml", "-o", "out", "--dry-run")
+def test_a_plan_is_only_told(batch_folder: Path) -> None:
+    output = succeed(batch_folder, "batch", "looks.toml", "-o", "out", "--dry-run")
     assert [line.split()[0] for line in output.splitlines()[1:-1]] == NAMES
     assert "GB of memory" in output
-    assert not (here / "out").exists()
-    told = json.loads(succeed(here, "batch", "looks.toml", "--dry-run", "--json"))
+    assert not (batch_folder / "out").exists()
+    told = json.loads(succeed(batch_folder, "batch", "looks.toml", "--dry-run", "--json"))
     assert [look["look"] for look in told["looks"]] == NAMES
 
 
 def test_what_fails_is_tried_again_as_often_as_is_asked(
-    here: Path, monkeypatch: pytest.MonkeyPatch
+    batch_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tries: list[str] = []
     answer = item_execution._answer
@@ -207,18 +207,18 @@ def test_what_fails_is_tried_again_as_often_as_is_asked(
         answer(task, *others)
 
     monkeypatch.setattr(item_execution, "_answer", sometimes)
-    outcome = run_item(here, retry=1)
+    outcome = run_item(batch_folder, retry=1)
     assert outcome.failed["p1"] == "RuntimeError: a library's"
     assert outcome.failed["p1-warmer"] == "it is made of p1, which failed"
     assert tries.count("p1") == 2
-    assert sorted(run_item(here, retry=1).done) == ["p1", "p1-warmer"]
+    assert sorted(run_item(batch_folder, retry=1).done) == ["p1", "p1-warmer"]
 
 
 def test_a_full_disk_stops_with_one_line_and_goes_on_after(
-    here: Path, monkeypatch: pytest.MonkeyPatch
+    batch_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    succeed(here, "batch", "looks.toml", "-o", "out")
-    (here / "out").rename(here / "whole")
+    succeed(batch_folder, "batch", "looks.toml", "-o", "out")
+    (batch_folder / "out").rename(batch_folder / "whole")
     answer, count = item_execution._answer, 0
 
     def full(task: Task, *others: Any) -> None:
@@ -232,52 +232,52 @@ def test_a_full_disk_stops_with_one_line_and_goes_on_after(
 
     with monkeypatch.context() as patch:
         patch.setattr(item_execution, "_answer", full)
-        done = run(here, "batch", "looks.toml", "-o", "out", "-q")
+        done = run(batch_folder, "batch", "looks.toml", "-o", "out", "-q")
     assert done.returncode == 2
     [line] = done.stderr.splitlines()
     assert "No space left" in line
     assert "run the same command to continue" in line
-    again = run(here, "batch", "looks.toml", "-o", "out", "--workers", 1)
+    again = run(batch_folder, "batch", "looks.toml", "-o", "out", "--workers", 1)
     assert "3 looks were done earlier" in again.stderr
-    assert contents(here / "out") == contents(here / "whole")
+    assert contents(batch_folder / "out") == contents(batch_folder / "whole")
 
 
-def test_one_look_is_not_several(here: Path) -> None:
+def test_one_look_is_not_several(batch_folder: Path) -> None:
     for _ in range(2):
-        done = run(here, "batch", "looks.toml", "-o", "one", "--only", "third")
+        done = run(batch_folder, "batch", "looks.toml", "-o", "one", "--only", "third")
     assert "1 look was done earlier and is unchanged" in done.stderr
 
 
 def test_a_basis_that_takes_too_much_memory_fails_its_looks_alone(
-    here: Path, monkeypatch: pytest.MonkeyPatch
+    batch_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def too_large(*_: Any, **__: Any) -> None:
         raise MemoryError
 
     with monkeypatch.context() as patch:
         patch.setattr("lightpaint.batch.run.obtain_bases", too_large)
-        done = run(here, "batch", "looks.toml", "-o", "out", "-q")
+        done = run(batch_folder, "batch", "looks.toml", "-o", "out", "-q")
     assert done.returncode == 1
     assert "it takes more memory than there is" in done.stderr
     assert "Traceback" not in done.stderr
-    succeed(here, "batch", "looks.toml", "-o", "out")
+    succeed(batch_folder, "batch", "looks.toml", "-o", "out")
 
 
-def test_a_disk_that_is_really_full(here: Path) -> None:
-    disk = here / "disk"
+def test_a_disk_that_is_really_full(batch_folder: Path) -> None:
+    disk = batch_folder / "disk"
     disk.mkdir()
     mount = ["mount", "-t", "tmpfs", "-o", "size=96K", "tmpfs", str(disk)]
     if shutil.which("mount") is None or subprocess.run(mount, capture_output=True).returncode:
         pytest.skip("the right to mount")
     try:
-        done = run(here, "batch", "looks.toml", "-o", disk / "out", "-q")
+        done = run(batch_folder, "batch", "looks.toml", "-o", disk / "out", "-q")
         assert done.returncode == 2
         [line] = done.stderr.splitlines()
         assert "No space left on device: make room, and run the same command to continue" in line
         assert not list((disk / "out").glob(".*"))
         more = ["mount", "-o", "remount,size=8M", str(disk)]
         subprocess.run(more, check=True)
-        again = run(here, "batch", "looks.toml", "-o", disk / "out")
+        again = run(batch_folder, "batch", "looks.toml", "-o", disk / "out")
         assert again.returncode == 0
         assert "looks were done earlier" in again.stderr
     finally:
@@ -285,7 +285,9 @@ def test_a_disk_that_is_really_full(here: Path) -> None:
 
 
 def test_an_interrupt_says_how_to_go_on(
-    here: Path, monkeypatch: pytest.MonkeyPatch, undisturbed: tuple[Path, dict[str, bytes]]
+    batch_folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    reference_batch: tuple[Path, dict[str, bytes]],
 ) -> None:
     def interrupted(*_: Any) -> ItemResult:
         raise KeyboardInterrupt
@@ -295,13 +297,13 @@ def test_an_interrupt_says_how_to_go_on(
         with pytest.raises(
             Interrupted, match="10 looks are left; run the same command to continue"
         ):
-            run_item(here)
-    run_item(here)
-    assert contents(here / "out") == undisturbed[1]
+            run_item(batch_folder)
+    run_item(batch_folder)
+    assert contents(batch_folder / "out") == reference_batch[1]
 
 
 def test_workers_that_are_all_gone_are_no_look_s_failure(
-    here: Path, undisturbed: tuple[Path, dict[str, bytes]]
+    batch_folder: Path, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:
     class Gone(engine.InProcess):
         def run(self, items: Any) -> Any:
@@ -315,15 +317,15 @@ def test_workers_that_are_all_gone_are_no_look_s_failure(
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(_Run, "_start_engine", begun)
         with pytest.raises(BatchError, match="the scheduler is gone"):
-            run_item(here)
-    [line] = (here / "out" / "journal.jsonl").read_text().splitlines()
+            run_item(batch_folder)
+    [line] = (batch_folder / "out" / "journal.jsonl").read_text().splitlines()
     assert json.loads(line)["state"] == "done"
-    run_item(here)
-    assert contents(here / "out") == undisturbed[1]
+    run_item(batch_folder)
+    assert contents(batch_folder / "out") == reference_batch[1]
 
 
-def test_two_batches_do_not_work_in_one_folder(here: Path) -> None:
-    planned, told = plan(here / "looks.toml", here / "out"), []
+def test_two_batches_do_not_work_in_one_folder(batch_folder: Path) -> None:
+    planned, told = plan(batch_folder / "looks.toml", batch_folder / "out"), []
 
     def other(*_: Any) -> None:
         with pytest.raises(OutputError, match="another batch is at work"):
@@ -334,8 +336,8 @@ def test_two_batches_do_not_work_in_one_folder(here: Path) -> None:
     assert told == [1]
 
 
-def test_tasks_are_the_same_wherever_they_are_sent(here: Path) -> None:
-    for look in plan(here / "looks.toml", here / "out").looks:
+def test_tasks_are_the_same_wherever_they_are_sent(batch_folder: Path) -> None:
+    for look in plan(batch_folder / "looks.toml", batch_folder / "out").looks:
         for step in look.steps:
             assert Task.from_json(step.task.to_json()) == step.task
     for text in ("", "[]", "{}", '{"format": "lightpaint-task 1", "share": "a"}'):
@@ -359,9 +361,9 @@ class _AtWork:
 
 
 def test_workers_make_the_same_and_one_that_dies_costs_nothing(
-    here: Path, undisturbed: tuple[Path, dict[str, bytes]]
+    batch_folder: Path, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:
-    planned, died = plan(here / "looks.toml", here / "out"), []
+    planned, died = plan(batch_folder / "looks.toml", batch_folder / "out"), []
 
     def told(*_: Any) -> None:
         if not died:  # the first answer is here, and another is on its way
@@ -380,22 +382,22 @@ def test_workers_make_the_same_and_one_that_dies_costs_nothing(
     assert hears.workers == {"worker 1": None, "worker 2": None}
     assert {f"{name}: answer" for name in outcome.done} <= hears.done
     assert not outcome.failed
-    assert contents(here / "out") == undisturbed[1]
+    assert contents(batch_folder / "out") == reference_batch[1]
 
 
 def test_killed_at_twenty_moments_it_ends_as_if_undisturbed(
-    here: Path, undisturbed: tuple[Path, dict[str, bytes]]
+    batch_folder: Path, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:
     chance, kills, batches = random.Random(1), 0, 0
     begun_s = time.monotonic()
-    assert killed(here / "looks.toml", here / "first", 60) == 0
+    assert kill_batch(batch_folder / "looks.toml", batch_folder / "first", 60) == 0
     run_s = time.monotonic() - begun_s
     while kills < 20:
-        folder, batches = here / f"out{batches}", batches + 1
-        while killed(here / "looks.toml", folder, chance.uniform(0, 0.6 * run_s)):
+        folder, batches = batch_folder / f"out{batches}", batches + 1
+        while kill_batch(batch_folder / "looks.toml", folder, chance.uniform(0, 0.6 * run_s)):
             kills += 1
             assert kills < 200
-        assert contents(folder) == undisturbed[1]
+        assert contents(folder) == reference_batch[1]
 
 
 class _Page(HTMLParser):
@@ -421,9 +423,9 @@ class _Page(HTMLParser):
 
 
 def test_the_page_holds_all_and_loads_nothing(
-    undisturbed: tuple[Path, dict[str, bytes]],
+    reference_batch: tuple[Path, dict[str, bytes]],
 ) -> None:
-    found = undisturbed[1]
+    found = reference_batch[1]
     page = _Page()
     page.feed(found["index.html"].decode())
     assert page.loads == []
@@ -431,7 +433,7 @@ def test_the_page_holds_all_and_loads_nothing(
     assert [look["look"] for look in looks] == NAMES
     assert all(look["picture"].startswith("data:image/jpeg;base64,") for look in looks)
     for look in looks:
-        assert all((undisturbed[0].parent / "out" / to).is_file() for _, to in look["links"])
+        assert all((reference_batch[0].parent / "out" / to).is_file() for _, to in look["links"])
     rows = list(csv.DictReader(found["summary.csv"].decode().splitlines()))
     assert [row["look"] for row in rows] == NAMES
     assert float(rows[0]["lamp 1"]) > 0
@@ -455,40 +457,46 @@ def test_a_page_of_a_thousand_looks_with_names_that_mean_mischief(tmp_path: Path
     assert sheet.shape[1] < 2000
 
 
-def test_a_first_manifest_is_one_that_can_be_run(here: Path) -> None:
-    (here / "room.xml").write_text("", encoding="utf-8")
-    (here / "sub").mkdir()
-    output = succeed(here, "batch", "--init", "room.xml", "p0.exr", "p1.exr", "-o", "sub/l.toml")
+def test_a_first_manifest_is_one_that_can_be_run(batch_folder: Path) -> None:
+    (batch_folder / "room.xml").write_text("", encoding="utf-8")
+    (batch_folder / "sub").mkdir()
+    output = succeed(
+        batch_folder, "batch", "--init", "room.xml", "p0.exr", "p1.exr", "-o", "sub/l.toml"
+    )
     assert "lightpaint batch sub/l.toml" in output
-    text = (here / "sub" / "l.toml").read_text()
+    text = (batch_folder / "sub" / "l.toml").read_text()
     text = text.replace('scene = "../room.xml"', 'basis = "../b.basis.exr"')
     text = text.replace('"verify", ', "").replace('quality = "preview"', "")
-    (here / "sub" / "l.toml").write_text(text, encoding="utf-8")
-    planned = plan(here / "sub" / "l.toml", here / "out")
+    (batch_folder / "sub" / "l.toml").write_text(text, encoding="utf-8")
+    planned = plan(batch_folder / "sub" / "l.toml", batch_folder / "out")
     assert [look.entry.name for look in planned.looks] == ["p0", "p1"]
     assert not any(look.failure for look in planned.looks)
 
 
-def test_without_anybody_listening(here: Path) -> None:
-    assert run_batch(plan(here / "looks.toml", here / "out").select("third"), None, silent).done
+def test_without_anybody_listening(batch_folder: Path) -> None:
+    assert run_batch(
+        plan(batch_folder / "looks.toml", batch_folder / "out").select("third"), None, silent
+    ).done
 
 
 @pytest.mark.parametrize("damage", [b"", b"junk", None])
-def test_small_pictures_that_are_damaged_are_made_again(here: Path, damage: bytes | None) -> None:
-    run_item(here)
-    pictures = sorted((here / "out" / "thumbnails").glob("*.jpg"))
+def test_small_pictures_that_are_damaged_are_made_again(
+    batch_folder: Path, damage: bytes | None
+) -> None:
+    run_item(batch_folder)
+    pictures = sorted((batch_folder / "out" / "thumbnails").glob("*.jpg"))
     before = {path: path.read_bytes() for path in pictures}
     assert pictures
     first = pictures[0]
     first.write_bytes(before[first][: len(before[first]) // 2] if damage is None else damage)
-    run_item(here)
+    run_item(batch_folder)
     assert {path: path.read_bytes() for path in pictures} == before
 
 
 @pytest.mark.parametrize("told", ['{"lights": 3}', '{"lights": [1]}', '{"lights": []}', "junk"])
-def test_planes_that_are_damaged_cost_no_gallery(here: Path, told: str) -> None:
-    run_item(here)
-    for path in (here / "out" / "thumbnails").glob("*.planes.json"):
+def test_planes_that_are_damaged_cost_no_gallery(batch_folder: Path, told: str) -> None:
+    run_item(batch_folder)
+    for path in (batch_folder / "out" / "thumbnails").glob("*.planes.json"):
         path.write_text(told)
-    run_item(here)
-    assert (here / "out" / "index.html").is_file()
+    run_item(batch_folder)
+    assert (batch_folder / "out" / "index.html").is_file()

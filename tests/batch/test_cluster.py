@@ -78,10 +78,10 @@ class Workers:
     def await_two(self) -> None:
         """Until both are there: a nanny begins another in the place of one that died."""
         with distributed.Client(self.address, set_as_default=False) as client:
-            until(lambda: len(client.nthreads()) == 2)
+            wait_until(lambda: len(client.nthreads()) == 2)
 
 
-def until(holds: Callable[[], Any]) -> None:
+def wait_until(holds: Callable[[], Any]) -> None:
     """Wait for it."""
     deadline_s = time.monotonic() + LONG_S
     while not holds():
@@ -114,8 +114,8 @@ def workers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workers]:
         ):  # fmt: skip
             process = stack.enter_context(subprocess.Popen(command, stderr=log, **quiet))
             stack.callback(_end, process)
-            until(file.exists)
-        until(lambda: _address(file))
+            wait_until(file.exists)
+        wait_until(lambda: _address(file))
         found = Workers(_address(file), slow)
         found.await_two()
         yield found
@@ -136,7 +136,7 @@ def _end(process: "subprocess.Popen[Any]") -> None:
 
 
 @pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, bytes]]:
+def reference_batch(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, bytes]]:
     """A folder with a manifest, and what its batch leaves that this process does alone."""
     here = tmp_path_factory.mktemp("looks")
     write_room(here)
@@ -144,7 +144,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[st
         write_rgb(here / f"{name}.exr", np.full((20, 24, 3), light, np.float32))
     (here / "looks.toml").write_text(LOOKS, encoding="utf-8")
     with pytest.MonkeyPatch.context() as patch:
-        in_small_parts(patch, here / "cache-alone")
+        render_small_parts(patch, here / "cache-alone")
         limit_threads(1)
         try:
             outcome = run_batch(plan(here / "looks.toml", here / "alone"))
@@ -154,7 +154,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[st
     return here, contents(here / "alone")
 
 
-def in_small_parts(patch: pytest.MonkeyPatch, cache: Path) -> None:
+def render_small_parts(patch: pytest.MonkeyPatch, cache: Path) -> None:
     patch.setattr(parts_module, "PART_SAMPLES", 2**10)
     patch.setattr(guide_training, "TRAINING_SAMPLES", (2**12,))
     patch.setattr(scene_render, "SAMPLES_PER_RANGE", 1)
@@ -162,7 +162,7 @@ def in_small_parts(patch: pytest.MonkeyPatch, cache: Path) -> None:
 
 
 @dataclass
-class Hears:
+class ItemListener:
     """Listens, and tells `when` of all that is said."""
 
     when: Callable[[str], None] = lambda text: None
@@ -186,9 +186,11 @@ class Hears:
         return Counter(text.split(" begun by ")[0] for text in self.said if " begun by " in text)
 
 
-def run_item(here: Path, name: str, workers: Workers, hears: Hears, **how: Any) -> BatchOutcome:
+def run_item(
+    here: Path, name: str, workers: Workers, hears: ItemListener, **how: Any
+) -> BatchOutcome:
     with pytest.MonkeyPatch.context() as patch:
-        in_small_parts(patch, here / f"cache-{name}")
+        render_small_parts(patch, here / f"cache-{name}")
         planned = plan(here / "looks.toml", here / name)
         outcome = run_batch(planned, RunOptions(cluster=workers.address, **how), hears)  # type: ignore[arg-type]
     assert not outcome.failed
@@ -216,17 +218,17 @@ class Killer:
 
     def _kill(self, worker: str) -> None:
         try:
-            until(self.is_time)
+            wait_until(self.is_time)
             os.kill(self.workers.pid(worker), self.how)
         finally:
             (self.workers.slow / f"wait-{self.victim}").unlink()
 
 
 def test_a_cluster_does_what_one_process_does(
-    workers: Workers, undisturbed: tuple[Path, dict[str, bytes]]
+    workers: Workers, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:
-    here, expected = undisturbed
-    hears = Hears()
+    here, expected = reference_batch
+    hears = ItemListener()
     run_item(here, "all", workers, hears)
     assert contents(here / "all") == expected
     parts = [name for name in hears.starts if name.startswith("part ")]
@@ -242,18 +244,18 @@ def test_a_cluster_does_what_one_process_does(
     assert len({text.split()[-1] for text in hears.said if " begun by " in text}) == 2
     # Again nothing is done; and on a shared disk it is the same.
     assert run_item(here, "all", workers, hears).done == []
-    run_item(here, "shared", workers, Hears(), shared_fs=True)
+    run_item(here, "shared", workers, ItemListener(), shared_fs=True)
     assert contents(here / "shared") == expected
 
 
 def test_a_worker_killed_in_the_middle_of_a_basis_costs_one_part(
-    workers: Workers, undisturbed: tuple[Path, dict[str, bytes]]
+    workers: Workers, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:
     workers.await_two()
-    here, expected = undisturbed
+    here, expected = reference_batch
     spool = here / "cache-killed" / "parts"
     killer = Killer(workers, "part 3", lambda: len(list(spool.glob("*/[0-9]*-*.npz"))) >= 2)
-    hears = Hears(killer.hear)
+    hears = ItemListener(killer.hear)
     run_item(here, "killed", workers, hears)
     assert killer.thread is not None
     assert contents(here / "killed") == expected
@@ -265,10 +267,10 @@ def test_a_worker_killed_in_the_middle_of_a_basis_costs_one_part(
 
 
 def test_a_worker_killed_in_the_middle_of_a_look_costs_one_try(
-    workers: Workers, undisturbed: tuple[Path, dict[str, bytes]]
+    workers: Workers, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:
     workers.await_two()
-    here, expected = undisturbed
+    here, expected = reference_batch
     journal = here / "look" / "journal.jsonl"
 
     def others_are_done() -> bool:
@@ -276,7 +278,7 @@ def test_a_worker_killed_in_the_middle_of_a_look_costs_one_try(
         return journal.is_file() and len(journal.read_text().splitlines()) >= 2
 
     killer = Killer(workers, "bright", others_are_done)
-    hears = Hears(killer.hear)
+    hears = ItemListener(killer.hear)
     run_item(here, "look", workers, hears)
     assert killer.thread is not None
     assert contents(here / "look") == expected
@@ -285,10 +287,10 @@ def test_a_worker_killed_in_the_middle_of_a_look_costs_one_try(
 
 
 def test_a_worker_that_hangs_and_one_without_memory_are_replaced(
-    workers: Workers, undisturbed: tuple[Path, dict[str, bytes]]
+    workers: Workers, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:
     workers.await_two()
-    here, expected = undisturbed
+    here, expected = reference_batch
     (workers.slow / "wait-part 2").touch()
     (workers.slow / "memory-third").touch()
 
@@ -296,7 +298,7 @@ def test_a_worker_that_hangs_and_one_without_memory_are_replaced(
         if text.startswith("part 2: ") and " takes more than " in text:
             (workers.slow / "wait-part 2").unlink()
 
-    hears = Hears(free)
+    hears = ItemListener(free)
     run_item(here, "hung", workers, hears, task_limit_s=5.0)
     assert contents(here / "hung") == expected
     # On a busy machine others may take too long as well.
@@ -305,17 +307,17 @@ def test_a_worker_that_hangs_and_one_without_memory_are_replaced(
 
 
 def test_a_batch_that_was_killed_goes_on_with_the_parts_that_it_has(
-    workers: Workers, undisturbed: tuple[Path, dict[str, bytes]]
+    workers: Workers, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:
     workers.await_two()
-    here, expected = undisturbed
+    here, expected = reference_batch
     spool = here / "cache-stopped" / "parts"
 
     def stop(text: str) -> None:
         if text.startswith("part ") and len(list(spool.glob("*/[0-9]*-*.npz"))) >= 2:
             raise KeyboardInterrupt
 
-    first, second = Hears(stop), Hears()
+    first, second = ItemListener(stop), ItemListener()
     with pytest.raises(KeyboardInterrupt):
         run_item(here, "stopped", workers, first)
     kept = len(list(spool.glob("*/[0-9]*-*.npz")))
@@ -331,11 +333,11 @@ def plan_of_parts(here: Path) -> list[Any]:
     from lightpaint.scene.scene_reader import load_scene
 
     with pytest.MonkeyPatch.context() as patch:
-        in_small_parts(patch, here / "none")
+        render_small_parts(patch, here / "none")
         return parts_module.plan_parts(load_scene(here / "room.xml"), 16)
 
 
-def test_what_is_wrong_with_a_cluster_is_one_line(here: Path, workers: Workers) -> None:
+def test_what_is_wrong_with_a_cluster_is_one_line(folder: Path, workers: Workers) -> None:
     for options, said in (
         (("--cluster", "tcp://127.0.0.1:9"), "no scheduler answers at tcp://127.0.0.1:9"),
         (("--cluster", "nowhere"), "no scheduler answers at nowhere"),
@@ -343,7 +345,7 @@ def test_what_is_wrong_with_a_cluster_is_one_line(here: Path, workers: Workers) 
         (("--shared-fs",), "give --cluster ADDRESS, too"),
         (("--task-limit", "3"), "give --cluster ADDRESS, too"),
     ):
-        found = run(here, "batch", "looks.toml", "-o", "wrong", "-q", *options)
+        found = run(folder, "batch", "looks.toml", "-o", "wrong", "-q", *options)
         assert found.returncode == 2
         [line] = found.stderr.splitlines()
         assert line.startswith("lightpaint batch: ")
@@ -351,10 +353,10 @@ def test_what_is_wrong_with_a_cluster_is_one_line(here: Path, workers: Workers) 
 
 
 def test_without_dask_the_line_is_said_that_installs_it(
-    here: Path, monkeypatch: pytest.MonkeyPatch
+    folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    found = run(here, "batch", "looks.toml", "-o", "wrong", "--cluster", "tcp://127.0.0.1:9")
+    found = run(folder, "batch", "looks.toml", "-o", "wrong", "--cluster", "tcp://127.0.0.1:9")
     assert found.returncode == 2
     assert "pip install 'lightpaint[cluster]'" in found.stderr
 
@@ -368,11 +370,11 @@ def test_workers_of_another_version_are_left_out(
     mine = {**cluster_worker.versions(), "lightpaint": "other"}
     # Workers find the function by its name, and theirs is not changed.
     monkeypatch.setattr("lightpaint.batch.cluster.workers.own_versions", lambda: mine)
-    hears = Hears()
+    hears = ItemListener()
     with Cluster(workers.address, hears):  # type: ignore[arg-type]
         assert sum("is left out: it has lightpaint" in text for text in hears.said) == 2
 
 
 @pytest.fixture
-def here(undisturbed: tuple[Path, dict[str, bytes]]) -> Path:
-    return undisturbed[0]
+def folder(reference_batch: tuple[Path, dict[str, bytes]]) -> Path:
+    return reference_batch[0]

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.skipif(shutil.which("openssl") is None, reason="no open
 
 
 @dataclass
-class Secured:
+class SecureScheduler:
     """A scheduler with certificates, and one that has none."""
 
     folder: Path
@@ -45,7 +45,7 @@ class Secured:
 
 
 @pytest.fixture(scope="module")
-def secured(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Secured]:
+def secure_scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SecureScheduler]:
     here = tmp_path_factory.mktemp("tls")
     for name in ("right", "wrong"):
         subprocess.run(
@@ -67,7 +67,7 @@ def secured(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Secured]:
     try:
         for name in ("tls", "plain"):
             addresses.append(_address(here / f"{name}.json"))
-        yield Secured(here, *addresses)
+        yield SecureScheduler(here, *addresses)
     finally:
         for process in started:
             process.terminate()
@@ -89,11 +89,11 @@ RIGHT = {"ca_file": "right.pem", "cert": "right.pem", "key": "right-key.pem"}
 WRONG = {"ca_file": "wrong.pem", "cert": "wrong.pem", "key": "wrong-key.pem"}
 
 
-def test_the_right_certificates_open_a_scheduler(secured: Secured) -> None:
-    assert secured.tls.startswith("tls://")
-    assert secured.reached(secured.tls, **RIGHT) == []
-    assert secured.reached(secured.plain) == []
-    assert secured.reached(secured.plain, **RIGHT) == []
+def test_the_right_certificates_open_a_scheduler(secure_scheduler: SecureScheduler) -> None:
+    assert secure_scheduler.tls.startswith("tls://")
+    assert secure_scheduler.reached(secure_scheduler.tls, **RIGHT) == []
+    assert secure_scheduler.reached(secure_scheduler.plain) == []
+    assert secure_scheduler.reached(secure_scheduler.plain, **RIGHT) == []
 
 
 @pytest.mark.parametrize(
@@ -112,23 +112,23 @@ def test_the_right_certificates_open_a_scheduler(secured: Secured) -> None:
     ],
 )
 def test_what_is_wrong_with_certificates_is_one_line(
-    secured: Secured, files: dict[str, str], said: str
+    secure_scheduler: SecureScheduler, files: dict[str, str], said: str
 ) -> None:
     begin = time.monotonic()
     with pytest.raises(BatchError) as refusal:
-        secured.reached(secured.tls, **files)
+        secure_scheduler.reached(secure_scheduler.tls, **files)
     assert said in str(refusal.value)
     assert "\n" not in str(refusal.value)
     assert time.monotonic() - begin < 10  # a client of Dask's own would wait for half a minute
 
 
-def test_an_address_of_the_other_kind_is_told(secured: Secured) -> None:
+def test_an_address_of_the_other_kind_is_told(secure_scheduler: SecureScheduler) -> None:
     with pytest.raises(BatchError, match=r"no TLS is spoken at tls://.*: .* is at tcp://127"):
-        secured.reached(secured.plain.replace("tcp", "tls"), **RIGHT)
+        secure_scheduler.reached(secure_scheduler.plain.replace("tcp", "tls"), **RIGHT)
     with pytest.raises(BatchError, match=r"like tcp://host:8786 or tls://host:8786"):
-        secured.reached(secured.tls.replace("tls", "tcp"))
+        secure_scheduler.reached(secure_scheduler.tls.replace("tls", "tcp"))
     with (
         dask.config.set({"distributed.comm.require-encryption": True}),
         pytest.raises(BatchError, match=r"wants encryption here, and tcp://.* has none"),
     ):
-        secured.reached(secured.plain, **RIGHT)
+        secure_scheduler.reached(secure_scheduler.plain, **RIGHT)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from axe import axe_source, violations
-from batches import NAMES, run_all, small_basis, write_batch
+from batches import NAMES, run_whole_batch, small_basis, write_batch
 from command import succeed
 from PIL import Image
 
@@ -40,7 +40,7 @@ def page(browser: Any) -> Iterator[Any]:
 def batch(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a batch of three lights."""
     here = tmp_path_factory.mktemp("batch")
-    run_all(str(write_batch(here)), str(here / "out"))
+    run_whole_batch(str(write_batch(here)), str(here / "out"))
     return here / "out"
 
 
@@ -148,7 +148,7 @@ def test_of_many_lights_those_that_do_most_have_sliders(page: Any, tmp_path: Pat
     made = replace(few, lights=lights, planes=images, noise=0 * images)
     key = '{"view": 0}'
     write_planes(tmp_path, key, made)
-    run_all(str(write_batch(tmp_path)), str(tmp_path / "out"))
+    run_whole_batch(str(write_batch(tmp_path)), str(tmp_path / "out"))
     (tmp_path / "many").mkdir()
     text = (tmp_path / "out" / "p0" / "lighting.json").read_text(encoding="utf-8")
     (tmp_path / "many" / "lighting.json").write_text(text, encoding="utf-8")
@@ -238,7 +238,7 @@ def test_planes_are_written_once_and_follow_their_basis(tmp_path: Path) -> None:
     assert read_planes(tmp_path / "none") == {}
 
 
-def many(folder: Path, count: int = 1000) -> Path:
+def write_many_looks(folder: Path, count: int = 1000) -> Path:
     """A page of so many looks, one of which failed."""
     lights = (LightRow("<b>key", 0.0), LightRow("fill", 2.5, hex="#ff8800", stops=-1.25))
     rows = [SummaryRow("broken", "failed", "no such file: <i>x</i>", "broken")]
@@ -251,7 +251,7 @@ def many(folder: Path, count: int = 1000) -> Path:
 
 
 def test_a_thousand_looks_are_filtered_and_ordered(page: Any, tmp_path: Path) -> None:
-    page.goto(many(tmp_path).as_uri())
+    page.goto(write_many_looks(tmp_path).as_uri())
     assert page.locator("#count").text_content() == "1001 of 1001"
     assert page.locator("#mixer-tab").is_hidden()
     assert _names(page)[0] == "broken"

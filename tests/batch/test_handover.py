@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from batches import contents
-from command import refused, run, succeed
+from command import run, run_refused, succeed
 from light_groups import interleaved, pictures
 from renderer import write_room
 
@@ -41,7 +41,7 @@ export = { to = ["json"] }
 
 
 @pytest.fixture
-def here(tmp_path: Path) -> Path:
+def folder(tmp_path: Path) -> Path:
     """Light groups of another renderer, two paintings of them, and an answer by hand."""
     images = pictures()
     interleaved(
@@ -55,19 +55,21 @@ def here(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def looks(here: Path, *how: Any) -> dict[str, Any]:
+def run_looks(here: Path, *how: Any) -> dict[str, Any]:
     """What the batch says of itself."""
     return dict(json.loads(succeed(here, "batch", "looks.toml", "-o", "out", "--json", "-q", *how)))
 
 
-def test_light_groups_stand_for_a_scene(here: Path) -> None:
-    told = looks(here, "--workers", "2")
+def test_light_groups_stand_for_a_scene(folder: Path) -> None:
+    told = run_looks(folder, "--workers", "2")
     assert told["failed"] == 0
     names = ["dim", "bright", "dim-warmer", "dim-white-only", "by hand", "on-0", "on-1", "on-2"]
     assert sorted(x["look"] for x in told["looks"]) == sorted(names)
-    out = here / "out"
+    out = folder / "out"
     # As solve answers them, with what it leaves for other programs.
-    lock_folder, many = (read_lighting(x / "lighting.json") for x in (here / "solved", out / "dim"))
+    lock_folder, many = (
+        read_lighting(x / "lighting.json") for x in (folder / "solved", out / "dim")
+    )
     assert lock_folder.emission == many.emission
     for name in ("dim", "dim-warmer", "by hand", "on-1"):
         assert (out / name / "relit.nk").is_file()
@@ -80,17 +82,17 @@ def test_light_groups_stand_for_a_scene(here: Path) -> None:
     assert "dim/export/fixtures.csv" in by_name["dim"]["files"]
     # The same to the last byte by one process.
     before = contents(out)
-    assert "done earlier" in run(here, "batch", "looks.toml", "-o", "out").stderr
+    assert "done earlier" in run(folder, "batch", "looks.toml", "-o", "out").stderr
     assert contents(out) == before
 
 
-def test_what_other_programs_get_is_made_again_alone(here: Path) -> None:
-    looks(here)
-    out = here / "out"
+def test_what_other_programs_get_is_made_again_alone(folder: Path) -> None:
+    run_looks(folder)
+    out = folder / "out"
     kept = {name: (out / name / "lighting.json").stat().st_ino for name in ("dim", "bright")}
     text = LOOKS.replace('"csv", "nuke"', '"json"')
-    (here / "looks.toml").write_text(text, encoding="utf-8")
-    looks(here)
+    (folder / "looks.toml").write_text(text, encoding="utf-8")
+    run_looks(folder)
     assert sorted(x.name for x in (out / "dim" / "export").iterdir()) == [
         *("fixtures.json", "result.json")
     ]
@@ -98,20 +100,20 @@ def test_what_other_programs_get_is_made_again_alone(here: Path) -> None:
         assert (out / name / "lighting.json").stat().st_ino == inode
     # What somebody has deleted, and what follows from another painting, comes again.
     (out / "bright" / "export" / "fixtures.json").unlink()
-    write_rgb(here / "dim.exr", 3 * pictures()[1])
+    write_rgb(folder / "dim.exr", 3 * pictures()[1])
     before = (out / "dim" / "export" / "fixtures.json").read_bytes()
-    looks(here)
+    run_looks(folder)
     assert (out / "bright" / "export" / "fixtures.json").is_file()
     assert (out / "dim" / "export" / "fixtures.json").read_bytes() != before
     # As if nothing had been there.
     again = contents(out)
-    (here / "looks.toml").write_text(text, encoding="utf-8")
-    succeed(here, "batch", "looks.toml", "-o", "fresh", "-q")
-    assert contents(here / "fresh").keys() == again.keys()
+    (folder / "looks.toml").write_text(text, encoding="utf-8")
+    succeed(folder, "batch", "looks.toml", "-o", "fresh", "-q")
+    assert contents(folder / "fresh").keys() == again.keys()
 
 
-def test_forms_that_a_look_has_nothing_for_are_told_before(here: Path) -> None:
-    write_room(here)
+def test_forms_that_a_look_has_nothing_for_are_told_before(folder: Path) -> None:
+    write_room(folder)
     groups, want = 'light_groups = "groups.exr"\n', 'want = ["export"]\n'
     for more, said in (
         ('light_groups = "gone.exr"\n', "light_groups: no such file or folder: gone.exr"),
@@ -125,8 +127,8 @@ def test_forms_that_a_look_has_nothing_for_are_told_before(here: Path) -> None:
         (groups + 'want = ["predict"]\nexport = {}\n', "want does not have 'export'"),
     ):
         text = f'[[look]]\npainting = "dim.exr"\n{more}'
-        (here / "looks.toml").write_text(text, encoding="utf-8")
-        line = refused(here, "batch", "looks.toml", "-o", "none")
+        (folder / "looks.toml").write_text(text, encoding="utf-8")
+        line = run_refused(folder, "batch", "looks.toml", "-o", "none")
         assert line.startswith("lightpaint batch: looks.toml: look 'dim.exr'"), line
         assert said in line
-        assert not (here / "none").exists()
+        assert not (folder / "none").exists()

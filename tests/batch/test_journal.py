@@ -17,7 +17,7 @@ LINES = [
 ]
 
 
-def written(folder: Path) -> bytes:
+def write_journal(folder: Path) -> bytes:
     journal = Journal(folder)
     for line in LINES:
         journal.add(line)
@@ -25,7 +25,7 @@ def written(folder: Path) -> bytes:
 
 
 def test_cut_off_anywhere_it_has_the_lines_before_and_goes_on(tmp_path: Path) -> None:
-    data = written(tmp_path)
+    data = write_journal(tmp_path)
     ends = [k + 1 for k, byte in enumerate(data) if byte == ord("\n")]
     for cut in range(0, len(data), 7):
         (tmp_path / JOURNAL).write_bytes(data[:cut])
@@ -70,7 +70,7 @@ def test_what_somebody_else_wrote_is_passed_over(junk: bytes) -> None:
 def test_a_damaged_byte_costs_no_more_than_the_lines_it_touches(place: int, flip: int) -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        whole = written(folder)
+        whole = write_journal(folder)
         data, place = bytearray(whole), place % len(whole)
         data[place] ^= flip
         (folder / JOURNAL).write_bytes(data)
@@ -88,7 +88,7 @@ def test_a_damaged_byte_costs_no_more_than_the_lines_it_touches(place: int, flip
 
 
 def test_damage_is_said_and_half_a_line_of_a_kill_is_not(tmp_path: Path) -> None:
-    data = written(tmp_path)
+    data = write_journal(tmp_path)
     first = data.index(b"\n")
     (tmp_path / JOURNAL).write_bytes(data[: first // 2] + b"\xff" + data[first // 2 + 1 :])
     [remark] = Journal(tmp_path).remarks

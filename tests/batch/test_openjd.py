@@ -10,14 +10,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from batches import NAMES, contents, run_all, write_batch
-from command import refused, run, succeed
+from batches import NAMES, contents, run_whole_batch, write_batch
+from command import run, run_refused, succeed
 
 OPENJD = os.environ.get("LIGHTPAINT_OPENJD") or shutil.which("openjd")
 
 
 @pytest.fixture
-def here(tmp_path: Path) -> Path:
+def folder(tmp_path: Path) -> Path:
     write_batch(tmp_path)
     output = succeed(tmp_path, "batch", "looks.toml", "-o", "out", "--export", "openjd", "job")
     assert "openjd run job/template.json" in output
@@ -29,8 +29,8 @@ def _template(here: Path) -> Any:
     return json.loads((here / "job" / "template.json").read_text())
 
 
-def test_each_look_is_in_one_task_after_all_that_it_is_made_of(here: Path) -> None:
-    steps = _template(here)["steps"]
+def test_each_look_is_in_one_task_after_all_that_it_is_made_of(folder: Path) -> None:
+    steps = _template(folder)["steps"]
     assert [step["name"] for step in steps] == ["Bases", "Looks", "Made 1", "Gallery"]
     done: list[str] = []
     for k, step in enumerate(steps[:-1]):
@@ -43,28 +43,28 @@ def test_each_look_is_in_one_task_after_all_that_it_is_made_of(here: Path) -> No
     assert done[0] == "p0"
 
 
-def test_its_commands_done_one_by_one_leave_what_one_batch_leaves(here: Path) -> None:
-    succeed(here, "batch", "looks.toml", "-o", "out")
-    (here / "out").rename(here / "once")
-    template = _template(here)
+def test_its_commands_done_one_by_one_leave_what_one_batch_leaves(folder: Path) -> None:
+    succeed(folder, "batch", "looks.toml", "-o", "out")
+    (folder / "out").rename(folder / "once")
+    template = _template(folder)
     values = {"{{Param.Manifest}}": "looks.toml", "{{Param.Output}}": "out"}
     for step in template["steps"]:
         action = step["script"]["actions"]["onRun"]
         space = step.get("parameterSpace", {"taskParameterDefinitions": [{"range": [""]}]})
         for look in space["taskParameterDefinitions"][0]["range"]:
             filled = {**values, "{{Task.Param.Look}}": look}
-            done = run(here, *(filled.get(word, word) for word in action["args"]), "-q")
+            done = run(folder, *(filled.get(word, word) for word in action["args"]), "-q")
             assert done.returncode == 0, done.stderr
-    assert contents(here / "out") == contents(here / "once")
+    assert contents(folder / "out") == contents(folder / "once")
 
 
-def test_those_that_share_a_folder_keep_others_out(here: Path) -> None:
+def test_those_that_share_a_folder_keep_others_out(folder: Path) -> None:
     from lightpaint.batch.plan.planner import plan
     from lightpaint.batch.run import run_batch
     from lightpaint.batch.run_options import RunOptions
     from lightpaint.errors import OutputError
 
-    planned, told = plan(here / "looks.toml", here / "out"), []
+    planned, told = plan(folder / "looks.toml", folder / "out"), []
 
     def meanwhile(*_: Any) -> None:
         with pytest.raises(OutputError, match="another batch is at work"):
@@ -73,49 +73,49 @@ def test_those_that_share_a_folder_keep_others_out(here: Path) -> None:
 
     run_batch(planned.select("p0"), RunOptions(shares_folder=True), on_step=meanwhile)
     assert told == [["p1"]]
-    assert not (here / "out" / "index.html").exists()
-    assert set(run_batch(plan(here / "looks.toml", here / "out")).skipped) == {"p0", "p1"}
+    assert not (folder / "out" / "index.html").exists()
+    assert set(run_batch(plan(folder / "looks.toml", folder / "out")).skipped) == {"p0", "p1"}
 
 
-def test_files_in_the_folder_of_the_job_go_with_it(here: Path) -> None:
+def test_files_in_the_folder_of_the_job_go_with_it(folder: Path) -> None:
     def kinds(template: Any) -> dict[str, tuple[str, str]]:
         given = template["parameterDefinitions"][:3]
         return {one["name"]: (one["type"], one["default"]) for one in given}
 
     outside = {"Manifest": "looks.toml", "Output": "out", "Cache": "out/.cache"}
-    whole = {name: ("STRING", str((here / file).resolve())) for name, file in outside.items()}
-    assert kinds(_template(here)) == whole
-    succeed(here, "batch", "looks.toml", "-o", "out", "--export", "openjd", ".")
-    inside = json.loads((here / "template.json").read_text())
+    whole = {name: ("STRING", str((folder / file).resolve())) for name, file in outside.items()}
+    assert kinds(_template(folder)) == whole
+    succeed(folder, "batch", "looks.toml", "-o", "out", "--export", "openjd", ".")
+    inside = json.loads((folder / "template.json").read_text())
     assert kinds(inside) == {name: ("PATH", file) for name, file in outside.items()}
 
 
-def test_a_template_that_is_there_is_kept(here: Path) -> None:
-    said = refused(here, "batch", "looks.toml", "--export", "openjd", "job")
+def test_a_template_that_is_there_is_kept(folder: Path) -> None:
+    said = run_refused(folder, "batch", "looks.toml", "--export", "openjd", "job")
     assert "template.json is there" in said
-    assert "folder of the job is missing" in refused(
-        here, "batch", "looks.toml", "--export", "openjd"
+    assert "folder of the job is missing" in run_refused(
+        folder, "batch", "looks.toml", "--export", "openjd"
     )
 
 
-def test_openjd_runs_it(here: Path) -> None:
+def test_openjd_runs_it(folder: Path) -> None:
     if OPENJD is None:
         pytest.skip("openjd (or LIGHTPAINT_OPENJD: its path)")
-    program = here / "lightpaint.sh"
+    program = folder / "lightpaint.sh"
     program.write_text(f'#!/bin/sh\nexec {sys.executable} -m lightpaint "$@"\n', encoding="utf-8")
     program.chmod(0o755)
     done = subprocess.run(
         [OPENJD, "run", "job/template.json", "-p", f"Lightpaint={program}"],
-        cwd=here,
+        cwd=folder,
         capture_output=True,
         text=True,
         check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
-    found = contents(here / "out")
+    found = contents(folder / "out")
     assert b"p1-warmer" in found["summary.csv"]
-    run_all(str(here / "looks.toml"), str(here / "once"))
-    once = contents(here / "once")
+    run_whole_batch(str(folder / "looks.toml"), str(folder / "once"))
+    once = contents(folder / "once")
     # The command, and so the sums of files with it, is that of the farm.
     same = [name for name in once if Path(name).name in ("lighting.json", "predicted.exr")]
     assert {name: found[name] for name in same} == {name: once[name] for name in same}

@@ -20,7 +20,7 @@ from lightpaint.progress import silent
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "project").mkdir()
     monkeypatch.chdir(tmp_path / "project")
     write_batch(tmp_path / "project")
@@ -36,11 +36,11 @@ def task(manifest: Path, out: Path, look: str = "p0") -> Task:
     return next(x.steps[0].task for x in plan(manifest, out).looks if x.entry.name == look)
 
 
-def here_done(item: WorkItem) -> ItemResult:
+def run_item_locally(item: WorkItem) -> ItemResult:
     return run_item(item, WorkerCache(), silent)
 
 
-def sent(store: ParcelStore, parcel: Parcel) -> None:
+def send_parcel(store: ParcelStore, parcel: Parcel) -> None:
     """Send what is lacking, as the engine does."""
     files = {its: file for file, its in (*parcel.files, *parcel.local_files)}
     for sum_ in store.missing(parcel):
@@ -51,43 +51,43 @@ def sent(store: ParcelStore, parcel: Parcel) -> None:
 
 @pytest.mark.parametrize("whole", [False, True])
 def test_a_look_done_elsewhere_is_the_look_done_here(
-    here: Path, store: ParcelStore, whole: bool
+    folder: Path, store: ParcelStore, whole: bool
 ) -> None:
-    base = here if whole else Path()
+    base = folder if whole else Path()
     run_batch(plan(base / "looks.toml", base / "expected").select("p0"))
     item = task(base / "looks.toml", base / "expected")
     elsewhere = task(base / "looks.toml", base / "out")
     parcel = pack(elsewhere, FileHashes(), run="a", is_shared=False)
     assert len(store.missing(parcel)) == 2  # basis and painting
-    sent(store, parcel)
-    done = store.run_parcel(parcel, here_done)
+    send_parcel(store, parcel)
+    done = store.run_parcel(parcel, run_item_locally)
     assert (done.failure, done.files and sorted(done.files)) == (
         "",
         ["lighting.json", "predicted.exr", "report.json", "result.json"],
     )
-    assert not (here / "out").exists()
+    assert not (folder / "out").exists()
     assert done.files is not None
     unpack(elsewhere, done.files)
-    assert contents(here / "out/p0") == contents(here / item.output_folder)
+    assert contents(folder / "out/p0") == contents(folder / item.output_folder)
     # And again, as the same answer; but not over what was changed by hand.
     unpack(elsewhere, done.files)
-    (here / "out/p0/lighting.json").write_text("mine", encoding="utf-8")
+    (folder / "out/p0/lighting.json").write_text("mine", encoding="utf-8")
     with pytest.raises(OutputError, match="was changed since lightpaint wrote it"):
         unpack(elsewhere, done.files)
-    unpack(forced(elsewhere), done.files)
+    unpack(force(elsewhere), done.files)
 
 
 @pytest.mark.parametrize("whole", [False, True])
 def test_light_groups_in_a_folder_among_paintings_are_the_same_elsewhere(
-    here: Path, store: ParcelStore, whole: bool
+    folder: Path, store: ParcelStore, whole: bool
 ) -> None:
-    base, images = here if whole else Path(), pictures()
-    (here / "renders").mkdir()
+    base, images = folder if whole else Path(), pictures()
+    (folder / "renders").mkdir()
     for name, image in zip("abc", images, strict=True):
-        interleaved(here / f"renders/{name}.exr", {"": image})
+        interleaved(folder / f"renders/{name}.exr", {"": image})
     for k in range(2):
-        interleaved(here / f"renders/p{k}.exr", {"": images[k] + images[2] / 2})
-    (here / "groups.toml").write_text(
+        interleaved(folder / f"renders/p{k}.exr", {"": images[k] + images[2] / 2})
+    (folder / "groups.toml").write_text(
         'look = [{ light_groups = "renders", paintings = ["renders/p*.exr"], '
         'variations = ["warmer"], want = ["predict"] }]',
         encoding="utf-8",
@@ -96,27 +96,27 @@ def test_light_groups_in_a_folder_among_paintings_are_the_same_elsewhere(
     for look in ("p0", "p1", "p1-warmer"):
         item = task(base / "groups.toml", base / "out", look)
         parcel = pack(item, FileHashes(), run="a", is_shared=False)
-        sent(store, parcel)
-        done = store.run_parcel(parcel, here_done)
+        send_parcel(store, parcel)
+        done = store.run_parcel(parcel, run_item_locally)
         assert done.failure == ""
         assert done.files is not None
         unpack(item, done.files)
-        assert contents(here / f"out/{look}") == contents(here / f"expected/{look}")
+        assert contents(folder / f"out/{look}") == contents(folder / f"expected/{look}")
 
 
-def forced(one: Task) -> Task:
+def force(one: Task) -> Task:
     job = json.loads(one.job)
     job["settings"]["force"] = True
     return replace(one, job=json.dumps(job))
 
 
-def test_other_content_under_the_same_name_is_sent_anew(here: Path, store: ParcelStore) -> None:
-    item, contents_ = task(here / "looks.toml", here / "out"), FileHashes()
-    sent(store, pack(item, contents_, run="a", is_shared=False))
-    (here / "p0.exr").write_bytes((here / "p1.exr").read_bytes())
+def test_other_content_under_the_same_name_is_sent_anew(folder: Path, store: ParcelStore) -> None:
+    item, contents_ = task(folder / "looks.toml", folder / "out"), FileHashes()
+    send_parcel(store, pack(item, contents_, run="a", is_shared=False))
+    (folder / "p0.exr").write_bytes((folder / "p1.exr").read_bytes())
     parcel = pack(item, contents_, run="a", is_shared=False)
     assert len(store.missing(parcel)) == 1
-    sent(store, parcel)
+    send_parcel(store, parcel)
     seen: list[bytes] = []
 
     def look(given: WorkItem) -> ItemResult:
@@ -126,7 +126,7 @@ def test_other_content_under_the_same_name_is_sent_anew(here: Path, store: Parce
         return ItemResult("p0", "answer")
 
     store.run_parcel(parcel, look)
-    assert seen == [(here / "p1.exr").read_bytes()]
+    assert seen == [(folder / "p1.exr").read_bytes()]
 
 
 def test_what_comes_otherwise_than_it_was_sent_is_refused(store: ParcelStore) -> None:
@@ -135,26 +135,26 @@ def test_what_comes_otherwise_than_it_was_sent_is_refused(store: ParcelStore) ->
 
 
 def test_a_shared_disk_is_believed_only_if_it_holds_the_same(
-    here: Path, store: ParcelStore
+    folder: Path, store: ParcelStore
 ) -> None:
-    item = task(here / "looks.toml", here / "out")
+    item = task(folder / "looks.toml", folder / "out")
     parcel = pack(item, FileHashes(), run="a", is_shared=True)
     assert store.missing(parcel) == []
-    assert store.run_parcel(parcel, here_done).failure == ""
-    assert (here / "out/p0/lighting.json").is_file()
-    (here / "p0.exr").write_bytes(b"other")
-    assert "p0.exr is another on a worker" in store.run_parcel(parcel, here_done).failure
+    assert store.run_parcel(parcel, run_item_locally).failure == ""
+    assert (folder / "out/p0/lighting.json").is_file()
+    (folder / "p0.exr").write_bytes(b"other")
+    assert "p0.exr is another on a worker" in store.run_parcel(parcel, run_item_locally).failure
 
 
 def test_files_that_are_only_here_are_carried_to_a_shared_disk_too(
-    here: Path, store: ParcelStore
+    folder: Path, store: ParcelStore
 ) -> None:
-    only_here = (here / "b.basis.exr").rename(here / "only-here.exr")
-    write_batch(here)
-    item = replace(task(here / "looks.toml", here / "out"), files=(str(only_here),))
+    only_here = (folder / "b.basis.exr").rename(folder / "only-here.exr")
+    write_batch(folder)
+    item = replace(task(folder / "looks.toml", folder / "out"), files=(str(only_here),))
     parcel = pack(item, FileHashes(), run="a", is_shared=True)
     assert len(store.missing(parcel)) == 1
-    sent(store, parcel)
+    send_parcel(store, parcel)
 
     def look(given: WorkItem) -> ItemResult:
         assert isinstance(given, Task)
@@ -175,8 +175,8 @@ def test_pieces_make_the_whole(size: int) -> None:
     assert [last for _, _, last in some] == [False] * (len(some) - 1) + [True]
 
 
-def test_a_file_that_is_gone_is_one_look_s_failure(here: Path) -> None:
-    item = task(here / "looks.toml", here / "out")
-    (here / "p0.exr").unlink()
+def test_a_file_that_is_gone_is_one_look_s_failure(folder: Path) -> None:
+    item = task(folder / "looks.toml", folder / "out")
+    (folder / "p0.exr").unlink()
     with pytest.raises(BatchError, match="cannot read"):
         pack(item, FileHashes(), run="a", is_shared=False)

@@ -15,7 +15,7 @@ from lightpaint.errors import BatchError
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     names = ["a.exr", "b.exr", "b.png", ".hidden.exr", "x/c.exr", "x/y/d.exr", "x/y/z/e.exr"]
     for name in [*names, ".x/f.exr", "x[1]/g.exr"]:
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
@@ -31,37 +31,39 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         *("**/**/**/*.exr", "x/**/z/*", "nowhere/*.exr", "*/nowhere", "./*.exr", "x/../*.exr"),
     ],
 )
-def test_they_find_what_glob_finds(here: Path, pattern: str) -> None:
-    for given in (pattern, str(here / pattern)):
+def test_they_find_what_glob_finds(folder: Path, pattern: str) -> None:
+    for given in (pattern, str(folder / pattern)):
         expected = {x for x in glob(given, recursive=True) if Path(x).is_file()}
         found = files_matching(given)
         assert {os.path.normpath(x) for x in found} == {os.path.normpath(x) for x in expected}
         assert len(set(found)) == len(found)
 
 
-def test_brackets_of_the_manifests_folder_are_no_pattern(here: Path) -> None:
-    found = files_matching("*.exr", here / "x[1]")
-    assert found == [str(here / "x[1]" / "g.exr")]
-    assert files_matching(str(here / "x" / "*.exr"), here / "x[1]") == [str(here / "x" / "c.exr")]
+def test_brackets_of_the_manifests_folder_are_no_pattern(folder: Path) -> None:
+    found = files_matching("*.exr", folder / "x[1]")
+    assert found == [str(folder / "x[1]" / "g.exr")]
+    assert files_matching(str(folder / "x" / "*.exr"), folder / "x[1]") == [
+        str(folder / "x" / "c.exr")
+    ]
 
 
 @pytest.mark.parametrize("pattern", ["/**/*", "/proc/**/*", "/usr/**/**", "/usr/**/**/**/*x*/**"])
-def test_one_that_means_the_whole_machine_ends_soon(here: Path, pattern: str) -> None:
-    (here / "looks.toml").write_text(f'[[look]]\nscene = "room.xml"\npainting = "{pattern}"\n')
+def test_one_that_means_the_whole_machine_ends_soon(folder: Path, pattern: str) -> None:
+    (folder / "looks.toml").write_text(f'[[look]]\nscene = "room.xml"\npainting = "{pattern}"\n')
     began_s = time.monotonic()
     with pytest.raises(BatchError, match="more than 20000 files to look at: name a folder"):
         plan("looks.toml", "out")
     assert time.monotonic() - began_s < 15
 
 
-def test_a_loop_of_links_has_an_end(here: Path) -> None:
-    (here / "x" / "again").symlink_to(here)
+def test_a_loop_of_links_has_an_end(folder: Path) -> None:
+    (folder / "x" / "again").symlink_to(folder)
     assert len(files_matching("**/d.exr")) == 1
 
 
-def test_looks_have_a_number(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (here / "room.xml").touch()
-    manifest = here / "looks.toml"
+def test_looks_have_a_number(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (folder / "room.xml").touch()
+    manifest = folder / "looks.toml"
     text = '[[look]]\nscene = "room.xml"\npainting = "a.exr"\nsensors = {}\n'
     names = [f"sensor {k}" for k in range(100_000)]
     manifest.write_text(text.format(names))

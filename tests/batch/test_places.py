@@ -46,7 +46,7 @@ THERE = lp.Pose(target=(-0.6, 0, -0.3))
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A room whose spot may turn, and two paintings of it, turned: a bright and a dark one."""
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
     scene = lp.load_scene(write_room(tmp_path))
@@ -59,7 +59,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-class _Heard(Listener):
+class RemarkListener(Listener):
     """A listener that keeps the remarks of a batch and the labels of its progress."""
 
     def __init__(self) -> None:
@@ -74,8 +74,8 @@ class _Heard(Listener):
         self.said.append(text)
 
 
-def run_all(here: Path, **how: Any) -> tuple[Any, _Heard]:
-    heard = _Heard()
+def run_all(here: Path, **how: Any) -> tuple[Any, RemarkListener]:
+    heard = RemarkListener()
     return run_batch(plan(here / "looks.toml", here / "out"), RunOptions(**how), heard), heard
 
 
@@ -89,55 +89,57 @@ def directions(here: Path) -> dict[str, np.ndarray]:
     return found
 
 
-def test_looks_hang_their_lights_once_and_dim_them_each(here: Path) -> None:
-    outcome, heard = run_all(here)
+def test_looks_hang_their_lights_once_and_dim_them_each(folder: Path) -> None:
+    outcome, heard = run_all(folder)
     assert sorted(outcome.done) == sorted(NAMES)
     assert heard.labels.count("poses") == 1
     # The basis of all lights, and once the plane of the spot.
     assert heard.labels.count("basis") == 2
-    found = directions(here)
-    painted = lp.load_scene(here / "room.xml").moved({"beam": THERE}).light("beam").members[0].site
+    found = directions(folder)
+    painted = (
+        lp.load_scene(folder / "room.xml").moved({"beam": THERE}).light("beam").members[0].site
+    )
     assert all(np.array_equal(its, found["day"]) for its in found.values())
     assert np.dot(found["day"], painted.direction) > np.cos(np.radians(5))
-    day, night = (read_lighting(here / "out" / x / "lighting.json") for x in ("day", "night"))
+    day, night = (read_lighting(folder / "out" / x / "lighting.json") for x in ("day", "night"))
     assert night["beam"].emission[0] == pytest.approx(day["beam"].emission[0] / 100, rel=0.05)
-    assert read_placement(here / "out" / "places" / "day.json").looks == ("day", "night")
+    assert read_placement(folder / "out" / "places" / "day.json").looks == ("day", "night")
     said = [text for text in heard.said if "beam turned by" in text]
     assert len(said) == 1
     assert said[0].startswith("day, night: ")
     # The gallery shows the plan once, and each report says who shares the places.
-    page = (here / "out" / "index.html").read_text(encoding="utf-8")
+    page = (folder / "out" / "index.html").read_text(encoding="utf-8")
     assert page.count("Plan and elevation of the room") == 1
     assert "day and night share places" in page
     for name in ("day", "night"):
-        report = json.loads((here / "out" / name / "report.json").read_text(encoding="utf-8"))
+        report = json.loads((folder / "out" / name / "report.json").read_text(encoding="utf-8"))
         assert report["placement"]["looks"] == ["day", "night"]
     # Nothing is left to do; another painting of one look moves the lights of all.
-    write_rgb(here / "night.exr", np.full((20, 24, 3), 0.01, np.float32))
-    again, heard = run_all(here)
+    write_rgb(folder / "night.exr", np.full((20, 24, 3), 0.01, np.float32))
+    again, heard = run_all(folder)
     assert sorted(again.done) == sorted(NAMES)
     assert heard.labels.count("poses") == 1
 
 
-def test_places_that_were_found_are_not_searched_for_again(here: Path) -> None:
+def test_places_that_were_found_are_not_searched_for_again(folder: Path) -> None:
     """A batch that was stopped after its search goes on from there."""
-    first = plan(here / "looks.toml", here / "out")
+    first = plan(folder / "looks.toml", folder / "out")
     run_batch(first.select("day"), RunOptions(shares_folder=True))
-    outcome, heard = run_all(here)
+    outcome, heard = run_all(folder)
     assert "poses" not in heard.labels
     assert sorted(outcome.done) == sorted(set(NAMES) - {"day"})
     # Half a file counts as none.
-    (here / "out" / "places" / "day.json").write_text('{"moves": [', encoding="utf-8")
-    assert plan(here / "looks.toml", here / "out").groups[0].read_record() is None
+    (folder / "out" / "places" / "day.json").write_text('{"moves": [', encoding="utf-8")
+    assert plan(folder / "looks.toml", folder / "out").groups[0].read_record() is None
 
 
 @pytest.mark.nightly
-def test_workers_place_as_one_process_does(here: Path) -> None:
-    run_all(here)
-    alone = directions(here)
-    (here / "out").rename(here / "alone")
-    run_all(here, workers=2)
-    assert all(np.array_equal(alone[name], its) for name, its in directions(here).items())
+def test_workers_place_as_one_process_does(folder: Path) -> None:
+    run_all(folder)
+    alone = directions(folder)
+    (folder / "out").rename(folder / "alone")
+    run_all(folder, workers=2)
+    assert all(np.array_equal(alone[name], its) for name, its in directions(folder).items())
 
 
 @pytest.mark.parametrize(
@@ -153,29 +155,29 @@ def test_workers_place_as_one_process_does(here: Path) -> None:
          "its lighting is given"),
     ],
 )  # fmt: skip
-def test_looks_that_cannot_share_places(here: Path, change: tuple[str, str], words: str) -> None:
+def test_looks_that_cannot_share_places(folder: Path, change: tuple[str, str], words: str) -> None:
     text = LOOKS.replace(*change, 1)
-    (here / "looks.toml").write_text(text, encoding="utf-8")
+    (folder / "looks.toml").write_text(text, encoding="utf-8")
     with pytest.raises(BatchError, match=words):
-        plan(here / "looks.toml", here / "out")
+        plan(folder / "looks.toml", folder / "out")
 
 
-def test_a_job_with_places_is_sent_and_read_again(here: Path) -> None:
-    first = plan(here / "looks.toml", here / "out")
+def test_a_job_with_places_is_sent_and_read_again(folder: Path) -> None:
+    first = plan(folder / "looks.toml", folder / "out")
     [task] = [x.steps[0].task for x in first.looks if x.entry.name == "day"]
-    moved = task.with_paths(lambda text: text.replace(str(here), "/elsewhere"))
+    moved = task.with_paths(lambda text: text.replace(str(folder), "/elsewhere"))
     assert moved.places == "/elsewhere/out/places/day.json"
     assert json.loads(moved.job)["placement"] == {"path": moved.places}
     assert moved == replace(type(task).from_json(moved.to_json()))
 
 
-def test_an_interrupt_amid_the_search_leaves_no_places(here: Path) -> None:
-    class Stopped(_Heard):
+def test_an_interrupt_amid_the_search_leaves_no_places(folder: Path) -> None:
+    class Stopped(RemarkListener):
         def __call__(self, label: str, done: int, total: int, unit: str = "passes") -> None:
             if label == "poses" and done:
                 raise KeyboardInterrupt
 
     with pytest.raises(Interrupted, match="6 looks are left; run the same command to continue"):
-        run_batch(plan(here / "looks.toml", here / "out"), RunOptions(), Stopped())
-    assert not (here / "out" / "places").exists()
-    assert len(plan(here / "looks.toml", here / "out").chosen_looks) == len(NAMES)
+        run_batch(plan(folder / "looks.toml", folder / "out"), RunOptions(), Stopped())
+    assert not (folder / "out" / "places").exists()
+    assert len(plan(folder / "looks.toml", folder / "out").chosen_looks) == len(NAMES)

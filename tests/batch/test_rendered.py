@@ -58,7 +58,7 @@ lighting = "preset.json"
 
 
 @pytest.fixture(scope="module")
-def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def batch_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("rendered")
     write_room(folder, lights=LIGHTS["panel"] + LIGHTS["bulb"], sensors=SIDE)
     for name, light in (("bright", 0.8), ("dark", 0.2)):
@@ -70,7 +70,7 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def done(here: Path) -> dict[str, Any]:
+def batch_record(batch_folder: Path) -> dict[str, Any]:
     """What the batch says of itself; and how often a basis was asked for."""
     asked: list[str] = []
     obtain = task_bases.obtain
@@ -81,32 +81,34 @@ def done(here: Path) -> dict[str, Any]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(task_bases, "obtain", counting)
-        told = json.loads(succeed(here, "batch", "looks.toml", "-o", "out", "--json", "-q"))
+        told = json.loads(succeed(batch_folder, "batch", "looks.toml", "-o", "out", "--json", "-q"))
     return {**told, "asked": asked}
 
 
-def test_each_basis_is_obtained_once_for_all_its_looks(here: Path, done: dict[str, Any]) -> None:
-    assert done["failed"] == 0
-    names = [look["look"] for look in done["looks"]]
+def test_each_basis_is_obtained_once_for_all_its_looks(
+    batch_folder: Path, batch_record: dict[str, Any]
+) -> None:
+    assert batch_record["failed"] == 0
+    names = [look["look"] for look in batch_record["looks"]]
     assert names == [
         *("bright-camera", "bright-side", "dark-camera", "dark-side", "both", "both"),
         *("both-warmer", "both-warmer", "final", "final-warmer", "preset"),
         *("path-0", "path-1", "path-2"),
     ]
-    seen = [look["sensor"] for look in done["looks"] if look["look"].startswith("path")]
+    seen = [look["sensor"] for look in batch_record["looks"] if look["look"].startswith("path")]
     assert seen == ["camera", "side", "camera"]
-    bright, path = (read_lighting(here / "out" / x / "lighting.json") for x in NAMED)
+    bright, path = (read_lighting(batch_folder / "out" / x / "lighting.json") for x in NAMED)
     assert bright.emission == path.emission
     # The first sensor by its name, by default, and both for the design in two views.
-    assert len(done["asked"]) <= 7
-    assert {look["sensor"] for look in done["looks"] if look["look"] == "both"} == {
+    assert len(batch_record["asked"]) <= 7
+    assert {look["sensor"] for look in batch_record["looks"] if look["look"] == "both"} == {
         "camera",
         "side",
     }
 
 
-def test_only_what_is_wanted_is_rendered(here: Path, done: dict[str, Any]) -> None:
-    out = here / "out"
+def test_only_what_is_wanted_is_rendered(batch_folder: Path, batch_record: dict[str, Any]) -> None:
+    out = batch_folder / "out"
     assert not (out / "dark-side" / "verified.exr").exists()
     assert not (out / "dark-side" / "report.html").exists()
     assert (out / "final" / "report.html").is_file()
@@ -125,18 +127,18 @@ def test_only_what_is_wanted_is_rendered(here: Path, done: dict[str, Any]) -> No
                 for file in ("relit.exr", "predicted.exr")
             )
             assert render == pytest.approx(predicted, rel=0.15)  # noise of 8 samples
-    by_name = {look["look"]: look for look in done["looks"]}
+    by_name = {look["look"]: look for look in batch_record["looks"]}
     assert by_name["final"]["agrees"] is True
     assert "agrees" not in by_name["dark-side"]
 
 
 def test_relit_scenes_load_in_plain_mitsuba_with_their_lights(
-    here: Path, done: dict[str, Any]
+    batch_folder: Path, batch_record: dict[str, Any]
 ) -> None:
     import mitsuba as mi
 
     for name in ("dark-side", "both", "final-warmer", "preset"):
-        path = here / "out" / name / "relit.xml"
+        path = batch_folder / "out" / name / "relit.xml"
         wanted = read_lighting(path.with_name("lighting.json")).emission
         found = {light.name: light.emission for light in load_scene(path).lights}
         for light, emission in wanted.items():
@@ -144,33 +146,35 @@ def test_relit_scenes_load_in_plain_mitsuba_with_their_lights(
         loaded = mi.load_file(str(path))
         assert len(loaded.emitters()) == 2
         del loaded
-    preset = read_lighting(here / "out" / "preset" / "lighting.json").emission
-    assert preset == read_lighting(here / "preset.json").emission
+    preset = read_lighting(batch_folder / "out" / "preset" / "lighting.json").emission
+    assert preset == read_lighting(batch_folder / "preset.json").emission
 
 
 def test_other_samples_of_a_final_render_render_it_alone_again(
-    here: Path, done: dict[str, Any]
+    batch_folder: Path, batch_record: dict[str, Any]
 ) -> None:
-    (here / "looks.toml").write_text(LOOKS.replace("spp = 4,", "spp = 6,"), encoding="utf-8")
-    again = run(here, "batch", "looks.toml", "-o", "out")
+    (batch_folder / "looks.toml").write_text(
+        LOOKS.replace("spp = 4,", "spp = 6,"), encoding="utf-8"
+    )
+    again = run(batch_folder, "batch", "looks.toml", "-o", "out")
     assert again.returncode == 0, again.stderr
     assert "steps: 2 steps" in again.stderr
     assert "final: render done" in again.stderr
     assert "answer done" not in again.stderr
 
 
-def test_a_scene_is_checked_before_its_first_sample(here: Path) -> None:
+def test_a_scene_is_checked_before_its_first_sample(batch_folder: Path) -> None:
     for text, said in (
         (LOOKS.replace('side = "dark', 'back = "dark'), "back"),
         (LOOKS.replace('resolution = "1/2"', 'resolution = "7x5"'), "7x5"),
         (LOOKS.replace("preset.json", "other.json"), "other.json"),
     ):
-        (here / "looks.toml").write_text(text, encoding="utf-8")
-        found = run(here, "batch", "looks.toml", "-o", "none")
+        (batch_folder / "looks.toml").write_text(text, encoding="utf-8")
+        found = run(batch_folder, "batch", "looks.toml", "-o", "none")
         assert found.returncode == 2, found.stderr
         assert all(x.startswith("lightpaint batch: ") for x in found.stderr.splitlines())
         assert said in found.stderr
-        assert not (here / "none").exists()
+        assert not (batch_folder / "none").exists()
 
 
 BY_ERROR = """
@@ -185,15 +189,15 @@ paintings = ["bright.exr", "dark.exr"]
 
 
 def test_looks_get_the_samples_that_an_error_needs(
-    here: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    batch_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """They begin with the same samples, and each goes on as `solve --error` does."""
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
-    (here / "by-error.toml").write_text(BY_ERROR, encoding="utf-8")
-    succeed(here, "batch", "by-error.toml", "-o", str(tmp_path / "out"), "-q")
+    (batch_folder / "by-error.toml").write_text(BY_ERROR, encoding="utf-8")
+    succeed(batch_folder, "batch", "by-error.toml", "-o", str(tmp_path / "out"), "-q")
     for name in ("bright", "dark"):
         given = ("room.xml", f"{name}.exr", "--error", "5%", "--no-cache", "--no-verify")
-        told = run(here, "solve", *given, "-o", tmp_path / name)
+        told = run(batch_folder, "solve", *given, "-o", tmp_path / name)
         assert "where the painting needs them" in told.stderr
         alone, of_batch = (
             read_lighting(tmp_path / folder / "lighting.json") for folder in (name, f"out/{name}")

@@ -28,7 +28,7 @@ SOON_S = 25.0
 
 
 @contextlib.contextmanager
-def answering(with_bytes: bytes | None) -> Iterator[str]:
+def fake_server(with_bytes: bytes | None) -> Iterator[str]:
     """A server that says that much to each who comes, and ends; None: never anything."""
     server = socket.create_server(("127.0.0.1", 0))
     held = []
@@ -59,7 +59,7 @@ def test_one_that_ends_while_it_is_reached(
     monkeypatch.setattr(workers, "ANSWER_S", 1.0)
     monkeypatch.setattr(workers, "GONE_S", 0.5)
     began_s = time.monotonic()
-    with answering(said) as address, pytest.raises(BatchError) as refusal:
+    with fake_server(said) as address, pytest.raises(BatchError) as refusal:
         ClusterWorkers(address, SilentListener(), "topic")  # type: ignore[arg-type]
     assert time.monotonic() - began_s < SOON_S
     assert f"no scheduler answers at {address}" in str(refusal.value)

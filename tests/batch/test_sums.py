@@ -30,7 +30,7 @@ from lightpaint.target.target import Target
 ROWS = [slice(0, 5), slice(5, 12)]
 
 
-def cut(basis: Basis, rows: slice) -> Basis:
+def cut_rows(basis: Basis, rows: slice) -> Basis:
     return Basis(
         basis.lights,
         basis.images[:, rows],
@@ -40,7 +40,7 @@ def cut(basis: Basis, rows: slice) -> Basis:
     )
 
 
-def of_sums(basis: Basis, sums: Sums, **asked: Any) -> np.ndarray:
+def solve_sums(basis: Basis, sums: Sums, **asked: Any) -> np.ndarray:
     constraints = asked.pop("constraints", Constraints())
     fit = Fit(literal=True, **asked)
     problem = summed_problem(basis.lights, "it", sums, constraints=constraints, fit=fit)
@@ -70,10 +70,10 @@ def test_the_lighting_is_that_of_the_whole_basis(
     target = Target.of(image, importance.astype(np.float32))
     fit = Fit(literal=True, **{k: v for k, v in asked.items() if k != "constraints"})
     assert reason_against_sums(target, fit) == ""
-    first, second = (sum_rows(cut(basis, rows), target, rows, fit) for rows in ROWS)
+    first, second = (sum_rows(cut_rows(basis, rows), target, rows, fit) for rows in ROWS)
     expected = solve(basis, target, literal=True, **asked).weights
     # Sums of float64 in another order.
-    np.testing.assert_allclose(of_sums(basis, first + second, **asked), expected, atol=1e-9)
+    np.testing.assert_allclose(solve_sums(basis, first + second, **asked), expected, atol=1e-9)
 
 
 def test_what_needs_pictures_says_so() -> None:
@@ -88,9 +88,9 @@ def test_what_needs_pictures_says_so() -> None:
 def test_where_nothing_counts(make_basis: BasisFactory) -> None:
     basis = make_basis(2, images=np.zeros((2, 12, 10, 3)))
     target = Target.of(np.zeros((12, 10, 3)))
-    sums = sum_rows(cut(basis, ROWS[0]), target, ROWS[0], Fit())
+    sums = sum_rows(cut_rows(basis, ROWS[0]), target, ROWS[0], Fit())
     with pytest.raises(TargetError, match="no light reaches"):
-        of_sums(basis, sums)
+        solve_sums(basis, sums)
 
 
 LOOKS = """
@@ -105,7 +105,7 @@ want = ["WANT"]
 
 
 @pytest.fixture(scope="module")
-def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def batch_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("sums")
     write_room(folder, lights=LIGHTS["panel"] + LIGHTS["bulb"])
     rng = np.random.default_rng(0)
@@ -118,7 +118,7 @@ def lighting_of(answer: Lighting) -> np.ndarray:
     return np.array(list(answer.emission.values()))
 
 
-def hearing(labels: list[str]) -> Any:
+def label_listener(labels: list[str]) -> Any:
     return lambda label, *_: labels.append(label)
 
 
@@ -130,20 +130,20 @@ def _one_thread() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("_one_thread")
-def test_a_batch_of_lightings(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_batch_of_lightings(batch_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(render_parts, "PART_SAMPLES", 2**10)
     monkeypatch.setattr(guide_training, "TRAINING_SAMPLES", (2**12,))
-    monkeypatch.setenv("LIGHTPAINT_CACHE", str(here / "cache"))
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(batch_folder / "cache"))
     found = {}
     for want in ("lights", "solve"):
-        (here / "looks.toml").write_text(LOOKS.replace("WANT", want), encoding="utf-8")
-        out = here / want
-        outcome = run_batch(plan(here / "looks.toml", out))
+        (batch_folder / "looks.toml").write_text(LOOKS.replace("WANT", want), encoding="utf-8")
+        out = batch_folder / want
+        outcome = run_batch(plan(batch_folder / "looks.toml", out))
         assert not outcome.failed
-        assert run_batch(plan(here / "looks.toml", out)).done == []
+        assert run_batch(plan(batch_folder / "looks.toml", out)).done == []
         answers = {name: read_lighting(out / name / "lighting.json") for name in ("bright", "dark")}
         found[want] = {name: lighting_of(answer) for name, answer in answers.items()}
-    written = {file.name for file in (here / "lights" / "bright").iterdir()}
+    written = {file.name for file in (batch_folder / "lights" / "bright").iterdir()}
     assert written == {"lighting.json", "relit.xml", "result.json"}
     for name, lights in found["lights"].items():
         # A basis in a file is rounded where a sixteenth of its noise hides it; sums are not.
@@ -151,17 +151,19 @@ def test_a_batch_of_lightings(here: Path, monkeypatch: pytest.MonkeyPatch) -> No
         assert (np.abs(lights - found["solve"][name]) < errors / 8).all()
     # Of a basis that is kept by now the same comes without rendering.
     text = LOOKS.replace("WANT", "lights")
-    (here / "looks.toml").write_text(text, encoding="utf-8")
+    (batch_folder / "looks.toml").write_text(text, encoding="utf-8")
     heard: list[str] = []
-    outcome = run_batch(plan(here / "looks.toml", here / "kept"), None, hearing(heard))
+    outcome = run_batch(
+        plan(batch_folder / "looks.toml", batch_folder / "kept"), None, label_listener(heard)
+    )
     assert outcome.done == ["bright", "dark"]
     assert "basis" not in heard
     for name in ("bright", "dark"):
-        kept = lighting_of(read_lighting(here / "kept" / name / "lighting.json"))
+        kept = lighting_of(read_lighting(batch_folder / "kept" / name / "lighting.json"))
         # Sums of float64 in another order.
         np.testing.assert_allclose(kept, found["solve"][name], rtol=1e-9)
     # Of one that nobody has, nothing is kept.
-    cache = [file for file in (here / "cache").rglob("*.basis.exr") if file.is_file()]
+    cache = [file for file in (batch_folder / "cache").rglob("*.basis.exr") if file.is_file()]
     assert len(cache) == 1
 
 
@@ -174,7 +176,7 @@ def test_a_batch_of_lightings(here: Path, monkeypatch: pytest.MonkeyPatch) -> No
     ],
 )
 def test_what_does_not_go_with_it_is_said_before_anything_is_rendered(
-    here: Path, change: str, said: str
+    batch_folder: Path, change: str, said: str
 ) -> None:
     instead = {
         "literal = true": "literal = false",
@@ -182,9 +184,9 @@ def test_what_does_not_go_with_it_is_said_before_anything_is_rendered(
         "spp = 16": "spp = 16, refine = 1",
     }[change]
     text = LOOKS.replace("WANT", "lights").replace(change, instead)
-    (here / "wrong.toml").write_text(text, encoding="utf-8")
+    (batch_folder / "wrong.toml").write_text(text, encoding="utf-8")
     with pytest.raises(BatchError, match=said):
-        plan(here / "wrong.toml", here / "wrong")
+        plan(batch_folder / "wrong.toml", batch_folder / "wrong")
 
 
 def test_light_groups_are_lit_without_a_picture_too(tmp_path: Path) -> None:

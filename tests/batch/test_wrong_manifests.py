@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from batches import write_batch
-from command import refused, run
+from command import run, run_refused
 from renderer import write_room
 
 HEAD = '[defaults]\nbasis = "b.basis.exr"\nwant = ["predict"]\n'
@@ -246,7 +246,7 @@ SEVERAL: dict[str, tuple[str, list[str]]] = {
 
 
 @pytest.fixture(scope="module")
-def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def batch_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("wrong")
     write_batch(folder)
     return folder
@@ -257,26 +257,26 @@ def test_there_are_forty() -> None:
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_it_is_one_line_and_nothing_is_done(here: Path, name: str) -> None:
+def test_it_is_one_line_and_nothing_is_done(batch_folder: Path, name: str) -> None:
     text, said = WRONG[name]
-    (here / "looks.toml").write_text(text, encoding="utf-8")
-    line = refused(here, "batch", "looks.toml", "-o", "out")
+    (batch_folder / "looks.toml").write_text(text, encoding="utf-8")
+    line = run_refused(batch_folder, "batch", "looks.toml", "-o", "out")
     assert line.startswith("lightpaint batch: looks.toml")
     for words in said:
         assert words in line
 
 
 @pytest.mark.parametrize("name", SEVERAL)
-def test_several_mistakes_are_told_at_once_and_no_others(here: Path, name: str) -> None:
+def test_several_mistakes_are_told_at_once_and_no_others(batch_folder: Path, name: str) -> None:
     text, said = SEVERAL[name]
-    (here / "looks.toml").write_text(text, encoding="utf-8")
-    done = run(here, "batch", "looks.toml", "-o", "out")
+    (batch_folder / "looks.toml").write_text(text, encoding="utf-8")
+    done = run(batch_folder, "batch", "looks.toml", "-o", "out")
     assert done.returncode == 2
     lines = done.stderr.splitlines()
     for words in said:
         assert any(words in line for line in lines), done.stderr
     assert len(lines) == len(said), done.stderr
-    assert not (here / "out").exists()
+    assert not (batch_folder / "out").exists()
 
 
 def test_a_wrong_sensor_is_told_beside_other_mistakes(tmp_path: Path) -> None:
@@ -300,27 +300,29 @@ def test_a_wrong_sensor_is_told_beside_other_mistakes(tmp_path: Path) -> None:
     assert len(lines) == len(expected), lines
 
 
-def test_all_mistakes_are_told_at_once(here: Path) -> None:
+def test_all_mistakes_are_told_at_once(batch_folder: Path) -> None:
     looks = '[[look]]\nname = "a"\npainting = "x.exr"\nmask = "y.png"\n'
     looks += '[[look]]\nname = "b"\npainting = "p0.exr"\n[look.settings]\nholds = 1\nseed = -1\n'
-    (here / "looks.toml").write_text(HEAD + looks, encoding="utf-8")
-    done = run(here, "batch", "looks.toml", "-o", "out")
+    (batch_folder / "looks.toml").write_text(HEAD + looks, encoding="utf-8")
+    done = run(batch_folder, "batch", "looks.toml", "-o", "out")
     assert done.returncode == 2
     lines = done.stderr.splitlines()
     assert len(lines) == 4
     assert all(line.startswith("lightpaint batch: looks.toml: look '") for line in lines)
-    assert not (here / "out").exists()
+    assert not (batch_folder / "out").exists()
 
 
-def test_a_manifest_that_is_not_there_and_other_things_of_the_command(here: Path) -> None:
-    assert "no such manifest: gone.toml" in refused(here, "batch", "gone.toml")
-    assert "2 manifests" in refused(here, "batch", "a.toml", "b.toml")
-    (here / "looks.toml").write_text(FIRST, encoding="utf-8")
-    line = refused(here, "batch", "looks.toml", "--only", "two*", "-o", "out")
+def test_a_manifest_that_is_not_there_and_other_things_of_the_command(batch_folder: Path) -> None:
+    assert "no such manifest: gone.toml" in run_refused(batch_folder, "batch", "gone.toml")
+    assert "2 manifests" in run_refused(batch_folder, "batch", "a.toml", "b.toml")
+    (batch_folder / "looks.toml").write_text(FIRST, encoding="utf-8")
+    line = run_refused(batch_folder, "batch", "looks.toml", "--only", "two*", "-o", "out")
     assert "no look matches 'two*': there are one" in line
-    (here / "file").write_text("", encoding="utf-8")
-    assert "cannot write into file" in refused(here, "batch", "looks.toml", "-o", "file")
-    (here / "file").unlink()
-    assert "no painting" in refused(here, "batch", "--init", "p0.exr")
-    assert "no such file" in refused(here, "batch", "--init", "s.xml", "p0.exr")
-    assert "looks.toml is there" in refused(here, "batch", "--init", "p0.exr", "p1.exr")
+    (batch_folder / "file").write_text("", encoding="utf-8")
+    assert "cannot write into file" in run_refused(
+        batch_folder, "batch", "looks.toml", "-o", "file"
+    )
+    (batch_folder / "file").unlink()
+    assert "no painting" in run_refused(batch_folder, "batch", "--init", "p0.exr")
+    assert "no such file" in run_refused(batch_folder, "batch", "--init", "s.xml", "p0.exr")
+    assert "looks.toml is there" in run_refused(batch_folder, "batch", "--init", "p0.exr", "p1.exr")

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import OpenEXR
 import pytest
-from command import refused, run, spawn, succeed
+from command import run, run_refused, spawn, succeed
 from PIL import Image
 from renderer import LIGHTS, REPOSITORY, write_room
 
@@ -54,14 +54,14 @@ def basis_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def solved(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+def solved_job(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """The main job: a scene and a painting in, a verified lighting out."""
     folder = tmp_path_factory.mktemp("solved")
     return folder / "warm", succeed(folder, "solve", CORNELL, WARM, "--spp", 32, by=spawn)
 
 
-def test_solve_leaves_everything_it_promises(solved: tuple[Path, str]) -> None:
-    folder, output = solved
+def test_solve_leaves_everything_it_promises(solved_job: tuple[Path, str]) -> None:
+    folder, output = solved_job
     assert {p.name for p in folder.iterdir()} == RESULTS
     assert "A render confirms it." in output
     for name in ("ceiling", "left_spot", "right_spot", "lamp", "window"):
@@ -94,8 +94,8 @@ def test_the_command_that_a_report_shows_works_from_any_folder(
     assert not [*elsewhere.iterdir()]
 
 
-def test_verify_and_relight_take_the_result(solved: tuple[Path, str], tmp_path: Path) -> None:
-    folder, _ = solved
+def test_verify_and_relight_take_the_result(solved_job: tuple[Path, str], tmp_path: Path) -> None:
+    folder, _ = solved_job
     assert "agree within noise" in succeed(tmp_path, "verify", folder, "--seed", 5)
     copies = []
     for name in ("one", "two"):
@@ -109,9 +109,9 @@ def test_verify_and_relight_take_the_result(solved: tuple[Path, str], tmp_path: 
         assert made == {"relit.xml", "relit.exr", "relit.png", "result.json"}
 
 
-def test_verify_tells_a_tampered_scene(solved: tuple[Path, str], tmp_path: Path) -> None:
+def test_verify_tells_a_tampered_scene(solved_job: tuple[Path, str], tmp_path: Path) -> None:
     folder = tmp_path / "warm"
-    shutil.copytree(solved[0], folder)
+    shutil.copytree(solved_job[0], folder)
     # The copy lies elsewhere: point it at the original's assets.
     relit = folder / "relit.xml"
     origin = os.path.relpath(CORNELL.parent, folder)
@@ -151,7 +151,7 @@ def test_each_target_with_its_own_mask(basis_file: Path, tmp_path: Path) -> None
     succeed(tmp_path, "solve", basis_file, COOL, "--mask", COOL_MASK, "-o", "cool")
     together = tmp_path / "both" / "cool" / "lighting.json"
     assert together.read_bytes() == (tmp_path / "cool" / "lighting.json").read_bytes()
-    assert "3 masks for 2 targets" in refused(
+    assert "3 masks for 2 targets" in run_refused(
         tmp_path, "solve", basis_file, WARM, COOL, *masks, "--mask", "m.exr"
     )
 
@@ -226,7 +226,7 @@ def test_lights_in_candela_and_lumen_where_the_scene_has_a_unit(tmp_path: Path) 
     assert found["flux_lm"] == pytest.approx(4 * np.pi * 100 * y, rel=1e-6)
     assert lamp["members"][0]["photometry"] == found
     for wrong in ("0", "-1", "bright", "inf"):
-        assert "cd/m²" in refused(tmp_path, "lights", CORNELL, f"--unit={wrong}")
+        assert "cd/m²" in run_refused(tmp_path, "lights", CORNELL, f"--unit={wrong}")
 
 
 def test_template_is_the_current_look(tmp_path: Path) -> None:
@@ -242,7 +242,7 @@ def test_a_painting_is_not_painted_over(tmp_path: Path) -> None:
         succeed(tmp_path, *command, "--force")
         painted = (tmp_path / output).parent / file if "." in output else tmp_path / output / file
         painted.write_bytes(b"hours of work")
-        assert "may have been painted on" in refused(tmp_path, *command)
+        assert "may have been painted on" in run_refused(tmp_path, *command)
         assert painted.read_bytes() == b"hours of work"
         succeed(tmp_path, *command, "--force")
         assert painted.read_bytes() != b"hours of work"
@@ -267,15 +267,15 @@ def test_painted_over_the_template_in_8_bits_and_solved(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     # 12 x 12 of 32 x 32 pixels.
     assert "warmer: 14.1 % painted: what differs from template/template.png" in done.stderr
-    itself = refused(tmp_path, *command[:2], "template/template.png", *command[3:])
+    itself = run_refused(tmp_path, *command[:2], "template/template.png", *command[3:])
     assert "template/template.png is the template itself" in itself
     Image.open(folder / "template.png").save(folder / "same.png")
-    same = refused(tmp_path, *command[:2], "template/same.png", *command[3:])
+    same = run_refused(tmp_path, *command[:2], "template/same.png", *command[3:])
     assert "nothing in template/same.png differs from template/template.png" in same
     about = folder / "template.json"
     other = about.read_text(encoding="utf-8").replace('"camera"', '"balcony"')
     about.write_text(other, encoding="utf-8")
-    assert "a template of the sensor balcony, not of camera" in refused(tmp_path, *command)
+    assert "a template of the sensor balcony, not of camera" in run_refused(tmp_path, *command)
 
 
 def test_a_template_that_is_forced_leaves_nothing_of_the_earlier_one(tmp_path: Path) -> None:
@@ -291,10 +291,10 @@ def test_a_template_that_is_forced_leaves_nothing_of_the_earlier_one(tmp_path: P
 
 
 def test_results_of_two_solves_never_stand_together(
-    solved: tuple[Path, str], basis_file: Path, tmp_path: Path
+    solved_job: tuple[Path, str], basis_file: Path, tmp_path: Path
 ) -> None:
     folder = tmp_path / "look"
-    shutil.copytree(solved[0], folder)
+    shutil.copytree(solved_job[0], folder)
     (folder / "notes.txt").write_text("mine", encoding="utf-8")
     succeed(tmp_path, "solve", basis_file, COOL, "--mask", COOL_MASK, "-o", folder, "--force")
     left = {p.name for p in folder.iterdir()}
@@ -329,13 +329,13 @@ def test_a_terminal_without_unicode_loses_no_result(tmp_path: Path) -> None:
 
 
 def test_a_lighting_cannot_name_a_folder_elsewhere(
-    solved: tuple[Path, str], tmp_path: Path
+    solved_job: tuple[Path, str], tmp_path: Path
 ) -> None:
-    data = json.loads((solved[0] / "lighting.json").read_text(encoding="utf-8"))
+    data = json.loads((solved_job[0] / "lighting.json").read_text(encoding="utf-8"))
     for target in ("../elsewhere", "/tmp/elsewhere", "..", 5):
         path = tmp_path / "l.json"
         path.write_text(json.dumps({**data, "target": target}), encoding="utf-8")
-        refused(tmp_path, "relight", CORNELL, path)
+        run_refused(tmp_path, "relight", CORNELL, path)
 
 
 def test_doctor_fails_where_something_is_missing(tmp_path: Path) -> None:
@@ -346,7 +346,9 @@ def test_doctor_fails_where_something_is_missing(tmp_path: Path) -> None:
 
 def test_resize_does_not_stretch(basis_file: Path, tmp_path: Path) -> None:
     write_rgb(tmp_path / "wide.exr", np.ones((64, 128, 3), np.float32))
-    assert "another aspect ratio" in refused(tmp_path, "solve", basis_file, "wide.exr", "--resize")
+    assert "another aspect ratio" in run_refused(
+        tmp_path, "solve", basis_file, "wide.exr", "--resize"
+    )
 
 
 def test_scalar_variant_says_so_and_serves(tmp_path: Path) -> None:
@@ -399,29 +401,29 @@ def test_nothing_is_printed_but_one_line_for_mistakes(basis_file: Path, tmp_path
         "bad/text.exr": "is not a picture that can be read",
         "bad": "is a folder",
     }.items():
-        assert words in refused(here, "solve", basis_file, target)
-        assert words in refused(here, "solve", CORNELL, target)
-    assert "cannot write into bad/file" in refused(
+        assert words in run_refused(here, "solve", basis_file, target)
+        assert words in run_refused(here, "solve", CORNELL, target)
+    assert "cannot write into bad/file" in run_refused(
         here, "solve", basis_file, WARM, "-o", "bad/file"
     )
-    assert "cannot write" in refused(here, "solve", basis_file, WARM, "-o", "bad/file/deeper")
-    assert "no layers named like" in refused(here, "solve", WARM, WARM)
-    assert "no such scene" in refused(here, "solve", "gone.xml", WARM)
-    assert "not a scene" in refused(here, "lights", "bad/text.exr")
-    assert "is a folder" in refused(here, "lights", "bad")
-    assert "refuses" in refused(here, "lights", "bad/file")
-    assert "nothing to render" in refused(here, "lights", GALLERY, "-D", "width=0")
-    assert "cannot change a saved basis" in refused(here, "solve", basis_file, WARM, "--spp", 9)
-    assert "no sensor 'nobody'" in refused(here, "lights", CORNELL, "-s", "nobody")
-    assert "not key=value" in refused(here, "lights", CORNELL, "-D", "spp")
-    assert "spp" in refused(here, "basis", CORNELL, "--spp", "1")
-    assert "seed" in refused(here, "basis", CORNELL, "--seed", "-1")
-    assert "unpainted" in refused(here, "solve", basis_file, WARM, "--unpainted", "nan")
-    assert "overwrite" in refused(here, "solve", basis_file, WARM, WARM)
-    assert "must end in .exr" in refused(here, "basis", CORNELL, "-o", "basis.png")
-    assert "no such lighting" in refused(here, "relight", CORNELL, "gone.json")
-    assert "not a JSON" in refused(here, "relight", CORNELL, "bad/file")
-    assert "not a result folder" in refused(here, "verify", "bad")
+    assert "cannot write" in run_refused(here, "solve", basis_file, WARM, "-o", "bad/file/deeper")
+    assert "no layers named like" in run_refused(here, "solve", WARM, WARM)
+    assert "no such scene" in run_refused(here, "solve", "gone.xml", WARM)
+    assert "not a scene" in run_refused(here, "lights", "bad/text.exr")
+    assert "is a folder" in run_refused(here, "lights", "bad")
+    assert "refuses" in run_refused(here, "lights", "bad/file")
+    assert "nothing to render" in run_refused(here, "lights", GALLERY, "-D", "width=0")
+    assert "cannot change a saved basis" in run_refused(here, "solve", basis_file, WARM, "--spp", 9)
+    assert "no sensor 'nobody'" in run_refused(here, "lights", CORNELL, "-s", "nobody")
+    assert "not key=value" in run_refused(here, "lights", CORNELL, "-D", "spp")
+    assert "spp" in run_refused(here, "basis", CORNELL, "--spp", "1")
+    assert "seed" in run_refused(here, "basis", CORNELL, "--seed", "-1")
+    assert "unpainted" in run_refused(here, "solve", basis_file, WARM, "--unpainted", "nan")
+    assert "overwrite" in run_refused(here, "solve", basis_file, WARM, WARM)
+    assert "must end in .exr" in run_refused(here, "basis", CORNELL, "-o", "basis.png")
+    assert "no such lighting" in run_refused(here, "relight", CORNELL, "gone.json")
+    assert "not a JSON" in run_refused(here, "relight", CORNELL, "bad/file")
+    assert "not a result folder" in run_refused(here, "verify", "bad")
     # Another variant, nothing but parsing, and a scene that is loaded: by processes of their own.
     for arguments, words in (
         (("lights", CORNELL, "-m", "llvm_ad_nonsense_rgb"), "no variant"),
@@ -429,7 +431,7 @@ def test_nothing_is_printed_but_one_line_for_mistakes(basis_file: Path, tmp_path
         (("basis", CORNELL, "--spp", "1"), "spp"),
         (("solve", CORNELL, "bad/nan.exr"), "NaN or Inf in every pixel"),
     ):
-        assert words in refused(here, *arguments, by=spawn)
+        assert words in run_refused(here, *arguments, by=spawn)
 
 
 def test_deep_images_are_refused_by_name(tmp_path: Path) -> None:
@@ -438,7 +440,7 @@ def test_deep_images_are_refused_by_name(tmp_path: Path) -> None:
         pixels[index] = np.ones(3, np.float32)
     header = {"compression": OpenEXR.ZIPS_COMPRESSION, "type": OpenEXR.deepscanline}
     OpenEXR.File(header, {"R": pixels, "G": pixels, "B": pixels}).write(str(tmp_path / "deep.exr"))
-    assert "deep" in refused(tmp_path, "solve", CORNELL, "deep.exr")
+    assert "deep" in run_refused(tmp_path, "solve", CORNELL, "deep.exr")
 
 
 def test_resize_and_unpainted(basis_file: Path, tmp_path: Path) -> None:
@@ -471,7 +473,7 @@ def test_missing_parameter_tells_the_option(tmp_path: Path) -> None:
     room = write_room(tmp_path)
     text = room.read_text(encoding="utf-8").replace('<default name="width" value="24"/>', "")
     room.write_text(text, encoding="utf-8")
-    assert "-D width=VALUE" in refused(tmp_path, "lights", room)
+    assert "-D width=VALUE" in run_refused(tmp_path, "lights", room)
     assert "sun" in succeed(tmp_path, "lights", room, "-D", "width=9", "--no-sheet")
 
 
@@ -529,7 +531,7 @@ def test_groups_and_kept_lights_from_solve_to_relight(tmp_path: Path) -> None:
     # A basis has no scene, which alone says where lights hang.
     assert [answers[0].pop(key) for key in ("places", "up")]
     assert answers[0] == answers[1]
-    line = refused(tmp_path, "solve", "b.basis.exr", "t.exr", "--lights", "sky", "-o", "no")
+    line = run_refused(tmp_path, "solve", "b.basis.exr", "t.exr", "--lights", "sky", "-o", "no")
     assert "--lights cannot change a saved basis" in line
 
 
@@ -555,11 +557,11 @@ def test_a_lights_file_beside_the_scene(tmp_path: Path) -> None:
     assert names("--lights-file", other) == ["all"]
 
     beside.write_text("lights = [", encoding="utf-8")
-    line = refused(tmp_path, "basis", room)
+    line = run_refused(tmp_path, "basis", room)
     assert "room.lights.toml is not TOML" in line
     assert "line 1" in line
     # The look is the sum of the basis of these lights, which the first solve is to find.
-    assert "room.lights.toml is not TOML" in refused(tmp_path, "template", room, "-o", "t.exr")
+    assert "room.lights.toml is not TOML" in run_refused(tmp_path, "template", room, "-o", "t.exr")
     succeed(tmp_path, "template", room, "--spp", 2, "-o", "t.exr", "--no-lights-file")
 
 
@@ -578,7 +580,7 @@ def test_a_lights_file_beside_the_scene(tmp_path: Path) -> None:
 def test_wrong_choices_are_refused_in_one_line(
     tmp_path: Path, arguments: tuple[str, ...], words: str
 ) -> None:
-    assert words in refused(tmp_path, "lights", write_room(tmp_path), *arguments)
+    assert words in run_refused(tmp_path, "lights", write_room(tmp_path), *arguments)
 
 
 def test_solved_small_and_verified_large(tmp_path: Path) -> None:
@@ -646,18 +648,18 @@ def test_a_basis_for_a_time(tmp_path: Path) -> None:
 
 def test_budgets_that_contradict_each_other_are_refused(basis_file: Path, tmp_path: Path) -> None:
     refuse = [tmp_path, "basis", CORNELL]
-    assert "not allowed with" in refused(*refuse, "--time", 3, "--spp", 4)
-    assert "not a number of seconds" in refused(*refuse, "--time", 0)
-    assert "invalid choice" in refused(*refuse, "--quality", "good")
-    assert "will do" in refused(*refuse, "--resolution", "100x100")
+    assert "not allowed with" in run_refused(*refuse, "--time", 3, "--spp", 4)
+    assert "not a number of seconds" in run_refused(*refuse, "--time", 0)
+    assert "invalid choice" in run_refused(*refuse, "--quality", "good")
+    assert "will do" in run_refused(*refuse, "--resolution", "100x100")
     solve = [tmp_path, "solve", CORNELL, WARM]
-    assert "error is 0.02 and spp 4" in refused(*solve, "--error", "2%", "--spp", 4)
+    assert "error is 0.02 and spp 4" in run_refused(*solve, "--error", "2%", "--spp", 4)
     for wrong in ("0", "nan", "100%"):
-        assert "expected a share of at least" in refused(*solve, "--error", wrong)
-    assert "not a share like 2%" in refused(*solve, "--error", "two")
+        assert "expected a share of at least" in run_refused(*solve, "--error", wrong)
+    assert "not a share like 2%" in run_refused(*solve, "--error", "two")
     given = (("--time", 3), ("--error", "2%"), ("--quality", "final"), ("--resolution", "1/2"))
     for option in given:
-        told = refused(tmp_path, "solve", basis_file, WARM, *option)
+        told = run_refused(tmp_path, "solve", basis_file, WARM, *option)
         assert f"{option[0]} cannot change a saved basis" in told
 
 

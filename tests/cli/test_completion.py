@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 
-def completed(folder: Path, line: str, **more: str) -> list[str]:
+def completions(folder: Path, line: str, **more: str) -> list[str]:
     """What bash is told when TAB is pressed behind `line`."""
     answer = folder / ".answer"
     answer.unlink(missing_ok=True)
@@ -62,7 +62,7 @@ def folder(tmp_path: Path) -> Path:
     ],
 )
 def test_what_is_offered(folder: Path, line: str, offered: list[str]) -> None:
-    assert [x for x in completed(folder, line) if x] == offered
+    assert [x for x in completions(folder, line) if x] == offered
 
 
 def test_nothing_is_rendered_or_loaded_for_it(folder: Path) -> None:
@@ -79,7 +79,7 @@ def test_nothing_is_rendered_or_loaded_for_it(folder: Path) -> None:
 def test_without_argcomplete_there_is_no_answer_and_no_noise(folder: Path) -> None:
     (folder / "argcomplete.py").write_text("raise ImportError")
     path = os.pathsep.join([str(folder), *sys.path])
-    assert completed(folder, "lightpaint so", PYTHONPATH=path) == []
+    assert completions(folder, "lightpaint so", PYTHONPATH=path) == []
 
 
 def test_the_shell_finds_it() -> None:

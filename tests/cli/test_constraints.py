@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command import refused, run, succeed
+from command import run, run_refused, succeed
 from renderer import write_room
 
 from lightpaint import Constraints, paint_with_light, read_basis
@@ -118,18 +118,18 @@ def test_every_option_from_a_saved_basis(room: Path, tmp_path: Path) -> None:
     assert not any(_lights(tmp_path / "c")["sun"]["emission"])
 
 
-def _parsed(*options: str) -> Any:
+def _parse(*options: str) -> Any:
     return command_parser().parse_args(["solve", "b.basis.exr", "t.exr", *options])
 
 
 def test_a_temperature_may_be_away_from_plancks_locus() -> None:
-    options = _parsed("--kelvin", "a=2700:6500,duv=-0.005", "--kelvin", "b=3200K, duv=1e-2")
+    options = _parse("--kelvin", "a=2700:6500,duv=-0.005", "--kelvin", "b=3200K, duv=1e-2")
     assert options.kelvin == [("a", [2700, 6500]), ("b", [3200])]
     assert options.duv == [("a", -0.005), ("b", 0.01)]
     # What is said last holds, and no list is shared between two commands.
-    options = _parsed("--kelvin", "a=2700,duv=0.01", "--kelvin", "a=3000")
+    options = _parse("--kelvin", "a=2700,duv=0.01", "--kelvin", "a=3000")
     assert (options.kelvin[-1], options.duv) == (("a", [3000]), [])
-    assert (_parsed().kelvin, _parsed().duv) == ([], [])
+    assert (_parse().kelvin, _parse().duv) == ([], [])
 
 
 def test_a_temperature_away_from_plancks_locus_is_solved_for(room: Path, tmp_path: Path) -> None:
@@ -162,7 +162,7 @@ def test_options_that_mean_nothing_are_refused_in_one_line(
     room: Path, tmp_path: Path, arguments: tuple[str, ...], words: str
 ) -> None:
     # From the scene: nothing may have been rendered.
-    line = refused(tmp_path, "solve", room / "room.xml", room / "t.exr", *arguments)
+    line = run_refused(tmp_path, "solve", room / "room.xml", room / "t.exr", *arguments)
     assert words in line
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command import refused, run, succeed
+from command import run, run_refused, succeed
 from fake_blender import fake_blender, run_in
 from light_groups import interleaved, pictures
 from renderer import LIGHTS, write_room
@@ -25,7 +25,7 @@ FLOAT32 = 1e-6
 
 
 @pytest.fixture(scope="module")
-def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def answer_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A room whose lights are in it and in a file that it includes, and an answer for it."""
     folder = tmp_path_factory.mktemp("export")
     (folder / "lamps").mkdir()
@@ -42,22 +42,22 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def elsewhere(here: Path) -> Any:
+def exported_values(here: Path) -> Any:
     """What other programs get: of lights whose colour four samples do not tell, their own."""
     current = {light.name: light.emission for light in load_scene(here / "room.xml").lights}
     return with_own_colors(read_lighting(here / "look" / "lighting.json"), current)[0].emission
 
 
-def test_a_patch_changes_the_lights_and_nothing_else(here: Path, tmp_path: Path) -> None:
+def test_a_patch_changes_the_lights_and_nothing_else(answer_folder: Path, tmp_path: Path) -> None:
     if shutil.which("patch") is None:
         pytest.skip("patch")
     given = ("look/lighting.json", "--to", "mitsuba", "--scene", "room.xml")
-    succeed(here, "export", *given, "-o", tmp_path / "out")
+    succeed(answer_folder, "export", *given, "-o", tmp_path / "out")
     patch = (tmp_path / "out" / "relit.patch").read_text()
-    shutil.copy(here / "room.xml", tmp_path)
-    shutil.copytree(here / "lamps", tmp_path / "lamps")
+    shutil.copy(answer_folder / "room.xml", tmp_path)
+    shutil.copytree(answer_folder / "lamps", tmp_path / "lamps")
     subprocess.run(["patch", "-p1"], input=patch, text=True, cwd=tmp_path, check=True)
-    wanted = read_lighting(here / "look" / "lighting.json").emission
+    wanted = read_lighting(answer_folder / "look" / "lighting.json").emission
     found = {light.name: light.emission for light in load_scene(tmp_path / "room.xml").lights}
     assert set(found) == set(wanted)
     for name, emission in wanted.items():
@@ -91,10 +91,10 @@ def _blender() -> Any:
     return bpy, modules
 
 
-def test_blender_is_given_watts_of_the_same_light(here: Path, tmp_path: Path) -> None:
+def test_blender_is_given_watts_of_the_same_light(answer_folder: Path, tmp_path: Path) -> None:
     given = ("look/lighting.json", "--to", "blender,csv", "--scene", "room.xml")
-    succeed(here, "export", *given, "-o", tmp_path)
-    wanted = elsewhere(here)
+    succeed(answer_folder, "export", *given, "-o", tmp_path)
+    wanted = exported_values(answer_folder)
     text = (tmp_path / "set_scene.py").read_text()
     ast.parse(text)
     blender, modules = _blender()
@@ -113,15 +113,15 @@ def test_blender_is_given_watts_of_the_same_light(here: Path, tmp_path: Path) ->
     np.testing.assert_allclose(np.array(color[:3]) * strength, wanted["panel"], rtol=FLOAT32)
 
 
-def test_light_groups_go_to_nuke_and_blender(here: Path, tmp_path: Path) -> None:
+def test_light_groups_go_to_nuke_and_blender(answer_folder: Path, tmp_path: Path) -> None:
     given = ("grouped/lighting.json", "--to", "nuke", "--to", "csv,blender")
-    succeed(here, "export", *given, "--lights", "groups.exr", "-o", tmp_path)
+    succeed(answer_folder, "export", *given, "--lights", "groups.exr", "-o", tmp_path)
     names = sorted(path.name for path in tmp_path.iterdir())
     assert names == ["fixtures.csv", "relit.nk", "set_lights.py"]
     assert (tmp_path / "relit.nk").read_text().startswith("version 12.0")
 
 
-def test_a_layer_of_usd_relights_a_stage(here: Path, tmp_path: Path) -> None:
+def test_a_layer_of_usd_relights_a_stage(answer_folder: Path, tmp_path: Path) -> None:
     pxr = pytest.importorskip("pxr.Usd", reason="usd-core")
     from pxr import UsdLux
 
@@ -130,25 +130,29 @@ def test_a_layer_of_usd_relights_a_stage(here: Path, tmp_path: Path) -> None:
     UsdLux.SphereLight.Define(stage, "/hall/bulb")
     stage.Save()
     given = ("look/lighting.json", "--to", "usd", "--scene", "room.xml")
-    done = run(here, "export", *given, "--stage", tmp_path / "hall.usda", "-o", tmp_path / "out")
+    done = run(
+        answer_folder, "export", *given, "--stage", tmp_path / "hall.usda", "-o", tmp_path / "out"
+    )
     assert done.returncode == 0, done.stderr
     assert "hall.usda has no single light for sun: set it by hand" in done.stderr
-    wanted = elsewhere(here)
+    wanted = exported_values(answer_folder)
     relit = pxr.Stage.Open(str(tmp_path / "out" / "lights.usda"))
     for name, factor in (("panel", 1.0), ("bulb", 4.0)):
         light = UsdLux.LightAPI(relit.GetPrimAtPath(f"/hall/{name}"))
         found = light.GetIntensityAttr().Get() * np.array(light.GetColorAttr().Get())
         np.testing.assert_allclose(found / factor, wanted[name], rtol=FLOAT32)
-    assert "--stage belongs to the form usd" in refused(
-        here, "export", *given[:1], "--to", "csv", "--stage", "hall.usda"
+    assert "--stage belongs to the form usd" in run_refused(
+        answer_folder, "export", *given[:1], "--to", "csv", "--stage", "hall.usda"
     )
     (tmp_path / "torn.usda").write_text("#usda 1.0\n(", encoding="utf-8")
     for name, said in (("gone.usda", "no such stage"), ("torn.usda", "is not a USD stage")):
-        line = refused(here, "export", *given, "--stage", tmp_path / name, "-o", "none")
+        line = run_refused(
+            answer_folder, "export", *given, "--stage", tmp_path / name, "-o", "none"
+        )
         assert said in line
 
 
-def test_what_it_lacks_is_one_line(here: Path) -> None:
+def test_what_it_lacks_is_one_line(answer_folder: Path) -> None:
     lighting = "look/lighting.json"
     wrong = {
         (lighting, "--to", "maya"): "no form 'maya': known are csv, json, mitsuba, usd",
@@ -160,8 +164,13 @@ def test_what_it_lacks_is_one_line(here: Path) -> None:
         ("gone.json", "--to", "csv"): "no such lighting file",
     }
     for given, said in wrong.items():
-        assert said in refused(here, "export", *given, "-o", "none")
-    (here / "kept").mkdir()
-    (here / "kept" / "fixtures.csv").write_text("mine", encoding="utf-8")
-    assert "exists: name another" in refused(here, "export", lighting, "--to", "csv", "-o", "kept")
-    assert run(here, "export", lighting, "--to", "csv", "-o", "kept", "--force").returncode == 0
+        assert said in run_refused(answer_folder, "export", *given, "-o", "none")
+    (answer_folder / "kept").mkdir()
+    (answer_folder / "kept" / "fixtures.csv").write_text("mine", encoding="utf-8")
+    assert "exists: name another" in run_refused(
+        answer_folder, "export", lighting, "--to", "csv", "-o", "kept"
+    )
+    assert (
+        run(answer_folder, "export", lighting, "--to", "csv", "-o", "kept", "--force").returncode
+        == 0
+    )

@@ -5,7 +5,7 @@ import stat
 from pathlib import Path
 
 import pytest
-from command import refused, run
+from command import run, run_refused
 
 from lightpaint.cli import dispatcher
 from lightpaint.cli.crash_report import FAULT
@@ -25,13 +25,13 @@ SCENE = """<scene version="3.0.0">
 @pytest.mark.parametrize("name", ["template", "basis"])
 def test_a_scene_that_mitsuba_cannot_render_is_one_line(tmp_path: Path, name: str) -> None:
     (tmp_path / "flat.xml").write_text(SCENE, encoding="utf-8")
-    line = refused(tmp_path, name, "flat.xml", "--spp", "2", "-o", "out.basis.exr", "-q")
+    line = run_refused(tmp_path, name, "flat.xml", "--spp", "2", "-o", "out.basis.exr", "-q")
     assert line.startswith(f"lightpaint {name}: Mitsuba cannot render flat.xml: ")
     assert "not implemented" in line
     assert "--integrator path" in line
 
 
-def fails(monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
+def make_fail(monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
     def doctor(**_: object) -> None:
         raise error
 
@@ -49,7 +49,7 @@ def test_a_recursion_without_end_is_no_error_of_mitsuba() -> None:
 def test_what_nobody_foresaw_has_a_code_a_line_and_a_private_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    fails(monkeypatch, KeyError("a\x1b[31m name\nof two lines"))
+    make_fail(monkeypatch, KeyError("a\x1b[31m name\nof two lines"))
     done = run(
         tmp_path, "doctor", "--json", XDG_STATE_HOME=str(tmp_path / "state"), HOME=str(tmp_path)
     )
@@ -72,8 +72,8 @@ def test_what_nobody_foresaw_has_a_code_a_line_and_a_private_file(
 
 
 def test_too_little_memory_is_no_fault(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    fails(monkeypatch, MemoryError("Unable to allocate 12 GiB"))
-    line = refused(tmp_path, "doctor")
+    make_fail(monkeypatch, MemoryError("Unable to allocate 12 GiB"))
+    line = run_refused(tmp_path, "doctor")
     assert "more memory than there is" in line
     assert "--resolution 1/2" in line
 
@@ -81,7 +81,7 @@ def test_too_little_memory_is_no_fault(tmp_path: Path, monkeypatch: pytest.Monke
 def test_where_nothing_can_be_written_it_is_one_line_still(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    fails(monkeypatch, ZeroDivisionError())
+    make_fail(monkeypatch, ZeroDivisionError())
     monkeypatch.setattr("lightpaint.cli.crash_report._folders", lambda: [Path("/dev/null/logs")])
     done = run(tmp_path, "doctor")
     assert done.returncode == FAULT

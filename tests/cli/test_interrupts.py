@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from command import as_from_a_terminal
-from nightly import at_night
+from nightly import nightly
 from renderer import CORNELL, LIGHTS, PATH, assert_equal_bits, write_room
 
 from lightpaint.basis.basis import Basis
@@ -53,16 +53,16 @@ def start(
     )
 
 
-def kept(folder: Path, cache: str) -> list[Path]:
+def kept_bases(folder: Path, cache: str) -> list[Path]:
     return list((folder / cache).glob("*.basis.exr"))
 
 
-def writings(folder: Path, cache: str) -> list[tuple[int, int]]:
+def basis_versions(folder: Path, cache: str) -> list[tuple[int, int]]:
     """Which file has the basis that is kept; nothing where there is none.
 
     Each one that is written is another file, while a time also changes when a basis is found.
     """
-    return [(path.stat().st_ino, path.stat().st_size) for path in kept(folder, cache)]
+    return [(path.stat().st_ino, path.stat().st_size) for path in kept_bases(folder, cache)]
 
 
 def samples(basis: Basis) -> int:
@@ -78,7 +78,7 @@ def three_lights(folder: Path, method: str) -> Path:
 
 
 @pytest.fixture(scope="module", params=INTEGRATORS)
-def never_stopped(
+def uninterrupted(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[str, Path, Basis]:
     """(method, a room, the basis that nothing interrupted)."""
@@ -93,24 +93,24 @@ def never_stopped(
     "signals",
     [
         (signal.SIGINT, signal.SIGKILL),
-        at_night((signal.SIGKILL,)),
-        at_night((signal.SIGKILL, signal.SIGINT)),
-        at_night((signal.SIGINT,) * 2),
+        nightly((signal.SIGKILL,)),
+        nightly((signal.SIGKILL, signal.SIGINT)),
+        nightly((signal.SIGINT,) * 2),
     ],
 )
 def test_stopped_and_gone_on_is_as_if_never_stopped(
-    tmp_path: Path, never_stopped: tuple[str, Path, Basis], signals: tuple[signal.Signals, ...]
+    tmp_path: Path, uninterrupted: tuple[str, Path, Basis], signals: tuple[signal.Signals, ...]
 ) -> None:
-    method, room, whole = never_stopped
+    method, room, whole = uninterrupted
     spp, done = SPP[method], 0
     for number in signals:
-        before = writings(tmp_path, "stopped")
+        before = basis_versions(tmp_path, "stopped")
         with start(tmp_path, room, spp, "stopped", SLOWLY="yes") as process:
             assert process.stderr is not None
             while not process.stderr.readline().startswith("basis"):
                 assert process.poll() is None
             # Something new is kept, and more is on its way.
-            while writings(tmp_path, "stopped") in ([], before):
+            while basis_versions(tmp_path, "stopped") in ([], before):
                 assert process.poll() is None
                 time.sleep(0.01)
             time.sleep(0.3)
@@ -125,7 +125,7 @@ def test_stopped_and_gone_on_is_as_if_never_stopped(
             assert said.startswith("lightpaint basis: interrupted")
             assert "are kept; run the same command to continue" in said
             assert said.count("\n") == 1
-        [path] = kept(tmp_path, "stopped")
+        [path] = kept_bases(tmp_path, "stopped")
         part = read_basis(path)
         assert part.origin.method == method
         # Nothing of what was kept is lost, and there is more to do.
@@ -141,7 +141,7 @@ def test_stopped_and_gone_on_is_as_if_never_stopped(
     stopped = read_basis(tmp_path / "stopped.exr")
     assert stopped.origin.spp == spp
     assert_equal_bits(stopped, whole)
-    assert len(kept(tmp_path, "stopped")) == 1
+    assert len(kept_bases(tmp_path, "stopped")) == 1
 
 
 @pytest.mark.parametrize(
@@ -151,10 +151,10 @@ def test_stopped_and_gone_on_is_as_if_never_stopped(
         (ONE_PASS, signal.SIGTERM, 0.1),
         (ONE_PASS, signal.SIGHUP, 0.1),
         (SEPARATE, signal.SIGINT, 0.1),
-        at_night(ONE_PASS, signal.SIGINT, 0.1),
-        at_night(SEPARATE, signal.SIGINT, 0),
-        at_night(SEPARATE, signal.SIGTERM, 0.1),
-        at_night(SEPARATE, signal.SIGHUP, 0.1),
+        nightly(ONE_PASS, signal.SIGINT, 0.1),
+        nightly(SEPARATE, signal.SIGINT, 0),
+        nightly(SEPARATE, signal.SIGTERM, 0.1),
+        nightly(SEPARATE, signal.SIGHUP, 0.1),
     ],
 )
 def test_interrupted_before_much_is_done(
@@ -175,7 +175,7 @@ def test_interrupted_before_much_is_done(
         assert process.wait(timeout=60) == 128 + number
     assert errors.startswith("lightpaint basis: interrupted")
     assert errors.count("\n") == 1
-    assert len(kept(tmp_path, "cache")) == ("are kept" in errors)
+    assert len(kept_bases(tmp_path, "cache")) == ("are kept" in errors)
     assert {p.name for p in tmp_path.iterdir()} <= {"cache"}
 
 
@@ -245,7 +245,7 @@ def test_what_a_script_starts_in_its_background_hears_ctrl_c(tmp_path: Path) -> 
         assert process.wait(timeout=60) == 130
 
 
-@pytest.mark.parametrize("delay_s", [at_night(0.3), 0.7, at_night(1.3)])
+@pytest.mark.parametrize("delay_s", [nightly(0.3), 0.7, nightly(1.3)])
 def test_killed_at_any_moment_leaves_a_readable_basis(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, delay_s: float
 ) -> None:

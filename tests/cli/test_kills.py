@@ -8,8 +8,8 @@ import signal
 from collections.abc import Callable
 
 import pytest
-from killed_commands import Stage, after, when_staged, when_staging
-from nightly import at_night
+from killed_commands import Stage, wait_for_record, wait_for_seconds, wait_for_staging
+from nightly import nightly
 
 
 @pytest.fixture(scope="module", params=["solve", "relight"])
@@ -20,10 +20,10 @@ def stage(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
 @pytest.mark.parametrize(
     ("until", "number"),
     [
-        at_night(after(0.5), signal.SIGKILL),
-        (when_staging(0.0), signal.SIGTERM),
-        at_night(when_staging(0.2), signal.SIGKILL),
-        (when_staged, signal.SIGKILL),
+        nightly(wait_for_seconds(0.5), signal.SIGKILL),
+        (wait_for_staging(0.0), signal.SIGTERM),
+        nightly(wait_for_staging(0.2), signal.SIGKILL),
+        (wait_for_record, signal.SIGKILL),
     ],
 )
 def test_the_earlier_or_the_new(

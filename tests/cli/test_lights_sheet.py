@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from command import refused, run
+from command import run, run_refused
 from PIL import Image
 from renderer import LIGHTS, write_room
 
@@ -50,7 +50,7 @@ def test_the_sheet_is_drawn_and_drawn_anew(room: Path, monkeypatch: pytest.Monke
     assert "no lights.png: lights.png exists and is not a light sheet" in kept.stderr
     assert "choose another name with -o, or pass --force" in kept.stderr
     assert sheet.read_bytes() == b"mine"
-    assert "is not a light sheet" in refused(folder, "lights", room, "-o", "lights.png")
+    assert "is not a light sheet" in run_refused(folder, "lights", room, "-o", "lights.png")
     assert run(folder, "lights", room, "--force").returncode == 0
     assert sheet.read_bytes() == drawn
 
@@ -61,10 +61,14 @@ def test_only_where_it_is_wanted(room: Path) -> None:
         assert done.returncode == 0
         assert "sheet" not in done.stdout
     assert [path.name for path in room.parent.iterdir()] == ["room.xml"]
-    assert "must end in .png" in refused(room.parent, "lights", room, "-o", "a.jpg")
+    assert "must end in .png" in run_refused(room.parent, "lights", room, "-o", "a.jpg")
     (room.parent / "link.png").symlink_to(room)
-    assert "is an input of this command" in refused(room.parent, "lights", room, "-o", "link.png")
-    assert "not allowed with" in refused(room.parent, "lights", room, "-o", "a.png", "--no-sheet")
+    assert "is an input of this command" in run_refused(
+        room.parent, "lights", room, "-o", "link.png"
+    )
+    assert "not allowed with" in run_refused(
+        room.parent, "lights", room, "-o", "a.png", "--no-sheet"
+    )
 
 
 def test_where_rendering_is_slow_the_list_is_all(

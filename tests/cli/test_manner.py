@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command import refused, run, succeed
+from command import run, run_refused, succeed
 from renderer import LIGHTS, write_room
 
 from lightpaint.basis.file.basis_file import write_basis
@@ -30,7 +30,7 @@ def document(folder: Path, *arguments: object, code: int = 0) -> Any:
 
 
 @pytest.fixture
-def here(tmp_path: Path, make_basis: Any) -> Path:
+def work_folder(tmp_path: Path, make_basis: Any) -> Path:
     """A basis, and two paintings: what it makes, and what no lights make."""
     basis = make_basis(2, names=["a", BAD])
     write_basis(tmp_path / "b.basis.exr", basis)
@@ -40,46 +40,46 @@ def here(tmp_path: Path, make_basis: Any) -> Path:
     return tmp_path
 
 
-def test_of_solve_it_is_what_the_files_say(here: Path) -> None:
-    told = document(here, "solve", "b.basis.exr", "good.exr", "bad.exr", "-o", "out")
+def test_of_solve_it_is_what_the_files_say(work_folder: Path) -> None:
+    told = document(work_folder, "solve", "b.basis.exr", "good.exr", "bad.exr", "-o", "out")
     assert [result["target"] for result in told["results"]] == ["good", "bad"]
     for result in told["results"]:
         folder = Path("out", result["target"])
         assert result["folder"] == result["view"] == str(folder)
-        there = {str(file.relative_to(here)) for file in (here / folder).iterdir()}
+        there = {str(file.relative_to(work_folder)) for file in (work_folder / folder).iterdir()}
         assert set(result["files"]) == there
         assert len(result["files"]) == len(there)
         for name in ("report", "lighting"):
-            assert result[name] == json.loads((here / folder / f"{name}.json").read_text())
+            assert result[name] == json.loads((work_folder / folder / f"{name}.json").read_text())
         assert list(result["lighting"]["lights"]) == ["a", BAD]
         assert f"Mean ΔE {result['report']['seen']['delta_e']:.1f} " in result["verdict"]
         assert result["is_close"] == (result["target"] == "good")
         assert "is_met" not in result
 
 
-def test_an_answer_that_is_not_close_enough(here: Path) -> None:
+def test_an_answer_that_is_not_close_enough(work_folder: Path) -> None:
     command = ("solve", "b.basis.exr", "bad.exr")
-    [result] = document(here, *command)["results"]
+    [result] = document(work_folder, *command)["results"]
     seen = result["report"]["seen"]
     assert seen["share_met"] == max(0, 1 - seen["delta_e"] / seen["asked"])
     missed, met = seen["delta_e"], seen["share_met"]
-    shutil.rmtree(here / "bad")
+    shutil.rmtree(work_folder / "bad")
 
-    done = run(here, *command, "--max-miss", missed - 0.01, "-q")
+    done = run(work_folder, *command, "--max-miss", missed - 0.01, "-q")
     assert done.returncode == 1
     said = f"lightpaint solve: bad misses a mean ΔE of {missed:.3f}, more than --max-miss"
     assert done.stderr.startswith(said)
     assert len(done.stderr.splitlines()) == 1
-    assert (here / "bad" / "lighting.json").is_file()
+    assert (work_folder / "bad" / "lighting.json").is_file()
 
     command += ("--max-miss", missed, "--min-fit", met)
-    assert run(here, *command).returncode == 0
-    [result] = document(here, *command[:-1], met + 0.01, code=1)["results"]
+    assert run(work_folder, *command).returncode == 0
+    [result] = document(work_folder, *command[:-1], met + 0.01, code=1)["results"]
     assert result["asked"] == {"max_miss": missed, "min_fit": met + 0.01}
     assert result["is_met"] is False
     # Of several, all that fall short are named in the one line.
     both = ("solve", "b.basis.exr", "bad.exr", "good.exr", "--max-miss", 1, "-o", "both", "-q")
-    done = run(here, *both)
+    done = run(work_folder, *both)
     assert done.returncode == 1
     assert "both/bad misses" in done.stderr
     assert "both/good" not in done.stderr
@@ -87,13 +87,13 @@ def test_an_answer_that_is_not_close_enough(here: Path) -> None:
 
 @pytest.mark.parametrize("option", ["--max-miss", "--min-fit"])
 @pytest.mark.parametrize("value", ["-1", "nan", "inf", "much", ""])
-def test_what_cannot_be_asked_is_refused(here: Path, option: str, value: str) -> None:
-    said = refused(here, "solve", "b.basis.exr", "good.exr", f"{option}={value}")
+def test_what_cannot_be_asked_is_refused(work_folder: Path, option: str, value: str) -> None:
+    said = run_refused(work_folder, "solve", "b.basis.exr", "good.exr", f"{option}={value}")
     assert f"{option}: {value!r} is not a number" in said
 
 
-def test_a_share_is_at_most_1(here: Path) -> None:
-    said = refused(here, "solve", "b.basis.exr", "good.exr", "--min-fit", 80)
+def test_a_share_is_at_most_1(work_folder: Path) -> None:
+    said = run_refused(work_folder, "solve", "b.basis.exr", "good.exr", "--min-fit", 80)
     assert "is not a number as a share <= 1" in said
 
 
@@ -137,36 +137,36 @@ def test_every_command_has_a_document(tmp_path: Path) -> None:
     assert (relit["folder"], relit["lighting"]) == ("r", "out/lighting.json")
 
 
-def test_the_cache_and_the_doctor(here: Path, make_basis: Any, monkeypatch: Any) -> None:
+def test_the_cache_and_the_doctor(work_folder: Path, make_basis: Any, monkeypatch: Any) -> None:
     from lightpaint.basis.cache import cache
 
-    monkeypatch.setenv("LIGHTPAINT_CACHE", str(here / "cache"))
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(work_folder / "cache"))
     assert cache.keep(make_basis(2, names=["a", BAD]))
-    told = document(here, "cache")
+    told = document(work_folder, "cache")
     [entry] = told["kept"]
     assert (entry["scene"], entry["lights"], entry["size"]) == ("scene.xml", 2, [10, 12])
-    assert told["folder"] == str(here / "cache")
-    assert document(here, "cache", "drop", "scene")["dropped"] == [entry]
-    assert document(here, "cache", "clear") == {
-        "folder": str(here / "cache"),
+    assert told["folder"] == str(work_folder / "cache")
+    assert document(work_folder, "cache", "drop", "scene")["dropped"] == [entry]
+    assert document(work_folder, "cache", "clear") == {
+        "folder": str(work_folder / "cache"),
         "dropped": [],
         "freed": 0,
     }
-    told = document(here, "doctor")
+    told = document(work_folder, "doctor")
     assert told["ok"]
     assert "mitsuba" in [finding["what"] for finding in told["findings"]]
 
 
-def test_errors_stay_one_line(here: Path) -> None:
+def test_errors_stay_one_line(work_folder: Path) -> None:
     for how in ("--json", "-q", "-v"):
-        assert "no such" in refused(here, "solve", "gone.xml", "good.exr", how)
-        assert "gone" in refused(here, "cache", "drop", "gone", how)
-    assert "not allowed with" in refused(here, "cache", "-q", "-v")
+        assert "no such" in run_refused(work_folder, "solve", "gone.xml", "good.exr", how)
+        assert "gone" in run_refused(work_folder, "cache", "drop", "gone", how)
+    assert "not allowed with" in run_refused(work_folder, "cache", "-q", "-v")
 
 
-def test_quiet_and_verbose(here: Path) -> None:
+def test_quiet_and_verbose(work_folder: Path) -> None:
     command = ("solve", "b.basis.exr", "good.exr", "-o", "out")
-    plain, quiet, verbose = (run(here, *command, *how) for how in ((), ("-q",), ("-v",)))
+    plain, quiet, verbose = (run(work_folder, *command, *how) for how in ((), ("-q",), ("-v",)))
     assert quiet.stderr == ""
     assert quiet.stdout == plain.stdout == verbose.stdout
     more = set(verbose.stderr.splitlines()) - set(plain.stderr.splitlines())

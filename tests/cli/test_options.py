@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command import refused
+from command import run_refused
 from light_groups import channels, interleaved, pictures, write
 from renderer import write_room
 
@@ -25,7 +25,7 @@ from lightpaint.target.target import Target
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, make_basis: Any) -> Path:
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, make_basis: Any) -> Path:
     """A folder with light groups, paintings, a scene, a basis and results."""
     monkeypatch.chdir(tmp_path)
     layers = {f"RGBA_{name}": x for name, x in zip("abc", pictures(), strict=True)}
@@ -60,7 +60,7 @@ def _jobs(*given: str) -> Any:
         ("key a.exr", "key", ["a.exr"]),
     ],
 )
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("folder")
 def test_light_groups_by_either_spelling(given: str, path: str, targets: list[str]):
     options = _options(*given.split())
     # A painting may lie in the folder of the lights.
@@ -78,7 +78,7 @@ def test_light_groups_by_either_spelling(given: str, path: str, targets: list[st
         ("missing.exr painting.exr", BasisFile("missing.exr")),  # which reading it will say
     ],
 )
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("folder")
 def test_everything_else_is_what_it_was(given: str, basis: BasisFile | None):
     assert basis_of(_options(*given.split())) == basis
 
@@ -92,13 +92,13 @@ def test_everything_else_is_what_it_was(given: str, basis: BasisFile | None):
         ("groups.exr p.exr --lights a,b", "--lights a,b chooses lights of a scene.* --lock NAME"),
     ],
 )
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("folder")
 def test_slips_are_said(given: str, says: str):
     with pytest.raises(BasisError, match=says):
         basis_of(_options(*given.split()))
 
 
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("folder")
 def test_the_mask_is_no_light_either():
     found = basis_of(_options("a.exr", "--mask", "m.exr", "--lights", "key"))
     assert found == GroupsFile("key", leave_out=("a.exr", "m.exr"))
@@ -106,8 +106,8 @@ def test_the_mask_is_no_light_either():
 
 @pytest.mark.parametrize("name", ["groups", "groups.exr.tmp", "groups.EXR"])
 @pytest.mark.parametrize("given", ["{} a.exr", "a.exr --lights {}"])
-def test_light_groups_are_known_by_how_they_begin(here: Path, name: str, given: str):
-    (here / "groups.exr").rename(here / name)
+def test_light_groups_are_known_by_how_they_begin(folder: Path, name: str, given: str):
+    (folder / "groups.exr").rename(folder / name)
     found = basis_of(_options(*given.format(name).split()))
     assert found == GroupsFile(name, leave_out=("a.exr",))
 
@@ -126,8 +126,8 @@ def test_light_groups_are_known_by_how_they_begin(here: Path, name: str, given: 
     ],
 )
 @pytest.mark.parametrize("given", ["x.exr painting.exr", "painting.exr --lights x.exr"])
-def test_what_is_wrong_with_a_file_is_said(here: Path, made: Any, says: str, given: str):
-    (here / "x.exr").write_bytes(made((here / "groups.exr").read_bytes()))
+def test_what_is_wrong_with_a_file_is_said(folder: Path, made: Any, says: str, given: str):
+    (folder / "x.exr").write_bytes(made((folder / "groups.exr").read_bytes()))
     with pytest.raises((BasisError, ImageError)) as raised:
         _jobs(*given.split())
     assert re.search(says, str(raised.value)), raised.value
@@ -146,7 +146,7 @@ def test_what_is_wrong_with_a_file_is_said(here: Path, made: Any, says: str, giv
         ("-s 1 -D a=b -m x", "-s, -D, -m"),
     ],
 )
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("folder")
 def test_options_that_need_a_renderer_are_refused(given: str, named: str):
     painting = [] if "--target" in given else ["painting.exr"]
     with pytest.raises(BasisError) as refused:
@@ -154,7 +154,7 @@ def test_options_that_need_a_renderer_are_refused(given: str, named: str):
     assert spoken(str(refused.value)).startswith(f"{named} cannot be used with groups.exr")
 
 
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("folder")
 def test_groups_are_read_with_their_pattern():
     [job] = _jobs("painting.exr", "--lights", "groups.exr")
     assert job.groups.basis.names == ("a", "b", "c")
@@ -188,13 +188,13 @@ def test_a_target_that_names_no_folder(tmp_path: Path, make_basis: Any, name: st
     write_lighting(tmp_path / "l.json", lighting)
     write_lighting(tmp_path / "m.json", lighting.for_target("good"))
     if name:  # which is then called as its file is
-        said = refused(tmp_path, "relight", "scene.xml", "l.json")
+        said = run_refused(tmp_path, "relight", "scene.xml", "l.json")
         assert "cannot be the name of a folder: choose one with -o" in said
         assert len(said) < 600
-        several = refused(tmp_path, "relight", "scene.xml", "l.json", "m.json", "-o", "looks")
+        several = run_refused(tmp_path, "relight", "scene.xml", "l.json", "m.json", "-o", "looks")
         assert "cannot be the name of a folder: solve it alone, with -o" in several
     # Named otherwise, it is only looked for where it is not.
-    assert "no such scene" in refused(tmp_path, "relight", "gone.xml", "l.json", "-o", "there")
+    assert "no such scene" in run_refused(tmp_path, "relight", "gone.xml", "l.json", "-o", "there")
 
 
 def test_numbers_beyond_any_light_are_one_line(tmp_path: Path, make_basis: Any):
@@ -211,13 +211,13 @@ def test_numbers_beyond_any_light_are_one_line(tmp_path: Path, make_basis: Any):
             light = {**data["lights"]["a"], key: [1, huge, 1]}
             bent = {**data, "lights": {**data["lights"], "a": light}}
             (tmp_path / "huge.json").write_text(json.dumps(bent), encoding="utf-8")
-            said = refused(tmp_path, "relight", room, "huge.json")
+            said = run_refused(tmp_path, "relight", room, "huge.json")
             assert "huge.json" in said
             assert "from 0 to 1e+30" in said
     toml = tmp_path / "huge.toml"
     for asked in ("lock = 1e39", "lock = [1, 1e39, 1]", "limits = {max = 1e39}", 'lock = "1e41%"'):
         toml.write_text(f"[light.a]\n{asked}\n", encoding="utf-8")
-        said = refused(tmp_path, "solve", "b.basis.exr", "p.exr", "--lights-file", toml)
+        said = run_refused(tmp_path, "solve", "b.basis.exr", "p.exr", "--lights-file", toml)
         assert "at most 1e+30" in said
     for option in ("--unit", "--unpainted", "--prefer-current"):
-        assert "<= 1e+30" in refused(tmp_path, "solve", "b.basis.exr", "p.exr", option, "1e39")
+        assert "<= 1e+30" in run_refused(tmp_path, "solve", "b.basis.exr", "p.exr", option, "1e39")

@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from command import refused
+from command import run_refused
 
 from lightpaint.cli.options.parser import command_parser
 
 
-def parsed(*line: str) -> dict[str, Any]:
+def parse(*line: str) -> dict[str, Any]:
     return vars(command_parser().parse_args(line))
 
 
@@ -27,13 +27,13 @@ PIECES = [
 
 
 def test_every_order_is_the_same_line() -> None:
-    expected = parsed("solve", *itertools.chain(*PIECES))
+    expected = parse("solve", *itertools.chain(*PIECES))
     assert (expected["source"], expected["targets"]) == ("room.xml", ["a.png"])
     assert (expected["spp"], expected["output"], expected["exposure"]) == (64, "out", -1.5)
     assert expected["suggest"] == 3
     orders = [x for x in itertools.permutations(PIECES) if x.index(PIECES[0]) < x.index(PIECES[1])]
     for order in orders[::7]:
-        assert parsed("solve", *itertools.chain(*order)) == expected, order
+        assert parse("solve", *itertools.chain(*order)) == expected, order
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,7 @@ def test_every_order_is_the_same_line() -> None:
     ],
 )
 def test_an_optional_number_takes_no_path(line: str, suggest: int, paths: list[str]) -> None:
-    found = parsed("solve", *line.split())
+    found = parse("solve", *line.split())
     assert found["suggest"] == suggest
     assert [found["source"], *found["targets"]] == paths
 
@@ -75,13 +75,13 @@ def test_an_optional_number_takes_no_path(line: str, suggest: int, paths: list[s
 )
 def test_values_that_look_like_something_else(line: list[str], name: str, value: object) -> None:
     for before, behind in (([], ["r.xml", "a.png"]), (["r.xml"], ["a.png"])):
-        assert parsed("solve", *before, *line, *behind)[name] == value
+        assert parse("solve", *before, *line, *behind)[name] == value
 
 
 def test_behind_two_dashes_everything_is_a_path() -> None:
-    found = parsed("solve", "--spp", "8", "r.xml", "--", "--spp", "-a.png")
+    found = parse("solve", "--spp", "8", "r.xml", "--", "--spp", "-a.png")
     assert (found["spp"], found["source"], found["targets"]) == (8, "r.xml", ["--spp", "-a.png"])
-    found = parsed("relight", "--", "-r.xml", "a.json")
+    found = parse("relight", "--", "-r.xml", "a.json")
     assert (found["scene"], found["lightings"]) == ("-r.xml", ["a.json"])
 
 
@@ -106,13 +106,13 @@ def test_behind_two_dashes_everything_is_a_path() -> None:
     ],
 )
 def test_slips_name_the_help_of_their_command(tmp_path: Path, line: str, says: str) -> None:
-    assert says in refused(tmp_path, *line.split())
+    assert says in run_refused(tmp_path, *line.split())
 
 
 @pytest.mark.parametrize("line", ["--help", "r.xml --help", "r.xml --spp 4 --help --bogus"])
 def test_help_is_found_anywhere(line: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as end:
-        parsed("solve", *line.split())
+        parse("solve", *line.split())
     assert end.value.code in (0, None)
     assert "usage: lightpaint solve" in capsys.readouterr().out
 

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command import as_from_a_terminal, refused
+from command import as_from_a_terminal, run_refused
 from light_groups import interleaved, pictures
 from raw_message import RawMessage
 from server_key import key_of, offered
@@ -44,7 +44,7 @@ from lightpaint.version import __version__
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, make_basis: Any) -> Path:
+def work_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, make_basis: Any) -> Path:
     """A folder with light groups, a scene and a basis."""
     monkeypatch.chdir(tmp_path)
     layers = {f"RGBA_{name}": x for name, x in zip("abc", pictures(), strict=True)}
@@ -54,7 +54,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, make_basis: Any) -> Pa
     return tmp_path
 
 
-def asked(line: str) -> dict[str, Any]:
+def painter_arguments(line: str) -> dict[str, Any]:
     """What the command is called with."""
     given = ["paint", *line.split()]
     return values_of(command_parser().parse_args(given), given)
@@ -71,11 +71,11 @@ def asked(line: str) -> dict[str, Any]:
         ("--lights groups.exr -o other", GroupsFile, "groups.exr", "other"),
     ],
 )
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("work_folder")
 def test_what_is_painted_and_where_it_is_kept(
     line: str, kind: type, path: str, folder: str | None
 ) -> None:
-    values = asked(line)
+    values = painter_arguments(line)
     [source] = values["sources"]
     assert type(source) is kind
     assert source.path == path
@@ -83,22 +83,22 @@ def test_what_is_painted_and_where_it_is_kept(
     assert values["folder"] == Path(folder or f"{Path.cwd().name}.paint")
 
 
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("work_folder")
 def test_the_command_for_what_is_exported_has_the_options_that_solve_has() -> None:
     line = "--new scene.xml -q --spp 8 --lock a=40% --port 0 -s 1 --no-browser --hold 0.5 -o x"
-    values = asked(f"{line} --group g=a,b* --view agx --host 127.0.0.1")
+    values = painter_arguments(f"{line} --group g=a,b* --view agx --host 127.0.0.1")
     words = ("--spp=8", "--lock=a=40%", "-s", "1", "--hold=0.5", "'--group=g=a,b*'")
     assert values["options"] == words
     given = ["solve", "scene.xml", "painting.exr", *shlex.split(" ".join(words))]
     options = command_parser().parse_args(given)
     assert settings_of(options, given).hold == values["settings"].hold == 0.5
-    assert asked("--lights groups.exr --lock a")["options"] == ("--lock=a",)
+    assert painter_arguments("--lights groups.exr --lock a")["options"] == ("--lock=a",)
     assert (values["new"], values["port"], values["host"]) == (True, 0, "127.0.0.1")
 
 
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("work_folder")
 def test_several_views_are_named_by_sensors_or_are_bases(make_basis: Any) -> None:
-    values = asked("scene.xml --spp 8 -s a --sensor b")
+    values = painter_arguments("scene.xml --spp 8 -s a --sensor b")
     assert [(one.path, one.sensor) for one in values["sources"]] == [
         ("scene.xml", "a"),
         ("scene.xml", "b"),
@@ -111,7 +111,7 @@ def test_several_views_are_named_by_sensors_or_are_bases(make_basis: Any) -> Non
     assert options.views == list(paintings.items())
     basis = make_basis(2)
     write_basis("side.basis.exr", replace(basis, origin=replace(basis.origin, sensor="side")))
-    values = asked("room.basis.exr side.basis.exr")
+    values = painter_arguments("room.basis.exr side.basis.exr")
     assert values["folder"] == Path("room.paint")
     subjects = make_subjects(values["sources"], Path("x"))
     found = [
@@ -139,13 +139,15 @@ def test_several_views_are_named_by_sensors_or_are_bases(make_basis: Any) -> Non
         ("room.basis.exr -o room.basis.exr", "cannot write"),
     ],
 )
-def test_what_cannot_be_painted_is_said_in_one_line(here: Path, line: str, said: str) -> None:
-    assert re.search(said, refused(here, "paint", *line.split(), "--no-browser"))
+def test_what_cannot_be_painted_is_said_in_one_line(
+    work_folder: Path, line: str, said: str
+) -> None:
+    assert re.search(said, run_refused(work_folder, "paint", *line.split(), "--no-browser"))
 
 
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("work_folder")
 def test_a_subject_of_light_groups_knows_them() -> None:
-    subject = make_subject(asked("groups.exr")["sources"][0], Path("x"))
+    subject = make_subject(painter_arguments("groups.exr")["sources"][0], Path("x"))
     assert subject.groups is not None
     assert subject.basis is subject.groups.basis
     assert subject.scene is None
@@ -163,7 +165,7 @@ sys.exit(main(sys.argv[1:]))
 
 
 @contextmanager
-def painting(folder: Path, *given: str) -> Iterator[tuple["subprocess.Popen[str]", str]]:
+def start_painting(folder: Path, *given: str) -> Iterator[tuple["subprocess.Popen[str]", str]]:
     """The process, and the address that it said."""
     command = [sys.executable, "-c", WITHOUT, "paint", *given, "--no-browser", "--port", "0"]
     process = subprocess.Popen(
@@ -187,14 +189,14 @@ def painting(folder: Path, *given: str) -> Iterator[tuple["subprocess.Popen[str]
 
 
 def test_it_serves_until_it_is_told_to_end_and_keeps_the_session(
-    here: Path, make_basis: Any
+    work_folder: Path, make_basis: Any
 ) -> None:
-    path = here / "room.paint" / "session.db"
-    with painting(here, "room.basis.exr") as (process, url):
+    path = work_folder / "room.paint" / "session.db"
+    with start_painting(work_folder, "room.basis.exr") as (process, url):
         assert url.startswith("http://127.0.0.1:")
         assert key_of(url)
         # Another process is told, and leaves it alone.
-        again = refused(here, "paint", "room.basis.exr", "--no-browser", "--port", "0")
+        again = run_refused(work_folder, "paint", "room.basis.exr", "--no-browser", "--port", "0")
         assert re.search(r"session.db is in use: .* folder \(-o\)$", again)
         process.send_signal(signal.SIGTERM)
         assert process.wait(timeout=60) == 0
@@ -205,7 +207,7 @@ def test_it_serves_until_it_is_told_to_end_and_keeps_the_session(
     identity = Identity.of([make_basis(2)])
     with Store.open(path, identity) as store:
         store.append(Step("stroke", "mine"))
-    with painting(here, "room.basis.exr", "--new") as (process, _):
+    with start_painting(work_folder, "room.basis.exr", "--new") as (process, _):
         process.send_signal(signal.SIGINT)
         assert process.wait(timeout=60) == 0
         assert process.stderr is not None
@@ -214,14 +216,14 @@ def test_it_serves_until_it_is_told_to_end_and_keeps_the_session(
         assert [step.label for step in store.steps] == ["mine"]
 
 
-def test_a_program_connects_by_one_line_or_by_a_file_of_its_owner(here: Path) -> None:
-    file = here / "room.paint" / "painter.json"
+def test_a_program_connects_by_one_line_or_by_a_file_of_its_owner(work_folder: Path) -> None:
+    file = work_folder / "room.paint" / "painter.json"
     options = ("room.basis.exr", "--no-browser", "--port", "0", "--json")
     killed = ""
     for ends in (signal.SIGKILL, signal.SIGTERM):
         with subprocess.Popen(
             [sys.executable, "-m", "lightpaint", "paint", *options],
-            cwd=here,
+            cwd=work_folder,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -236,15 +238,15 @@ def test_a_program_connects_by_one_line_or_by_a_file_of_its_owner(here: Path) ->
                     additional_headers={"Authorization": f"Bearer {told['token']}"},
                     max_size=None,
                 ) as socket:
-                    state = said(socket, 0, "observe", version=VERSION)
+                    state = ask(socket, 0, "observe", version=VERSION)
                     if state["kind"] == "waiting":
                         state = from_frame(bytes(socket.recv(timeout=60)))[0]
                     assert state["kind"] == "state"
                     names = [light["name"] for light in state["lights"]]
                     lights = {names[0]: [1.0, 1.0, 1.0]}
-                    kept = said(socket, 1, "propose", name="evening", lights=lights)
+                    kept = ask(socket, 1, "propose", name="evening", lights=lights)
                     assert kept["looks"][-1]["is_proposal"]
-                    assert said(socket, 2, "undo")["kind"] == "failed"
+                    assert ask(socket, 2, "undo")["kind"] == "failed"
                 # That of the killed painter was replaced.
                 found = json.loads(file.read_text())
                 assert found == {key: told[key] for key in found}
@@ -259,12 +261,14 @@ def test_a_program_connects_by_one_line_or_by_a_file_of_its_owner(here: Path) ->
         assert file.exists() == (ends == signal.SIGKILL)
 
 
-def test_the_observer_of_the_document_hears_the_state(here: Path) -> None:
+def test_the_observer_of_the_document_hears_the_state(work_folder: Path) -> None:
     text = (Path(__file__).parents[2] / "docs" / "protocol.md").read_text(encoding="utf-8")
     [code] = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
-    with painting(here, "room.basis.exr"):
+    with start_painting(work_folder, "room.basis.exr"):
         listening = [sys.executable, "-u", "-c", code]
-        with subprocess.Popen(listening, cwd=here, stdout=subprocess.PIPE, text=True) as observer:
+        with subprocess.Popen(
+            listening, cwd=work_folder, stdout=subprocess.PIPE, text=True
+        ) as observer:
             try:
                 assert observer.stdout is not None
                 lines = iter(observer.stdout.readline, "")
@@ -274,8 +278,8 @@ def test_the_observer_of_the_document_hears_the_state(here: Path) -> None:
 
 
 @pytest.mark.parametrize("second", [signal.SIGINT, signal.SIGTERM])
-def test_who_asks_twice_for_the_end_gets_one(here: Path, second: signal.Signals) -> None:
-    with painting(here, "room.basis.exr") as (process, url), live(url):
+def test_who_asks_twice_for_the_end_gets_one(work_folder: Path, second: signal.Signals) -> None:
+    with start_painting(work_folder, "room.basis.exr") as (process, url), connect_page(url):
         process.send_signal(signal.SIGINT)
         time.sleep(0.05)  # while the page is told
         process.send_signal(second)
@@ -286,7 +290,7 @@ def test_who_asks_twice_for_the_end_gets_one(here: Path, second: signal.Signals)
     assert said.endswith("the session is kept in room.paint\n")
 
 
-def live(url: str) -> ClientConnection:
+def connect_page(url: str) -> ClientConnection:
     """The socket of a page that was opened at `url`."""
     base = url.partition("/#")[0]
     speaks = [Subprotocol(word) for word in offered(key_of(url))]
@@ -294,7 +298,7 @@ def live(url: str) -> ClientConnection:
     return connect(where, origin=Origin(base), subprotocols=speaks, max_size=None)
 
 
-def said(socket: ClientConnection, seq: int, kind: str, **fields: Any) -> dict[str, Any]:
+def ask(socket: ClientConnection, seq: int, kind: str, **fields: Any) -> dict[str, Any]:
     """Say something, and hear the answer to it; to `hello` the state when there is a picture."""
     arrays = {name: fields.pop(name) for name in ("image", "importance") if name in fields}
     message = RawMessage(kind, {"seq": seq, **fields}, arrays)
@@ -307,8 +311,8 @@ def said(socket: ClientConnection, seq: int, kind: str, **fields: Any) -> dict[s
             return content
 
 
-def greeted(socket: ClientConnection) -> dict[str, Any]:
-    return said(socket, 0, "hello", version=VERSION)
+def greet(socket: ClientConnection) -> dict[str, Any]:
+    return ask(socket, 0, "hello", version=VERSION)
 
 
 def test_who_is_being_started_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -324,29 +328,34 @@ def test_who_is_being_started_is_not_waited_for(monkeypatch: pytest.MonkeyPatch)
     threads.join_all()
 
 
-def test_what_was_answered_is_there_after_a_kill(here: Path) -> None:
+def test_what_was_answered_is_there_after_a_kill(work_folder: Path) -> None:
     pixels = {"image": np.ones((2, 3, 3), np.float32), "importance": np.ones((2, 3), np.float32)}
     stroke = {"stroke": 1, "region": [0, 2, 0, 3], "is_final": True, "label": "mine"}
-    with painting(here, "room.basis.exr") as (process, url), live(url) as socket:
-        assert greeted(socket)["history"]["undo"] == []
-        assert said(socket, 1, "paint", **stroke, **pixels)["kind"] == "answer"
+    with (
+        start_painting(work_folder, "room.basis.exr") as (process, url),
+        connect_page(url) as socket,
+    ):
+        assert greet(socket)["history"]["undo"] == []
+        assert ask(socket, 1, "paint", **stroke, **pixels)["kind"] == "answer"
         process.kill()
         process.wait()
-    with painting(here, "room.basis.exr") as (_, url), live(url) as socket:
-        assert greeted(socket)["history"]["undo"] == ["mine"]
+    with start_painting(work_folder, "room.basis.exr") as (_, url), connect_page(url) as socket:
+        assert greet(socket)["history"]["undo"] == ["mine"]
 
 
-def test_a_message_that_no_page_would_send_costs_its_sender_the_connection(here: Path) -> None:
-    with painting(here, "room.basis.exr") as (_, url):
-        with live(url) as socket:
-            greeted(socket)
+def test_a_message_that_no_page_would_send_costs_its_sender_the_connection(
+    work_folder: Path,
+) -> None:
+    with start_painting(work_folder, "room.basis.exr") as (_, url):
+        with connect_page(url) as socket:
+            greet(socket)
             socket.send(bytes(2**20 + 16 * 12 * 10 + 1))
             with pytest.raises(ConnectionClosedError) as closed:
                 deque(socket, 0)
             assert closed.value.rcvd is not None
             assert closed.value.rcvd.code == 1009
-        with live(url) as socket:
-            assert greeted(socket)["kind"] == "state"
+        with connect_page(url) as socket:
+            assert greet(socket)["kind"] == "state"
             assert socket.protocol.extensions == []  # nothing is compressed
 
 
@@ -358,9 +367,9 @@ def test_a_message_that_no_page_would_send_costs_its_sender_the_connection(here:
     ],
 )
 def test_a_host_is_told_what_it_means_and_a_closed_terminal_ends_it(
-    here: Path, host: str, open_to: str
+    work_folder: Path, host: str, open_to: str
 ) -> None:
-    with painting(here, "groups.exr", "--host", host) as (process, url):
+    with start_painting(work_folder, "groups.exr", "--host", host) as (process, url):
         assert key_of(url)
         process.send_signal(signal.SIGHUP)
         assert process.wait(timeout=60) == 0
@@ -374,15 +383,15 @@ def test_a_host_is_told_what_it_means_and_a_closed_terminal_ends_it(
 
 
 @pytest.mark.parametrize("host", ["", "no.such.name.invalid", "203.0.113.7"])
-def test_a_host_that_this_machine_has_not_is_one_line(here: Path, host: str) -> None:
-    said = refused(here, "paint", "room.basis.exr", "--no-browser", "--host", host)
+def test_a_host_that_this_machine_has_not_is_one_line(work_folder: Path, host: str) -> None:
+    said = run_refused(work_folder, "paint", "room.basis.exr", "--no-browser", "--host", host)
     assert "give an address of this machine, 0.0.0.0 for all of them" in said
 
 
-def test_a_session_of_another_basis_is_refused(here: Path, make_basis: Any) -> None:
-    folder = here / "room.paint"
+def test_a_session_of_another_basis_is_refused(work_folder: Path, make_basis: Any) -> None:
+    folder = work_folder / "room.paint"
     Store.open(folder / "session.db", Identity.of([make_basis(2, (6, 5))])).close()
-    said = refused(here, "paint", "room.basis.exr", "--no-browser")
+    said = run_refused(work_folder, "paint", "room.basis.exr", "--no-browser")
     assert "is a session of 5x6 pixels, and scene.xml has 10x12" in said
     assert "(-o)" in said
     assert "(--new)" in said

@@ -19,7 +19,7 @@ line = [[0, -5, 0], [1, -5, 0]]
 
 
 @pytest.fixture(scope="module")
-def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def work_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A room, and a painting of it with its spot turned."""
     folder = tmp_path_factory.mktemp("room")
     scene = lp.load_scene(write_room(folder))
@@ -29,7 +29,7 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def refused(here: Path, *options: str) -> str:
+def run_refused(here: Path, *options: str) -> str:
     """The one line that a command with these options ends in."""
     done = run(here, "solve", "room.xml", "p.exr", "-o", "out", *options)
     assert done.returncode == 2
@@ -62,16 +62,18 @@ def refused(here: Path, *options: str) -> str:
         ("--off nobody", "no light 'nobody'"),
     ],
 )
-def test_hostile_values_are_told_by_their_option(here: Path, options: str, words: str) -> None:
-    line = refused(here, *options.split())
+def test_hostile_values_are_told_by_their_option(
+    work_folder: Path, options: str, words: str
+) -> None:
+    line = run_refused(work_folder, *options.split())
     assert words in line
     assert "light." not in line
     assert "on the command line" not in line
 
 
-def test_places_that_see_nothing(here: Path) -> None:
+def test_places_that_see_nothing(work_folder: Path) -> None:
     """Known only once the room is looked at: one line, nothing written."""
-    line = refused(here, "--add", "point@buried", "--spp", "4")
+    line = run_refused(work_folder, "--add", "point@buried", "--spp", "4")
     assert "'new_point' has no free place that sees anything of the picture" in line
 
 
@@ -86,8 +88,8 @@ def test_places_that_see_nothing(here: Path) -> None:
     ],
 )
 def test_a_lights_file_is_told_by_its_keys(
-    here: Path, tmp_path: Path, text: str, words: str
+    work_folder: Path, tmp_path: Path, text: str, words: str
 ) -> None:
     (tmp_path / "l.toml").write_text(text, encoding="utf-8")
-    line = refused(here, "--lights-file", str(tmp_path / "l.toml"))
+    line = run_refused(work_folder, "--lights-file", str(tmp_path / "l.toml"))
     assert words in line

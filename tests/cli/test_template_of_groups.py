@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command import refused, run, succeed
+from command import run, run_refused, succeed
 from light_groups import interleaved
 from PIL import Image
 
@@ -18,7 +18,7 @@ from lightpaint.target.template import read_template
 SIZE = (48, 64)
 
 
-def lit(seed: int) -> np.ndarray:
+def light_pool(seed: int) -> np.ndarray:
     """Return a soft pool of light on surfaces of several colours, (h, w, 3)."""
     rng = np.random.default_rng(seed)
     albedo = np.kron(np.random.default_rng(9).uniform(0.2, 0.8, (6, 8, 3)), np.ones((8, 8, 1)))
@@ -30,7 +30,7 @@ def lit(seed: int) -> np.ndarray:
 @pytest.fixture
 def shot(tmp_path: Path) -> Path:
     """Light groups of three lamps, with their sum."""
-    lamps = {f"RGBA_{name}": lit(k) for k, name in enumerate(("key", "fill", "rim"))}
+    lamps = {f"RGBA_{name}": light_pool(k) for k, name in enumerate(("key", "fill", "rim"))}
     return interleaved(tmp_path / "shot.exr", {"RGBA": sum(lamps.values()), **lamps})
 
 
@@ -40,7 +40,7 @@ def save(path: Path, light: np.ndarray, view: ViewTransform | None = None) -> No
     Image.fromarray(np.round(255 * shown).astype(np.uint8)).save(path)
 
 
-def key_brighter(shot: Path) -> np.ndarray:
+def brighten_key(shot: Path) -> np.ndarray:
     """Return what the groups show with the key a stop up, painted where it does most."""
     basis = read_light_groups(shot).basis
     key = basis.image("key")
@@ -60,7 +60,7 @@ def test_light_groups_are_painted_on_and_answered(shot: Path, tmp_path: Path):
     assert template.transform == ViewTransform()
     names = {path.name for path in (tmp_path / "template" / "lights").iterdir()}
     assert names == {"key.png", "fill.png", "rim.png"}
-    save(tmp_path / "template" / "warm.png", key_brighter(shot))
+    save(tmp_path / "template" / "warm.png", brighten_key(shot))
     done = run(tmp_path, "solve", "shot.exr", "template/warm.png")
     assert done.returncode == 0, done.stderr
     assert "painted: what differs from template/template.png" in done.stderr
@@ -73,7 +73,7 @@ def test_a_painting_over_the_beauty_is_known_as_such(
     shot: Path, tmp_path: Path, view: ViewTransform
 ):
     """It was read as sRGB, and all of it counted: `3.6 (3.4 as the scene is now)`."""
-    save(tmp_path / "warm.png", key_brighter(shot), view)
+    save(tmp_path / "warm.png", brighten_key(shot), view)
     done = run(tmp_path, "solve", "shot.exr", "warm.png", "--hold", "3")
     assert done.returncode == 0, done.stderr
     assert f"what differs from the look of shot.exr through {view.spoken}" in done.stderr
@@ -97,9 +97,9 @@ def test_a_saved_basis_is_painted_on(shot: Path, tmp_path: Path):
 
 
 def test_what_is_no_template_of_groups_is_refused(shot: Path, tmp_path: Path):
-    assert "give a scene, a basis, or light groups" in refused(tmp_path, "template")
-    both = refused(tmp_path, "template", "room.xml", "--lights", "shot.exr")
+    assert "give a scene, a basis, or light groups" in run_refused(tmp_path, "template")
+    both = run_refused(tmp_path, "template", "room.xml", "--lights", "shot.exr")
     assert "room.xml and --lights shot.exr at once" in both
-    assert "--spp cannot be used" in refused(tmp_path, "template", "shot.exr", "--spp", 4)
-    assert "shot.exr" in refused(tmp_path, "template", "shot.exr", "-o", "shot.exr", "--force")
-    assert "no such file" in refused(tmp_path, "template", "--lights", "none.exr")
+    assert "--spp cannot be used" in run_refused(tmp_path, "template", "shot.exr", "--spp", 4)
+    assert "shot.exr" in run_refused(tmp_path, "template", "shot.exr", "-o", "shot.exr", "--force")
+    assert "no such file" in run_refused(tmp_path, "template", "--lights", "none.exr")

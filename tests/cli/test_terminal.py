@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from command import refused, run, spawn, succeed
+from command import run, run_refused, spawn, succeed
 from renderer import write_room
 from rich.markup import escape
 
@@ -29,7 +29,7 @@ STEERS = re.compile(
 )
 
 
-def room_with(folder: Path, name: str) -> Path:
+def write_room_with_bulb(folder: Path, name: str) -> Path:
     """The small room, its bulb called `name`."""
     path = write_room(folder)
     written = "".join(f"&#{ord(c)};" for c in name)
@@ -63,7 +63,7 @@ def test_lists_are_cut_with_a_count() -> None:
 
 
 def test_lights_and_errors(tmp_path: Path) -> None:
-    room = room_with(tmp_path, BAD.replace("\0", ""))
+    room = write_room_with_bulb(tmp_path, BAD.replace("\0", ""))
     output = succeed(tmp_path, "lights", room, "--no-sheet")
     assert SHOWN in output
     assert not STEERS.search(output)
@@ -71,7 +71,7 @@ def test_lights_and_errors(tmp_path: Path) -> None:
     listed = json.loads(succeed(tmp_path, "lights", room, "--json"))["lights"]
     assert listed[1]["name"] == BAD
     assert not STEERS.search(succeed(tmp_path, "lights", room, "--json"))
-    said = refused(tmp_path, "lights", room, "--lights", "nope\x1b[1m")
+    said = run_refused(tmp_path, "lights", room, "--lights", "nope\x1b[1m")
     assert r"no light 'nope\x1b[1m'" in said
     assert SHOWN in said
     assert not STEERS.search(said)
@@ -80,13 +80,13 @@ def test_lights_and_errors(tmp_path: Path) -> None:
 @pytest.mark.parametrize("command", ["lights", "basis", "template", "solve", "relight", "verify"])
 def test_paths_and_options(tmp_path: Path, command: str) -> None:
     for line in ([f"no\n{BAD}.xml", f"{BAD}.png"], [f"--{BAD}", "a", "b"], ["a.xml", "--spp", BAD]):
-        said = refused(tmp_path, command, *line)
+        said = run_refused(tmp_path, command, *line)
         assert not STEERS.search(said)
         assert r"\x1b[31m" in said or "not a whole number" in said
 
 
 def test_a_path_that_is_no_unicode(tmp_path: Path) -> None:
-    said = refused(tmp_path, "lights", "a\udcff\x1b.xml")
+    said = run_refused(tmp_path, "lights", "a\udcff\x1b.xml")
     assert r"a\udcff\x1b.xml" in said
 
 
@@ -114,7 +114,7 @@ def test_the_cache_and_solve(tmp_path: Path, make_basis: Any) -> None:
 def test_relight_of_names_that_steer(tmp_path: Path, make_basis: Any) -> None:
     lighting = Lighting.current(make_basis(2, names=["a", BAD])).for_target("evening")
     write_lighting(tmp_path / "l.json", lighting)
-    said = refused(tmp_path, "relight", write_room(tmp_path), "l.json")
+    said = run_refused(tmp_path, "relight", write_room(tmp_path), "l.json")
     assert SHOWN in said
     assert not STEERS.search(said)
 
@@ -123,7 +123,7 @@ def test_thousands_of_names_are_not_repeated(tmp_path: Path, make_basis: Any) ->
     names = [f"light_{k}" for k in range(3000)]
     basis = make_basis(images=[[[[1.0] * 3]]] * 3000, names=names)
     write_lighting(tmp_path / "l.json", Lighting.current(basis).for_target("evening"))
-    said = refused(tmp_path, "relight", write_room(tmp_path), "l.json")
+    said = run_refused(tmp_path, "relight", write_room(tmp_path), "l.json")
     assert "more that the scene does not have" in said
     assert len(said) < 1000
 

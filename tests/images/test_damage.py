@@ -15,7 +15,7 @@ import numpy as np
 import OpenEXR
 import pytest
 import tifffile
-from damaged_files import Case, cut_and_read, damaged, outcomes, wrong
+from damaged_files import Case, damage, outcomes, read_despite_cut, wrong_outcomes
 from picture_files import P3, SRGB_CURVE, icc, layered, luminance_chroma, para, png, psd
 from PIL import Image
 
@@ -57,7 +57,7 @@ def _compressed(name: str, dtype: str = "f2") -> bytes:
     return _exr((header, _channels(dtype), "x"))
 
 
-def _checked() -> dict[str, bytes]:
+def _checked_files() -> dict[str, bytes]:
     """Formats whose every byte of pixels is under a checksum."""
     profile = b"x\0\0" + zlib.compress(icc(para(3, *SRGB_CURVE), P3))
     words = png(WORDS, (b"iCCP", profile), (b"tEXt", b"lightpaint.view\0agx 1.0"))
@@ -69,7 +69,7 @@ def _checked() -> dict[str, bytes]:
     }
 
 
-def _unchecked() -> dict[str, bytes]:
+def _unchecked_files() -> dict[str, bytes]:
     return {
         "plain.tif": _tiff(WORDS[..., :3]),
         "zip.tif": _tiff(WORDS, compression="zlib", extrasamples=["unassalpha"]),
@@ -107,21 +107,21 @@ def _outcomes(
     cases = [
         case
         for k, (name, content) in enumerate(samples.items())
-        for case in damaged(name, content, k, each, each)
+        for case in damage(name, content, k, each, each)
     ]
     results = outcomes("picture", samples, cases, folder)
-    assert wrong(results, ("same", "refused", *right)) == []
-    assert cut_and_read(results) == []
+    assert wrong_outcomes(results, ("same", "refused", *right)) == []
+    assert read_despite_cut(results) == []
     assert len(results) > 1500
     return results
 
 
 def test_what_has_checksums(tmp_path: Path):
-    _outcomes(_checked(), tmp_path, 250)
+    _outcomes(_checked_files(), tmp_path, 250)
 
 
 def test_what_has_none(tmp_path: Path):
-    results = _outcomes(_unchecked(), tmp_path, 120, "agreed", "alone")
+    results = _outcomes(_unchecked_files(), tmp_path, 120, "agreed", "alone")
     # Few are such that the other reader has no opinion.
     assert sum(said == "alone" for _, said in results) < len(results) / 50
 
@@ -134,16 +134,19 @@ def test_exr(tmp_path: Path):
 
 
 def test_masks(tmp_path: Path):
-    samples = {**_checked(), **{k: v for k, v in _exrs().items() if k in ("ZIP.exr", "parts.exr")}}
+    samples = {
+        **_checked_files(),
+        **{k: v for k, v in _exrs().items() if k in ("ZIP.exr", "parts.exr")},
+    }
     masks = {name: content for name, content in samples.items() if name != "parts.exr"}
     cases = [
         case
         for k, (name, content) in enumerate(samples.items())
-        for case in damaged(name, content, k, 60, 60)
+        for case in damage(name, content, k, 60, 60)
     ]
     results = outcomes("mask", masks, cases, tmp_path)
-    assert wrong(results) == []
-    assert cut_and_read(results) == []
+    assert wrong_outcomes(results) == []
+    assert read_despite_cut(results) == []
 
 
 def test_estimates(tmp_path: Path):
@@ -151,14 +154,14 @@ def test_estimates(tmp_path: Path):
     estimate = Estimate(*(rng.random((2, 6, 5, 3), np.float32)))
     write_estimate(tmp_path / "predicted.exr", estimate, {"lightpaint.view": "{}"})
     content = (tmp_path / "predicted.exr").read_bytes()
-    cases = list(damaged("predicted.exr", content, 1, 150, 150))
+    cases = list(damage("predicted.exr", content, 1, 150, 150))
     renamed = content.replace(b"half_difference.G", b"half_difference.X")
     cases += [
         Case("predicted.exr", "no green", content.replace(b"\0G\0", b"\0Q\0")),
         Case("predicted.exr", "no noise in green", renamed),
     ]
     results = outcomes("estimate", {"predicted.exr": content}, cases, tmp_path)
-    assert wrong(results) == []
+    assert wrong_outcomes(results) == []
     assert [said for case, said in results if case.done.startswith("no ")] == ["refused"] * 2
 
 
@@ -186,7 +189,7 @@ def test_names_in_a_file_that_a_terminal_would_obey(tmp_path: Path):
         assert str(caught.value).isprintable()
 
 
-def _declaring(content: bytes, at: int, order: Any, width: int, height: int) -> bytes:
+def _declare_size(content: bytes, at: int, order: Any, width: int, height: int) -> bytes:
     size = width.to_bytes(4, order) + height.to_bytes(4, order)
     return content[:at] + size + content[at + 8 :]
 
@@ -194,12 +197,12 @@ def _declaring(content: bytes, at: int, order: Any, width: int, height: int) -> 
 @pytest.mark.parametrize(("width", "height"), [(2**31 - 1, 1), (60_000, 60_000), (2**20, 2**20)])
 def test_sizes_that_no_picture_has(tmp_path: Path, width: int, height: int):
     whole = png(BYTES)
-    bent = _declaring(whole, 16, "big", width, height)
+    bent = _declare_size(whole, 16, "big", width, height)
     checksum = zlib.crc32(bent[12:29]).to_bytes(4, "big")
     photoshop = psd(BYTES)
     files = {
         "a.png": bent[:29] + checksum + bent[33:],
-        "a.psd": _declaring(photoshop, 14, "big", height, width),
+        "a.psd": _declare_size(photoshop, 14, "big", height, width),
     }
     for name, content in files.items():
         (tmp_path / name).write_bytes(content)

@@ -78,7 +78,7 @@ def test_rgb_of_layers(tmp_path: Path):
         part.rgb("x")
 
 
-def _written(path: Path, kind: str) -> bytes:
+def _write_kind(path: Path, kind: str) -> bytes:
     """A file of `kind`. Its pixels do not compress to nothing."""
     rgb = {c: np.random.default_rng(1).random((33, 21)).astype(np.float32) for c in "RGB"}
     if kind == "parts":
@@ -100,7 +100,7 @@ def test_a_cut_off_file_is_refused_quietly(
     tmp_path: Path, kind: str, capfd: pytest.CaptureFixture[str]
 ):
     path = tmp_path / "cut.exr"
-    content = _written(path, kind)
+    content = _write_kind(path, kind)
     offsets = {*range(0, len(content), len(content) // 60), *range(len(content) - 5, len(content))}
     for length in sorted(offsets):
         path.write_bytes(content[:length])
@@ -111,7 +111,7 @@ def test_a_cut_off_file_is_refused_quietly(
 
 def test_damage_is_an_image_error_or_harmless(tmp_path: Path):
     path = tmp_path / "damaged.exr"
-    content = _written(path, "parts")
+    content = _write_kind(path, "parts")
     rng = np.random.default_rng(0)
     refused = 0
     for _ in range(150):
@@ -129,7 +129,7 @@ def test_damage_is_an_image_error_or_harmless(tmp_path: Path):
 
 def test_the_terminal_is_given_back(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
     path = tmp_path / "cut.exr"
-    path.write_bytes(_written(path, "parts")[:-1])
+    path.write_bytes(_write_kind(path, "parts")[:-1])
     before = len(os.listdir("/proc/self/fd"))
     for _ in range(5):
         with pytest.raises(ImageError):
@@ -174,7 +174,7 @@ def test_threads_that_read_at_once_give_the_terminal_back(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ):
     path = tmp_path / "cut.exr"
-    path.write_bytes(_written(path, "parts")[:-1])
+    path.write_bytes(_write_kind(path, "parts")[:-1])
     before = [os.stat(fd) for fd in (1, 2)]
     began = threading.Barrier(4)
 
@@ -255,7 +255,7 @@ def test_absurd_sizes_are_refused_at_once(
     tmp_path: Path, window: tuple[int, int, int, int], message: str
 ):
     path = tmp_path / "huge.exr"
-    content = bytearray(_written(path, "ZIP_COMPRESSION"))
+    content = bytearray(_write_kind(path, "ZIP_COMPRESSION"))
     start = content.index(b"dataWindow\0box2i\0") + len(b"dataWindow\0box2i\0") + 4
     content[start : start + 16] = struct.pack("<4i", *window)
     path.write_bytes(content)

@@ -352,14 +352,14 @@ def test_integers_of_32_bits(tmp_path: Path):
 # --- JPEG
 
 
-def _smooth() -> Any:
+def _smooth_pixels() -> Any:
     y, x = np.mgrid[:40, :48] / 48
     return np.round(255 * np.stack([x, y, (x + y) / 2], axis=-1)).astype(np.uint8)
 
 
 @pytest.mark.parametrize("options", [{}, {"progressive": True}, {"subsampling": 0}])
 def test_jpeg(tmp_path: Path, options: Any):
-    pixels = _smooth()
+    pixels = _smooth_pixels()
     Image.fromarray(pixels).save(tmp_path / "a.jpg", quality=98, **options)
     picture = read_picture(tmp_path / "a.jpg")
     assert picture.kind == "jpeg"
@@ -381,7 +381,9 @@ def test_pictures_are_upright(tmp_path: Path, orientation: int, suffix: str):
     exif = Image.Exif()
     exif[0x112] = orientation
     path = tmp_path / f"a.{suffix}"
-    Image.fromarray(_smooth()).save(path, exif=exif, **({"quality": 98} if suffix == "jpg" else {}))
+    Image.fromarray(_smooth_pixels()).save(
+        path, exif=exif, **({"quality": 98} if suffix == "jpg" else {})
+    )
     with Image.open(path) as file:
         upright = np.asarray(ImageOps.exif_transpose(file))
     shown = ViewTransform().encode(read_picture(path).image) * 255
@@ -390,7 +392,7 @@ def test_pictures_are_upright(tmp_path: Path, orientation: int, suffix: str):
 
 
 def test_jpeg_of_cmyk_is_refused(tmp_path: Path):
-    Image.fromarray(_smooth()).convert("CMYK").save(tmp_path / "a.jpg")
+    Image.fromarray(_smooth_pixels()).convert("CMYK").save(tmp_path / "a.jpg")
     with pytest.raises(ImageError, match="holds CMYK"):
         read_picture(tmp_path / "a.jpg")
 

@@ -29,7 +29,7 @@ def _rgb(dtype: Any = np.float32, seed: int = 0) -> Any:
     return values.astype(dtype)
 
 
-def _named(image: Any, prefix: str = "", names: Any = "RGB") -> Any:
+def _name_channels(image: Any, prefix: str = "", names: Any = "RGB") -> Any:
     return {prefix + name: image[..., k] for k, name in enumerate(names)}
 
 
@@ -43,7 +43,7 @@ def test_exr(tmp_path: Path, dtype: str, kind: str, compression: str):
     header: dict[str, Any] = {"compression": getattr(OpenEXR, f"{compression}_COMPRESSION")}
     if kind == "tiledimage":
         header["tiles"] = OpenEXR.TileDescription()
-    path = _exr(tmp_path / "a.exr", _named(image), type=getattr(OpenEXR, kind), **header)
+    path = _exr(tmp_path / "a.exr", _name_channels(image), type=getattr(OpenEXR, kind), **header)
     picture = read_picture(path)
     assert (picture.kind, picture.codes) == ("exr", None)
     # Lossy compressions are of half (B44, DWA) or of 24 bits (PXR24).
@@ -69,7 +69,7 @@ def test_layers_by_name(tmp_path: Path):
     colours = {"": _rgb(seed=1), "Combined_key": _rgb(seed=2), "ViewLayer.Combined": _rgb(seed=3)}
     channels = {}
     for name, image in colours.items():
-        channels |= _named(image, f"{name}." if name else "")
+        channels |= _name_channels(image, f"{name}." if name else "")
     channels |= {"Normal.X": colours[""][..., 0], "Normal.Y": colours[""][..., 1]}
     path = _exr(tmp_path / "a.exr", channels)
     np.testing.assert_array_equal(read_picture(path).image, colours[""])
@@ -85,27 +85,27 @@ def test_layers_by_name(tmp_path: Path):
 def test_layers_of_krita_are_not_taken_for_a_picture(tmp_path: Path):
     """Krita 5.1.5 leaves the background without a prefix, and the paint beside it."""
     background, paint = _rgb(seed=1), _rgb(seed=2)
-    both = _named(background) | _named(paint, "paint.")
+    both = _name_channels(background) | _name_channels(paint, "paint.")
     path = _exr(tmp_path / "a.exr", both, krita_layers_info="<!DOCTYPE krita-extra-layers-info>")
     with pytest.raises(
         ImageError, match=r"2 layers of Krita \(one without a name, paint\).*flatten"
     ):
         read_picture(path)
     np.testing.assert_array_equal(read_picture(path, layer="paint").image, paint)
-    flat = _exr(path, _named(paint, "root Merged."), krita_layers_info="<!DOCTYPE>")
+    flat = _exr(path, _name_channels(paint, "root Merged."), krita_layers_info="<!DOCTYPE>")
     np.testing.assert_array_equal(read_picture(flat).image, paint)
 
 
 @pytest.mark.parametrize("names", ["rgb", ["red", "green", "blue"]])
 def test_other_names_of_channels(tmp_path: Path, names: Any):
     image = _rgb()
-    path = _exr(tmp_path / "a.exr", _named(image, "paint.", names))
+    path = _exr(tmp_path / "a.exr", _name_channels(image, "paint.", names))
     np.testing.assert_array_equal(read_picture(path).image, image)
 
 
 def test_views_of_one_part(tmp_path: Path):
     left, right = _rgb(seed=1), _rgb(seed=2)
-    channels = _named(left) | _named(right, "right.")
+    channels = _name_channels(left) | _name_channels(right, "right.")
     path = _exr(tmp_path / "a.exr", channels, multiView=["left", "right"])
     np.testing.assert_array_equal(read_picture(path).image, left)
     np.testing.assert_array_equal(read_picture(path, layer="left").image, left)
@@ -115,7 +115,9 @@ def test_views_of_one_part(tmp_path: Path):
 def test_views_in_parts(tmp_path: Path):
     images = {"left": _rgb(seed=1), "right": _rgb(seed=2)}
     parts = [
-        OpenEXR.Part({"view": view}, {n: c.copy() for n, c in _named(image).items()}, f"rgb.{view}")
+        OpenEXR.Part(
+            {"view": view}, {n: c.copy() for n, c in _name_channels(image).items()}, f"rgb.{view}"
+        )
         for view, image in images.items()
     ]
     OpenEXR.File(parts).write(str(tmp_path / "a.exr"))
@@ -174,7 +176,7 @@ def test_the_librarys_own_reader_agrees_on_chroma():
 
 def test_xyz_is_not_adapted(tmp_path: Path):
     xyz = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1 / 3, 1 / 3)
-    path = _exr(tmp_path / "a.exr", _named(_rgb()), chromaticities=xyz)
+    path = _exr(tmp_path / "a.exr", _name_channels(_rgb()), chromaticities=xyz)
     expected = colour.algebra.vecmul(
         np.linalg.inv(colour.RGB_COLOURSPACES["ITU-R BT.709"].matrix_RGB_to_XYZ), _rgb()
     )
@@ -195,7 +197,7 @@ def test_xyz_is_not_adapted(tmp_path: Path):
 )
 def test_a_colour_space_by_name_is_converted(tmp_path: Path, name: str, space: str):
     """As Blender declares it, without chromaticities."""
-    path = _exr(tmp_path / "a.exr", _named(_rgb()), colorInteropID=name)
+    path = _exr(tmp_path / "a.exr", _name_channels(_rgb()), colorInteropID=name)
     spaces = colour.RGB_COLOURSPACES
     expected = colour.RGB_to_RGB(_rgb(), spaces[space], spaces["ITU-R BT.709"], "Bradford")
     # colour-science has whites of five decimals.
@@ -203,12 +205,12 @@ def test_a_colour_space_by_name_is_converted(tmp_path: Path, name: str, space: s
     # Numbers go before names.
     rec709 = (0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329)
     header = {"colorInteropID": name, "chromaticities": rec709}
-    path = _exr(tmp_path / "b.exr", _named(_rgb()), **header)
+    path = _exr(tmp_path / "b.exr", _name_channels(_rgb()), **header)
     np.testing.assert_array_equal(read_picture(path).image, _rgb())
 
 
 def test_encoded_colours_are_no_light(tmp_path: Path):
-    path = _exr(tmp_path / "a.exr", _named(_rgb()), colorInteropID="srgb_rec709_display")
+    path = _exr(tmp_path / "a.exr", _name_channels(_rgb()), colorInteropID="srgb_rec709_display")
     with pytest.raises(ImageError, match=r"a\.exr is in the colour space 'srgb_rec709_display'"):
         read_picture(path)
 
@@ -217,7 +219,7 @@ def test_encoded_colours_are_no_light(tmp_path: Path):
 @pytest.mark.parametrize("case", [str, str.upper, str.capitalize])
 def test_channels_in_any_words(tmp_path: Path, names: Any, case: Any):
     image, alpha = _rgb(), np.full(SIZE, 0.5, np.float32)
-    channels = _named(image * 0.5, names=[case(name) for name in names[:3]])
+    channels = _name_channels(image * 0.5, names=[case(name) for name in names[:3]])
     picture = read_picture(_exr(tmp_path / "a.exr", channels | {case(names[3]): alpha}))
     np.testing.assert_array_equal(picture.image, image)
     np.testing.assert_array_equal(picture.alpha, alpha)
@@ -227,7 +229,7 @@ def test_channels_in_any_words(tmp_path: Path, names: Any, case: Any):
     "primaries", [(0.0,) * 8, (0.3, 0.3, 0.3, 0.3, 0.3, 0.3, 0.3, 0.3), (np.nan,) * 8]
 )
 def test_chromaticities_that_mean_nothing(tmp_path: Path, primaries: Any):
-    path = _exr(tmp_path / "a.exr", _named(_rgb()), chromaticities=primaries)
+    path = _exr(tmp_path / "a.exr", _name_channels(_rgb()), chromaticities=primaries)
     with pytest.raises(ImageError, match=r"a\.exr declares chromaticities that span no colours"):
         read_picture(path)
 
@@ -235,7 +237,7 @@ def test_chromaticities_that_mean_nothing(tmp_path: Path, primaries: Any):
 def test_alpha_and_weight_of_a_layer(tmp_path: Path):
     image, alpha = _rgb(), np.full(SIZE, 0.5, np.float32)
     alpha[0] = 0
-    layer = _named(image * alpha[..., None], "paint.") | {"paint.A": alpha}
+    layer = _name_channels(image * alpha[..., None], "paint.") | {"paint.A": alpha}
     picture = read_picture(_exr(tmp_path / "a.exr", layer | {"A": alpha * 0}))
     np.testing.assert_array_equal(picture.alpha, alpha)
     np.testing.assert_array_equal(picture.image[1:], image[1:])
@@ -249,5 +251,5 @@ def test_alpha_and_weight_of_a_layer(tmp_path: Path):
 def test_straight_alpha_is_pointed_out(tmp_path: Path):
     alpha = np.random.default_rng(0).random(SIZE).astype(np.float32)
     alpha[:3] = 0
-    picture = read_picture(_exr(tmp_path / "a.exr", _named(_rgb()) | {"A": alpha}))
+    picture = read_picture(_exr(tmp_path / "a.exr", _name_channels(_rgb()) | {"A": alpha}))
     assert "if it is not premultiplied" in picture.notes[0]

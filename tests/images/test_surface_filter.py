@@ -65,7 +65,7 @@ def room(rng: np.random.Generator) -> Features:
     return Features(*(its.astype(np.float32) for its in (albedo, normal, position)))
 
 
-def one_by_one(features: Features, image: Any, radius: int) -> Any:
+def filter_pixelwise(features: Features, image: Any, radius: int) -> Any:
     """Filter a picture pixel by pixel, in double precision, as the words of the module say."""
     albedo, normal, position = (
         its.astype(np.float64)
@@ -114,7 +114,7 @@ def test_it_is_what_its_plain_form_is(radius: int, rng: np.random.Generator):
     features = room(rng)
     image = rng.random((*SIZE, 3), dtype=np.float32)
     filtered = SurfaceFilter(features, radius)(image)
-    expected = one_by_one(features, image, radius)
+    expected = filter_pixelwise(features, image, radius)
     # Single precision, of sums of 81 terms of any size up to 1, and of exponents up to 30.
     np.testing.assert_allclose(filtered, expected, rtol=1e-4, atol=1e-6)
 

@@ -25,7 +25,7 @@ VIEWS = [ViewTransform("srgb"), ViewTransform("agx", 1.0), ViewTransform("filmic
 
 
 @pytest.fixture
-def few(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
+def few_samples(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     """Samples of 400 pixels, and strips of 500."""
     monkeypatch.setattr(warm_start, "MIN_SAMPLE", 400)
     monkeypatch.setattr(warm_start, "PIXELS_PER_LIGHT", 1)
@@ -33,7 +33,7 @@ def few(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     return monkeypatch
 
 
-def _random(make_basis: Any, seed: int, *, n: int = 4) -> tuple[Basis, Target]:
+def _random_problem(make_basis: Any, seed: int, *, n: int = 4) -> tuple[Basis, Target]:
     """Pools of light with noise in them, and a picture that no mix of them is."""
     rng = np.random.default_rng(seed)
     y, x = (axis / SIZE[0] for axis in np.mgrid[: SIZE[0], : SIZE[1]])
@@ -46,7 +46,7 @@ def _random(make_basis: Any, seed: int, *, n: int = 4) -> tuple[Basis, Target]:
     return basis, Target("t", image.astype(np.float32), importance, everything=False)
 
 
-def _alone(few: pytest.MonkeyPatch, *args: Any, **how: Any) -> Solution:
+def _solve_by_rounds(few: pytest.MonkeyPatch, *args: Any, **how: Any) -> Solution:
     """By rounds over all pixels alone."""
     with few.context() as patch:
         patch.setattr(warm_start, "MIN_SAMPLE", 10**9)
@@ -65,10 +65,10 @@ def _value(solution: Solution, w: Any) -> float:
     [(0, 0.0, VIEWS[0]), (1, 0.3, VIEWS[0]), (0, 0.3, VIEWS[1]), (1, 0.0, VIEWS[2])],
 )
 def test_the_optimum_is_that_of_all_pixels(
-    make_basis: Any, few: Any, seed: int, hold: float, transform: ViewTransform
+    make_basis: Any, few_samples: Any, seed: int, hold: float, transform: ViewTransform
 ):
     """By another's descent over all of them, from the answer and from all lights at 1."""
-    basis, target = _random(make_basis, seed)
+    basis, target = _random_problem(make_basis, seed)
     solution = solve(basis, target, transform=transform, hold=hold)
     w = solution.weights
     # Bounds by a scale of 1, and derivatives by differences.
@@ -103,14 +103,14 @@ def test_the_optimum_is_that_of_all_pixels(
     ids=lambda a: "+".join(a) or "free",
 )
 def test_it_ends_where_rounds_over_all_pixels_do(
-    make_basis: Any, few: Any, asked: dict[str, Any], transform: ViewTransform
+    make_basis: Any, few_samples: Any, asked: dict[str, Any], transform: ViewTransform
 ):
-    basis, target = _random(make_basis, 3)
+    basis, target = _random_problem(make_basis, 3)
     target = replace(target, at_least=target.image > 0.8)
     asked = dict(asked)
     constraints = Constraints.of(asked.pop("lights", {}), **asked)
     how: dict[str, Any] = {"transform": transform, "constraints": constraints, "hold": 0.3}
-    expected = _alone(few, basis, target, **how)
+    expected = _solve_by_rounds(few_samples, basis, target, **how)
     found = solve(basis, target, **how)
     assert found.certificate.rounds < expected.certificate.rounds
     value = _value(found, expected.weights)
@@ -120,38 +120,43 @@ def test_it_ends_where_rounds_over_all_pixels_do(
     np.testing.assert_allclose(found.equations.M, expected.equations.M, rtol=2e-2)
 
 
-def test_several_views_are_one(make_basis: Any, few: Any):
-    parts = [_random(make_basis, seed) for seed in (4, 5)]
+def test_several_views_are_one(make_basis: Any, few_samples: Any):
+    parts = [_random_problem(make_basis, seed) for seed in (4, 5)]
     bases = [replace(basis, lights=parts[0][0].lights) for basis, _ in parts]
     targets = [target for _, target in parts]
     how = {"transform": VIEWS[0], "hold": 0.3}
-    expected, found = _alone(few, bases, targets, **how), solve(bases, targets, **how)
+    expected, found = (
+        _solve_by_rounds(few_samples, bases, targets, **how),
+        solve(bases, targets, **how),
+    )
     assert found.certificate.rounds < expected.certificate.rounds
     np.testing.assert_allclose(found.weights, expected.weights, atol=2e-5)
 
 
 @pytest.mark.parametrize("transform", VIEWS, ids=lambda v: v.spoken)
 def test_answers_have_the_same_bits_on_any_number_of_processors(
-    make_basis: Any, few: Any, transform: ViewTransform
+    make_basis: Any, few_samples: Any, transform: ViewTransform
 ):
-    basis, target = _random(make_basis, 6)
+    basis, target = _random_problem(make_basis, 6)
     found = []
     for count in (1, 2, 7):
-        few.setattr(os, "cpu_count", lambda count=count: count)
+        few_samples.setattr(os, "cpu_count", lambda count=count: count)
         found.append(solve(basis, target, transform=transform, hold=0.3).weights)
     np.testing.assert_array_equal(found[0], found[1])
     np.testing.assert_array_equal(found[0], found[2])
 
 
-def _lit(basis: Basis, target: Target, transform: ViewTransform) -> tuple[Problem, LitPixels]:
+def _lit_problem(
+    basis: Basis, target: Target, transform: ViewTransform
+) -> tuple[Problem, LitPixels]:
     problem = Problem.of(basis, target, fit=Fit(transform=transform, hold=0.3))
     return problem, LitPixels.of(basis, problem.loss)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("transform", VIEWS, ids=lambda v: v.spoken)
-def test_the_gradient_is_that_of_the_objective(make_basis: Any, few: Any, transform: Any):
-    basis, target = _random(make_basis, 7)
-    problem, lit = _lit(basis, replace(target, at_least=target.image > 0.5), transform)
+def test_the_gradient_is_that_of_the_objective(make_basis: Any, few_samples: Any, transform: Any):
+    basis, target = _random_problem(make_basis, 7)
+    problem, lit = _lit_problem(basis, replace(target, at_least=target.image > 0.5), transform)
     w = 0.5 + np.random.default_rng(0).random((4, 3))
     value, gradient = lit.objective_and_gradient(w)
     assert value == pytest.approx(problem.objective(w).sum(), rel=1e-12)
@@ -163,7 +168,7 @@ def test_the_gradient_is_that_of_the_objective(make_basis: Any, few: Any, transf
         assert rise / 2e-6 == pytest.approx(2 * gradient[k, c], rel=1e-3, abs=1e-3)
 
 
-def test_a_sample_stands_for_all_and_has_every_light(make_basis: Any, few: Any):
+def test_a_sample_stands_for_all_and_has_every_light(make_basis: Any, few_samples: Any):
     """Also a light that reaches five pixels of nearly three thousand."""
     rng = np.random.default_rng(0)
     images = rng.random((4, *SIZE, 3)) ** 3
@@ -171,7 +176,7 @@ def test_a_sample_stands_for_all_and_has_every_light(make_basis: Any, few: Any):
     images[3, 10, 20:25] = 1e-3
     basis = make_basis(images=images)
     target = Target("t", rng.random((*SIZE, 3)).astype(np.float32), np.ones(SIZE, np.float32), True)
-    problem, lit = _lit(basis, target, VIEWS[0])
+    problem, lit = _lit_problem(basis, target, VIEWS[0])
     part = sample_pixels(lit, np.einsum("cii->ic", problem.equations.M), 400)
     assert 350 <= len(part.pixels) <= 450
     assert (part.planes.pixels(slice(None))[3] > 0).any(axis=-1).sum() == 5
@@ -187,12 +192,12 @@ def test_a_sample_stands_for_all_and_has_every_light(make_basis: Any, few: Any):
     np.testing.assert_allclose(products(part)[:, 3, 3], products(lit)[:, 3, 3], rtol=1e-6)
 
 
-def test_few_pixels_need_no_sample(make_basis: Any, few: Any):
-    basis, target = _random(make_basis, 8)
+def test_few_pixels_need_no_sample(make_basis: Any, few_samples: Any):
+    basis, target = _random_problem(make_basis, 8)
     counted = np.zeros(SIZE, np.float32)
     counted[:10] = 1
     asked: list[int] = []
-    few.setattr(warm_start, "sample_pixels", lambda *args: asked.append(1))
+    few_samples.setattr(warm_start, "sample_pixels", lambda *args: asked.append(1))
     solution = solve(basis, replace(target, importance=counted), transform=VIEWS[0])
     assert not asked
     assert solution.certificate.converged
@@ -200,7 +205,7 @@ def test_few_pixels_need_no_sample(make_basis: Any, few: Any):
 
 def test_pixels_that_do_not_count_are_not_looked_at(make_basis: Any, monkeypatch: Any):
     """What they hold changes nothing, and in the rounds nothing is asked of them."""
-    basis, target = _random(make_basis, 9)
+    basis, target = _random_problem(make_basis, 9)
     some = target.importance * (np.random.default_rng(1).random(SIZE) < 0.3)
     target = replace(target, importance=some.astype(np.float32))
     solution = solve(basis, target, transform=VIEWS[1], hold=0.0, colors="free")

@@ -33,7 +33,7 @@ def _duv(basis: lp.Basis, target: lp.Target, **how: Any) -> np.ndarray:
     return white_range(1901, 100_000).greener(solution.weights)
 
 
-def _over_look(basis: lp.Basis, painted: dict[tuple[float, ...], Any]) -> lp.Target:
+def _paint_over_look(basis: lp.Basis, painted: dict[tuple[float, ...], Any]) -> lp.Target:
     """Colours of light on surfaces, in rectangles (top, bottom, left, right) of shares."""
     image, weight = basis.current_look.copy(), np.zeros(basis.size, np.float32)
     height, width = basis.size
@@ -59,7 +59,7 @@ def test_warm_light_on_the_vase_and_none_in_the_annex(gallery: lp.Basis, space: 
     bright = 2 * float(gallery.current_look.mean())
     vase, annex = (0.5, 0.63, 0.77, 0.83), (0.35, 0.6, 0.65, 0.75)
     warm = bright * kelvin_to_rgb(2700)
-    duv = _duv(gallery, _over_look(gallery, {vase: warm, annex: np.zeros(3)}), space=space)
+    duv = _duv(gallery, _paint_over_look(gallery, {vase: warm, annex: np.zeros(3)}), space=space)
     assert duv.max() < GREEN
     assert duv.min() > PINK
 
@@ -70,7 +70,7 @@ def test_white_light_on_a_wall_that_wood_reflects_on(gallery: lp.Basis) -> None:
     left = (0.3, 0.45, 0.02, 0.25)
     for kelvin in (4000, 6500, 12_000):
         white = bright * kelvin_to_rgb(kelvin)
-        assert _duv(gallery, _over_look(gallery, {left: white})).max() < GREEN
+        assert _duv(gallery, _paint_over_look(gallery, {left: white})).max() < GREEN
 
 
 @pytest.mark.parametrize(("mired", "stops"), [(-100, -1), (-60, -2), (60, -1)])

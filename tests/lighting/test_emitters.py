@@ -32,7 +32,7 @@ def basis(make_basis: Any) -> Basis:
     return make_basis(images=images, names=["sky", "lantern"], seen=seen, emission=emission)
 
 
-def _painted(basis: Basis, where: Any, color: Any, *, times: bool = False) -> lp.Target:
+def _paint(basis: Basis, where: Any, color: Any, *, times: bool = False) -> lp.Target:
     """A stroke over the current look. times: whether it multiplies what is there."""
     image = basis.current_look.copy()
     image[where] = image[where] * color if times else color
@@ -42,7 +42,7 @@ def _painted(basis: Basis, where: Any, color: Any, *, times: bool = False) -> lp
     return lp.Target("t", image, counts, False, transform=lp.ViewTransform(), **how)
 
 
-def _lantern(basis: Basis, target: lp.Target, **fit: Any) -> tuple[float, float]:
+def _lantern_levels(basis: Basis, target: lp.Target, **fit: Any) -> tuple[float, float]:
     """How bright it comes out, exactly and live, beside the present."""
     exact = lp.solve(basis, target, **fit).weights
     view = LiveView(basis, target.image.copy(), target.importance.copy())
@@ -59,9 +59,9 @@ def _lantern(basis: Basis, target: lp.Target, **fit: Any) -> tuple[float, float]
 def test_a_warm_stroke_over_a_lantern_leaves_it_on(basis: Basis, space: Any):
     """What it lights is painted brighter, the flame itself darker than it is, or even black."""
     for flame in (0.5 * WARM, 0 * WARM):
-        target = _painted(basis, AROUND, 0.5 * WARM)
+        target = _paint(basis, AROUND, 0.5 * WARM)
         target.image[FLAME] = flame
-        exact, live = _lantern(basis, target, space=space)
+        exact, live = _lantern_levels(basis, target, space=space)
         assert exact > 1.5
         assert live > 1.5
 
@@ -70,25 +70,25 @@ def test_a_warm_stroke_over_a_lantern_leaves_it_on(basis: Basis, space: Any):
 def test_a_warm_stroke_over_a_lantern_leaves_it_on_in_a_dark_room(basis: Basis, space: Any):
     """The room two stops down, then the brush: darker than it was, but brighter than the room."""
     everywhere = (slice(None), slice(None))
-    target = _painted(basis, everywhere, 0.25, times=True)
-    room = _lantern(basis, target, space=space)
+    target = _paint(basis, everywhere, 0.25, times=True)
+    room = _lantern_levels(basis, target, space=space)
     assert room == pytest.approx((0.25, 0.25), rel=0.05)
     target.image[AROUND] = 0.06 * WARM
     target.importance[AROUND] = 10  # as a page counts strokes over what was asked of the whole
-    exact, live = _lantern(basis, target, space=space)
+    exact, live = _lantern_levels(basis, target, space=space)
     assert exact > 0.35
     assert live > 0.35
 
 
 def test_a_room_that_becomes_darker_and_warmer_dims_its_lantern(basis: Basis):
     everywhere = (slice(None), slice(None))
-    exact, live = _lantern(basis, _painted(basis, everywhere, 0.15 * WARM, times=True))
+    exact, live = _lantern_levels(basis, _paint(basis, everywhere, 0.15 * WARM, times=True))
     assert exact < 0.3
     assert live < 0.3
 
 
 def test_a_clearly_darker_stroke_dims_it(basis: Basis):
-    exact, live = _lantern(basis, _painted(basis, AROUND, 0.2, times=True))
+    exact, live = _lantern_levels(basis, _paint(basis, AROUND, 0.2, times=True))
     assert exact < 0.7
     assert live < 0.7
 
@@ -97,7 +97,7 @@ def test_a_clearly_darker_stroke_dims_it(basis: Basis):
     ("color", "is_less"), [(WARM, False), (0.9 * WARM, False), (0.1 * WARM, True), (0 * WARM, True)]
 )
 def test_of_a_flame_alone_what_a_display_shows_decides(basis: Basis, color: Any, is_less: bool):
-    exact, live = _lantern(basis, _painted(basis, FLAME, color))
+    exact, live = _lantern_levels(basis, _paint(basis, FLAME, color))
     assert (exact < 0.7) == is_less
     # Beyond white a display's curve is flat, which answers under the brush cannot leave.
     assert is_less or live > 0.7
@@ -113,19 +113,19 @@ def test_a_glow_that_is_painted_brighter_comes_about(make_basis: Any, basis: Bas
         seen=basis.emitters_seen,
         emission=[[1.0] * 3, [1.0] * 3],
     )
-    exact, _ = _lantern(window, _painted(window, FLAME, 0.3), hold=0.1)
+    exact, _ = _lantern_levels(window, _paint(window, FLAME, 0.3), hold=0.1)
     assert exact > 2
 
 
 @pytest.mark.parametrize("fit", [{"emitters": "count"}, {"literal": True}])
 def test_who_says_so_has_it_as_painted(basis: Basis, fit: Any):
-    target = _painted(basis, AROUND, 0.5 * WARM)
+    target = _paint(basis, AROUND, 0.5 * WARM)
     target.image[FLAME] = 0
     assert lp.solve(basis, target, **fit).weights[1].max() < 0.7
 
 
 def test_what_is_read_once_is_not_read_again(basis: Basis):
-    [read] = lp.Problem.of(basis, _painted(basis, AROUND, 0.5 * WARM)).views.targets
+    [read] = lp.Problem.of(basis, _paint(basis, AROUND, 0.5 * WARM)).views.targets
     assert read.at_least is not None
     assert (read.at_least.any(axis=-1) == basis.emitters_seen).all()
     [again] = lp.Problem.of(basis, read).views.targets

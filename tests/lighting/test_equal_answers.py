@@ -42,7 +42,7 @@ def folder(make_basis: Any, tmp_path: Path) -> Path:
     return tmp_path
 
 
-def _solved(folder: Path, name: str, **variables: str) -> bytes:
+def _solve_apart(folder: Path, name: str, **variables: str) -> bytes:
     done = spawn(folder, "solve", "a.basis.exr", "t.exr", "-o", name, **variables)
     assert done.returncode == 0, done.stderr
     return (folder / name / "lighting.json").read_bytes()
@@ -54,8 +54,8 @@ def _emissions(text: bytes) -> Any:
 
 def test_equal_commands_have_equal_answers_and_other_kernels_nearly_so(folder: Path):
     blas, kernel = linear_algebra()
-    here = _solved(folder, "here")
-    assert _solved(folder, "again") == here
+    here = _solve_apart(folder, "here")
+    assert _solve_apart(folder, "again") == here
     for name in ("predicted.exr", "comparison.png"):
         whole, other = ((folder / x / name).read_bytes() for x in ("here", "again"))
         assert whole == other, name
@@ -64,7 +64,7 @@ def test_equal_commands_have_equal_answers_and_other_kernels_nearly_so(folder: P
     assert told["numpy"] == np.__version__
     if not (blas.startswith("openblas") and platform.machine() == "x86_64" and kernel != OTHER):
         pytest.skip("OpenBLAS with kernels for x86-64")
-    there = _solved(folder, "there", OPENBLAS_CORETYPE=OTHER)
+    there = _solve_apart(folder, "there", OPENBLAS_CORETYPE=OTHER)
     assert json.loads(there)["solve"]["software"]["kernel"] == OTHER
     a, b = _emissions(here), _emissions(there)
     # Not the same sums, or this test would show nothing.

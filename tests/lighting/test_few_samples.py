@@ -36,7 +36,7 @@ NOISE = 1.03
 MOST_STOPS = 6.5
 
 
-def _few(scene: lp.Scene) -> dict[int, Basis]:
+def _bases_of_few_samples(scene: lp.Scene) -> dict[int, Basis]:
     """Bases of one, two and four samples, each of which has those of the one before."""
     two = render_basis(scene, spp=2, seed=2)
     # Of two halves one, which has twice the noise of both.
@@ -73,7 +73,7 @@ def _painting(basis: Basis, look: Any, wish: str) -> lp.Target:
     )
 
 
-def _live(basis: Basis, target: lp.Target) -> Any:
+def _live_answer(basis: Basis, target: lp.Target) -> Any:
     view = LiveView(basis, target.image.copy(), target.importance.copy())
     live = LiveSolver(
         [view], fit=resolve_for_targets(lp.Fit(), [target]), constraints=lp.Constraints()
@@ -86,7 +86,7 @@ def test_no_answer_is_worse_than_none(name: str):
     scene = lp.load_scene(SCENES / name / "scene.xml").reduced(FILMS[name])
     judge = render_basis(scene, spp=MANY, seed=MANY)
     wishes = ("all darker, a warm spot", "a warm spot", "a darker side", "nothing else")
-    for (spp, few), wish in product(_few(scene).items(), wishes):
+    for (spp, few), wish in product(_bases_of_few_samples(scene).items(), wishes):
         target = _painting(few, judge.current_look, wish)
         problem = lp.Problem.of(judge, target)
 
@@ -99,7 +99,7 @@ def test_no_answer_is_worse_than_none(name: str):
         answers = {
             "exact": solution.weights,
             "noise taken out": correct_noise(solution).weights,
-            "live": _live(few, target),
+            "live": _live_answer(few, target),
         }
         for kind, weights in answers.items():
             assert missed(weights) <= now, (name, spp, wish, kind)
@@ -108,7 +108,7 @@ def test_no_answer_is_worse_than_none(name: str):
 
 
 @pytest.fixture
-def noisy(make_basis: Any) -> Basis:
+def noisy_basis(make_basis: Any) -> Basis:
     """Two lights, even but for noise that is as bright as they are, and halves that say so."""
     rng = np.random.default_rng(0)
     size = (48, 64)
@@ -119,7 +119,7 @@ def noisy(make_basis: Any) -> Basis:
     return replace(made, origin=replace(made.origin, halves=(1, 1)))
 
 
-def _over(basis: Basis, times: float) -> lp.Target:
+def _paint_over(basis: Basis, times: float) -> lp.Target:
     mean = basis.current_look.mean(axis=(0, 1))
     look = np.broadcast_to(times * mean, (*basis.size, 3)).astype(np.float32)
     how: dict[str, Any] = {"through_view": True, "over_look": True}
@@ -127,26 +127,30 @@ def _over(basis: Basis, times: float) -> lp.Target:
     return lp.Target("t", look, counts, False, transform=lp.ViewTransform(), **how)
 
 
-def test_blocks_are_as_large_as_noise_asks(noisy: Basis):
-    quiet = replace(noisy, noise=noisy.half_differences / 50)
-    unknown = replace(noisy, origin=replace(noisy.origin, halves=(0, 0)))
+def test_blocks_are_as_large_as_noise_asks(noisy_basis: Basis):
+    quiet = replace(noisy_basis, noise=noisy_basis.half_differences / 50)
+    unknown = replace(noisy_basis, origin=replace(noisy_basis.origin, halves=(0, 0)))
     tiny = replace(
-        noisy,
-        planes=noisy.images[:, :12, :10],
-        noise=noisy.half_differences[:, :12, :10],
-        emitters_seen=noisy.emitters_seen[:12, :10],
+        noisy_basis,
+        planes=noisy_basis.images[:, :12, :10],
+        noise=noisy_basis.half_differences[:, :12, :10],
+        emitters_seen=noisy_basis.emitters_seen[:12, :10],
     )
     sides = []
-    for basis in (noisy, quiet, unknown, tiny):
+    for basis in (noisy_basis, quiet, unknown, tiny):
         assert block_side([basis], None) == 1  # linear light needs none
         sides.append(block_side([basis], lp.ViewTransform()))
     assert sides == [3, 1, 1, 1]
 
 
-def test_noise_of_what_a_display_shows_moves_no_light(noisy: Basis):
+def test_noise_of_what_a_display_shows_moves_no_light(noisy_basis: Basis):
     """Fitted pixel by pixel a display's curve would make up for it: 15 % here."""
-    solution = lp.solve(noisy, _over(noisy, 0.25), colors="free")
-    shown = noisy.images.mean(axis=(1, 2)).T @ solution.weights / noisy.current_look.mean((0, 1))
+    solution = lp.solve(noisy_basis, _paint_over(noisy_basis, 0.25), colors="free")
+    shown = (
+        noisy_basis.images.mean(axis=(1, 2)).T
+        @ solution.weights
+        / noisy_basis.current_look.mean((0, 1))
+    )
     # Of 48 x 64 pixels in blocks of nine, the residual noise's bias.
     assert np.diag(shown) == pytest.approx(np.full(3, 0.25), rel=0.06)
     assert solution.problem.block_side == 3

@@ -18,10 +18,10 @@ def basis(make_basis: Any) -> lp.Basis:
     basis = make_basis(
         3, SIZE, names=("key", "lamp", "rest"), half_differences=np.ones((3, 6, 5, 3))
     )
-    return _with_kept(basis)
+    return _add_kept_light(basis)
 
 
-def _with_kept(basis: lp.Basis) -> lp.Basis:
+def _add_kept_light(basis: lp.Basis) -> lp.Basis:
     *others, rest = basis.lights
     return replace(basis, lights=(*others, replace(rest, emission=(1.0,) * 3, is_fixed=True)))
 

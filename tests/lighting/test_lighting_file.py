@@ -56,7 +56,7 @@ def test_there_and_back_is_exact(tmp_path_factory: pytest.TempPathFactory, light
 
 
 @pytest.fixture
-def good(tmp_path: Path) -> tuple[Path, dict[str, Any]]:
+def good_file(tmp_path: Path) -> tuple[Path, dict[str, Any]]:
     """A file of two lights, and its content."""
     lamp = LightSetting("lamp", "area", "radiance", "W/(m² sr)", (1.5, 2, 3), (1.5, 2, 3))
     sun = LightSetting("sun", "directional", "irradiance", "W/m²", (0.1, 0, 0), (0.1, 0, 0))
@@ -66,8 +66,8 @@ def good(tmp_path: Path) -> tuple[Path, dict[str, Any]]:
     return path, json.loads(path.read_text(encoding="utf-8"))
 
 
-def test_the_file_is_for_people_too(good: tuple[Path, dict[str, Any]]):
-    path, data = good
+def test_the_file_is_for_people_too(good_file: tuple[Path, dict[str, Any]]):
+    path, data = good_file
     assert data["lights"]["lamp"]["emission"] == [1.5, 2, 3]
     assert list(data["lights"]) == ["lamp", "sun"]
     text = path.read_text(encoding="utf-8")
@@ -75,8 +75,8 @@ def test_the_file_is_for_people_too(good: tuple[Path, dict[str, Any]]):
     assert text.endswith("}\n")
 
 
-def test_a_file_without_a_solve_is_complete(good: tuple[Path, dict[str, Any]]):
-    path, data = good
+def test_a_file_without_a_solve_is_complete(good_file: tuple[Path, dict[str, Any]]):
+    path, data = good_file
     del data["solve"], data["target"], data["scene_identity"], data["lightpaint"]
     path.write_text(json.dumps(data))
     assert read_lighting(path).certificate is None
@@ -95,8 +95,8 @@ REMOVALS = [
 
 
 @pytest.mark.parametrize("where", REMOVALS, ids="/".join)
-def test_a_missing_key(good: tuple[Path, dict[str, Any]], where: tuple[str, ...]):
-    path, data = good
+def test_a_missing_key(good_file: tuple[Path, dict[str, Any]], where: tuple[str, ...]):
+    path, data = good_file
     *outer, last = where
     inner = data
     for key in outer:
@@ -130,8 +130,8 @@ BAD_COLOURS = [
 
 @pytest.mark.parametrize("colour", BAD_COLOURS, ids=lambda c: str(c)[:20])
 @pytest.mark.parametrize("which", ["emission", "weight"])
-def test_a_colour_that_is_none(good: tuple[Path, dict[str, Any]], which: str, colour: Any):
-    path, data = good
+def test_a_colour_that_is_none(good_file: tuple[Path, dict[str, Any]], which: str, colour: Any):
+    path, data = good_file
     data["lights"]["lamp"][which] = colour
     path.write_text(json.dumps(data))
     with pytest.raises(LightingError, match=r"lighting\.json"):
@@ -156,8 +156,8 @@ def test_a_colour_that_is_none(good: tuple[Path, dict[str, Any]], which: str, co
     ],
     ids=lambda c: str(c)[:40],
 )
-def test_wrong_types(good: tuple[Path, dict[str, Any]], change: dict[str, Any]):
-    path, data = good
+def test_wrong_types(good_file: tuple[Path, dict[str, Any]], change: dict[str, Any]):
+    path, data = good_file
     path.write_text(json.dumps(data | change))
     with pytest.raises(LightingError, match=r"lighting\.json"):
         read_lighting(path)
@@ -187,8 +187,8 @@ def test_no_lighting_at_all(tmp_path: Path, content: bytes):
         read_lighting(path)
 
 
-def test_a_file_cut_off_anywhere(good: tuple[Path, dict[str, Any]]):
-    path, _ = good
+def test_a_file_cut_off_anywhere(good_file: tuple[Path, dict[str, Any]]):
+    path, _ = good_file
     content = path.read_bytes()
     # All but the final newline is needed.
     for length in range(len(content) - 1):

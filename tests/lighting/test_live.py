@@ -63,7 +63,7 @@ class _Brush:
         return Target("t", image, importance, False, through_view=True, over_look=True)
 
 
-def _painted(make_basis: Any, seed: int, views: int, count: int) -> list[_Brush]:
+def _paint_views(make_basis: Any, seed: int, views: int, count: int) -> list[_Brush]:
     brushes = [_Brush(make_basis, seed + k, SIZES[k]) for k in range(views)]
     rng = np.random.default_rng([seed, 2])
     for brush in brushes:
@@ -78,7 +78,7 @@ def _painted(make_basis: Any, seed: int, views: int, count: int) -> list[_Brush]
     return brushes
 
 
-def _meant(targets: list[Target], **fit: Any) -> Fit:
+def _resolve_fit(targets: list[Target], **fit: Any) -> Fit:
     return resolve_for_targets(Fit(**fit), targets)
 
 
@@ -91,9 +91,9 @@ def _meant(targets: list[Target], **fit: Any) -> Fit:
 def test_sums_under_a_brush_are_those_of_the_whole_problem(
     make_basis: Any, seed: int, count: int, views: int, fit: dict[str, float]
 ) -> None:
-    brushes = _painted(make_basis, seed, views, count)
+    brushes = _paint_views(make_basis, seed, views, count)
     targets = [brush.target for brush in brushes]
-    meant = _meant(targets, space="linear", **fit)
+    meant = _resolve_fit(targets, space="linear", **fit)
     problem = Problem.of([brush.basis for brush in brushes], targets, fit=meant)
     rest = unpainted_weight_of(problem.views, meant)
     live = reduce(add, (brush.view.tiles().equations(rest) for brush in brushes))
@@ -107,7 +107,7 @@ def test_sums_under_a_brush_are_those_of_the_whole_problem(
 @given(st.integers(0, 10_000), st.integers(1, 6))
 def test_no_stroke_leaves_a_trace_in_the_sums(make_basis: Any, seed: int, count: int) -> None:
     """What is painted has the bits of a view that begins with it; the rest but for round-off."""
-    [brush] = _painted(make_basis, seed, 1, count)
+    [brush] = _paint_views(make_basis, seed, 1, count)
     fresh = LiveView(brush.basis, brush.image, brush.importance)
     paint, anew = (view.tiles().equations(0.0) for view in (brush.view, fresh))
     both, both_anew = (view.tiles().equations(0.7) for view in (brush.view, fresh))
@@ -117,7 +117,7 @@ def test_no_stroke_leaves_a_trace_in_the_sums(make_basis: Any, seed: int, count:
 
 
 def test_undoing_a_stroke_gives_back_the_bits(make_basis: Any) -> None:
-    [brush] = _painted(make_basis, 1, 1, 4)
+    [brush] = _paint_views(make_basis, 1, 1, 4)
     before, region = brush.view.tiles().equations(0.0), (slice(5, 30), slice(2, 19))
     image, importance = brush.image[region].copy(), brush.importance[region].copy()
     brush.image[region], brush.importance[region] = (1.0, 0.5, 0.2), 1.0
@@ -140,8 +140,8 @@ def test_the_answer_under_a_brush_is_that_of_a_solve(
     make_basis: Any, asked: dict[str, Any], fit: dict[str, Any], views: int
 ) -> None:
     constraints = Constraints.of(light=asked)
-    brushes = _painted(make_basis, 5, views, 0)
-    meant = _meant([brush.target for brush in brushes], space="linear", **fit)
+    brushes = _paint_views(make_basis, 5, views, 0)
+    meant = _resolve_fit([brush.target for brush in brushes], space="linear", **fit)
     live = LiveSolver([brush.view for brush in brushes], fit=meant, constraints=constraints)
     rng, answer = np.random.default_rng(3), brushes[0].basis.current_weights
     for _ in range(4):
@@ -156,8 +156,8 @@ def test_the_answer_under_a_brush_is_that_of_a_solve(
 
 
 def test_rounds_under_a_brush_come_to_the_answer_of_a_display(make_basis: Any) -> None:
-    [brush] = _painted(make_basis, 8, 1, 5)
-    meant = _meant([brush.target], space="display", hold=1.0)
+    [brush] = _paint_views(make_basis, 8, 1, 5)
+    meant = _resolve_fit([brush.target], space="display", hold=1.0)
     live = LiveSolver([brush.view], fit=meant, constraints=Constraints())
     answer = brush.basis.current_weights
     for _ in range(60):
@@ -173,8 +173,8 @@ def test_planes_that_are_replaced_answer_as_if_they_had_been_there(
     make_basis: Any, space: Any, views: int
 ) -> None:
     """And what is not painted is held near the look of before."""
-    brushes = _painted(make_basis, 5, views, 4)
-    meant = _meant([brush.target for brush in brushes], space=space)
+    brushes = _paint_views(make_basis, 5, views, 4)
+    meant = _resolve_fit([brush.target for brush in brushes], space=space)
     live = LiveSolver([b.view for b in brushes], fit=meant, constraints=Constraints())
     start = live.answer(brushes[0].basis.current_weights)
     fresh = []

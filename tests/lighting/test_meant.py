@@ -25,7 +25,7 @@ def _basis(make_basis: Any, n: int = 4, seed: int = 0) -> lp.Basis:
     return make_basis(images=rng.random((n, 12, 10, 3)) ** 3, emission=rng.random((n, 3)) + 0.1)
 
 
-def _painted(basis: lp.Basis, seed: int = 1, **about: Any) -> lp.Target:
+def _paint(basis: lp.Basis, seed: int = 1, **about: Any) -> lp.Target:
     """Something else than the look, within the left half."""
     rng = np.random.default_rng(seed)
     mask = np.zeros(basis.size)
@@ -48,7 +48,7 @@ def _painted(basis: lp.Basis, seed: int = 1, **about: Any) -> lp.Target:
     ],
 )
 def test_what_is_left_open_follows_from_how_it_was_painted(make_basis: Any, about: Any, fit: Any):
-    target = _painted(_basis(make_basis), **about)
+    target = _paint(_basis(make_basis), **about)
     found = resolve_for_targets(Fit(), [target])
     assert (found.space, found.hold, found.colors, found.transform) == fit
     literal = resolve_for_targets(Fit(literal=True), [target])
@@ -60,10 +60,10 @@ def test_what_is_left_open_follows_from_how_it_was_painted(make_basis: Any, abou
 
 def test_views_of_which_one_was_painted_over_the_look(make_basis: Any):
     basis = _basis(make_basis)
-    both = [_painted(basis), _painted(basis, over_look=True)]
+    both = [_paint(basis), _paint(basis, over_look=True)]
     assert resolve_for_targets(Fit(), both).hold == DEFAULT_HOLD
     agx = lp.ViewTransform("agx")
-    seen = [_painted(basis, through_view=True, transform=x) for x in (SRGB, agx)]
+    seen = [_paint(basis, through_view=True, transform=x) for x in (SRGB, agx)]
     with pytest.raises(TargetError, match=r"srgb at \+0 stops.*transform=\.\.\."):
         resolve_for_targets(Fit(), seen)
     assert resolve_for_targets(Fit(transform=agx), seen).transform == agx
@@ -72,7 +72,7 @@ def test_views_of_which_one_was_painted_over_the_look(make_basis: Any):
 def test_what_is_not_painted_weighs_as_much_as_is_said(make_basis: Any):
     """h Σ D over all of it, but no pixel more than a painted one."""
     basis = _basis(make_basis)
-    target = _painted(basis, over_look=True)
+    target = _paint(basis, over_look=True)
     D = target.importance.astype(float)
     # Of this painting the rest is too small to weigh more.
     hold = 0.9 * float((1 - D).sum() / D.sum())
@@ -93,7 +93,7 @@ def test_an_untouched_look_is_met_by_the_present_lighting(make_basis: Any):
     basis = _basis(make_basis)
     look = basis.mix(basis.current_weights)
     for about in ({"over_look": True}, {"over_look": True, "through_view": True}):
-        target = replace(_painted(basis, transform=lp.ViewTransform("srgb", -1.0)), image=look)
+        target = replace(_paint(basis, transform=lp.ViewTransform("srgb", -1.0)), image=look)
         solution = lp.solve(basis, replace(target, **about))
         np.testing.assert_allclose(solution.weights, basis.current_weights, rtol=1e-4)
 
@@ -105,7 +105,7 @@ def test_colors_are_pulled_as_the_formula_says(make_basis: Any, monkeypatch: pyt
     """
     monkeypatch.setattr(problem, "gamuts_for", lambda *_: None)
     basis = _basis(make_basis)
-    target = _painted(basis, over_look=True)
+    target = _paint(basis, over_look=True)
     solution = lp.solve(basis, target, hold=0)
     D, current = target.importance.astype(float), basis.current_weights
     images = basis.images.astype(float)
@@ -144,7 +144,7 @@ def test_lamps_that_only_dim_cost_nothing(make_basis: Any):
 
 def test_colors_that_were_asked_for_are_not_pulled(make_basis: Any):
     basis = _basis(make_basis)
-    target = _painted(basis, over_look=True)
+    target = _paint(basis, over_look=True)
     red = lp.Constraints.of({"light 0": {"color": "#ff0000"}})
     problem = Problem.of(basis, target, constraints=red)
     assert problem.keeps_color.tolist() == [False, True, True, True]
@@ -155,7 +155,7 @@ def test_colors_that_were_asked_for_are_not_pulled(make_basis: Any):
 
 def test_white_is_what_kelvin_does(make_basis: Any):
     basis = _basis(make_basis)
-    target = _painted(basis)
+    target = _paint(basis)
     asked = lp.Constraints.of({"*": {"kelvin": [2200, 9000]}})
     expected = lp.solve(basis, target, constraints=asked).weights
     np.testing.assert_allclose(lp.solve(basis, target, colors="white").weights, expected, rtol=1e-9)
@@ -167,7 +167,7 @@ def test_white_is_what_kelvin_does(make_basis: Any):
 
 def test_the_answer_says_how_it_was_found(make_basis: Any, tmp_path: Any):
     basis = _basis(make_basis)
-    lighting = lp.solve(basis, _painted(basis, over_look=True)).lighting
+    lighting = lp.solve(basis, _paint(basis, over_look=True)).lighting
     lp.write_lighting(tmp_path / "a.json", lighting)
     certificate = lp.read_lighting(tmp_path / "a.json").certificate
     assert (certificate.hold, certificate.colors) == (DEFAULT_HOLD, "gentle")

@@ -53,7 +53,7 @@ def test_both_methods_come_to_one_answer(make_basis: Any, seed: int, asked: Any)
     np.testing.assert_allclose(a, b, rtol=0, atol=atol)
 
 
-def _alike(make_basis: Any) -> Any:
+def _similar_lights(make_basis: Any) -> Any:
     """Two lights that do nearly the same: sweeps go along a long narrow valley."""
     rng = np.random.default_rng(0)
     images = rng.random((3, *SIZE, 3))
@@ -65,7 +65,7 @@ def _alike(make_basis: Any) -> Any:
 
 
 def test_running_out_of_sweeps_is_said(make_basis: Any) -> None:
-    basis, target = _alike(make_basis)
+    basis, target = _similar_lights(make_basis)
     assert solve(basis, target).certificate.converged
     for constraints in (None, Constraints.of({"light 2": {"limits": {"max": [9, 9, 9]}}})):
         swept = solve(basis, target, constraints=constraints, method="gauss-seidel")
@@ -75,7 +75,7 @@ def test_running_out_of_sweeps_is_said(make_basis: Any) -> None:
 
 
 def test_the_method_stays_where_the_answer_is_improved(make_basis: Any) -> None:
-    basis, target = _alike(make_basis)
+    basis, target = _similar_lights(make_basis)
     better = correct_noise(solve(basis, target, method="gauss-seidel"))
     assert better.problem.fit.method == "gauss-seidel"
     assert max(better.certificate.sweeps) > 0

@@ -23,7 +23,7 @@ def _problem(n: int, size: tuple[int, int], seed: int = 0) -> tuple[Any, Any, An
     return images, target, importance
 
 
-def _dense(images: Any, target: Any, importance: Any, c: int) -> tuple[Any, Any, Any]:
+def _dense_equations(images: Any, target: Any, importance: Any, c: int) -> tuple[Any, Any, Any]:
     """AᵀDA, AᵀDΨ and ΨᵀDΨ of channel `c`, with D as a matrix."""
     A = images[..., c].reshape(len(images), -1).T.astype(np.float64)
     D = np.diag(importance.ravel().astype(np.float64))
@@ -38,7 +38,7 @@ def test_equal_to_dense_algebra(n: int, size: tuple[int, int]):
     assert (M.shape, b.shape, norm2.shape) == ((3, n, n), (3, n), (3,))
     assert M.dtype == b.dtype == norm2.dtype == np.float64
     for c in range(3):
-        dense_M, dense_b, dense_norm2 = _dense(*problem, c)
+        dense_M, dense_b, dense_norm2 = _dense_equations(*problem, c)
         np.testing.assert_allclose(M[c], dense_M, rtol=PRECISION)
         np.testing.assert_allclose(b[c], dense_b, rtol=PRECISION)
         np.testing.assert_allclose(norm2[c], dense_norm2, rtol=PRECISION)
@@ -70,24 +70,24 @@ def test_a_run_of_pixels_is_not_gathered_and_comes_to_the_same():
     seen[:, 8, 7] = 0
     unpainted = target.copy()
     unpainted[8, 7] = 0
-    read = _Watched(images)
+    read = CountedPixels(images)
     for got, want in zip(
         inner_products(read, target, run), inner_products(seen, unpainted, gathered), strict=True
     ):
         np.testing.assert_allclose(got, want, rtol=PRECISION)
-    assert _Watched.gathered == 0
+    assert CountedPixels.gathered == 0
 
 
-class _Watched(np.ndarray):  # type: ignore[type-arg]
+class CountedPixels(np.ndarray):  # type: ignore[type-arg]
     """Pixels that count how often they are gathered by index."""
 
     gathered = 0
 
-    def __new__(cls, pixels: Any) -> "_Watched":
+    def __new__(cls, pixels: Any) -> "CountedPixels":
         return np.asarray(pixels).view(cls)
 
     def __getitem__(self, where: Any) -> Any:
-        _Watched.gathered += isinstance(where, tuple) and any(
+        CountedPixels.gathered += isinstance(where, tuple) and any(
             isinstance(k, np.ndarray) for k in where
         )
         return super().__getitem__(where)

@@ -42,7 +42,7 @@ def _target(image: Any, importance: Any = None, *, top: float | None = None) -> 
     return Target("t", image, importance.astype(np.float32), everything=False, at_least=at_least)
 
 
-def _random(make_basis: Any, seed: int, *, n: int = 4) -> tuple[Basis, Any, Any]:
+def _random_problem(make_basis: Any, seed: int, *, n: int = 4) -> tuple[Basis, Any, Any]:
     """A basis with contrast, a picture that no mix of it is, and importances, some of them 0."""
     rng = np.random.default_rng(seed)
     basis = make_basis(images=rng.random((n, *SIZE, 3)) ** 3, emission=rng.random((n, 3)))
@@ -54,7 +54,7 @@ def _pictures(basis: Basis, w: Any) -> Any:
     return np.einsum("nhwc,nc->hwc", basis.images.astype(np.float64), w.reshape(-1, 3))
 
 
-def _hinge(basis: Basis, target: Target, unpainted: float) -> Any:
+def _hinge_objective(basis: Basis, target: Target, unpainted: float) -> Any:
     """The objective by hand: squares, of which those of saturated paint only pull upwards."""
     a = target.importance[..., None].astype(np.float64)
     current = basis.mix(basis.current_weights)
@@ -68,7 +68,9 @@ def _hinge(basis: Basis, target: Target, unpainted: float) -> Any:
     return value
 
 
-def _displayed(basis: Basis, target: Target, transform: ViewTransform, unpainted: float) -> Any:
+def _displayed_objective(
+    basis: Basis, target: Target, transform: ViewTransform, unpainted: float
+) -> Any:
     a = target.importance[..., None].astype(np.float64)
     painted = transform.encode(target.image.astype(np.float64))
     current = transform.encode(basis.mix(basis.current_weights).astype(np.float64))
@@ -80,7 +82,7 @@ def _displayed(basis: Basis, target: Target, transform: ViewTransform, unpainted
     return value
 
 
-def _best(value: Any, starts: list[Any]) -> float:
+def _least_value(value: Any, starts: list[Any]) -> float:
     """The least that scipy's quasi-Newton method finds from these weights."""
     options = {"maxiter": 2000, "maxfun": 10**6, "ftol": 1e-16, "gtol": 1e-11}
     found = [
@@ -103,13 +105,13 @@ def _projected_gradient(value: Any, w: Any) -> Any:
 @pytest.mark.parametrize("unpainted", [0.0, 0.3])
 @pytest.mark.parametrize("seed", range(10))
 def test_at_least_is_the_optimum_of_the_hinge(make_basis: Any, seed: int, unpainted: float):
-    basis, image, importance = _random(make_basis, seed)
+    basis, image, importance = _random_problem(make_basis, seed)
     target = _target(image, importance, top=0.3)
     solution = solve(basis, target, unpainted=unpainted)
     w = solution.lighting.weights_for(basis)
-    value = _hinge(basis, target, unpainted)
+    value = _hinge_objective(basis, target, unpainted)
     # It is convex, and the quasi-Newton method's finite differences are good to some 1e-8.
-    best = _best(value, [np.ones_like(w), w])
+    best = _least_value(value, [np.ones_like(w), w])
     assert value(w) <= best * (1 + 1e-9)
     assert solution.certificate.converged
     # Certified as any linear solve is: the last problem is exact around its own optimum.
@@ -129,7 +131,7 @@ def test_at_least_is_the_optimum_of_the_hinge(make_basis: Any, seed: int, unpain
 def test_the_objective_never_rises(
     make_basis: Any, seed: int, transform: ViewTransform | None, monkeypatch: pytest.MonkeyPatch
 ):
-    basis, image, importance = _random(make_basis, seed)
+    basis, image, importance = _random_problem(make_basis, seed)
     target = _target(image, importance, top=0.3 if transform is None else None)
     problem = solve(basis, target, transform=transform).problem
     plain = solve(basis, replace(target, at_least=None))
@@ -147,7 +149,7 @@ def test_running_out_of_rounds_keeps_what_was_won(
     make_basis: Any, seed: int, monkeypatch: pytest.MonkeyPatch
 ):
     """Whole steps would be for the worse here, parts of them are not; labels stay as well."""
-    basis, image, importance = _random(make_basis, seed)
+    basis, image, importance = _random_problem(make_basis, seed)
     target, transform = _target(image, importance), ViewTransform("srgb", 2.0)
     asked = Constraints.of({"light 0": {"limits": {"max": 0.2}}, "light 1": {"lock": True}})
     problem = solve(basis, target, constraints=asked)
@@ -206,9 +208,9 @@ VIEWS = [
 def test_a_display_fit_is_stationary_and_no_worse(
     make_basis: Any, seed: int, transform: ViewTransform, unpainted: float
 ):
-    basis, image, importance = _random(make_basis, seed)
+    basis, image, importance = _random_problem(make_basis, seed)
     target = _target(image, importance)
-    value = _displayed(basis, target, transform, unpainted)
+    value = _displayed_objective(basis, target, transform, unpainted)
     linear = solve(basis, target, unpainted=unpainted).lighting.weights_for(basis)
     solution = solve(basis, target, unpainted=unpainted, transform=transform)
     w = solution.lighting.weights_for(basis)
@@ -226,12 +228,12 @@ def test_most_display_fits_are_the_best_there_are(make_basis: Any):
     """The loss is not convex. Random starts seldom find better, or much better."""
     worse = []
     for seed in range(12):
-        basis, image, importance = _random(make_basis, seed)
+        basis, image, importance = _random_problem(make_basis, seed)
         target = _target(image, importance)
-        value = _displayed(basis, target, SRGB, 0.0)
+        value = _displayed_objective(basis, target, SRGB, 0.0)
         w = solve(basis, target, transform=SRGB).lighting.weights_for(basis)
         rng = np.random.default_rng(seed)
-        best = _best(value, [3 * rng.random(w.shape) for _ in range(4)] + [w])
+        best = _least_value(value, [3 * rng.random(w.shape) for _ in range(4)] + [w])
         worse.append(value(w) / best - 1)
     assert np.median(worse) < 1e-6
     assert np.max(worse) < 0.1
@@ -273,7 +275,7 @@ def test_squares_have_the_gradient_of_the_loss(make_basis: Any, transform: ViewT
 
 
 def test_importance_per_channel(make_basis: Any):
-    basis, image, _ = _random(make_basis, 3)
+    basis, image, _ = _random_problem(make_basis, 3)
     weight = np.clip(np.random.default_rng(0).normal(0.3, 0.5, (*SIZE, 3)), 0, None)
     M, b, norm2 = inner_products(basis.images, image, weight)
     for c in range(3):
@@ -297,7 +299,7 @@ ASKED: list[dict[str, Any]] = [
 def test_constraints_hold_and_nothing_near_is_better(
     make_basis: Any, asked: dict[str, Any], transform: ViewTransform | None
 ):
-    basis, image, importance = _random(make_basis, 7)
+    basis, image, importance = _random_problem(make_basis, 7)
     target = _target(image, importance, top=0.3)
     asked = dict(asked)
     constraints = Constraints.of(asked.pop("lights", {}), **asked)
@@ -321,7 +323,7 @@ def test_constraints_hold_and_nothing_near_is_better(
     # Any mix of two lightings that constraints allow is allowed, too.
     if not constraints.sparse:
         for seed in range(5):
-            other = _random(make_basis, seed + 20)[1]
+            other = _random_problem(make_basis, seed + 20)[1]
             free = solve(basis, _target(other, importance), constraints=constraints)
             there = free.lighting.weights_for(basis)
             assert value(w + 1e-3 * (there - w)) >= value(w) * (1 - 1e-9)
@@ -330,7 +332,7 @@ def test_constraints_hold_and_nothing_near_is_better(
 @pytest.mark.parametrize("transform", [None, SRGB])
 def test_views_together_are_one_picture(make_basis: Any, transform: ViewTransform | None):
     """Two views, of which one alone has saturated paint, against one view of both pictures."""
-    basis, image, importance = _random(make_basis, 1)
+    basis, image, importance = _random_problem(make_basis, 1)
     current = [light.emission for light in basis.lights]
     first, second = (
         make_basis(images=basis.images[:, rows], emission=current)
@@ -354,7 +356,7 @@ def test_views_together_are_one_picture(make_basis: Any, transform: ViewTransfor
     np.testing.assert_allclose(M, expected.equations.M, rtol=1e-4)
 
 
-def _least(solution: Solution, basis: Basis, solve_channel: Any) -> float:
+def _least_of_last_problem(solution: Solution, basis: Basis, solve_channel: Any) -> float:
     """The least of the last linear problem, by another solver, of dense rows."""
     total = 0.0
     for c in range(3):
@@ -367,7 +369,7 @@ def _least(solution: Solution, basis: Basis, solve_channel: Any) -> float:
     return total
 
 
-def _of_any_sign(A: Any, y: Any) -> Any:
+def _solve_unbounded(A: Any, y: Any) -> Any:
     return np.linalg.lstsq(A, y, rcond=None)[0]
 
 
@@ -379,15 +381,18 @@ def test_what_each_of_several_views_misses_is_split_on_one_scale(
     """Each part from its own optimum, of the view's own squares: nnls, and lstsq for any sign."""
     bases, targets = [], []
     for k in range(2):
-        basis, image, importance = _random(make_basis, seed + 50 * k)
+        basis, image, importance = _random_problem(make_basis, seed + 50 * k)
         bases.append(replace(basis, lights=bases[0].lights if bases else basis.lights))
         targets.append(_target(image, importance + 0.01, top=None if transform else 0.6))
     joint = solve(bases, targets, transform=transform)
     told, energies = [], []
     for b, its in zip(bases, joint.views, strict=True):
         found = diagnose(its)
-        free, alone = (_least(its, b, f) for f in (_of_any_sign, lambda A, y: nnls(A, y)[0]))
-        energy = _least(its, b, partial(_as_solved, joint, iter(range(3))))
+        free, alone = (
+            _least_of_last_problem(its, b, f)
+            for f in (_solve_unbounded, lambda A, y: nnls(A, y)[0])
+        )
+        energy = _least_of_last_problem(its, b, partial(_replace_channels, joint, iter(range(3))))
         # Pixels in float32, sums of 72 of them.
         close = partial(pytest.approx, abs=1e-5 * energy)
         assert found.total == close(energy)
@@ -406,14 +411,14 @@ def test_what_each_of_several_views_misses_is_split_on_one_scale(
         assert found.lighting_total == pytest.approx(sum(energies), rel=1e-5)
 
 
-def _as_solved(joint: Solution, channels: Any, A: Any, y: Any) -> Any:
+def _replace_channels(joint: Solution, channels: Any, A: Any, y: Any) -> Any:
     c = next(channels)
     return np.array([light.weight[c] for light in joint.lighting.lights])
 
 
 @pytest.mark.parametrize("transform", [SRGB, ViewTransform("agx", 1.0)], ids=str)
 def test_gains_are_beside_what_the_same_squares_miss(make_basis: Any, transform: ViewTransform):
-    basis, image, importance = _random(make_basis, 2)
+    basis, image, importance = _random_problem(make_basis, 2)
     target = _target(image, importance)
     solution = solve(basis, target, transform=transform)
     found = diagnose(solution)
@@ -423,7 +428,7 @@ def test_gains_are_beside_what_the_same_squares_miss(make_basis: Any, transform:
 
 
 def test_nothing_changes_where_nothing_is_saturated_that_counts(make_basis: Any):
-    basis, image, importance = _random(make_basis, 4)
+    basis, image, importance = _random_problem(make_basis, 4)
     target = _target(image, importance)
     nowhere = replace(target, at_least=np.repeat((importance == 0)[..., None], 3, axis=-1))
     assert nowhere.at_least.any()

@@ -69,7 +69,7 @@ def _painting(name: str, basis: lp.Basis) -> lp.Target:
     return target.fitted_to(basis.size, resize=True)
 
 
-def _literal(basis: lp.Basis, target: lp.Target) -> tuple[Any, Any]:
+def _literal_problem(basis: lp.Basis, target: lp.Target) -> tuple[Any, Any]:
     """Ψ, (h, w, 3), and D, (h, w), where pixels with an emitter in view count if painted."""
     D = target.importance.astype(np.float64)
     if target.everything:
@@ -77,13 +77,13 @@ def _literal(basis: lp.Basis, target: lp.Target) -> tuple[Any, Any]:
     return target.image.astype(np.float64), D
 
 
-def _held(basis: lp.Basis, target: lp.Target) -> tuple[Any, Any]:
+def _hold_look(basis: lp.Basis, target: lp.Target) -> tuple[Any, Any]:
     """The same with unpainted pixels held to the current look C: D + u and (D Ψ + u C) / (D + u).
 
     All u together are HOLD times all D, and no u is more than 1 − D (docs/method.md, "Unpainted
     pixels").
     """
-    psi, D = _literal(basis, target)
+    psi, D = _literal_problem(basis, target)
     look = np.einsum("nc,nhwc->hwc", basis.current_weights, basis.images.astype(np.float64))
     free = np.where(basis.emitters_seen, 0, np.maximum(1 - D, 0))
     u = free * (min(HOLD * D.sum() / free.sum(), 1.0) if free.any() else 0.0)
@@ -113,13 +113,13 @@ def test_sums_over_pixels_are_those_of_numpy(planes: Planes, name: str) -> None:
     target = _painting(name, basis)
     equations = lp.Problem.of(basis, target, fit=lp.Fit(literal=True)).equations
     for channel in range(3):
-        A, y = _rows(basis, *_literal(basis, target), channel)
+        A, y = _rows(basis, *_literal_problem(basis, target), channel)
         np.testing.assert_allclose(equations.M[channel], A.T @ A, rtol=1e-11)
         np.testing.assert_allclose(equations.b[channel], A.T @ y, rtol=1e-11)
         np.testing.assert_allclose(equations.target_norm2[channel], y @ y, rtol=1e-11)
 
 
-def _by_scipy(basis: lp.Basis, psi: Any, D: Any) -> Any:
+def _solve_by_scipy(basis: lp.Basis, psi: Any, D: Any) -> Any:
     return np.stack([nnls(*_rows(basis, psi, D, c))[0] for c in range(3)], axis=-1)
 
 
@@ -129,9 +129,9 @@ def test_literal_lightings_are_those_of_scipy(planes: Planes, name: str) -> None
     target = _painting(name, basis)
     solution = lp.solve(basis, target, literal=True)
     if solution.problem.is_linear:
-        _assert_close(solution.weights, _by_scipy(basis, *_literal(basis, target)))
+        _assert_close(solution.weights, _solve_by_scipy(basis, *_literal_problem(basis, target)))
     else:
-        _assert_least(basis, target, solution.weights, *_literal(basis, target))
+        _assert_least(basis, target, solution.weights, *_literal_problem(basis, target))
 
 
 @pytest.mark.parametrize("name", [name for name in PAINTINGS if name.endswith(".exr")])
@@ -139,7 +139,7 @@ def test_held_lightings_are_those_of_scipy(planes: Planes, name: str) -> None:
     basis = planes(name)
     target = _painting(name, basis)
     weights = lp.solve(basis, target, space="linear", colors="free", hold=HOLD).weights
-    _assert_close(weights, _by_scipy(basis, *_held(basis, target)), PICTURE_ROUND_OFF)
+    _assert_close(weights, _solve_by_scipy(basis, *_hold_look(basis, target)), PICTURE_ROUND_OFF)
 
 
 def _assert_least(basis: lp.Basis, target: lp.Target, weights: Any, psi: Any, D: Any) -> None:
@@ -177,7 +177,7 @@ def test_constrained_lightings_are_those_of_quadprog(planes: Planes, name: str) 
     assert (weights[limited] == most).any()
     n = len(basis.lights)
     for channel in range(3):
-        A, y = _rows(basis, *_literal(basis, target), channel)
+        A, y = _rows(basis, *_literal_problem(basis, target), channel)
         lower, upper = np.zeros(n), np.full(n, np.inf)
         lower[locked] = upper[locked] = basis.current_weights[locked, channel]
         upper[dark], upper[limited] = 0, most[channel]

@@ -42,13 +42,13 @@ def _random_target(seed: int = 1) -> Target:
     return _target(rng.random((*SIZE, 3)), importance)
 
 
-def _seen() -> Any:
+def _emitter_mask() -> Any:
     seen = np.zeros(SIZE, bool)
     seen[:3, :4] = True
     return seen
 
 
-def _weighted(basis: Any, target: Target, *, unpainted: float = 0.0) -> tuple[Any, Any]:
+def _weighted_target(basis: Any, target: Target, *, unpainted: float = 0.0) -> tuple[Any, Any]:
     """The image and importance that are solved for."""
     squares = target_squares(basis, target, unpainted=unpainted)
     return squares.image, squares.weight[..., 0]
@@ -62,9 +62,9 @@ def _squares(importance: Any, image: Any, basis: Any, w: Any) -> Any:
 @pytest.mark.parametrize("unpainted", [0.0, 0.01, 1.0, 30.0])
 def test_one_residual_stands_for_two(make_basis: Any, unpainted: float):
     """Σ a‖Ψ−x‖² + unpainted (1−a)‖current−x‖² and the weighted residual differ by a constant."""
-    basis = make_basis(4, SIZE, seen=_seen())
+    basis = make_basis(4, SIZE, seen=_emitter_mask())
     target = _random_target()
-    image, importance = _weighted(basis, target, unpainted=unpainted)
+    image, importance = _weighted_target(basis, target, unpainted=unpainted)
     current = basis.mix(basis.current_weights)
     a = target.importance.astype(np.float64)
     rest = unpainted * np.where(basis.emitters_seen, 0, np.maximum(1 - a, 0))
@@ -80,22 +80,24 @@ def test_one_residual_stands_for_two(make_basis: Any, unpainted: float):
 
 
 def test_seen_emitters_do_not_count_if_nobody_said_what_does(make_basis: Any):
-    basis = make_basis(3, SIZE, seen=_seen())
+    basis = make_basis(3, SIZE, seen=_emitter_mask())
     target = _target(np.ones((*SIZE, 3)))
     for unpainted in (0.0, 2.0):
-        _, importance = _weighted(basis, target, unpainted=unpainted)
-        np.testing.assert_array_equal(importance, np.where(_seen(), 0, 1))
+        _, importance = _weighted_target(basis, target, unpainted=unpainted)
+        np.testing.assert_array_equal(importance, np.where(_emitter_mask(), 0, 1))
 
 
 def test_seen_emitters_count_where_somebody_painted_them(make_basis: Any):
-    basis = make_basis(3, SIZE, seen=_seen())
+    basis = make_basis(3, SIZE, seen=_emitter_mask())
     painted = np.zeros(SIZE)
     painted[0, 0] = painted[8, 8] = 0.5
-    _, importance = _weighted(basis, _target(np.ones((*SIZE, 3)), painted))
+    _, importance = _weighted_target(basis, _target(np.ones((*SIZE, 3)), painted))
     np.testing.assert_array_equal(importance, painted)
     # What is not painted pulls towards the current look, but not where an emitter is seen.
-    _, importance = _weighted(basis, _target(np.ones((*SIZE, 3)), painted), unpainted=4)
-    np.testing.assert_array_equal(importance, painted + np.where(_seen(), 0, 4 * (1 - painted)))
+    _, importance = _weighted_target(basis, _target(np.ones((*SIZE, 3)), painted), unpainted=4)
+    np.testing.assert_array_equal(
+        importance, painted + np.where(_emitter_mask(), 0, 4 * (1 - painted))
+    )
 
 
 def test_nothing_but_emitters(make_basis: Any):
@@ -251,7 +253,7 @@ def test_combine_mixes_images_and_noise_alike(make_basis: Any):
     )
 
 
-def _with_fixed(basis: Any, fixed: list[int]) -> Any:
+def _fix_lights(basis: Any, fixed: list[int]) -> Any:
     lights = [
         replace(light, is_fixed=True, emission=(1.0, 1.0, 1.0)) if k in fixed else light
         for k, light in enumerate(basis.lights)
@@ -264,7 +266,7 @@ def test_what_is_kept_leaves_scipy_the_rest_of_the_target(
     make_basis: Any, n: int, seed: int, data: st.DataObject
 ) -> None:
     fixed = data.draw(st.lists(st.integers(0, n - 1), max_size=n - 1, unique=True))
-    basis = _with_fixed(make_basis(n, SIZE, seed=seed), fixed)
+    basis = _fix_lights(make_basis(n, SIZE, seed=seed), fixed)
     target = _target(n / 2 * _random_target(seed + 1).image, _random_target(seed + 2).importance)
     solution = solve(basis, target)
     weights = solution.lighting.weights_for(basis)
@@ -286,7 +288,7 @@ def test_what_is_kept_leaves_scipy_the_rest_of_the_target(
 @pytest.mark.parametrize("unpainted", [0.0, 0.3])
 def test_keeping_a_light_is_painting_without_it(make_basis: Any, unpainted: float) -> None:
     basis = make_basis(4, SIZE, seed=5)
-    held = _with_fixed(basis, [1])
+    held = _fix_lights(basis, [1])
     others = replace(
         basis,
         lights=tuple(np.delete(np.array(basis.lights, object), 1)),
@@ -302,10 +304,10 @@ def test_keeping_a_light_is_painting_without_it(make_basis: Any, unpainted: floa
 
 
 def test_what_is_kept_stays_through_any_painting(make_basis: Any) -> None:
-    basis = _with_fixed(make_basis(3, SIZE), [0, 2])
+    basis = _fix_lights(make_basis(3, SIZE), [0, 2])
     black = solve(basis, _target(np.zeros((*SIZE, 3)))).lighting
     assert black.weights_for(basis).tolist() == [[1, 1, 1], [0, 0, 0], [1, 1, 1]]
-    alone = _with_fixed(make_basis(2, SIZE), [0, 1])
+    alone = _fix_lights(make_basis(2, SIZE), [0, 1])
     everything = solve(alone, _random_target())
     assert everything.certificate.converged
     assert (everything.lighting.weights_for(alone) == 1).all()

@@ -24,7 +24,7 @@ def basis(make_basis: Any) -> lp.Basis:
     return make_basis(images=images, emission=np.full((7, 3), 0.3))
 
 
-def _over(look: np.ndarray, factor: Any, where: Any) -> lp.Target:
+def _paint_over(look: np.ndarray, factor: Any, where: Any) -> lp.Target:
     """Painted over the look, and saved in 8 bits."""
     mask = np.zeros(SIZE)
     mask[where] = 1
@@ -35,7 +35,7 @@ def _over(look: np.ndarray, factor: Any, where: Any) -> lp.Target:
     return replace(target, transform=view, through_view=True, over_look=True)
 
 
-def _apart(basis: lp.Basis, solution: lp.Solution, where: Any) -> float:
+def _mean_change(basis: lp.Basis, solution: lp.Solution, where: Any) -> float:
     """Mean ΔE from the current look."""
     look, found = basis.mix(basis.current_weights), basis.mix(solution.weights)
     return float(delta_e(look, found)[where].mean())
@@ -50,11 +50,11 @@ def _hue(basis: lp.Basis, solution: lp.Solution) -> float:
 def test_more_light_on_the_statue_leaves_the_room_alone(basis: lp.Basis):
     """One percent of the picture, two stops brighter: the room next door stays as it was."""
     look = basis.mix(basis.current_weights)
-    target = _over(look, 2.5, (slice(15, 21), slice(9, 13)))
+    target = _paint_over(look, 2.5, (slice(15, 21), slice(9, 13)))
     elsewhere = (slice(None), slice(32, None))
     meant, literal = lp.solve(basis, target), lp.solve(basis, target, literal=True)
-    assert _apart(basis, literal, elsewhere) > 5
-    assert _apart(basis, meant, elsewhere) < 1
+    assert _mean_change(basis, literal, elsewhere) > 5
+    assert _mean_change(basis, meant, elsewhere) < 1
     # And it is brighter: by more than half of the stops that were painted.
     there = np.log2(basis.mix(meant.weights) / look)[target.importance > 0]
     assert there.mean() > 0.5 * np.log2(2.5)
@@ -63,7 +63,7 @@ def test_more_light_on_the_statue_leaves_the_room_alone(basis: lp.Basis):
 def test_a_warm_stroke_makes_no_red_and_green_lamps(basis: lp.Basis):
     look = basis.mix(basis.current_weights)
     noise = np.random.default_rng(5).normal(0, 0.15, (*SIZE, 3))
-    target = _over(look, np.array([1.5, 1.2, 0.9]) * 2**noise, (slice(4, 30), slice(2, 20)))
+    target = _paint_over(look, np.array([1.5, 1.2, 0.9]) * 2**noise, (slice(4, 30), slice(2, 20)))
     meant, literal = lp.solve(basis, target), lp.solve(basis, target, literal=True)
     assert _hue(basis, literal) > 0.8
     assert _hue(basis, meant) < 0.5
@@ -71,9 +71,9 @@ def test_a_warm_stroke_makes_no_red_and_green_lamps(basis: lp.Basis):
 
 def test_an_untouched_look_changes_nothing(basis: lp.Basis):
     look = basis.mix(basis.current_weights)
-    target = _over(look, 1.0, (slice(None), slice(0, 30)))
+    target = _paint_over(look, 1.0, (slice(None), slice(0, 30)))
     # Codes of 8 bits are a percent or so of light.
-    assert _apart(basis, lp.solve(basis, target), ...) < 0.2
+    assert _mean_change(basis, lp.solve(basis, target), ...) < 0.2
 
 
 def test_what_has_its_own_mask_is_taken_at_its_word(basis: lp.Basis):

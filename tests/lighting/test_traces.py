@@ -27,7 +27,7 @@ def _basis(images: Any, *, spp: int = 0) -> Basis:
     return Basis(lights, images, np.zeros_like(images), np.zeros(SIZE, dtype=bool), origin)
 
 
-def _solved(images: Any, painted: Any, **how: Any) -> Any:
+def _solve(images: Any, painted: Any, **how: Any) -> Any:
     image = painted.astype(np.float32)
     return solve(_basis(images), Target("t", image, np.ones(SIZE, np.float32), True), **how).weights
 
@@ -40,7 +40,7 @@ def test_what_is_painted_off_is_off(layers: Any, painting: Any, seed: int):
     weights = np.random.default_rng(seed).uniform(0.2, 2, (5, 3))
     weights[1], weights[3, 1] = 0, 0
     painted = np.einsum("nhwc,nc->hwc", images, weights).astype(painting)
-    found = _solved(images.astype(layers), painted)
+    found = _solve(images.astype(layers), painted)
     assert (found[1] == 0).all()
     assert found[3, 1] == 0
     # Rounding of half floats, which other weights are found to within.
@@ -54,7 +54,7 @@ def test_day_for_night(dimmed: float, kind: Any):
     images = pictures(2, size=SIZE)
     images[0] *= 1e5
     painted = (dimmed * images[0]).astype(np.float32)
-    found = _solved(images.astype(np.float32), painted)
+    found = _solve(images.astype(np.float32), painted)
     np.testing.assert_allclose(found[0], dimmed, rtol=1e-4)
 
 
@@ -64,7 +64,7 @@ def test_a_dim_light_in_a_corner_stays_on():
     images[1, :2, :2] = 1
     images[0, :2, :2] = 0
     painted = images[0] + np.float32(1e-5) * images[1]
-    np.testing.assert_allclose(_solved(images, painted)[1], 1e-5, rtol=1e-3)
+    np.testing.assert_allclose(_solve(images, painted)[1], 1e-5, rtol=1e-3)
 
 
 def test_a_dim_light_beside_a_bright_one_stays_as_it_was():
@@ -83,7 +83,7 @@ def test_a_dim_light_beside_a_bright_one_stays_as_it_was():
 def test_what_is_asked_is_kept():
     images = pictures(3, size=SIZE)
     asked = Constraints.of({"light 1": {"lock": [1e-9, 1e-9, 1e-9]}})
-    found = _solved(images, 2 * images[0], constraints=asked)
+    found = _solve(images, 2 * images[0], constraints=asked)
     assert (found[1] == 1e-9).all()
     assert (found[2] == 0).all()
 

@@ -5,14 +5,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from live_server import Serving
-from moving import Moving
+from live_server import RunningServer
+from moving import MovingStudio
 
 
 @pytest.fixture
-def serving(caplog: pytest.LogCaptureFixture) -> Iterator[Serving]:
+def serving(caplog: pytest.LogCaptureFixture) -> Iterator[RunningServer]:
     """What the terminal would show beside, is an error as well."""
-    made = Serving()
+    made = RunningServer()
     with caplog.at_level(logging.WARNING):
         yield made
         made.end()
@@ -23,8 +23,8 @@ def serving(caplog: pytest.LogCaptureFixture) -> Iterator[Serving]:
 
 
 @pytest.fixture
-def moving(tmp_path: Path) -> Iterator[Moving]:
+def moving(tmp_path: Path) -> Iterator[MovingStudio]:
     """A studio of the test room."""
-    made = Moving(tmp_path)
+    made = MovingStudio(tmp_path)
     yield made
     made.close()

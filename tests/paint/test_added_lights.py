@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from moving import Moving, exact, opened_rig, pixel_of, placed, stroke
+from moving import MovingStudio, exact_answer, opened_rig, pixel_of, place_lights, stroke
 
 import lightpaint as lp
 from lightpaint.errors import LightpaintError
@@ -16,24 +16,24 @@ from lightpaint.scene.scene_reader import load_scene
 FLOOR, AIR = (-0.4, 0.0, 0.3), (-0.3, 1.2, 0.4)
 
 
-def added(moving: Moving, request: protocol.AddLight) -> Any:
+def add_light(moving: MovingStudio, request: protocol.AddLight) -> Any:
     """The state after a light was added, which is its answer."""
     [state, *_] = moving.send(request)
     assert state.kind == "state"
     return state
 
 
-def names(moving: Moving) -> tuple[str, ...]:
+def names(moving: MovingStudio) -> tuple[str, ...]:
     return moving.studio.session.basis.names
 
 
 @pytest.mark.parametrize("kind", ["spot", "point", "panel"])
-def test_an_added_light_has_the_plane_of_its_place(moving: Moving, kind: Any) -> None:
+def test_an_added_light_has_the_plane_of_its_place(moving: MovingStudio, kind: Any) -> None:
     """At once about, and rendered soon; the other planes and the current look stay."""
     session = moving.studio.session
     before = {name: moving.plane(name) for name in session.basis.names}
     look = session.basis.current_look.copy()
-    state = added(moving, protocol.AddLight(kind, position=AIR))
+    state = add_light(moving, protocol.AddLight(kind, position=AIR))
     name = f"{kind}_1"
     assert [light.name for light in state.lights] == [*before, name]
     assert state.added_lights == (name,)
@@ -54,7 +54,7 @@ def test_an_added_light_has_the_plane_of_its_place(moving: Moving, kind: Any) ->
     assert 0.1 < state.answer.lights[-1].share < 0.6
 
 
-def test_the_painting_finds_a_light_that_is_missing(moving: Moving) -> None:
+def test_the_painting_finds_a_light_that_is_missing(moving: MovingStudio) -> None:
     """The painting is the look with one light more; the search shows what it tries."""
     there = lp.NewEmitter("lamp", "point", lp.Pose(position=(-0.2, 0.5, 0.7)), emission=(2, 2, 2))
     wanted = lp.render_basis(moving.scene.with_new_emitters([there]), spp=128, seed=5)
@@ -64,7 +64,7 @@ def test_the_painting_finds_a_light_that_is_missing(moving: Moving) -> None:
         protocol.Paint(0, whole, True), image=look, importance=np.ones(look.shape[:2], np.float32)
     )
     moving.send(protocol.PlaceLights(new_type="point"))
-    result = placed(moving)
+    result = place_lights(moving)
     assert result["names"] == ["point_1"], result
     assert any("point_1" in m.positions for m in moving.messages if m.kind == "trial")
     found = moving.studio.session.requests.added["point_1"]
@@ -75,9 +75,9 @@ def test_the_painting_finds_a_light_that_is_missing(moving: Moving) -> None:
     assert moving.studio.session.requests.added == {}
 
 
-def test_a_click_hangs_a_light_before_the_surface(moving: Moving) -> None:
+def test_a_click_hangs_a_light_before_the_surface(moving: MovingStudio) -> None:
     opened_rig(moving)
-    added(moving, protocol.AddLight("spot", pixel=pixel_of(moving, FLOOR)))
+    add_light(moving, protocol.AddLight("spot", pixel=pixel_of(moving, FLOOR)))
     place = moving.studio.session.requests.added["spot_1"]
     x, y, z = place["position"]
     assert (x, z) == pytest.approx((FLOOR[0], FLOOR[2]), abs=2e-3)
@@ -85,9 +85,9 @@ def test_a_click_hangs_a_light_before_the_surface(moving: Moving) -> None:
     assert np.subtract(place["target"], place["position"])[1] > 0
 
 
-def test_undo_looks_and_the_file_keep_added_lights(moving: Moving) -> None:
+def test_undo_looks_and_the_file_keep_added_lights(moving: MovingStudio) -> None:
     session, before = moving.studio.session, names(moving)
-    added(moving, protocol.AddLight("point", position=AIR))
+    add_light(moving, protocol.AddLight("point", position=AIR))
     moving.rendered()
     plane = moving.plane("point_1")
     light = len(before)
@@ -107,7 +107,7 @@ def test_undo_looks_and_the_file_keep_added_lights(moving: Moving) -> None:
     assert names(moving) == before
     moving.send(protocol.Undo())
     moving.close()
-    again = Moving(moving.folder)
+    again = MovingStudio(moving.folder)
     try:
         assert names(again) == (*before, "point_1")
         assert again.studio.session.weights[light] == pytest.approx((0.3, 0.2, 0.1))
@@ -117,10 +117,10 @@ def test_undo_looks_and_the_file_keep_added_lights(moving: Moving) -> None:
         again.close()
 
 
-def test_an_added_light_moves_is_named_anew_and_goes(moving: Moving) -> None:
+def test_an_added_light_moves_is_named_anew_and_goes(moving: MovingStudio) -> None:
     session, before = moving.studio.session, names(moving)
     for _ in range(2):
-        added(moving, protocol.AddLight("point", position=AIR))
+        add_light(moving, protocol.AddLight("point", position=AIR))
     assert names(moving)[-2:] == ("point_1", "point_2")
     here = moving.plane("point_2")
     there = [0.4, 1.2, 0.1]
@@ -139,10 +139,10 @@ def test_an_added_light_moves_is_named_anew_and_goes(moving: Moving) -> None:
     assert names(moving) == (*before, "point_2")
 
 
-def test_added_lights_are_solved_for_exported_and_verified(moving: Moving) -> None:
-    added(moving, protocol.AddLight("spot", position=AIR))
+def test_added_lights_are_solved_for_exported_and_verified(moving: MovingStudio) -> None:
+    add_light(moving, protocol.AddLight("spot", position=AIR))
     stroke(moving)
-    assert exact(moving)["lights"][-1]["error"]
+    assert exact_answer(moving)["lights"][-1]["error"]
     moving.send(protocol.Export(("lighting", "relit", "report")))
     moving.wait(lambda: [m for m in moving.messages if m.kind == "exported"])
     relit = load_scene(moving.folder / "relit.xml")
@@ -167,7 +167,9 @@ def test_added_lights_are_solved_for_exported_and_verified(moving: Moving) -> No
         (protocol.RemoveLight("ghost"), "no light is called 'ghost'"),
     ],
 )
-def test_lights_that_cannot_be_added_or_removed(moving: Moving, request_: Any, text: str) -> None:
+def test_lights_that_cannot_be_added_or_removed(
+    moving: MovingStudio, request_: Any, text: str
+) -> None:
     version, before = moving.studio.session.version, names(moving)
     with pytest.raises(LightpaintError) as caught:
         moving.send(request_)
@@ -176,7 +178,9 @@ def test_lights_that_cannot_be_added_or_removed(moving: Moving, request_: Any, t
     assert (moving.studio.session.version, names(moving)) == (version, before)
 
 
-def test_a_drag_is_answered_while_a_search_runs_which_then_moves_nothing(moving: Moving) -> None:
+def test_a_drag_is_answered_while_a_search_runs_which_then_moves_nothing(
+    moving: MovingStudio,
+) -> None:
     stroke(moving)
     opened_rig(moving)
     moving.send(protocol.PlaceLights())
@@ -184,14 +188,14 @@ def test_a_drag_is_answered_while_a_search_runs_which_then_moves_nothing(moving:
     for is_final in (False, False, True):
         moving.send(protocol.MoveLights({"bulb": {"position": [0.4, 1.2, 0.1]}}, is_final=is_final))
     assert not [m for m in moving.messages if m.kind == "placed"]
-    assert "somebody moved lights meanwhile" in placed(moving)["text"]
+    assert "somebody moved lights meanwhile" in place_lights(moving)["text"]
     assert set(moving.studio.session.requests.placed) == {"bulb"}
 
 
-def test_undo_and_removal_while_a_plane_renders(moving: Moving) -> None:
+def test_undo_and_removal_while_a_plane_renders(moving: MovingStudio) -> None:
     before = names(moving)
     for last in (protocol.Undo(), protocol.RemoveLight("spot_1")):
-        added(moving, protocol.AddLight("spot", position=AIR))
+        add_light(moving, protocol.AddLight("spot", position=AIR))
         moving.send(protocol.MoveLights({"bulb": {"position": [0.4, 1.2, 0.1]}}))
         moving.send(last)
         moving.send(protocol.Undo())
@@ -214,7 +218,7 @@ def test_undo_and_removal_while_a_plane_renders(moving: Moving) -> None:
         ),
     ],
 )
-def test_searches_for_impossible_lights(moving: Moving, request_: Any, text: str) -> None:
+def test_searches_for_impossible_lights(moving: MovingStudio, request_: Any, text: str) -> None:
     with pytest.raises(LightpaintError, match="nothing is painted yet"):
         moving.send(request_)
     stroke(moving)

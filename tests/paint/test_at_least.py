@@ -51,7 +51,7 @@ def _basis() -> lp.Basis:
     return lp.Basis(tuple(lights), images, np.zeros_like(images), np.zeros(SIZE, bool), origin)
 
 
-def _clipped(basis: lp.Basis) -> lp.Target:
+def _clip(basis: lp.Basis) -> lp.Target:
     """What 8 bits hold of a lighting."""
     light = basis.mix(np.array([[1.5, 1.2, 1.0], [0.4, 0.6, 0.9]]))
     image = np.minimum(light, 1).astype(np.float32)
@@ -95,7 +95,7 @@ def _marks(session: Session) -> Any:
 
 
 def test_the_answer_is_that_of_the_file(basis: lp.Basis):
-    target, session = _clipped(basis), _session(basis)
+    target, session = _clip(basis), _session(basis)
     _set(session, target)
     solution = session.snapshot().solution()
     assert solution is not None
@@ -108,7 +108,7 @@ def test_the_answer_is_that_of_the_file(basis: lp.Basis):
 
 
 def test_paint_means_what_it_says_and_what_it_leaves_means_what_it_did(basis: lp.Basis):
-    target, session = _clipped(basis), _session(basis)
+    target, session = _clip(basis), _session(basis)
     _set(session, target)
     np.testing.assert_array_equal(_marks(session), target.at_least)
     _paint(session, 1, BRUSH, _corner)
@@ -132,7 +132,7 @@ def test_paint_means_what_it_says_and_what_it_leaves_means_what_it_did(basis: lp
 
 def test_a_stroke_may_change_its_mind(basis: lp.Basis):
     """As a straight line does, which is somewhere else with each move."""
-    target, session = _clipped(basis), _session(basis)
+    target, session = _clip(basis), _session(basis)
     _set(session, target)
     before = session.views[0].pixels(BRUSH)
 
@@ -168,7 +168,7 @@ STROKES = st.lists(
 def test_any_sequence_is_a_rebuild_and_never_says_it_of_paint(done: Any):
     basis = _basis()
     store = MemoryStore(Identity.of([basis]))
-    target, session = _clipped(basis), _session(basis, store)
+    target, session = _clip(basis), _session(basis, store)
     _set(session, target)
     for stroke, (what, (top, rows, left, columns), is_done) in enumerate(done):
         region = top, min(top + rows, SIZE[0]), left, min(left + columns, SIZE[1])
@@ -202,7 +202,7 @@ def test_any_sequence_is_a_rebuild_and_never_says_it_of_paint(done: Any):
 
 
 def test_it_is_in_files_and_looks(basis: lp.Basis, tmp_path: Path):
-    target = _clipped(basis)
+    target = _clip(basis)
     with Store.open(tmp_path / "a.db", Identity.of([basis])) as store:
         session = _session(basis, store)
         looks = LookLibrary(session, PictureTable())

@@ -12,7 +12,7 @@ from lightpaint.errors import OutputError
 from lightpaint.paint.launch import CONNECTION_FILE, ConnectionFile
 
 
-def about(token: str) -> dict[str, Any]:
+def connection_fields(token: str) -> dict[str, Any]:
     return {"address": "http://127.0.0.1:8421/", "token": token, "version": "1", "protocol": 2}
 
 
@@ -20,23 +20,23 @@ def about(token: str) -> dict[str, Any]:
 def test_only_its_owner_reads_it_whatever_the_mask(tmp_path: Path, mask: int) -> None:
     before = os.umask(mask)
     try:
-        file = ConnectionFile(tmp_path, about("a"))
+        file = ConnectionFile(tmp_path, connection_fields("a"))
         file.write()
     finally:
         os.umask(before)
     assert stat.S_IMODE(file.path.stat().st_mode) == 0o600
-    assert json.loads(file.path.read_text()) == about("a")
+    assert json.loads(file.path.read_text()) == connection_fields("a")
     file.remove()
     assert list(tmp_path.iterdir()) == []
     file.remove()
 
 
 def test_what_a_killed_painter_left_is_replaced_whoever_could_read_it(tmp_path: Path) -> None:
-    ConnectionFile(tmp_path, about("killed")).write()
+    ConnectionFile(tmp_path, connection_fields("killed")).write()
     path = tmp_path / CONNECTION_FILE
     path.chmod(0o644)
     with path.open() as reader:  # who has it open reads the old one
-        file = ConnectionFile(tmp_path, about("new"))
+        file = ConnectionFile(tmp_path, connection_fields("new"))
         file.write()
         assert json.loads(reader.read())["token"] == "killed"
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
@@ -48,7 +48,7 @@ def test_a_link_is_replaced_and_not_followed(tmp_path: Path) -> None:
     elsewhere.write_text("mine")
     folder.mkdir()
     (folder / CONNECTION_FILE).symlink_to(elsewhere)
-    file = ConnectionFile(folder, about("a"))
+    file = ConnectionFile(folder, connection_fields("a"))
     file.write()
     assert elsewhere.read_text() == "mine"
     assert not file.path.is_symlink()
@@ -57,7 +57,10 @@ def test_a_link_is_replaced_and_not_followed(tmp_path: Path) -> None:
 
 
 def test_that_of_another_painter_stays(tmp_path: Path) -> None:
-    first, second = ConnectionFile(tmp_path, about("a")), ConnectionFile(tmp_path, about("b"))
+    first, second = (
+        ConnectionFile(tmp_path, connection_fields("a")),
+        ConnectionFile(tmp_path, connection_fields("b")),
+    )
     first.write()
     second.write()
     first.remove()
@@ -70,4 +73,4 @@ def test_that_of_another_painter_stays(tmp_path: Path) -> None:
 def test_where_it_cannot_be_written_is_said(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match=r"cannot write .*painter.json"):
-        ConnectionFile(tmp_path / "file", about("a")).write()
+        ConnectionFile(tmp_path / "file", connection_fields("a")).write()

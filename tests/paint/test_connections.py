@@ -7,7 +7,7 @@ from contextlib import closing, suppress
 from typing import Any
 
 import pytest
-from live_server import Page, Serving, until
+from live_server import Page, RunningServer, wait_until
 from server_key import bearer
 
 from lightpaint.paint.protocol import VERSION
@@ -16,7 +16,7 @@ from lightpaint.paint.server import http_connections
 HALF = b"GET / HTTP/1.1\r\nHost: 127.0"
 
 
-def status(serving: Serving, path: str, key: str = "") -> int:
+def status(serving: RunningServer, path: str, key: str = "") -> int:
     """How a page's request is answered, on a connection of its own."""
     with closing(http.client.HTTPConnection("127.0.0.1", serving.server.port, 20)) as asking:
         asking.request("GET", path, headers=bearer(key) if key else {})
@@ -31,29 +31,32 @@ def is_cut(connection: socket.socket) -> bool:
         return True
 
 
-def there(serving: Serving) -> list[Any]:
+def connected_sockets(serving: RunningServer) -> list[Any]:
     assert serving.server._uvicorn is not None
     return list(serving.server._uvicorn.server_state.connections)
 
 
-def test_hundreds_of_half_sent_requests_shut_nobody_out(serving: Serving) -> None:
+def test_hundreds_of_half_sent_requests_shut_nobody_out(serving: RunningServer) -> None:
     page = Page(serving)
     for _ in range(300):
         serving.connection().sendall(HALF)
-    until(lambda: len(there(serving)) >= http_connections.MAX_UNAUTHENTICATED, "they do not come")
+    wait_until(
+        lambda: len(connected_sockets(serving)) >= http_connections.MAX_UNAUTHENTICATED,
+        "they do not come",
+    )
     assert status(serving, "/data/present", serving.key) == 200
     assert status(serving, "/") == 200  # a page that is being opened
     another = Page(serving)
     for one in (page, another):
         one.says("hello", version=VERSION)
         assert one.hears()[0]["kind"] in ("state", "closed")
-    assert len(there(serving)) <= http_connections.MAX_UNAUTHENTICATED + 4
+    assert len(connected_sockets(serving)) <= http_connections.MAX_UNAUTHENTICATED + 4
     # The latest have the best chance of being people.
     assert is_cut(serving.connections[1])
 
 
 def test_a_request_comes_in_time_or_its_connection_is_closed(
-    serving: Serving, monkeypatch: pytest.MonkeyPatch
+    serving: RunningServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(http_connections, "REQUEST_TIMEOUT_S", 0.3)
     silent, half, second, slow, known = (serving.connection() for _ in range(5))
@@ -81,17 +84,17 @@ def test_a_request_comes_in_time_or_its_connection_is_closed(
     page.says("hello", version=VERSION)
     assert page.hears()[0]["kind"] == "state"
     known.sendall(f".0.1:{serving.server.port}\r\n{serving.key_header}\r\n\r\n".encode())
-    until(lambda: b"HTTP/1.1 200" in known.recv(1 << 16), "it is not answered again")
+    wait_until(lambda: b"HTTP/1.1 200" in known.recv(1 << 16), "it is not answered again")
 
 
 def test_an_answer_that_is_taken_slowly_is_not_cut(
-    serving: Serving, monkeypatch: pytest.MonkeyPatch
+    serving: RunningServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As the page's own files through a slow tunnel are, by a browser that has no key yet."""
     monkeypatch.setattr(http_connections, "REQUEST_TIMEOUT_S", 0.1)
     asking = serving.connection()
-    until(lambda: there(serving), "it is not there")
-    for connection in there(serving):  # else the system takes it all
+    wait_until(lambda: connected_sockets(serving), "it is not there")
+    for connection in connected_sockets(serving):  # else the system takes it all
         accepted = connection.transport.get_extra_info("socket")
         accepted.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
     asking.sendall(f"GET /main.js HTTP/1.1\r\nHost: {serving.here}\r\n\r\n".encode())
@@ -109,18 +112,20 @@ def test_an_answer_that_is_taken_slowly_is_not_cut(
         got += len(data)
 
 
-def test_what_is_sent_goes_at_once(serving: Serving) -> None:
+def test_what_is_sent_goes_at_once(serving: RunningServer) -> None:
     """Nothing waits until what was sent before it is acknowledged (RFC 896): 40 ms an answer."""
     kept, page = serving.connection(), Page(serving)
     kept.sendall(HALF)
     page.says("hello", version=VERSION)
-    until(lambda: len(there(serving)) >= 2, "they are not there")
-    for connection in there(serving):
+    wait_until(lambda: len(connected_sockets(serving)) >= 2, "they are not there")
+    for connection in connected_sockets(serving):
         accepted = connection.transport.get_extra_info("socket")
         assert accepted.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
 
 
-def test_junk_of_strangers_is_no_news(serving: Serving, capfd: pytest.CaptureFixture[str]) -> None:
+def test_junk_of_strangers_is_no_news(
+    serving: RunningServer, capfd: pytest.CaptureFixture[str]
+) -> None:
     for junk in (
         b"\x16\x03\x01\x02\0\x01\0\x01\xfc\x03\x03",  # a browser that tries TLS
         b"GET / HTTP/9.9\r\n\r\n",
@@ -153,7 +158,7 @@ LAST = websocket_frame(FINAL | CONTINUED, b"x")
 
 
 def test_malformed_frames_cost_their_page_its_connection_at_most(
-    serving: Serving, capfd: pytest.CaptureFixture[str]
+    serving: RunningServer, capfd: pytest.CaptureFixture[str]
 ) -> None:
     for junk in (
         websocket_frame(FINAL | TEXT, b"\xff\xfe"),

@@ -1,11 +1,11 @@
 """How the server ends, over real connections: with pages that hear, are deaf, or have just left."""
 
-from live_server import LARGE, Page, Serving, until
+from live_server import LARGE, Page, RunningServer, wait_until
 
 from lightpaint.paint.protocol import VERSION, PictureData
 
 
-def deaf(serving: Serving) -> Page:
+def deaf_page(serving: RunningServer) -> Page:
     """A page that does not read what it is sent."""
     page = Page(serving)
     page.says("hello", version=VERSION)
@@ -15,14 +15,14 @@ def deaf(serving: Serving) -> Page:
     return page
 
 
-def unsent(serving: Serving) -> list[int]:
+def unsent_bytes(serving: RunningServer) -> list[int]:
     """Bytes that wait in the server for each of its connections."""
     assert serving.server._uvicorn is not None
     connections = list(serving.server._uvicorn.server_state.connections)
     return [c.transport.get_write_buffer_size() for c in connections]
 
 
-def test_a_page_that_is_there_hears_of_the_end(serving: Serving) -> None:
+def test_a_page_that_is_there_hears_of_the_end(serving: RunningServer) -> None:
     page = Page(serving)
     page.says("hello", version=VERSION)
     assert page.hears()[0]["kind"] == "state"
@@ -30,29 +30,29 @@ def test_a_page_that_is_there_hears_of_the_end(serving: Serving) -> None:
     assert page.hears()[0]["reason"] == "ended"
 
 
-def test_a_page_that_does_not_hear_is_not_waited_for(serving: Serving) -> None:
-    deaf(serving)
-    until(lambda: any(unsent(serving)), "the system takes it all")
+def test_a_page_that_does_not_hear_is_not_waited_for(serving: RunningServer) -> None:
+    deaf_page(serving)
+    wait_until(lambda: any(unsent_bytes(serving)), "the system takes it all")
     serving.end()
 
 
-def test_a_page_that_is_at_its_own_goodbye_is_no_error(serving: Serving) -> None:
-    page = deaf(serving)
-    until(lambda: any(unsent(serving)), "the system takes it all")
+def test_a_page_that_is_at_its_own_goodbye_is_no_error(serving: RunningServer) -> None:
+    page = deaf_page(serving)
+    wait_until(lambda: any(unsent_bytes(serving)), "the system takes it all")
     page.says_goodbye()
     assert serving.server._uvicorn is not None
     [connection] = serving.server._uvicorn.server_state.connections
-    until(connection.transport.is_closing, "the goodbye is not heard")
+    wait_until(connection.transport.is_closing, "the goodbye is not heard")
     serving.end()
 
 
 def test_a_picture_that_nobody_takes_and_half_a_question_are_not_waited_for(
-    serving: Serving,
+    serving: RunningServer,
 ) -> None:
     asking, _, half = (serving.connection() for _ in range(3))
     here = f"Host: {serving.here}\r\n"
     asking.sendall(f"GET /data/large HTTP/1.1\r\n{here}{serving.key_header}\r\n\r\n".encode())
     half.sendall(f"GET /data/large HTTP/1.1\r\n{here}".encode())
     assert asking.recv(12) == b"HTTP/1.1 200"
-    until(lambda: any(unsent(serving)), "the system takes it all")
+    wait_until(lambda: any(unsent_bytes(serving)), "the system takes it all")
     serving.end()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from layered_sessions import SIZES, Hand, identity_of, random_mask, session_on
+from layered_sessions import SIZES, RandomEditor, identity_of, open_session, random_mask
 from renderer import REPOSITORY
 
 import lightpaint as lp
@@ -152,7 +152,7 @@ def test_any_partition_of_the_picture_gives_the_same_bits(seed: int) -> None:
 @settings(max_examples=12)
 @given(seed=st.integers(0, 10**6))
 def test_whatever_the_hand_did_the_target_is_that_of_the_layers_built_afresh(seed: int) -> None:
-    hand = Hand(seed)
+    hand = RandomEditor(seed)
     for _ in range(14):
         hand.act()
     session = hand.session
@@ -163,7 +163,7 @@ def test_whatever_the_hand_did_the_target_is_that_of_the_layers_built_afresh(see
         shown = [ShownLayer(*pair, by) for pair, by in zip(pairs, accents(pairs), strict=True)]
         assert view.painting.equals(compose(shown, view.current, view.full_region))
     # Opened again it is the same, and undo and redo lead through all of it.
-    again = session_on(session.store)
+    again = open_session(session.store)
     assert again.views.layers == session.views.layers
     assert hand.state(again) == hand.state()
     for position in range(session.store.position - 1, -1, -1):
@@ -177,7 +177,7 @@ def test_whatever_the_hand_did_the_target_is_that_of_the_layers_built_afresh(see
 @settings(max_examples=6)
 @given(seed=st.integers(0, 10**6))
 def test_the_exported_painting_solves_to_the_same_lamps(seed: int) -> None:
-    hand = Hand(seed, views=1)
+    hand = RandomEditor(seed, views=1)
     for _ in range(6):
         hand.act()
     snapshot = hand.session.snapshot()
@@ -191,7 +191,7 @@ def test_the_exported_painting_solves_to_the_same_lamps(seed: int) -> None:
 
 
 def test_a_look_keeps_its_layers_and_undo_leads_back() -> None:
-    hand = Hand(4)
+    hand = RandomEditor(4)
     for _ in range(10):
         hand.act()
     session = hand.session
@@ -205,13 +205,13 @@ def test_a_look_keeps_its_layers_and_undo_leads_back() -> None:
     looks.load(protocol.LoadLook(1))
     assert hand.pixels() == kept[1]
     assert [layer.kind for layer in session.views.layers] == layers
-    assert hand.state(session_on(session.store)) == hand.state()
+    assert hand.state(open_session(session.store)) == hand.state()
     session.handle(protocol.Undo(), {})
     assert hand.state() == before
 
 
 def test_what_no_layer_can_be_is_refused_and_nothing_changes() -> None:
-    hand = Hand(0)
+    hand = RandomEditor(0)
     hand.add("paint")
     hand.add("adjust")
     state, steps = hand.state(), len(hand.session.store.steps)
@@ -245,8 +245,8 @@ def test_killed_at_any_moment_the_layers_of_all_acknowledged_steps_are_there(
         known = int(heard[-1])
         with Store.open(path, identity_of()) as store:
             assert store.position >= known
-            found = session_on(store)
-            hand = Hand(7)
+            found = open_session(store)
+            hand = RandomEditor(7)
             while hand.session.store.position < store.position:
                 hand.act(with_undo=False)
             assert hand.state(found) == hand.state()

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from moving import Moving, exact, opened_rig, pixel_of, placed, stroke
+from moving import MovingStudio, exact_answer, opened_rig, pixel_of, place_lights, stroke
 from renderer import LIGHTS
 
 import lightpaint as lp
@@ -26,7 +26,7 @@ POSITION = [0.4, 1.2, 0.1]
 BALL = (0.3, 0.3, 0.2)
 
 
-def test_a_moved_light_has_the_plane_of_its_place(moving: Moving) -> None:
+def test_a_moved_light_has_the_plane_of_its_place(moving: MovingStudio) -> None:
     """At once about, and rendered soon; the other planes and the current look stay."""
     session = moving.studio.session
     before = {name: moving.plane(name) for name in session.basis.names}
@@ -48,7 +48,7 @@ def test_a_moved_light_has_the_plane_of_its_place(moving: Moving) -> None:
 
 
 def test_a_receiver_with_a_lock_may_change_the_session_while_it_is_sent_planes(
-    moving: Moving,
+    moving: MovingStudio,
 ) -> None:
     """As the notebook does: it takes its own lock, then that of the studio."""
     studio, lock = moving.studio, RLock()
@@ -68,7 +68,7 @@ def test_a_receiver_with_a_lock_may_change_the_session_while_it_is_sent_planes(
     moving.rendered()
 
 
-def test_undo_looks_and_the_file_know_places(moving: Moving) -> None:
+def test_undo_looks_and_the_file_know_places(moving: MovingStudio) -> None:
     session, at_rest = moving.studio.session, moving.plane("bulb")
     moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}))
     moving.rendered()
@@ -85,7 +85,7 @@ def test_undo_looks_and_the_file_know_places(moving: Moving) -> None:
     assert session.requests.poses == {"bulb": {"position": POSITION}}
     assert np.array_equal(moving.plane("bulb"), there)
     moving.close()
-    again = Moving(moving.folder)
+    again = MovingStudio(moving.folder)
     try:
         assert again.studio.session.requests.poses == {"bulb": {"position": POSITION}}
         again.rendered()
@@ -94,7 +94,7 @@ def test_undo_looks_and_the_file_know_places(moving: Moving) -> None:
         again.close()
 
 
-def test_a_drag_that_is_given_up_moves_nothing(moving: Moving) -> None:
+def test_a_drag_that_is_given_up_moves_nothing(moving: MovingStudio) -> None:
     before = moving.plane("bulb")
     moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}, is_final=False))
     assert not np.array_equal(moving.plane("bulb"), before)
@@ -103,7 +103,7 @@ def test_a_drag_that_is_given_up_moves_nothing(moving: Moving) -> None:
     assert moving.studio.session.requests.poses == {}
 
 
-def test_exports_and_verification_have_the_new_places(moving: Moving) -> None:
+def test_exports_and_verification_have_the_new_places(moving: MovingStudio) -> None:
     moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}))
     stroke(moving)
     moving.send(protocol.Export(("lighting", "relit", "report")))
@@ -130,7 +130,9 @@ def test_exports_and_verification_have_the_new_places(moving: Moving) -> None:
         ("ghost", {"position": [0, 1, 0]}, "no light is called 'ghost'"),
     ],
 )
-def test_poses_that_no_light_can_have(moving: Moving, light: str, pose: Any, text: str) -> None:
+def test_poses_that_no_light_can_have(
+    moving: MovingStudio, light: str, pose: Any, text: str
+) -> None:
     version = moving.studio.session.version
     with pytest.raises(LightpaintError) as caught:
         moving.send(protocol.MoveLights({light: pose}))
@@ -139,7 +141,7 @@ def test_poses_that_no_light_can_have(moving: Moving, light: str, pose: Any, tex
     assert (moving.studio.session.version, moving.studio.session.requests.poses) == (version, {})
 
 
-def test_the_rig_says_where_lights_hang_and_what_cannot_move(moving: Moving) -> None:
+def test_the_rig_says_where_lights_hang_and_what_cannot_move(moving: MovingStudio) -> None:
     rig = opened_rig(moving)
     places = dict(zip(moving.studio.session.basis.names, rig.lights, strict=True))
     assert places["bulb"].position == pytest.approx((-0.5, 1, 0.5))
@@ -152,14 +154,14 @@ def test_the_rig_says_where_lights_hang_and_what_cannot_move(moving: Moving) -> 
     assert last.lights[moving.light("bulb")].position == pytest.approx(POSITION)
 
 
-def test_a_light_in_a_wall_is_told_of(moving: Moving) -> None:
+def test_a_light_in_a_wall_is_told_of(moving: MovingStudio) -> None:
     """It may be meant, as on the way through one; undo brings it back."""
     moving.send(protocol.MoveLights({"bulb": {"position": [0, 1, -1.5]}}))
     warned = moving.wait(lambda: [m for m in moving.messages if m.kind == "notice"])
     assert warned[0].fields["text"].startswith("bulb lights nothing that is seen from there")
 
 
-def pointed(moving: Moving, name: str, how: Any, at: Any, **more: Any) -> Any:
+def point_light(moving: MovingStudio, name: str, how: Any, at: Any, **more: Any) -> Any:
     """The place of a light after it was pointed by a click."""
     opened_rig(moving)
     light = moving.light(name)
@@ -167,7 +169,7 @@ def pointed(moving: Moving, name: str, how: Any, at: Any, **more: Any) -> Any:
     return rig_state(moving.studio.rig, moving.studio.session.requests.poses).lights[light]
 
 
-def test_pages_see_points_where_the_camera_does(moving: Moving) -> None:
+def test_pages_see_points_where_the_camera_does(moving: MovingStudio) -> None:
     [camera] = opened_rig(moving).cameras
     axes = np.stack([camera.x_axis, camera.y_axis, camera.forward], axis=1)
     for point in ((0.3, 0.3, 0.2), (-0.5, 1, 0.5), (0.1, 1.2, -0.9)):
@@ -176,16 +178,16 @@ def test_pages_see_points_where_the_camera_does(moving: Moving) -> None:
         assert (x / s, y / s) == pytest.approx(pixel_of(moving, point), abs=1e-3)
 
 
-def test_a_spot_is_aimed_at_what_was_clicked(moving: Moving) -> None:
-    place = pointed(moving, "beam", "aim", (-0.4, 0, 0.3))
+def test_a_spot_is_aimed_at_what_was_clicked(moving: MovingStudio) -> None:
+    place = point_light(moving, "beam", "aim", (-0.4, 0, 0.3))
     assert place.position == pytest.approx((0.8, 1.8, 1.5))
     assert place.target == pytest.approx((-0.4, 0, 0.3), abs=2e-3)
 
 
-def test_a_highlight_is_the_mirrored_ray_of_the_eye(moving: Moving) -> None:
+def test_a_highlight_is_the_mirrored_ray_of_the_eye(moving: MovingStudio) -> None:
     """On the floor: the mirror image of the eye, the place and the light are on one line."""
     at = np.array([0.0, 0.0, 0.6])
-    place = pointed(moving, "beam", "highlight", at)
+    place = point_light(moving, "beam", "highlight", at)
     mirrored_eye = np.array([0, -1, 3.5])
     way, towards = at - mirrored_eye, np.array(place.position) - at
     assert np.linalg.norm(np.cross(way, towards)) < 2e-3 * np.linalg.norm(way)
@@ -193,10 +195,10 @@ def test_a_highlight_is_the_mirrored_ray_of_the_eye(moving: Moving) -> None:
     assert place.target == pytest.approx(at, abs=2e-3)
 
 
-def test_a_shadow_ends_on_the_line_through_its_edge(moving: Moving) -> None:
+def test_a_shadow_ends_on_the_line_through_its_edge(moving: MovingStudio) -> None:
     edge, at = np.array([0.3, 0.6, 0.2]), np.array([-0.6, 0, 0.6])
     seen = pixel_of(moving, edge - (0, 0.01, 0))
-    place = pointed(moving, "bulb", "shadow", at, edge=seen)
+    place = point_light(moving, "bulb", "shadow", at, edge=seen)
     line = np.array(place.position) - at
     hit = BALL + 0.3 * (edge - BALL) / 0.3
     assert np.linalg.norm(np.cross(line, hit - at)) < 0.12 * np.linalg.norm(line)  # a pixel is .1
@@ -216,7 +218,7 @@ def test_a_shadow_ends_on_the_line_through_its_edge(moving: Moving) -> None:
     ],
 )
 def test_clicks_that_point_no_light(
-    moving: Moving, name: str, how: Any, at: Any, text: str
+    moving: MovingStudio, name: str, how: Any, at: Any, text: str
 ) -> None:
     with pytest.raises(LightpaintError) as caught:
         moving.send(protocol.PointLight(moving.light(name), how, at))
@@ -226,16 +228,16 @@ def test_clicks_that_point_no_light(
 
 
 @pytest.fixture
-def dim(tmp_path: Path) -> Iterator[Moving]:
+def dim_room(tmp_path: Path) -> Iterator[MovingStudio]:
     """The room with a bulb, and a sky that shows what is in it."""
-    made = Moving(tmp_path, LIGHTS["bulb"].replace("0.5 0.6 0.7", "5 6 7") + LIGHTS["sky"])
+    made = MovingStudio(tmp_path, LIGHTS["bulb"].replace("0.5 0.6 0.7", "5 6 7") + LIGHTS["sky"])
     yield made
     made.close()
 
 
-def test_lights_that_may_move_come_closer_in_one_step(dim: Moving) -> None:
+def test_lights_that_may_move_come_closer_in_one_step(dim_room: MovingStudio) -> None:
     """The painting is the look with the bulb elsewhere."""
-    moving = dim
+    moving = dim_room
     session = moving.studio.session
     there = (-0.1, 1.2, 0.6)
     moved = moving.scene.moved({"bulb": lp.Pose(position=there)})
@@ -245,26 +247,26 @@ def test_lights_that_may_move_come_closer_in_one_step(dim: Moving) -> None:
     moving.send(
         protocol.Paint(0, whole, True), image=look, importance=np.ones(look.shape[:2], np.float32)
     )
-    before = exact(moving)
+    before = exact_answer(moving)
     moving.send(protocol.PlaceLights())
-    result = placed(moving)
+    result = place_lights(moving)
     assert "bulb" in result["names"], result
-    after = exact(moving.rendered())
+    after = exact_answer(moving.rendered())
     assert after["delta_e"] < 0.7 * before["delta_e"]
     assert session.store.position == 2
     moving.send(protocol.Undo())
     assert session.requests.poses == {}
 
 
-def test_a_search_for_places_can_be_stopped(moving: Moving) -> None:
+def test_a_search_for_places_can_be_stopped(moving: MovingStudio) -> None:
     stroke(moving)
     moving.send(protocol.PlaceLights())
     moving.send(protocol.PlaceLights(run=False))
-    assert placed(moving)["text"] == "Stopped: every light stays where it was."
+    assert place_lights(moving)["text"] == "Stopped: every light stays where it was."
     assert moving.studio.session.requests.poses == {}
 
 
-def test_what_cannot_be_placed_is_said(moving: Moving) -> None:
+def test_what_cannot_be_placed_is_said(moving: MovingStudio) -> None:
     with pytest.raises(LightpaintError, match="nothing is painted yet"):
         moving.send(protocol.PlaceLights())
     stroke(moving)
@@ -275,20 +277,20 @@ def test_what_cannot_be_placed_is_said(moving: Moving) -> None:
 
 
 def test_what_comes_no_closer_to_the_eye_is_not_done(
-    dim: Moving, monkeypatch: pytest.MonkeyPatch
+    dim_room: MovingStudio, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The painting is the current look: every move is a step away, whatever a search says."""
-    session = dim.studio.session
+    session = dim_room.studio.session
     look = session.basis.current_look.copy()
     whole = (0, look.shape[0], 0, look.shape[1])
-    dim.send(
+    dim_room.send(
         protocol.Paint(0, whole, True), image=look, importance=np.ones(look.shape[:2], np.float32)
     )
-    old = dim.scene.light("bulb").members[0].site
+    old = dim_room.scene.light("bulb").members[0].site
     move = lp.Move("bulb", old, Site((0.8, 0.2, -0.5)), gain_share=0.1)
-    found = lp.Placement((dim.scene,), (move,), (), 0.1, 0.05)
+    found = lp.Placement((dim_room.scene,), (move,), (), 0.1, 0.05)
     monkeypatch.setattr("lightpaint.paint.rig.light_placer.place", lambda *_, **__: found)
-    dim.send(protocol.PlaceLights())
-    assert "no closer to the eye" in placed(dim)["text"]
+    dim_room.send(protocol.PlaceLights())
+    assert "no closer to the eye" in place_lights(dim_room)["text"]
     assert session.requests.placed == {}
     assert session.store.position == 1

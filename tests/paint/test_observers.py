@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from fake_messages import fake_answer, fake_pending, fake_progress, fake_state
 from fake_session import FakeSession
-from live_server import until
+from live_server import wait_until
 from raw_message import RawMessage
 from server_key import bearer, offered
 from starlette.testclient import TestClient, WebSocketDenialResponse, WebSocketTestSession
@@ -48,13 +48,13 @@ HERE = Address("127.0.0.1", 8421, Reach.MACHINE, frozenset({"127.0.0.1"}))
 REFUSED = (WebSocketDisconnect, WebSocketDenialResponse)
 
 
-class Served:
+class ServedSession:
     """A session behind its guard; what is shown to it is a test's."""
 
     def __init__(self) -> None:
         self.session = FakeSession()
         self.line = Connections(self.session, None)
-        self.guard = Guard(_nothing, address=HERE)
+        self.guard = Guard(_unserved, address=HERE)
         self.guard.app = page_app(self.line, files={}, is_program=self.guard.is_program)
         self.browser = TestClient(self.guard, base_url=f"http://{HOST}")
 
@@ -70,61 +70,67 @@ class Served:
         )
 
 
-async def _nothing(scope: Any, receive: Any, send: Any) -> None:
+async def _unserved(scope: Any, receive: Any, send: Any) -> None:
     """Nobody is served yet."""
 
 
 @pytest.fixture
-def served() -> Iterator[Served]:
-    made = Served()
+def served_session() -> Iterator[ServedSession]:
+    made = ServedSession()
     with made.browser:
         yield made
 
 
-def say(socket: WebSocketTestSession, kind: str, seq: int = 1, **fields: Any) -> None:
+def send_request(socket: WebSocketTestSession, kind: str, seq: int = 1, **fields: Any) -> None:
     arrays = {k: fields.pop(k) for k in ("image", "importance") if k in fields}
     message = RawMessage(kind, {"seq": seq, **fields}, arrays)
     socket.send_bytes(to_frame(message.content(), message.buffers()))
 
 
-def hear(socket: WebSocketTestSession) -> dict[str, Any]:
+def receive(socket: WebSocketTestSession) -> dict[str, Any]:
     return from_frame(socket.receive_bytes())[0]
 
 
 def paint(socket: WebSocketTestSession, seq: int, *, is_final: bool) -> None:
     pixel = {"image": np.ones((1, 1, 3), np.float32), "importance": np.ones((1, 1), np.float32)}
-    say(socket, "paint", seq, stroke=1, region=[0, 1, 0, 1], is_final=is_final, **pixel)
+    send_request(socket, "paint", seq, stroke=1, region=[0, 1, 0, 1], is_final=is_final, **pixel)
 
 
 # Who is let in
 
 
-def test_a_program_shows_its_token_in_a_header_and_names_no_origin(served: Served) -> None:
-    with served.program() as program:
-        say(program, "observe", version=VERSION)
-        assert hear(program)["kind"] == "state"
-    answer = served.browser.get("/data/present", headers=bearer(served.guard.program_token))
+def test_a_program_shows_its_token_in_a_header_and_names_no_origin(
+    served_session: ServedSession,
+) -> None:
+    with served_session.program() as program:
+        send_request(program, "observe", version=VERSION)
+        assert receive(program)["kind"] == "state"
+    answer = served_session.browser.get(
+        "/data/present", headers=bearer(served_session.guard.program_token)
+    )
     assert answer.status_code == 200
 
 
 @pytest.mark.parametrize("token", ["", "x", "x" * 5000, "Bearer"])
-def test_a_wrong_token_is_refused(served: Served, token: str) -> None:
-    with pytest.raises(REFUSED), served.program(token):
+def test_a_wrong_token_is_refused(served_session: ServedSession, token: str) -> None:
+    with pytest.raises(REFUSED), served_session.program(token):
         pass
-    assert served.browser.get("/data/present", headers=bearer("x")).status_code == 410
+    assert served_session.browser.get("/data/present", headers=bearer("x")).status_code == 410
 
 
-def test_what_opens_pages_opens_no_program_and_the_other_way_round(served: Served) -> None:
-    guard = served.guard
-    key = served.browser.get("/key", headers=bearer(guard.token)).text
+def test_what_opens_pages_opens_no_program_and_the_other_way_round(
+    served_session: ServedSession,
+) -> None:
+    guard = served_session.guard
+    key = served_session.browser.get("/key", headers=bearer(guard.token)).text
     for token in (guard.token, guard.one_time_token(), key):
-        with pytest.raises(REFUSED), served.program(token):
+        with pytest.raises(REFUSED), served_session.program(token):
             pass
     assert len({guard.token, guard.program_token, key}) == 3
-    assert served.browser.get("/key", headers=bearer(guard.program_token)).text != key
+    assert served_session.browser.get("/key", headers=bearer(guard.program_token)).text != key
     with (
         pytest.raises(REFUSED),
-        served.browser.websocket_connect(
+        served_session.browser.websocket_connect(
             f"ws://{HOST}/live",
             headers={"origin": f"http://{HOST}"},
             subprotocols=offered(guard.program_token),
@@ -142,36 +148,44 @@ def test_what_opens_pages_opens_no_program_and_the_other_way_round(served: Serve
         {"host": "evil.example:8421"},
     ],
 )
-def test_a_page_gets_in_by_no_programs_token(served: Served, headers: dict[str, str]) -> None:
+def test_a_page_gets_in_by_no_programs_token(
+    served_session: ServedSession, headers: dict[str, str]
+) -> None:
     """Neither of this server, nor of another one by whatever name it leads here."""
-    with pytest.raises(REFUSED), served.program(**headers):
+    with pytest.raises(REFUSED), served_session.program(**headers):
         pass
-    shown = bearer(served.guard.program_token)
-    assert served.browser.get("/data/present", headers={**shown, **headers}).status_code != 200
+    shown = bearer(served_session.guard.program_token)
+    assert (
+        served_session.browser.get("/data/present", headers={**shown, **headers}).status_code != 200
+    )
 
 
 # What they hear
 
 
 def test_observers_hear_what_comes_of_painting_and_the_painter_keeps_the_session(
-    served: Served,
+    served_session: ServedSession,
 ) -> None:
-    with served.page() as page, served.program() as one, served.program() as other:
-        say(page, "hello", version=VERSION)
-        assert hear(page)["kind"] == "state"
+    with (
+        served_session.page() as page,
+        served_session.program() as one,
+        served_session.program() as other,
+    ):
+        send_request(page, "hello", version=VERSION)
+        assert receive(page)["kind"] == "state"
         for program in (one, other):
-            say(program, "observe", version=VERSION)
-            assert hear(program)["kind"] == "state"
+            send_request(program, "observe", version=VERSION)
+            assert receive(program)["kind"] == "state"
         paint(page, 2, is_final=True)
-        assert hear(page)["reply"] == 2
+        assert receive(page)["reply"] == 2
         for program in (one, other):
-            told = hear(program)
+            told = receive(program)
             assert told["kind"] == "answer"
             assert "reply" not in told
-        served.session.on_message(fake_progress("basis", 3))  # type: ignore[misc]
-        assert [hear(x)["kind"] for x in (page, one, other)] == ["progress"] * 3
+        served_session.session.on_message(fake_progress("basis", 3))  # type: ignore[misc]
+        assert [receive(x)["kind"] for x in (page, one, other)] == ["progress"] * 3
         paint(page, 3, is_final=True)
-        assert hear(page)["reply"] == 3
+        assert receive(page)["reply"] == 3
 
 
 @pytest.mark.parametrize(
@@ -190,166 +204,168 @@ def test_observers_hear_what_comes_of_painting_and_the_painter_keeps_the_session
     ],
 )
 def test_an_observer_neither_paints_nor_takes_the_session(
-    served: Served, kind: str, fields: Any
+    served_session: ServedSession, kind: str, fields: Any
 ) -> None:
-    with served.page() as page, served.program() as program:
-        say(page, "hello", version=VERSION)
-        hear(page)
-        say(program, "observe", version=VERSION)
-        hear(program)
-        say(program, kind, 5, **fields)
-        told = hear(program)
+    with served_session.page() as page, served_session.program() as program:
+        send_request(page, "hello", version=VERSION)
+        receive(page)
+        send_request(program, "observe", version=VERSION)
+        receive(program)
+        send_request(program, kind, 5, **fields)
+        told = receive(program)
         assert (told["kind"], told["reply"]) == ("failed", 5)
         assert told["text"].startswith("an observer may fetch, export and propose")
         paint(program, 6, is_final=True)
-        assert hear(program)["kind"] == "failed"
-        assert served.session.heard == []
+        assert receive(program)["kind"] == "failed"
+        assert served_session.session.heard == []
         paint(page, 2, is_final=True)
-        assert hear(page)["kind"] == "answer"
+        assert receive(page)["kind"] == "answer"
 
 
-def messages_to_who_paints(served: Served, observers: int) -> list[tuple[str, Any]]:
+def messages_to_painter(served: ServedSession, observers: int) -> list[tuple[str, Any]]:
     """Paint while so many observe, ask, and try what they may not; return what the page is sent."""
     with ExitStack() as stack:
         page = stack.enter_context(served.page())
         programs = [stack.enter_context(served.program()) for _ in range(observers)]
-        say(page, "hello", version=VERSION)
-        received = [hear(page)]
+        send_request(page, "hello", version=VERSION)
+        received = [receive(page)]
         for program in programs:
-            say(program, "observe", version=VERSION)
-            assert hear(program)["kind"] == "state"
+            send_request(program, "observe", version=VERSION)
+            assert receive(program)["kind"] == "state"
 
         def ask() -> None:
             for k, kind in enumerate(("fetch", "take_over", "hello"), start=1):
                 fields = {"fetch": {"name": "present"}, "hello": {"version": VERSION}}
                 for program in programs:
-                    say(program, kind, 10 + k, **fields.get(kind, {}))
+                    send_request(program, kind, 10 + k, **fields.get(kind, {}))
 
         for seq in range(2, 10):
             paint(page, seq, is_final=seq % 4 == 1)
-            received.append(hear(page))
+            received.append(receive(page))
             ask()
             served.session.on_message(fake_progress("basis", seq))  # type: ignore[misc]
-            received.append(hear(page))
+            received.append(receive(page))
         # All that observers have asked for is answered before nothing more can come.
         for program in programs:
-            say(program, "fetch", 99, name="present")
-            while hear(program).get("reply") != 99:
+            send_request(program, "fetch", 99, name="present")
+            while receive(program).get("reply") != 99:
                 pass
-        say(page, "undo", 50)
-        received += [hear(page), hear(page)]
+        send_request(page, "undo", 50)
+        received += [receive(page), receive(page)]
         assert received[-2]["reply"] == 50
     return [(one["kind"], one.get("reply")) for one in received]
 
 
-def test_who_paints_is_sent_the_same_however_many_observe(served: Served) -> None:
+def test_who_paints_is_sent_the_same_however_many_observe(served_session: ServedSession) -> None:
     """An observer costs a stroke no message, and takes no session."""
-    alone = messages_to_who_paints(served, 0)
-    strokes = [request for request in served.session.heard if request.kind == "paint"]
+    alone = messages_to_painter(served_session, 0)
+    strokes = [request for request in served_session.session.heard if request.kind == "paint"]
     assert len(strokes) == 8
-    assert messages_to_who_paints(served, 3) == alone
-    again = [request for request in served.session.heard if request.kind == "paint"]
+    assert messages_to_painter(served_session, 3) == alone
+    again = [request for request in served_session.session.heard if request.kind == "paint"]
     assert len(again) == 2 * len(strokes)
 
 
 @pytest.mark.parametrize(("kind", "ask"), [("page", "hello"), ("program", "observe")])
 def test_no_older_state_follows_a_newer_one(
-    served: Served, monkeypatch: pytest.MonkeyPatch, kind: str, ask: str
+    served_session: ServedSession, monkeypatch: pytest.MonkeyPatch, kind: str, ask: str
 ) -> None:
     """The first basis arrives while a client is told that there is none yet."""
 
-    known = dict.fromkeys(served.session.pictures, 1)
+    known = dict.fromkeys(served_session.session.pictures, 1)
 
     def pending_then_known(**_: Any) -> SessionPending:
-        served.session.on_message(fake_state(known))  # type: ignore[misc]
-        served.session.on_message(PictureUpdate(resources={"present": 2}))  # type: ignore[misc]
-        until(lambda: served.line.generations.get("present") == 2, "they are not handled")
+        served_session.session.on_message(fake_state(known))  # type: ignore[misc]
+        served_session.session.on_message(PictureUpdate(resources={"present": 2}))  # type: ignore[misc]
+        wait_until(
+            lambda: served_session.line.generations.get("present") == 2, "they are not handled"
+        )
         return fake_pending()
 
     for name in ("greet", "state"):
-        monkeypatch.setattr(served.session, name, pending_then_known)
-    with getattr(served, kind)() as client:
-        say(client, ask, version=VERSION)
-        received = [hear(client)]
-        say(client, "fetch", 2, name="present")
+        monkeypatch.setattr(served_session.session, name, pending_then_known)
+    with getattr(served_session, kind)() as client:
+        send_request(client, ask, version=VERSION)
+        received = [receive(client)]
+        send_request(client, "fetch", 2, name="present")
         while received[-1].get("reply") != 2:
-            received.append(hear(client))
+            received.append(receive(client))
         *news, _ = received
         assert [(one["kind"], one.get("reply")) for one in news] == [
             ("waiting", 1),
             ("state", None),
             ("renewed", None),
         ]
-    assert served.line.generations["present"] == 2
+    assert served_session.line.generations["present"] == 2
 
 
-def test_who_has_the_session_does_not_become_an_observer(served: Served) -> None:
-    with served.page() as page:
-        say(page, "hello", version=VERSION)
-        hear(page)
-        say(page, "observe", 2, version=VERSION)
-        assert hear(page)["kind"] == "failed"
+def test_who_has_the_session_does_not_become_an_observer(served_session: ServedSession) -> None:
+    with served_session.page() as page:
+        send_request(page, "hello", version=VERSION)
+        receive(page)
+        send_request(page, "observe", 2, version=VERSION)
+        assert receive(page)["kind"] == "failed"
         paint(page, 3, is_final=True)
-        assert hear(page)["kind"] == "answer"
+        assert receive(page)["kind"] == "answer"
 
 
 def test_observers_are_few_and_speak_this_version(
-    served: Served, monkeypatch: pytest.MonkeyPatch
+    served_session: ServedSession, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(observers, "MAX_OBSERVERS", 1)
-    with served.program() as one, served.program() as other:
-        say(one, "observe", version=VERSION + 1)
-        assert hear(one)["reason"] == "version"
-        say(one, "observe", version=VERSION)
-        assert hear(one)["kind"] == "state"
-        say(other, "observe", version=VERSION)
-        assert hear(other)["text"] == "1 observers are there already: close one of them"
+    with served_session.program() as one, served_session.program() as other:
+        send_request(one, "observe", version=VERSION + 1)
+        assert receive(one)["reason"] == "version"
+        send_request(one, "observe", version=VERSION)
+        assert receive(one)["kind"] == "state"
+        send_request(other, "observe", version=VERSION)
+        assert receive(other)["text"] == "1 observers are there already: close one of them"
 
 
-def test_what_observers_ask_for_waits_while_a_brush_is_down(served: Served) -> None:
-    with served.page() as page, served.program() as program:
-        say(page, "hello", version=VERSION)
-        hear(page)
-        say(program, "observe", version=VERSION)
-        hear(program)
+def test_what_observers_ask_for_waits_while_a_brush_is_down(served_session: ServedSession) -> None:
+    with served_session.page() as page, served_session.program() as program:
+        send_request(page, "hello", version=VERSION)
+        receive(page)
+        send_request(program, "observe", version=VERSION)
+        receive(program)
         paint(page, 2, is_final=False)
-        hear(page)
-        assert hear(program)["kind"] == "answer"
-        say(program, "export", 7, outputs=["lighting"])
+        receive(page)
+        assert receive(program)["kind"] == "answer"
+        send_request(program, "export", 7, outputs=["lighting"])
         paint(page, 3, is_final=True)
-        assert hear(page)["reply"] == 3
-        assert [hear(program).get("reply") for _ in range(2)] == [None, 7]
-    kinds = [said.kind for said in served.session.heard]
+        assert receive(page)["reply"] == 3
+        assert [receive(program).get("reply") for _ in range(2)] == [None, 7]
+    kinds = [said.kind for said in served_session.session.heard]
     assert kinds == ["paint", "paint", "export"]
 
 
-def test_the_brush_of_who_leaves_is_down_no_more(served: Served) -> None:
-    with served.program() as program:
-        with served.page() as page:
-            say(page, "hello", version=VERSION)
-            hear(page)
+def test_the_brush_of_who_leaves_is_down_no_more(served_session: ServedSession) -> None:
+    with served_session.program() as program:
+        with served_session.page() as page:
+            send_request(page, "hello", version=VERSION)
+            receive(page)
             paint(page, 2, is_final=False)
-            hear(page)
-        say(program, "observe", version=VERSION)
-        assert hear(program)["kind"] == "state"
+            receive(page)
+        send_request(program, "observe", version=VERSION)
+        assert receive(program)["kind"] == "state"
 
 
-def test_a_proposal_is_heard_of_where_somebody_paints(served: Served) -> None:
+def test_a_proposal_is_heard_of_where_somebody_paints(served_session: ServedSession) -> None:
     def said(said: Any, arrays: Any) -> list[Message]:
         return [LookList(looks=(), resources={})]
 
-    served.session.handle = said  # type: ignore[method-assign]
-    with served.page() as page, served.program() as program:
-        say(page, "hello", version=VERSION)
-        hear(page)
-        say(program, "observe", version=VERSION)
-        hear(program)
-        say(program, "propose", 9, name="evening", lights={"lamp 0": [1, 1, 1]})
-        assert (hear(program)["kind"], hear(page)["kind"]) == ("looks", "looks")
-        assert hear(page)["text"] == "evening was proposed: see the looks"
+    served_session.session.handle = said  # type: ignore[method-assign]
+    with served_session.page() as page, served_session.program() as program:
+        send_request(page, "hello", version=VERSION)
+        receive(page)
+        send_request(program, "observe", version=VERSION)
+        receive(program)
+        send_request(program, "propose", 9, name="evening", lights={"lamp 0": [1, 1, 1]})
+        assert (receive(program)["kind"], receive(page)["kind"]) == ("looks", "looks")
+        assert receive(page)["text"] == "evening was proposed: see the looks"
 
 
-class Deaf:
+class DeafSocket:
     """A socket that takes nothing."""
 
     async def receive(self) -> Any:
@@ -363,7 +379,7 @@ class Deaf:
 
 
 def test_what_waits_for_a_slow_observer_is_replaced_and_nothing_asked_is_lost() -> None:
-    slow = client.Client(Deaf())
+    slow = client.Client(DeafSocket())
     slow.is_observer = True
     line = observers.Observers([slow])
     history = HistoryInfo(("stroke",), (), 1)
@@ -380,7 +396,7 @@ def test_what_waits_for_a_slow_observer_is_replaced_and_nothing_asked_is_lost() 
 
 
 def test_of_what_a_canvas_holds_observers_get_the_lighting() -> None:
-    slow = client.Client(Deaf())
+    slow = client.Client(DeafSocket())
     slow.is_observer = True
     pixels = np.zeros((1, 1, 3), np.float32)
     patch = CanvasPatch(

@@ -43,16 +43,18 @@ def path(tmp_path: Path) -> Path:
     return write_room(tmp_path)
 
 
-def opened(path: Path, **settings: Any) -> Subject:
+def open_subject(path: Path, **settings: Any) -> Subject:
     return make_subject(SceneFile(str(path)), path.parent / "s", settings=Settings(**settings))
 
 
-def kept(path: Path, make_basis: Any, meanwhile: Callable[[], object] = lambda: None) -> lp.Basis:
+def keep_basis(
+    path: Path, make_basis: Any, meanwhile: Callable[[], object] = lambda: None
+) -> lp.Basis:
     """A made-up basis, kept as a first session leaves it, and what was known then.
 
     meanwhile: happens between the two.
     """
-    first = opened(path)
+    first = open_subject(path)
     assert session_identity([first]) is None
     scene, opening = first.loaded_scene, first.scene
     assert isinstance(opening, LazyScene)
@@ -82,10 +84,10 @@ def kept(path: Path, make_basis: Any, meanwhile: Callable[[], object] = lambda: 
 
 def test_previews_of_more_and_more_samples_come_to_the_bits_of_one_render(path: Path) -> None:
     solved = obtain(lp.load_scene(path), Settings(spp=48, use_cache=False), silent)
-    bases = list(opened(path, spp=48).bases())
+    bases = list(open_subject(path, spp=48).bases())
     assert [basis.origin.spp for basis in bases] == [2, 8, 32, 48]
     assert_equal_bits(bases[-1], solved)
-    [found] = opened(path, spp=48).bases()
+    [found] = open_subject(path, spp=48).bases()
     assert_equal_bits(found, solved)
 
 
@@ -95,23 +97,23 @@ def test_nothing_is_known_of_a_scene_where_the_clock_was_set_meanwhile(
 ) -> None:
     """A file that was written since it was read could then look older."""
     now = time.time
-    kept(path, make_basis, lambda: monkeypatch.setattr(time, "time", lambda: now() + set_by))
+    keep_basis(path, make_basis, lambda: monkeypatch.setattr(time, "time", lambda: now() + set_by))
     monkeypatch.setattr(time, "time", now)
-    assert session_identity([opened(path)]) is None
+    assert session_identity([open_subject(path)]) is None
 
 
 def test_a_known_scene_is_painted_without_being_loaded(
     path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    basis = kept(path, make_basis)
-    identity = session_identity([opened(path)], {0: opened(path).loaded_scene})
+    basis = keep_basis(path, make_basis)
+    identity = session_identity([open_subject(path)], {0: open_subject(path).loaded_scene})
 
     def loads(**_: Any) -> None:
         raise AssertionError("the scene is loaded")
 
     with monkeypatch.context() as patch:
         patch.setattr("lightpaint.pipeline.job.sources.load_scene", loads)
-        subject = opened(path)
+        subject = open_subject(path)
         assert session_identity([subject]) == identity
         assert subject.target_spp == basis.origin.spp
         assert isinstance(subject.scene, LazyScene)
@@ -121,13 +123,13 @@ def test_a_known_scene_is_painted_without_being_loaded(
         np.testing.assert_array_equal(found.images, basis.images)
         # Of more samples than there are it has to be loaded, as for what is asked of no light.
         with pytest.raises(AssertionError):
-            next(opened(path, spp=4 * basis.origin.spp).bases())
+            next(open_subject(path, spp=4 * basis.origin.spp).bases())
         asked = lp.Constraints.of({"nobody": {"lock": True}})
         with pytest.raises(ConstraintError, match="nobody"):
             make_subject(SceneFile(str(path)), path.parent / "s", constraints=asked)
     # Whoever exports gets the scene that was painted, or is told.
     assert subject.loaded_scene.identity == basis.origin.scene_identity
-    other = opened(path)
+    other = open_subject(path)
     path.write_text(path.read_text().replace("</scene>", "<!-- later --></scene>"))
     with pytest.raises(PaintError, match="not what it was when this session was opened"):
         _ = other.loaded_scene

@@ -105,20 +105,20 @@ def test_what_is_said_is_read_as_it_is_meant() -> None:
     assert all(kind.startswith(name) for name, kind in names.items())
 
 
-def _refused(frame: bytes) -> None:
+def _assert_refused(frame: bytes) -> None:
     with suppress(PaintError):
         parse_request(*from_frame(frame))
 
 
 @given(st.binary(max_size=300))
 def test_noise_is_refused(noise: bytes) -> None:
-    _refused(noise)
-    _refused(struct.pack("<I", max(0, len(noise) - 4)) + noise)
+    _assert_refused(noise)
+    _assert_refused(struct.pack("<I", max(0, len(noise) - 4)) + noise)
 
 
 @given(PLAIN)
 def test_any_json_is_refused_or_read(content: Any) -> None:
-    _refused(to_frame(_finite(content), []))
+    _assert_refused(to_frame(_finite(content), []))
 
 
 @given(
@@ -148,7 +148,7 @@ def test_any_json_is_refused_or_read(content: Any) -> None:
     st.binary(max_size=64),
 )
 def test_nearly_right_messages_are_refused_or_read(content: Any, rest: bytes) -> None:
-    _refused(to_frame(_finite(content), []) + rest)
+    _assert_refused(to_frame(_finite(content), []) + rest)
 
 
 @given(FINITE, st.data())

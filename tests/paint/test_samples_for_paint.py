@@ -34,7 +34,7 @@ def subject(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Subject:
     return Subject(str(room), tmp_path, scene=load_scene(room), settings=settings)
 
 
-def wait(is_so: Callable[[], Any], seconds: float = 120) -> None:
+def wait_until(is_so: Callable[[], Any], seconds: float = 120) -> None:
     until = time.monotonic() + seconds
     while not is_so():
         assert time.monotonic() < until
@@ -55,7 +55,7 @@ def test_paint_is_answered_as_surely_as_was_asked_for(subject: Subject):
     studio.on_message = heard.append
     studio.start()
     try:
-        wait(lambda: studio.store is not None)
+        wait_until(lambda: studio.store is not None)
         paint(studio, 1, (0.5, 0.3, 0.2))
 
         def is_sure() -> bool:
@@ -64,7 +64,7 @@ def test_paint_is_answered_as_surely_as_was_asked_for(subject: Subject):
             extra = snapshot.bases[0].origin.extra_spp
             return extra > 0 and Certainty.of(solution).error <= 0.1
 
-        wait(is_sure)
+        wait_until(is_sure)
         basis = studio.snapshot().bases[0]
         # Most of them are where the paint is.
         where = np.zeros(basis.size, bool)
@@ -80,7 +80,7 @@ def test_paint_is_answered_as_surely_as_was_asked_for(subject: Subject):
             return [x.done / x.total for x in reports if x.task == SAMPLING]
 
         assert 0 < shares()[0] < 1
-        wait(lambda: shares()[-1] == 1)
+        wait_until(lambda: shares()[-1] == 1)
     finally:
         studio.close()
         studio.wait()
@@ -101,7 +101,7 @@ def test_planes_with_added_samples_are_denoised_anew(
     studio = Studio([subject], MemoryStore)
     studio.start()
     try:
-        wait(lambda: studio.store is not None)
+        wait_until(lambda: studio.store is not None)
         paint(studio, 1, (0.5, 0.3, 0.2))
 
         def is_done() -> bool:
@@ -109,12 +109,12 @@ def test_planes_with_added_samples_are_denoised_anew(
             extra = basis.origin.extra_spp
             return extra > 0 and (extra, len(basis.lights) - 1) in denoised
 
-        wait(is_done)
+        wait_until(is_done)
         [basis] = studio.snapshot().bases
         assert Certainty.of(studio.snapshot().solution()).error <= 0.1
         lights = list(range(len(basis.lights)))
         assert [k for extra, k in denoised if extra > 0] == lights
-        wait(lambda: read_denoised_planes(basis) is not None)
+        wait_until(lambda: read_denoised_planes(basis) is not None)
     finally:
         studio.close()
         studio.wait()
@@ -124,7 +124,7 @@ def test_a_round_gives_way_to_the_brush(subject: Subject):
     studio = Studio([subject], MemoryStore)
     studio.start()
     try:
-        wait(lambda: studio.store is not None)
+        wait_until(lambda: studio.store is not None)
         paint(studio, 1, (0.5, 0.3, 0.2))
         snapshot = studio.snapshot()
         solution = snapshot.solution()
@@ -151,7 +151,7 @@ def test_only_the_latest_is_worked_on():
     loop.give(2)
     loop.give(3)
     may_go_on.set()
-    wait(lambda: len(seen) == 2)
+    wait_until(lambda: len(seen) == 2)
     loop.stop()
     thread.join(60)
     assert seen == [1, 3]

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from fake_messages import fake_answer, fake_progress
 from fake_session import FakeSession
-from live_server import in_a_loop
+from live_server import run_in_loop
 from raw_message import RawMessage
 from server_key import bearer, offered
 from starlette.testclient import TestClient, WebSocketDenialResponse, WebSocketTestSession
@@ -38,7 +38,7 @@ REFUSED = (WebSocketDisconnect, WebSocketDenialResponse)
 HERE = Address("127.0.0.1", DEFAULT_PORT, Reach.MACHINE, frozenset({"127.0.0.1"}))
 
 
-class Served:
+class ServedSession:
     """A session behind its guard, and a browser whose page has not shown its token yet."""
 
     def __init__(self, folder: Path, address: Address = HERE) -> None:
@@ -71,16 +71,16 @@ class Served:
 
 
 @pytest.fixture
-def stranger(tmp_path: Path) -> Iterator[Served]:
-    served = Served(tmp_path / "page")
+def unknown_browser(tmp_path: Path) -> Iterator[ServedSession]:
+    served = ServedSession(tmp_path / "page")
     with served.browser:
         yield served
 
 
 @pytest.fixture
-def served(stranger: Served) -> Served:
-    stranger.enter()
-    return stranger
+def known_browser(unknown_browser: ServedSession) -> ServedSession:
+    unknown_browser.enter()
+    return unknown_browser
 
 
 def frame(kind: str, seq: int, arrays: dict[str, Any] | None = None, **fields: Any) -> bytes:
@@ -94,93 +94,97 @@ def paint(seq: int, stroke: int = 1, region: tuple[int, ...] = (0, 1, 0, 1), **h
     return frame("paint", seq, arrays, stroke=stroke, region=list(region), **how)
 
 
-def heard(socket: WebSocketTestSession) -> dict[str, Any]:
+def receive(socket: WebSocketTestSession) -> dict[str, Any]:
     return from_frame(socket.receive_bytes())[0]
 
 
 def greet(socket: WebSocketTestSession, seq: int = 0) -> dict[str, Any]:
     socket.send_bytes(frame("hello", seq, version=VERSION))
-    return heard(socket)
+    return receive(socket)
 
 
 # Who may ask
 
 
-def test_a_stranger_gets_the_page_and_nothing_of_the_session(stranger: Served) -> None:
-    assert stranger.browser.get("/").text == "<!doctype html><title>page</title>"
-    assert stranger.browser.get("/engine/gl.js").text == "export {}"
+def test_a_stranger_gets_the_page_and_nothing_of_the_session(
+    unknown_browser: ServedSession,
+) -> None:
+    assert unknown_browser.browser.get("/").text == "<!doctype html><title>page</title>"
+    assert unknown_browser.browser.get("/engine/gl.js").text == "export {}"
     for path in ("/data/present", "/data/", "/key", "/live", "/nowhere", "/engine"):
-        answer = stranger.browser.get(path, follow_redirects=False)
+        answer = unknown_browser.browser.get(path, follow_redirects=False)
         assert answer.status_code == 403
         assert "open the painter by the address that its terminal shows" in answer.text
-    with pytest.raises(REFUSED), stranger.socket():
+    with pytest.raises(REFUSED), unknown_browser.socket():
         pass
 
 
 def test_the_token_is_exchanged_for_a_key_and_for_nothing_that_a_browser_keeps(
-    stranger: Served,
+    unknown_browser: ServedSession,
 ) -> None:
-    token = stranger.guard.token
+    token = unknown_browser.guard.token
     for _ in range(2):  # the link of the terminal opens a second tab, too
-        answer = stranger.exchange(token)
+        answer = unknown_browser.exchange(token)
         assert answer.status_code == 200
         assert "set-cookie" not in answer.headers
         assert answer.headers["cache-control"] == "no-store"
         assert answer.text not in ("", token)
     key = answer.text
-    assert stranger.browser.get("/data/present", headers=bearer(key)).status_code == 200
+    assert unknown_browser.browser.get("/data/present", headers=bearer(key)).status_code == 200
     # What opens the door is no key to the rooms; and an address grants nothing.
-    assert stranger.browser.get("/data/present", headers=bearer(token)).status_code == 410
+    assert unknown_browser.browser.get("/data/present", headers=bearer(token)).status_code == 410
     for given in (token, key):
         for path in (f"/key?token={given}", f"/data/present?token={given}&key={given}"):
-            assert stranger.browser.get(path).status_code == 403
+            assert unknown_browser.browser.get(path).status_code == 403
         cookie = {"cookie": f"lightpaint_{DEFAULT_PORT}={given}; key={given}"}
-        assert stranger.browser.get("/data/present", headers=cookie).status_code == 403
+        assert unknown_browser.browser.get("/data/present", headers=cookie).status_code == 403
 
 
-def test_the_token_of_a_command_line_is_good_once(stranger: Served) -> None:
-    token = stranger.guard.one_time_token()
-    assert stranger.browser.head("/key", headers=bearer(token)).status_code == 410
-    assert stranger.exchange(token).status_code == 200
-    assert stranger.exchange(token).status_code == 410
+def test_the_token_of_a_command_line_is_good_once(unknown_browser: ServedSession) -> None:
+    token = unknown_browser.guard.one_time_token()
+    assert unknown_browser.browser.head("/key", headers=bearer(token)).status_code == 410
+    assert unknown_browser.exchange(token).status_code == 200
+    assert unknown_browser.exchange(token).status_code == 410
 
 
 def test_the_token_of_a_command_line_is_good_soon_whatever_the_clock_says(
-    stranger: Served, monkeypatch: pytest.MonkeyPatch
+    unknown_browser: ServedSession, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    early, late = stranger.guard.one_time_token(), stranger.guard.one_time_token()
+    early, late = unknown_browser.guard.one_time_token(), unknown_browser.guard.one_time_token()
     now = time.monotonic()
     monkeypatch.setattr(time, "time", lambda: 0.0)
-    assert stranger.exchange(early).status_code == 200
+    assert unknown_browser.exchange(early).status_code == 200
     monkeypatch.setattr(time, "monotonic", lambda: now + 121)
-    assert stranger.exchange(late).status_code == 410
+    assert unknown_browser.exchange(late).status_code == 410
 
 
 @pytest.mark.parametrize(
     "shown", ["", "wrong", "é", '"', "Bearer", "Bearer ", "Basic {}", "{}", "Bearer {} {}"]
 )
-def test_what_is_no_key_opens_nothing(served: Served, shown: str) -> None:
-    headers = {"authorization": shown.format(served.key, served.key).encode()}
-    assert served.browser.get("/data/present", headers=headers).status_code in (403, 410)
+def test_what_is_no_key_opens_nothing(known_browser: ServedSession, shown: str) -> None:
+    headers = {"authorization": shown.format(known_browser.key, known_browser.key).encode()}
+    assert known_browser.browser.get("/data/present", headers=headers).status_code in (403, 410)
 
 
-def test_a_socket_without_the_key_is_refused(served: Served) -> None:
-    right = served.key
+def test_a_socket_without_the_key_is_refused(known_browser: ServedSession) -> None:
+    right = known_browser.key
     for key in ("", "wrong", right[:-1], f"{right}=", f"{right}, lightpaint-key.{right}"):
-        served.key = key
-        with pytest.raises(REFUSED), served.socket():
+        known_browser.key = key
+        with pytest.raises(REFUSED), known_browser.socket():
             pass
 
 
-def test_two_keys_are_none(served: Served) -> None:
-    one = ("authorization", f"Bearer {served.key}")
-    asking = served.browser.build_request("GET", "/data/present", headers=[one, one])
-    assert served.browser.send(asking).status_code == 403
+def test_two_keys_are_none(known_browser: ServedSession) -> None:
+    one = ("authorization", f"Bearer {known_browser.key}")
+    asking = known_browser.browser.build_request("GET", "/data/present", headers=[one, one])
+    assert known_browser.browser.send(asking).status_code == 403
 
 
-def test_a_page_of_an_earlier_launch_is_told_what_to_do(served: Served, tmp_path: Path) -> None:
-    other = Served(tmp_path / "later")
-    other.browser.headers.update(bearer(served.key))
+def test_a_page_of_an_earlier_launch_is_told_what_to_do(
+    known_browser: ServedSession, tmp_path: Path
+) -> None:
+    other = ServedSession(tmp_path / "later")
+    other.browser.headers.update(bearer(known_browser.key))
     with other.browser:
         for path in ("/data/", "/data/present", "/key"):
             answer = other.browser.get(path)
@@ -201,39 +205,44 @@ def test_a_page_of_an_earlier_launch_is_told_what_to_do(served: Served, tmp_path
     "host",
     ["evil.example", f"evil.example:{DEFAULT_PORT}", "", "127.0.0.1.evil.example", "192.168.1.2"],
 )
-def test_another_name_is_refused_even_with_the_key(served: Served, host: str) -> None:
+def test_another_name_is_refused_even_with_the_key(known_browser: ServedSession, host: str) -> None:
     for path in ("/", "/data/present"):
-        assert served.browser.get(path, headers={"host": host}).status_code == 403
-    assert served.exchange(served.guard.token, host=host).status_code == 403
-    with pytest.raises(REFUSED), served.socket(host=host):
+        assert known_browser.browser.get(path, headers={"host": host}).status_code == 403
+    assert known_browser.exchange(known_browser.guard.token, host=host).status_code == 403
+    with pytest.raises(REFUSED), known_browser.socket(host=host):
         pass
 
 
 @pytest.mark.parametrize("host", ["localhost:8421", "127.0.0.1:9000", "[::1]:8421", "LOCALHOST"])
 def test_names_of_the_machine_itself_and_ports_of_tunnels_are_right(
-    served: Served, host: str
+    known_browser: ServedSession, host: str
 ) -> None:
-    assert served.browser.get("/data/present", headers={"host": host}).status_code == 200
+    assert known_browser.browser.get("/data/present", headers={"host": host}).status_code == 200
 
 
 @pytest.mark.parametrize(
     "origin", ["http://evil.example", "null", f"https://{HOST}", "http://127.0.0.1:9999", ""]
 )
-def test_a_page_of_another_server_is_refused_even_with_the_key(served: Served, origin: str) -> None:
-    assert served.exchange(served.guard.token, origin=origin).status_code == 403
-    assert served.browser.get("/data/present", headers={"origin": origin}).status_code == 403
-    with pytest.raises(REFUSED), served.socket(origin=origin):
+def test_a_page_of_another_server_is_refused_even_with_the_key(
+    known_browser: ServedSession, origin: str
+) -> None:
+    assert known_browser.exchange(known_browser.guard.token, origin=origin).status_code == 403
+    assert known_browser.browser.get("/data/present", headers={"origin": origin}).status_code == 403
+    with pytest.raises(REFUSED), known_browser.socket(origin=origin):
         pass
 
 
-def test_a_socket_that_says_nothing_of_its_page_is_refused(served: Served) -> None:
-    offer = {"subprotocols": offered(served.key)}
-    with pytest.raises(REFUSED), served.browser.websocket_connect(f"ws://{HOST}/live", **offer):
+def test_a_socket_that_says_nothing_of_its_page_is_refused(known_browser: ServedSession) -> None:
+    offer = {"subprotocols": offered(known_browser.key)}
+    with (
+        pytest.raises(REFUSED),
+        known_browser.browser.websocket_connect(f"ws://{HOST}/live", **offer),
+    ):
         pass
 
 
-def test_a_socket_speaks_the_protocol_that_is_no_secret(served: Served) -> None:
-    with served.socket() as socket:
+def test_a_socket_speaks_the_protocol_that_is_no_secret(known_browser: ServedSession) -> None:
+    with known_browser.socket() as socket:
         assert socket.accepted_subprotocol == "lightpaint"
 
 
@@ -241,21 +250,21 @@ def test_where_others_are_let_in_addresses_are_right_and_foreign_names_are_not(
     tmp_path: Path,
 ) -> None:
     everywhere = Address("192.168.1.2", DEFAULT_PORT, Reach.ALL, frozenset({"studio"}))
-    served = Served(tmp_path / "page", everywhere)
+    served = ServedSession(tmp_path / "page", everywhere)
     with served.browser:
         for host in ("192.168.1.2:8421", "[fe80::1]:8421", "Studio:8421", "127.0.0.1:8421"):
             assert served.exchange(served.guard.token, host=host).status_code == 200
         assert served.exchange(served.guard.token, host="evil.net").status_code == 403
 
 
-def test_only_reading_is_answered(served: Served) -> None:
+def test_only_reading_is_answered(known_browser: ServedSession) -> None:
     for method in ("POST", "PUT", "DELETE", "OPTIONS"):
-        assert served.browser.request(method, "/").status_code == 405
+        assert known_browser.browser.request(method, "/").status_code == 405
 
 
-def test_every_answer_has_the_policy(served: Served) -> None:
+def test_every_answer_has_the_policy(known_browser: ServedSession) -> None:
     for path in ("/", "/engine/gl.js", "/data/present", "/data/none", "/none", "/key"):
-        headers = served.browser.get(path).headers
+        headers = known_browser.browser.get(path).headers
         policy = dict(x.split(" ", 1) for x in headers["content-security-policy"].split("; "))
         assert policy["default-src"] == "'none'"
         assert policy["script-src"] == "'self' 'wasm-unsafe-eval'"
@@ -287,8 +296,8 @@ def test_every_answer_has_the_policy(served: Served) -> None:
         "/engine/gl.js%00",
     ],
 )
-def test_what_is_not_in_the_table_is_not_there(served: Served, path: str) -> None:
-    answer = served.browser.get(path, follow_redirects=False)
+def test_what_is_not_in_the_table_is_not_there(known_browser: ServedSession, path: str) -> None:
+    answer = known_browser.browser.get(path, follow_redirects=False)
     assert answer.status_code == 404
     assert "secret" not in answer.text
 
@@ -321,38 +330,40 @@ def test_a_link_out_of_the_page_is_no_file_of_it(tmp_path: Path) -> None:
     assert page_files(tmp_path / "page") == {}
 
 
-def test_pictures_are_raw_bytes_by_name(served: Served) -> None:
-    for name, picture in served.session.pictures.items():
-        answer = served.browser.get(f"/data/{name}")
+def test_pictures_are_raw_bytes_by_name(known_browser: ServedSession) -> None:
+    for name, picture in known_browser.session.pictures.items():
+        answer = known_browser.browser.get(f"/data/{name}")
         assert answer.headers["x-dtype"] == picture.dtype.name
         shape = tuple(map(int, answer.headers["x-shape"].split(",")))
         got = np.frombuffer(answer.content, picture.dtype.newbyteorder("<")).reshape(shape)
         np.testing.assert_array_equal(got, picture)
     for name in ("none", "../present", "%2e%2e/present", "present/", "x" * 999, "plane/%00"):
-        assert served.browser.get(f"/data/{name}").status_code == 404
+        assert known_browser.browser.get(f"/data/{name}").status_code == 404
 
 
-def test_a_picture_is_kept_by_its_generation_only(served: Served) -> None:
-    with served.socket() as socket:
+def test_a_picture_is_kept_by_its_generation_only(known_browser: ServedSession) -> None:
+    with known_browser.socket() as socket:
         greet(socket)
-        kept = served.browser.get("/data/present?g=1").headers
+        kept = known_browser.browser.get("/data/present?g=1").headers
         assert "immutable" in kept["cache-control"]
         assert kept["vary"] == "Authorization"
         for asked in ("", "?g=0", "?g=2", "?g=x"):
-            answer = served.browser.get(f"/data/present{asked}")
+            answer = known_browser.browser.get(f"/data/present{asked}")
             assert answer.headers["cache-control"] == "no-store"
-        assert served.session.on_message is not None
-        served.session.on_message(PictureUpdate(resources={"present": 2}))
-        assert heard(socket)["kind"] == "renewed"
-        assert "immutable" in served.browser.get("/data/present?g=2").headers["cache-control"]
-        assert served.browser.get("/data/present?g=1").headers["cache-control"] == "no-store"
+        assert known_browser.session.on_message is not None
+        known_browser.session.on_message(PictureUpdate(resources={"present": 2}))
+        assert receive(socket)["kind"] == "renewed"
+        assert (
+            "immutable" in known_browser.browser.get("/data/present?g=2").headers["cache-control"]
+        )
+        assert known_browser.browser.get("/data/present?g=1").headers["cache-control"] == "no-store"
 
 
 # What is said
 
 
-def test_each_message_is_answered_by_its_number(served: Served) -> None:
-    with served.socket() as socket:
+def test_each_message_is_answered_by_its_number(known_browser: ServedSession) -> None:
+    with known_browser.socket() as socket:
         told = greet(socket, 7)
         assert (told["reply"], told["kind"], told["is_back"]) == (7, "state", False)
         assert greet(socket, 7) == told | {"is_back": True}
@@ -361,27 +372,27 @@ def test_each_message_is_answered_by_its_number(served: Served) -> None:
         assert (content["kind"], content["reply"]) == ("answer", 8)
         np.testing.assert_array_equal(np.frombuffer(weights, "<f8"), np.full(6, 3.0))
         socket.send_bytes(frame("undo", 9))
-        assert heard(socket) == {"kind": "done", "reply": 9, "buffers": []}
-        assert heard(socket) == {"kind": "notice", "text": "said", "tone": "info", "buffers": []}
+        assert receive(socket) == {"kind": "done", "reply": 9, "buffers": []}
+        assert receive(socket) == {"kind": "notice", "text": "said", "tone": "info", "buffers": []}
         socket.send_bytes(paint(10, label="nothing"))
-        assert heard(socket)["reply"] == 10
-    assert len(served.session.threads) == 1
-    assert threading.get_ident() not in served.session.threads
+        assert receive(socket)["reply"] == 10
+    assert len(known_browser.session.threads) == 1
+    assert threading.get_ident() not in known_browser.session.threads
 
 
-def test_mistakes_are_answered_and_end_nothing(served: Served) -> None:
-    with served.socket() as socket:
+def test_mistakes_are_answered_and_end_nothing(known_browser: ServedSession) -> None:
+    with known_browser.socket() as socket:
         greet(socket)
         socket.send_bytes(paint(1, label="refuse"))
-        assert heard(socket)["text"] == "this cannot be painted"
+        assert receive(socket)["text"] == "this cannot be painted"
         socket.send_bytes(paint(2, label="break"))
-        failed = heard(socket)
+        failed = receive(socket)
         assert (failed["kind"], failed["reply"]) == ("failed", 2)
         assert "ZeroDivisionError" in failed["text"]
         assert "Traceback" not in failed["text"]
-        assert "Traceback" in served.said[-1]
+        assert "Traceback" in known_browser.said[-1]
         socket.send_bytes(paint(3))
-        assert heard(socket)["kind"] == "answer"
+        assert receive(socket)["kind"] == "answer"
 
 
 NAN = {"image": np.full((1, 1, 3), np.nan, np.float32), "importance": np.ones((1, 1), np.float32)}
@@ -411,40 +422,42 @@ SHORT = to_frame(
     ],
 )
 def test_junk_is_answered_and_the_session_alive(
-    served: Served, junk: bytes, seq: int | None
+    known_browser: ServedSession, junk: bytes, seq: int | None
 ) -> None:
-    with served.socket() as socket:
+    with known_browser.socket() as socket:
         greet(socket)
         socket.send_bytes(junk)
-        answer = heard(socket)
+        answer = receive(socket)
         assert answer["kind"] == "failed"
         assert answer.get("reply") == seq
         socket.send_text("text")
-        assert heard(socket)["kind"] == "failed"
+        assert receive(socket)["kind"] == "failed"
         socket.send_bytes(paint(6))
-        assert heard(socket)["kind"] == "answer"
-    assert len(served.session.heard) == 1
+        assert receive(socket)["kind"] == "answer"
+    assert len(known_browser.session.heard) == 1
 
 
-def test_a_page_of_another_version_is_told(served: Served) -> None:
-    with served.socket() as socket:
+def test_a_page_of_another_version_is_told(known_browser: ServedSession) -> None:
+    with known_browser.socket() as socket:
         socket.send_bytes(frame("hello", 1, version=VERSION + 1, novelty=True))
-        answer = heard(socket)
+        answer = receive(socket)
         assert (answer["kind"], answer["reason"], answer["reply"]) == ("closed", "version", 1)
         assert greet(socket)["kind"] == "state"
 
 
-def test_nothing_is_done_before_hello(served: Served) -> None:
-    with served.socket() as socket:
+def test_nothing_is_done_before_hello(known_browser: ServedSession) -> None:
+    with known_browser.socket() as socket:
         socket.send_bytes(paint(1))
-        assert heard(socket)["kind"] == "closed"
-    assert served.session.heard == []
+        assert receive(socket)["kind"] == "closed"
+    assert known_browser.session.heard == []
 
 
-def test_live_paint_that_newer_covers_is_answered_and_not_done(served: Served) -> None:
+def test_live_paint_that_newer_covers_is_answered_and_not_done(
+    known_browser: ServedSession,
+) -> None:
     busy, free = threading.Event(), threading.Event()
-    served.session.before_paint = lambda: (busy.set(), free.wait(30))
-    with served.socket() as socket:
+    known_browser.session.before_paint = lambda: (busy.set(), free.wait(30))
+    with known_browser.socket() as socket:
         greet(socket)
         socket.send_bytes(paint(1))
         assert busy.wait(30)
@@ -458,82 +471,84 @@ def test_live_paint_that_newer_covers_is_answered_and_not_done(served: Served) -
         ):
             socket.send_bytes(message)
         # All that waits has been heard when this, which nobody has to do, is answered.
-        served.browser.get("/")
+        known_browser.browser.get("/")
         free.set()
-        answers = [heard(socket) for _ in range(7)]
+        answers = [receive(socket) for _ in range(7)]
     assert sorted(answer["reply"] for answer in answers) == [1, 2, 3, 4, 5, 6, 7]
-    strokes = [said.stroke for said in served.session.heard]
+    strokes = [said.stroke for said in known_browser.session.heard]
     assert strokes[0] == 1
     assert strokes[-1] == 2
-    assert sum(said.is_final for said in served.session.heard) == 1
+    assert sum(said.is_final for said in known_browser.session.heard) == 1
     assert len(strokes) <= 7
 
 
 # Who has the session
 
 
-def test_the_second_tab_is_told_and_may_take_over(served: Served) -> None:
-    with served.socket("a") as first, served.socket("b") as second:
+def test_the_second_tab_is_told_and_may_take_over(known_browser: ServedSession) -> None:
+    with known_browser.socket("a") as first, known_browser.socket("b") as second:
         assert greet(first)["kind"] == "state"
         told = greet(second, 3)
         assert (told["kind"], told["reason"], told["reply"]) == ("closed", "taken", 3)
         second.send_bytes(paint(4))
-        assert heard(second)["reason"] == "taken"
+        assert receive(second)["reason"] == "taken"
         second.send_bytes(frame("take_over", 5))
-        assert heard(second)["kind"] == "state"
-        told = heard(first)
+        assert receive(second)["kind"] == "state"
+        told = receive(first)
         assert (told["kind"], told["reason"]) == ("closed", "taken")
         assert "reply" not in told
         first.send_bytes(paint(6))
-        assert heard(first)["reason"] == "taken"
-        assert served.session.heard == []
+        assert receive(first)["reason"] == "taken"
+        assert known_browser.session.heard == []
         second.send_bytes(paint(7))
-        assert heard(second)["kind"] == "answer"
+        assert receive(second)["kind"] == "answer"
         first.send_bytes(frame("take_over", 8))
-        told = heard(first)
+        told = receive(first)
         # What it has not said yet is of before the other one.
         assert (told["kind"], told["is_back"]) == ("state", False)
         assert greet(first, 9)["is_back"]
 
 
-def test_the_session_is_free_when_its_tab_has_gone(served: Served) -> None:
-    with served.socket() as first:
+def test_the_session_is_free_when_its_tab_has_gone(known_browser: ServedSession) -> None:
+    with known_browser.socket() as first:
         greet(first)
-    with served.socket() as second:
+    with known_browser.socket() as second:
         assert greet(second)["kind"] == "state"
 
 
-def test_a_page_that_is_back_after_a_dropped_connection_has_its_session(served: Served) -> None:
-    with served.socket("same") as first, served.socket("same") as again:
+def test_a_page_that_is_back_after_a_dropped_connection_has_its_session(
+    known_browser: ServedSession,
+) -> None:
+    with known_browser.socket("same") as first, known_browser.socket("same") as again:
         greet(first)
         assert greet(again)["kind"] == "state"
         with pytest.raises(WebSocketDisconnect):  # and is not told that another has it
             first.receive_bytes()
 
 
-def test_too_many_tabs_are_sent_away(served: Served) -> None:
+def test_too_many_tabs_are_sent_away(known_browser: ServedSession) -> None:
     with ExitStack() as stack:
         for _ in range(16):
-            greet(stack.enter_context(served.socket()))
-        with served.socket() as one_more, pytest.raises(WebSocketDisconnect) as refusal:
+            greet(stack.enter_context(known_browser.socket()))
+        with known_browser.socket() as one_more, pytest.raises(WebSocketDisconnect) as refusal:
             one_more.receive_bytes()
         assert refusal.value.code == 1013
 
 
-def test_all_are_told_of_the_end(stranger: Served) -> None:
-    stranger.enter()
-    with stranger.socket() as socket:
+def test_all_are_told_of_the_end(unknown_browser: ServedSession) -> None:
+    unknown_browser.enter()
+    with unknown_browser.socket() as socket:
         greet(socket)
-        assert stranger.browser.portal is not None
-        stranger.browser.portal.call(stranger.line.close)
-        assert heard(socket)["reason"] == "ended"
-    assert stranger.session.on_message is None
+        assert unknown_browser.browser.portal is not None
+        unknown_browser.browser.portal.call(unknown_browser.line.close)
+        assert receive(socket)["reason"] == "ended"
+    assert unknown_browser.session.on_message is None
 
 
 # Last words
 
 
-class Scripted:
+class ScriptedSocket:
     """A socket whose other end has said all it will say at once."""
 
     def __init__(self, *frames: bytes, leaves: bool = True) -> None:
@@ -568,9 +583,9 @@ def test_what_a_page_says_last_is_done_though_it_has_gone() -> None:
         its = Connections(session, None)
         its.attach()
         strokes = [paint(k, stroke=k, is_final=True) for k in (1, 2, 3)]
-        page = asyncio.ensure_future(its.serve(client.Client(Scripted(HELLO, *strokes), "a")))
+        page = asyncio.ensure_future(its.serve(client.Client(ScriptedSocket(HELLO, *strokes), "a")))
         await asyncio.sleep(0.03)  # it has left, and is not done with
-        after = Scripted(HELLO, paint(4, stroke=4, is_final=True), leaves=False)
+        after = ScriptedSocket(HELLO, paint(4, stroke=4, is_final=True), leaves=False)
         other = asyncio.ensure_future(its.serve(client.Client(after, "b")))
         await page
         while len(after.sent) < 2:  # what is done may not have been sent yet
@@ -579,7 +594,7 @@ def test_what_a_page_says_last_is_done_though_it_has_gone() -> None:
         assert after.sent[0]["kind"] == "state"  # and not that it is open in another tab
         await its.close()
 
-    in_a_loop(trial)
+    run_in_loop(trial)
     assert strokes_of(session) == [1, 2, 3, 4]
 
 
@@ -589,10 +604,10 @@ def test_a_page_that_greets_and_goes_is_not_waited_for() -> None:
     async def trial() -> None:
         its = Connections(session, None)
         its.attach()
-        await its.serve(client.Client(Scripted(HELLO, HELLO, paint(1), HELLO), "a"))
+        await its.serve(client.Client(ScriptedSocket(HELLO, HELLO, paint(1), HELLO), "a"))
         await its.close()
 
-    in_a_loop(trial)
+    run_in_loop(trial)
     assert strokes_of(session) == [1]
 
 
@@ -603,7 +618,7 @@ def test_what_was_said_before_the_end_is_done() -> None:
     async def trial() -> None:
         its = Connections(session, None)
         its.attach()
-        socket = Scripted(
+        socket = ScriptedSocket(
             HELLO, *(paint(k, stroke=k, is_final=True) for k in (1, 2, 3)), leaves=False
         )
         serving = asyncio.ensure_future(its.serve(client.Client(socket, "a")))
@@ -613,7 +628,7 @@ def test_what_was_said_before_the_end_is_done() -> None:
         serving.cancel()
         assert socket.sent[-1]["reason"] == "ended"
 
-    in_a_loop(trial)
+    run_in_loop(trial)
     assert strokes_of(session) == [1, 2, 3]
 
 
@@ -623,7 +638,7 @@ def test_a_page_can_be_given_up_at_any_step() -> None:
     async def given_up_after(steps: int, *, leaves: bool) -> None:
         its = Connections(FakeSession(), None)
         its.attach()
-        page = client.Client(Scripted(HELLO, leaves=leaves), "a")
+        page = client.Client(ScriptedSocket(HELLO, leaves=leaves), "a")
         serving = asyncio.ensure_future(its.serve(page))
         for _ in range(steps):
             await asyncio.sleep(0)
@@ -638,13 +653,13 @@ def test_a_page_can_be_given_up_at_any_step() -> None:
 
     for steps in range(40):
         for leaves in (False, True):
-            in_a_loop(partial(given_up_after, steps, leaves=leaves))
+            run_in_loop(partial(given_up_after, steps, leaves=leaves))
 
 
 # Pages that are slow
 
 
-class Deaf:
+class DeafSocket:
     """A socket whose other end does not listen."""
 
     def __init__(self) -> None:
@@ -661,7 +676,7 @@ class Deaf:
 
 
 def test_of_what_nobody_asked_for_a_slow_page_gets_the_newest() -> None:
-    page = client.Client(Deaf())
+    page = client.Client(DeafSocket())
     for k in range(1000):
         page.send(fake_answer(version=k))
         page.send(fake_progress("render", k))
@@ -674,7 +689,7 @@ def test_of_what_nobody_asked_for_a_slow_page_gets_the_newest() -> None:
     assert renewed.fields["resources"] == {"plane/0": 999, "plane/1": 997, "plane/2": 998}
 
 
-class Slow(Scripted):
+class SlowSocket(ScriptedSocket):
     """A socket whose other end asks for much, and takes one answer when it is let."""
 
     def __init__(self, *frames: bytes) -> None:
@@ -703,7 +718,7 @@ def test_a_page_that_asks_and_does_not_listen_is_answered_no_further(
     async def trial() -> None:
         its = Connections(session, None)
         its.attach()
-        socket = Slow(HELLO, *(frame("fetch", k, name="x") for k in range(1, count + 1)))
+        socket = SlowSocket(HELLO, *(frame("fetch", k, name="x") for k in range(1, count + 1)))
         page = asyncio.ensure_future(its.serve(client.Client(socket, "a")))
         while len(asked) < 2:
             await asyncio.sleep(0.001)
@@ -717,7 +732,7 @@ def test_a_page_that_asks_and_does_not_listen_is_answered_no_further(
         assert [one["reply"] for one in socket.sent] == list(range(count + 1))
         await its.close()
 
-    in_a_loop(trial)
+    run_in_loop(trial)
 
 
 def test_what_a_page_has_said_at_length_is_answered_before_it_says_more(
@@ -727,7 +742,7 @@ def test_what_a_page_has_said_at_length_is_answered_before_it_says_more(
     monkeypatch.setattr(client, "MAX_QUEUED_BYTES", 3 * len(frames[0]))
 
     async def trial() -> None:
-        socket = Scripted(*frames, leaves=False)
+        socket = ScriptedSocket(*frames, leaves=False)
         page = client.Client(socket)
         signals_as_interrupts = asyncio.ensure_future(page.receive_all())
         for _ in range(50):
@@ -739,11 +754,11 @@ def test_what_a_page_has_said_at_length_is_answered_before_it_says_more(
             assert heard.request.stroke == stroke
         signals_as_interrupts.cancel()
 
-    in_a_loop(trial)
+    run_in_loop(trial)
 
 
-def test_two_pages_that_fight_over_the_session_harm_nobody(served: Served) -> None:
-    with served.socket("a") as one, served.socket("b") as other:
+def test_two_pages_that_fight_over_the_session_harm_nobody(known_browser: ServedSession) -> None:
+    with known_browser.socket("a") as one, known_browser.socket("b") as other:
         greet(one)
         pages = [one, other]
         for turn in range(40):
@@ -752,19 +767,21 @@ def test_two_pages_that_fight_over_the_session_harm_nobody(served: Served) -> No
             page.send_bytes(paint(2 * turn + 1, stroke=turn, is_final=True))
             kinds = list[str]()
             while kinds[-1:] != ["answer"]:
-                told = heard(page)
+                told = receive(page)
                 kinds.append(told["kind"])
                 assert told["kind"] in ("state", "answer", "closed")
                 assert told["kind"] != "closed" or "reply" not in told
             loser.send_bytes(paint(10_000 + turn, stroke=turn, is_final=True))
-            while (told := heard(loser)).get("reply") != 10_000 + turn:
+            while (told := receive(loser)).get("reply") != 10_000 + turn:
                 assert told["kind"] == "closed"
             assert told["reason"] == "taken"
-    assert [said.stroke for said in served.session.heard if isinstance(said, Paint)] == [*range(40)]
+    assert [said.stroke for said in known_browser.session.heard if isinstance(said, Paint)] == [
+        *range(40)
+    ]
 
 
 def test_answers_to_what_was_asked_are_not_dropped_and_who_is_too_slow_is_sent_away() -> None:
-    page = client.Client(Deaf())
+    page = client.Client(DeafSocket())
     for k in range(client.MAX_UNSENT):
         page.send(fake_answer(), k)
     assert len(page._unsent) == client.MAX_UNSENT

@@ -34,7 +34,7 @@ from lightpaint.pipeline.job.settings import Settings
 SIZE = (18, 32)
 
 
-def made_of(images: Any, sensor: str = "camera") -> lp.Basis:
+def noiseless_basis(images: Any, sensor: str = "camera") -> lp.Basis:
     """A basis without noise."""
     images = np.asarray(images, np.float32)
     names = [f"lamp {k}" for k in range(len(images))]
@@ -47,12 +47,12 @@ def made_of(images: Any, sensor: str = "camera") -> lp.Basis:
     )
 
 
-def overlapping() -> lp.Basis:
+def overlapping_lights() -> lp.Basis:
     """Three soft lights of different colours."""
     y, x = np.mgrid[: SIZE[0], : SIZE[1]] / SIZE[0]
     colors = np.random.default_rng(5).uniform(0.3, 1, (3, 3))
     places = zip((0.2, 0.6, 0.4), (0.3, 0.8, 1.4), colors, strict=True)
-    return made_of(
+    return noiseless_basis(
         [
             np.exp(-((y - cy) ** 2 + (x - cx) ** 2) / 0.3)[..., None] * color + 0.02
             for cy, cx, color in places
@@ -62,23 +62,25 @@ def overlapping() -> lp.Basis:
 
 def two_views() -> list[lp.Basis]:
     """The same lights, seen from another place, too: smaller, and each otherwise."""
-    first = overlapping()
+    first = overlapping_lights()
     colors = np.random.default_rng(6).uniform(0.3, 1, (3, 1, 1, 3))
-    return [first, made_of(colors * first.images[[1, 2, 0], 3:13, 4:18], "side")]
+    return [first, noiseless_basis(colors * first.images[[1, 2, 0], 3:13, 4:18], "side")]
 
 
 @pytest.fixture
 def basis() -> lp.Basis:
     """Three soft lights of different colours."""
-    return overlapping()
+    return overlapping_lights()
 
 
 def session_of(basis: lp.Basis, store: MemoryStore | None = None, **how: Any) -> Session:
     """A session as the command line makes it."""
-    return several([basis], store, **how)
+    return session_of_views([basis], store, **how)
 
 
-def several(bases: list[lp.Basis], store: MemoryStore | None = None, **how: Any) -> Session:
+def session_of_views(
+    bases: list[lp.Basis], store: MemoryStore | None = None, **how: Any
+) -> Session:
     """The same, of several views."""
     return Session(
         bases,
@@ -169,7 +171,7 @@ def test_what_is_asked_is_kept_to_at_once(basis: lp.Basis, space: Any):
 @pytest.mark.parametrize("space", ["linear", "display"])
 def test_several_views_have_one_answer_that_of_solve(space: Any):
     bases = two_views()
-    session = several(bases, space=space)
+    session = session_of_views(bases, space=space)
     session.handle(*paint(1, (2, 9, 3, 12), 0.9))
     alone = session.snapshot().solution()
     assert alone is not None
@@ -198,7 +200,7 @@ def test_several_views_have_one_answer_that_of_solve(space: Any):
 
 
 def test_undo_goes_through_views_in_order():
-    session = several(two_views())
+    session = session_of_views(two_views())
     session.handle(*paint(1, (2, 9, 3, 12), 0.9))
     session.handle(*paint(2, (1, 6, 2, 9), 0.3, view=1))
     [patch] = session.handle(protocol.Undo(), {})
@@ -256,7 +258,7 @@ DONE = st.one_of(
 def test_any_sequence_equals_a_rebuild(actions: list[Any]):
     bases = two_views()
     store = MemoryStore(Identity.of(bases))
-    session, stroke = several(bases, store), 0
+    session, stroke = session_of_views(bases, store), 0
     for what, *its in actions:
         try:
             match what:
@@ -288,7 +290,7 @@ def test_any_sequence_equals_a_rebuild(actions: list[Any]):
         except lp.LightpaintError:
             pass
     session.handle(protocol.DropStroke(stroke), {})
-    again = several(bases, store)
+    again = session_of_views(bases, store)
     for one, other, basis in zip(session.views, again.views, bases, strict=True):
         np.testing.assert_array_equal(one.image, other.image)
         np.testing.assert_array_equal(one.importance, other.importance)

@@ -48,12 +48,12 @@ ACTIONS = st.lists(
 
 
 @pytest.fixture
-def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
+def without_process_check(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whoever ends the process here is not the current."""
     monkeypatch.setattr(database, "SYNCHRONOUS", "OFF")
 
 
-@pytest.mark.usefixtures("hasty")
+@pytest.mark.usefixtures("without_process_check")
 @settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(ACTIONS)
 def test_any_sequence_is_there_again(
@@ -161,7 +161,7 @@ for number in range(len(store.steps), 10**6):
 """
 
 
-def writing(path: Path) -> "subprocess.Popen[str]":
+def start_writer(path: Path) -> "subprocess.Popen[str]":
     return subprocess.Popen(
         [sys.executable, "-c", WRITER, str(path)],
         stdout=subprocess.PIPE,
@@ -174,7 +174,7 @@ def test_killed_at_any_moment_all_that_was_acknowledged_is_there(tmp_path: Path)
     path, chance = tmp_path / "session.db", random.Random(0)
     steps = 0
     for _ in range(5):
-        with writing(path) as process:
+        with start_writer(path) as process:
             assert process.stdout is not None
             assert process.stdout.readline() == f"open {steps}\n"
             heard = "".join(process.stdout.readline() for _ in range(chance.randrange(3, 12)))
@@ -205,7 +205,7 @@ def test_killed_at_any_moment_all_that_was_acknowledged_is_there(tmp_path: Path)
 
 def test_the_second_process_is_told_and_the_lock_dies_with_the_first(tmp_path: Path) -> None:
     path = tmp_path / "session.db"
-    with writing(path) as process:
+    with start_writer(path) as process:
         assert process.stdout is not None
         process.stdout.readline()
         for opening in (lambda: Store.open(path, IDENTITY), lambda: set_aside(path)):
@@ -318,15 +318,18 @@ def test_a_limit_of_file_sizes_loses_nothing_either(tmp_path: Path) -> None:
 # What is no session of this picture
 
 
-def seen(*views: ViewIdentity) -> Identity:
+def identity_of_views(*views: ViewIdentity) -> Identity:
     return replace(IDENTITY, views=views)
 
 
 @pytest.mark.parametrize(
     ("other", "said"),
     [
-        (seen(ViewIdentity("camera", (12, 20))), "of 10x12 pixels, and room.xml has 20x12"),
-        (seen(ViewIdentity("side", SIZE)), "through camera, and this is through side"),
+        (
+            identity_of_views(ViewIdentity("camera", (12, 20))),
+            "of 10x12 pixels, and room.xml has 20x12",
+        ),
+        (identity_of_views(ViewIdentity("side", SIZE)), "through camera, and this is through side"),
         (replace(IDENTITY, lights=("panel", "sun")), "lights panel, bulb, and room.xml has"),
     ],
 )
@@ -357,7 +360,10 @@ def test_a_scene_that_has_changed_keeps_its_session(tmp_path: Path) -> None:
 
 
 def test_a_view_may_come_later_and_none_may_go(tmp_path: Path) -> None:
-    path, both = tmp_path / "session.db", seen(*IDENTITY.views, ViewIdentity("side", (4, 6)))
+    path, both = (
+        tmp_path / "session.db",
+        identity_of_views(*IDENTITY.views, ViewIdentity("side", (4, 6))),
+    )
     with Store.open(path, IDENTITY) as store:
         store.append(step(1))
     with Store.open(path, both) as store:
@@ -366,7 +372,7 @@ def test_a_view_may_come_later_and_none_may_go(tmp_path: Path) -> None:
         Store.open(path, IDENTITY)
 
 
-def _done(path: Path, statement: str) -> None:
+def _execute(path: Path, statement: str) -> None:
     other = sqlite3.connect(path)
     other.execute(statement)
     other.commit()
@@ -378,10 +384,10 @@ def _done(path: Path, statement: str) -> None:
     [
         lambda path: path.write_bytes(b"junk" * 1000),
         lambda path: path.write_bytes(path.read_bytes()[:40_000]),
-        lambda path: _done(path, "DROP TABLE step"),
-        lambda path: _done(path, "PRAGMA user_version=2"),
-        lambda path: _done(path, "PRAGMA user_version=9"),
-        lambda path: _done(path, "PRAGMA application_id=9"),
+        lambda path: _execute(path, "DROP TABLE step"),
+        lambda path: _execute(path, "PRAGMA user_version=2"),
+        lambda path: _execute(path, "PRAGMA user_version=9"),
+        lambda path: _execute(path, "PRAGMA application_id=9"),
     ],
 )
 def test_a_damaged_file_is_said_in_one_line_and_can_be_put_aside(
@@ -427,7 +433,7 @@ def test_what_can_be_read_of_a_damaged_session_is_there(
         for number in (1, 2):
             store.put_look(look(number, number))
         _, steps, looks = content(store)
-    _done(path, damage)
+    _execute(path, damage)
     before = path.read_bytes()
     with Store.open(path, IDENTITY) as store:
         if not store.remarks:  # what nobody has looked at yet
@@ -448,7 +454,7 @@ def test_what_can_be_read_of_a_damaged_session_is_there(
         assert len(store.steps) == len(left) + 1
 
 
-@pytest.mark.usefixtures("hasty")
+@pytest.mark.usefixtures("without_process_check")
 def test_bytes_and_pages_that_are_others_never_end_in_more_than_a_line(tmp_path: Path) -> None:
     """All over the file: what is there afterwards is as it was, and what is not is said."""
     whole, path = tmp_path / "whole.db", tmp_path / "session.db"
@@ -562,7 +568,7 @@ def test_a_painting_is_reached_though_a_look_is_damaged(tmp_path: Path, make_bas
         "UPDATE look_array SET data=x'00' WHERE look=1 AND name='weights'",
         "UPDATE pixels SET change=x'00' WHERE step = 2",
     ):
-        _done(path, damage)
+        _execute(path, damage)
     with Store.open(path, IDENTITY) as store:
         about: dict[str, Any] = {"settings": Settings(), "transform": ViewTransform("srgb")}
         session = Session([basis], [basis.current_look], store, **about)
@@ -656,7 +662,7 @@ def test_a_place_that_cannot_be_written_is_said(tmp_path: Path) -> None:
         Store.open(tmp_path / "session.db", IDENTITY)
 
 
-@pytest.mark.usefixtures("hasty")
+@pytest.mark.usefixtures("without_process_check")
 def test_room_of_what_was_cut_off_is_used_again(tmp_path: Path) -> None:
     """So that a day of trying and undoing costs no more than what is there in the end."""
     path = tmp_path / "session.db"

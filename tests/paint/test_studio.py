@@ -38,7 +38,7 @@ from lightpaint.paint.subject import Subject
 SIZE = (18, 32)
 
 
-class IncomingMessage:
+class StudioClient:
     """A studio of saved bases, and all that it says."""
 
     def __init__(self, folder: Path, *bases: lp.Basis, scene: Any = None) -> None:
@@ -102,20 +102,20 @@ def basis(make_basis: Any) -> lp.Basis:
 
 
 @pytest.fixture
-def heard(basis: lp.Basis, tmp_path: Path) -> Iterator[IncomingMessage]:
+def client(basis: lp.Basis, tmp_path: Path) -> Iterator[StudioClient]:
     """A studio that is open."""
-    made = IncomingMessage(tmp_path, basis)
+    made = StudioClient(tmp_path, basis)
     yield made
     made.studio.close()
 
 
-def test_what_is_exported_is_solved_alike(heard: IncomingMessage, basis: lp.Basis, tmp_path: Path):
-    heard.paint(1, 0.8)
-    heard.studio.handle(protocol.ConstrainLight(1, {"limits": {"min": 0.1, "max": 0.45}}), {})
-    heard.studio.handle(protocol.ChangeSettings({"colors": "free"}), {})
-    exact = heard.exact()
-    heard.studio.handle(protocol.Export(("target", "picture", "lighting")), {})
-    exported = heard.wait(lambda m: m.kind == "exported")
+def test_what_is_exported_is_solved_alike(client: StudioClient, basis: lp.Basis, tmp_path: Path):
+    client.paint(1, 0.8)
+    client.studio.handle(protocol.ConstrainLight(1, {"limits": {"min": 0.1, "max": 0.45}}), {})
+    client.studio.handle(protocol.ChangeSettings({"colors": "free"}), {})
+    exact = client.exact()
+    client.studio.handle(protocol.Export(("target", "picture", "lighting")), {})
+    exported = client.wait(lambda m: m.kind == "exported")
     assert set(exported.fields["files"]) == {
         str(tmp_path / "painting.exr"),
         str(tmp_path / "answer.png"),
@@ -138,34 +138,34 @@ def test_what_is_exported_is_solved_alike(heard: IncomingMessage, basis: lp.Basi
     np.testing.assert_allclose(
         [emission[name] for name in basis.names], exact.arrays["weights"], rtol=1e-12
     )
-    heard.messages.clear()
-    heard.studio.handle(protocol.Export(("lighting",)), {})
-    assert heard.wait(lambda m: m.kind == "exported").fields["command"] == ""
+    client.messages.clear()
+    client.studio.handle(protocol.Export(("lighting",)), {})
+    assert client.wait(lambda m: m.kind == "exported").fields["command"] == ""
 
 
-def test_what_is_not_of_a_painting_is_exported_without_one(heard: IncomingMessage, tmp_path: Path):
-    heard.studio.handle(protocol.Export(("target", "picture", "lighting", "report")), {})
-    exported = heard.wait(lambda m: m.kind == "exported").fields
+def test_what_is_not_of_a_painting_is_exported_without_one(client: StudioClient, tmp_path: Path):
+    client.studio.handle(protocol.Export(("target", "picture", "lighting", "report")), {})
+    exported = client.wait(lambda m: m.kind == "exported").fields
     files = [str(tmp_path / "answer.png"), str(tmp_path / "lighting.json")]
     assert exported == {"files": files, "command": "", "is_unpainted": True}
-    heard.studio.handle(protocol.Export(("target",)), {})
-    said = heard.wait(lambda m: m.kind == "notice" and "nothing is painted" in m.fields["text"])
+    client.studio.handle(protocol.Export(("target",)), {})
+    said = client.wait(lambda m: m.kind == "notice" and "nothing is painted" in m.fields["text"])
     assert said.fields["task"] == "export"
 
 
 def test_a_stroke_whose_end_was_never_heard_is_kept_at_the_end(
-    heard: IncomingMessage, tmp_path: Path
+    client: StudioClient, tmp_path: Path
 ):
     arrays = {"image": np.ones((4, 4, 3), np.float32), "importance": np.ones((4, 4), np.float32)}
-    heard.studio.handle(protocol.Paint(1, (0, 4, 0, 4), False), arrays)
-    identity = heard.studio.session.store.identity
-    heard.studio.close()
+    client.studio.handle(protocol.Paint(1, (0, 4, 0, 4), False), arrays)
+    identity = client.studio.session.store.identity
+    client.studio.close()
     with Store.open(tmp_path / "session.db", identity) as store:
         assert [step.kind for step in store.steps] == ["stroke"]
         np.testing.assert_array_equal(store.steps[0].patches[0].after.image, arrays["image"])
 
 
-def test_one_export_is_written_at_a_time(heard: IncomingMessage, monkeypatch: pytest.MonkeyPatch):
+def test_one_export_is_written_at_a_time(client: StudioClient, monkeypatch: pytest.MonkeyPatch):
     """Also of what needs no render: they go to the same files."""
     at_work, most = 0, 0
     real = session_exports.export
@@ -181,16 +181,16 @@ def test_one_export_is_written_at_a_time(heard: IncomingMessage, monkeypatch: py
             at_work -= 1
 
     monkeypatch.setattr(session_exports, "export", export)
-    heard.paint(1, 0.8)
-    heard.exact()
+    client.paint(1, 0.8)
+    client.exact()
     for _ in range(3):
-        heard.studio.handle(protocol.Export(("target", "lighting")), {})
-    heard.wait(lambda _: sum(m.kind == "exported" for m in heard.messages) == 3)
+        client.studio.handle(protocol.Export(("target", "lighting")), {})
+    client.wait(lambda _: sum(m.kind == "exported" for m in client.messages) == 3)
     assert most == 1
 
 
 def test_an_export_can_be_stopped(
-    heard: IncomingMessage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    client: StudioClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     """What is there by then stays, and is named; one that begins later is not stopped with it."""
     begun = threading.Event()
@@ -203,22 +203,22 @@ def test_an_export_can_be_stopped(
         yield tmp_path / "never.html"
 
     monkeypatch.setattr(session_exports, "_write_report", report)
-    heard.paint(1, 0.8)
-    heard.exact()
-    heard.studio.handle(protocol.Export(("lighting", "report")), {})
+    client.paint(1, 0.8)
+    client.exact()
+    client.studio.handle(protocol.Export(("lighting", "report")), {})
     assert begun.wait(60)
-    heard.studio.handle(protocol.Export((), run=False), {})
-    exported = heard.wait(lambda m: m.kind == "exported", seconds=5)
+    client.studio.handle(protocol.Export((), run=False), {})
+    exported = client.wait(lambda m: m.kind == "exported", seconds=5)
     files = [str(tmp_path / name) for name in ("painting.exr", "lighting.json")]
     assert exported.fields == {"files": files, "command": "", "is_stopped": True}
-    heard.messages.clear()
-    heard.studio.handle(protocol.Export(("lighting",)), {})
-    assert "is_stopped" not in heard.wait(lambda m: m.kind == "exported").fields
+    client.messages.clear()
+    client.studio.handle(protocol.Export(("lighting",)), {})
+    assert "is_stopped" not in client.wait(lambda m: m.kind == "exported").fields
 
 
-def test_an_exact_answer_tells_of_each_light(heard: IncomingMessage, basis: lp.Basis):
-    heard.paint(1, 0.8)
-    fields = heard.exact().fields
+def test_an_exact_answer_tells_of_each_light(client: StudioClient, basis: lp.Basis):
+    client.paint(1, 0.8)
+    fields = client.exact().fields
     assert fields["exact"]
     assert fields["delta_e"] >= 0
     assert sum(light["share"] for light in fields["lights"]) == pytest.approx(1)
@@ -245,7 +245,7 @@ def test_denoised_planes_of_few_samples_do_until_there_are_better_ones(
 
     monkeypatch.setattr(plane_denoiser, "denoise_to_halves", denoise_to_halves)
     monkeypatch.setattr(session_bases, "obtain_bases", lambda *_: iter([[basis], [better]]))
-    heard = IncomingMessage(tmp_path, basis)
+    heard = StudioClient(tmp_path, basis)
     assert is_taken.wait(30)
     assert len(cleaned) == len(basis.lights)
     fields = heard.studio.state().fields
@@ -270,7 +270,7 @@ def test_lights_of_unknown_noise_are_cleaned_too(
     none = np.zeros_like(basis.half_differences)
     unknown = replace(basis, noise=none, origin=origin)
     assert not unknown.knows_noise
-    heard = IncomingMessage(tmp_path, unknown)
+    heard = StudioClient(tmp_path, unknown)
     heard.wait(lambda m: m.kind == "renewed" and "clean/2" in m.fields["resources"])
     heard.studio.close()
 
@@ -296,7 +296,7 @@ def test_what_is_said_comes_in_the_order_in_which_it_came_about(
 
     monkeypatch.setattr(Publisher, "publish", slow)
     monkeypatch.setattr(session_bases, "obtain_bases", obtain_bases)
-    heard = IncomingMessage(tmp_path, basis)
+    heard = StudioClient(tmp_path, basis)
     goes_on.set()
     assert is_telling.wait(30)
     heard.studio.publisher.publish_picture("verified", np.zeros((*SIZE, 3), np.float16))
@@ -315,7 +315,7 @@ def test_denoised_planes_come_later_and_keep_the_light(
     basis: lp.Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
-    heard = IncomingMessage(tmp_path / "first", basis)
+    heard = StudioClient(tmp_path / "first", basis)
     heard.wait(lambda m: m.kind == "renewed" and "clean/2" in m.fields["resources"])
     state = heard.studio.state().fields
     for k, light in enumerate(state["lights"]):
@@ -333,7 +333,7 @@ def test_denoised_planes_come_later_and_keep_the_light(
     while not read_denoised_planes(basis) and time.monotonic() < until:
         time.sleep(0.01)
     # The next session has the same at once, and one of other pixels has not.
-    again = IncomingMessage(tmp_path / "again", basis)
+    again = StudioClient(tmp_path / "again", basis)
     first = again.wait(lambda m: m.kind == "state").fields
     for k in range(len(basis.lights)):
         assert f"clean/{k}" in first["resources"]
@@ -367,37 +367,37 @@ def test_kept_pictures_that_are_damaged_are_made_again(
     np.testing.assert_array_equal(found.halves, clean.halves)
 
 
-def test_a_look_is_gone_back_to_and_undone(heard: IncomingMessage):
-    heard.paint(1, 0.8)
-    [looks] = heard.studio.handle(protocol.SaveLook("  bright \n day "), {})
+def test_a_look_is_gone_back_to_and_undone(client: StudioClient):
+    client.paint(1, 0.8)
+    [looks] = client.studio.handle(protocol.SaveLook("  bright \n day "), {})
     [look] = looks.fields["looks"]
     assert look["name"] == "bright day"
-    first = heard.studio.session.views[0].image.copy()
-    heard.paint(2, 0.1)
-    second = heard.studio.session.views[0].image.copy()
-    heard.studio.handle(protocol.LoadLook(look["id"]), {})
-    np.testing.assert_array_equal(heard.studio.session.views[0].image, first)
-    heard.studio.handle(protocol.Undo(), {})
-    np.testing.assert_array_equal(heard.studio.session.views[0].image, second)
-    heard.studio.handle(protocol.CopyLook(look["id"]), {})
-    heard.studio.handle(protocol.RenameLook(look["id"], "noon"), {})
-    [message] = heard.studio.handle(protocol.DropLook(look["id"]), {})
+    first = client.studio.session.views[0].image.copy()
+    client.paint(2, 0.1)
+    second = client.studio.session.views[0].image.copy()
+    client.studio.handle(protocol.LoadLook(look["id"]), {})
+    np.testing.assert_array_equal(client.studio.session.views[0].image, first)
+    client.studio.handle(protocol.Undo(), {})
+    np.testing.assert_array_equal(client.studio.session.views[0].image, second)
+    client.studio.handle(protocol.CopyLook(look["id"]), {})
+    client.studio.handle(protocol.RenameLook(look["id"], "noon"), {})
+    [message] = client.studio.handle(protocol.DropLook(look["id"]), {})
     assert [x["name"] for x in message.fields["looks"]] == ["bright day copy"]
     with pytest.raises(lp.LightpaintError, match="no look"):
-        heard.studio.handle(protocol.LoadLook(99), {})
+        client.studio.handle(protocol.LoadLook(99), {})
 
 
-def test_a_look_that_is_gone_back_to_has_its_own_answer_at_once(heard: IncomingMessage):
+def test_a_look_that_is_gone_back_to_has_its_own_answer_at_once(client: StudioClient):
     """Not one that comes from that of another look, until the exact one is there."""
-    heard.paint(1, 0.8)
-    kept = heard.exact().arrays["weights"]
-    [looks] = heard.studio.handle(protocol.SaveLook("day"), {})
-    heard.paint(2, 0.02, (0, 12, 0, 16))
-    other = heard.exact().arrays["weights"]
+    client.paint(1, 0.8)
+    kept = client.exact().arrays["weights"]
+    [looks] = client.studio.handle(protocol.SaveLook("day"), {})
+    client.paint(2, 0.02, (0, 12, 0, 16))
+    other = client.exact().arrays["weights"]
     assert np.abs(other - kept).max() > 0.1 * kept.max()
-    [patch] = heard.studio.handle(protocol.LoadLook(looks.fields["looks"][0]["id"]), {})
+    [patch] = client.studio.handle(protocol.LoadLook(looks.fields["looks"][0]["id"]), {})
     np.testing.assert_array_equal(patch.arrays["weights"], kept)
-    np.testing.assert_allclose(heard.exact().arrays["weights"], kept, rtol=1e-6)
+    np.testing.assert_allclose(client.exact().arrays["weights"], kept, rtol=1e-6)
 
 
 def test_rounds_of_samples_are_counted_as_one_work():
@@ -421,29 +421,29 @@ def test_rounds_of_samples_are_counted_as_one_work():
     assert heard[-1][:2] == (128, 128)
 
 
-def test_what_lies_between_two_looks_is_kept(heard: IncomingMessage):
+def test_what_lies_between_two_looks_is_kept(client: StudioClient):
     answers = []
     for stroke, light in ((1, 0.8), (2, 0.1)):
-        heard.paint(stroke, light)
-        answers.append(heard.exact().arrays["weights"])
-        [message] = heard.studio.handle(protocol.SaveLook(f"look {stroke}"), {})
+        client.paint(stroke, light)
+        answers.append(client.exact().arrays["weights"])
+        [message] = client.studio.handle(protocol.SaveLook(f"look {stroke}"), {})
     one, two = (look["id"] for look in message.fields["looks"])
-    [message] = heard.studio.handle(protocol.MixLooks(one, two, 0.25, "between"), {})
-    heard.studio.handle(protocol.LoadLook(message.fields["looks"][-1]["id"]), {})
-    between = heard.exact().arrays["weights"]
+    [message] = client.studio.handle(protocol.MixLooks(one, two, 0.25, "between"), {})
+    client.studio.handle(protocol.LoadLook(message.fields["looks"][-1]["id"]), {})
+    between = client.exact().arrays["weights"]
     np.testing.assert_allclose(between, 0.75 * answers[0] + 0.25 * answers[1], rtol=1e-9)
     with pytest.raises(lp.LightpaintError, match="part is 2"):
-        heard.studio.handle(protocol.MixLooks(one, two, 2, "beyond"), {})
+        client.studio.handle(protocol.MixLooks(one, two, 2, "beyond"), {})
 
 
-def test_what_was_done_is_there_again(heard: IncomingMessage, basis: lp.Basis, tmp_path: Path):
-    heard.paint(1, 0.8)
-    heard.paint(2, 0.3, (0, 6, 10, 30))
-    heard.studio.handle(protocol.ConstrainLight(0, {"lock": True}), {})
-    heard.studio.handle(protocol.SaveLook("a"), {})
-    session = heard.studio.session
-    heard.studio.close()
-    again = IncomingMessage(tmp_path, basis)
+def test_what_was_done_is_there_again(client: StudioClient, basis: lp.Basis, tmp_path: Path):
+    client.paint(1, 0.8)
+    client.paint(2, 0.3, (0, 6, 10, 30))
+    client.studio.handle(protocol.ConstrainLight(0, {"lock": True}), {})
+    client.studio.handle(protocol.SaveLook("a"), {})
+    session = client.studio.session
+    client.studio.close()
+    again = StudioClient(tmp_path, basis)
     np.testing.assert_array_equal(again.studio.session.views[0].image, session.views[0].image)
     assert again.studio.session.requests == session.requests
     state = again.studio.state().fields
@@ -456,7 +456,7 @@ def test_what_was_done_is_there_again(heard: IncomingMessage, basis: lp.Basis, t
 
 
 def test_a_full_disk_is_said_to_pages_and_to_the_terminal(
-    heard: IncomingMessage, monkeypatch: pytest.MonkeyPatch
+    client: StudioClient, monkeypatch: pytest.MonkeyPatch
 ):
     @contextmanager
     def full(_: Any) -> Iterator[None]:
@@ -467,18 +467,18 @@ def test_a_full_disk_is_said_to_pages_and_to_the_terminal(
         return message.kind == "notice"
 
     at_terminal: list[str] = []
-    heard.studio.on_unsaved = at_terminal.append
+    client.studio.on_unsaved = at_terminal.append
     with monkeypatch.context() as patch:
         patch.setattr(write_queue, "transaction", full)
-        heard.paint(1, 0.8)
-        text = heard.wait(said).fields["text"]
+        client.paint(1, 0.8)
+        text = client.wait(said).fields["text"]
         assert "disk is full" in text
-    heard.wait(lambda m: said(m) and m.fields["tone"] == "info")
+    client.wait(lambda m: said(m) and m.fields["tone"] == "info")
     assert at_terminal == [text, "all that was painted is kept again"]
-    assert [m.fields["text"] for m in heard.messages if said(m)] == at_terminal
+    assert [m.fields["text"] for m in client.messages if said(m)] == at_terminal
 
 
-def test_why_it_is_not_closer(heard: IncomingMessage, monkeypatch: pytest.MonkeyPatch):
+def test_why_it_is_not_closer(client: StudioClient, monkeypatch: pytest.MonkeyPatch):
     copied: list[str] = []  # by which threads all pixels were, for which strokes wait
     snapshot = Session.snapshot
 
@@ -489,66 +489,66 @@ def test_why_it_is_not_closer(heard: IncomingMessage, monkeypatch: pytest.Monkey
     monkeypatch.setattr(Session, "snapshot", copies)
 
     def explained() -> Any:
-        heard.messages.clear()
+        client.messages.clear()
         copied.clear()
-        heard.studio.handle(protocol.Explain(), {})
-        message = heard.wait(lambda m: m.kind == "explained")
+        client.studio.handle(protocol.Explain(), {})
+        message = client.wait(lambda m: m.kind == "explained")
         assert message.fields["sentences"]
         assert not message.fields["is_old"]
         assert copied.count("lightpaint-explain") == 1
-        beyond = heard.studio.resource("beyond")
-        assert not beyond[heard.studio.session.views[0].importance == 0].any()
+        beyond = client.studio.resource("beyond")
+        assert not beyond[client.studio.session.views[0].importance == 0].any()
         return beyond
 
     # Brighter than the lights are, and even: they come near. Black beside it: none of them does.
-    heard.paint(1, 0.8)
+    client.paint(1, 0.8)
     assert explained().max() < 64
-    heard.paint(2, 0.0, (3, 12, 10, 15))
+    client.paint(2, 0.0, (3, 12, 10, 15))
     assert explained()[3:12, 10:15].max() > 128
 
 
 def test_a_preview_shows_what_the_change_does_then(
-    heard: IncomingMessage, monkeypatch: pytest.MonkeyPatch
+    client: StudioClient, monkeypatch: pytest.MonkeyPatch
 ):
     """To the last pixel, where no clean planes are there; and nothing is done before."""
     monkeypatch.setattr(
         plane_denoiser.PlaneDenoiser, "planes_for", lambda _, bases: [None] * len(bases)
     )
-    heard.paint(1, 1.2)
-    heard.paint(2, 0.02, (3, 12, 20, 30))
-    heard.exact()
-    studio = heard.studio
+    client.paint(1, 1.2)
+    client.paint(2, 0.02, (3, 12, 20, 30))
+    client.exact()
+    studio = client.studio
     version, before = studio.session.version, studio.session.weights.copy()
     for number, values in enumerate(({"hold": 0.5}, {"hold": 0.0}, {"colors": "white"})):
         assert studio.handle(protocol.Preview(number, values), {})[0].kind == "started"
-        seen = heard.wait(lambda m, n=number: m.kind == "previewed" and m.fields["number"] == n)
+        seen = client.wait(lambda m, n=number: m.kind == "previewed" and m.fields["number"] == n)
         assert studio.session.version == version + 2 * number
         np.testing.assert_array_equal(studio.session.weights, before)
         assert not seen.fields["is_old"]
         assert "of the difference" in seen.fields["text"] or "no closer" in seen.fields["text"]
         studio.handle(protocol.ChangeSettings(values), {})
-        heard.exact()
+        client.exact()
         mixed = studio.session.views[0].basis.mix(studio.session.weights)
         shown = picture_table.display_thumbnail(mixed, studio.session.transform)
         np.testing.assert_array_equal(seen.arrays["after"], shown)
         assert (seen.arrays["after"] != seen.arrays["before"]).any()
         studio.handle(protocol.Undo(), {})
-        heard.exact()
+        client.exact()
     with pytest.raises(lp.LightpaintError, match="nothing is called 'holds'"):
         studio.handle(protocol.Preview(9, {"holds": 1}), {})
 
 
-def test_letting_go_gradually_is_judged_on_the_whole_picture(heard: IncomingMessage):
+def test_letting_go_gradually_is_judged_on_the_whole_picture(client: StudioClient):
     """What the button sets brings what it says, and changes the rest less than no hold does."""
-    heard.paint(1, 1.2)
-    answer = heard.exact()
+    client.paint(1, 1.2)
+    answer = client.exact()
     advised = answer.fields["help"]
     assert advised is not None
     assert advised["kind"] == "hold"
     assert 0 < advised["hold"] < 3
     [found] = [
-        heard.wait(lambda m: m.kind == "previewed" and m.fields["number"] == 1)
-        for _ in heard.studio.handle(protocol.Preview(1, {"hold": advised["hold"]}), {})
+        client.wait(lambda m: m.kind == "previewed" and m.fields["number"] == 1)
+        for _ in client.studio.handle(protocol.Preview(1, {"hold": advised["hold"]}), {})
     ]
     share = round(100 * advised["gain"])
     told = re.match(r"Removes (\d+) % of the difference", found.fields["text"])
@@ -556,23 +556,23 @@ def test_letting_go_gradually_is_judged_on_the_whole_picture(heard: IncomingMess
     assert int(told[1]) == share
     changed = []
     for hold in (advised["hold"], 0.0):
-        heard.studio.handle(protocol.ChangeSettings({"hold": hold}), {})
-        heard.exact()
-        session = heard.studio.session
+        client.studio.handle(protocol.ChangeSettings({"hold": hold}), {})
+        client.exact()
+        session = client.studio.session
         view = session.views[0]
         look, mixed = (view.basis.mix(x) for x in (view.basis.current_weights, session.weights))
         changed.append(np.abs(look - mixed)[view.importance == 0].mean())
     assert changed[0] < changed[1]
 
 
-def test_without_a_scene_there_is_nothing_to_render(heard: IncomingMessage):
+def test_without_a_scene_there_is_nothing_to_render(client: StudioClient):
     with pytest.raises(lp.LightpaintError, match="no scene to render"):
-        heard.studio.handle(protocol.Verify(), {})
+        client.studio.handle(protocol.Verify(), {})
     with pytest.raises(lp.LightpaintError, match="no picture"):
-        heard.studio.resource("../secret")
+        client.studio.resource("../secret")
 
 
-class Renders:
+class EndlessVerification:
     """Stands for the verifying render: it goes on for as long as it is wanted."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -594,14 +594,14 @@ class Renders:
 
 
 @pytest.fixture
-def with_scenes(
+def studio_of_scenes(
     basis: lp.Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> Iterator[tuple[IncomingMessage, Renders]]:
+) -> Iterator[tuple[StudioClient, EndlessVerification]]:
     """A studio of two views, and what stands for their renders."""
     side = replace(basis, origin=replace(basis.origin, sensor="side"))
     scene: Any = SimpleNamespace(spp=4)
-    made = Renders(monkeypatch)
-    heard = IncomingMessage(tmp_path, basis, side, scene=scene)
+    made = EndlessVerification(monkeypatch)
+    heard = StudioClient(tmp_path, basis, side, scene=scene)
     yield heard, made
     made.is_enough.set()
     heard.studio.close()
@@ -612,8 +612,10 @@ def is_stopped(message: Message) -> bool:
     return message.kind == "stopped" and message.fields["task"] == "verify"
 
 
-def test_a_verifying_render_can_be_stopped(with_scenes: tuple[IncomingMessage, Renders]):
-    heard, renders = with_scenes
+def test_a_verifying_render_can_be_stopped(
+    studio_of_scenes: tuple[StudioClient, EndlessVerification],
+):
+    heard, renders = studio_of_scenes
     heard.studio.handle(protocol.Verify(), {})
     heard.wait(lambda m: m.kind == "progress" and m.fields["task"] == "verify")
     [told] = heard.studio.handle(protocol.Verify(run=False), {})
@@ -633,10 +635,10 @@ def test_a_verifying_render_can_be_stopped(with_scenes: tuple[IncomingMessage, R
 
 
 def test_a_render_that_is_stopped_before_it_begins_does_not_begin(
-    with_scenes: tuple[IncomingMessage, Renders], monkeypatch: pytest.MonkeyPatch
+    studio_of_scenes: tuple[StudioClient, EndlessVerification], monkeypatch: pytest.MonkeyPatch
 ):
     """The exact answer comes first, and may take longer than somebody waits."""
-    heard, renders = with_scenes
+    heard, renders = studio_of_scenes
     heard.paint(1, 0.8)
     heard.exact()
     begun, goes_on = threading.Event(), threading.Event()
@@ -656,9 +658,11 @@ def test_a_render_that_is_stopped_before_it_begins_does_not_begin(
     assert not renders.views
 
 
-def test_who_verifies_again_stops_the_render_before(with_scenes: tuple[IncomingMessage, Renders]):
+def test_who_verifies_again_stops_the_render_before(
+    studio_of_scenes: tuple[StudioClient, EndlessVerification],
+):
     """Somebody has painted on, or come back with another page."""
-    heard, renders = with_scenes
+    heard, renders = studio_of_scenes
     heard.studio.handle(protocol.Verify(), {})
     heard.wait(lambda _: renders.at_work)
     for view in (0, 1):
@@ -672,7 +676,7 @@ def test_who_verifies_again_stops_the_render_before(with_scenes: tuple[IncomingM
 
 
 def test_what_is_painted_while_an_answer_is_sought_is_answered_too(
-    heard: IncomingMessage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    client: StudioClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     begun, goes_on = threading.Event(), threading.Event()
     solution = SessionSnapshot.solution
@@ -684,22 +688,22 @@ def test_what_is_painted_while_an_answer_is_sought_is_answered_too(
         return solution(snapshot)
 
     monkeypatch.setattr(SessionSnapshot, "solution", slow)
-    heard.paint(1, 0.8)
-    heard.studio.handle(protocol.Export(("target", "lighting")), {})
+    client.paint(1, 0.8)
+    client.studio.handle(protocol.Export(("target", "lighting")), {})
     assert begun.wait(30)
-    painted = heard.studio.session.views[0].image.copy()
-    answer = heard.paint(2, 0.1, (3, 12, 16, 30))
+    painted = client.studio.session.views[0].image.copy()
+    answer = client.paint(2, 0.1, (3, 12, 16, 30))
     assert answer.fields["stroke"] == 2  # at once
     goes_on.set()
-    exact = heard.exact()
-    np.testing.assert_array_equal(exact.arrays["weights"], heard.studio.session.weights)
-    heard.wait(lambda m: m.kind == "exported")
+    exact = client.exact()
+    np.testing.assert_array_equal(exact.arrays["weights"], client.studio.session.weights)
+    client.wait(lambda m: m.kind == "exported")
     written = lp.read_target(tmp_path / "painting.exr")
     np.testing.assert_allclose(written.image[10, 20], painted[10, 20], rtol=1e-3)
 
 
 @pytest.fixture
-def both(basis: lp.Basis) -> list[lp.Basis]:
+def two_bases(basis: lp.Basis) -> list[lp.Basis]:
     """The same lights, from another place, too."""
     part = {
         "planes": np.ascontiguousarray(basis.images[:, 2:12, 4:20]),
@@ -709,13 +713,13 @@ def both(basis: lp.Basis) -> list[lp.Basis]:
     return [basis, replace(basis, **part, origin=replace(basis.origin, sensor="side"))]
 
 
-def test_several_views_are_painted_kept_and_exported(both: list[lp.Basis], tmp_path: Path):
-    heard = IncomingMessage(tmp_path, *both)
+def test_several_views_are_painted_kept_and_exported(two_bases: list[lp.Basis], tmp_path: Path):
+    heard = StudioClient(tmp_path, *two_bases)
     studio = heard.studio
-    names = [basis.origin.sensor for basis in both]
+    names = [basis.origin.sensor for basis in two_bases]
     state = studio.state().fields
     assert [view["name"] for view in state["views"]] == names
-    assert [view["size"] for view in state["views"]] == [list(basis.size) for basis in both]
+    assert [view["size"] for view in state["views"]] == [list(basis.size) for basis in two_bases]
     assert studio.resource("plane/2@1").shape == (10, 16, 3)
     heard.paint(1, 0.8)
     assert heard.exact().fields["closeness"][0]["delta_e"] >= 0
@@ -741,10 +745,12 @@ def test_several_views_are_painted_kept_and_exported(both: list[lp.Basis], tmp_p
     files = [tmp_path / f"painting-{name}.exr" for name in names]
     pictures = [tmp_path / f"answer-{name}.png" for name in names]
     assert exported["files"] == [*map(str, files + pictures), str(tmp_path / "lighting.json")]
-    assert [lp.read_target(path).image.shape[:2] for path in pictures] == [x.size for x in both]
+    assert [lp.read_target(path).image.shape[:2] for path in pictures] == [
+        x.size for x in two_bases
+    ]
     targets = [f"--target {name}={file}" for name, file in zip(names, files, strict=True)]
     assert " ".join(targets) in exported["command"]
-    solution = correct_noise(lp.solve(both, [lp.read_target(file) for file in files]))
+    solution = correct_noise(lp.solve(two_bases, [lp.read_target(file) for file in files]))
     np.testing.assert_allclose(solution.weights, exact.arrays["weights"], rtol=1e-9)
     studio.handle(protocol.Export(("report",)), {})
     said = heard.wait(lambda m: m.kind == "notice" and "needs their scene" in m.fields["text"])
@@ -754,13 +760,13 @@ def test_several_views_are_painted_kept_and_exported(both: list[lp.Basis], tmp_p
     studio.close()
 
 
-def test_a_view_that_comes_later_finds_the_session(both: list[lp.Basis], tmp_path: Path):
-    heard = IncomingMessage(tmp_path, both[0])
+def test_a_view_that_comes_later_finds_the_session(two_bases: list[lp.Basis], tmp_path: Path):
+    heard = StudioClient(tmp_path, two_bases[0])
     heard.paint(1, 0.8)
     heard.studio.handle(protocol.SaveLook("alone"), {})
     painted = heard.studio.session.views[0].image.copy()
     heard.studio.close()
-    heard = IncomingMessage(tmp_path, *both)
+    heard = StudioClient(tmp_path, *two_bases)
     studio = heard.studio
     heard.paint(2, 0.1, (1, 6, 2, 9), view=1)
     heard.paint(3, 0.4, (0, 6, 2, 9))
@@ -796,9 +802,9 @@ def test_a_render_that_fails_is_said_to_who_waits(tmp_path: Path):
 
 
 def test_a_render_that_comes_after_another_stroke_is_of_an_earlier_answer(
-    with_scenes: tuple[IncomingMessage, Renders],
+    studio_of_scenes: tuple[StudioClient, EndlessVerification],
 ):
-    heard, renders = with_scenes
+    heard, renders = studio_of_scenes
     heard.paint(1, 0.8)
     heard.exact()
     heard.studio.handle(protocol.Verify(), {})

@@ -52,7 +52,7 @@ HOW = {"colors": "free", "hold": 0.0, "space": "linear"}
 VIEW = lp.ViewTransform("srgb", 0.5)
 
 
-class Noted(comm.base_comm.BaseComm):  # type: ignore[misc,name-defined]
+class RecordingComm(comm.base_comm.BaseComm):  # type: ignore[misc,name-defined]
     """A line to a page that there is none of."""
 
     def publish_msg(self, msg_type: str, **said: Any) -> None:
@@ -64,10 +64,10 @@ class Noted(comm.base_comm.BaseComm):  # type: ignore[misc,name-defined]
 
 
 @pytest.fixture(autouse=True)
-def line(monkeypatch: pytest.MonkeyPatch) -> None:
+def page_line(monkeypatch: pytest.MonkeyPatch) -> None:
     """Widgets have such a line, where no kernel runs; nor any loop, as Playwright leaves one."""
     monkeypatch.setattr("lightpaint.paint.notebook.widget_views._running_loop", lambda: None)
-    noted = type("Line", (Noted,), {"messages": [], "synced": {}})
+    noted = type("Line", (RecordingComm,), {"messages": [], "synced": {}})
     monkeypatch.setattr(comm, "create_comm", lambda *_, **how: noted(**how))
 
 
@@ -78,7 +78,7 @@ def basis(make_basis: Any) -> lp.Basis:
 
 
 @pytest.fixture
-def open_(basis: lp.Basis, tmp_path: Path) -> Iterator[Callable[..., Any]]:
+def open_painter(basis: lp.Basis, tmp_path: Path) -> Iterator[Callable[..., Any]]:
     """Painters that are closed at the end."""
     made = []
 
@@ -138,8 +138,8 @@ def wait_for(what: Callable[[], Any]) -> Any:
     return found
 
 
-def test_a_page_opens_fetches_and_paints(basis: lp.Basis, open_: Any) -> None:
-    painter = open_()
+def test_a_page_opens_fetches_and_paints(basis: lp.Basis, open_painter: Any) -> None:
+    painter = open_painter()
     page = Page(painter)
     state = page.say("hello", version=protocol.VERSION)
     assert state["kind"] == "state"
@@ -167,8 +167,8 @@ def test_a_page_opens_fetches_and_paints(basis: lp.Basis, open_: Any) -> None:
     np.testing.assert_allclose(painter.solution.weights, weights, atol=1e-5)
 
 
-def test_what_is_set_from_a_cell_shows(basis: lp.Basis, open_: Any, tmp_path: Path) -> None:
-    painter = open_()
+def test_what_is_set_from_a_cell_shows(basis: lp.Basis, open_painter: Any, tmp_path: Path) -> None:
+    painter = open_painter()
     page = Page(painter)
     page.say("hello", version=protocol.VERSION)
     weights = np.array([[1, 0.5, 0.2], [0.1, 0.7, 0.3], [0.4, 0.2, 0.9]])
@@ -210,14 +210,14 @@ def test_what_is_set_from_a_cell_shows(basis: lp.Basis, open_: Any, tmp_path: Pa
         {"through_view": True, "over_look": True, "transform": VIEW},
     ],
 )
-def test_a_target_is_answered_as_by_solve(basis: lp.Basis, open_: Any, how: Any) -> None:
+def test_a_target_is_answered_as_by_solve(basis: lp.Basis, open_painter: Any, how: Any) -> None:
     """And so is the painter's own target, and so are both of them with something left out."""
     image = np.random.default_rng(3).random((*SIZE, 3)).astype(np.float32)
     counts = np.ones(SIZE, np.float32)
     if "everything" not in how:
         counts[:, :8] = 0
     target = lp.Target("t", image, counts, **{"everything": False, **how})
-    painter = open_(target=target, colors=None, hold=None, space=None)
+    painter = open_painter(target=target, colors=None, hold=None, space=None)
     expected = lp.solve(basis, target)
     assert painter.solution.problem.space == expected.problem.space
     np.testing.assert_allclose(painter.solution.weights, expected.weights, rtol=1e-6, atol=1e-9)
@@ -227,9 +227,9 @@ def test_a_target_is_answered_as_by_solve(basis: lp.Basis, open_: Any, how: Any)
 
 @pytest.mark.parametrize("how", [{}, {"through_view": True, "over_look": True}])
 def test_the_first_answer_to_an_untouched_target_is_the_present(
-    basis: lp.Basis, open_: Any, how: Any
+    basis: lp.Basis, open_painter: Any, how: Any
 ) -> None:
-    painter = open_(colors=None, hold=None, space=None)
+    painter = open_painter(colors=None, hold=None, space=None)
     told: list[Any] = []
     painter.observe(lambda change: told.append(change.new), "lighting")
     counts = np.ones(SIZE, np.float32)
@@ -241,10 +241,10 @@ def test_the_first_answer_to_an_untouched_target_is_the_present(
 
 
 def test_two_threads_may_tell_at_once(
-    basis: lp.Basis, open_: Any, monkeypatch: pytest.MonkeyPatch
+    basis: lp.Basis, open_painter: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As at the start, where the exact answer comes while the first one is told."""
-    painter = open_()
+    painter = open_painter()
     set_trait, pauses_s = painter.set_trait, threading.local()
 
     def slowly(name: str, value: Any) -> None:
@@ -271,10 +271,10 @@ def test_two_threads_may_tell_at_once(
 
 
 def test_what_is_told_is_of_one_time(
-    basis: lp.Basis, open_: Any, monkeypatch: pytest.MonkeyPatch
+    basis: lp.Basis, open_painter: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Also where something is painted by another thread just then."""
-    painter, paint = open_(), np.full((*SIZE, 3), 0.5, np.float32)
+    painter, paint = open_painter(), np.full((*SIZE, 3), 0.5, np.float32)
     now, snapshot = painter._studio.snapshot_and_lighting, painter._studio.snapshot
 
     def painted_on(look: Callable[[], Any]) -> Any:
@@ -312,12 +312,12 @@ def test_it_is_called_as_what_is_painted(basis: lp.Basis, tmp_path: Path, monkey
         painter.close()
 
 
-def test_it_has_room_beside_other_widgets(open_: Any) -> None:
-    assert (open_().layout.width, open_().layout.min_width) == ("100%", "320px")
-    half = open_(layout={"width": "50%"})
+def test_it_has_room_beside_other_widgets(open_painter: Any) -> None:
+    assert (open_painter().layout.width, open_painter().layout.min_width) == ("100%", "320px")
+    half = open_painter(layout={"width": "50%"})
     assert (half.layout.width, half.layout.min_width) == ("50%", "320px")
     own = ipywidgets.Layout(flex="1")
-    assert open_(layout=own).layout is own
+    assert open_painter(layout=own).layout is own
 
 
 def test_several_views_have_a_target_each(basis: lp.Basis, tmp_path: Path) -> None:
@@ -351,8 +351,8 @@ def test_several_views_have_a_target_each(basis: lp.Basis, tmp_path: Path) -> No
             lp.Painter(views)
 
 
-def test_what_cannot_be_set_is_said_where_it_is_set(basis: lp.Basis, open_: Any) -> None:
-    painter = open_()
+def test_what_cannot_be_set_is_said_where_it_is_set(basis: lp.Basis, open_painter: Any) -> None:
+    painter = open_painter()
     before = painter.lighting
     small = lp.Target("s", np.ones((3, 3, 3), np.float32), np.ones((3, 3), np.float32), True)
     with pytest.raises(lp.LightpaintError, match="3x3"):
@@ -371,24 +371,26 @@ def test_what_cannot_be_set_is_said_where_it_is_set(basis: lp.Basis, open_: Any)
         lp.Painter(3)
 
 
-def test_what_cannot_be_given_is_said_at_once(basis: lp.Basis, open_: Any, tmp_path: Path) -> None:
+def test_what_cannot_be_given_is_said_at_once(
+    basis: lp.Basis, open_painter: Any, tmp_path: Path
+) -> None:
     for how, said in (
         ({"transform": "agx"}, r"transform is 'agx': expected a ViewTransform, like lp.ViewTran"),
         ({"constraints": {"key": {"off": True}}}, r"are a dict: give lp.Constraints.of\(\.\.\.\)"),
         ({"spp": 4}, r"spp=\.\.\. cannot change a saved basis: leave it out, or give the scene"),
     ):
         with pytest.raises(lp.LightpaintError, match=said):
-            open_(**how)
+            open_painter(**how)
     with pytest.raises(TypeError, match=r"lp.Painter has no argument 'heigth': did you mean 'heig"):
-        open_(heigth=300)
+        open_painter(heigth=300)
     with pytest.raises(TypeError, match=r"lp.Painter has no argument 'sp': did you mean 'spp'"):
-        open_(sp=300)
+        open_painter(sp=300)
     for height in (-5, 10):
         with pytest.raises(traitlets.TraitError, match="should not be less than 240"):
-            open_(height=height)
+            open_painter(height=height)
     with pytest.raises(lp.LightpaintError, match=r"give lp.read_basis\('x.basis.exr'\)"):
         lp.Painter("x.basis.exr")
-    painter = open_(target=lp.Target.of(basis.images[0]))
+    painter = open_painter(target=lp.Target.of(basis.images[0]))
     for name in ("x.exr", "x.json"):
         for view in (3, -1):
             with pytest.raises(lp.LightpaintError, match=f"view is {view}: expected one of 1"):
@@ -396,10 +398,10 @@ def test_what_cannot_be_given_is_said_at_once(basis: lp.Basis, open_: Any, tmp_p
 
 
 def test_what_is_said_is_said_in_words_of_a_notebook(
-    basis: lp.Basis, open_: Any, tmp_path: Path
+    basis: lp.Basis, open_painter: Any, tmp_path: Path
 ) -> None:
     image = basis.images[0]
-    painter = open_()
+    painter = open_painter()
     with pytest.raises(lp.LightpaintError, match=r"not ndarray: give lp.Target.of\(array\)"):
         painter.target = image
     with pytest.raises(lp.LightpaintError, match=r"targets .* not ndarray: give lp.Target.of"):
@@ -407,9 +409,9 @@ def test_what_is_said_is_said_in_words_of_a_notebook(
     with pytest.raises(lp.LightpaintError, match=r"a list of 1, a lp.Target or None for each"):
         painter.targets = lp.Target.of(image)
     with pytest.raises(lp.LightpaintError, match=r"painter.target .*: give lp.Target.of\(array\)"):
-        open_(target=image)
+        open_painter(target=image)
     with pytest.raises(lp.LightpaintError, match=r"painter.target .*: give lp.read_target\(path\)"):
-        open_(target="evening.exr")
+        open_painter(target="evening.exr")
     large = lp.Target.of(np.ones((30, 50, 3)))
     with pytest.raises(lp.LightpaintError, match=r"or give target.resized\(\(height, width\)\)$"):
         painter.target = large
@@ -417,19 +419,19 @@ def test_what_is_said_is_said_in_words_of_a_notebook(
     (tmp_path / "junk.db").write_bytes(b"hello" * 1000)
     elsewhere = "give another file as its store"
     with pytest.raises(lp.LightpaintError, match=f"damaged .*: {elsewhere}, or give") as junk:
-        open_(store=tmp_path / "junk.db")
+        open_painter(store=tmp_path / "junk.db")
     assert not any(word in str(junk.value) for word in ("folder", "new="))
     used = Store.open(tmp_path / "used.db", Identity.of([basis]))
     with pytest.raises(lp.LightpaintError, match=f"is in use: .*, or {elsewhere}$"):
-        open_(store=tmp_path / "used.db")
+        open_painter(store=tmp_path / "used.db")
     used.close()
     with pytest.raises(lp.LightpaintError, match="store is 3: expected the path of a file"):
-        open_(store=3)
+        open_painter(store=3)
 
 
-def test_names_are_found_and_slips_of_the_pen_are_said(open_: Any) -> None:
+def test_names_are_found_and_slips_of_the_pen_are_said(open_painter: Any) -> None:
     assert "Painter" in dir(lp)
-    painter = open_()
+    painter = open_painter()
     with pytest.raises(AttributeError, match="no attribute 'lightning': did you mean 'lighting'"):
         painter.lightning = painter.lighting
     painter.shown_in = "the hall"  # whoever wants may keep something with it
@@ -463,7 +465,7 @@ def test_type_checkers_know_what_can_be_set(tmp_path: Path) -> None:
     assert lines == ["7", "8", "9"], ran.stdout
 
 
-class Rendered:
+class ProgressiveScene:
     """Stands for a scene whose basis is rendered meanwhile: a first one, and then a better one."""
 
     def __init__(self, basis: lp.Basis, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -481,9 +483,9 @@ class Rendered:
 
 
 def test_what_cannot_be_set_is_said_while_it_still_renders(
-    basis: lp.Basis, open_: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    basis: lp.Basis, open_painter: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    Rendered(basis, tmp_path, monkeypatch)
+    ProgressiveScene(basis, tmp_path, monkeypatch)
     small = lp.Target("s", np.ones((3, 3, 3), np.float32), np.ones((3, 3), np.float32), True)
     for target, said in (
         (small, "3x3"),
@@ -493,15 +495,15 @@ def test_what_cannot_be_set_is_said_while_it_still_renders(
         ([small.image], "lp.Target or None, not ndarray"),
     ):
         with pytest.raises(lp.LightpaintError, match=said):
-            open_(target=target)
+            open_painter(target=target)
 
 
 def test_messages_about_a_basis_come_while_nobody_holds_the_session(
-    basis: lp.Basis, open_: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    basis: lp.Basis, open_painter: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A cell may wait for the session meanwhile, and whoever gets messages for the cell."""
-    rendered = Rendered(basis, tmp_path, monkeypatch)
-    studio = open_()._studio
+    rendered = ProgressiveScene(basis, tmp_path, monkeypatch)
+    studio = open_painter()._studio
     forward, was_free = studio.on_message, []
 
     def is_free() -> bool:
@@ -523,14 +525,14 @@ def test_messages_about_a_basis_come_while_nobody_holds_the_session(
 
 
 def test_what_cannot_be_set_later_ends_no_render(
-    basis: lp.Basis, open_: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
+    basis: lp.Basis, open_painter: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
 ) -> None:
     def no(*_: Any) -> Any:
         raise PaintError("no room for it")
 
-    rendered = Rendered(basis, tmp_path, monkeypatch)
+    rendered = ProgressiveScene(basis, tmp_path, monkeypatch)
     whole = lp.Target("s", np.ones((*SIZE, 3), np.float32), np.ones(SIZE, np.float32), True)
-    painter = open_(target=whole)
+    painter = open_painter(target=whole)
     with monkeypatch.context() as patch:
         patch.setattr(Studio, "load", no)
         rendered.goes_on.set()
@@ -551,19 +553,19 @@ def test_what_cannot_be_set_later_ends_no_render(
 
 
 def test_what_is_set_while_it_renders_is_set_once_it_can_be(
-    basis: lp.Basis, open_: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    basis: lp.Basis, open_painter: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    rendered = Rendered(basis, tmp_path, monkeypatch)
+    rendered = ProgressiveScene(basis, tmp_path, monkeypatch)
     whole = lp.Target("s", np.ones((*SIZE, 3), np.float32), np.ones(SIZE, np.float32), True)
-    painter = open_(target=whole)
+    painter = open_painter(target=whole)
     assert painter.target is None
     rendered.goes_on.set()
     wait_for(lambda: painter.target is not None)
     np.testing.assert_array_equal(painter.target.image, whole.image)
 
 
-def test_a_callback_that_fails_is_shown(basis: lp.Basis, open_: Any, capsys: Any) -> None:
-    painter = open_()
+def test_a_callback_that_fails_is_shown(basis: lp.Basis, open_painter: Any, capsys: Any) -> None:
+    painter = open_painter()
     page = Page(painter)
     page.say("hello", version=protocol.VERSION)
     painter.observe(lambda _: 1 / 0, "target")
@@ -575,11 +577,13 @@ def test_a_callback_that_fails_is_shown(basis: lp.Basis, open_: Any, capsys: Any
     assert page.paint(basis.images[1], 1)["kind"] == "answer"
 
 
-def test_a_callback_that_fails_silences_no_other(basis: lp.Basis, open_: Any, capsys: Any) -> None:
+def test_a_callback_that_fails_silences_no_other(
+    basis: lp.Basis, open_painter: Any, capsys: Any
+) -> None:
     def fails(_: Any) -> None:
         raise ValueError("boom")
 
-    painter = open_()
+    painter = open_painter()
     told: list[str] = []
     painter.observe(fails, "lighting")
     painter.observe(lambda change: told.append(change.name), "lighting")
@@ -598,8 +602,8 @@ def test_a_callback_that_fails_silences_no_other(basis: lp.Basis, open_: Any, ca
     assert capsys.readouterr().err == ""
 
 
-def test_what_a_callback_sets_is_set_once_all_are_told(basis: lp.Basis, open_: Any) -> None:
-    painter = open_()
+def test_what_a_callback_sets_is_set_once_all_are_told(basis: lp.Basis, open_painter: Any) -> None:
+    painter = open_painter()
     off = lp.Constraints.of({"key": {"off": True}})
     told: list[str] = []
     painter.observe(lambda _: setattr(painter, "constraints", off), "lighting")
@@ -612,8 +616,10 @@ def test_what_a_callback_sets_is_set_once_all_are_told(basis: lp.Basis, open_: A
     assert len(painter._studio.session.store.steps) == 2
 
 
-def test_what_a_callback_cannot_set_is_shown(basis: lp.Basis, open_: Any, capsys: Any) -> None:
-    painter = open_()
+def test_what_a_callback_cannot_set_is_shown(
+    basis: lp.Basis, open_painter: Any, capsys: Any
+) -> None:
+    painter = open_painter()
     page = Page(painter)
     page.say("hello", version=protocol.VERSION)
     key, fill = (lp.Constraints.of({name: {"lock": True}}) for name in ("key", "lamp"))
@@ -628,8 +634,10 @@ def test_what_a_callback_cannot_set_is_shown(basis: lp.Basis, open_: Any, capsys
     assert painter.constraints == key
 
 
-def test_callbacks_that_never_come_to_an_end_are_stopped(basis: lp.Basis, open_: Any) -> None:
-    painter = open_()
+def test_callbacks_that_never_come_to_an_end_are_stopped(
+    basis: lp.Basis, open_painter: Any
+) -> None:
+    painter = open_painter()
     page = Page(painter)
     page.say("hello", version=protocol.VERSION)
     levels = iter(np.linspace(0.1, 0.9, 1000).tolist())
@@ -644,8 +652,10 @@ def test_callbacks_that_never_come_to_an_end_are_stopped(basis: lp.Basis, open_:
 
 
 @pytest.mark.filterwarnings("ignore")
-def test_junk_is_answered(basis: lp.Basis, open_: Any, monkeypatch: Any, capsys: Any) -> None:
-    painter = open_()
+def test_junk_is_answered(
+    basis: lp.Basis, open_painter: Any, monkeypatch: Any, capsys: Any
+) -> None:
+    painter = open_painter()
     page = Page(painter)
     page.say("hello", version=protocol.VERSION)
     assert page.say("nothing")["kind"] == "failed"
@@ -668,16 +678,16 @@ def test_constraints_that_cannot_be_met_are_refused_in_their_cell(tmp_path: Path
         lp.Painter(scene, constraints=constraints, folder=tmp_path)
 
 
-def test_what_cannot_begin_is_told_to_who_asked(open_: Any) -> None:
+def test_what_cannot_begin_is_told_to_who_asked(open_painter: Any) -> None:
     """Also where nobody has begun, and by a page of a version that says more."""
-    painter = open_()
+    painter = open_painter()
     told = Page(painter).say("hello", version=protocol.VERSION + 1, with_news=True)
     assert (told["kind"], told["reason"]) == ("closed", "version")
     assert Page(painter, OTHER).say("nothing")["kind"] == "failed"
 
 
-def test_who_is_shown_last_has_it(basis: lp.Basis, open_: Any) -> None:
-    painter = open_()
+def test_who_is_shown_last_has_it(basis: lp.Basis, open_painter: Any) -> None:
+    painter = open_painter()
     first, second = Page(painter), Page(painter, OTHER)
     first.say("hello", version=protocol.VERSION)
     second.say("hello", version=protocol.VERSION)
@@ -689,14 +699,14 @@ def test_who_is_shown_last_has_it(basis: lp.Basis, open_: Any) -> None:
 
 
 def test_callbacks_come_in_the_thread_of_the_kernel(
-    basis: lp.Basis, open_: Any, monkeypatch: pytest.MonkeyPatch
+    basis: lp.Basis, open_painter: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     heard: list[Any] = []
 
     async def cell() -> None:
         loop = asyncio.get_running_loop()
         monkeypatch.setattr("lightpaint.paint.notebook.widget_views._running_loop", lambda: loop)
-        painter = open_()
+        painter = open_painter()
         page = Page(painter)
         page.say("hello", version=protocol.VERSION)
         painter.observe(lambda _: heard.append(threading.current_thread()), "lighting")
@@ -713,18 +723,18 @@ def test_callbacks_come_in_the_thread_of_the_kernel(
     assert heard[0] is thread
 
 
-def test_a_session_with_a_file_goes_on(basis: lp.Basis, open_: Any, tmp_path: Path) -> None:
-    painter = open_(store=tmp_path / "evening.db")
+def test_a_session_with_a_file_goes_on(basis: lp.Basis, open_painter: Any, tmp_path: Path) -> None:
+    painter = open_painter(store=tmp_path / "evening.db")
     page = Page(painter)
     page.say("hello", version=protocol.VERSION)
     page.paint(basis.images[2])
     painter.close()
-    again = open_(store=tmp_path / "evening.db")
+    again = open_painter(store=tmp_path / "evening.db")
     np.testing.assert_array_equal(again.target.image, basis.images[2])
 
 
 def test_a_full_disk_is_said_and_tried_again(
-    basis: lp.Basis, open_: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    basis: lp.Basis, open_painter: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     @contextmanager
     def full(_: Any) -> Iterator[None]:
@@ -735,7 +745,7 @@ def test_a_full_disk_is_said_and_tried_again(
         return [x["text"] for x, _ in page.heard() if x["kind"] == "notice" and x["tone"] == tone]
 
     monkeypatch.setattr(background_threads, "RETRY_S", 0.01)
-    painter = open_(store=tmp_path / "evening.db")
+    painter = open_painter(store=tmp_path / "evening.db")
     page = Page(painter)
     page.say("hello", version=protocol.VERSION)
     with monkeypatch.context() as patch:
@@ -750,21 +760,21 @@ def test_a_full_disk_is_said_and_tried_again(
 
 
 def test_a_cell_with_a_file_runs_again(
-    basis: lp.Basis, open_: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    basis: lp.Basis, open_painter: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    painter = open_(store=tmp_path / "evening.db")
+    painter = open_painter(store=tmp_path / "evening.db")
     page = Page(painter)
     page.say("hello", version=protocol.VERSION)
     page.paint(basis.images[2])
     monkeypatch.chdir(tmp_path)
-    again = open_(store="evening.db")
+    again = open_painter(store="evening.db")
     assert painter.comm is None
     np.testing.assert_array_equal(again.target.image, basis.images[2])
 
 
-def test_who_is_closed_cannot_be_set(basis: lp.Basis, open_: Any) -> None:
+def test_who_is_closed_cannot_be_set(basis: lp.Basis, open_painter: Any) -> None:
     target = lp.Target.of(basis.images[0])
-    painter = open_(target=target)
+    painter = open_painter(target=target)
     painter.close()
     with pytest.raises(lp.LightpaintError, match=r"painter.target cannot be set: it is closed"):
         painter.target = None
@@ -774,10 +784,12 @@ def test_who_is_closed_cannot_be_set(basis: lp.Basis, open_: Any) -> None:
     painter.close()
 
 
-def test_who_closes_waits_for_no_other_painter(open_: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_who_closes_waits_for_no_other_painter(
+    open_painter: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Whose renders may go on for as long as they like."""
     monkeypatch.setattr(Studio, "has_scenes", property(lambda _: True))
-    one, _ = open_(), open_()
+    one, _ = open_painter(), open_painter()
     mine = list(one._studio._threads._threads)
     begun_s = time.monotonic()
     one.close()
@@ -800,12 +812,12 @@ def test_who_is_closed_is_let_go_of(basis: lp.Basis, monkeypatch: pytest.MonkeyP
 
 
 def test_who_cannot_keep_what_was_done_has_ended_all_the_same(
-    open_: Any, monkeypatch: pytest.MonkeyPatch
+    open_painter: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(_: Store) -> None:
         raise OutputError("the last steps are lost")
 
-    painter = open_()
+    painter = open_painter()
     with monkeypatch.context() as patch:
         patch.setattr(Store, "close", full)
         with pytest.raises(OutputError, match="are lost"):
@@ -814,17 +826,17 @@ def test_who_cannot_keep_what_was_done_has_ended_all_the_same(
 
 
 def test_a_cell_that_is_put_right_finds_its_file(
-    basis: lp.Basis, open_: Any, tmp_path: Path
+    basis: lp.Basis, open_painter: Any, tmp_path: Path
 ) -> None:
     """Whatever was wrong with it, and also where an exception keeps what it was raised in."""
     path = tmp_path / "evening.db"
-    open_(store=path)._studio.handle(protocol.TieLights((("key", "fill"),)), {})
+    open_painter(store=path)._studio.handle(protocol.TieLights((("key", "fill"),)), {})
     asked = {"key": {"lock": [1, 1, 1]}, "fill": {"lock": [3, 1, 1]}}
     with pytest.raises(lp.LightpaintError, match="on one dimmer") as kept:
-        open_(store=path, constraints=lp.Constraints.of(asked))
+        open_painter(store=path, constraints=lp.Constraints.of(asked))
     small = lp.Target("s", np.ones((3, 3, 3), np.float32), np.ones((3, 3), np.float32), True)
     with pytest.raises(lp.LightpaintError, match="3x3") as also_kept:
-        open_(store=path, target=small)
+        open_painter(store=path, target=small)
     # It is anybody's, not only the next painter's of this kernel.
     with Store.open(path, Identity.of([basis])) as store:
         assert [step.kind for step in store.steps] == ["requests"]

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from nightly import at_night
+from nightly import nightly
 from renderer import LIGHTS, PLASTIC, write_room
 
 from lightpaint.basis.basis import Basis
@@ -88,7 +88,7 @@ def missing(
     return suggested
 
 
-@pytest.mark.parametrize("hidden", [HIDDEN, at_night((-0.9, 1.0, 2.5))])
+@pytest.mark.parametrize("hidden", [HIDDEN, nightly((-0.9, 1.0, 2.5))])
 def test_a_light_that_is_missing_is_found(
     tmp_path: Path, lacking: tuple[Scene, Basis], missing: Any, hidden: Any
 ):
@@ -160,7 +160,7 @@ def test_where_the_lights_can_do_it_none_is_named(small_room: Scene, small_room_
     assert suggest_lights(small_room, basis, solve(basis, exact)) == ()
 
 
-@pytest.mark.parametrize("seed", [1, at_night(2), at_night(3)])
+@pytest.mark.parametrize("seed", [1, nightly(2), nightly(3)])
 def test_noise_is_not_taken_for_a_lack_of_light(
     small_room: Scene, small_room_basis: Any, seed: int
 ):
@@ -180,7 +180,7 @@ def test_constraints_hold_beside_a_suggestion(lacking: tuple[Scene, Basis], miss
     assert first.gain_share > 0.7
 
 
-@pytest.mark.parametrize("sensor", ["orthographic", at_night("thinlens")])
+@pytest.mark.parametrize("sensor", ["orthographic", nightly("thinlens")])
 def test_other_cameras(tmp_path: Path, sensor: str):
     camera = f"""<sensor type="{sensor}" id="other">
         {

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from nightly import at_night
+from nightly import nightly
 from renderer import CORNELL
 
 import lightpaint as lp
@@ -31,7 +31,7 @@ def target(scene: lp.Scene) -> lp.Target:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("seeds", "refined"), [FEW, at_night(*MANY)])
+@pytest.mark.parametrize(("seeds", "refined"), [FEW, nightly(*MANY)])
 def test_error_bars_hold_the_answer_of_many_samples(
     scene: lp.Scene, target: lp.Target, seeds: int, refined: int
 ):

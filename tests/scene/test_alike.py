@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command import refused, run, succeed
+from command import run, run_refused, succeed
 from renderer import LIGHTS, write_room
 
 from lightpaint.errors import SceneError
@@ -169,5 +169,5 @@ def test_from_the_listing_to_the_relit_scene(tmp_path: Path) -> None:
     assert all(np.array_equal(np.float32(x.emission), solved) for x in relit.emitters[:40])
     # The basis that is kept is found again.
     assert "kept from an earlier run" in run(tmp_path, "basis", room, *small).stderr
-    told = refused(tmp_path, "solve", room, "p.exr", *small, "--lock", "area_3")
+    told = run_refused(tmp_path, "solve", room, "p.exr", *small, "--lock", "area_3")
     assert "'area_3' is part of the light 'glass': constrain that light" in told

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command import refused, run, succeed
+from command import run, run_refused, succeed
 from renderer import LIGHTS, write_room
 
 import lightpaint as lp
@@ -140,7 +140,7 @@ def test_each_is_a_basis_of_its_own(tmp_path: Path) -> None:
 
 def test_from_solve_to_verify(tmp_path: Path) -> None:
     path = room(tmp_path)
-    line = refused(tmp_path, "lights", path)
+    line = run_refused(tmp_path, "lights", path)
     assert "no integrator plugin 'bdpt'; --integrator path renders it with another" in line
     chosen = ("--integrator", "path", "--spp", 16)
     assert "bulb" in succeed(tmp_path, "lights", "--no-sheet", path, *chosen[:2])
@@ -158,7 +158,7 @@ def test_from_solve_to_verify(tmp_path: Path) -> None:
     assert again.read_bytes() == relit.read_bytes()
     assert "bdpt" not in relit.read_text(encoding="utf-8")
     succeed(tmp_path, "basis", path, *chosen, "-o", "b.basis.exr")
-    line = refused(tmp_path, "solve", "b.basis.exr", "t.exr", *chosen[:2], "-o", "no")
+    line = run_refused(tmp_path, "solve", "b.basis.exr", "t.exr", *chosen[:2], "-o", "no")
     assert "--integrator cannot change a saved basis" in line
 
 

@@ -37,18 +37,18 @@ def cycles(view: str, images: Any, *, seed: int = 5) -> dict[str, Any]:
     return made | {f"{view}.Denoising Depth.Z": position[..., 0]}
 
 
-def one_part(path: Path, held: dict[str, Any]) -> Path:
+def write_one_part(path: Path, held: dict[str, Any]) -> Path:
     return write(path, ("", held))
 
 
-def a_part_each(path: Path, held: dict[str, Any]) -> Path:
+def write_part_each(path: Path, held: dict[str, Any]) -> Path:
     layers: dict[str, dict[str, Any]] = {}
     for name, plane in held.items():
         layers.setdefault(name.rpartition(".")[0], {})[name] = plane
     return write(path, *layers.items())
 
 
-@pytest.mark.parametrize("written", [one_part, a_part_each])
+@pytest.mark.parametrize("written", [write_one_part, write_part_each])
 def test_denoising_data_of_cycles(tmp_path: Path, written: Writer):
     images = pictures(2)
     groups = read_light_groups(written(tmp_path / "a.exr", cycles("ViewLayer", images)))
@@ -81,7 +81,7 @@ def test_without_normals_there_are_no_features(tmp_path: Path):
     assert basis.features is None
 
 
-def folder_of(path: Path, layers: dict[str, Any]) -> Path:
+def write_folder(path: Path, layers: dict[str, Any]) -> Path:
     path.mkdir()
     for name, image in layers.items():
         interleaved(path / f"shot_{name}_v1.exr", {"": image})
@@ -91,7 +91,7 @@ def folder_of(path: Path, layers: dict[str, Any]) -> Path:
 def test_files_of_surfaces_are_no_lights(tmp_path: Path):
     images, (albedo, normal, _) = pictures(2), surfaces()
     layers = {"key": images[0], "fill": images[1], "albedo": albedo, "normal": normal}
-    groups = read_light_groups(folder_of(tmp_path / "lights", layers))
+    groups = read_light_groups(write_folder(tmp_path / "lights", layers))
     assert set(groups.basis.names) == {"key", "fill"}
     assert groups.basis.features is not None
     np.testing.assert_array_equal(groups.basis.features.albedo, albedo)
@@ -101,7 +101,7 @@ def test_a_light_may_be_called_normal(tmp_path: Path):
     """Nothing but an albedo beside it says otherwise."""
     images = pictures(3)
     layers = dict(zip(("key", "fill", "normal"), images, strict=True))
-    groups = read_light_groups(folder_of(tmp_path / "lights", layers))
+    groups = read_light_groups(write_folder(tmp_path / "lights", layers))
     assert set(groups.basis.names) == {"key", "fill", "normal"}
 
 
@@ -170,7 +170,7 @@ def test_passes_alone_are_no_light_groups(tmp_path: Path):
 def test_normals_of_another_size_are_passed_by(tmp_path: Path):
     images, (albedo, normal, _) = pictures(2), surfaces()
     layers = {"key": images[0], "fill": images[1], "albedo": albedo}
-    folder = folder_of(tmp_path / "lights", layers)
+    folder = write_folder(tmp_path / "lights", layers)
     small = channels("", normal[::2, ::2], names="XYZ")
     write(folder / "shot_normal_v1.exr", ("", small))
     basis = read_light_groups(folder).basis

@@ -17,7 +17,7 @@ from lightpaint.images.formats.exr import write_rgb
 LIGHTS = ["fill", "key", "rim"]
 
 
-def _plain(path: Path, image: Any, **more: Any) -> Path:
+def _write_plain(path: Path, image: Any, **more: Any) -> Path:
     return write(path, ("rgb", channels("", image) | more))
 
 
@@ -27,13 +27,13 @@ def folder(tmp_path: Path, request: pytest.FixtureRequest) -> Path:
     made = tmp_path / "lights"
     made.mkdir()
     for name, image in zip(LIGHTS, pictures(), strict=True):
-        _plain(made / f"{name}.exr", image)
+        _write_plain(made / f"{name}.exr", image)
     if request.param:
-        _plain(made / f"{request.param}.exr", pictures().sum(axis=0))
+        _write_plain(made / f"{request.param}.exr", pictures().sum(axis=0))
     return made
 
 
-def _told(groups: Any) -> str:
+def _remarks(groups: Any) -> str:
     return "\n".join(groups.remarks)
 
 
@@ -44,7 +44,7 @@ def test_what_lightpaint_has_made_is_no_light(folder: Path, make_basis: Any):
     write_basis(folder / "a.basis.exr", make_basis(2))
     groups = read_light_groups(folder)
     assert groups.basis.names == tuple(LIGHTS)
-    assert "a.basis.exr, predicted.exr, template.exr (made by lightpaint)" in _told(groups)
+    assert "a.basis.exr, predicted.exr, template.exr (made by lightpaint)" in _remarks(groups)
 
 
 def test_a_result_from_before_there_was_a_mark_is_no_light(folder: Path):
@@ -52,41 +52,41 @@ def test_a_result_from_before_there_was_a_mark_is_no_light(folder: Path):
     write(folder / "verified.exr", ("rgb", channels("", pictures(4)[3]) | half))
     groups = read_light_groups(folder)
     assert groups.basis.names == tuple(LIGHTS)
-    assert "verified.exr (made by lightpaint)" in _told(groups)
+    assert "verified.exr (made by lightpaint)" in _remarks(groups)
 
 
 def test_the_painting_of_the_command_is_no_light(folder: Path):
-    path = _plain(folder / "evening.exr", 2 * pictures()[1])
+    path = _write_plain(folder / "evening.exr", 2 * pictures()[1])
     groups = read_light_groups(folder, leave_out=[path])
     assert groups.basis.names == tuple(LIGHTS)
-    assert "left out of the lights: evening.exr" in _told(groups)
+    assert "left out of the lights: evening.exr" in _remarks(groups)
 
 
 def test_paintings_are_known_by_their_weights_and_by_krita(folder: Path):
-    _plain(folder / "noon.exr", pictures(4)[3], W=np.ones((6, 8), np.float32))
+    _write_plain(folder / "noon.exr", pictures(4)[3], W=np.ones((6, 8), np.float32))
     header = {"krita_layers_info": "<layers/>"}
     write(folder / "night.exr", ("rgb", channels("", pictures(5)[4])), **header)
     groups = read_light_groups(folder)
     assert groups.basis.names == tuple(LIGHTS)
-    assert "noon.exr (a painting, with weights W)" in _told(groups)
-    assert "night.exr (painted in Krita)" in _told(groups)
+    assert "noon.exr (a painting, with weights W)" in _remarks(groups)
+    assert "night.exr (painted in Krita)" in _remarks(groups)
 
 
 @pytest.mark.parametrize("folder", ["beauty", "final"], indirect=True)
 def test_what_the_others_need_not_to_add_up_is_no_light(folder: Path):
-    _plain(folder / "noon.exr", 1.5 * pictures()[1] + pictures()[0])
+    _write_plain(folder / "noon.exr", 1.5 * pictures()[1] + pictures()[0])
     groups = read_light_groups(folder)
     assert groups.basis.names == tuple(LIGHTS)
     assert not groups.has_rest
-    assert "left out of the lights: noon.exr (without it the others add up to" in _told(groups)
+    assert "left out of the lights: noon.exr (without it the others add up to" in _remarks(groups)
 
 
 @pytest.mark.parametrize("folder", [None], indirect=True)
 def test_where_nothing_tells_that_is_told(folder: Path):
-    _plain(folder / "noon.exr", pictures(4)[3])
+    _write_plain(folder / "noon.exr", pictures(4)[3])
     groups = read_light_groups(folder)
     assert groups.basis.names == ("fill", "key", "noon", "rim")
-    told = _told(groups)
+    told = _remarks(groups)
     assert (
         "unknown whether the groups add up to all of it, and whether each of them is a light"
         in told
@@ -108,7 +108,7 @@ def test_an_exr_of_another_name_is_told(folder: Path):
     (folder / "key.exr").rename(folder / "key.exr.tmp")
     groups = read_light_groups(folder)
     assert "key" not in groups.basis.names
-    assert "key.exr.tmp (not named .exr)" in _told(groups)
+    assert "key.exr.tmp (not named .exr)" in _remarks(groups)
 
 
 def test_a_folder_of_nothing_else_is_refused(tmp_path: Path):
@@ -122,7 +122,7 @@ def test_a_folder_of_nothing_else_is_refused(tmp_path: Path):
 def test_the_groups_of_one_file_beside_a_painting(tmp_path: Path):
     layers = {f"RGBA_{n}": x for n, x in zip(LIGHTS, pictures(), strict=True)}
     interleaved(tmp_path / "shot.exr", layers)
-    path = _plain(tmp_path / "evening.exr", pictures()[0])
+    path = _write_plain(tmp_path / "evening.exr", pictures()[0])
     groups = read_light_groups(tmp_path, leave_out=[path])
     assert groups.basis.names == tuple(LIGHTS)
 
@@ -131,7 +131,7 @@ def test_of_a_group_without_a_pixel_nobody_is_told_to_paint_it(tmp_path: Path):
     a, b = pictures(2)
     layers = {"Combined": a + b, "Combined_key": a, "Combined_old": 0 * a}
     interleaved(tmp_path / "a.exr", layers)
-    _plain(tmp_path / "p.exr", 0.5 * a + b)
+    _write_plain(tmp_path / "p.exr", 0.5 * a + b)
     done = run(tmp_path, "solve", "a.exr", "p.exr")
     assert done.returncode == 0
     assert "the picture shows nothing of old: left unchanged" in done.stderr
@@ -143,7 +143,7 @@ def test_of_a_group_without_a_pixel_nobody_is_told_to_paint_it(tmp_path: Path):
 
 def test_a_solve_into_the_folder_of_its_lights_twice(folder: Path):
     """The painting lies there, and so does the first answer when it is asked again."""
-    _plain(folder / "evening.exr", 2 * pictures()[1] + 0.5 * pictures()[2])
+    _write_plain(folder / "evening.exr", 2 * pictures()[1] + 0.5 * pictures()[2])
     how = ("solve", "--lights", "lights", "lights/evening.exr", "-o", "lights")
     printed = []
     for _ in range(2):

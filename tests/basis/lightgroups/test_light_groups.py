@@ -38,7 +38,7 @@ def _target(image: Any) -> Target:
     return Target("t", image.astype(np.float32), np.ones(image.shape[:2], np.float32), True)
 
 
-def _solved(groups: LightGroups, image: Any) -> Any:
+def _solve(groups: LightGroups, image: Any) -> Any:
     return solve(groups.basis, _target(image)).lighting.weights_for(groups.basis)
 
 
@@ -69,7 +69,7 @@ def test_a_rebalanced_beauty_gives_back_its_multipliers(
     groups = read_light_groups(written(tmp_path / "a.exr", layers))
     wanted = np.array([[2, 1, 0.5], [0, 0.25, 3], [1, 1, 1]], np.float64)
     mixed = np.einsum("nhwc,nc->hwc", images[:3], wanted) + images[3] * lacks
-    found = _solved(groups, mixed)
+    found = _solve(groups, mixed)
     # The painting and the rest are rounded to float32, the solve is in float64.
     np.testing.assert_allclose(found[:3], wanted, atol=10 * FLOAT32)
     assert groups.basis.names[3:] == (("rest",) if lacks else ())
@@ -285,7 +285,7 @@ def test_pixels_without_a_number_count_nothing(tmp_path: Path):
     painted = np.einsum("nhwc,n->hwc", images, [2, 0.5, 1])
     painted[0, 0] = painted[2, 3] = 100  # nobody can reach that, and nobody tries to
     np.testing.assert_allclose(
-        _solved(groups, painted), np.repeat([[2], [0.5], [1]], 3, axis=1), atol=10 * FLOAT32
+        _solve(groups, painted), np.repeat([[2], [0.5], [1]], 3, axis=1), atol=10 * FLOAT32
     )
 
 
@@ -416,7 +416,7 @@ def test_a_file_of_cycles(tmp_path: Path):
     np.testing.assert_allclose(whole, groups.beauty.image, rtol=1e-5, atol=1e-6)
     wanted = np.random.default_rng(0).uniform(0, 3, (6, 3))
     wanted[2] = 0
-    np.testing.assert_allclose(_solved(groups, basis.mix(wanted)), wanted, atol=1e-4)
+    np.testing.assert_allclose(_solve(groups, basis.mix(wanted)), wanted, atol=1e-4)
 
 
 @pytest.mark.parametrize("at", [0, 2])

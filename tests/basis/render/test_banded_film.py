@@ -37,12 +37,14 @@ def small_steps(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def whole(small_room: Scene) -> Basis:
+def whole_basis(small_room: Scene) -> Basis:
     return render_basis(small_room, spp=20, seed=3)
 
 
 @pytest.fixture
-def in_bands(monkeypatch: pytest.MonkeyPatch, whole: Basis, small_room: Scene) -> list[int]:
+def band_memory(
+    monkeypatch: pytest.MonkeyPatch, whole_basis: Basis, small_room: Scene
+) -> list[int]:
     """Bands from here on. Returns the bytes of the sums that memory has at a time."""
     _, width = small_room.size
     planes = 2 * len(small_room.lights)
@@ -62,25 +64,25 @@ def in_bands(monkeypatch: pytest.MonkeyPatch, whole: Basis, small_room: Scene) -
 
 
 def test_bands_have_the_bits_of_the_whole_film(
-    small_room: Scene, whole: Basis, in_bands: list[int]
+    small_room: Scene, whole_basis: Basis, band_memory: list[int]
 ) -> None:
     found = render_basis(small_room, spp=20, seed=3)
     assert isinstance(found.planes, SumPlanes)
-    assert_equal_bits(found, whole)
+    assert_equal_bits(found, whole_basis)
     assert found.indirect is not None
     for mine in (found.planes, found.noise, found.indirect.planes, found.indirect.noise):
         its = mine.array()
         assert mine.plane(1).tobytes() == its[1].tobytes()
         assert mine.rows(3, 9).tobytes() == its[:, 3:9].tobytes()
-    assert max(in_bands) <= banded_film.BAND_BYTES
-    assert len(in_bands) > 8
+    assert max(band_memory) <= banded_film.BAND_BYTES
+    assert len(band_memory) > 8
 
 
 @pytest.mark.parametrize("after", [2, 6, 11])
 def test_an_interrupted_band_goes_on_to_the_same_bits(
     small_room: Scene,
-    whole: Basis,
-    in_bands: list[int],
+    whole_basis: Basis,
+    band_memory: list[int],
     monkeypatch: pytest.MonkeyPatch,
     tmp_path: Path,
     after: int,
@@ -92,8 +94,8 @@ def test_an_interrupted_band_goes_on_to_the_same_bits(
 
     def interrupted(sums: FileSums, half: int, rows: range, values: Any) -> None:
         plain(sums, half, rows, values)
-        if len(in_bands) == after:
-            in_bands.append(0)
+        if len(band_memory) == after:
+            band_memory.append(0)
             os.kill(os.getpid(), signal.SIGINT)
 
     with monkeypatch.context() as patch:
@@ -106,11 +108,11 @@ def test_an_interrupted_band_goes_on_to_the_same_bits(
     assert 0 < part.origin.spp < 20
     found = obtain_basis(small_room, spp=20, seed=3)
     assert isinstance(found.planes, EncodedPlanes)
-    assert_equal_bits(found, basis_file.as_stored(whole))
+    assert_equal_bits(found, basis_file.as_stored(whole_basis))
 
 
 def test_sums_are_read_once_to_write_all_planes(
-    small_room: Scene, in_bands: list[int], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    small_room: Scene, band_memory: list[int], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     found = render_basis(small_room, spp=4, seed=3)
     read: list[int] = []
@@ -126,7 +128,7 @@ def test_sums_are_read_once_to_write_all_planes(
 
 
 def test_indirect_planes_of_many_lights_stay_in_their_file(
-    small_room: Scene, whole: Basis, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    small_room: Scene, whole_basis: Basis, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """Rendered, found again, and of a file: with the bits that memory would have."""
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
@@ -134,7 +136,7 @@ def test_indirect_planes_of_many_lights_stay_in_their_file(
     assert isinstance(expected.indirect.planes, MemoryPlanes)  # type: ignore[union-attr]
     monkeypatch.setattr(basis_file, "SINGLES_MAX_BYTES", 0)
     path = tmp_path / "a.basis.exr"
-    basis_file.write_basis(path, whole)
+    basis_file.write_basis(path, whole_basis)
     rendered, kept = (obtain_basis(small_room, spp=20, seed=3) for _ in range(2))
     for found in (rendered, kept, basis_reader.read_basis(path)):
         assert isinstance(found.planes, EncodedPlanes)
@@ -145,17 +147,17 @@ def test_indirect_planes_of_many_lights_stay_in_their_file(
 
 
 def test_indirect_planes_of_another_file_are_not_taken(
-    small_room: Scene, whole: Basis, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    small_room: Scene, whole_basis: Basis, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(basis_file, "SINGLES_MAX_BYTES", 0)
     path = tmp_path / "a.basis.exr"
     basis_file.write_basis(path, render_basis(small_room, spp=4, seed=3))
-    assert basis_reader.leave_indirect(whole, path) is whole
-    assert basis_reader.leave_indirect(whole, tmp_path / "none.exr") is whole
+    assert basis_reader.leave_indirect(whole_basis, path) is whole_basis
+    assert basis_reader.leave_indirect(whole_basis, tmp_path / "none.exr") is whole_basis
 
 
 def test_memory_is_that_of_half_floats_and_some_bands(
-    small_room: Scene, in_bands: list[int]
+    small_room: Scene, band_memory: list[int]
 ) -> None:
     whole, banded = (memory_needed(small_room, in_bands=x) for x in (False, True))
     height, width = small_room.size
@@ -163,7 +165,7 @@ def test_memory_is_that_of_half_floats_and_some_bands(
 
 
 def test_a_full_disk_is_one_clear_line(
-    small_room: Scene, in_bands: list[int], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    small_room: Scene, band_memory: list[int], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     def full(*_: Any) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")

@@ -47,7 +47,7 @@ def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def rendered(monkeypatch: pytest.MonkeyPatch) -> Rendered:
+def rendered_lights(monkeypatch: pytest.MonkeyPatch) -> Rendered:
     """List what is rendered from now on."""
     log: Rendered = []
 
@@ -76,7 +76,7 @@ def room(folder: Path, *edits: tuple[str, str], **how: Any) -> Scene:
     return load_scene(path)
 
 
-def taken(basis: Basis, of: Basis) -> set[str]:
+def reused_lights(basis: Basis, of: Basis) -> set[str]:
     """Names of the lights whose planes are those of the other basis to the bit."""
     return {
         name
@@ -89,7 +89,7 @@ def taken(basis: Basis, of: Basis) -> set[str]:
     }
 
 
-def agrees(a: Basis, b: Basis) -> None:
+def assert_agrees(a: Basis, b: Basis) -> None:
     """Assert that two bases of other random numbers show the same, and know their noise.
 
     Pixels are independent. Four standard errors: of the sum of differences, and of the squares
@@ -107,45 +107,45 @@ def agrees(a: Basis, b: Basis) -> None:
         assert abs(excess.sum()) <= 4 * np.sqrt((excess**2).sum()), name
 
 
-def test_a_moved_lamp_is_rendered_alone(tmp_path: Path, rendered: Rendered) -> None:
+def test_a_moved_lamp_is_rendered_alone(tmp_path: Path, rendered_lights: Rendered) -> None:
     first = obtain_basis(room(tmp_path), spp=64)
     scene = room(tmp_path, MOVED)
-    assert rendered == [(NAMES, 64, True)]
+    assert rendered_lights == [(NAMES, 64, True)]
     second = obtain_basis(scene, spp=64)
-    assert rendered[1:] == [(("bulb",), 64, True)]
-    assert taken(second, first) == {*NAMES} - {"bulb"}
+    assert rendered_lights[1:] == [(("bulb",), 64, True)]
+    assert reused_lights(second, first) == {*NAMES} - {"bulb"}
     assert (second.origin.halves, second.origin.each_light) == ((32, 32), ())
     assert second.origin.is_composed
     assert second.origin.scene_identity == scene.identity
-    agrees(second, render_basis(scene, spp=64, seed=5))
+    assert_agrees(second, render_basis(scene, spp=64, seed=5))
     # The camera sees emitters where it did.
     np.testing.assert_array_equal(second.emitters_seen, first.emitters_seen)
     assert second.features is not None
     # And again: then it is kept as a whole. Moved back, the first is.
     same_basis(obtain_basis(scene, spp=64), second)
     same_basis(obtain_basis(room(tmp_path), spp=64), first)
-    assert len(rendered) == 2
+    assert len(rendered_lights) == 2
 
 
 def test_two_moved_lamps_are_one_pass_and_planes_come_from_several_files(
-    tmp_path: Path, rendered: Rendered
+    tmp_path: Path, rendered_lights: Rendered
 ) -> None:
     turn = ('origin="0.8 1.8 1.5"', 'origin="0.6 1.8 1.5"')
     first = obtain_basis(room(tmp_path), spp=16)
     both = obtain_basis(room(tmp_path, MOVED, turn), spp=16)
-    assert rendered[1:] == [(("bulb", "beam"), 16, True)]
+    assert rendered_lights[1:] == [(("bulb", "beam"), 16, True)]
     # The bulb from the one and the beam from the other.
     last = obtain_basis(room(tmp_path, MOVED), spp=16)
-    assert len(rendered) == 2
-    assert taken(last, both) == {*NAMES} - {"beam"}
-    assert taken(last, first) == {*NAMES} - {"bulb"}
+    assert len(rendered_lights) == 2
+    assert reused_lights(last, both) == {*NAMES} - {"beam"}
+    assert reused_lights(last, first) == {*NAMES} - {"bulb"}
 
 
-def test_edits_of_colour_and_name_render_nothing(tmp_path: Path, rendered: Rendered) -> None:
+def test_edits_of_colour_and_name_render_nothing(tmp_path: Path, rendered_lights: Rendered) -> None:
     first = obtain_basis(room(tmp_path), spp=16)
     scene = room(tmp_path, ("0.5 0.6 0.7", "0 0 3"), ('id="beam"', 'id="ray"'))
     second = obtain_basis(scene, spp=16)
-    assert len(rendered) == 1
+    assert len(rendered_lights) == 1
     assert second.names == ("panel", "bulb", "ray", "sun", "sky")
     assert second.lights[1].emission == (0, 0, 3)
     assert second.images.tobytes() == first.images.tobytes()
@@ -156,69 +156,71 @@ def test_edits_of_colour_and_name_render_nothing(tmp_path: Path, rendered: Rende
     assert {"panel"} ^ {*second.objects.names} == {"lid"} ^ {*third.objects.names}
 
 
-def test_lamps_that_come_and_go(tmp_path: Path, rendered: Rendered) -> None:
+def test_lamps_that_come_and_go(tmp_path: Path, rendered_lights: Rendered) -> None:
     lights = LIGHTS["panel"] + LIGHTS["bulb"]
     first = obtain_basis(room(tmp_path, lights=lights), spp=32)
     more = obtain_basis(scene := room(tmp_path, lights=lights + LIGHTS["sky"]), spp=32)
-    assert rendered[1:] == [(("sky",), 32, True)]
-    assert taken(more, first) == {"panel", "bulb"}
-    agrees(more, render_basis(scene, spp=32, seed=5))
+    assert rendered_lights[1:] == [(("sky",), 32, True)]
+    assert reused_lights(more, first) == {"panel", "bulb"}
+    assert_agrees(more, render_basis(scene, spp=32, seed=5))
     assert more.emitters_seen.sum() > first.emitters_seen.sum()  # where there is sky
     fewer = obtain_basis(scene := room(tmp_path, lights=lights[: len(LIGHTS["panel"])]), spp=32)
-    assert len(rendered) == 2
-    assert taken(fewer, first) == {"panel"}
+    assert len(rendered_lights) == 2
+    assert reused_lights(fewer, first) == {"panel"}
     np.testing.assert_array_equal(fewer.emitters_seen, first.emitters_seen)
-    agrees(fewer, render_basis(scene, spp=32, seed=5))
+    assert_agrees(fewer, render_basis(scene, spp=32, seed=5))
 
 
-def test_an_area_lamp_that_moves_is_another_room(tmp_path: Path, rendered: Rendered) -> None:
+def test_an_area_lamp_that_moves_is_another_room(tmp_path: Path, rendered_lights: Rendered) -> None:
     obtain_basis(room(tmp_path), spp=4)
     obtain_basis(room(tmp_path, ('<translate y="1.9"/>', '<translate y="1.7"/>')), spp=4)
-    assert rendered == [(NAMES, 4, True)] * 2
+    assert rendered_lights == [(NAMES, 4, True)] * 2
 
 
-def test_lights_with_fewer_samples_catch_up(tmp_path: Path, rendered: Rendered) -> None:
+def test_lights_with_fewer_samples_catch_up(tmp_path: Path, rendered_lights: Rendered) -> None:
     obtain_basis(room(tmp_path), spp=16)
     scene = room(tmp_path, MOVED)
     basis = obtain_basis(scene, spp=64)
     # First to what the others have, then all together.
-    assert rendered[1:] == [(("bulb",), 16, True), (NAMES, 64, False)]
+    assert rendered_lights[1:] == [(("bulb",), 16, True), (NAMES, 64, False)]
     assert (basis.origin.halves, basis.origin.each_light) == ((32, 32), ())
     assert basis.origin.is_composed
-    agrees(basis, render_basis(scene, spp=64, seed=5))
+    assert_agrees(basis, render_basis(scene, spp=64, seed=5))
 
 
-def test_unequal_numbers_of_samples(tmp_path: Path, rendered: Rendered) -> None:
+def test_unequal_numbers_of_samples(tmp_path: Path, rendered_lights: Rendered) -> None:
     first = obtain_basis(room(tmp_path), spp=64)
     scene = room(tmp_path, MOVED)
     basis = obtain_basis(scene, spp=16)
-    assert taken(basis, first) == {*NAMES} - {"bulb"}
+    assert reused_lights(basis, first) == {*NAMES} - {"bulb"}
     assert [its[:2] for its in basis.origin.each_light] == [
         (8, 8) if name == "bulb" else (32, 32) for name in NAMES
     ]
     assert basis.origin.spp == 16
     assert basis.knows_noise
-    agrees(basis, render_basis(scene, spp=64, seed=5))
+    assert_agrees(basis, render_basis(scene, spp=64, seed=5))
     write_basis(tmp_path / "b.exr", basis)
     same_basis(read_basis(tmp_path / "b.exr"), basis)
     # The one that lags behind goes on by itself; nobody else's call does as if all were equal.
     with pytest.raises(BasisError, match="unequal numbers of samples"):
         render_basis(scene, spp=64, start=basis)
     more = obtain_basis(scene, spp=64)
-    assert rendered[1:] == [(("bulb",), 16, True), (("bulb",), 64, False)]
+    assert rendered_lights[1:] == [(("bulb",), 16, True), (("bulb",), 64, False)]
     assert (more.origin.halves, more.origin.each_light) == ((32, 32), ())
-    agrees(more, render_basis(scene, spp=64, seed=5))
+    assert_agrees(more, render_basis(scene, spp=64, seed=5))
 
 
-def test_a_time_is_spent_on_what_lacks(tmp_path: Path, rendered: Rendered) -> None:
+def test_a_time_is_spent_on_what_lacks(tmp_path: Path, rendered_lights: Rendered) -> None:
     obtain_basis(room(tmp_path), spp=4)
     basis = obtain_basis(room(tmp_path, MOVED), time_s=0.01)
     # No more than the others have: what is left of a time is for all.
-    assert rendered[1:] == [(("bulb",), 4, True)]
+    assert rendered_lights[1:] == [(("bulb",), 4, True)]
     assert (basis.origin.halves, basis.origin.each_light) == ((2, 2), ())
 
 
-def test_what_is_left_of_a_time_is_for_all_lights(tmp_path: Path, rendered: Rendered) -> None:
+def test_what_is_left_of_a_time_is_for_all_lights(
+    tmp_path: Path, rendered_lights: Rendered
+) -> None:
     """As soon as the one that was moved has as many samples as the others."""
     obtain_basis(room(tmp_path), spp=4)
     scene = room(tmp_path, MOVED)
@@ -235,21 +237,21 @@ def test_what_is_left_of_a_time_is_for_all_lights(tmp_path: Path, rendered: Rend
 
 
 def test_exactly_what_is_asked_for_is_rendered_as_a_whole(
-    tmp_path: Path, rendered: Rendered
+    tmp_path: Path, rendered_lights: Rendered
 ) -> None:
     obtain_basis(room(tmp_path), spp=16)
     scene = room(tmp_path, MOVED)
     fresh = obtain_basis(scene, spp=16, use_cache=False)
     obtain_basis(scene, spp=16)  # which is composed, and kept
-    del rendered[:]
+    del rendered_lights[:]
     same_basis(obtain_basis(scene, spp=16, exact_spp=True), fresh)
-    assert rendered == [(NAMES, 16, True)]
+    assert rendered_lights == [(NAMES, 16, True)]
     assert not obtain_basis(scene, spp=16).origin.is_composed
 
 
 @pytest.mark.parametrize("other", [{"seed": 1}, {"half": True}, {"sensor": True}])
 def test_nothing_of_another_view_size_or_seed_is_taken(
-    tmp_path: Path, rendered: Rendered, other: dict[str, Any]
+    tmp_path: Path, rendered_lights: Rendered, other: dict[str, Any]
 ) -> None:
     sensor = """<sensor type="perspective" id="other"><film type="hdrfilm">
         <integer name="width" value="24"/><integer name="height" value="20"/></film></sensor>"""
@@ -258,34 +260,34 @@ def test_nothing_of_another_view_size_or_seed_is_taken(
     scene = scene.reduced("1/2") if "half" in other else scene
     scene = load_scene(scene.path, sensor="other") if "sensor" in other else scene
     obtain_basis(scene, spp=4, seed=other.get("seed", 0))
-    assert [its[0] for its in rendered] == [NAMES] * 2
+    assert [its[0] for its in rendered_lights] == [NAMES] * 2
 
 
-def test_a_reduced_film_has_planes_of_its_own(tmp_path: Path, rendered: Rendered) -> None:
+def test_a_reduced_film_has_planes_of_its_own(tmp_path: Path, rendered_lights: Rendered) -> None:
     first = obtain_basis(room(tmp_path).reduced("1/3"), spp=36)
     scene = room(tmp_path, MOVED).reduced("1/3")
     second = obtain_basis(scene, spp=36)
-    assert rendered[1:] == [(("bulb",), 36, True)]
-    assert taken(second, first) == {*NAMES} - {"bulb"}
-    agrees(second, render_basis(scene, spp=36, seed=5))
+    assert rendered_lights[1:] == [(("bulb",), 36, True)]
+    assert reused_lights(second, first) == {*NAMES} - {"bulb"}
+    assert_agrees(second, render_basis(scene, spp=36, seed=5))
 
 
-def test_groups_and_what_is_kept(tmp_path: Path, rendered: Rendered) -> None:
+def test_groups_and_what_is_kept(tmp_path: Path, rendered_lights: Rendered) -> None:
     how: dict[str, Any] = {"lights": ["pair", "panel"], "groups": {"pair": ["bulb", "beam"]}}
     first = obtain_basis(load_scene(room(tmp_path).path, **how), spp=32)
     assert first.names == ("panel", "pair", "rest")
     scene = load_scene(room(tmp_path, MOVED).path, **how)
     second = obtain_basis(scene, spp=32)
-    assert rendered[1:] == [(("pair",), 32, True)]
-    agrees(second, render_basis(scene, spp=32, seed=5))
+    assert rendered_lights[1:] == [(("pair",), 32, True)]
+    assert_agrees(second, render_basis(scene, spp=32, seed=5))
     scene = load_scene(room(tmp_path, ('x="0.3" y="-1"', 'x="0.5" y="-1"')).path, **how)
     third = obtain_basis(scene, spp=32)
-    assert rendered[2:] == [(("rest",), 32, True)]
-    assert taken(third, first) == {"panel", "pair"}
-    agrees(third, render_basis(scene, spp=32, seed=5))
+    assert rendered_lights[2:] == [(("rest",), 32, True)]
+    assert reused_lights(third, first) == {"panel", "pair"}
+    assert_agrees(third, render_basis(scene, spp=32, seed=5))
 
 
-def test_separate_renders(tmp_path: Path, rendered: Rendered) -> None:
+def test_separate_renders(tmp_path: Path, rendered_lights: Rendered) -> None:
     how: dict[str, Any] = {"integrator": '<integrator type="volpathmis"/>'}
     first = obtain_basis(room(tmp_path, **how), spp=16)
     passes: list[str] = []
@@ -300,7 +302,7 @@ def test_separate_renders(tmp_path: Path, rendered: Rendered) -> None:
     scale = 2.0**-10 * first.images.max()
     others = [k for k, name in enumerate(NAMES) if name != "bulb"]
     assert np.abs(second.images[others] - first.images[others]).max() <= scale
-    agrees(second, render_basis(scene, spp=16, seed=5))
+    assert_agrees(second, render_basis(scene, spp=16, seed=5))
     assert second.origin.is_composed
 
 
@@ -318,28 +320,28 @@ def test_what_is_rendered_in_parts(tmp_path: Path) -> None:
     second = obtain_basis(scene, spp=16, render=render)
     third = obtain_basis(scene, spp=32, render=render)
     assert log == [(NAMES, True), (("bulb",), True), (NAMES, False)]
-    assert taken(second, first) == {*NAMES} - {"bulb"}
-    agrees(second, render_basis(scene, spp=16, seed=5))
-    agrees(third, render_basis(scene, spp=32, seed=5))
+    assert reused_lights(second, first) == {*NAMES} - {"bulb"}
+    assert_agrees(second, render_basis(scene, spp=16, seed=5))
+    assert_agrees(third, render_basis(scene, spp=32, seed=5))
 
 
 def test_what_is_larger_than_memory(
-    tmp_path: Path, rendered: Rendered, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, rendered_lights: Rendered, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first = obtain_basis(room(tmp_path), spp=16)
     expected = obtain_basis(room(tmp_path, MOVED), spp=16)
     cache.delete_entries([entry for entry in cache.entries() if entry.origin == expected.origin])
     monkeypatch.setattr(basis_file, "IN_MEMORY_MAX_BYTES", 0)
     large = obtain_basis(room(tmp_path, MOVED), spp=16)
-    assert [its[0] for its in rendered] == [NAMES, ("bulb",), ("bulb",)]
+    assert [its[0] for its in rendered_lights] == [NAMES, ("bulb",), ("bulb",)]
     assert isinstance(large.planes, FilePlanes)
-    assert taken(large, first) == {*NAMES} - {"bulb"}
+    assert reused_lights(large, first) == {*NAMES} - {"bulb"}
     assert large.lights == expected.lights
     # Where it cannot be kept it stays in several files.
     cache.delete_entries([entry for entry in cache.entries() if entry.origin == large.origin])
     monkeypatch.setattr(cache, "keep", lambda basis: False)
     apart = obtain_basis(room(tmp_path, MOVED), spp=16)
-    assert taken(apart, large) >= {*NAMES} - {"bulb"}
+    assert reused_lights(apart, large) >= {*NAMES} - {"bulb"}
     weights = np.linspace(0, 1, 15).reshape(5, 3)
     np.testing.assert_allclose(apart.mix(weights), large.mix(weights), atol=2e-3)
     some = slice(100, 333)
@@ -348,7 +350,7 @@ def test_what_is_larger_than_memory(
 
 @pytest.mark.parametrize("damage", ["cut", "gone"])
 def test_a_damaged_file_costs_its_planes(
-    tmp_path: Path, rendered: Rendered, damage: str, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, rendered_lights: Rendered, damage: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     obtain_basis(room(tmp_path), spp=16)
     [entry] = cache.entries()
@@ -365,13 +367,13 @@ def test_a_damaged_file_costs_its_planes(
 
         monkeypatch.setattr(cache, "entries", and_gone)
     basis = obtain_basis(scene := room(tmp_path, MOVED), spp=16)
-    assert [its[0] for its in rendered] == [NAMES] * 2
+    assert [its[0] for its in rendered_lights] == [NAMES] * 2
     assert basis.origin.scene_identity == scene.identity
     assert not basis.origin.is_composed
 
 
 def test_planes_without_an_identity_are_none_of_anybodys(
-    tmp_path: Path, rendered: Rendered
+    tmp_path: Path, rendered_lights: Rendered
 ) -> None:
     """As in files of versions that knew of none."""
     first = obtain_basis(room(tmp_path), spp=16)
@@ -379,13 +381,13 @@ def test_planes_without_an_identity_are_none_of_anybodys(
     cache.delete_entries(cache.entries())
     assert cache.keep(replace(first, lights=lights))
     obtain_basis(room(tmp_path, MOVED), spp=16)
-    assert [its[0] for its in rendered] == [NAMES] * 2
+    assert [its[0] for its in rendered_lights] == [NAMES] * 2
     same_basis(obtain_basis(room(tmp_path), spp=16), first)
-    assert len(rendered) == 2
+    assert len(rendered_lights) == 2
 
 
 def test_an_interrupt_keeps_what_is_done(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rendered: Rendered
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rendered_lights: Rendered
 ) -> None:
     monkeypatch.setattr("lightpaint.scene.scene_render.SAMPLES_PER_PASS", 4 * 2 * 24 * 20)
     obtain_basis(room(tmp_path), spp=32)
@@ -398,18 +400,18 @@ def test_an_interrupt_keeps_what_is_done(
     with pytest.raises(Interrupted, match="16 of 32"):
         obtain_basis(scene, spp=32, render=render_basis, progress=press_ctrl_c)
     basis = obtain_basis(scene, spp=32)
-    assert rendered[1:] == [(("bulb",), 32, False)]
-    agrees(basis, render_basis(scene, spp=32, seed=5))
+    assert rendered_lights[1:] == [(("bulb",), 32, False)]
+    assert_agrees(basis, render_basis(scene, spp=32, seed=5))
 
 
 def test_two_scenes_in_one_folder_share_what_is_the_same(
-    tmp_path: Path, rendered: Rendered
+    tmp_path: Path, rendered_lights: Rendered
 ) -> None:
     first = obtain_basis(room(tmp_path), spp=16)
     path = write_room(tmp_path, name="hall.xml", lights=LIGHTS["panel"] + LIGHTS["sun"])
     second = obtain_basis(load_scene(path), spp=16)
-    assert len(rendered) == 1
-    assert taken(second, first) == {"panel", "sun"}
+    assert len(rendered_lights) == 1
+    assert reused_lights(second, first) == {"panel", "sun"}
     assert (second.origin.scene, second.source) == ("hall.xml", str(path))
 
 
@@ -441,7 +443,7 @@ def make_listener() -> Callable[[], Any]:
     return Hears
 
 
-class Here:
+class LocalEngine:
     """An engine that does its items in this process, and notes of which lights they are."""
 
     def __init__(self) -> None:
@@ -456,7 +458,7 @@ class Here:
 
 def test_workers_render_the_moved_lamp_alone(tmp_path: Path) -> None:
     def obtained(scene: Scene) -> tuple[Basis, set[tuple[str, ...]]]:
-        engine = Here()
+        engine = LocalEngine()
         render = PartwiseRender(engine, SceneFilm(SceneFile(str(scene.path))))  # type: ignore[arg-type]
         return obtain_basis(scene, spp=16, render=render), engine.lights
 
@@ -464,8 +466,8 @@ def test_workers_render_the_moved_lamp_alone(tmp_path: Path) -> None:
     assert lights == {()}
     second, lights = obtained(scene := room(tmp_path, MOVED))
     assert lights == {("bulb",)}
-    assert taken(second, first) == {*NAMES} - {"bulb"}
-    agrees(second, render_basis(scene, spp=16, seed=5))
+    assert reused_lights(second, first) == {*NAMES} - {"bulb"}
+    assert_agrees(second, render_basis(scene, spp=16, seed=5))
 
 
 @pytest.mark.parametrize("done", [0, 2, 5])

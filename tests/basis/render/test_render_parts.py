@@ -40,7 +40,7 @@ def guide_table(small_room: Scene) -> np.ndarray:
     return guide_training.train_guide(small_room, 0)
 
 
-def made(
+def render_in_order(
     scene: Scene,
     guide_table: np.ndarray | None,
     order: list[Part],
@@ -55,7 +55,7 @@ def made(
     return sums.basis(guide_table)
 
 
-def same(one: Basis, other: Basis) -> bool:
+def is_same(one: Basis, other: Basis) -> bool:
     return all(
         np.array_equal(getattr(one, name), getattr(other, name))
         for name in ("images", "half_differences", "emitters_seen")
@@ -91,8 +91,8 @@ def test_parts_in_any_order_make_the_basis_of_one_go(
     shuffled = plan.copy()
     random.Random(3).shuffle(shuffled)
     for order in (plan, shuffled):
-        basis = made(small_room, guide_table, order, plan)
-        assert same(basis, whole)
+        basis = render_in_order(small_room, guide_table, order, plan)
+        assert is_same(basis, whole)
         assert basis.origin == whole.origin
         np.testing.assert_array_equal(basis.guide_table, whole.guide_table)
 
@@ -102,7 +102,7 @@ def test_parts_in_any_order_make_the_basis_of_one_go(
 def test_threads_decide_no_bit(small_room: Scene, threads: int) -> None:
     whole = render_basis(small_room, spp=SPP)
     limit_threads(threads)
-    assert same(render_basis(small_room, spp=SPP), whole)
+    assert is_same(render_basis(small_room, spp=SPP), whole)
 
 
 def test_any_budget_that_comes_to_the_same_samples_makes_the_same(
@@ -119,16 +119,16 @@ def test_any_budget_that_comes_to_the_same_samples_makes_the_same(
     monkeypatch.undo()
     monkeypatch.setattr(guide_training, "TRAINING_SAMPLES", (2**12, 2**13))
     whole = render_basis(small_room, spp=basis.origin.spp)
-    assert same(basis, whole)
+    assert is_same(basis, whole)
     assert basis.origin == whole.origin
 
 
 def test_what_is_there_counts(small_room: Scene) -> None:
     half = render_basis(small_room, spp=16)
     plan = plan_parts(small_room, 32, start=half)
-    in_parts = made(small_room, half.guide_table, plan, plan, start=half)
+    in_parts = render_in_order(small_room, half.guide_table, plan, plan, start=half)
     on = render_basis(small_room, spp=32, start=half)
-    assert same(in_parts, on)
+    assert is_same(in_parts, on)
     whole = render_basis(small_room, spp=32)
     assert in_parts.origin == on.origin == whole.origin
     # The sums behind a basis are known up to round-off of float32.
@@ -149,7 +149,7 @@ def test_what_an_older_version_has_rendered_is_used_but_not_gone_on_with(
     new = render_basis(small_room, spp=4)
     old = replace(new, origin=replace(new.origin, method="one pass"))
     assert render_basis(small_room, spp=4, start=old).origin.method == "one pass"
-    assert same(render_basis(small_room, spp=8, start=old), render_basis(small_room, spp=8))
+    assert is_same(render_basis(small_room, spp=8, start=old), render_basis(small_room, spp=8))
 
 
 @pytest.mark.usefixtures("_all_threads")
@@ -161,7 +161,7 @@ def test_lights_that_are_rendered_one_by_one(tmp_path: Path) -> None:
     scene = load_scene(write_room(tmp_path, lights=lights, integrator=integrator))
     plan = plan_parts(scene, 8)
     assert len(plan) == 4
-    parts = made(scene, None, plan[::-1], plan)
+    parts = render_in_order(scene, None, plan[::-1], plan)
     whole = render_basis(scene, spp=8)
-    assert same(parts, whole)
+    assert is_same(parts, whole)
     assert parts.origin == whole.origin

@@ -41,7 +41,7 @@ def scene(tmp_path: Path) -> Scene:
     return load_scene(write_room(tmp_path, lights=THREE, integrator=SEPARATELY))
 
 
-def interrupted_after(passes: int, scene: Scene, kept: list[Basis], **budget: object) -> str:
+def interrupt_after(passes: int, scene: Scene, kept: list[Basis], **budget: object) -> str:
     """Render, press Ctrl-C after so many passes, and return what is said then."""
     count = 0
 
@@ -81,7 +81,7 @@ def test_interrupted_and_gone_on_is_as_if_never_interrupted(
 ) -> None:
     """Four passes for each of three lights."""
     kept: list[Basis] = []
-    said = interrupted_after(after, scene, kept, spp=16)
+    said = interrupt_after(after, scene, kept, spp=16)
     assert "of 16 samples per pixel, on average over the lights, are kept" in said
     part = kept[-1]
     assert part.origin.method == SEPARATE
@@ -111,7 +111,7 @@ def test_more_samples_add_only_what_is_missing(scene: Scene) -> None:
 
 def test_nothing_is_mixed(scene: Scene, tmp_path: Path) -> None:
     kept: list[Basis] = []
-    interrupted_after(4, scene, kept, spp=16)
+    interrupt_after(4, scene, kept, spp=16)
     with pytest.raises(BasisError, match="another scene"):
         render_basis(scene, spp=16, seed=1, start=kept[-1])
     with pytest.raises(BasisError, match="another scene"):
@@ -169,7 +169,7 @@ def test_a_time_is_kept_and_adds_samples(
 
 def test_a_time_goes_on_from_unequal_lights(scene: Scene) -> None:
     kept: list[Basis] = []
-    interrupted_after(4, scene, kept, spp=16)
+    interrupt_after(4, scene, kept, spp=16)
     part = kept[-1]
     assert len(set(part.origin.each_light)) > 1
     whole = render_basis(scene, time_s=0.01, start=part)

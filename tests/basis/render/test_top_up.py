@@ -46,13 +46,13 @@ def counts() -> Any:
     return made
 
 
-def weighted(basis: Basis, samples: Any) -> Any:
+def weighted_sums(basis: Basis, samples: Any) -> Any:
     """The sums that means of so many samples of each half stand for, (2, n, h, w, 3) float64."""
     images, halves = (x.astype(np.float64) for x in (basis.images, basis.half_differences))
     return np.stack([images + halves, images - halves]) * samples[..., None]
 
 
-def close(a: Any, b: Any) -> None:
+def assert_close(a: Any, b: Any) -> None:
     """Assert that two arrays differ by the round-off of some sums."""
     np.testing.assert_allclose(a, b, rtol=0, atol=8 * SAME_SAMPLES * np.abs(b).max())
 
@@ -134,9 +134,9 @@ def test_uniform_samples_go_on_after_a_top_up(small_room: Scene, counts: Any):
     before = pixel_top_up.top_up(small_room, basis, counts)
     after = render_basis(small_room, spp=24, start=before)
     np.testing.assert_array_equal(after.extra, counts)
-    uniform = weighted(render_basis(small_room, spp=24), np.full(counts.shape, 12.0))
-    added = weighted(before, 4.0 + counts) - weighted(basis, np.full(counts.shape, 4.0))
-    close(weighted(after, 12.0 + counts), uniform + added)
+    uniform = weighted_sums(render_basis(small_room, spp=24), np.full(counts.shape, 12.0))
+    added = weighted_sums(before, 4.0 + counts) - weighted_sums(basis, np.full(counts.shape, 4.0))
+    assert_close(weighted_sums(after, 12.0 + counts), uniform + added)
     same_basis(render_in_parts(small_room, spp=24, start=before), after)
 
 

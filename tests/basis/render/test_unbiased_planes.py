@@ -152,7 +152,7 @@ def test_each_plane_is_the_render_of_its_light_alone(tmp_path: Path, kind: str) 
     check_means(z)
 
 
-def mutated(name: str) -> Any:
+def mutation(name: str) -> Any:
     """A replacement of a function of the paths, by which light is counted twice or too little."""
     from lightpaint.basis.render.tracer import path_tracer
 
@@ -175,7 +175,7 @@ def test_a_wrong_weight_is_found(
 ) -> None:
     use_variant()
     scene = room(tmp_path, **ROOMS["hidden emitters"])
-    monkeypatch.setattr(*mutated(fault))
+    monkeypatch.setattr(*mutation(fault))
     z = plane_deviations(scene, render_basis(scene, spp=BASIS_SPP))
     with pytest.raises(AssertionError):
         check_means(z)

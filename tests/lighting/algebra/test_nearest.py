@@ -56,7 +56,7 @@ def test_a_bound_ends_the_way_back() -> None:
     assert found.converged
 
 
-def _capped(seed: int) -> tuple[Any, Any, list[Cap]]:
+def _capped_problem(seed: int) -> tuple[Any, Any, list[Cap]]:
     rng = np.random.default_rng(seed)
     A = rng.random((40, 12)) ** 2
     caps = [
@@ -71,7 +71,7 @@ def test_clipped_steps_under_caps_come_to_what_cannot_go_in_circles(
 ) -> None:
     certified = 0
     for seed in range(40):
-        M, b, caps = _capped(seed)
+        M, b, caps = _capped_problem(seed)
         quick = minimise(M, b, caps=caps)
         with monkeypatch.context() as patch:
             patch.setattr(optimum, "capped_newton", lambda _q, x, **_: (x, np.inf, 0))

@@ -64,13 +64,13 @@ def _certify(found: Optimum, M: Any, b: Any, lower: Any, upper: Any, caps: Any =
 
 
 @pytest.fixture(params=["clipped steps", "polish"])
-def _either_way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+def _solver_path(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """As it comes, and with what follows where the clipped steps do not do."""
     if request.param == "polish":
         monkeypatch.setattr(clipped_newton, "MAX_STEPS", 0)
 
 
-@pytest.mark.usefixtures("_either_way")
+@pytest.mark.usefixtures("_solver_path")
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_light_is_negative_as_in_scipy(kind: str):
     for seed in range(60):
@@ -87,7 +87,7 @@ def test_no_light_is_negative_as_in_scipy(kind: str):
         assert mine <= oracle + 1e-10 * np.square(y).sum()
 
 
-@pytest.mark.usefixtures("_either_way")
+@pytest.mark.usefixtures("_solver_path")
 @pytest.mark.parametrize("kind", KINDS)
 def test_between_bounds_as_in_scipy(kind: str):
     for seed in range(40):
@@ -110,7 +110,7 @@ def test_between_bounds_as_in_scipy(kind: str):
         assert mine <= oracle + 1e-10 * (np.square(y).sum() + np.square(A @ lower).sum())
 
 
-def _capped(seed: int) -> tuple[Any, Any, Any, Any, list[Cap], Any]:
+def _capped_problem(seed: int) -> tuple[Any, Any, Any, Any, list[Cap], Any]:
     """M, b, lower, upper, caps and a start, with three unknowns for each cap."""
     rng = np.random.default_rng([seed, 2])
     k = int(rng.integers(1, 5))
@@ -135,7 +135,7 @@ def _capped(seed: int) -> tuple[Any, Any, Any, Any, list[Cap], Any]:
 def test_under_caps_certified_and_as_quadprog(seeds: range):
     compared = 0
     for seed in seeds:
-        M, b, lower, upper, caps, start = _capped(seed)
+        M, b, lower, upper, caps, start = _capped_problem(seed)
         found = minimise(M, b, lower=lower, upper=upper, caps=caps, start=start)
         assert found.converged
         _certify(found, M, b, lower, upper, caps)
@@ -155,7 +155,7 @@ def test_under_caps_certified_and_as_quadprog(seeds: range):
 
 @pytest.mark.parametrize("seed", range(20))
 def test_the_papers_iteration_comes_to_the_same_under_caps(seed: int):
-    M, b, lower, upper, caps, start = _capped(4 * seed)
+    M, b, lower, upper, caps, start = _capped_problem(4 * seed)
     kept = {"lower": lower, "upper": upper, "caps": caps, "start": start}
     swept = minimise(M, b, method="gauss-seidel", tolerance=1e-10, **kept)
     best = minimise(M, b, **kept)
@@ -166,7 +166,7 @@ def test_the_papers_iteration_comes_to_the_same_under_caps(seed: int):
 
 def test_no_sweep_raises_the_objective_under_caps():
     for seed in range(10):
-        M, b, lower, upper, caps, start = _capped(seed)
+        M, b, lower, upper, caps, start = _capped_problem(seed)
         kept = {"lower": lower, "upper": upper, "caps": caps, "start": start}
         trace = []
         for k in range(12):
@@ -204,7 +204,7 @@ def test_multipliers_are_prices():
 
 def test_units_and_order_are_of_no_importance():
     for seed in range(30):
-        M, b, lower, upper, caps, start = _capped(4 * seed)
+        M, b, lower, upper, caps, start = _capped_problem(4 * seed)
         n = b.size
         plain = minimise(M, b, lower=lower, upper=upper, caps=caps, start=start)
         rng = np.random.default_rng(seed)

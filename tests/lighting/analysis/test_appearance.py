@@ -36,7 +36,7 @@ def _left_and_right(make_basis: Any, *, spill: float = 0.0, noise: float = 0.0) 
     )
 
 
-def _over(look: Any, where: Any, color: Any, *, alpha: float = 1.0) -> Target:
+def _paint_over(look: Any, where: Any, color: Any, *, alpha: float = 1.0) -> Target:
     """Painted over the current look, through a display."""
     image, importance = look.copy(), np.zeros(look.shape[:2], np.float32)
     image[where], importance[where] = color, alpha
@@ -52,7 +52,7 @@ def test_the_mean_is_over_the_paint_weighted_and_against_the_paint(make_basis: A
     """Whatever the solve held: in closed form."""
     basis = _left_and_right(make_basis)
     where = (slice(None), slice(0, 24))
-    target = _over(_look(basis), where, (0.5, 0.4, 0.3))
+    target = _paint_over(_look(basis), where, (0.5, 0.4, 0.3))
     target.importance[:12, :24] = 0.25
     target.image[:12, :24] = 0.6
     solution = solve(basis, target, constraints=Constraints.of({"left": {"lock": True}}))
@@ -75,8 +75,8 @@ def test_a_look_at_the_exposure_and_through_the_view_of_the_painting(make_basis:
     where = (slice(None), slice(0, 24))
     found = []
     for its, scale, view in ((basis, 1, ViewTransform()), (dark, 64, bright)):
-        target = replace(_over(_look(its), where, 0.5 / scale), transform=view)
-        found.append(compare_appearance(solve(its, target, constraints=_locked())))
+        target = replace(_paint_over(_look(its), where, 0.5 / scale), transform=view)
+        found.append(compare_appearance(solve(its, target, constraints=_lock_all())))
     assert found[0].delta_e > 1
     assert found[1].delta_e == pytest.approx(found[0].delta_e, rel=1e-3)
 
@@ -84,7 +84,7 @@ def test_a_look_at_the_exposure_and_through_the_view_of_the_painting(make_basis:
 def test_a_painting_that_is_made_is_close(make_basis: Any):
     basis = _left_and_right(make_basis)
     appearance = compare_appearance(
-        solve(basis, _over(_look(basis), (slice(None), slice(0, 24)), 0.5))
+        solve(basis, _paint_over(_look(basis), (slice(None), slice(0, 24)), 0.5))
     )
     assert appearance.is_close
     assert not appearance.is_far
@@ -95,7 +95,7 @@ def test_a_painting_that_is_made_is_close(make_basis: Any):
 def test_an_untouched_picture_is_close(make_basis: Any):
     basis = _left_and_right(make_basis)
     appearance = compare_appearance(
-        solve(basis, _over(_look(basis), (slice(None), slice(None)), 0.2))
+        solve(basis, _paint_over(_look(basis), (slice(None), slice(None)), 0.2))
     )
     assert appearance.is_close
     assert appearance.delta_e < 1e-3
@@ -112,7 +112,7 @@ def test_an_untouched_picture_is_close(make_basis: Any):
 def test_a_held_picture_never_meets_the_wish(make_basis: Any, asked: Any, held: Any):
     """What was asked for is swallowed: that is no success, and what swallowed it is told."""
     basis = _left_and_right(make_basis, spill=0.5)
-    target = _over(_look(basis), (slice(8, 16), slice(4, 12)), 0.6)
+    target = _paint_over(_look(basis), (slice(8, 16), slice(4, 12)), 0.6)
     limits = Constraints.of(asked.get("constraints", {}))
     appearance = compare_appearance(solve(basis, target, hold=asked["hold"], constraints=limits))
     assert appearance.is_close == (not held)
@@ -122,7 +122,7 @@ def test_a_held_picture_never_meets_the_wish(make_basis: Any, asked: Any, held: 
 def test_what_holds_whatever_else_is_let_go_comes_first(make_basis: Any):
     """Where all lights are locked it is of no use to let go of what was not painted."""
     basis = _left_and_right(make_basis, spill=0.5)
-    target = _over(_look(basis), (slice(8, 16), slice(4, 12)), 0.6)
+    target = _paint_over(_look(basis), (slice(8, 16), slice(4, 12)), 0.6)
     locked = Constraints.of({"*": {"lock": True}})
     assert compare_appearance(solve(basis, target, hold=50.0)).limit_groups == ("hold",)
     both = compare_appearance(solve(basis, target, hold=50.0, constraints=locked)).limit_groups
@@ -130,7 +130,7 @@ def test_what_holds_whatever_else_is_let_go_comes_first(make_basis: Any):
     assert "hold" in both
 
 
-def _four(make_basis: Any) -> Any:
+def _four_quarters(make_basis: Any) -> Any:
     """A picture of four quarters, each with a light of its own, that spill a little."""
     images = np.full((4, *SIZE, 3), 0.02)
     for k in range(4):
@@ -143,8 +143,8 @@ def _four(make_basis: Any) -> Any:
 
 def test_a_light_that_somebody_switched_off_goes_before_the_hold(make_basis: Any):
     """Two are off by hand, and one of them is all that is missed."""
-    basis = _four(make_basis)
-    target = _over(_look(basis), (slice(None), slice(12, 24)), 0.5)
+    basis = _four_quarters(make_basis)
+    target = _paint_over(_look(basis), (slice(None), slice(12, 24)), 0.5)
     off = {name: {"off": True} for name in ("annex_window", "annex_lamp")}
     appearance = compare_appearance(
         solve(basis, target, hold=10.0, constraints=Constraints.of(off))
@@ -154,7 +154,7 @@ def test_a_light_that_somebody_switched_off_goes_before_the_hold(make_basis: Any
     assert first.share > 0.8
     assert "annex_window is switched off" in headline(appearance)
     # What both are needed for is told of both, and of no other light that is locked.
-    wide = _over(_look(basis), (slice(None), slice(12, 36)), 0.5)
+    wide = _paint_over(_look(basis), (slice(None), slice(12, 36)), 0.5)
     asked = Constraints.of(off | {"left": {"lock": True}})
     first = compare_appearance(solve(basis, wide, hold=10.0, constraints=asked)).reasons[0]
     assert first.names == ("annex_window", "annex_lamp")
@@ -162,8 +162,8 @@ def test_a_light_that_somebody_switched_off_goes_before_the_hold(make_basis: Any
 
 def test_the_share_of_a_reason_is_what_the_fit_misses_no_more(make_basis: Any):
     """By a solve without it, of all pixels: the few that are looked at give the same."""
-    basis = _four(make_basis)
-    target = _over(_look(basis), (slice(None), slice(12, 24)), 0.5)
+    basis = _four_quarters(make_basis)
+    target = _paint_over(_look(basis), (slice(None), slice(12, 24)), 0.5)
     off = Constraints.of({"annex_window": {"off": True}})
 
     def missed(**options: Any) -> float:
@@ -186,7 +186,7 @@ def test_what_counts_of_the_few_pixels_is_what_counts_of_all(make_basis: Any):
     images = np.kron(_left_and_right(make_basis, spill=0.5).images, np.ones((1, 6, 6, 1)))
     basis = make_basis(images=images, names=["left", "right"], emission=[[0.2] * 3] * 2)
     look = _look(basis)
-    target = _over(look, (slice(None), slice(0, 240)), 0.6)
+    target = _paint_over(look, (slice(None), slice(0, 240)), 0.6)
     solution = solve(basis, target, hold=3.0)
     sample = PixelSample.of(solution)
     weights = sample.solve((), sample.other_views)
@@ -204,7 +204,7 @@ def test_a_weaker_hold_is_the_strongest_that_brings_half(make_basis: Any, stops:
     index[:, 36:] = 1
     basis = replace(basis, objects=Objects(index, ("wall", "annex")))
     look = _look(basis)
-    target = _over(look, (slice(None), slice(0, 24)), look[:, :24] * 2.0 ** stops[1])
+    target = _paint_over(look, (slice(None), slice(0, 24)), look[:, :24] * 2.0 ** stops[1])
     target.image[:, :12] = look[:, :12] * 2.0 ** stops[0]
     solution = solve(basis, target, hold=10.0)
     hold = next(x for x in compare_appearance(solution).reasons if x.kind == "hold")
@@ -229,15 +229,15 @@ def test_a_weaker_hold_is_the_strongest_that_brings_half(make_basis: Any, stops:
 
 def test_what_becomes_of_the_rest_is_seen(make_basis: Any):
     """In closed form; and what a person did to a light is no harm of the answer."""
-    basis = _four(make_basis)
+    basis = _four_quarters(make_basis)
     where = (slice(None), slice(0, 12))
     locked = Constraints.of({"*": {"lock": True}, "annex_window": {"lock": 0.4}})
     appearance = compare_appearance(
-        solve(basis, _over(_look(basis), where, 0.2), constraints=locked)
+        solve(basis, _paint_over(_look(basis), where, 0.2), constraints=locked)
     )
     assert appearance.unpainted_change is not None
     assert appearance.unpainted_change.worst < 1e-3
-    target = _over(_look(basis), where, 0.5)
+    target = _paint_over(_look(basis), where, 0.5)
     solution = solve(basis, target, hold=0.0, constraints=Constraints.of({"left": {"off": True}}))
     appearance = compare_appearance(solution)
     mixed = solution.basis.mix(solution.weights)
@@ -253,7 +253,7 @@ def test_what_becomes_of_the_rest_is_seen(make_basis: Any):
 
 def test_lights_that_are_held_back_are_known(make_basis: Any):
     basis = _left_and_right(make_basis, spill=0.5)
-    target = _over(_look(basis), (slice(8, 16), slice(4, 12)), 0.6)
+    target = _paint_over(_look(basis), (slice(8, 16), slice(4, 12)), 0.6)
     limits = Constraints.of({"left": {"limits": {"max": 0.21}}})
     appearance = compare_appearance(solve(basis, target, constraints=limits))
     assert appearance.held_lights == ("left",)
@@ -265,7 +265,7 @@ def test_lights_that_are_held_back_are_known(make_basis: Any):
 
 def test_a_small_wish_that_is_swallowed_is_not_close(make_basis: Any):
     basis = _left_and_right(make_basis, spill=0.9)
-    target = _over(_look(basis), (slice(8, 12), slice(4, 8)), 0.415)
+    target = _paint_over(_look(basis), (slice(8, 12), slice(4, 8)), 0.415)
     appearance = compare_appearance(solve(basis, target, hold=100.0))
     assert appearance.error < CLOSE
     assert appearance.is_far
@@ -275,7 +275,7 @@ def test_a_small_wish_that_is_swallowed_is_not_close(make_basis: Any):
 def test_colours_that_hold_are_told(make_basis: Any):
     """A white lamp cannot be green."""
     basis = _left_and_right(make_basis)
-    target = _over(_look(basis), (slice(None), slice(0, 24)), (0.1, 0.6, 0.1))
+    target = _paint_over(_look(basis), (slice(None), slice(0, 24)), (0.1, 0.6, 0.1))
     appearance = compare_appearance(solve(basis, target, colors="white"))
     assert appearance.is_far
     assert appearance.limit_groups == ("colors",)
@@ -303,13 +303,13 @@ def test_where_no_light_gets(make_basis: Any):
 def test_noise_that_the_painting_does_not_share_is_told_from_a_miss(make_basis: Any):
     basis = _left_and_right(make_basis, noise=0.05)
     where = (slice(None), slice(0, 24))
-    appearance = compare_appearance(solve(basis, _over(_look(basis), where, 0.5)))
+    appearance = compare_appearance(solve(basis, _paint_over(_look(basis), where, 0.5)))
     assert appearance.delta_e > 2
     assert appearance.error < 0.4 * appearance.delta_e
     # A painting over the same samples shares it: then what is missed is no noise.
     look = _look(basis)
-    target = _over(look, where, 2.5 * look[where])
-    appearance = compare_appearance(solve(basis, target, hold=0.0, constraints=_locked()))
+    target = _paint_over(look, where, 2.5 * look[where])
+    appearance = compare_appearance(solve(basis, target, hold=0.0, constraints=_lock_all()))
     assert appearance.noise < 0.1 * appearance.delta_e
 
 
@@ -353,9 +353,9 @@ def test_a_miss_that_is_spread_is_on_nothing(make_basis: Any):
 @pytest.mark.parametrize("space", ["linear", "display"])
 def test_another_view_that_holds_is_named(make_basis: Any, space: Any):
     """One lamp lights all three views alike, and one is to be dark."""
-    views = [_of_view(make_basis, name) for name in ("stalls", "balcony", "box")]
+    views = [_basis_of_view(make_basis, name) for name in ("stalls", "balcony", "box")]
     paints = (0.8, 0.05, 0.8)
-    targets = [_even(x) for x in paints]
+    targets = [_even_target(x) for x in paints]
     solution = solve(views, targets, space=space)
     stalls, balcony, _ = (compare_appearance(view) for view in solution.views)
     assert stalls.limit_groups == balcony.limit_groups == ("views",)
@@ -368,8 +368,8 @@ def test_another_view_that_holds_is_named(make_basis: Any, space: Any):
 
 def test_what_holds_beside_other_views_is_told_apart(make_basis: Any):
     """A limit alone keeps both from being bright."""
-    views = [_of_view(make_basis, name) for name in ("stalls", "balcony")]
-    targets = [_even(0.8)] * 2
+    views = [_basis_of_view(make_basis, name) for name in ("stalls", "balcony")]
+    targets = [_even_target(0.8)] * 2
     dim = Constraints.of({"lamp": {"limits": {"max": 0.1}}})
     for view in solve(views, targets, constraints=dim).views:
         appearance = compare_appearance(view)
@@ -379,25 +379,25 @@ def test_what_holds_beside_other_views_is_told_apart(make_basis: Any):
         assert compare_appearance(view).limit_groups == ()
 
 
-def _of_view(make_basis: Any, sensor: str) -> Any:
+def _basis_of_view(make_basis: Any, sensor: str) -> Any:
     basis = make_basis(images=np.ones((1, *SIZE, 3)), names=["lamp"], emission=[[0.3] * 3])
     return replace(basis, origin=replace(basis.origin, sensor=sensor))
 
 
-def _even(light: float) -> Target:
+def _even_target(light: float) -> Target:
     """As a display shows it at its own exposure."""
     image = np.full((*SIZE, 3), light, np.float32)
     return replace(Target.of(image, name=f"{light:g} painted"), transform=ViewTransform())
 
 
-def _locked() -> Constraints:
+def _lock_all() -> Constraints:
     return Constraints.of({"left": {"lock": True}, "right": {"lock": True}})
 
 
 def test_words_do_not_depend_on_how_finely_it_is_rendered(make_basis: Any):
     """Beyond enough pixels every second one is looked at."""
     basis = _left_and_right(make_basis)
-    target = _over(_look(basis), (slice(None), slice(0, 24)), 0.5)
+    target = _paint_over(_look(basis), (slice(None), slice(0, 24)), 0.5)
     large = make_basis(
         images=np.kron(basis.images, np.ones((1, 16, 16, 1))), emission=basis.current_weights
     )
@@ -417,7 +417,7 @@ def test_words_do_not_depend_on_how_finely_it_is_rendered(make_basis: Any):
 def test_nothing_is_left_to_solve_where_all_is_held(make_basis: Any):
     """Of a basis with noise, whose errors are asked for: no direction is left that they have."""
     basis = _left_and_right(make_basis, noise=0.01)
-    target = _over(_look(basis), np.s_[:, :24], 0.5)
+    target = _paint_over(_look(basis), np.s_[:, :24], 0.5)
     held = Constraints.of({"*": {"lock": 0.3}})
     [analysis] = analyse(solve(basis, target, constraints=held))
     np.testing.assert_allclose(analysis.solution.weights, 0.3)

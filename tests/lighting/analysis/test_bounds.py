@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from least_squares import stacked
+from least_squares import stack_rows
 from nightly import seeds
 from scipy.optimize import lsq_linear
 
@@ -38,7 +38,7 @@ STEPS = (STEP, -STEP)
 
 
 @dataclass
-class Asked:
+class LightRange:
     """One light, or tied ones, by its own words: w = C x + w0 with low <= x <= high."""
 
     lights: tuple[int, ...]
@@ -49,16 +49,16 @@ class Asked:
     kind: str = ""
 
 
-def _on(n: int, light: int, colours: Any) -> Any:
+def _light_columns(n: int, light: int, colours: Any) -> Any:
     C = np.zeros((len(colours), n, 3))
     C[:, light] = colours
     return C.reshape(len(colours), 3 * n)
 
 
-def _free(n: int, light: int, is_scalar: bool) -> Asked:
-    C = _on(n, light, np.ones((1, 3)) if is_scalar else np.eye(3))
+def _free_range(n: int, light: int, is_scalar: bool) -> LightRange:
+    C = _light_columns(n, light, np.ones((1, 3)) if is_scalar else np.eye(3))
     k = len(C)
-    return Asked((light,), C, np.zeros(k), np.full(k, np.inf), np.zeros(3 * n))
+    return LightRange((light,), C, np.zeros(k), np.full(k, np.inf), np.zeros(3 * n))
 
 
 def _problem(make_basis: Any, seed: int, n: int = 6) -> tuple[Any, Target]:
@@ -76,18 +76,18 @@ def _problem(make_basis: Any, seed: int, n: int = 6) -> tuple[Any, Target]:
 
 def _reduced(basis: Any, target: Target) -> tuple[Any, Any]:
     """R (3 n + 1 rows) and q with ‖R w − q‖² the objective: QR of the weighted pixels."""
-    R = np.linalg.qr(np.column_stack(stacked(basis, target)), mode="r")
+    R = np.linalg.qr(np.column_stack(stack_rows(basis, target)), mode="r")
     return R[:, :-1], R[:, -1]
 
 
-def _random(rng: Any, basis: Any) -> tuple[dict[str, Any], list[str], list[Asked]]:
+def _random_ranges(rng: Any, basis: Any) -> tuple[dict[str, Any], list[str], list[LightRange]]:
     """What is asked of each light: as `Constraints.of` takes it, and by its own words."""
     n = len(basis.lights)
     now = np.array([light.emission for light in basis.lights])
     wishes: dict[str, Any] = {}
     asked = []
     for k in range(n - 3):
-        one = _free(n, k, is_scalar=False)
+        one = _free_range(n, k, is_scalar=False)
         kind = rng.choice(["", "lock", "off", "rgb", "color", "dimmer", "kelvin"])
         if kind == "lock":
             emission = rng.exponential(0.3, 3)
@@ -103,14 +103,14 @@ def _random(rng: Any, basis: Any) -> tuple[dict[str, Any], list[str], list[Asked
             limits = {"min": one.low.tolist(), "max": one.high.tolist()}
             wishes[f"l{k}"] = {"limits": limits}
         elif kind in ("color", "dimmer"):
-            one.C = _on(n, k, [kelvin_to_rgb(3200)])
+            one.C = _light_columns(n, k, [kelvin_to_rgb(3200)])
             one.low, one.high = np.zeros(1), np.full(1, np.inf)
             wishes[f"l{k}"] = {"color": "3200K"}
             if kind == "dimmer":
                 one.high[0] = rng.uniform(0.05, 0.5)
                 wishes[f"l{k}"]["limits"] = {"max": float(one.high[0])}
         elif kind == "kelvin":
-            one.C = _on(n, k, [kelvin_to_rgb(2700), kelvin_to_rgb(6500)])
+            one.C = _light_columns(n, k, [kelvin_to_rgb(2700), kelvin_to_rgb(6500)])
             one.low, one.high = np.zeros(2), np.full(2, np.inf)
             wishes[f"l{k}"] = {"kelvin": [2700, 6500]}
         one.kind = kind
@@ -118,20 +118,24 @@ def _random(rng: Any, basis: Any) -> tuple[dict[str, Any], list[str], list[Asked
     # Two tied lights, and one that can only be dimmed.
     ties = []
     if rng.random() < 0.5:
-        C = (_on(n, n - 3, now[[n - 3]]) + _on(n, n - 2, now[[n - 2]])).reshape(1, -1)
-        tied = Asked((n - 3, n - 2), C, np.zeros(1), np.full(1, np.inf), np.zeros(3 * n), "tie")
+        C = (
+            _light_columns(n, n - 3, now[[n - 3]]) + _light_columns(n, n - 2, now[[n - 2]])
+        ).reshape(1, -1)
+        tied = LightRange(
+            (n - 3, n - 2), C, np.zeros(1), np.full(1, np.inf), np.zeros(3 * n), "tie"
+        )
         asked.append(tied)
         ties = [f"l{n - 3}", f"l{n - 2}"]
     else:
-        asked += [_free(n, n - 3, is_scalar=False), _free(n, n - 2, is_scalar=False)]
-    last = _free(n, n - 1, is_scalar=True)
+        asked += [_free_range(n, n - 3, is_scalar=False), _free_range(n, n - 2, is_scalar=False)]
+    last = _free_range(n, n - 1, is_scalar=True)
     if rng.random() < 0.6:
         last.kind, last.high = "scalar", np.array([rng.uniform(0.05, 0.4)])
         wishes[f"l{n - 1}"] = {"limits": {"max": float(last.high[0])}}
     return wishes, ties, [*asked, last]
 
 
-def _best(R: Any, q: Any, asked: list[Asked]) -> float:
+def _least_objective(R: Any, q: Any, asked: list[LightRange]) -> float:
     """The least objective, by scipy."""
     C = np.concatenate([a.C for a in asked]).T
     w0 = np.sum([a.w0 for a in asked], axis=0)
@@ -143,27 +147,27 @@ def _best(R: Any, q: Any, asked: list[Asked]) -> float:
     return float(2 * found.cost)
 
 
-def _let_go(bound: Bound, asked: list[Asked], w: Any, basis: Any) -> list[Asked]:
+def _drop_bound(bound: Bound, asked: list[LightRange], w: Any, basis: Any) -> list[LightRange]:
     """What is asked of all lights without that one bound."""
     n = len(basis.lights)
     mine = [basis.names.index(name) for name in bound.lights]
     others = [a for a in asked if set(a.lights) != set(mine)]
     if bound.kind != "zero":
-        return others + [_free(n, k, basis.lights[k].is_scalar) for k in mine]
+        return others + [_free_range(n, k, basis.lights[k].is_scalar) for k in mine]
     [one] = (a for a in asked if set(a.lights) == set(mine))
-    off = _at_zero(one, w)
+    off = _is_at_zero(one, w)
     low, high = np.where(off, -np.inf, one.low), np.where(off, 0, one.high)
     return [*others, replace(one, low=low, high=high)]
 
 
-def _at_zero(one: Asked, w: Any) -> Any:
+def _is_at_zero(one: LightRange, w: Any) -> Any:
     return np.array([not w.ravel()[column > 0].any() for column in one.C]) & (one.low == 0)
 
 
-def _solved(make_basis: Any, seed: int) -> Any:
+def _solve(make_basis: Any, seed: int) -> Any:
     basis, target = _problem(make_basis, seed)
     rng = np.random.default_rng(1000 + seed)
-    wishes, ties, asked = _random(rng, basis)
+    wishes, ties, asked = _random_ranges(rng, basis)
     constraints = Constraints.of(wishes, tie=ties)
     solution = solve(basis, target, constraints=constraints)
     assert solution.certificate.converged
@@ -177,27 +181,29 @@ def _tangent(solution: Any, light: int) -> Any:
     """The emissions that a light of a range of white mixes about its answer."""
     knobs = solution.problem.local_reduction.knobs
     [knob] = (knob for knob in knobs if knob.lights == (light,))
-    return _on(6, light, [rgb for unknown in knob.unknowns for _, rgb in unknown.columns])
+    return _light_columns(
+        6, light, [rgb for unknown in knob.unknowns for _, rgb in unknown.columns]
+    )
 
 
 def _white_pieces(low: float, high: float) -> list[Any]:
     """The emissions that a light of a range of white mixes, piece by piece."""
-    return [_on(6, 0, pair) for pair in pairwise(white_range(low, high).colors)]
+    return [_light_columns(6, 0, pair) for pair in pairwise(white_range(low, high).colors)]
 
 
 @pytest.mark.parametrize("seed", seeds(60, 250))
 def test_each_gain_is_that_of_the_problem_without_that_one_bound(
     make_basis: Any, seed: int
 ) -> None:
-    basis, target, solution, asked = _solved(make_basis, seed)
+    basis, target, solution, asked = _solve(make_basis, seed)
     R, q = _reduced(basis, target)
     w = solution.lighting.weights_for(basis)
     bounds, left_out = bound_release.bounds_of(solution)
     assert left_out == 0
     assert [b.gain for b in bounds] == sorted((b.gain for b in bounds), reverse=True)
-    before, scale = _best(R, q, asked), q @ q
+    before, scale = _least_objective(R, q, asked), q @ q
     for bound in bounds:
-        gain = before - _best(R, q, _let_go(bound, asked, w, basis))
+        gain = before - _least_objective(R, q, _drop_bound(bound, asked, w, basis))
         assert abs(bound.gain - gain) <= SAME * scale
     # None is overlooked: whatever is asked of a light and costs something has its bound.
     told = {bound.lights for bound in bounds if bound.kind != "zero"}
@@ -205,15 +211,17 @@ def test_each_gain_is_that_of_the_problem_without_that_one_bound(
         names = tuple(basis.names[k] for k in one.lights)
         if one.kind and names not in told:
             freed = [a for a in asked if a is not one]
-            freed += [_free(6, k, basis.lights[k].is_scalar) for k in one.lights]
-            assert before - _best(R, q, freed) <= WORTH * scale
+            freed += [_free_range(6, k, basis.lights[k].is_scalar) for k in one.lights]
+            assert before - _least_objective(R, q, freed) <= WORTH * scale
         labels = {light.name: light.constraint for light in solution.lighting.lights}
     for bound in bounds:
         if bound.kind != "zero":
             assert bound.held_by == labels[bound.lights[0]] != ""
 
 
-def _moved(bound: Bound, asked: list[Asked], w: Any, basis: Any, j: int, h: float) -> list[Asked]:
+def _raise_bound(
+    bound: Bound, asked: list[LightRange], w: Any, basis: Any, j: int, h: float
+) -> list[LightRange]:
     """What is asked of all lights with the j-th number that holds raised by h."""
     mine = [basis.names.index(name) for name in bound.lights]
     others = [a for a in asked if set(a.lights) != set(mine)]
@@ -237,7 +245,7 @@ def _moved(bound: Bound, asked: list[Asked], w: Any, basis: Any, j: int, h: floa
     return [*others, replace(one, w0=w0, low=low, high=high)]
 
 
-def _numbers_of(bound: Bound, asked: list[Asked], basis: Any, j: int) -> Any:
+def _bound_indices(bound: Bound, asked: list[LightRange], basis: Any, j: int) -> Any:
     """Which numbers multiplier j is of: of a mix that is off, the primary that matters most."""
     mine = {basis.names.index(name) for name in bound.lights}
     [one] = (a for a in asked if set(a.lights) == mine)
@@ -246,7 +254,7 @@ def _numbers_of(bound: Bound, asked: list[Asked], basis: Any, j: int) -> Any:
 
 @pytest.mark.parametrize("seed", seeds(40, 120))
 def test_each_multiplier_is_how_fast_the_objective_changes(make_basis: Any, seed: int) -> None:
-    basis, target, solution, asked = _solved(make_basis, seed)
+    basis, target, solution, asked = _solve(make_basis, seed)
     R, q = _reduced(basis, target)
     w = solution.lighting.weights_for(basis)
     bounds, _ = bound_release.bounds_of(solution)
@@ -258,8 +266,11 @@ def test_each_multiplier_is_how_fast_the_objective_changes(make_basis: Any, seed
             if bound.kind == "zero" and multiplier == 0:
                 continue  # a channel that is on
             slopes = []
-            for i in _numbers_of(bound, asked, basis, j):
-                up, down = (_best(R, q, _moved(bound, asked, w, basis, i, h)) for h in STEPS)
+            for i in _bound_indices(bound, asked, basis, j):
+                up, down = (
+                    _least_objective(R, q, _raise_bound(bound, asked, w, basis, i, h))
+                    for h in STEPS
+                )
                 slopes.append((up - down) / (2 * STEP))
             slope = max(slopes)
             if bound.kind == "off":
@@ -276,7 +287,7 @@ def test_multipliers_of_the_tests_are_not_small(make_basis: Any) -> None:
     """Else the one above could not fail."""
     sizes: dict[str, list[float]] = {}
     for seed in range(60):
-        basis, target, solution, _ = _solved(make_basis, seed)
+        basis, target, solution, _ = _solve(make_basis, seed)
         R, q = _reduced(basis, target)
         allowed = 1e-12 * (q @ q) / STEP + 4 * STEP * np.square(R).sum(axis=0).max() * 6
         for bound in bound_release.bounds_of(solution)[0]:
@@ -323,16 +334,20 @@ def test_lights_that_sparse_leaves_out(make_basis: Any, seed: int) -> None:
     constraints = Constraints.of({"l0": {"kelvin": [2700, 6500]}}, sparse=2)
     solution = solve(basis, target, constraints=constraints)
     w = solution.lighting.weights_for(basis)
-    asked = [_free(6, k, basis.lights[k].is_scalar) for k in range(6)]
-    asked[0] = Asked((0,), _tangent(solution, 0), np.zeros(2), np.full(2, np.inf), np.zeros(18))
+    asked = [_free_range(6, k, basis.lights[k].is_scalar) for k in range(6)]
+    asked[0] = LightRange(
+        (0,), _tangent(solution, 0), np.zeros(2), np.full(2, np.inf), np.zeros(18)
+    )
     on = [k for k in range(6) if w[k].any()]
-    before = _best(R, q, [asked[k] for k in on])
+    before = _least_objective(R, q, [asked[k] for k in on])
 
     def gained(k: int) -> float:
         if k:
-            return before - _best(R, q, [asked[j] for j in (*on, k)])
+            return before - _least_objective(R, q, [asked[j] for j in (*on, k)])
         pieces = [replace(asked[0], C=C) for C in _white_pieces(2700, 6500)]
-        return before - min(_best(R, q, [*(asked[j] for j in on), one]) for one in pieces)
+        return before - min(
+            _least_objective(R, q, [*(asked[j] for j in on), one]) for one in pieces
+        )
 
     bounds = [b for b in bound_release.bounds_of(solution)[0] if b.kind == "left out"]
     # Each as what else is asked of it allows: l0 is still white.
@@ -403,7 +418,7 @@ def test_of_many_bounds_those_that_seem_to_matter_most_are_looked_into(
 @pytest.mark.parametrize("seed", seeds(20, 40))
 def test_the_estimate_is_a_lower_limit(make_basis: Any, seed: int) -> None:
     """By moving one light alone nothing is gained that moving all would not gain."""
-    basis, _, solution, _ = _solved(make_basis, seed)
+    basis, _, solution, _ = _solve(make_basis, seed)
     answer = bound_release._bounded_answer(solution, solution.problem.solved)
     norm2 = float(solution.equations.target_norm2.sum())
     gains = {(b.lights, b.kind): b.gain for b in bound_release.bounds_of(solution)[0]}
@@ -414,7 +429,7 @@ def test_the_estimate_is_a_lower_limit(make_basis: Any, seed: int) -> None:
 
 
 def test_bounds_stand_in_the_answer_file(make_basis: Any, tmp_path: Any) -> None:
-    _basis, _target, solution, _ = _solved(make_basis, 7)
+    _basis, _target, solution, _ = _solve(make_basis, 7)
     found = diagnose(solution)
     assert found.bounds
     path = tmp_path / "lighting.json"

@@ -35,7 +35,7 @@ def grain(residual: Any, counted: Any) -> Any:
     return np.stack([channel_grain(residual[..., c], counted) for c in range(3)], axis=-1)
 
 
-def _painted(kind: str) -> Any:
+def _brush_coverage(kind: str) -> Any:
     """(h, w), what a brush does."""
     far = np.hypot(X - 61.3, Y - 40.7)
     return {
@@ -63,7 +63,7 @@ def test_noise_is_measured(kind: str) -> None:
     "kind", ["soft brush", "hard disc", "slanted edge", "gradient", "stripes", "lamp", "strokes"]
 )
 def test_paint_is_no_noise(kind: str) -> None:
-    shape = np.repeat(_painted(kind)[..., None], 3, axis=2)
+    shape = np.repeat(_brush_coverage(kind)[..., None], 3, axis=2)
     part = grain(shape, EVERYWHERE).sum() / np.square(shape).sum()
     assert part < {"lamp": 0.25, "hard disc": 0.03, "slanted edge": 0.03}.get(kind, 0.005)
 
@@ -96,7 +96,7 @@ def test_a_render_as_painting_lacks_nothing_that_lights_could_give(
     halves = 0.02 * rng.normal(size=noise.shape)
     basis = make_basis(images=clean + noise, half_differences=halves if known else None)
     image = clean.sum(axis=0) + 0.1 * _noise("normal")
-    stroke = 0.4 * _painted("soft brush")[..., None]
+    stroke = 0.4 * _brush_coverage("soft brush")[..., None]
 
     def diagnosis(image: Any) -> Any:
         target = Target("render", image.astype(np.float32), EVERYWHERE * np.float32(1), True)

@@ -73,7 +73,7 @@ def _halves(kind: str, rng: np.random.Generator) -> tuple[Any, list[Any]]:
     return clean, halves
 
 
-def _painted(kind: str, clean: Any) -> Target:
+def _painting(kind: str, clean: Any) -> Target:
     image = np.einsum("n,nhwc->hwc", [1, 0.5, 12 if kind == "fireflies" else 0.8], clean)
     image[:, 12:] *= [0.7, 0.6, 0.5]
     return Target("t", image.astype(np.float32), np.ones(SIZE, np.float32), everything=True)
@@ -91,7 +91,7 @@ def test_intervals_hold_what_few_pixels_show(
     make_basis: Any, kind: str, untold: tuple[float, float]
 ):
     clean = _halves(kind, np.random.default_rng(0))[0]
-    target = _painted(kind, clean)
+    target = _painting(kind, clean)
     truth = solve(make_basis(images=clean), target).weights
     held, said = [], []
     for seed in range(SEEDS):
@@ -110,7 +110,7 @@ def test_intervals_hold_what_few_pixels_show(
 def test_intervals_hold_what_one_pixel_has_a_share_of(make_basis: Any, kind: str):
     """A pixel that a few paths meet: its halves may agree by chance, one number for all noise."""
     clean = _halves(kind, np.random.default_rng(0))[0]
-    target = _painted(kind, clean)
+    target = _painting(kind, clean)
     truth = solve(make_basis(images=clean), target).weights
     held = []
     for seed in range(4 * SEEDS):
@@ -122,7 +122,7 @@ def test_intervals_hold_what_one_pixel_has_a_share_of(make_basis: Any, kind: str
 
 
 def test_a_light_that_cannot_be_told_is_so_in_words(make_basis: Any):
-    target = _painted("fireflies", _halves("fireflies", np.random.default_rng(0))[0])
+    target = _painting("fireflies", _halves("fireflies", np.random.default_rng(0))[0])
     basis = _basis(make_basis, "fireflies", 1)
     found = error_bars(solve(basis, target))
     solution = with_error_bars(solve(basis, target), found)

@@ -47,7 +47,7 @@ def bars_of_seeds(bases: list[Basis]) -> list[Any]:
     return [lp.error_bars(answer) for answer in answers]
 
 
-def held(bars: list[Any], light: int) -> float:
+def coverage_share(bars: list[Any], light: int) -> float:
     """The share of seeds and channels whose intervals hold the true weight of a light."""
     true = TRUE_WEIGHTS[light]
     ends = [(low[light], high[light]) for low, high in (its.interval for its in bars)]
@@ -58,11 +58,11 @@ def test_intervals_hold_the_weight_of_a_bulb_in_glass(
     bases: list[Basis], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     bars = bars_of_seeds(bases)
-    assert held(bars, 2) >= 0.9
+    assert coverage_share(bars, 2) >= 0.9
     assert np.mean([its.untold[2] for its in bars]) >= 0.9
     # All are far too dim, and by half differences alone nobody would know.
     solved = np.array([its.weights[2] for its in bars])
     assert (solved < 0.5 * TRUE_WEIGHTS[2]).mean() > 0.9
     none = np.zeros(TRUE_WEIGHTS.shape)
     monkeypatch.setattr(uncertainty, "noise_doubts", lambda *_: none)
-    assert held(bars_of_seeds(bases), 2) < 0.5
+    assert coverage_share(bars_of_seeds(bases), 2) < 0.5

@@ -38,7 +38,7 @@ def _pools(n: int = 5) -> Any:
     return np.stack(pools)[..., None] * np.ones(3)
 
 
-def _painted(clean: Any) -> Target:
+def _painting(clean: Any) -> Target:
     """Something no mix of the pools is: half dark, reddish, and lit from below."""
     y, x = np.mgrid[: SIZE[0], : SIZE[1], :1][:2]
     image = np.einsum("n,nhwc->hwc", [1, 0.5, 0, 0.3, 0], clean)
@@ -46,7 +46,7 @@ def _painted(clean: Any) -> Target:
     return _target(image)
 
 
-def _noisy(clean: Any, sigma: float, rng: np.random.Generator) -> tuple[Any, Any]:
+def _noisy_halves(clean: Any, sigma: float, rng: np.random.Generator) -> tuple[Any, Any]:
     """Mean and half difference of two halves: skewed noise, the same in all channels."""
 
     def half() -> Any:
@@ -57,7 +57,7 @@ def _noisy(clean: Any, sigma: float, rng: np.random.Generator) -> tuple[Any, Any
     return (a + b) / 2, (a - b) / 2
 
 
-def _with_scalar(basis: Basis, *dimmed: int) -> Basis:
+def _tie_channels(basis: Basis, *dimmed: int) -> Basis:
     lights = [replace(x, is_scalar=k in dimmed) for k, x in enumerate(basis.lights)]
     return replace(basis, lights=tuple(lights))
 
@@ -70,13 +70,13 @@ def test_intervals_hold_the_answer_without_noise(
 ):
     """95 % intervals, over seeds: those of lights that are on, and of those that are off."""
     clean = _pools()
-    target = _painted(clean)
-    quiet = _with_scalar(make_basis(images=clean), *dimmed)
+    target = _painting(clean)
+    quiet = _tie_channels(make_basis(images=clean), *dimmed)
     truth = solve(quiet, target).lighting.weights_for(quiet)
     held, missed, told = [], [], []
     for seed in range(SEEDS):
-        images, halves = _noisy(clean, sigma, np.random.default_rng(seed))
-        basis = _with_scalar(make_basis(images=images, half_differences=halves), *dimmed)
+        images, halves = _noisy_halves(clean, sigma, np.random.default_rng(seed))
+        basis = _tie_channels(make_basis(images=images, half_differences=halves), *dimmed)
         found = error_bars(solve(basis, target))
         low, high = found.interval
         held.append((low <= truth + 1e-9) & (truth <= high + 1e-9))
@@ -142,7 +142,7 @@ def test_intervals_are_those_of_student_where_few_pixels_have_noise(make_basis: 
 
 def test_without_noise_nothing_is_uncertain(make_basis: Any):
     basis = make_basis(4, SIZE)
-    solution = solve(basis, _painted(_pools()))
+    solution = solve(basis, _painting(_pools()))
     found = error_bars(solution)
     assert found.scatter.max() == 0
     np.testing.assert_allclose(found.bias, 0, atol=1e-5)
@@ -160,7 +160,7 @@ def test_an_estimate_below_zero_is_nothing_to_gain(make_basis: Any):
 def test_kept_and_unreached_lights_have_no_error(make_basis: Any):
     clean = _pools(3)
     clean[2] = 0
-    images, halves = _noisy(clean, 0.2, np.random.default_rng(0))
+    images, halves = _noisy_halves(clean, 0.2, np.random.default_rng(0))
     basis = make_basis(
         images=images, half_differences=halves, emission=[[1, 1, 1], [1, 0, 0], [2, 2, 2]]
     )
@@ -182,7 +182,7 @@ def test_kept_and_unreached_lights_have_no_error(make_basis: Any):
 def test_a_refinement_comes_closer(make_basis: Any, mixed_sigma: float):
     """On average over seeds; a render of the mix that is nothing but noise does no harm."""
     clean = _pools()
-    target = _painted(clean)
+    target = _painting(clean)
     quiet = make_basis(images=clean)
     best = solve(quiet, target)
     excess: dict[str, list[float]] = {"plain": [], "corrected": [], "refined": []}
@@ -190,12 +190,12 @@ def test_a_refinement_comes_closer(make_basis: Any, mixed_sigma: float):
     truth = best.lighting.weights_for(quiet)
     for seed in range(20):
         rng = np.random.default_rng(seed)
-        images, halves = _noisy(clean, 0.5, rng)
+        images, halves = _noisy_halves(clean, 0.5, rng)
         basis = make_basis(images=images, half_differences=halves)
         plain = solve(basis, target)
         weights = plain.lighting.weights_for(basis)
         mix = np.einsum("nc,nhwc->hwc", weights, clean)
-        image, half = _noisy(mix, mixed_sigma, rng)
+        image, half = _noisy_halves(mix, mixed_sigma, rng)
         mixed = Estimate(image.astype(np.float32), half.astype(np.float32))
         refined = refine(plain, mixed)
         assert refined.problem.refinement is not None
@@ -216,7 +216,7 @@ def test_a_refinement_comes_closer(make_basis: Any, mixed_sigma: float):
 
 def test_the_render_of_the_mix_has_the_size_of_the_basis(make_basis: Any):
     basis = make_basis(2, SIZE)
-    solution = solve(basis, _painted(_pools()))
+    solution = solve(basis, _painting(_pools()))
     small = np.zeros((12, 12, 3), np.float32)
     with pytest.raises(SizeError, match="render of the mix is 12x12 but the basis is 24x24"):
         refine(solution, Estimate(small, small))
@@ -226,7 +226,7 @@ def test_what_is_not_known_is_not_taken_for_no_noise(make_basis: Any):
     """A render beside noise of which nothing is known would be thrown away in silence."""
     basis = make_basis(2, SIZE)
     basis = replace(basis, origin=replace(basis.origin, halves=(0, 0)))
-    solution = solve(basis, _painted(_pools()))
+    solution = solve(basis, _painting(_pools()))
     image = 1.3 * basis.mix(solution.lighting.weights_for(basis))
     assert error_bars(solution) is None
     with pytest.raises(BasisError, match="is unknown, so"):
@@ -237,7 +237,7 @@ def test_what_is_not_known_is_not_taken_for_no_noise(make_basis: Any):
 
 def test_a_noiseless_refinement_stays_where_it_is(make_basis: Any):
     basis = make_basis(4, SIZE)
-    solution = solve(basis, _painted(_pools()))
+    solution = solve(basis, _painting(_pools()))
     image = basis.mix(solution.lighting.weights_for(basis))
     again = refine(solution, Estimate(image, 0 * image))
     weights = partial(Basis.mix, basis)
@@ -270,10 +270,10 @@ def test_error_bars_under_constraints(make_basis: Any, name: str) -> None:
     asked, lights = ASKED[name]
     others = {key: value for key, value in asked.items() if key != "lights"}
     constraints = Constraints.of(asked.get("lights", {}), **others)
-    target = _painted(clean)
+    target = _painting(clean)
     solved, errors, ends = [], [], []
     for seed in range(SEEDS):
-        images, halves = _noisy(clean, 0.1, np.random.default_rng(seed))
+        images, halves = _noisy_halves(clean, 0.1, np.random.default_rng(seed))
         basis = make_basis(
             images=images, half_differences=halves, names="abcde", emission=np.ones((5, 3))
         )
@@ -367,7 +367,7 @@ def test_what_to_believe_is_decided_among_what_may_move(make_basis: Any, name: s
     halves = sigma * rng.normal(size=(2, *SIZE, 1)) * images
     basis = make_basis(images=images, half_differences=halves, names="ab", emission=np.ones((2, 3)))
     if name == "scalar":
-        basis = _with_scalar(basis, 0, 1)
+        basis = _tie_channels(basis, 0, 1)
     others = {key: value for key, value in asked.items() if key != "lights"}
     constraints = Constraints.of(asked.get("lights", {}), **others)
     there = {"lock": 3, "scalar": 3, "color": 0.2, "tie": 1, "limit": 0}[name]
@@ -463,7 +463,7 @@ def test_intervals_at_bounds_hold_what_is_just_inside(make_basis: Any, name: str
     one = 0.005 / (np.sqrt(3) if "dimmer" in name else 1)
     truth = (0.0 if name == "zero" else 0.5) + side * inside * one
     clean = 0.5 + rng.random((2, *SIZE, 3))
-    painted = np.einsum("nhwc,n->hwc", clean, [1, truth]) + _out_of_reach(clean, rng)
+    painted = np.einsum("nhwc,n->hwc", clean, [1, truth]) + _unreachable_picture(clean, rng)
     constraints = Constraints.of({"lamp": asked})
     held, spread = [], []
     for _ in range(seeds):
@@ -479,7 +479,7 @@ def test_intervals_at_bounds_hold_what_is_just_inside(make_basis: Any, name: str
     assert np.mean(held) >= 0.95 - 3 * np.sqrt(0.95 * 0.05 / count)
 
 
-def _out_of_reach(clean: Any, rng: np.random.Generator) -> Any:
+def _unreachable_picture(clean: Any, rng: np.random.Generator) -> Any:
     """(h, w, 3) of unit variance that no mix of the lights has a part in."""
     residual = rng.normal(0, 1, clean.shape[1:])
     for c in range(3):

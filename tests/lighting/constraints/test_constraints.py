@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from least_squares import stacked
+from least_squares import stack_rows
 from nightly import seeds
 from qp import least
 from scipy.optimize import lsq_linear, nnls
@@ -42,25 +42,25 @@ def _problem(make_basis: Any, seed: int, n: int = 4, *, scalar: tuple[int, ...] 
     return replace(basis, lights=tuple(lights)), Target("t", image, importance, everything=False)
 
 
-def _solved(basis: Any, target: Target, **asked: Any) -> tuple[Any, float, Any]:
+def _solve(basis: Any, target: Target, **asked: Any) -> tuple[Any, float, Any]:
     solution = solve(basis, target, constraints=Constraints.of(**asked))
     assert solution.certificate.converged
     w = solution.lighting.weights_for(basis)
-    A, y = stacked(basis, target)
+    A, y = stack_rows(basis, target)
     return w, float(((A @ w.ravel() - y) ** 2).sum()), solution
 
 
-def _current(basis: Any) -> Any:
+def _current_weights(basis: Any) -> Any:
     return np.array([light.emission for light in basis.lights])
 
 
-def _best(A: Any, y: Any, C: Any, w0: Any, low: Any = 0.0, high: Any = np.inf) -> float:
+def _least_squares(A: Any, y: Any, C: Any, w0: Any, low: Any = 0.0, high: Any = np.inf) -> float:
     """The least ‖A (C x + w₀) − y‖² between bounds, by scipy."""
     found = lsq_linear(A @ C, y - A @ w0.ravel(), bounds=(low, high), method="bvls", tol=1e-14)
     return float(2 * found.cost)
 
 
-def _best_capped(A: Any, y: Any, C: Any, row: Any, least_of: float, most: float) -> float:
+def _least_squares_capped(A: Any, y: Any, C: Any, row: Any, least_of: float, most: float) -> float:
     """The same under least_of ≤ row · x ≤ most, x ≥ 0, by quadprog."""
     AC = A @ C
     x = least(AC.T @ AC, AC.T @ y, rows=[row], limits=[(least_of, most)])
@@ -83,8 +83,8 @@ def _check_close(mine: float, oracle: float, y: Any, *, tolerance: float = SAME)
 @pytest.mark.parametrize("seed", PROBLEMS)
 def test_fixed_colours_and_leds(make_basis: Any, seed: int) -> None:
     basis, target = _problem(make_basis, seed)
-    A, y = stacked(basis, target)
-    free = _solved(basis, target, sparse=None, prefer_current=0, light={})[1]
+    A, y = stack_rows(basis, target)
+    free = _solve(basis, target, sparse=None, prefer_current=0, light={})[1]
     leds = [hex_to_rgb(text) for text in ("#ff2000", "#20ff00", "#3000ff", "#ffb070")]
     for asked, colours in (
         ({"color": "3200K"}, [kelvin_to_rgb(3200)]),
@@ -92,8 +92,8 @@ def test_fixed_colours_and_leds(make_basis: Any, seed: int) -> None:
         ({"color": [0.2, 0, 1]}, [[0.2, 0, 1]]),
         ({"primaries": ["#ff2000", "#20ff00", "#3000ff", "#ffb070"]}, leds),
     ):
-        w, mine, solution = _solved(basis, target, light={"l1": asked})
-        _check_close(mine, _best(A, y, _columns(4, 1, colours), np.zeros(12)), y)
+        w, mine, solution = _solve(basis, target, light={"l1": asked})
+        _check_close(mine, _least_squares(A, y, _columns(4, 1, colours), np.zeros(12)), y)
         assert mine >= free - SAME * (y @ y)
         x, distance = nnls(np.transpose(colours).astype(float), w[1])
         assert distance < 1e-9 * max(1, w[1].max())
@@ -104,7 +104,7 @@ def test_fixed_colours_and_leds(make_basis: Any, seed: int) -> None:
 @pytest.mark.parametrize("seed", PROBLEMS)
 def test_limits_of_emission(make_basis: Any, seed: int) -> None:
     basis, target = _problem(make_basis, seed)
-    A, y = stacked(basis, target)
+    A, y = stack_rows(basis, target)
     high = np.full((4, 3), np.inf)
     low = np.zeros((4, 3))
     high[:, :] = [0.3, 0.4, 0.2]
@@ -113,20 +113,20 @@ def test_limits_of_emission(make_basis: Any, seed: int) -> None:
         "l*": {"limits": {"max": [0.3, 0.4, 0.2]}},
         "l2": {"limits": {"min": [0.1, 0.2, 0.3], "max": [0.6, 0.6, 2]}},
     }
-    w, mine, _ = _solved(basis, target, light=asked)
+    w, mine, _ = _solve(basis, target, light=asked)
     assert (w <= high).all()
     assert (w >= low).all()
-    _check_close(mine, _best(A, y, np.eye(12), np.zeros(12), low.ravel(), high.ravel()), y)
+    _check_close(mine, _least_squares(A, y, np.eye(12), np.zeros(12), low.ravel(), high.ravel()), y)
 
 
 @pytest.mark.parametrize("seed", PROBLEMS)
 def test_a_range_of_white_is_as_good_as_the_best_of_its_pieces(make_basis: Any, seed: int) -> None:
     basis, target = _problem(make_basis, seed)
-    A, y = stacked(basis, target)
+    A, y = stack_rows(basis, target)
     asked = {"kelvin": [2700, 6500], "duv": 0.002}
-    w, mine, solution = _solved(basis, target, light={"l1": asked})
+    w, mine, solution = _solve(basis, target, light={"l1": asked})
     pieces = pairwise(white_range(2700, 6500, 0.002).colors)
-    best = min(_best(A, y, _columns(4, 1, piece), np.zeros(12)) for piece in pieces)
+    best = min(_least_squares(A, y, _columns(4, 1, piece), np.zeros(12)) for piece in pieces)
     _check_close(mine, best, y)
     assert solution.lighting.lights[1].constraint
     if w[1].any():
@@ -138,8 +138,8 @@ def test_a_range_of_white_is_as_good_as_the_best_of_its_pieces(make_basis: Any, 
 @pytest.mark.parametrize("seed", PROBLEMS)
 def test_limits_of_luminance(make_basis: Any, seed: int) -> None:
     basis, target = _problem(make_basis, seed)
-    A, y = stacked(basis, target)
-    current = float(_current(basis)[1] @ LUMINANCE)
+    A, y = stack_rows(basis, target)
+    current = float(_current_weights(basis)[1] @ LUMINANCE)
     whites = list(pairwise(white_range(2700, 6500).colors))
     for limits, lowest, most in (
         ({"max": 0.2}, 0.0, 0.2),
@@ -147,11 +147,11 @@ def test_limits_of_luminance(make_basis: Any, seed: int) -> None:
         ({"min": 0.5, "max": 0.9}, 0.5, 0.9),
     ):
         for extra, mixes in (({}, [np.eye(3)]), ({"kelvin": [2700, 6500]}, whites)):
-            w, mine, _ = _solved(basis, target, light={"l1": {"limits": limits, **extra}})
+            w, mine, _ = _solve(basis, target, light={"l1": {"limits": limits, **extra}})
             # Round-off of a sum of three.
             assert lowest - 1e-12 <= w[1] @ LUMINANCE <= most + 1e-12
             each = [_columns(4, 1, colours) for colours in mixes]
-            best = [_best_capped(A, y, C, LUMINANCE @ C[3:6], lowest, most) for C in each]
+            best = [_least_squares_capped(A, y, C, LUMINANCE @ C[3:6], lowest, most) for C in each]
             # Of whites that no neighbour and no other white alone betters there may be several.
             tolerance = 2e-4 if extra else SAME
             assert mine >= min(best) - SAME * (y @ y)
@@ -161,51 +161,51 @@ def test_limits_of_luminance(make_basis: Any, seed: int) -> None:
 @pytest.mark.parametrize("seed", PROBLEMS)
 def test_ties_locks_and_off(make_basis: Any, seed: int) -> None:
     basis, target = _problem(make_basis, seed)
-    A, y = stacked(basis, target)
-    now = _current(basis)
+    A, y = stack_rows(basis, target)
+    now = _current_weights(basis)
     # One dimmer: the columns of both, as they shine now, are one.
-    w, mine, _ = _solved(basis, target, tie=["l0", "l2"])
+    w, mine, _ = _solve(basis, target, tie=["l0", "l2"])
     C = np.zeros((12, 7))
     C[[3, 4, 5, 9, 10, 11], range(6)] = 1
     C[0:3, 6], C[6:9, 6] = now[0], now[2]
-    _check_close(mine, _best(A, y, C, np.zeros(12)), y)
+    _check_close(mine, _least_squares(A, y, C, np.zeros(12)), y)
     np.testing.assert_allclose(w[0] / now[0], w[2, 0] / now[2, 0], rtol=1e-12)
     # What is locked moves to the right-hand side.
     held = np.zeros((4, 3))
     held[3], held[0] = now[3], [0.5, 0.25, 0.125]
     C = np.eye(12)[:, 3:9]
     asked = {"l3": {"lock": True}, "l0": {"lock": [0.5, 0.25, 0.125]}}
-    w, mine, _ = _solved(basis, target, light=asked)
+    w, mine, _ = _solve(basis, target, light=asked)
     np.testing.assert_array_equal(w[[0, 3]], held[[0, 3]])
-    _check_close(mine, _best(A, y, C, held), y)
+    _check_close(mine, _least_squares(A, y, C, held), y)
     # What is off might as well not be there.
-    w, mine, _ = _solved(basis, target, light={"l0": {"off": True}, "l3": {"off": True}})
+    w, mine, _ = _solve(basis, target, light={"l0": {"off": True}, "l3": {"off": True}})
     assert not w[[0, 3]].any()
-    _check_close(mine, _best(A, y, C, np.zeros(12)), y)
+    _check_close(mine, _least_squares(A, y, C, np.zeros(12)), y)
 
 
 @pytest.mark.parametrize("seed", PROBLEMS)
 def test_the_pull_to_the_present(make_basis: Any, seed: int) -> None:
     basis, target = _problem(make_basis, seed, scalar=(2,))
-    A, y = stacked(basis, target)
-    now, strength = _current(basis), 0.05
+    A, y = stack_rows(basis, target)
+    now, strength = _current_weights(basis), 0.05
     power = np.square(basis.images, dtype=np.float64).sum(axis=(1, 2))
     root = np.sqrt(strength * power).ravel()
     rows, aims = np.vstack([A, np.diag(root)]), np.concatenate([y, root * now.ravel()])
-    w, _, _ = _solved(basis, target, prefer_current=strength)
+    w, _, _ = _solve(basis, target, prefer_current=strength)
     mine = float(((rows @ w.ravel() - aims) ** 2).sum())
     C = _columns(4, 2, np.ones((1, 3)))
-    _check_close(mine, _best(rows, aims, C, np.zeros(12)), aims)
+    _check_close(mine, _least_squares(rows, aims, C, np.zeros(12)), aims)
 
 
-def _feasible(rng: Any, basis: Any, answer: Any) -> Any:
+def _random_feasible(rng: Any, basis: Any, answer: Any) -> Any:
     """A random lighting that keeps to `EVERYTHING`, by its words alone.
 
     Of a range of white, on the straight piece on which the answer is: the range is no convex set.
     """
     whites = white_range(2700, 5000)
     [place] = np.floor(whites.places(answer[[2]]) - 1e-9).clip(0)
-    now, w = _current(basis), rng.exponential(1, (7, 3))
+    now, w = _current_weights(basis), rng.exponential(1, (7, 3))
     w[0] = now[0]
     w[1] = rng.exponential() * kelvin_to_rgb(3200)
     w[1] *= min(1, 0.3 / (w[1] @ LUMINANCE))
@@ -234,20 +234,20 @@ def test_no_feasible_lighting_is_better_than_all_constraints_at_once(
 ) -> None:
     """The variational inequality: no way from the answer to another lighting goes down."""
     basis, target = _problem(make_basis, seed, 7, scalar=(6,))
-    w, _, _ = _solved(basis, target, **EVERYTHING)
-    A, y = stacked(basis, target)
+    w, _, _ = _solve(basis, target, **EVERYTHING)
+    A, y = stack_rows(basis, target)
     gradient = A.T @ (A @ w.ravel() - y)
     rng = np.random.default_rng(seed)
     for _ in range(200):
-        way = (_feasible(rng, basis, w) - w).ravel()
+        way = (_random_feasible(rng, basis, w) - w).ravel()
         # A KKT residual of 1e-12 and its condition, beside the terms that cancel.
         assert gradient @ way >= -1e-8 * (y @ y)
 
 
 def test_one_light_of_fixed_colour_in_closed_form(make_basis: Any) -> None:
     basis, target = _problem(make_basis, 3, 1)
-    w, _, _ = _solved(basis, target, light={"l0": {"color": "3200K"}})
-    A, y = stacked(basis, target)
+    w, _, _ = _solve(basis, target, light={"l0": {"color": "3200K"}})
+    A, y = stack_rows(basis, target)
     column = A @ kelvin_to_rgb(3200)
     expected = max(column @ y / (column @ column), 0) * kelvin_to_rgb(3200)
     np.testing.assert_allclose(w[0], expected, rtol=1e-10)
@@ -259,7 +259,7 @@ def test_a_light_of_a_range_has_every_white_in_it(make_basis: Any, kelvin: float
     truth = np.array([1.7 * kelvin_to_rgb(kelvin), [0.2, 0.3, 0.4]])
     image = np.einsum("nhwc,nc->hwc", basis.images, truth).astype(np.float32)
     target = replace(target, image=image)
-    w, _, _ = _solved(basis, target, light={"l0": {"kelvin": [2700, 6500]}})
+    w, _, _ = _solve(basis, target, light={"l0": {"kelvin": [2700, 6500]}})
     # The picture is float32, and a piece of the locus straight.
     np.testing.assert_allclose(w, truth, atol=3e-4)
 
@@ -269,11 +269,11 @@ def test_what_is_not_active_changes_nothing(make_basis: Any, seed: int) -> None:
     basis, target = _problem(make_basis, seed)
     plain = solve(basis, target).lighting.weights_for(basis)
     for limits in ({"max": 1e4}, {"max": [1e3, 1e4, 1e5]}, {"min": 0.0, "max": "1e6%"}):
-        w, _, solution = _solved(basis, target, light={"l*": {"limits": limits}})
+        w, _, solution = _solve(basis, target, light={"l*": {"limits": limits}})
         # A KKT residual of 1e-10 times the condition of the basis.
         np.testing.assert_allclose(w, plain, atol=1e-8)
         assert not any(light.is_active for light in solution.lighting.lights)
-    w, _, _ = _solved(basis, target, light={"l1": {"limits": {"max": 0.01}}})
+    w, _, _ = _solve(basis, target, light={"l1": {"limits": {"max": 0.01}}})
     assert np.abs(w - plain).max() > 1e-3
 
 
@@ -282,9 +282,9 @@ def test_active_is_what_holds_a_light_back(make_basis: Any) -> None:
     plain = solve(basis, target).lighting.weights_for(basis)
     tight = {"l0": {"lock": plain[0].tolist()}, "l1": {"limits": {"max": (plain[1] / 2).tolist()}}}
     # Locked where it would be anyway: nothing holds it, until another light is moved.
-    alone = _solved(basis, target, light={"l0": tight["l0"]})[2]
+    alone = _solve(basis, target, light={"l0": tight["l0"]})[2]
     assert [light.is_active for light in alone.lighting.lights] == [False] * 4
-    both = _solved(basis, target, light=tight)[2]
+    both = _solve(basis, target, light=tight)[2]
     assert [light.is_active for light in both.lighting.lights] == [True, True, False, False]
 
 
@@ -296,13 +296,13 @@ def test_a_light_that_reaches_nothing_stays_as_near_as_it_may(make_basis: Any) -
     target = Target(
         "t", np.ones((*SIZE, 3), np.float32), np.ones(SIZE, np.float32), everything=True
     )
-    free = _solved(basis, target, light={"a": {"limits": {"max": 9}}})[2]
+    free = _solve(basis, target, light={"a": {"limits": {"max": 9}}})[2]
     assert free.certificate.unreached == ("b",)
     assert free.lighting.emission["b"] == (1, 2, 3)
     assert free.lighting.emission["c"][0] == pytest.approx(1, rel=1e-9)
-    w, _, _ = _solved(basis, target, light={"b": {"limits": {"max": "50%"}}})
+    w, _, _ = _solve(basis, target, light={"b": {"limits": {"max": "50%"}}})
     assert w[1] @ LUMINANCE == pytest.approx(0.5 * (np.array([1, 2, 3]) @ LUMINANCE))
-    w, _, solution = _solved(basis, target, tie=["a", "b"])
+    w, _, solution = _solve(basis, target, tie=["a", "b"])
     np.testing.assert_allclose(w[0], w[1])
     assert solution.certificate.unreached == ()
 
@@ -311,9 +311,9 @@ def test_scalar_and_kept_lights(make_basis: Any) -> None:
     basis, target = _problem(make_basis, 2, 5, scalar=(1, 2))
     kept = replace(basis.lights[4], name="rest", emission=(1.0,) * 3, is_fixed=True, members=("x",))
     basis = replace(basis, lights=(*basis.lights[:4], kept))
-    A, y = stacked(basis, target)
+    A, y = stack_rows(basis, target)
     asked = {"l1": {"limits": {"max": "20%"}}, "rest": {"lock": True}, "x": {"lock": True}}
-    w, mine, _ = _solved(basis, target, light=asked, tie=["l2", "l3"])
+    w, mine, _ = _solve(basis, target, light=asked, tie=["l2", "l3"])
     assert (w[4] == 1).all()
     assert w[1, 0] == w[1, 1] == w[1, 2] <= 0.2
     C = np.zeros((15, 5))
@@ -322,8 +322,8 @@ def test_scalar_and_kept_lights(make_basis: Any) -> None:
     C[6:9, 4], C[9:12, 4] = 1, basis.lights[3].emission
     w0 = np.zeros(15)
     w0[12:] = 1
-    _check_close(mine, _best(A, y, C, w0, 0, [np.inf] * 3 + [0.2, np.inf]), y)
-    w, _, _ = _solved(basis, target, light={"l1": {"lock": "30%"}, "l2": {"lock": 0.7}})
+    _check_close(mine, _least_squares(A, y, C, w0, 0, [np.inf] * 3 + [0.2, np.inf]), y)
+    w, _, _ = _solve(basis, target, light={"l1": {"lock": "30%"}, "l2": {"lock": 0.7}})
     np.testing.assert_allclose(w[1:3], [[0.3] * 3, [0.7] * 3])
 
 
@@ -341,7 +341,7 @@ def test_scalar_and_kept_lights(make_basis: Any) -> None:
 def test_what_a_light_can_be_locked_at(make_basis: Any, lock: Any, expected: Any) -> None:
     basis = make_basis(2, SIZE, names=["a", "b"], emission=[[1, 2, 3]] * 2)
     _, target = _problem(make_basis, 0)
-    w, _, _ = _solved(basis, target, light={"a": {"lock": lock}})
+    w, _, _ = _solve(basis, target, light={"a": {"lock": lock}})
     np.testing.assert_allclose(w[0], expected, rtol=1e-12)
 
 
@@ -354,14 +354,14 @@ def test_what_stands_later_and_names_go_before(make_basis: Any) -> None:
     both = below.and_then(Constraints.of({"l*": {"lock": True}}, sparse=2))
     assert both.sparse == 2
     w = solve(basis, target, constraints=replace(both, sparse=None)).lighting.weights_for(basis)
-    np.testing.assert_array_equal(w, _current(basis))
+    np.testing.assert_array_equal(w, _current_weights(basis))
     again = below.and_then(Constraints.of({"l2": {"off": False}}))
     assert solve(basis, target, constraints=again).lighting.weights_for(basis)[2].any()
 
 
 def test_the_answer_file_says_what_held_a_light(make_basis: Any, tmp_path: Any) -> None:
     basis, target = _problem(make_basis, 4)
-    _, _, solution = _solved(basis, target, light={"l1": {"limits": {"max": 0.01}}})
+    _, _, solution = _solve(basis, target, light={"l1": {"limits": {"max": 0.01}}})
     write_lighting(tmp_path / "lighting.json", solution.lighting)
     again = read_lighting(tmp_path / "lighting.json")
     assert again == solution.lighting
@@ -500,8 +500,8 @@ def test_wishes_that_do_not_fit_the_lights(make_basis: Any, asked: Any, words: s
 
 def test_ties_of_lights_with_colours_and_limits(make_basis: Any) -> None:
     basis, target = _problem(make_basis, 8)
-    now = _current(basis) @ LUMINANCE
-    w, _, _ = _solved(
+    now = _current_weights(basis) @ LUMINANCE
+    w, _, _ = _solve(
         basis,
         target,
         tie=[{"lights": ["l0", "l1"], "color": "3200K"}, ["l2", "l3"]],
@@ -516,7 +516,7 @@ def test_ties_of_lights_with_colours_and_limits(make_basis: Any) -> None:
 def test_who_holds_a_light_holds_its_dimmer(make_basis: Any) -> None:
     """As if each of the lights on it had been held, at the same share of the present."""
     basis, target = _problem(make_basis, 8)
-    now, tie = _current(basis), [["l0", "l1"]]
+    now, tie = _current_weights(basis), [["l0", "l1"]]
     level = 0.3 * float(now[0] @ LUMINANCE)
     warm = (level * kelvin_to_rgb(3200)).tolist()
     for lock, first, share in (
@@ -528,14 +528,14 @@ def test_who_holds_a_light_holds_its_dimmer(make_basis: Any) -> None:
         (None, 0 * now[0], 0.0),
     ):
         asked = {"off": True} if lock is None else {"lock": lock}
-        w, _, _ = _solved(basis, target, tie=tie, light={"l0": asked})
+        w, _, _ = _solve(basis, target, tie=tie, light={"l0": asked})
         each = {"l0": {"lock": first.tolist()}, "l1": {"lock": (share * now[1]).tolist()}}
-        expected, _, _ = _solved(basis, target, light=each)
+        expected, _, _ = _solve(basis, target, light=each)
         np.testing.assert_allclose(w[0], first, rtol=1e-12)
         np.testing.assert_allclose(w, expected, rtol=1e-9, atol=1e-9 * expected.max())
     # Both at the same share are one wish.
     both = {"l0": {"lock": "30%"}, "l1": {"lock": "30%"}}
-    w, _, _ = _solved(basis, target, tie=tie, light=both)
+    w, _, _ = _solve(basis, target, tie=tie, light=both)
     np.testing.assert_allclose(w[:2], 0.3 * now[:2], rtol=1e-12)
 
 
@@ -555,16 +555,16 @@ def test_no_constraints_are_the_plain_problem(make_basis: Any) -> None:
 def test_the_best_few_lights(make_basis: Any, seed: int) -> None:
     """Against all choices of two of five by scipy; what is locked shines along."""
     basis, target = _problem(make_basis, seed, 6)
-    A, y = stacked(basis, target)
+    A, y = stack_rows(basis, target)
     w0 = np.zeros((6, 3))
-    w0[5] = _current(basis)[5]
-    w, mine, solution = _solved(basis, target, sparse=2, light={"l5": {"lock": True}})
+    w0[5] = _current_weights(basis)[5]
+    w, mine, solution = _solve(basis, target, sparse=2, light={"l5": {"lock": True}})
     on = np.flatnonzero(w[:5].any(axis=1))
     assert len(on) <= 2
 
     def of(lights: Any) -> float:
         C = np.eye(18)[:, [3 * k + c for k in lights for c in range(3)]]
-        return _best(A, y, C, w0)
+        return _least_squares(A, y, C, w0)
 
     # The best of these that are on, and, where exchanging found it, of all.
     _check_close(mine, of(on), y)
@@ -582,13 +582,13 @@ def test_the_best_few_lights(make_basis: Any, seed: int) -> None:
 def test_few_lights_among_ties_and_lower_limits(make_basis: Any) -> None:
     basis, target = _problem(make_basis, 1, 5)
     limits = {"l4": {"limits": {"min": 0.01}}}
-    w, _, _ = _solved(basis, target, sparse=2, tie=["l0", "l1", "l2"], light=limits)
+    w, _, _ = _solve(basis, target, sparse=2, tie=["l0", "l1", "l2"], light=limits)
     assert w[4] @ LUMINANCE >= 0.01 - 1e-12
     assert w[0].any() == w[1].any() == w[2].any()
     with pytest.raises(ConstraintError, match="sparse is 1, but 2 lights have a lower limit"):
-        _solved(basis, target, sparse=1, light={"l[34]": limits["l4"]})
+        _solve(basis, target, sparse=1, light={"l[34]": limits["l4"]})
     # More than there are is no constraint.
-    all_of_them = _solved(basis, target, sparse=9)[0]
+    all_of_them = _solve(basis, target, sparse=9)[0]
     np.testing.assert_allclose(all_of_them, solve(basis, target).lighting.weights_for(basis))
 
 

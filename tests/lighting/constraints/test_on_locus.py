@@ -136,13 +136,13 @@ def test_under_the_brush_all_lights_are_white(make_basis: Any, space: Any) -> No
     basis = make_basis(4, SIZE, seed=5)
     view = LiveView(basis, image := basis.current_look.copy(), weight := np.zeros(SIZE, np.float32))
     fit = resolve_for_targets(
-        lp.Fit(colors="white", space=space, hold=0.3), [_asked_through(basis)]
+        lp.Fit(colors="white", space=space, hold=0.3), [_narrow_target(basis)]
     )
     live = LiveSolver([view], fit=fit, constraints=lp.Constraints())
     answer = live.answer(basis.current_weights)
     current = basis.current_weights
     np.testing.assert_allclose(luminance(answer), luminance(current), rtol=1e-9)
-    _are_nearest(answer, current)
+    _assert_nearest(answer, current)
     rng = np.random.default_rng(1)
     for _ in range(12):
         top, left = rng.integers(0, 6, 2)
@@ -161,12 +161,12 @@ def test_under_the_brush_all_lights_are_white(make_basis: Any, space: Any) -> No
     assert problem.objective(answer).sum() <= 1.02 * problem.objective(exact.weights).sum()
 
 
-def _asked_through(basis: lp.Basis) -> lp.Target:
+def _narrow_target(basis: lp.Basis) -> lp.Target:
     one = np.ones(SIZE, np.float32)
     return lp.Target("t", basis.current_look, one, False, through_view=True, over_look=True)
 
 
-def _are_nearest(answer: Any, current: Any) -> None:
+def _assert_nearest(answer: Any, current: Any) -> None:
     """Whether each light has the white at its own temperature."""
     for w, now in zip(answer, current, strict=True):
         kelvin, duv = cct_and_duv(w)  # type: ignore[misc]

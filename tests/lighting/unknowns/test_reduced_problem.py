@@ -56,7 +56,7 @@ def _solve(columns: Any, values: Any, start: Any = None, **options: Any) -> Redu
     return solve_free(_equations(columns, values), start, **options)
 
 
-def _oracle(columns: Any, values: Any) -> Any:
+def _solve_by_scipy(columns: Any, values: Any) -> Any:
     return np.stack([nnls(A, y)[0] for A, y in zip(columns, values, strict=True)], axis=1)
 
 
@@ -73,7 +73,7 @@ def test_agrees_with_scipy(n: int, kind: str):
     for seed in range(8):
         columns, values = _problem(n, kind, seed)
         result = _solve(columns, values)
-        truth = _oracle(columns, values)
+        truth = _solve_by_scipy(columns, values)
         assert result.converged
         assert _relative_error(result.weights, truth, columns) < WEIGHT_TOLERANCE
         # A light that should be off is off, not nearly off.
@@ -104,13 +104,13 @@ def test_the_start_does_not_change_the_answer(start_at: float):
         columns, values = _problem(8, "correlated", seed)
         start = np.random.default_rng(seed).random((8, 3)) * start_at
         result = _solve(columns, values, start)
-        truth = _oracle(columns, values)
+        truth = _solve_by_scipy(columns, values)
         assert _relative_error(result.weights, truth, columns) < WEIGHT_TOLERANCE
 
 
 def test_a_start_at_the_answer_needs_no_sweep():
     columns, values = _problem(8, "uniform", 0)
-    assert _solve(columns, values, _oracle(columns, values)).sweeps == (0, 0, 0)
+    assert _solve(columns, values, _solve_by_scipy(columns, values)).sweeps == (0, 0, 0)
 
 
 def test_the_start_is_not_written_to():

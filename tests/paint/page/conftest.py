@@ -48,7 +48,7 @@ def site() -> Iterator[Site]:
 
         def do_GET(self) -> None:
             path = unquote(urlsplit(self.path).path)
-            headers, content = served(made, path)
+            headers, content = served_file(made, path)
             self.send_response(200 if headers else 404)
             for name, value in headers.items():
                 self.send_header(name, value)
@@ -70,7 +70,7 @@ def site() -> Iterator[Site]:
     server.server_close()
 
 
-def served(site: Site, path: str) -> tuple[dict[str, str], bytes]:
+def served_file(site: Site, path: str) -> tuple[dict[str, str], bytes]:
     """Headers and content; none for what there is not."""
     if path.startswith("/data/"):
         array = site.arrays.get(path.removeprefix("/data/"))
@@ -158,7 +158,7 @@ def tabs(browser: Any, site: Site) -> Iterator[Tabs]:
 
 
 @pytest.fixture
-def opened(tabs: Tabs) -> Iterator[Any]:
+def new_painter(tabs: Tabs) -> Iterator[Any]:
     """Opens painters. No test leaves an error on the console, or one that nobody caught.
 
     is_fresh: in a context of its own, for a test that changes what cannot be changed back, such as
@@ -209,5 +209,5 @@ def opened(tabs: Tabs) -> Iterator[Any]:
 
 
 @pytest.fixture
-def painter(opened: Any) -> Painter:
-    return opened()
+def painter(new_painter: Any) -> Painter:
+    return new_painter()

@@ -83,9 +83,9 @@ LEGENDS = [("48x27", "side", True), ("27x48", "wipe", True), ("48x27", "wipe", F
 
 @pytest.mark.parametrize(("size", "layout", "has_room"), LEGENDS)
 def test_a_legend_lies_on_no_picture_where_there_is_room(
-    opened: Any, size: str, layout: str, has_room: bool
+    new_painter: Any, size: str, layout: str, has_room: bool
 ) -> None:
-    painter = opened(f"size={size}")
+    painter = new_painter(f"size={size}")
     if layout == "wipe":
         painter.page.keyboard.press("v")
     painter.page.evaluate("() => { engine.importance = 10; }")
@@ -181,8 +181,8 @@ def test_looks(painter: Painter) -> None:
 
 
 @pytest.mark.parametrize("way", ["deleted", "elsewhere"])
-def test_looks_are_compared_while_both_are_there(opened: Any, way: str) -> None:
-    painter = opened(viewport={"width": 1600, "height": 900})
+def test_looks_are_compared_while_both_are_there(new_painter: Any, way: str) -> None:
+    painter = new_painter(viewport={"width": 1600, "height": 900})
     for _ in range(3):
         painter.page.keyboard.press("Control+s")
         painter.still()
@@ -269,9 +269,9 @@ WITH_LOOKS = [(1280, 720), (1600, 900), (780, 600), (690, 560), (480, 640)]
 
 @pytest.mark.parametrize("size", WITH_LOOKS)
 def test_pictures_stay_as_large_whatever_is_done_with_looks(
-    opened: Any, size: tuple[int, int]
+    new_painter: Any, size: tuple[int, int]
 ) -> None:
-    painter = opened(viewport={"width": size[0], "height": size[1]})
+    painter = new_painter(viewport={"width": size[0], "height": size[1]})
     stage, strip = painter.page.locator(".stage"), painter.page.locator(".looks")
     before = stage.bounding_box()
     assert "saves painting and answer" in strip.inner_text()
@@ -305,8 +305,8 @@ def test_pictures_stay_as_large_whatever_is_done_with_looks(
     assert "saves painting and answer" in strip.inner_text()
 
 
-def test_in_a_low_painter_an_empty_strip_gives_pictures_its_room(opened: Any) -> None:
-    painter = opened(viewport={"width": 1280, "height": 300})
+def test_in_a_low_painter_an_empty_strip_gives_pictures_its_room(new_painter: Any) -> None:
+    painter = new_painter(viewport={"width": 1280, "height": 300})
     assert not painter.page.locator(".looks").is_visible()
     painter.page.keyboard.press("Control+s")
     painter.page.locator(".look").wait_for()
@@ -609,8 +609,10 @@ def test_what_is_half_typed_is_given_up_by_escape(painter: Painter) -> None:
     assert painter.said("change_settings") == painter.said("constrain_light") == []
 
 
-def test_where_a_page_may_not_copy_it_says_so(opened: Any) -> None:
-    painter = opened(init="Object.defineProperty(navigator, 'clipboard', { value: undefined })")
+def test_where_a_page_may_not_copy_it_says_so(new_painter: Any) -> None:
+    painter = new_painter(
+        init="Object.defineProperty(navigator, 'clipboard', { value: undefined })"
+    )
     painter.button("Export").click()
     painter.button("Copy the folder's path").click()
     painter.page.get_by_text("select the text instead").wait_for()

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from foreign_server import Neighbour
+from foreign_server import ForeignServer
 from websockets.sync.client import ClientConnection, connect
 
 import lightpaint as lp
@@ -33,7 +33,7 @@ PAINTER = "document.getElementById('lightpaint').painter"
 PATIENCE_S = 60.0
 
 
-class Fox:
+class Firefox:
     """One tab."""
 
     def __init__(self, socket: ClientConnection) -> None:
@@ -109,7 +109,7 @@ class Fox:
 
 
 @pytest.fixture
-def fox(tmp_path: Path) -> Iterator[Fox]:
+def firefox(tmp_path: Path) -> Iterator[Firefox]:
     """Firefox, where one is installed."""
     path = shutil.which("firefox-esr") or shutil.which("firefox")
     if path is None:
@@ -131,13 +131,13 @@ def fox(tmp_path: Path) -> Iterator[Fox]:
             assert address, "Firefox has not begun"
             threading.Thread(target=process.stderr.read, daemon=True).start()
             with connect(f"{address}/session", max_size=2**26, proxy=None) as socket:
-                yield Fox(socket)
+                yield Firefox(socket)
         finally:
             process.terminate()
 
 
 @contextmanager
-def served(basis: lp.Basis, folder: Path) -> Iterator[tuple[Studio, str]]:
+def serve_painter(basis: lp.Basis, folder: Path) -> Iterator[tuple[Studio, str]]:
     """A painter of `basis`, and its address."""
     studio = Studio([Subject("room.basis.exr", folder, basis=basis)], MemoryStore)
     server = Server(studio, port=0)
@@ -153,60 +153,70 @@ def served(basis: lp.Basis, folder: Path) -> Iterator[tuple[Studio, str]]:
         studio.close()
 
 
-def until(is_so: Callable[[], Any], what: str) -> None:
+def wait_until(is_so: Callable[[], Any], what: str) -> None:
     end = time.monotonic() + PATIENCE_S
     while not is_so():
         assert time.monotonic() < end, what
         time.sleep(0.1)
 
 
-def test_what_is_painted_is_answered_and_shown(fox: Fox, make_basis: Any, tmp_path: Path) -> None:
+def test_what_is_painted_is_answered_and_shown(
+    firefox: Firefox, make_basis: Any, tmp_path: Path
+) -> None:
     basis = make_basis(3, (54, 96))
-    with served(basis, tmp_path / "room") as (studio, url):
-        fox.open(url)
-        until(
-            lambda: fox.look("return mirror.isReady && screen.width > 0 && !mirror.loader.total"),
+    with serve_painter(basis, tmp_path / "room") as (studio, url):
+        firefox.open(url)
+        wait_until(
+            lambda: firefox.look(
+                "return mirror.isReady && screen.width > 0 && !mirror.loader.total"
+            ),
             "the page is not ready",
         )
-        fox.press("0", *"]" * 4)
-        before = fox.seen(80, 40)
+        firefox.press("0", *"]" * 4)
+        before = firefox.seen(80, 40)
 
         def painted() -> bool:
             if not studio.session.store.steps:
-                fox.drag(fox.at(20, 20), fox.at(30, 20), fox.at(40, 20))
+                firefox.drag(firefox.at(20, 20), firefox.at(30, 20), firefox.at(40, 20))
             return bool(studio.session.store.steps)
 
-        until(painted, "no stroke is heard")
-        light = np.array(fox.look("return engine.tool.rgb"), float).reshape(1, 3)
+        wait_until(painted, "no stroke is heard")
+        light = np.array(firefox.look("return engine.tool.rgb"), float).reshape(1, 3)
         code = to_8_bit(studio.session.transform.encode(light))[0].astype(int)
 
         def is_answered() -> bool:
-            shown = fox.look("return Array.from(mirror.weights)")
+            shown = firefox.look("return Array.from(mirror.weights)")
             is_exact = "headline" in studio.state().fields["answer"]
             return is_exact and shown == studio.session.weights.ravel().tolist()
 
-        until(is_answered, "the exact answer does not come")
-        until(lambda: np.allclose(fox.seen(30, 20), code, atol=8), "the stroke is not shown")
-        assert fox.seen(80, 40) == before
-        assert fox.errors() == []
+        wait_until(is_answered, "the exact answer does not come")
+        wait_until(
+            lambda: np.allclose(firefox.seen(30, 20), code, atol=8), "the stroke is not shown"
+        )
+        assert firefox.seen(80, 40) == before
+        assert firefox.errors() == []
         # What another server of the machine collects of this browser opens nothing, and the page
         # that is left for it and opened again goes on.
         painter = url.partition("#")[0]
-        with closing(Neighbour()) as neighbour:
-            fox.open(f"{neighbour.url}?of={painter}")
+        with closing(ForeignServer()) as neighbour:
+            firefox.open(f"{neighbour.url}?of={painter}")
             assert neighbour.has_tried.wait(PATIENCE_S)
             assert {how: what for how, what in neighbour.tried.items() if what} == {}
             assert neighbour.collected
             assert url.partition("=")[2] not in str(neighbour.collected)
             assert neighbour.replay(painter) == []
-        fox.open(painter)
-        until(lambda: fox.look("return mirror.isReady && screen.width > 0"), "it does not go on")
-        until(lambda: np.allclose(fox.seen(30, 20), code, atol=8), "the stroke is not there")
+        firefox.open(painter)
+        wait_until(
+            lambda: firefox.look("return mirror.isReady && screen.width > 0"), "it does not go on"
+        )
+        wait_until(
+            lambda: np.allclose(firefox.seen(30, 20), code, atol=8), "the stroke is not there"
+        )
         # The address alone opens nothing; with its token it opens a second tab.
-        fox.new_tab()
+        firefox.new_tab()
         for address, said in (
             (painter, "belongs to a painter that has ended"),
             (url, "open in another tab"),
         ):
-            fox.open(address)
-            until(partial(fox.reads, said), f"it does not say: {said}")
+            firefox.open(address)
+            wait_until(partial(firefox.reads, said), f"it does not say: {said}")

@@ -7,8 +7,8 @@ import pytest
 from painter_page import Painter
 
 
-def test_a_stroke_goes_to_the_engine_and_the_hint_goes_away(opened: Any) -> None:
-    painter = opened("first")
+def test_a_stroke_goes_to_the_engine_and_the_hint_goes_away(new_painter: Any) -> None:
+    painter = new_painter("first")
     assert painter.page.get_by_text("Paint how it should look").is_visible()
     assert painter.page.get_by_text("You can paint already").is_visible()
     painter.stroke()
@@ -98,9 +98,9 @@ def test_escape_leaves_a_stroke(painter: Painter) -> None:
     assert painter.said("drop_stroke")
 
 
-def test_one_finger_paints_and_two_move_and_zoom(opened: Any) -> None:
+def test_one_finger_paints_and_two_move_and_zoom(new_painter: Any) -> None:
     size = {"width": 1024, "height": 768}
-    painter = opened(viewport=size, has_touch=True, is_mobile=True)
+    painter = new_painter(viewport=size, has_touch=True, is_mobile=True)
     touch = painter.page.context.new_cdp_session(painter.page)
     x, y = painter.place()
 
@@ -132,8 +132,8 @@ LINE_WIDTHS = """(one) => {
 }"""
 
 
-def test_hints_are_of_the_tool_and_of_fingers(opened: Any) -> None:
-    painter = opened("first")
+def test_hints_are_of_the_tool_and_of_fingers(new_painter: Any) -> None:
+    painter = new_painter("first")
     hint, status = painter.page.locator(".hint"), painter.page.locator("#lp-status")
     assert "Shift-click" in status.text_content()
     for key, first in (
@@ -149,7 +149,7 @@ def test_hints_are_of_the_tool_and_of_fingers(opened: Any) -> None:
         *lines, last = hint.locator("span").evaluate(LINE_WIDTHS)
         assert last > 0.4 * max([*lines, last])
     assert "Click" in status.text_content()
-    tablet = opened(
+    tablet = new_painter(
         "first", viewport={"width": 1024, "height": 768}, has_touch=True, is_mobile=True
     )
     status = tablet.page.locator("#lp-status")
@@ -235,7 +235,7 @@ def test_how_bright_a_colour_is_is_seen_and_said(painter: Painter) -> None:
 HELD = ("colour", "stops", "second", "recent", "flow", "fillFlow", "hardness", "size")
 
 
-def open_again(painter: Painter, query: str = "") -> None:
+def reopen(painter: Painter, query: str = "") -> None:
     url = painter.page.url
     painter.page.goto("about:blank")
     painter.page.goto(url.replace("?", f"?{query}&"))
@@ -258,9 +258,9 @@ def test_a_page_that_is_loaded_anew_knows_what_was_in_the_hand(painter: Painter)
     painter.page.keyboard.press("6")
     held = {name: painter.ui(name) for name in HELD}
     assert all(held[name] != fresh[name] for name in HELD)
-    open_again(painter)
+    reopen(painter)
     assert {name: painter.ui(name) for name in HELD} == held
-    open_again(painter, "size=96x54")
+    reopen(painter, "size=96x54")
     assert painter.ui("size") == 2 * held["size"]  # it is a part of the picture
 
 
@@ -283,7 +283,7 @@ def test_what_is_remembered_is_not_believed(painter: Painter, junk: str) -> None
         " localStorage[`lightpaint.${key}`] = junk; }",
         junk,
     )
-    open_again(painter)
+    reopen(painter)
     assert {name: painter.ui(name) for name in names} == fresh
 
 
@@ -299,7 +299,7 @@ def test_what_was_used_in_painters_beside_each_other_is_remembered(painter: Pain
     painter.stroke()
     painter.type("Hex", "#778899")
     painter.stroke()
-    open_again(beside)
+    reopen(beside)
     lately = beside.page.get_by_role("group", name="Recent colours").get_by_role("button")
     names = [str(one.get_attribute("aria-label")) for one in lately.all()]
     assert [name.split(": ")[1] for name in names] == ["#778899", "#112233", "#445566"]
@@ -604,8 +604,8 @@ OUTLINE = """(object) => {
 
 
 @pytest.mark.parametrize("engine", ["", "engine"], ids=["made up", "real"])
-def test_the_object_that_would_be_filled_has_an_outline(opened: Any, engine: str) -> None:
-    painter = opened(engine)
+def test_the_object_that_would_be_filled_has_an_outline(new_painter: Any, engine: str) -> None:
+    painter = new_painter(engine)
     page = painter.page
     page.wait_for_function("() => engine.objects() !== null")
     outline = page.locator(".outline")
@@ -713,8 +713,10 @@ def test_zoom_is_said_in_pixels_of_the_picture(painter: Painter) -> None:
 
 
 @pytest.mark.parametrize("width", [1600, 1280, 1024])
-def test_what_is_under_the_pointer_has_room_beside_what_goes_on(opened: Any, width: int) -> None:
-    painter = opened("first&lights=12", viewport={"width": width, "height": 720})
+def test_what_is_under_the_pointer_has_room_beside_what_goes_on(
+    new_painter: Any, width: int
+) -> None:
+    painter = new_painter("first&lights=12", viewport={"width": width, "height": 720})
     painter.tell(kind="progress", task="basis", done=128, total=1024, unit="samples")
     painter.page.mouse.move(*painter.place())
     here, working = painter.page.locator(".here"), painter.page.locator(".working")

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from foreign_server import Neighbour
+from foreign_server import ForeignServer
 
 from lightpaint.paint.server.server import Server
 from lightpaint.paint.store.store import MemoryStore
@@ -39,14 +39,14 @@ def server(make_basis: Any, tmp_path: Path) -> Iterator[Server]:
 
 
 @pytest.fixture
-def neighbour() -> Iterator[Neighbour]:
-    made = Neighbour()
+def foreign_server() -> Iterator[ForeignServer]:
+    made = ForeignServer()
     yield made
     made.close()
 
 
 @pytest.fixture
-def tab(browser: Any) -> Iterator[Any]:
+def open_tab(browser: Any) -> Iterator[Any]:
     """Opens tabs of one browser."""
     context = browser.new_context(viewport={"width": 1280, "height": 720})
     context.set_default_timeout(60_000)
@@ -63,44 +63,44 @@ def has_painter(page: Any) -> None:
 
 
 def test_a_neighbour_that_is_visited_gets_nothing_that_opens_the_session(
-    server: Server, neighbour: Neighbour, tab: Any
+    server: Server, foreign_server: ForeignServer, open_tab: Any
 ) -> None:
-    page = tab()
+    page = open_tab()
     page.goto(server.url)
     has_painter(page)
     assert page.url == server.address.url  # the token is seen no longer
-    where = f"{neighbour.url}?of={server.address.url}"
+    where = f"{foreign_server.url}?of={server.address.url}"
     page.evaluate("(url) => { location.href = url; }", where)  # as a link would
-    assert neighbour.has_tried.wait(60)
-    beside = tab()
+    assert foreign_server.has_tried.wait(60)
+    beside = open_tab()
     beside.goto(where)
     beside.wait_for_function("() => document.title === 'done'")
-    assert len(neighbour.collected) >= 3
-    assert {how: what for how, what in neighbour.tried.items() if what} == {}
+    assert len(foreign_server.collected) >= 3
+    assert {how: what for how, what in foreign_server.tried.items() if what} == {}
     token = server.url.partition("=")[2]
-    for headers in neighbour.collected:
+    for headers in foreign_server.collected:
         assert token not in str(headers)
         assert str(server.port) not in headers.get("Referer", "").partition("?")[0]
-    assert neighbour.replay(server.address.url) == []
+    assert foreign_server.replay(server.address.url) == []
     # The person comes back to a page that goes on.
     page.go_back()
     has_painter(page)
 
 
 def test_a_page_that_is_loaded_anew_goes_on_and_so_does_a_second_tab(
-    server: Server, tab: Any
+    server: Server, open_tab: Any
 ) -> None:
-    first = tab()
+    first = open_tab()
     first.goto(server.url)
     has_painter(first)
     first.reload()
     has_painter(first)
-    second = tab()
+    second = open_tab()
     second.goto(server.url)
     second.get_by_role("button", name="Take over").click()
     has_painter(second)
     # The address alone opens nothing, and says what does.
-    third = tab()
+    third = open_tab()
     third.goto(server.address.url)
     third.get_by_text(NO_KEY_TEXT).wait_for()
     third.goto(server.url)  # in the same tab, where no more than its fragment changes
@@ -109,9 +109,11 @@ def test_a_page_that_is_loaded_anew_goes_on_and_so_does_a_second_tab(
     assert third.url == server.address.url
 
 
-def test_the_address_that_a_browser_was_started_with_is_good_once(server: Server, tab: Any) -> None:
+def test_the_address_that_a_browser_was_started_with_is_good_once(
+    server: Server, open_tab: Any
+) -> None:
     url = server.one_time_url()
-    first, second = tab(), tab()
+    first, second = open_tab(), open_tab()
     first.goto(url)
     has_painter(first)
     second.goto(url)

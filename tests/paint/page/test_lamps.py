@@ -22,7 +22,7 @@ from lightpaint.scene.scene_reader import load_scene
 PAINTER = "document.getElementById('lightpaint').painter"
 
 
-def until(is_so: Callable[[], Any], seconds: float = 60) -> Any:
+def wait_until(is_so: Callable[[], Any], seconds: float = 60) -> Any:
     end = time.monotonic() + seconds
     while not (found := is_so()):
         assert time.monotonic() < end
@@ -30,7 +30,7 @@ def until(is_so: Callable[[], Any], seconds: float = 60) -> Any:
     return found
 
 
-class Room:
+class PaintedRoom:
     """A painter of the test room, and a page of it whose lights are marked."""
 
     def __init__(self, page: Any, folder: Path) -> None:
@@ -72,7 +72,7 @@ class Room:
     def until_step(self, count: int) -> None:
         """Wait for a step to be kept, and for its requests to be in effect, which follow it."""
         session = self.studio.session
-        until(lambda: session.store.position == count and not session.is_open)
+        wait_until(lambda: session.store.position == count and not session.is_open)
 
     def drag(self, start: tuple[float, float], dx: float, dy: float) -> None:
         mouse = self.page.mouse
@@ -90,12 +90,12 @@ class Room:
 
 
 @pytest.fixture
-def room(browser: Any, tmp_path: Path) -> Iterator[Room]:
+def room(browser: Any, tmp_path: Path) -> Iterator[PaintedRoom]:
     context = browser.new_context(viewport={"width": 1280, "height": 720})
     page, wrong = context.new_page(), []
     page.on("pageerror", lambda error: wrong.append(str(error)))
     page.on("console", lambda said: wrong.append(said.text) if said.type == "error" else None)
-    made = Room(page, tmp_path)
+    made = PaintedRoom(page, tmp_path)
     yield made
     context.close()
     made.close()
@@ -103,7 +103,7 @@ def room(browser: Any, tmp_path: Path) -> Iterator[Room]:
 
 
 @pytest.mark.long
-def test_lights_are_marked_dragged_and_taken_back(room: Room) -> None:
+def test_lights_are_marked_dragged_and_taken_back(room: PaintedRoom) -> None:
     bulb = (-0.5, 1, 0.5)
     assert room.mark("bulb") == pytest.approx(room.seen(bulb), abs=1)
     assert room.page.locator('[data-lamp="sky"]').count() == 0
@@ -112,7 +112,7 @@ def test_lights_are_marked_dragged_and_taken_back(room: Room) -> None:
     place = room.poses["bulb"]["position"]
     assert place[1] == pytest.approx(bulb[1])  # in its horizontal plane
     assert place[0] > bulb[0]
-    until(lambda: room.mark("bulb") == pytest.approx(room.seen(place), abs=1))
+    wait_until(lambda: room.mark("bulb") == pytest.approx(room.seen(place), abs=1))
     room.page.keyboard.down("Shift")
     room.drag(room.mark("bulb"), 0, -30)
     room.page.keyboard.up("Shift")
@@ -122,23 +122,23 @@ def test_lights_are_marked_dragged_and_taken_back(room: Room) -> None:
     assert higher[1] > place[1]
     room.page.keyboard.press("Control+z")
     room.page.keyboard.press("Control+z")
-    until(lambda: room.poses == {})
-    until(lambda: room.mark("bulb") == pytest.approx(room.seen(bulb), abs=1))
+    wait_until(lambda: room.poses == {})
+    wait_until(lambda: room.mark("bulb") == pytest.approx(room.seen(bulb), abs=1))
 
 
-def test_a_spot_is_pointed_by_clicks_and_by_numbers(room: Room, axe: str) -> None:
+def test_a_spot_is_pointed_by_clicks_and_by_numbers(room: PaintedRoom, axe: str) -> None:
     row = room.page.locator('[data-light="beam"]')
     row.get_by_role("button", name="beam", exact=True).first.click()
     room.page.evaluate(axe)
     assert violations(room.page, ".lightpaint") == []
     row.get_by_role("button", name="Aim here").click()
     room.page.mouse.click(*room.seen((-0.4, 0, 0.3)))
-    target = until(lambda: room.poses.get("beam"))["target"]
+    target = wait_until(lambda: room.poses.get("beam"))["target"]
     assert target == pytest.approx((-0.4, 0, 0.3), abs=0.02)
     assert not room.studio.session.is_painted
     row.get_by_label("Position y").fill("1.5")
     row.get_by_label("Position y").press("Enter")
-    until(lambda: room.poses["beam"].get("position"))
+    wait_until(lambda: room.poses["beam"].get("position"))
     assert room.poses["beam"]["position"] == pytest.approx([0.8, 1.5, 1.5])
     assert room.poses["beam"]["target"] == target
     # A click that the keyboard gives up paints nothing and points nothing.
@@ -146,15 +146,15 @@ def test_a_spot_is_pointed_by_clicks_and_by_numbers(room: Room, axe: str) -> Non
     room.page.keyboard.press("Escape")
     assert room.page.locator(".is-pointing").count() == 0
     row.get_by_role("button", name="Put back").click()
-    until(lambda: room.poses == {})
+    wait_until(lambda: room.poses == {})
 
 
-def test_a_light_is_added_by_a_click_dragged_and_removed(room: Room) -> None:
+def test_a_light_is_added_by_a_click_dragged_and_removed(room: PaintedRoom) -> None:
     page, session = room.page, room.studio.session
     page.get_by_role("button", name="Add a light").click()
     page.mouse.click(*room.seen((-0.4, 0, 0.3)))
-    place = until(lambda: session.requests.added.get("spot_1"))["position"]
-    until(lambda: room.mark("spot_1") == pytest.approx(room.seen(place), abs=1))
+    place = wait_until(lambda: session.requests.added.get("spot_1"))["position"]
+    wait_until(lambda: room.mark("spot_1") == pytest.approx(room.seen(place), abs=1))
     assert not session.is_painted
     room.drag(room.mark("spot_1"), 40, 0)
     room.until_step(2)
@@ -165,11 +165,11 @@ def test_a_light_is_added_by_a_click_dragged_and_removed(room: Room) -> None:
     page.wait_for_selector('[data-lamp="spot_1"]', state="detached")
     page.keyboard.press("Control+z")
     page.wait_for_selector('[data-lamp="spot_1"]')
-    until(lambda: room.mark("spot_1") == pytest.approx(room.seen(moved), abs=1))
+    wait_until(lambda: room.mark("spot_1") == pytest.approx(room.seen(moved), abs=1))
     # In the plan it hangs below the ceiling, where it was clicked.
     page.get_by_label("New light").select_option("point")
     page.get_by_role("button", name="Add a light").click()
     box = page.locator(".room-plan > svg").bounding_box()
     page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-    until(lambda: "point_1" in session.requests.added)
+    wait_until(lambda: "point_1" in session.requests.added)
     page.wait_for_selector('[data-lamp="point_1"]')

@@ -36,8 +36,8 @@ def test_by_keyboard_alone(painter: Painter) -> None:
 
 
 @pytest.mark.parametrize("query", ["lights=12", "lights=40&shadow"])
-def test_tab_leads_to_pictures_and_lights_at_once(opened: Any, query: str) -> None:
-    painter = opened(query)
+def test_tab_leads_to_pictures_and_lights_at_once(new_painter: Any, query: str) -> None:
+    painter = new_painter(query)
     before = painter.page.locator(".stage").bounding_box()
     find = (
         "() => { const all = document.activeElement; const one = all.shadowRoot?.activeElement"
@@ -65,8 +65,8 @@ def test_tab_leads_to_pictures_and_lights_at_once(opened: Any, query: str) -> No
 
 
 @pytest.mark.parametrize("size", [(1280, 720), (900, 600)])
-def test_how_true_is_seen_where_it_opens(opened: Any, size: tuple[int, int]) -> None:
-    painter = opened("lights=12", viewport={"width": size[0], "height": size[1]})
+def test_how_true_is_seen_where_it_opens(new_painter: Any, size: tuple[int, int]) -> None:
+    painter = new_painter("lights=12", viewport={"width": size[0], "height": size[1]})
     button = painter.button("Analysis")
     button.click()
     painter.still()
@@ -80,8 +80,8 @@ def test_how_true_is_seen_where_it_opens(opened: Any, size: tuple[int, int]) -> 
     assert painter.page.locator(".side").evaluate("(one) => one.scrollTop") == 0
 
 
-def test_in_a_shadow_root_it_looks_the_same(opened: Any) -> None:
-    plain, shadow = opened(), opened("shadow")
+def test_in_a_shadow_root_it_looks_the_same(new_painter: Any) -> None:
+    plain, shadow = new_painter(), new_painter("shadow")
     width = "engine.element.getBoundingClientRect().width"
     wide = plain.page.evaluate(f"() => {width}")
     shadow.page.wait_for_function(f"(wide) => {width} === wide", arg=wide)
@@ -91,9 +91,9 @@ def test_in_a_shadow_root_it_looks_the_same(opened: Any) -> None:
     assert shadow.ui("tool") == "eraser"
 
 
-def test_around_it_nothing_hears_its_keys(opened: Any) -> None:
+def test_around_it_nothing_hears_its_keys(new_painter: Any) -> None:
     """In a notebook `B` makes a cell, Delete deletes the painter's own."""
-    painter = opened("shadow")
+    painter = new_painter("shadow")
     painter.page.evaluate(
         "() => { window.heard = [];"
         " window.addEventListener('keydown', (event) => window.heard.push(event.key)); }"
@@ -130,9 +130,9 @@ def test_around_it_nothing_hears_its_keys(opened: Any) -> None:
 
 
 @pytest.mark.parametrize("query", ["", "shadow"])
-def test_a_look_is_kept_from_anywhere(opened: Any, query: str) -> None:
+def test_a_look_is_kept_from_anywhere(new_painter: Any, query: str) -> None:
     """With what is being typed; the browser's own window for that never opens."""
-    painter = opened(query)
+    painter = new_painter(query)
     painter.page.evaluate(
         "() => { window.prevented = []; window.addEventListener('keydown', (event) =>"
         " setTimeout(() => event.key.length === 1 && window.prevented.push("
@@ -173,9 +173,9 @@ def test_a_look_is_kept_from_anywhere(opened: Any, query: str) -> None:
     assert kept() == 4
 
 
-def test_a_window_is_open_before_the_next_key(opened: Any) -> None:
+def test_a_window_is_open_before_the_next_key(new_painter: Any) -> None:
     """An Escape that comes at once closes it, and is not lost."""
-    painter = opened()
+    painter = new_painter()
     painter.page.evaluate(
         """() => {
           const press = (key) => document.body.dispatchEvent(
@@ -190,9 +190,9 @@ def test_a_window_is_open_before_the_next_key(opened: Any) -> None:
     painter.page.wait_for_function("() => !document.querySelector('dialog')")
 
 
-def test_windows_lie_over_it(opened: Any) -> None:
+def test_windows_lie_over_it(new_painter: Any) -> None:
     """In a frame as high as all of a notebook; over the frame where hardly any of it is seen."""
-    painter = opened("shadow", viewport={"width": 1280, "height": 5000})
+    painter = new_painter("shadow", viewport={"width": 1280, "height": 5000})
 
     def shown(key: str, top: int) -> tuple[Any, Any]:
         painter.page.evaluate(
@@ -223,9 +223,9 @@ def test_windows_lie_over_it(opened: Any) -> None:
     assert window["height"] > 300
 
 
-def test_a_space_is_typed_beside_it(opened: Any) -> None:
+def test_a_space_is_typed_beside_it(new_painter: Any) -> None:
     """Where the pointer rests on the pictures meanwhile."""
-    painter = opened("shadow")
+    painter = new_painter("shadow")
     painter.page.evaluate(
         "() => { const cell = document.createElement('p'); cell.contentEditable = 'true';"
         " document.body.append(cell); cell.focus(); }"
@@ -255,7 +255,7 @@ SENTENCE = (
 HELP = {"kind": "colors", "names": [], "gain": 0.57, "hold": None}
 
 
-def cut_off(painter: Painter) -> list[str]:
+def clipped_elements(painter: Painter) -> list[str]:
     """What is wider, or higher, than what is seen of it."""
     names: list[str] = painter.page.evaluate(
         "() => ['.top', '.options', '.tools', '.side', '.answer', '.said', '.fold-body'].filter("
@@ -267,20 +267,20 @@ def cut_off(painter: Painter) -> list[str]:
 
 
 @pytest.mark.parametrize("size", SIZES + COLUMNS + LOW)
-def test_nothing_is_cut_off(opened: Any, size: tuple[int, int]) -> None:
-    painter = opened("lights=12", viewport={"width": size[0], "height": size[1]})
+def test_nothing_is_cut_off(new_painter: Any, size: tuple[int, int]) -> None:
+    painter = new_painter("lights=12", viewport={"width": size[0], "height": size[1]})
     about = {"headline": SENTENCE, "help": HELP, "delta_e": 11.2, "delta_e_present": 20.5}
     painter.tell(kind="answer", version=2, exact=True, lights=[], **about)
     painter.page.keyboard.press("Control+s")
     for key in "bwa":
         painter.page.keyboard.press(key)
-        assert cut_off(painter) == []
+        assert clipped_elements(painter) == []
 
 
 @pytest.mark.parametrize("size", [(1280, 720), (1024, 768)])
-def test_numbers_show_all_their_digits(opened: Any, size: tuple[int, int]) -> None:
+def test_numbers_show_all_their_digits(new_painter: Any, size: tuple[int, int]) -> None:
     """Also the second colour that a painter begins with, 12000 K."""
-    painter = opened("", viewport={"width": size[0], "height": size[1]})
+    painter = new_painter("", viewport={"width": size[0], "height": size[1]})
     painter.page.keyboard.press("x")
     fields = painter.page.locator(".lightpaint .number input:visible")
     assert "12000" in fields.evaluate_all("(all) => all.map((one) => one.value)")
@@ -289,8 +289,8 @@ def test_numbers_show_all_their_digits(opened: Any, size: tuple[int, int]) -> No
 
 
 @pytest.mark.parametrize("size", [(853, 480), (1024, 768), (1280, 720), (1600, 900)])
-def test_without_panels_pictures_have_all_there_is(opened: Any, size: tuple[int, int]) -> None:
-    painter = opened(viewport=dict(zip(("width", "height"), size, strict=True)))
+def test_without_panels_pictures_have_all_there_is(new_painter: Any, size: tuple[int, int]) -> None:
+    painter = new_painter(viewport=dict(zip(("width", "height"), size, strict=True)))
     painter.page.keyboard.press("p")
     painter.still()
     tools, stage = (painter.page.locator(x).bounding_box() for x in (".tools", ".stage"))
@@ -299,9 +299,9 @@ def test_without_panels_pictures_have_all_there_is(opened: Any, size: tuple[int,
 
 
 @pytest.mark.parametrize("size", LOW)
-def test_of_a_low_painter_the_sentence_comes_first(opened: Any, size: tuple[int, int]) -> None:
+def test_of_a_low_painter_the_sentence_comes_first(new_painter: Any, size: tuple[int, int]) -> None:
     """Nothing that is needed lies below what is seen, and panels scroll."""
-    painter = opened("lights=12", viewport={"width": size[0], "height": size[1]})
+    painter = new_painter("lights=12", viewport={"width": size[0], "height": size[1]})
     stage = painter.page.locator(".stage").bounding_box()
     said = painter.page.locator(".said").bounding_box()
     assert said["y"] + said["height"] <= stage["y"]
@@ -318,8 +318,10 @@ def test_of_a_low_painter_the_sentence_comes_first(opened: Any, size: tuple[int,
 
 
 @pytest.mark.parametrize("size", [(1280, 720), (690, 560), (690, 300)])
-def test_what_has_to_be_known_does_not_lie_over_a_name(opened: Any, size: tuple[int, int]) -> None:
-    painter = opened(viewport={"width": size[0], "height": size[1]})
+def test_what_has_to_be_known_does_not_lie_over_a_name(
+    new_painter: Any, size: tuple[int, int]
+) -> None:
+    painter = new_painter(viewport={"width": size[0], "height": size[1]})
     painter.page.keyboard.press("Control+s")
     painter.tell(kind="closed", reason="taken", text="The painter is open at another place.")
     top = painter.page.locator(".banner").bounding_box()["y"]
@@ -327,8 +329,8 @@ def test_what_has_to_be_known_does_not_lie_over_a_name(opened: Any, size: tuple[
     assert name["y"] + name["height"] <= top
 
 
-def test_panels_leave_the_pictures_of_a_narrow_column_their_room(opened: Any) -> None:
-    painter = opened(viewport={"width": 690, "height": 560})
+def test_panels_leave_the_pictures_of_a_narrow_column_their_room(new_painter: Any) -> None:
+    painter = new_painter(viewport={"width": 690, "height": 560})
     stage, side = painter.page.locator(".stage"), painter.page.locator(".side")
     width = stage.bounding_box()["width"]
     assert side.count() == 0
@@ -346,8 +348,8 @@ def test_panels_leave_the_pictures_of_a_narrow_column_their_room(opened: Any) ->
 
 
 @pytest.mark.parametrize("state", ["first", "busy", "keys", "export", "settings"])
-def test_axe_finds_nothing(opened: Any, axe: str, state: str) -> None:
-    painter = opened("first&lights=12", init=axe)
+def test_axe_finds_nothing(new_painter: Any, axe: str, state: str) -> None:
+    painter = new_painter("first&lights=12", init=axe)
     if state == "busy":
         painter.button("Analysis").click()
         painter.button("False colour").click()

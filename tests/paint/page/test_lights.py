@@ -7,7 +7,7 @@ import pytest
 from painter_page import Finger, Painter
 
 
-def newest(painter: Painter) -> Any:
+def newest_constraints(painter: Painter) -> Any:
     """Return the constraints of the last request on one light."""
     return painter.said("constrain_light")[-1]["constraints"]
 
@@ -21,16 +21,16 @@ def test_a_light_is_moved_by_hand_and_freed(painter: Painter) -> None:
     lock = asked[-1]["constraints"]["lock"]
     assert lock == pytest.approx([x * 2 for x in current], rel=1e-6)  # 20 steps of a twentieth
     painter.button("Unlock key").click()
-    assert newest(painter) == {}
+    assert newest_constraints(painter) == {}
     painter.slide("key, stops from now", "Home")
-    assert newest(painter) == {"lock": [0, 0, 0]}
+    assert newest_constraints(painter) == {"lock": [0, 0, 0]}
 
 
 def test_a_level_is_typed_in_stops_or_percent(painter: Painter) -> None:
     current = painter.page.evaluate("() => window.painter.store.value.lights[0].present")
 
     def lock() -> Any:
-        return newest(painter)["lock"]
+        return newest_constraints(painter)["lock"]
 
     for text, factor in (
         ("+1.5", 2**1.5),
@@ -85,7 +85,7 @@ def test_a_light_is_held_at_what_is_typed_in_any_unit(painter: Painter) -> None:
     ):
         painter.choose("Unit", unit)
         painter.type("Locked at", text)
-        lock = newest(painter)["lock"]
+        lock = newest_constraints(painter)["lock"]
         assert lock == pytest.approx([factor * x for x in current], rel=1e-6)
 
 
@@ -94,7 +94,7 @@ def test_of_a_light_that_is_off_there_are_no_percent(painter: Painter) -> None:
     assert "cove is off now" in painter.ui("toasts")[-1]["text"]
     assert painter.said("constrain_light") == []
     painter.type("cove, level", "as now")
-    assert newest(painter) == {"lock": [0, 0, 0]}
+    assert newest_constraints(painter) == {"lock": [0, 0, 0]}
 
 
 def test_limits_that_leave_nothing_are_not_sent(painter: Painter) -> None:
@@ -117,8 +117,10 @@ def test_limits_that_leave_nothing_are_not_sent(painter: Painter) -> None:
 
 
 @pytest.mark.parametrize("size", [(1280, 720), (1920, 1080), (690, 560), (480, 640)])
-def test_what_is_asked_of_a_level_stands_in_one_row(opened: Any, size: tuple[int, int]) -> None:
-    painter = opened(viewport={"width": size[0], "height": size[1]})
+def test_what_is_asked_of_a_level_stands_in_one_row(
+    new_painter: Any, size: tuple[int, int]
+) -> None:
+    painter = new_painter(viewport={"width": size[0], "height": size[1]})
     painter.page.evaluate("() => painter.store.set({ side: true, open: { lights: true } })")
     painter.page.get_by_role("button", name="key", exact=True).click()
     panel = painter.page.get_by_role("group", name="Constraints on key")
@@ -182,32 +184,32 @@ def test_what_was_asked_of_a_light_is_known_until_it_is_free(painter: Painter, w
     )
     painter.still()
     painter.page.evaluate("() => painter.session.unlockLight(0)")
-    assert newest(painter) == limits
+    assert newest_constraints(painter) == limits
 
 
 def test_what_a_light_may_do(painter: Painter) -> None:
     page = painter.page
     page.get_by_role("button", name="key", exact=True).click()
     painter.type("Max", "150")
-    assert newest(painter) == {"limits": {"max": "150%"}}
+    assert newest_constraints(painter) == {"limits": {"max": "150%"}}
     painter.type("Min", "20")
-    assert newest(painter) == {"limits": {"min": "20%", "max": "150%"}}
+    assert newest_constraints(painter) == {"limits": {"min": "20%", "max": "150%"}}
     painter.choose("Colour", "kelvin")
     painter.type("From", "3000")
-    asked = newest(painter)
+    asked = newest_constraints(painter)
     assert asked == {"limits": {"min": "20%", "max": "150%"}, "kelvin": [3000, 6500]}
     panel = page.get_by_role("group", name="Constraints on key")
     panel.get_by_role("button", name="Off", exact=True).click()
-    assert newest(painter) == {"off": True}
+    assert newest_constraints(painter) == {"off": True}
     panel.get_by_role("button", name="Free", exact=True).click()
-    assert newest(painter) == asked  # as it was before it was off
+    assert newest_constraints(painter) == asked  # as it was before it was off
     painter.choose("Colour", "color")
     painter.type("Hex or kelvin", "3200K")
-    assert newest(painter)["color"] == "3200K"
+    assert newest_constraints(painter)["color"] == "3200K"
     painter.choose("Colour", "primaries")
-    assert len(newest(painter)["primaries"]) == 3
+    assert len(newest_constraints(painter)["primaries"]) == 3
     panel.get_by_role("button", name="As now", exact=True).click()
-    assert newest(painter) == {"lock": True}
+    assert newest_constraints(painter) == {"lock": True}
     painter.choose("Tie to", "cove")
     assert painter.said("tie")[-1]["ties"] == [["key", "cove"]]
     group = painter.page.get_by_role("group", name="key and cove, tied")
@@ -235,7 +237,7 @@ def test_who_holds_a_light_holds_its_dimmer(painter: Painter) -> None:
     free.wait_for()
     assert cove.locator(".dimmer.is-held").count() == 1
     free.click()
-    assert newest(painter) == {}
+    assert newest_constraints(painter) == {}
     assert (
         painter.said("constrain_light")[-1]["light"] == painter.said("constrain_light")[0]["light"]
     )  # key holds both
@@ -259,9 +261,9 @@ def test_a_light_is_said_to_be_held_back_by_what_is_asked_of_it_alone(painter: P
     assert badge.all_inner_texts() == ["locked"]
 
 
-def test_names_that_differ_at_their_end_are_told_apart(opened: Any) -> None:
+def test_names_that_differ_at_their_end_are_told_apart(new_painter: Any) -> None:
     """On a tablet, whose buttons need most of a row."""
-    painter = opened(has_touch=True)
+    painter = new_painter(has_touch=True)
     painter.page.evaluate(
         """() => {
           const [first, second, ...rest] = window.painter.store.value.lights;
@@ -283,9 +285,9 @@ def test_names_that_differ_at_their_end_are_told_apart(opened: Any) -> None:
 
 
 def test_a_light_says_its_unit_in_its_tip_and_keeps_its_height_while_it_is_sought(
-    opened: Any,
+    new_painter: Any,
 ) -> None:
-    painter = opened(viewport={"width": 1280, "height": 720})
+    painter = new_painter(viewport={"width": 1280, "height": 720})
     row = painter.page.locator(".light").first
     value, error = row.locator(".values"), row.locator(".error")
     said = value.inner_text(), "W/(m² sr)", error.inner_text()
@@ -303,10 +305,10 @@ def test_a_light_that_hardly_shines_is_turned_up_in_its_own_colour(painter: Pain
     dark = "(rgb) => painter.store.set(({ weights }) => ({ weights: [rgb, ...weights.slice(1)] }))"
     painter.page.evaluate(dark, [0, 0, current[2] / 100])
     painter.type("key, level", "-1")
-    assert newest(painter)["lock"] == pytest.approx([x / 2 for x in current])
+    assert newest_constraints(painter)["lock"] == pytest.approx([x / 2 for x in current])
     painter.page.evaluate(dark, [0, 0, 5 * current[2]])  # this one everybody has
     painter.type("key, level", "-1")
-    red, green, blue = newest(painter)["lock"]
+    red, green, blue = newest_constraints(painter)["lock"]
     assert (red, green) == (0, 0)
     assert blue > current[2]
 
@@ -327,18 +329,18 @@ def test_on_its_way_through_the_dark_a_light_keeps_its_colour(painter: Painter) 
           }
         }"""
     )
-    red, green, blue = newest(painter)["lock"]
+    red, green, blue = newest_constraints(painter)["lock"]
     assert [green / red, blue / red] == pytest.approx([0.5, 0.25])
 
 
 def test_a_light_is_held_at_a_white(painter: Painter) -> None:
     painter.button("key", exact=True).click()
     painter.button("Locked", exact=True).click()
-    before = newest(painter)["lock"]
+    before = newest_constraints(painter)["lock"]
     kelvin = painter.page.locator(".held-colour").get_by_role("textbox", name="CCT")
     kelvin.fill("2700")
     kelvin.press("Enter")
-    lock = np.array(newest(painter)["lock"])
+    lock = np.array(newest_constraints(painter)["lock"])
     luminance = [0.2126, 0.7152, 0.0722]
     assert lock @ luminance == pytest.approx(np.array(before) @ luminance)
     white = painter.page.evaluate(
@@ -386,8 +388,8 @@ def test_a_light_is_shown_alone_until_its_row_is_gone(painter: Painter, way: str
     painter.page.wait_for_function("() => engine.shown.right === 'solution'")
 
 
-def test_64_lights_are_found_sorted_and_folded(opened: Any) -> None:
-    painter = opened("lights=64")
+def test_64_lights_are_found_sorted_and_folded(new_painter: Any) -> None:
+    painter = new_painter("lights=64")
     rows = painter.page.locator(".light")
     assert rows.count() == 64
     painter.page.get_by_label("Search lights").fill("row b")
@@ -414,9 +416,9 @@ def test_a_number_is_taken_as_it_is_shown(painter: Painter) -> None:
     assert painter.page.get_by_role("textbox", name="At most").input_value() == "2"
 
 
-def test_a_finger_scrolls_lights_and_moves_none(opened: Any) -> None:
+def test_a_finger_scrolls_lights_and_moves_none(new_painter: Any) -> None:
     """Where it begins on a slider; sideways it moves it, and so does a tap."""
-    painter = opened("lights=12", viewport={"width": 1024, "height": 768}, has_touch=True)
+    painter = new_painter("lights=12", viewport={"width": 1024, "height": 768}, has_touch=True)
     slider = painter.page.get_by_role("slider", name="sconce, stops from now", exact=True)
     finger = Finger(painter.page)
 
@@ -457,34 +459,34 @@ def test_a_finger_scrolls_lights_and_moves_none(opened: Any) -> None:
     assert mark(x + 30) == pytest.approx(0, abs=10)
 
 
-def panel_of_key(painter: Painter) -> Any:
+def open_key_panel(painter: Painter) -> Any:
     """What may be asked of the key light."""
     painter.page.get_by_role("button", name="key", exact=True).click()
     return painter.page.get_by_role("group", name="Constraints on key")
 
 
 def test_what_is_off_is_not_turned_up_by_turning_it_down(painter: Painter) -> None:
-    panel = panel_of_key(painter)
+    panel = open_key_panel(painter)
     panel.get_by_role("button", name="Locked", exact=True).click()
     painter.type("Locked at", "")
     painter.still()
     level = panel.get_by_role("textbox", name="Locked at", exact=True)
     level.press("ArrowDown")
-    assert max(newest(painter)["lock"]) == 0
+    assert max(newest_constraints(painter)["lock"]) == 0
     level.press("ArrowUp")
     lock, current = (
-        newest(painter)["lock"],
+        newest_constraints(painter)["lock"],
         painter.ui("lights")[0]["present"],
     )
     assert lock == pytest.approx([x * 2**-7.9 for x in current], rel=1e-6)
 
 
 def test_levels_far_below_one_are_not_off(painter: Painter) -> None:
-    panel = panel_of_key(painter)
+    panel = open_key_panel(painter)
     panel.get_by_role("button", name="Locked", exact=True).click()
     painter.choose("Unit", "value")
     painter.type("Locked at", "0.00004")
-    lock = newest(painter)["lock"]
+    lock = newest_constraints(painter)["lock"]
     assert 0.2126 * lock[0] + 0.7152 * lock[1] + 0.0722 * lock[2] == pytest.approx(4e-5, rel=1e-3)
 
 
@@ -501,7 +503,7 @@ def test_limits_of_a_lights_file_are_shown_in_one_unit(
 ) -> None:
     painter.page.evaluate("(limits) => painter.session.constrainLight(0, { limits })", limits)
     painter.still()
-    panel = panel_of_key(painter)
+    panel = open_key_panel(painter)
     red, green, blue = painter.ui("lights")[0]["present"]
     now = 0.2126 * red + 0.7152 * green + 0.0722 * blue
     is_share = panel.get_by_role("combobox", name="Unit").input_value() == "share"
@@ -512,7 +514,7 @@ def test_limits_of_a_lights_file_are_shown_in_one_unit(
     assert float(fields[1].input_value()) == pytest.approx(most, rel=1e-3)
     unit, *ends = turned
     painter.choose("Unit", unit)
-    asked = newest(painter)["limits"]
+    asked = newest_constraints(painter)["limits"]
     for key, end in zip(("min", "max"), ends, strict=True):
         if isinstance(end, str):
             assert float(asked[key].rstrip("%")) == pytest.approx(float(end.rstrip("%")), rel=1e-3)

@@ -6,8 +6,8 @@ import pytest
 from painter_page import Painter
 
 
-def test_a_tab_that_comes_second_says_where_the_painter_is(opened: Any) -> None:
-    painter = opened("elsewhere", until=".lightpaint .banner")
+def test_a_tab_that_comes_second_says_where_the_painter_is(new_painter: Any) -> None:
+    painter = new_painter("elsewhere", until=".lightpaint .banner")
     said = painter.page.get_by_role("alert")
     assert "the painter is open in another tab" in said.inner_text().lower()
     assert painter.page.get_by_role("progressbar").count() == 0
@@ -51,10 +51,10 @@ THUMBS = (
 
 
 def test_a_place_that_has_lost_the_painter_gets_its_pictures_when_it_has_it_again(
-    opened: Any,
+    new_painter: Any,
 ) -> None:
     """In a notebook it asks for them over the same line by which it is told of its loss."""
-    painter = opened("model=taken&engine")
+    painter = new_painter("model=taken&engine")
     take_over = painter.button("Take over")
     take_over.wait_for()
     painter.page.wait_for_timeout(100)
@@ -69,7 +69,7 @@ def test_a_place_that_has_lost_the_painter_gets_its_pictures_when_it_has_it_agai
     assert painter.said("paint")
 
 
-def refuse(painter: Painter) -> None:
+def fail_next_request(painter: Painter) -> None:
     """Have what is said next fail, and not what is on its way."""
     painter.still()
     painter.page.evaluate("() => { host.fails = 'That cannot be done.'; }")
@@ -81,14 +81,14 @@ def test_what_is_refused_is_shown_no_longer(painter: Painter) -> None:
     painter.type("Min", "20")
     before = {name: painter.ui(name) for name in ("constraints", "ties", "settings", "weights")}
     at_most = painter.page.get_by_role("textbox", name="Max")
-    refuse(painter)
+    fail_next_request(painter)
     painter.type("Max", "1e308")
     painter.still()
     assert at_most.input_value() == ""
     painter.choose("Colour", "kelvin")
     asked = {"limits": {"min": "20%"}, "kelvin": [2700, 6500]}
     assert painter.said("constrain_light")[-1]["constraints"] == asked
-    refuse(painter)
+    fail_next_request(painter)
     painter.choose("Colour", "any")
     painter.still()
     assert painter.ui("constraints") == {"key": asked}
@@ -98,7 +98,7 @@ def test_what_is_refused_is_shown_no_longer(painter: Painter) -> None:
         lambda: painter.page.evaluate("() => void painter.session.changeSetting('sparse', 99)"),
         lambda: painter.page.evaluate("() => painter.session.lockLight(2, [9, 9, 9], true)"),
     ):
-        refuse(painter)
+        fail_next_request(painter)
         act()
         painter.still()
         assert {name: painter.ui(name) for name in before} == before
@@ -117,28 +117,28 @@ def test_what_is_refused_leaves_what_is_on_its_way(painter: Painter) -> None:
     assert painter.ui("constraints") == {"window left": {"off": True}}
 
 
-def alert(painter: Painter) -> str:
+def alert_text(painter: Painter) -> str:
     """What has to be known now, or nothing."""
     return " ".join(painter.page.get_by_role("alert").all_inner_texts())
 
 
-def test_a_kernel_that_does_not_answer_is_said_to_until_it_does(opened: Any) -> None:
-    painter = opened("model", is_fresh=True)
+def test_a_kernel_that_does_not_answer_is_said_to_until_it_does(new_painter: Any) -> None:
+    painter = new_painter("model", is_fresh=True)
     painter.page.clock.install(time=0)
     painter.page.clock.pause_at(60_000)  # else it goes on, as long as this test takes
     painter.page.evaluate("() => { model.isBusy = true; }")
     painter.stroke()
     painter.page.clock.run_for(9_000)
-    assert alert(painter) == ""
+    assert alert_text(painter) == ""
     painter.page.clock.run_for(1_100)
-    assert "has not answered for 10 s" in alert(painter)
+    assert "has not answered for 10 s" in alert_text(painter)
     painter.page.clock.resume()
     painter.page.evaluate("() => { model.isBusy = false; void model.work(); }")
     painter.page.wait_for_function("() => !document.querySelector('[role=alert]')")
     assert painter.said("paint")[-1]["is_final"] is True
-    assert alert(painter) == ""
+    assert alert_text(painter) == ""
     painter.page.clock.fast_forward(60_000)  # nothing is waited for
-    assert alert(painter) == ""
+    assert alert_text(painter) == ""
     # Nor is what was lost on its way.
     painter.page.evaluate(
         """() => {
@@ -150,23 +150,23 @@ def test_a_kernel_that_does_not_answer_is_said_to_until_it_does(opened: Any) -> 
         }"""
     )
     painter.page.clock.fast_forward(60_000)
-    assert alert(painter) == ""
+    assert alert_text(painter) == ""
 
 
 @pytest.mark.parametrize("model", ["model", "model=taken"])
-def test_a_kernel_that_has_ended_is_said_to_have(opened: Any, model: str) -> None:
+def test_a_kernel_that_has_ended_is_said_to_have(new_painter: Any, model: str) -> None:
     """Nothing is painted for nobody, and nobody is there to take it over from."""
-    painter = opened(model)
+    painter = new_painter(model)
     assert painter.page.get_by_role("button", name="Take over").count() == (model != "model")
     painter.page.evaluate("() => model.trigger('comm_live_update')")
     painter.still()
-    assert "The kernel has ended. Run the cell again" in alert(painter)
+    assert "The kernel has ended. Run the cell again" in alert_text(painter)
     assert painter.page.get_by_role("button", name="Take over").count() == 0
     painter.stroke()
     assert not painter.calls("begin")
 
 
-def under_way(painter: Painter) -> set[str]:
+def running_tasks(painter: Painter) -> set[str]:
     """What is shown to be: writing files, rendering, finding out why it is not closer."""
     ui = painter.page.evaluate("() => painter.store.value")
     flags = {"export": ui["isWriting"], "verify": ui["verifying"], "explain": ui["explaining"]}
@@ -188,7 +188,7 @@ LOST = "Promise.reject(new Error('there is no connection to the painter'))"
 def test_what_could_not_be_asked_for_is_not_under_way(painter: Painter) -> None:
     painter.page.evaluate(f"() => {{ host.send = () => {LOST}; }}")
     ask_for_all(painter)
-    assert under_way(painter) == set()
+    assert running_tasks(painter) == set()
     painter.button("Export").click()
     painter.page.get_by_role("dialog").get_by_role("button", name="Export", exact=True).click()
     assert (
@@ -205,26 +205,26 @@ def test_what_could_not_be_asked_for_is_not_under_way(painter: Painter) -> None:
 def test_what_fails_is_under_way_no_more_and_the_rest_is(painter: Painter) -> None:
     painter.page.evaluate("() => { host.send = () => new Promise(() => {}); }")
     ask_for_all(painter)
-    assert under_way(painter) == {"export", "verify", "explain"}
+    assert running_tasks(painter) == {"export", "verify", "explain"}
     painter.tell(kind="notice", text="The scene does not load.", tone="warn")
     painter.tell(kind="failed", text="A stroke is too large.")
-    assert under_way(painter) == {"export", "verify", "explain"}
+    assert running_tasks(painter) == {"export", "verify", "explain"}
     for what in ("verify", "explain", "export"):
-        assert what in under_way(painter)
+        assert what in running_tasks(painter)
         painter.tell(kind="notice", text="It does not render.", tone="warn", task=what)
-        assert what not in under_way(painter)
+        assert what not in running_tasks(painter)
 
 
 def test_what_ended_while_the_connection_was_lost_is_not_waited_for(painter: Painter) -> None:
     painter.page.evaluate("() => { host.send = () => new Promise(() => {}); }")
     ask_for_all(painter)
     painter.page.evaluate("() => host.tell(host.state())")  # another round of samples is there
-    assert under_way(painter) == {"export", "verify", "explain"}
+    assert running_tasks(painter) == {"export", "verify", "explain"}
     painter.tell(kind="connection", state="lost")
     painter.page.evaluate("() => host.tell(host.state())")
-    assert under_way(painter) == set()
+    assert running_tasks(painter) == set()
     painter.tell(kind="progress", task="verification", done=5, total=16, unit="passes")
-    assert under_way(painter) == {"verify"}  # which still goes on
+    assert running_tasks(painter) == {"verify"}  # which still goes on
     painter.tell(kind="closed", reason="taken", text="It is open on another page.")
     painter.page.evaluate("() => host.tell(host.state())")
-    assert under_way(painter) == set()
+    assert running_tasks(painter) == set()

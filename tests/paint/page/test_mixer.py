@@ -25,7 +25,7 @@ SIZE = (36, 64)
 EVIL = "</script><script>document.title='x'</script>"
 
 
-def lit(make_basis: Any, n: int, **how: Any) -> lp.Basis:
+def light_basis(make_basis: Any, n: int, **how: Any) -> lp.Basis:
     """Soft spots of light of whitish colours, over 12 stops."""
     rng = np.random.default_rng(4)
     y, x = np.mgrid[: SIZE[0], : SIZE[1]] / SIZE[0]
@@ -37,7 +37,7 @@ def lit(make_basis: Any, n: int, **how: Any) -> lp.Basis:
     return make_basis(images=images, emission=emission, **how)
 
 
-def solved(basis: lp.Basis, **how: Any) -> tuple[lp.Target, lp.Solution]:
+def solve_painting(basis: lp.Basis, **how: Any) -> tuple[lp.Target, lp.Solution]:
     """The answer to a painting of other weights."""
     weights = np.random.default_rng(1).uniform(0.1, 1.5, (len(basis.lights), 3))
     image = basis.mix(weights).astype(np.float32)
@@ -47,7 +47,7 @@ def solved(basis: lp.Basis, **how: Any) -> tuple[lp.Target, lp.Solution]:
 
 def report(basis: lp.Basis, **how: Any) -> str:
     """A whole report."""
-    target, solution = solved(basis, **how)
+    target, solution = solve_painting(basis, **how)
     predicted = lp.combine(basis, solution.lighting)
     about: dict[str, Any] = {"target": target, "solution": solution, "predicted": predicted}
     return report_page(basis=basis, verification=None, command="lightpaint solve", **about)
@@ -67,7 +67,7 @@ def offline_tab(browser: Any) -> Iterator[tuple[Any, list[str]]]:
 
 
 @pytest.fixture
-def opened(offline_tab: tuple[Any, list[str]], tmp_path: Path) -> Any:
+def open_file(offline_tab: tuple[Any, list[str]], tmp_path: Path) -> Any:
     """Opens a page from a file; whatever goes wrong in it fails the test."""
     page, wrong = offline_tab
 
@@ -104,11 +104,11 @@ def codes(basis: lp.Basis, weights: Any, transform: lp.ViewTransform) -> Any:
     return to_8_bit(transform.encode(basis.mix(np.asarray(weights)))).astype(np.int16)
 
 
-def shown_through(basis: lp.Basis) -> lp.ViewTransform:
+def transform_of_report(basis: lp.Basis) -> lp.ViewTransform:
     """The transform of the report of `report(basis)`."""
     from lightpaint.report.answer_pictures import report_transform
 
-    target, solution = solved(basis)
+    target, solution = solve_painting(basis)
     return report_transform(target, basis, lp.combine(basis, solution.lighting).image)
 
 
@@ -128,10 +128,10 @@ def check(page: Any, expected: Any) -> None:
     assert off.max() <= 2
 
 
-def test_sliders_solo_and_mute_show_the_sum_of_the_planes(make_basis: Any, opened: Any) -> None:
-    basis = lit(make_basis, 3)
-    transform, answer = shown_through(basis), solved(basis)[1].weights
-    page = opened(report(basis))
+def test_sliders_solo_and_mute_show_the_sum_of_the_planes(make_basis: Any, open_file: Any) -> None:
+    basis = light_basis(make_basis, 3)
+    transform, answer = transform_of_report(basis), solve_painting(basis)[1].weights
+    page = open_file(report(basis))
     check(page, codes(basis, answer, transform))
     weights = answer.copy()
     # From the present by stops; the colour stays.
@@ -156,10 +156,10 @@ def test_sliders_solo_and_mute_show_the_sum_of_the_planes(make_basis: Any, opene
     check(page, codes(basis, answer, transform))
 
 
-def test_kelvin_turns_the_colour_and_keeps_the_luminance(make_basis: Any, opened: Any) -> None:
-    basis = lit(make_basis, 2)
-    transform, answer = shown_through(basis), solved(basis)[1].weights
-    page = opened(report(basis))
+def test_kelvin_turns_the_colour_and_keeps_the_luminance(make_basis: Any, open_file: Any) -> None:
+    basis = light_basis(make_basis, 2)
+    transform, answer = transform_of_report(basis), solve_painting(basis)[1].weights
+    page = open_file(report(basis))
     move(page, 0, 1, 1e6 / 3000)
     warm = np.asarray(kelvin_to_rgb(3000.0))
     weights = answer.copy()
@@ -168,10 +168,10 @@ def test_kelvin_turns_the_colour_and_keeps_the_luminance(make_basis: Any, opened
     assert "3000 K" in page.locator(".mixer-light").nth(0).inner_text()
 
 
-def test_a_finger_scrolls_past_sliders(make_basis: Any, opened: Any, browser: Any) -> None:
+def test_a_finger_scrolls_past_sliders(make_basis: Any, open_file: Any, browser: Any) -> None:
     """One that begins on them; sideways it moves them."""
-    basis = lit(make_basis, 3)
-    path = opened(report(basis)).url
+    basis = light_basis(make_basis, 3)
+    path = open_file(report(basis)).url
     context = browser.new_context(viewport={"width": 400, "height": 500}, has_touch=True)
     page = context.new_page()
     page.goto(path)
@@ -195,9 +195,9 @@ def test_a_finger_scrolls_past_sliders(make_basis: Any, opened: Any, browser: An
     context.close()
 
 
-def test_on_a_phone_nothing_parts_lights_and_buttons(make_basis: Any, opened: Any) -> None:
+def test_on_a_phone_nothing_parts_lights_and_buttons(make_basis: Any, open_file: Any) -> None:
     """But what is said of a copy, while it is; and nothing is wider than the phone."""
-    page = opened(report(lit(make_basis, 4)))
+    page = open_file(report(light_basis(make_basis, 4)))
     between = """() => document.querySelector('.mixer-light').getBoundingClientRect().top
         - document.querySelector('.mixer-buttons').getBoundingClientRect().bottom"""
     for width in (360, 400):
@@ -216,20 +216,20 @@ def test_on_a_phone_nothing_parts_lights_and_buttons(make_basis: Any, opened: An
 
 
 @pytest.mark.parametrize("name", ["filmic", "agx", "linear"])
-def test_through_other_transforms(make_basis: Any, opened: Any, name: str) -> None:
-    basis = lit(make_basis, 3)
+def test_through_other_transforms(make_basis: Any, open_file: Any, name: str) -> None:
+    basis = light_basis(make_basis, 3)
     transform = lp.ViewTransform(name, 0.5)
-    lighting = solved(basis)[1].lighting
+    lighting = solve_painting(basis)[1].lighting
     text = mixer_html(basis, lighting, transform=transform) + mixer_assets()
-    page = opened(f"<!doctype html><body>{text}")
+    page = open_file(f"<!doctype html><body>{text}")
     off = np.abs(pixels(page) - codes(basis, lighting.weights_for(basis), transform))
     assert off.mean() < 1
 
 
-def test_what_is_copied_is_read(make_basis: Any, opened: Any, tmp_path: Path) -> None:
+def test_what_is_copied_is_read(make_basis: Any, open_file: Any, tmp_path: Path) -> None:
     """Names, whatever they are, are text on the page and in the file."""
-    basis = lit(make_basis, 3, names=(EVIL, 'a "b" <i>', "key"))
-    page = opened(report(basis))
+    basis = light_basis(make_basis, 3, names=(EVIL, 'a "b" <i>', "key"))
+    page = open_file(report(basis))
     page.context.grant_permissions(["clipboard-read", "clipboard-write"])
     assert page.title().startswith("evening")
     assert [x.inner_text() for x in page.locator(".mixer-name").all()] == list(basis.names)
@@ -238,7 +238,7 @@ def test_what_is_copied_is_read(make_basis: Any, opened: Any, tmp_path: Path) ->
     page.get_by_text("is on the clipboard").wait_for()
     (tmp_path / "lighting.json").write_text(page.evaluate("navigator.clipboard.readText()"))
     lighting = lp.read_lighting(tmp_path / "lighting.json")
-    answer = solved(basis)[1].weights
+    answer = solve_painting(basis)[1].weights
     weights = lighting.weights_for(basis)
     # As the answer has them to the last bit, but for the one that was moved.
     np.testing.assert_array_equal(weights[:2], answer[:2])
@@ -252,10 +252,10 @@ def test_what_is_copied_is_read(make_basis: Any, opened: Any, tmp_path: Path) ->
     assert copied == "lightpaint relight scene.xml lighting.json"
 
 
-def test_of_hundreds_of_lights_the_rest_is_one(make_basis: Any, opened: Any) -> None:
-    basis = lit(make_basis, 60)
-    transform, answer = shown_through(basis), solved(basis)[1].weights
-    page = opened(report(basis))
+def test_of_hundreds_of_lights_the_rest_is_one(make_basis: Any, open_file: Any) -> None:
+    basis = light_basis(make_basis, 60)
+    transform, answer = transform_of_report(basis), solve_painting(basis)[1].weights
+    page = open_file(report(basis))
     assert page.locator(".mixer-light").count() == ROWS_SHOWN + 1
     check(page, codes(basis, answer, transform))
     page.get_by_text("Reset to now").click()
@@ -269,8 +269,8 @@ def test_of_hundreds_of_lights_the_rest_is_one(make_basis: Any, opened: Any) -> 
     check(page, codes(basis, weights, transform))
 
 
-def test_the_wipe(make_basis: Any, opened: Any) -> None:
-    page = opened(report(lit(make_basis, 2)))
+def test_the_wipe(make_basis: Any, open_file: Any) -> None:
+    page = open_file(report(light_basis(make_basis, 2)))
     stage = page.locator(".mixer-stage")
     box = stage.bounding_box()
     # The mix is whole at first: in the painting no slider changes anything.
@@ -283,8 +283,8 @@ def test_the_wipe(make_basis: Any, opened: Any) -> None:
     assert tag.is_visible()
 
 
-def test_axe_finds_nothing_in_the_mixer(make_basis: Any, opened: Any, axe: str) -> None:
-    page = opened(report(lit(make_basis, 3)))
+def test_axe_finds_nothing_in_the_mixer(make_basis: Any, open_file: Any, axe: str) -> None:
+    page = open_file(report(light_basis(make_basis, 3)))
     page.evaluate(axe)
     assert violations(page, ".mixer") == []
 
@@ -292,7 +292,7 @@ def test_axe_finds_nothing_in_the_mixer(make_basis: Any, opened: Any, axe: str) 
 def test_without_scripts_a_report_is_as_it_was(
     make_basis: Any, browser: Any, tmp_path: Path
 ) -> None:
-    (tmp_path / "report.html").write_text(report(lit(make_basis, 2)), encoding="utf-8")
+    (tmp_path / "report.html").write_text(report(light_basis(make_basis, 2)), encoding="utf-8")
     context = browser.new_context(java_script_enabled=False)
     page = context.new_page()
     page.goto((tmp_path / "report.html").as_uri())
@@ -308,7 +308,7 @@ def test_twelve_lights_of_noise_can_be_mailed(make_basis: Any) -> None:
     assert len(page) + len(mixer_assets()) < 6_000_000
 
 
-def _unpacked(packed: PackedPicture) -> Any:
+def _unpack(packed: PackedPicture) -> Any:
     """The picture (h, w, 3) of packed data, pixel by pixel as in `packed_picture.js`."""
     height, width = packed.size
     data = np.frombuffer(zlib.decompress(packed.data), np.uint8).astype(np.int32)
@@ -333,7 +333,7 @@ def test_a_compact_picture_is_the_picture(dropped: int) -> None:
     image[2, 3], image[4] = 0, [0, 5, 1e-9]
     its = pack_picture(image, dropped=dropped)
     assert its.scale * BRIGHTEST >= image.max()
-    made = _unpacked(its)
+    made = _unpack(its)
     # Rounded to the 11 bits of halves, then to those that are left; and there is a least value.
     rtol = 2.0**-11 + (2.0 ** (dropped - 11) if dropped else 0)
     np.testing.assert_allclose(made, image, rtol=rtol, atol=its.scale * 2.0**-20)

@@ -51,7 +51,7 @@ def folder(make_basis: Any, tmp_path: Path) -> Path:
 
 
 @contextmanager
-def served(folder: Path, *command: str) -> Iterator[str]:
+def serve_notebooks(folder: Path, *command: str) -> Iterator[str]:
     """A server on a port of its own, with settings of its own, until the end of the test."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
@@ -70,7 +70,7 @@ def served(folder: Path, *command: str) -> Iterator[str]:
             stderr=log,
         )
     try:
-        wait_for(lambda: answers(url), START_S)
+        wait_for(lambda: is_reachable(url), START_S)
         yield url
     finally:
         end_at_once(server)
@@ -88,7 +88,7 @@ def end_at_once(server: "subprocess.Popen[bytes]") -> None:
     assert alive == []
 
 
-def answers(url: str) -> bool:
+def is_reachable(url: str) -> bool:
     """Whether somebody is there."""
     try:
         with urllib.request.urlopen(url, timeout=5):
@@ -107,7 +107,7 @@ def wait_for(what: Callable[[], Any], limit_s: float = SHOW_MS / 1000) -> Any:
 
 
 @contextmanager
-def tab(browser: Any) -> Iterator[Any]:
+def open_tab(browser: Any) -> Iterator[Any]:
     """A page on which nothing of the painter's goes wrong."""
     context = browser.new_context(viewport={"width": 1400, "height": 950})
     page, wrong = context.new_page(), []
@@ -127,7 +127,7 @@ def paint(page: Any, folder: Path) -> None:
     picture.wait_for()
     wait_for(lambda: page.locator(".lightpaint .loading, .lightpaint .waiting").count() == 0)
     end_s = time.monotonic() + SHOW_MS / 1000
-    while not is_told(folder):
+    while not has_painting(folder):
         assert time.monotonic() < end_s
         box = picture.bounding_box()
         x, y = box["x"] + 0.3 * box["width"], box["y"] + 0.22 * box["height"]
@@ -137,7 +137,7 @@ def paint(page: Any, folder: Path) -> None:
             page.mouse.move(x + 12 * k, y)
         page.mouse.up()
         told_s = time.monotonic() + STROKE_S
-        while time.monotonic() < told_s and not is_told(folder):
+        while time.monotonic() < told_s and not has_painting(folder):
             time.sleep(0.1)
 
 
@@ -153,7 +153,7 @@ def run_cell(page: Any, k: int, is_done: Callable[[], bool]) -> None:
             time.sleep(0.1)
 
 
-def is_told(folder: Path) -> bool:
+def has_painting(folder: Path) -> bool:
     """Whether Python has heard of a painting."""
     path = folder / "told.txt"
     return path.exists() and "lighting True" in path.read_text()
@@ -170,7 +170,7 @@ def test_in_jupyterlab(browser: Any, folder: Path) -> None:
     cells = [cell(0, PAINTER + "painter"), cell(1, ASK)]
     (folder / "paint.ipynb").write_text(json.dumps({**notebook, "cells": cells}))
     options = ["--no-browser", "--allow-root", "--ServerApp.token=", "--ServerApp.password="]
-    with served(folder, "jupyterlab", *options) as url, tab(browser) as page:
+    with serve_notebooks(folder, "jupyterlab", *options) as url, open_tab(browser) as page:
         # A slow JupyterLab may ask which kernel it is, before it has read that: it knows by then.
         asks = page.locator(".jp-Dialog .jp-mod-accept")
         page.add_locator_handler(asks, lambda: asks.click())
@@ -204,7 +204,10 @@ def test_in_marimo(browser: Any, folder: Path) -> None:
         text += f"\n@app.cell\ndef _({head}):\n{lines}    return {made}\n"
     (folder / "paint.py").write_text(text)
     options = ["--headless", "--no-token", "--host", "127.0.0.1"]
-    with served(folder, "marimo", "run", "paint.py", *options) as url, tab(browser) as page:
+    with (
+        serve_notebooks(folder, "marimo", "run", "paint.py", *options) as url,
+        open_tab(browser) as page,
+    ):
         page.goto(url)
         page.get_by_text("for nothing").wait_for()
         paint(page, folder)

@@ -41,7 +41,7 @@ UNPAINTED = "Nothing is painted: the answer is the current lighting."
 PAINTER = "document.getElementById('lightpaint').painter"
 
 
-def until(is_so: Callable[[], Any], what: str, seconds: float = 60) -> Any:
+def wait_until(is_so: Callable[[], Any], what: str, seconds: float = 60) -> Any:
     """What is looked for, once it is so."""
     end = time.monotonic() + seconds
     while not (found := is_so()):
@@ -54,7 +54,7 @@ def until(is_so: Callable[[], Any], what: str, seconds: float = 60) -> Any:
 FIRM = ("0", *["Shift+}"] * 8)
 
 
-class Served:
+class ServedPainter:
     """A painter on a port of its own, in threads of this process."""
 
     def __init__(self, *subjects: Subject, port: int = 0) -> None:
@@ -83,10 +83,10 @@ class Served:
         self.studio.close()
 
 
-class Person:
+class PainterUser:
     """Somebody at a page, and what they do and see."""
 
-    def __init__(self, page: Any, served: Served) -> None:
+    def __init__(self, page: Any, served: ServedPainter) -> None:
         self.page, self.served = page, served
 
     def look(self, script: str, given: Any = None) -> Any:
@@ -94,7 +94,7 @@ class Person:
         names = f"const {{ host, engine }} = {PAINTER}; const {{ mirror, screen }} = engine;"
         return self.page.evaluate(f"(given) => {{ {names} {script} }}", given)
 
-    def ready(self) -> "Person":
+    def ready(self) -> "PainterUser":
         """Wait until all pictures are there, and what was done before."""
         self.page.wait_for_selector(".lightpaint .tag")
         there = (
@@ -102,15 +102,15 @@ class Person:
             " && !loader.onTheWay.size"
             "&& screen.width > 0 && screen.width === engine.element.clientWidth"
         )
-        until(lambda: self.look(there), "the page is not ready")
+        wait_until(lambda: self.look(there), "the page is not ready")
         return self.still(*self.served.steps)
 
-    def still(self, *steps: str) -> "Person":
+    def still(self, *steps: str) -> "PainterUser":
         """Wait until these steps are done, and the exact answer to them is on screen."""
         studio = self.served.studio
-        until(lambda: self.served.steps == list(steps), f"not {steps}")
+        wait_until(lambda: self.served.steps == list(steps), f"not {steps}")
         at_rest = "return !mirror.strokes.isPending && !screen.isLive && !screen.frame"
-        until(lambda: self.look(at_rest), "strokes are not answered")
+        wait_until(lambda: self.look(at_rest), "strokes are not answered")
 
         def is_exact() -> bool:
             with studio._access.lock:
@@ -122,8 +122,8 @@ class Person:
             shown = self.look("return Array.from(mirror.weights)")
             return bool(shown == [x for rgb in weights for x in rgb])
 
-        until(is_exact, "there is no exact answer")
-        until(lambda: self.look(at_rest), "the answer is not on screen")
+        wait_until(is_exact, "there is no exact answer")
+        wait_until(lambda: self.look(at_rest), "the answer is not on screen")
         return self
 
     def at(self, x: float, y: float, pane: int = 0) -> tuple[float, float]:
@@ -146,7 +146,7 @@ class Person:
             [x, y, pane],
         )  # type: ignore[no-any-return]
 
-    def drag(self, *places: tuple[float, float], hold: bool = False) -> "Person":
+    def drag(self, *places: tuple[float, float], hold: bool = False) -> "PainterUser":
         """Press the mouse and go from place to place of the screen."""
         mouse = self.page.mouse
         mouse.move(*places[0])
@@ -157,11 +157,11 @@ class Person:
             mouse.up()
         return self
 
-    def stroke(self, *places: tuple[float, float]) -> "Person":
+    def stroke(self, *places: tuple[float, float]) -> "PainterUser":
         """Drag from place to place of the painting."""
         return self.drag(*(self.at(*place) for place in places))
 
-    def press(self, *keys: str) -> "Person":
+    def press(self, *keys: str) -> "PainterUser":
         for key in keys:
             self.page.keyboard.press(key)
         return self
@@ -224,22 +224,25 @@ def subject(basis: lp.Basis, tmp_path: Path) -> Subject:
 
 
 @pytest.fixture
-def served(subject: Subject) -> Iterator[Served]:
+def served_painter(subject: Subject) -> Iterator[ServedPainter]:
     """A painter of it."""
-    made = Served(subject)
+    made = ServedPainter(subject)
     yield made
     made.close()
 
 
 @pytest.fixture
-def opened(browser: Any) -> Iterator[Callable[..., Person]]:
+def open_page(browser: Any) -> Iterator[Callable[..., PainterUser]]:
     """Opens pages of a painter; of the same browser, if they are to know each other."""
     contexts: list[Any] = []
     wrong: list[str] = []
 
     def open_(
-        served: Served, view: str | None = "cpu", beside: Person | None = None, **how: Any
-    ) -> Person:
+        served: ServedPainter,
+        view: str | None = "cpu",
+        beside: PainterUser | None = None,
+        **how: Any,
+    ) -> PainterUser:
         about = {"viewport": {"width": 1280, "height": 720}, **how}
         context = beside.page.context if beside else browser.new_context(**about)
         contexts.append(context)
@@ -249,7 +252,7 @@ def opened(browser: Any) -> Iterator[Callable[..., Person]]:
         page.on("pageerror", lambda error: wrong.append(str(error)))
         page.on("console", lambda said: wrong.append(said.text) if is_wrong(said) else None)
         page.goto(served.server.url.replace("#", f"?view={view}#" if view else "#"))
-        return Person(page, served)
+        return PainterUser(page, served)
 
     def is_wrong(said: Any) -> bool:
         return said.type in ("error", "warning") and OURS not in said.text
@@ -263,9 +266,9 @@ def opened(browser: Any) -> Iterator[Callable[..., Person]]:
 
 @pytest.mark.parametrize("view", ["cpu", "gl"])
 def test_what_is_painted_and_answered_is_on_the_screen(
-    served: Served, opened: Any, view: str
+    served_painter: ServedPainter, open_page: Any, view: str
 ) -> None:
-    me = opened(served, view).ready()
+    me = open_page(served_painter, view).ready()
     assert me.look("return screen.view.name") == view
     before, far, now = me.seen(30, 10), me.seen(90, 50), me.seen(30, 10, 1)
     me.look("mirror.canvas.importance[5] = 2.5")
@@ -284,7 +287,9 @@ def test_what_is_painted_and_answered_is_on_the_screen(
     me.drag(me.at(60, 10), me.at(70, 10), hold=True)
     me.press("Control+z").page.mouse.up()
     me.still()
-    assert me.seen(70, 10) == me.code(served.studio.session.views[0].current[10, 70]).tolist()
+    assert (
+        me.seen(70, 10) == me.code(served_painter.studio.session.views[0].current[10, 70]).tolist()
+    )
     me.press("Control+Shift+Z").still("brush")
     np.testing.assert_allclose(me.seen(30, 10), me.code(me.paint), atol=1)
     fill_and_ask(me)
@@ -298,7 +303,7 @@ def test_what_is_painted_and_answered_is_on_the_screen(
     np.testing.assert_allclose(me.seen(90, 50, 0), me.answered(90, 50), atol=1)
 
 
-def fill_and_ask(me: Person) -> None:
+def fill_and_ask(me: PainterUser) -> None:
     """Fill the floor; then, by a drag, ask for a place of the wall to be two stops darker."""
     wall = me.seen(10, H // 2 - 1)
     me.press("g").stroke((50, 40)).still("brush", "fill")
@@ -314,9 +319,9 @@ def fill_and_ask(me: Person) -> None:
     np.testing.assert_allclose(me.seen(80, 15), me.code(light), atol=2)
 
 
-def test_a_light_is_held_and_moved_and_left(served: Served, opened: Any) -> None:
-    me = opened(served).ready()
-    session = served.studio.session
+def test_a_light_is_held_and_moved_and_left(served_painter: ServedPainter, open_page: Any) -> None:
+    me = open_page(served_painter).ready()
+    session = served_painter.studio.session
     me.press("0").stroke((60, 30), (80, 30)).still("brush")
     slider = me.page.get_by_role("slider", name="light 1, stops from now", exact=True).first
     box = slider.bounding_box()
@@ -337,7 +342,7 @@ def test_a_light_is_held_and_moved_and_left(served: Served, opened: Any) -> None
     box = slider.bounding_box()
     y = box["y"] + box["height"] / 2
     me.drag((box["x"] + 40, y), (box["x"] + box["width"], y), hold=True)
-    until(lambda: session.is_open, "the slider is not heard")
+    wait_until(lambda: session.is_open, "the slider is not heard")
     me.page.reload()
     me.ready()
     assert not session.is_open
@@ -345,42 +350,44 @@ def test_a_light_is_held_and_moved_and_left(served: Served, opened: Any) -> None
 
 
 def test_a_stroke_is_kept_though_the_page_is_closed_at_once(
-    served: Served, opened: Any, monkeypatch: pytest.MonkeyPatch
+    served_painter: ServedPainter, open_page: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    me = opened(served).ready().press("0")
-    said = served.studio.handle
+    me = open_page(served_painter).ready().press("0")
+    said = served_painter.studio.handle
 
     def slowly(*given: Any) -> Any:
         time.sleep(0.3)
         return said(*given)
 
-    monkeypatch.setattr(served.studio, "handle", slowly)
+    monkeypatch.setattr(served_painter.studio, "handle", slowly)
     me.stroke((60, 30), (80, 30))  # its end waits for the answer to what was said while it went on
     me.page.goto("about:blank")
-    until(lambda: served.steps == ["brush"], "the stroke is lost")
+    wait_until(lambda: served_painter.steps == ["brush"], "the stroke is lost")
 
 
-def test_what_is_said_while_nothing_is_painted(served: Served, opened: Any) -> None:
-    me = opened(served).ready()
+def test_what_is_said_while_nothing_is_painted(
+    served_painter: ServedPainter, open_page: Any
+) -> None:
+    me = open_page(served_painter).ready()
     said, rows = me.page.locator(".headline"), me.page.locator(".lights")
-    until(lambda: said.inner_text() == UNPAINTED, "it is not said at the start")
+    wait_until(lambda: said.inner_text() == UNPAINTED, "it is not said at the start")
     me.press("0").stroke((60, 30), (80, 30)).still("brush")
     me.page.get_by_text("ΔE").first.wait_for()
-    until(lambda: "±" in rows.inner_text(), "it is not said how sure lights are")
+    wait_until(lambda: "±" in rows.inner_text(), "it is not said how sure lights are")
     me.page.reload()
     me.ready().press("Control+z").still()
-    until(lambda: said.inner_text() == UNPAINTED, "it is not said after all is undone")
+    wait_until(lambda: said.inner_text() == UNPAINTED, "it is not said after all is undone")
     assert "±" not in rows.inner_text()
     slider = me.page.get_by_role("slider", name="light 1, stops from now", exact=True).first
     slider.press("ArrowRight")
     me.still("light 1")
-    until(lambda: "except for your constraints" in said.inner_text(), "it is said as before")
+    wait_until(lambda: "except for your constraints" in said.inner_text(), "it is said as before")
 
 
 def test_a_pen_paints_with_its_pressure_and_fingers_paint_and_zoom(
-    served: Served, opened: Any
+    served_painter: ServedPainter, open_page: Any
 ) -> None:
-    me = opened(served, has_touch=True, viewport={"width": 1024, "height": 768}).ready()
+    me = open_page(served_painter, has_touch=True, viewport={"width": 1024, "height": 768}).ready()
     me.press("0")
     screen = me.page.context.new_cdp_session(me.page)
 
@@ -399,7 +406,7 @@ def test_a_pen_paints_with_its_pressure_and_fingers_paint_and_zoom(
     pen(10, 1.0)
     pen(45, 0.25)
     me.still("brush", "brush")
-    hard, soft = (served.studio.session.views[0].importance[y, 30] for y in (10, 45))
+    hard, soft = (served_painter.studio.session.views[0].importance[y, 30] for y in (10, 45))
     assert 0 < soft < 0.8 * hard
     np.testing.assert_allclose(me.seen(30, 10), me.code(me.paint), atol=1)
     assert me.seen(30, 45) not in (before, me.seen(30, 10))
@@ -421,8 +428,8 @@ def test_a_pen_paints_with_its_pressure_and_fingers_paint_and_zoom(
     np.testing.assert_allclose(me.seen(30, 27), me.code(me.paint), atol=1)
 
 
-def test_strokes_outlive_their_connection(served: Served, opened: Any) -> None:
-    me = opened(served).ready()
+def test_strokes_outlive_their_connection(served_painter: ServedPainter, open_page: Any) -> None:
+    me = open_page(served_painter).ready()
     lost = me.page.get_by_text("The connection is lost")
     me.press(*FIRM).drag(me.at(20, 20), me.at(30, 20), hold=True)
     me.look("host.socket.close()")
@@ -433,7 +440,9 @@ def test_strokes_outlive_their_connection(served: Served, opened: Any) -> None:
     me.still("brush")
     for x in (20, 30, 40):
         np.testing.assert_allclose(me.seen(x, 20), me.code(me.paint), atol=1)
-        np.testing.assert_allclose(served.studio.session.views[0].image[20, x], me.paint, rtol=1e-6)
+        np.testing.assert_allclose(
+            served_painter.studio.session.views[0].image[20, x], me.paint, rtol=1e-6
+        )
     # A stroke that was kept, and whose answer never came, comes again and is kept once.
     me.look(
         "const receive = host.receive.bind(host);"
@@ -448,13 +457,13 @@ def test_strokes_outlive_their_connection(served: Served, opened: Any) -> None:
     me.still("brush", "brush")
     me.press("Control+z", "Control+z")
     me.still()
-    assert not served.studio.session.is_painted
+    assert not served_painter.studio.session.is_painted
 
 
 def test_what_is_kept_is_there_again_and_solved_alike_from_its_files(
-    served: Served, opened: Any
+    served_painter: ServedPainter, open_page: Any
 ) -> None:
-    me = opened(served, view=None).ready()  # as the terminal's address leads there
+    me = open_page(served_painter, view=None).ready()  # as the terminal's address leads there
     before = me.seen(60, 30)
     me.press("0").stroke((20, 20), (40, 20)).still("brush")
     me.press("Control+s")
@@ -477,20 +486,25 @@ def test_what_is_kept_is_there_again_and_solved_alike_from_its_files(
     me.page.get_by_label("Report").uncheck()
     me.page.get_by_role("dialog").get_by_role("button", name="Export", exact=True).click()
     command = shlex.split(me.page.locator(".command code").inner_text())
-    again = [sys.executable, "-m", *command, "--output", str(served.folder / "again")]
+    again = [sys.executable, "-m", *command, "--output", str(served_painter.folder / "again")]
     made = subprocess.run(again, cwd=REPOSITORY, capture_output=True, text=True, check=False)
     assert made.returncode == 0, made.stderr
-    session = served.studio.session
-    for path in (served.folder / "lighting.json", served.folder / "again" / "lighting.json"):
+    session = served_painter.studio.session
+    for path in (
+        served_painter.folder / "lighting.json",
+        served_painter.folder / "again" / "lighting.json",
+    ):
         emission = lp.read_lighting(path).emission
         found = [emission[name] for name in session.basis.names]
         np.testing.assert_allclose(found, session.weights, rtol=1e-9)
 
 
-def test_a_second_tab_takes_over_and_the_first_takes_back(served: Served, opened: Any) -> None:
-    first = opened(served).ready()
+def test_a_second_tab_takes_over_and_the_first_takes_back(
+    served_painter: ServedPainter, open_page: Any
+) -> None:
+    first = open_page(served_painter).ready()
     first.press("0").stroke((20, 20), (40, 20)).still("brush")
-    second = opened(served, beside=first)
+    second = open_page(served_painter, beside=first)
     second.page.get_by_text("the painter is open in another tab").wait_for()
     second.button("Take over").click()
     second.ready()
@@ -498,20 +512,22 @@ def test_a_second_tab_takes_over_and_the_first_takes_back(served: Served, opened
     second.press("0").stroke((60, 40), (80, 40)).still("brush", "brush")
     first.page.bring_to_front()
     first.stroke((10, 5), (20, 5))
-    assert served.steps == ["brush", "brush"]
+    assert served_painter.steps == ["brush", "brush"]
     first.button("Take over").click()
     second.page.get_by_text("another tab has taken this session over").wait_for(state="attached")
     first.ready()
     np.testing.assert_allclose(first.seen(70, 40), first.code(first.paint), atol=1)
-    now = served.studio.session.views[0].current[5, 15]
+    now = served_painter.studio.session.views[0].current[5, 15]
     np.testing.assert_allclose(first.seen(15, 5), first.code(now), atol=1)
 
 
-def test_a_stroke_that_was_taken_over_lies_over_nothing(served: Served, opened: Any) -> None:
-    first = opened(served).ready()
+def test_a_stroke_that_was_taken_over_lies_over_nothing(
+    served_painter: ServedPainter, open_page: Any
+) -> None:
+    first = open_page(served_painter).ready()
     first.press(*FIRM).drag(first.at(10, 5), first.at(20, 5), hold=True)
-    until(lambda: served.studio.session.is_open, "the stroke is not heard")
-    second = opened(served, beside=first)
+    wait_until(lambda: served_painter.studio.session.is_open, "the stroke is not heard")
+    second = open_page(served_painter, beside=first)
     second.button("Take over").click()
     second.ready()
     # What was heard of it is kept; what the second tab paints there lies over it. It has the brush
@@ -523,20 +539,20 @@ def test_a_stroke_that_was_taken_over_lies_over_nothing(served: Served, opened: 
     first.button("Take over").click()
     first.page.get_by_text("A stroke in this tab had not been sent").wait_for()
     first.ready()
-    assert served.steps == ["stroke", "brush"]
+    assert served_painter.steps == ["stroke", "brush"]
     np.testing.assert_allclose(first.seen(15, 5), first.code(second.paint), atol=1)
-    now = served.studio.session.views[0].current[5, 58]
+    now = served_painter.studio.session.views[0].current[5, 58]
     np.testing.assert_allclose(first.seen(58, 5), first.code(now), atol=1)
 
 
 def test_a_tab_of_an_earlier_start_says_what_to_do(subject: Subject, browser: Any) -> None:
     """Its errors on the console are what a server that is not there, or refuses it, makes."""
-    served = Served(subject)
+    served = ServedPainter(subject)
     context = browser.new_context()
     try:
         page = context.new_page()
         page.goto(served.server.url)
-        me = Person(page, served).ready()
+        me = PainterUser(page, served).ready()
         me.look("host.listeners.delete('closed')")  # one that is killed says no goodbye
     finally:
         served.close()
@@ -545,7 +561,7 @@ def test_a_tab_of_an_earlier_start_says_what_to_do(subject: Subject, browser: An
         page.get_by_text("What you paint now is sent if the same painter comes back").wait_for()
         me.stroke((10, 5), (20, 5))
         me.stroke((10, 15), (20, 15))
-        again = Served(subject, port=served.server.port)
+        again = ServedPainter(subject, port=served.server.port)
         page.get_by_text("This page belongs to a painter that has ended").wait_for()
         page.get_by_text("2 strokes painted here could not be sent, and are lost").wait_for()
         # Nobody would hear more of them.
@@ -555,7 +571,7 @@ def test_a_tab_of_an_earlier_start_says_what_to_do(subject: Subject, browser: An
         beside = context.new_page()
         beside.goto(again.server.url)
         # The new tab has the new key, and the old one does not take the session by it.
-        Person(beside, again).ready()
+        PainterUser(beside, again).ready()
         assert page.get_by_text("This page belongs to a painter that has ended").is_visible()
     finally:
         context.close()
@@ -564,7 +580,7 @@ def test_a_tab_of_an_earlier_start_says_what_to_do(subject: Subject, browser: An
 
 
 @pytest.fixture
-def two(subject: Subject, basis: lp.Basis) -> Iterator[Served]:
+def two_views(subject: Subject, basis: lp.Basis) -> Iterator[ServedPainter]:
     """A painter of two views: the second one is smaller, and sees a part of the first."""
     half = {
         "planes": np.ascontiguousarray(basis.images[:, 10:, :48]),
@@ -573,14 +589,16 @@ def two(subject: Subject, basis: lp.Basis) -> Iterator[Served]:
         "objects": Objects(basis.objects.index[10:, :48], ("wall", "floor")),
         "origin": replace(basis.origin, sensor="side"),
     }
-    made = Served(subject, replace(subject, basis=replace(basis, **half)))
+    made = ServedPainter(subject, replace(subject, basis=replace(basis, **half)))
     yield made
     made.close()
 
 
-def test_two_views_are_painted_and_have_one_answer(two: Served, opened: Any) -> None:
-    me = opened(two).ready()
-    views = two.studio.session.views
+def test_two_views_are_painted_and_have_one_answer(
+    two_views: ServedPainter, open_page: Any
+) -> None:
+    me = open_page(two_views).ready()
+    views = two_views.studio.session.views
     me.press(*FIRM).stroke((20, 10), (40, 10)).still("brush")
     before = me.answered(10, 30, 1)
     me.press("n").ready()
@@ -602,25 +620,25 @@ def test_two_views_are_painted_and_have_one_answer(two: Served, opened: Any) -> 
     np.testing.assert_allclose(me.seen(70, 40, 1), me.answered(70, 40), atol=1)
     # What is undone is seen.
     me.press("Control+z")
-    until(lambda: me.look("return engine.mirror.view") == 1, "the other view is shown")
+    wait_until(lambda: me.look("return engine.mirror.view") == 1, "the other view is shown")
     me.ready().still("brush", "brush")
     np.testing.assert_allclose(me.seen(20, 30), me.code(paint), atol=1)
     me.press("Control+z").still("brush")
     me.press("Control+z")
-    until(lambda: me.look("return engine.mirror.view") == 0, "the first view is shown")
+    wait_until(lambda: me.look("return engine.mirror.view") == 0, "the first view is shown")
     me.ready().still()
     np.testing.assert_allclose(me.seen(30, 10), me.code(views[0].current[10, 30]), atol=1)
     me.press("Control+Shift+Z", "Control+Shift+Z").still("brush", "brush")
-    until(lambda: me.look("return engine.mirror.view") == 1, "the other view is shown")
+    wait_until(lambda: me.look("return engine.mirror.view") == 1, "the other view is shown")
     me.ready()
     me.button("Export").click()
     assert not me.page.get_by_label("Report").is_visible()  # of bases without their scene
     me.page.get_by_role("dialog").get_by_role("button", name="Export", exact=True).click()
     me.page.locator(".exported li", has_text="painting-side.exr").wait_for()
-    paintings = [two.folder / f"painting-{view.name}.exr" for view in views]
+    paintings = [two_views.folder / f"painting-{view.name}.exr" for view in views]
     bases = [view.basis for view in views]
     solution = correct_noise(lp.solve(bases, [lp.read_target(path) for path in paintings]))
-    found = lp.read_lighting(two.folder / "lighting.json").weights_for(bases[0])
+    found = lp.read_lighting(two_views.folder / "lighting.json").weights_for(bases[0])
     np.testing.assert_allclose(found, solution.weights, rtol=1e-9)
 
 
@@ -648,13 +666,13 @@ class Folder(type(Path())):  # type: ignore[misc]
 
 
 def test_one_waits_for_the_first_picture_and_paints_while_it_gets_better(
-    basis: lp.Basis, tmp_path: Path, opened: Any
+    basis: lp.Basis, tmp_path: Path, open_page: Any
 ) -> None:
     folder = Folder(tmp_path)
     folder.events = threading.Event(), threading.Event(), threading.Event()
-    served = Served(Rendering("room.xml", folder, basis=basis))
+    served = ServedPainter(Rendering("room.xml", folder, basis=basis))
     try:
-        me = opened(served)
+        me = open_page(served)
         me.page.get_by_text("Rendering the first picture …").wait_for()
         whole = me.page.get_by_role("button", name="1:1", exact=True)
         assert whole.get_attribute("aria-pressed") != "true"  # there is no picture yet
@@ -667,7 +685,7 @@ def test_one_waits_for_the_first_picture_and_paints_while_it_gets_better(
         me.press(*FIRM).drag(me.at(20, 20), me.at(30, 20), hold=True)
         folder.events[1].set()
         folder.events[2].wait(60)
-        until(lambda: me.seen(90, 50) != now, "the page has the old picture")
+        wait_until(lambda: me.seen(90, 50) != now, "the page has the old picture")
         me.page.mouse.move(*me.at(40, 20), steps=3)
         me.page.mouse.up()
         me.still("brush").ready()
@@ -686,26 +704,28 @@ def test_one_waits_for_the_first_picture_and_paints_while_it_gets_better(
         served.close()
 
 
-def test_what_comes_at_rest_is_drawn_sharply_at_once(served: Served, opened: Any) -> None:
+def test_what_comes_at_rest_is_drawn_sharply_at_once(
+    served_painter: ServedPainter, open_page: Any
+) -> None:
     """As each round of samples does: a picture that is looked at does not turn coarse for it."""
-    me = opened(served).ready()
+    me = open_page(served_painter).ready()
     me.stroke((20, 20), (40, 20)).still("brush")
     me.look(
         "const draw = screen.view.draw.bind(screen.view); window.drawn = [];"
         "screen.view.draw = (params) => { window.drawn.push(params.live); draw(params); }"
     )
-    served.studio._exact_answers.notify()
-    until(lambda: me.page.evaluate("() => window.drawn.length"), "nothing is drawn")
+    served_painter.studio._exact_answers.notify()
+    wait_until(lambda: me.page.evaluate("() => window.drawn.length"), "nothing is drawn")
     me.still("brush")
     assert not any(me.page.evaluate("() => window.drawn"))
 
 
 def test_in_a_browser_that_is_zoomed_it_is_sharp_and_in_its_place(
-    served: Served, opened: Any
+    served_painter: ServedPainter, open_page: Any
 ) -> None:
     """At 200 % a window of 1280x720 has half the room, and two pixels for each of its own."""
     size = {"width": 640, "height": 360}
-    me = opened(served, viewport=size, device_scale_factor=2).ready()
+    me = open_page(served_painter, viewport=size, device_scale_factor=2).ready()
     width = me.look("return screen.view.canvas.width / engine.element.clientWidth")
     assert width == pytest.approx(2, rel=0.01)
     me.press("0").stroke((20, 20), (40, 20)).still("brush")

@@ -11,7 +11,7 @@ from lightpaint.paint.protocol import VERSION
 
 
 @pytest.fixture
-def told(page: Any) -> Any:
+def host_messages(page: Any) -> Any:
     """What is said to a host, after a script with `strokes`, `canvas` and `host`."""
 
     def run(script: str) -> Any:
@@ -31,8 +31,8 @@ def told(page: Any) -> Any:
     return run
 
 
-def test_one_message_is_in_flight_and_the_rest_is_merged(told: Any):
-    said, flights = told(
+def test_one_message_is_in_flight_and_the_rest_is_merged(host_messages: Any):
+    said, flights = host_messages(
         """
         const flights = [];
         strokes.begin();
@@ -57,8 +57,8 @@ def test_one_message_is_in_flight_and_the_rest_is_merged(told: Any):
     assert said[2]["label"] == "brush"
 
 
-def test_a_stroke_that_is_sent_already_still_ends(told: Any):
-    said = told(
+def test_a_stroke_that_is_sent_already_still_ends(host_messages: Any):
+    said = host_messages(
         """
         strokes.begin(); strokes.touch([3, 4, 5, 6]); await host.answer();
         strokes.end("brush"); await host.answer();
@@ -71,8 +71,8 @@ def test_a_stroke_that_is_sent_already_still_ends(told: Any):
     ]
 
 
-def test_what_is_done_is_sent_as_it_was_then(told: Any):
-    pixels = told(
+def test_what_is_done_is_sent_as_it_was_then(host_messages: Any):
+    pixels = host_messages(
         """
         strokes.begin(); canvas.image.fill(1); strokes.touch([0, 2, 0, 2]);
         strokes.end("a");
@@ -86,8 +86,8 @@ def test_what_is_done_is_sent_as_it_was_then(told: Any):
     assert pixels == [[1, False, 1], [1, True], [2, True, 2]]
 
 
-def test_a_lost_connection_loses_no_stroke(told: Any):
-    said = told(
+def test_a_lost_connection_loses_no_stroke(host_messages: Any):
+    said = host_messages(
         """
         strokes.begin(); strokes.touch([0, 2, 0, 2]); await host.answer();
         strokes.touch([4, 6, 4, 6]); strokes.end("a");
@@ -107,8 +107,8 @@ def test_a_lost_connection_loses_no_stroke(told: Any):
     ]
 
 
-def test_what_another_page_has_not_let_through_is_given_up(told: Any):
-    said = told(
+def test_what_another_page_has_not_let_through_is_given_up(host_messages: Any):
+    said = host_messages(
         """
         strokes.begin(); strokes.touch([0, 2, 0, 2]); strokes.end("a");
         host.emit("closed", { kind: "closed", reason: "taken" });
@@ -130,8 +130,8 @@ def test_what_another_page_has_not_let_through_is_given_up(told: Any):
     ]
 
 
-def test_a_stroke_that_was_given_up_is_not_lost(told: Any):
-    lost = told(
+def test_a_stroke_that_was_given_up_is_not_lost(host_messages: Any):
+    lost = host_messages(
         """
         host.lost = null;
         strokes.begin(); strokes.touch([0, 2, 0, 2]); strokes.drop();
@@ -143,8 +143,8 @@ def test_a_stroke_that_was_given_up_is_not_lost(told: Any):
     assert lost is None
 
 
-def test_nothing_of_a_stroke_is_sent_again_as_pictures_come(told: Any):
-    said = told(
+def test_nothing_of_a_stroke_is_sent_again_as_pictures_come(host_messages: Any):
+    said = host_messages(
         """
         strokes.begin(); strokes.touch([0, 2, 0, 2]); await host.answer();
         host.emit("renewed", { kind: "renewed", resources: {} });
@@ -155,12 +155,12 @@ def test_nothing_of_a_stroke_is_sent_again_as_pictures_come(told: Any):
     assert [one["region"] for one in said] == [[0, 2, 0, 2], [5, 6, 5, 6]]
 
 
-def test_strokes_go_on_counting_where_the_session_is(told: Any):
-    assert told("await host.find(41); strokes.begin(); return strokes.live.stroke;") == 42
+def test_strokes_go_on_counting_where_the_session_is(host_messages: Any):
+    assert host_messages("await host.find(41); strokes.begin(); return strokes.live.stroke;") == 42
 
 
-def test_a_dropped_stroke_is_said_to_be_dropped_if_anything_of_it_was_said(told: Any):
-    said = told(
+def test_a_dropped_stroke_is_said_to_be_dropped_if_anything_of_it_was_said(host_messages: Any):
+    said = host_messages(
         """
         strokes.begin(); strokes.drop();
         strokes.begin(); strokes.touch([0, 2, 0, 2]); strokes.drop();
@@ -171,8 +171,8 @@ def test_a_dropped_stroke_is_said_to_be_dropped_if_anything_of_it_was_said(told:
     assert [(one["kind"], one["stroke"]) for one in said] == [("paint", 2), ("drop_stroke", 2)]
 
 
-def test_an_error_does_not_end_painting(told: Any):
-    said, refused = told(
+def test_an_error_does_not_end_painting(host_messages: Any):
+    said, refused = host_messages(
         """
         strokes.begin(); strokes.touch([0, 2, 0, 2]); await host.answer("failed");
         const before = host.refused;
@@ -186,8 +186,8 @@ def test_an_error_does_not_end_painting(told: Any):
     assert refused == [False, True]
 
 
-def test_what_else_is_said_comes_after_strokes_that_are_done(told: Any):
-    order = told(
+def test_what_else_is_said_comes_after_strokes_that_are_done(host_messages: Any):
+    order = host_messages(
         """
         const order = [];
         strokes.begin(); strokes.touch([0, 2, 0, 2]); strokes.end("a");
@@ -200,8 +200,8 @@ def test_what_else_is_said_comes_after_strokes_that_are_done(told: Any):
     assert order in (["live", "undo", "done"], ["live", "done", "undo"])
 
 
-def test_what_another_page_did_not_let_through_waits(told: Any):
-    said, pending = told(
+def test_what_another_page_did_not_let_through_waits(host_messages: Any):
+    said, pending = host_messages(
         """
         strokes.begin(); strokes.touch([0, 2, 0, 2]); strokes.end("a");
         await host.answer();

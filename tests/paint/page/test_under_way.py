@@ -124,8 +124,8 @@ def test_until_a_look_is_there_no_picture_is_called_its_own(painter: Painter, pi
     assert tag.inner_text() == picture
 
 
-def test_an_answer_without_some_of_its_lights_says_so(opened: Any) -> None:
-    painter = opened()
+def test_an_answer_without_some_of_its_lights_says_so(new_painter: Any) -> None:
+    painter = new_painter()
     tag = painter.page.locator(".tag").last
     painter.page.evaluate("() => engine.tell('loading', { done: 1, total: 4, isFirst: true })")
     tag.get_by_text("Answer: some lights are still loading …").wait_for()

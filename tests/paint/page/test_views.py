@@ -35,7 +35,7 @@ def pictures(site: Any) -> dict[str, np.ndarray]:
     return made
 
 
-def shown(
+def draw_panes(
     page: Any, which: str, pictures: dict[str, Any], params: Any = None, lut: Any = None
 ) -> np.ndarray:
     """Codes of the left and the right picture, pixel by pixel, (2, H, W, 3)."""
@@ -48,7 +48,7 @@ def shown(
     return np.stack([codes[:, :W], codes[:, W + GAP :]])
 
 
-def mixed(pictures: dict[str, np.ndarray]) -> np.ndarray:
+def mix_planes(pictures: dict[str, np.ndarray]) -> np.ndarray:
     return np.einsum("khwc,kc->hwc", pictures["planes"], pictures["weights"])
 
 
@@ -64,7 +64,7 @@ def lattice(name: str, side: int, low: float, high: float) -> np.ndarray:
     return ViewTransform(name).encode(axes).astype(np.float16)
 
 
-def interpolated(lut: np.ndarray, light: np.ndarray) -> np.ndarray:
+def interpolate(lut: np.ndarray, light: np.ndarray) -> np.ndarray:
     """Codes by a lattice, as SciPy has them."""
     axis = np.linspace(-14, 6, len(lut))
     between = RegularGridInterpolator((axis, axis, axis), lut.astype(np.float64))
@@ -74,9 +74,9 @@ def interpolated(lut: np.ndarray, light: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("which", ["cpu", "gl"])
 @pytest.mark.parametrize("stops", [0.0, -2.3])
 def test_both_pictures_are_shown_in_srgb(page: Any, pictures: Any, which: str, stops: float):
-    left, right = shown(page, which, pictures, {"stops": stops})
+    left, right = draw_panes(page, which, pictures, {"stops": stops})
     assert np.abs(left - codes(pictures["painting"], stops=stops)).max() <= 1
-    assert np.abs(right - codes(mixed(pictures), stops=stops)).max() <= 1
+    assert np.abs(right - codes(mix_planes(pictures), stops=stops)).max() <= 1
 
 
 @pytest.mark.parametrize("which", ["cpu", "gl"])
@@ -87,11 +87,11 @@ def test_view_transforms_are_those_of_the_library(
     lut = {"name": name, "side": 48, "low": -14.0, "high": 6.0}
     site.arrays["lut"] = lattice(name, 48, -14, 6)
     for got, light in zip(
-        shown(page, which, pictures, {"stops": 0.7}, lut),
-        (pictures["painting"], mixed(pictures)),
+        draw_panes(page, which, pictures, {"stops": 0.7}, lut),
+        (pictures["painting"], mix_planes(pictures)),
         strict=True,
     ):
-        assert np.abs(got - interpolated(site.arrays["lut"], light * 2**0.7)).max() <= CODES
+        assert np.abs(got - interpolate(site.arrays["lut"], light * 2**0.7)).max() <= CODES
         # Between its points a lattice is straight, which the transform is not.
         assert np.abs(got - codes(light, name, 0.7)).mean() < 0.5
 
@@ -99,20 +99,20 @@ def test_view_transforms_are_those_of_the_library(
 @pytest.mark.parametrize("overlay", [None, "missed", "beyond", "importance", "falsecolor"])
 def test_views_agree(page: Any, pictures: Any, overlay: str | None):
     params = {"overlay": overlay, "stops": 0.4}
-    one, other = (shown(page, which, pictures, params) for which in ("cpu", "gl"))
+    one, other = (draw_panes(page, which, pictures, params) for which in ("cpu", "gl"))
     off = np.abs(one - other).max(axis=-1)
     # On the border of two bands of false colour, or of too dark and too bright, they may differ.
     assert (off <= 1).mean() > 0.99
     if overlay:
-        plain = shown(page, "cpu", pictures, {"stops": 0.4})
+        plain = draw_panes(page, "cpu", pictures, {"stops": 0.4})
         changed = [bool((one[k] != plain[k]).any()) for k in (0, 1)]
         assert changed == [overlay in ("importance", "falsecolor"), overlay != "importance"]
 
 
 @pytest.mark.parametrize("which", ["cpu", "gl"])
 def test_wipe_blink_and_zoom(page: Any, pictures: Any, which: str):
-    shown(page, which, pictures)
-    painting, solution = codes(pictures["painting"]), codes(mixed(pictures))
+    draw_panes(page, which, pictures)
+    painting, solution = codes(pictures["painting"]), codes(mix_planes(pictures))
     width = 2 * W + GAP
 
     def whole(params: Any) -> np.ndarray:
@@ -135,20 +135,20 @@ def test_wipe_blink_and_zoom(page: Any, pictures: Any, which: str):
 
 @pytest.mark.parametrize("which", ["cpu", "gl"])
 def test_light_at_a_pixel_is_light(page: Any, pictures: Any, which: str):
-    shown(page, which, pictures, {"stops": 3})
+    draw_panes(page, which, pictures, {"stops": 3})
     planes = page.evaluate("() => Array.from(view.planesAt(7, 9))")
     want = pictures["planes"][:, 9, 7]
     # Halves times a scale, in float32.
     np.testing.assert_allclose(np.reshape(planes, (N, 3)), want, rtol=1e-6)
     solution = page.evaluate("() => view.lightAt('solution', 7, 9)")
-    np.testing.assert_allclose(solution, mixed(pictures)[9, 7], rtol=1e-6)
+    np.testing.assert_allclose(solution, mix_planes(pictures)[9, 7], rtol=1e-6)
     painting = page.evaluate("() => view.lightAt('painting', 7, 9)")
     np.testing.assert_array_equal(painting, pictures["painting"][9, 7].astype(float))
 
 
 @pytest.mark.parametrize("which", ["cpu", "gl"])
 def test_a_region_of_the_painting_changes_alone(page: Any, pictures: Any, which: str):
-    shown(page, which, pictures)
+    draw_panes(page, which, pictures)
     rgba = page.evaluate(
         """([H, W]) => {
             const image = new Float32Array(3 * H * W).fill(1), full = new Float32Array(H * W);
@@ -167,7 +167,7 @@ def test_a_region_of_the_painting_changes_alone(page: Any, pictures: Any, which:
 
 
 def test_what_is_added_to_a_mix_is_what_a_new_mix_has(page: Any, pictures: Any):
-    shown(page, "cpu", pictures)
+    draw_panes(page, "cpu", pictures)
     differences = page.evaluate(
         """() => {
             const weights = Array.from(view.mixes.solution.weights);
@@ -187,14 +187,14 @@ def test_what_is_added_to_a_mix_is_what_a_new_mix_has(page: Any, pictures: Any):
 
 
 def test_half_size_is_every_second_pixel(page: Any, pictures: Any):
-    shown(page, "cpu", pictures)
+    draw_panes(page, "cpu", pictures)
     light = page.evaluate(
         "() => { view.pace = 60; bench.shown({ live: true }); "
         "return [Array.from(view.mixes.solution.light), view.step] }"
     )
     assert light[1] == 2
     half = np.reshape(light[0], ((H + 1) // 2, W // 2, 3))
-    np.testing.assert_allclose(half, mixed(pictures)[::2, ::2], rtol=1e-5)  # float32
+    np.testing.assert_allclose(half, mix_planes(pictures)[::2, ::2], rtol=1e-5)  # float32
     step = page.evaluate("() => { bench.shown({}); return view.step }")
     assert step == 1
 
@@ -205,17 +205,17 @@ def test_bright_halves_spread_nothing(page: Any, site: Any, pictures: Any, which
     plane[0, 0], plane[0, 1] = np.inf, np.nan
     site.arrays["plane/0"] = plane
     site.arrays["weights"] = np.zeros((N, 3))
-    _, right = shown(page, which, pictures)
+    _, right = draw_panes(page, which, pictures)
     np.testing.assert_array_equal(right, 0)  # and no Inf · 0
     site.arrays["weights"] = np.ones((N, 3))
-    _, right = shown(page, which, pictures)
+    _, right = draw_panes(page, which, pictures)
     np.testing.assert_array_equal(right[0, 0], 255)
-    rest = mixed(pictures | {"weights": np.ones((N, 3))})[1:]
+    rest = mix_planes(pictures | {"weights": np.ones((N, 3))})[1:]
     assert np.abs(right[1:] - codes(rest)).max() <= 1
 
 
 def test_a_lost_context_comes_back_empty(page: Any, pictures: Any):
-    shown(page, "gl", pictures)
+    draw_panes(page, "gl", pictures)
     lost = page.evaluate(
         """async () => {
             const away = view.gl.getExtension("WEBGL_lose_context");
@@ -252,7 +252,7 @@ def test_without_a_gpu_the_view_is_chosen_that_is_faster_there(page: Any):
 
 @pytest.mark.parametrize("which", ["cpu", "gl"])
 def test_memory_for_each_pixel_and_light_is_bounded(page: Any, pictures: Any, which: str):
-    shown(page, which, pictures)
+    draw_panes(page, which, pictures)
     planes = {"cpu": 6, "gl": 8}[which] * N * H * W
     rest = page.evaluate("() => view.memory()") - planes
     rows = 8 * 2**18 if which == "gl" else 0  # on their way to the GPU

@@ -18,7 +18,7 @@ CUT = """async (where) => {
 
 
 @pytest.fixture(scope="module")
-def crowd(browser: Any, site: Any) -> Iterator[Painter]:
+def crowded_page(browser: Any, site: Any) -> Iterator[Painter]:
     """One page for all panels and sizes; each of them is brought to how it begins."""
     page = browser.new_page()
     wrong: list[str] = []
@@ -34,43 +34,43 @@ def crowd(browser: Any, site: Any) -> Iterator[Painter]:
 
 
 @pytest.fixture(scope="module", params=SIZES, ids=["1280x720", "1440x900"])
-def crowded(request: pytest.FixtureRequest, crowd: Painter) -> Painter:
+def crowded_painter(request: pytest.FixtureRequest, crowded_page: Painter) -> Painter:
     width, height = request.param
-    crowd.page.set_viewport_size({"width": width, "height": height})
-    return crowd
+    crowded_page.page.set_viewport_size({"width": width, "height": height})
+    return crowded_page
 
 
 @pytest.fixture
-def painter(crowded: Painter) -> Painter:
-    crowded.page.evaluate(
+def painter(crowded_painter: Painter) -> Painter:
+    crowded_painter.page.evaluate(
         "() => window.painter.store.set({ ...window.first, toasts: [], preview: null })"
     )
-    crowded.page.mouse.move(5, 5)
-    crowded.still()
-    crowded.page.evaluate(
+    crowded_painter.page.mouse.move(5, 5)
+    crowded_painter.still()
+    crowded_painter.page.evaluate(
         """() => {
           for (const one of document.querySelectorAll('.lightpaint, .lightpaint *')) {
             one.scrollTo(0, 0);
           }
         }"""
     )
-    return crowded
+    return crowded_painter
 
 
-def cut_off(painter: Painter, where: str = ".lightpaint") -> list[str]:
+def clipped_elements(painter: Painter, where: str = ".lightpaint") -> list[str]:
     painter.still()
     found: list[str] = painter.page.evaluate(CUT, where)
     return found
 
 
-def how_true(painter: Painter) -> None:
+def show_check(painter: Painter) -> None:
     painter.button("Analysis").click()
     painter.button("Why not closer?").click()
     painter.page.get_by_text("Of the difference (large").wait_for()
 
 
 def verified(painter: Painter) -> None:
-    how_true(painter)
+    show_check(painter)
     painter.button("Verify").click()
     painter.page.locator(".verified").wait_for()
 
@@ -109,7 +109,7 @@ def comparing(painter: Painter) -> None:
     painter.button("Compare looks").click()
 
 
-def some_only(painter: Painter) -> None:
+def show_some_lights(painter: Painter) -> None:
     painter.page.evaluate("() => window.painter.store.set({ solo: [3, 4] })")
 
 
@@ -163,7 +163,7 @@ def agx(painter: Painter) -> None:
 
 
 PANELS: tuple[Callable[[Painter], None], ...] = (
-    how_true,
+    show_check,
     verified,
     numbers,
     importance,
@@ -171,7 +171,7 @@ PANELS: tuple[Callable[[Painter], None], ...] = (
     longest,
     preview,
     comparing,
-    some_only,
+    show_some_lights,
     settings,
     files,
     exporting,
@@ -183,13 +183,13 @@ PANELS: tuple[Callable[[Painter], None], ...] = (
 
 
 def test_it_begins_with_nothing_cut(painter: Painter) -> None:
-    assert cut_off(painter) == []
+    assert clipped_elements(painter) == []
 
 
 @pytest.mark.parametrize("panel", PANELS, ids=lambda panel: panel.__name__)
 def test_no_panel_has_anything_cut(painter: Painter, panel: Callable[[Painter], None]) -> None:
     panel(painter)
-    assert cut_off(painter) == []
+    assert clipped_elements(painter) == []
 
 
 def test_no_light_has_anything_cut(painter: Painter) -> None:
@@ -205,12 +205,12 @@ def test_no_light_has_anything_cut(painter: Painter) -> None:
         painter.still()
         row = painter.page.locator(".light.is-open")
         row.evaluate("(one) => one.scrollIntoView({ block: 'center' })")
-        assert (k, cut_off(painter, ".lightpaint .side")) == (k, [])
+        assert (k, clipped_elements(painter, ".lightpaint .side")) == (k, [])
 
 
 def test_all_that_is_said_of_an_answer_comes_into_sight(painter: Painter) -> None:
     """As it comes, and not what there is room for below what was there before."""
-    how_true(painter)
+    show_check(painter)
     painter.still()
     side, panel = (painter.page.locator(x).bounding_box() for x in (".side", ".fold.is-truth"))
     assert panel["y"] >= side["y"] - 1
@@ -237,7 +237,7 @@ def test_a_sentence_with_its_button_is_whole(painter: Painter) -> None:
 
 
 def test_numbers_stay_on_the_lines_of_their_units(painter: Painter) -> None:
-    how_true(painter)
+    show_check(painter)
     said = painter.page.locator(".truth").evaluate("(one) => one.textContent")
     assert said.count("\u00a0%") >= 5
     assert " %" not in said

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from damaged_files import Case, damaged, outcomes, wrong
+from damaged_files import Case, damage, outcomes, wrong_outcomes
 from renderer import GLOSSY, LIGHTS, PATH, ROOM, write_room
 
 from lightpaint.errors import SceneError
@@ -100,14 +100,14 @@ def test_hostile_scenes(tmp_path: Path) -> None:
     (tmp_path / "fro.xml").write_text(_hostile()["fro"])
     cases += [Case(device, "as a scene") for device in DEVICES if device != "/dev/stdin"]
     results = outcomes("scene", {}, cases, tmp_path)
-    assert wrong(results, ("refused",)) == []
+    assert wrong_outcomes(results, ("refused",)) == []
 
 
 def test_damage_of_the_text(tmp_path: Path) -> None:
     content = write_room(tmp_path).read_bytes()
     cases = [
         case
-        for case in damaged("bent.xml", content, 1, 150, 60)
+        for case in damage("bent.xml", content, 1, 150, 60)
         if not case.done.startswith("cut") or int(case.done[-1]) % 2
     ]
     bent = content.replace(b'id="bulb"', b'id="\xff\xfe"')
@@ -118,7 +118,7 @@ def test_damage_of_the_text(tmp_path: Path) -> None:
         Case("bent.xml", "mark", b"\xef\xbb\xbf" + content),
     ]
     results = outcomes("scene", {"bent.xml": content}, cases, tmp_path)
-    assert wrong(results) == []
+    assert wrong_outcomes(results) == []
     cut = [case.done for case, said in results if case.done[:3] == "cut" and said != "refused"]
     assert set(cut) <= {f"cut at {len(content) - 1}"}
 
@@ -146,10 +146,10 @@ def _assets(folder: Path) -> list[tuple[str, bytes]]:
     exr = (folder / "t.exr").read_bytes()
     wide = struct.pack(">HBHHB", 11, 8, 65500, 65500, 1) + b"\1\x11\0"
     return [
-        *(("exr", case.content) for case in damaged("", exr, 1, 60, 60)),
+        *(("exr", case.content) for case in damage("", exr, 1, 60, 60)),
         *(("ply", _ply(3, index)) for index in (-1, 3, 2_000_000, -2_000_000)),
         *(("ply", _ply(3, index, ascii=True)) for index in (3, 2_000_000)),
-        *(("ply", case.content) for case in damaged("", _ply(3, 2), 2, 40, 40)),
+        *(("ply", case.content) for case in damage("", _ply(3, 2), 2, 40, 40)),
         ("ply", _ply(4_000_000_000, 2)),
         ("serialized", _serialized(3, 1, 2_000_000)),
         ("serialized", _serialized(3, 2**30, 2)),
@@ -176,7 +176,7 @@ def test_hostile_files_of_a_scene(tmp_path: Path) -> None:
         )
         cases.append(Case(f"asset_{k}.xml", f"{ending} {k}", text.encode()))
     results = outcomes("scene", {}, cases, tmp_path)
-    assert wrong(results) == []
+    assert wrong_outcomes(results) == []
     assert sum(said == "refused" for _, said in results) > 100
 
 
@@ -208,7 +208,7 @@ def test_plugins_that_lack_what_mitsuba_takes_for_granted(tmp_path: Path) -> Non
         (tmp_path / f"{k}.vol").write_bytes(_grid(*size))
         made[f"grid_{k}"] = _wall(texture.format("volume", volume.format(f"{k}.vol")))
     cases = [Case(f"{name}.xml", name, text.encode()) for name, text in made.items()]
-    assert wrong(outcomes("scene", {}, cases, tmp_path), ("refused",)) == []
+    assert wrong_outcomes(outcomes("scene", {}, cases, tmp_path), ("refused",)) == []
     with pytest.raises(SceneError, match=r"line \d+: the texture 'bitmap', which has file, needs"):
         load_scene(tmp_path / "misspelt.xml")
     (tmp_path / "good.vol").write_bytes(_grid(2, 2, 2))

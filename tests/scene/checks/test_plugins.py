@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from command import refused
+from command import run_refused
 from renderer import GLOSSY, LIGHTS, PATH, ROOM
 
 from lightpaint.errors import SceneError
@@ -81,7 +81,7 @@ def test_nor_is_an_integrator_that_is_asked_for(tmp_path: Path, choice: str) -> 
 def test_commands_refuse_it_in_one_line(tmp_path: Path) -> None:
     mark = library(tmp_path, "plugins/evil")
     path = room_with(tmp_path, '<bsdf type="evil"/>')
-    line = refused(tmp_path, "lights", path)
+    line = run_refused(tmp_path, "lights", path)
     assert "line " in line
     assert "Mitsuba has no bsdf plugin 'evil'" in line
     assert not mark.exists()
