@@ -37,10 +37,10 @@ from lightpaint.progress import Interrupted, silent
 @pytest.fixture(scope="module")
 def reference_batch(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, bytes]]:
     """A manifest, and what its batch leaves."""
-    here = tmp_path_factory.mktemp("batch")
-    manifest = write_batch(here)
-    run_whole_batch(str(manifest), str(here / "out"))
-    return manifest, contents(here / "out")
+    folder = tmp_path_factory.mktemp("batch")
+    manifest = write_batch(folder)
+    run_whole_batch(str(manifest), str(folder / "out"))
+    return manifest, contents(folder / "out")
 
 
 @pytest.fixture
@@ -49,30 +49,35 @@ def batch_folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def run_item(here: Path, **how: Any) -> Any:
-    return run_batch(plan(here / "looks.toml", here / "out"), RunOptions(**how))
+def run_item(folder: Path, **options: Any) -> Any:
+    return run_batch(plan(folder / "looks.toml", folder / "out"), RunOptions(**options))
 
 
 def test_every_look_is_what_solve_makes_of_it(
     reference_batch: tuple[Path, dict[str, bytes]], tmp_path: Path
 ) -> None:
-    manifest, found = reference_batch
-    assert {name.split("/")[0] for name in found if "/" in name} == {*NAMES, "thumbnails"}
-    assert {*FILES, "journal.jsonl"} == {name for name in found if "/" not in name}
+    manifest, reference_contents = reference_batch
+    assert {name.split("/")[0] for name in reference_contents if "/" in name} == {
+        *NAMES,
+        "thumbnails",
+    }
+    assert {*FILES, "journal.jsonl"} == {name for name in reference_contents if "/" not in name}
     # No look can lie where any of it goes.
-    assert all(is_reserved(name) for name in {x.split("/")[0] for x in found} - {*NAMES})
+    assert all(
+        is_reserved(name) for name in {x.split("/")[0] for x in reference_contents} - {*NAMES}
+    )
     assert not any(map(is_reserved, NAMES))
     write_batch(tmp_path)
     succeed(tmp_path, "solve", "b.basis.exr", "p0.exr")
-    ours, its = (
+    batch_weights, solve_weights = (
         np.array(list(read_lighting(path).emission.values()))
         for path in (
             manifest.parent / "out" / "p0" / "lighting.json",
             tmp_path / "p0/lighting.json",
         )
     )
-    np.testing.assert_array_equal(ours, its)
-    assert set(json.loads(found["p0/result.json"])["files"]) == {
+    np.testing.assert_array_equal(batch_weights, solve_weights)
+    assert set(json.loads(reference_contents["p0/result.json"])["files"]) == {
         "lighting.json",
         "predicted.exr",
         "report.json",
@@ -82,8 +87,10 @@ def test_every_look_is_what_solve_makes_of_it(
 def test_a_sequence_begins_and_ends_with_its_looks(
     reference_batch: tuple[Path, dict[str, bytes]],
 ) -> None:
-    out = reference_batch[0].parent / "out"
-    lights = {name: read_lighting(out / name / "lighting.json").emission for name in NAMES}
+    output_folder = reference_batch[0].parent / "out"
+    lights = {
+        name: read_lighting(output_folder / name / "lighting.json").emission for name in NAMES
+    }
     assert lights["dusk-0"] == lights["p0"]
     assert lights["dusk-2"] == lights["third"]
     assert lights["p0"] != lights["p0-warmer"] != lights["dusk-1"]
@@ -117,9 +124,9 @@ def is_derived(name: str) -> bool:
 
 def test_a_project_that_was_moved_is_done_still(batch_folder: Path) -> None:
     run_item(batch_folder)
-    moved = batch_folder.parent / f"{batch_folder.name}-moved"
-    batch_folder.rename(moved)
-    assert run_item(moved).done == []
+    moved_folder = batch_folder.parent / f"{batch_folder.name}-moved"
+    batch_folder.rename(moved_folder)
+    assert run_item(moved_folder).done == []
 
 
 def test_a_damaged_journal_is_said_and_its_look_done_again(batch_folder: Path) -> None:
@@ -127,52 +134,53 @@ def test_a_damaged_journal_is_said_and_its_look_done_again(batch_folder: Path) -
     run(batch_folder, *command)
     before = contents(batch_folder / "out")
     rows = before["journal.jsonl"].split(b"\n")
-    [which] = (k for k, row in enumerate(rows) if b'"third"' in row)
-    rows[which] = rows[which].replace(b"done", b"d\xffne")
+    [line_index] = (k for k, row in enumerate(rows) if b'"third"' in row)
+    rows[line_index] = rows[line_index].replace(b"done", b"d\xffne")
     (batch_folder / "out" / "journal.jsonl").write_bytes(b"\n".join(rows))
-    done = run(batch_folder, *command)
-    assert done.returncode == 0, done.stderr
+    completed = run(batch_folder, *command)
+    assert completed.returncode == 0, completed.stderr
     assert (
-        "journal.jsonl has a line that cannot be read: its step will be done again" in done.stderr
+        "journal.jsonl has a line that cannot be read: its step will be done again"
+        in completed.stderr
     )
-    assert "third: answer done" in done.stderr
-    assert "p0: answer done" not in done.stderr
+    assert "third: answer done" in completed.stderr
+    assert "p0: answer done" not in completed.stderr
     assert contents(batch_folder / "out") == before
     assert "journal" not in run(batch_folder, *command).stderr
 
 
 def test_only_some(batch_folder: Path) -> None:
-    some = plan(batch_folder / "looks.toml", batch_folder / "out").select("dusk-1")
-    outcome = run_batch(some)
+    partial_plan = plan(batch_folder / "looks.toml", batch_folder / "out").select("dusk-1")
+    outcome = run_batch(partial_plan)
     assert outcome.done == ["p0", "third", "dusk-1"]
     assert [row.state for row in outcome.rows].count("waiting") == 7
     assert len(run_item(batch_folder).done) == 7
     with pytest.raises(BatchError, match="no look matches"):
-        some.select("x*")
+        partial_plan.select("x*")
 
 
 def test_one_bad_painting_fails_alone(batch_folder: Path) -> None:
     (batch_folder / "p1.exr").write_bytes(b"no picture")
-    done = run(batch_folder, "batch", "looks.toml", "-o", "out", "--log", "log.txt")
-    assert done.returncode == 1
-    complaints = [x for x in done.stderr.splitlines() if x.startswith("lightpaint batch: ")]
+    completed = run(batch_folder, "batch", "looks.toml", "-o", "out", "--log", "log.txt")
+    assert completed.returncode == 1
+    complaints = [x for x in completed.stderr.splitlines() if x.startswith("lightpaint batch: ")]
     assert [x.split()[2] for x in complaints] == ["p1:", "p1-warmer:", "p1-white-only:"]
-    assert "10 looks: 3 failed" in done.stdout
-    told = json.loads((batch_folder / "out" / "summary.json").read_text())
-    assert [look["look"] for look in told["looks"]][:3] == ["p1", "p1-warmer", "p1-white-only"]
-    assert "p1.exr" in told["looks"][0]["why"]
-    assert (told["done"], told["failed"]) == (7, 3)
+    assert "10 looks: 3 failed" in completed.stdout
+    summary = json.loads((batch_folder / "out" / "summary.json").read_text())
+    assert [look["look"] for look in summary["looks"]][:3] == ["p1", "p1-warmer", "p1-white-only"]
+    assert "p1.exr" in summary["looks"][0]["why"]
+    assert (summary["done"], summary["failed"]) == (7, 3)
     log = (batch_folder / "log.txt").read_text().splitlines()
     assert sum("failed: " in line for line in log) == 3
     assert all(line[:4].isdigit() for line in log)
     # Mended, it is done, and nothing else is.
     write_rgb(batch_folder / "p1.exr", small_basis().images.sum(axis=0))
-    told = json.loads(succeed(batch_folder, "batch", "looks.toml", "-o", "out", "-q", "--json"))
-    assert (told["done"], told["failed"]) == (10, 0)
+    summary = json.loads(succeed(batch_folder, "batch", "looks.toml", "-o", "out", "-q", "--json"))
+    assert (summary["done"], summary["failed"]) == (10, 0)
     # Or nothing is begun.
     (batch_folder / "p1.exr").write_bytes(b"no picture")
-    done = run(batch_folder, "batch", "looks.toml", "-o", "other", "--stop-early", "-q")
-    assert done.returncode == 1
+    completed = run(batch_folder, "batch", "looks.toml", "-o", "other", "--stop-early", "-q")
+    assert completed.returncode == 1
     assert not (batch_folder / "other" / "p0").exists()
 
 
@@ -190,8 +198,8 @@ def test_a_plan_is_only_told(batch_folder: Path) -> None:
     assert [line.split()[0] for line in output.splitlines()[1:-1]] == NAMES
     assert "GB of memory" in output
     assert not (batch_folder / "out").exists()
-    told = json.loads(succeed(batch_folder, "batch", "looks.toml", "--dry-run", "--json"))
-    assert [look["look"] for look in told["looks"]] == NAMES
+    summary = json.loads(succeed(batch_folder, "batch", "looks.toml", "--dry-run", "--json"))
+    assert [look["look"] for look in summary["looks"]] == NAMES
 
 
 def test_what_fails_is_tried_again_as_often_as_is_asked(
@@ -200,11 +208,11 @@ def test_what_fails_is_tried_again_as_often_as_is_asked(
     tries: list[str] = []
     answer = item_execution._answer
 
-    def sometimes(task: Task, *others: Any) -> None:
+    def sometimes(task: Task, *rest: Any) -> None:
         tries.append(task.look)
         if task.look == "p1" and tries.count("p1") < 3:
             raise RuntimeError("a library's\nown words")
-        answer(task, *others)
+        answer(task, *rest)
 
     monkeypatch.setattr(item_execution, "_answer", sometimes)
     outcome = run_item(batch_folder, retry=1)
@@ -221,31 +229,31 @@ def test_a_full_disk_stops_with_one_line_and_goes_on_after(
     (batch_folder / "out").rename(batch_folder / "whole")
     answer, count = item_execution._answer, 0
 
-    def full(task: Task, *others: Any) -> None:
+    def full(task: Task, *rest: Any) -> None:
         nonlocal count
         if (count := count + 1) > 3:
             try:
                 raise OSError(28, "No space left on device")
             except OSError as error:
                 raise OutputError("cannot write it: No space left on device") from error
-        answer(task, *others)
+        answer(task, *rest)
 
     with monkeypatch.context() as patch:
         patch.setattr(item_execution, "_answer", full)
-        done = run(batch_folder, "batch", "looks.toml", "-o", "out", "-q")
-    assert done.returncode == 2
-    [line] = done.stderr.splitlines()
+        completed = run(batch_folder, "batch", "looks.toml", "-o", "out", "-q")
+    assert completed.returncode == 2
+    [line] = completed.stderr.splitlines()
     assert "No space left" in line
     assert "run the same command to continue" in line
-    again = run(batch_folder, "batch", "looks.toml", "-o", "out", "--workers", 1)
-    assert "3 looks were done earlier" in again.stderr
+    second_run = run(batch_folder, "batch", "looks.toml", "-o", "out", "--workers", 1)
+    assert "3 looks were done earlier" in second_run.stderr
     assert contents(batch_folder / "out") == contents(batch_folder / "whole")
 
 
 def test_one_look_is_not_several(batch_folder: Path) -> None:
     for _ in range(2):
-        done = run(batch_folder, "batch", "looks.toml", "-o", "one", "--only", "third")
-    assert "1 look was done earlier and is unchanged" in done.stderr
+        completed = run(batch_folder, "batch", "looks.toml", "-o", "one", "--only", "third")
+    assert "1 look was done earlier and is unchanged" in completed.stderr
 
 
 def test_a_basis_that_takes_too_much_memory_fails_its_looks_alone(
@@ -256,10 +264,10 @@ def test_a_basis_that_takes_too_much_memory_fails_its_looks_alone(
 
     with monkeypatch.context() as patch:
         patch.setattr("lightpaint.batch.run.obtain_bases", too_large)
-        done = run(batch_folder, "batch", "looks.toml", "-o", "out", "-q")
-    assert done.returncode == 1
-    assert "it takes more memory than there is" in done.stderr
-    assert "Traceback" not in done.stderr
+        completed = run(batch_folder, "batch", "looks.toml", "-o", "out", "-q")
+    assert completed.returncode == 1
+    assert "it takes more memory than there is" in completed.stderr
+    assert "Traceback" not in completed.stderr
     succeed(batch_folder, "batch", "looks.toml", "-o", "out")
 
 
@@ -270,16 +278,16 @@ def test_a_disk_that_is_really_full(batch_folder: Path) -> None:
     if shutil.which("mount") is None or subprocess.run(mount, capture_output=True).returncode:
         pytest.skip("the right to mount")
     try:
-        done = run(batch_folder, "batch", "looks.toml", "-o", disk / "out", "-q")
-        assert done.returncode == 2
-        [line] = done.stderr.splitlines()
+        completed = run(batch_folder, "batch", "looks.toml", "-o", disk / "out", "-q")
+        assert completed.returncode == 2
+        [line] = completed.stderr.splitlines()
         assert "No space left on device: make room, and run the same command to continue" in line
         assert not list((disk / "out").glob(".*"))
-        more = ["mount", "-o", "remount,size=8M", str(disk)]
-        subprocess.run(more, check=True)
-        again = run(batch_folder, "batch", "looks.toml", "-o", disk / "out")
-        assert again.returncode == 0
-        assert "looks were done earlier" in again.stderr
+        remount = ["mount", "-o", "remount,size=8M", str(disk)]
+        subprocess.run(remount, check=True)
+        second_run = run(batch_folder, "batch", "looks.toml", "-o", disk / "out")
+        assert second_run.returncode == 0
+        assert "looks were done earlier" in second_run.stderr
     finally:
         subprocess.run(["umount", str(disk)], check=True)
 
@@ -311,11 +319,11 @@ def test_workers_that_are_all_gone_are_no_look_s_failure(
             self.is_gone = True
             yield ItemResult(items[1].name, items[1].kind, "the scheduler is gone")
 
-    def begun(run: Any, _: Any) -> Any:
+    def lose_worker(run: Any, _: Any) -> Any:
         return Gone(run._cache, run._listen)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(_Run, "_start_engine", begun)
+        patch.setattr(_Run, "_start_engine", lose_worker)
         with pytest.raises(BatchError, match="the scheduler is gone"):
             run_item(batch_folder)
     [line] = (batch_folder / "out" / "journal.jsonl").read_text().splitlines()
@@ -325,15 +333,15 @@ def test_workers_that_are_all_gone_are_no_look_s_failure(
 
 
 def test_two_batches_do_not_work_in_one_folder(batch_folder: Path) -> None:
-    planned, told = plan(batch_folder / "looks.toml", batch_folder / "out"), []
+    planned, remarks = plan(batch_folder / "looks.toml", batch_folder / "out"), []
 
     def other(*_: Any) -> None:
         with pytest.raises(OutputError, match="another batch is at work"):
             run_batch(planned)
-        told.append(1)
+        remarks.append(1)
 
     run_batch(planned.select("p0"), on_step=other)
-    assert told == [1]
+    assert remarks == [1]
 
 
 def test_tasks_are_the_same_wherever_they_are_sent(batch_folder: Path) -> None:
@@ -354,33 +362,35 @@ class _AtWork:
 
     def __call__(self, *_: Any) -> None: ...
 
-    def at_work(self, worker: str, what: str | None) -> None:
-        assert (self.workers.get(worker) is None) == (what is not None)
-        self.workers[worker] = what
-        self.done.add(what or "")
+    def at_work(self, worker: str, task: str | None) -> None:
+        assert (self.workers.get(worker) is None) == (task is not None)
+        self.workers[worker] = task
+        self.done.add(task or "")
 
 
 def test_workers_make_the_same_and_one_that_dies_costs_nothing(
     batch_folder: Path, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:
-    planned, died = plan(batch_folder / "looks.toml", batch_folder / "out"), []
+    planned, pids = plan(batch_folder / "looks.toml", batch_folder / "out"), []
 
-    def told(*_: Any) -> None:
-        if not died:  # the first answer is here, and another is on its way
+    def record_remark(*_: Any) -> None:
+        if not pids:  # the first answer is here, and another is on its way
             [pool] = [x for x in started if x._pool is not None]
             victim = next(iter(pool._pool._processes))
-            died.append(victim)
+            pids.append(victim)
             os.kill(victim, signal.SIGKILL)
 
     started: list[Any] = []
     begin = Processes.__enter__
-    hears = _AtWork()
+    listener = _AtWork()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Processes, "__enter__", lambda it: started.append(it) or begin(it))
-        outcome = run_batch(planned, RunOptions(workers=2), hears, on_step=told)
-    assert died
-    assert hears.workers == {"worker 1": None, "worker 2": None}
-    assert {f"{name}: answer" for name in outcome.done} <= hears.done
+        patch.setattr(
+            Processes, "__enter__", lambda manager: started.append(manager) or begin(manager)
+        )
+        outcome = run_batch(planned, RunOptions(workers=2), listener, on_step=record_remark)
+    assert pids
+    assert listener.workers == {"worker 1": None, "worker 2": None}
+    assert {f"{name}: answer" for name in outcome.done} <= listener.done
     assert not outcome.failed
     assert contents(batch_folder / "out") == reference_batch[1]
 
@@ -409,10 +419,10 @@ class _Page(HTMLParser):
         self.data, self._is_data = "", False
 
     def handle_starttag(self, tag: str, attributes: Any) -> None:
-        given = dict(attributes)
-        self._is_data = given.get("id") == "looks" and tag == "script"
+        attribute_values = dict(attributes)
+        self._is_data = attribute_values.get("id") == "looks" and tag == "script"
         if tag in ("script", "img", "link", "iframe"):
-            loaded = given.get("src") or given.get("href") or "data:"
+            loaded = attribute_values.get("src") or attribute_values.get("href") or "data:"
             self.loads += [] if loaded.startswith("data:") else [loaded]
 
     def handle_endtag(self, tag: str) -> None:
@@ -425,33 +435,42 @@ class _Page(HTMLParser):
 def test_the_page_holds_all_and_loads_nothing(
     reference_batch: tuple[Path, dict[str, bytes]],
 ) -> None:
-    found = reference_batch[1]
+    contents_by_name = reference_batch[1]
     page = _Page()
-    page.feed(found["index.html"].decode())
+    page.feed(contents_by_name["index.html"].decode())
     assert page.loads == []
     looks = json.loads(page.data)
     assert [look["look"] for look in looks] == NAMES
     assert all(look["picture"].startswith("data:image/jpeg;base64,") for look in looks)
     for look in looks:
-        assert all((reference_batch[0].parent / "out" / to).is_file() for _, to in look["links"])
-    rows = list(csv.DictReader(found["summary.csv"].decode().splitlines()))
+        assert all(
+            (reference_batch[0].parent / "out" / target).is_file() for _, target in look["links"]
+        )
+    rows = list(csv.DictReader(contents_by_name["summary.csv"].decode().splitlines()))
     assert [row["look"] for row in rows] == NAMES
     assert float(rows[0]["lamp 1"]) > 0
-    told = json.loads(found["summary.json"])
-    assert [light["name"] for light in told["looks"][0]["lights"]] == ["lamp 0", "lamp 1", "lamp 2"]
+    summary = json.loads(contents_by_name["summary.json"])
+    assert [light["name"] for light in summary["looks"][0]["lights"]] == [
+        "lamp 0",
+        "lamp 1",
+        "lamp 2",
+    ]
 
 
 def test_a_page_of_a_thousand_looks_with_names_that_mean_mischief(tmp_path: Path) -> None:
-    bad = "</script><img src=x onerror=alert(1)>\u202e$title"
-    lights = tuple(LightRow(f"{bad}{k}", 1.0, hex="#ffffff") for k in range(12))
-    rows = [SummaryRow(f"{bad}{k}", "failed", bad, f"look {k}", lights=lights) for k in range(1000)]
-    text = gallery_page(tmp_path, bad, rows)
+    hostile_name = "</script><img src=x onerror=alert(1)>\u202e$title"
+    lights = tuple(LightRow(f"{hostile_name}{k}", 1.0, hex="#ffffff") for k in range(12))
+    rows = [
+        SummaryRow(f"{hostile_name}{k}", "failed", hostile_name, f"look {k}", lights=lights)
+        for k in range(1000)
+    ]
+    text = gallery_page(tmp_path, hostile_name, rows)
     assert text.count("</script>") == 3
     assert "<img src=x" not in text
     page = _Page()
     page.feed(text)
     assert page.loads == []
-    assert json.loads(page.data)[0]["look"] == f"{bad}0"
+    assert json.loads(page.data)[0]["look"] == f"{hostile_name}0"
     sheet = contact_sheet(tmp_path, rows)
     assert sheet.dtype == np.uint8
     assert sheet.shape[1] < 2000
@@ -493,10 +512,10 @@ def test_small_pictures_that_are_damaged_are_made_again(
     assert {path: path.read_bytes() for path in pictures} == before
 
 
-@pytest.mark.parametrize("told", ['{"lights": 3}', '{"lights": [1]}', '{"lights": []}', "junk"])
-def test_planes_that_are_damaged_cost_no_gallery(batch_folder: Path, told: str) -> None:
+@pytest.mark.parametrize("message", ['{"lights": 3}', '{"lights": [1]}', '{"lights": []}', "junk"])
+def test_planes_that_are_damaged_cost_no_gallery(batch_folder: Path, message: str) -> None:
     run_item(batch_folder)
     for path in (batch_folder / "out" / "thumbnails").glob("*.planes.json"):
-        path.write_text(told)
+        path.write_text(message)
     run_item(batch_folder)
     assert (batch_folder / "out" / "index.html").is_file()

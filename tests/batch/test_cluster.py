@@ -81,44 +81,44 @@ class Workers:
             wait_until(lambda: len(client.nthreads()) == 2)
 
 
-def wait_until(holds: Callable[[], Any]) -> None:
+def wait_until(condition: Callable[[], Any]) -> None:
     """Wait for it."""
     deadline_s = time.monotonic() + LONG_S
-    while not holds():
+    while not condition():
         assert time.monotonic() < deadline_s
         time.sleep(0.02)
 
 
 @pytest.fixture(scope="module")
 def workers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workers]:
-    here = tmp_path_factory.mktemp("cluster")
-    (slow := here / "slow").mkdir()
-    file, tests = here / "scheduler.json", Path(__file__).parent.parent
+    folder = tmp_path_factory.mktemp("cluster")
+    (slow := folder / "slow").mkdir()
+    file, tests = folder / "scheduler.json", Path(__file__).parent.parent
     environment = {
         **os.environ,
         "LIGHTPAINT_TEST_SLOW": str(slow),
         "PYTHONPATH": os.pathsep.join([str(tests), *filter(None, sys.path)]),
         # Its own, so that nothing is found that the tests have kept.
-        "LIGHTPAINT_CACHE": str(here / "none"),
+        "LIGHTPAINT_CACHE": str(folder / "none"),
     }
     dask = [sys.executable, "-m", "dask"]
-    known = ["--scheduler-file", str(file)]
-    quiet: dict[str, Any] = {"stdout": subprocess.DEVNULL, "env": environment, "cwd": here}
-    with contextlib.ExitStack() as stack, (here / "log").open("w") as log:
+    options = ["--scheduler-file", str(file)]
+    quiet: dict[str, Any] = {"stdout": subprocess.DEVNULL, "env": environment, "cwd": folder}
+    with contextlib.ExitStack() as stack, (folder / "log").open("w") as log:
         for command in (
-            [*dask, "scheduler", "--port", "0", "--host", "127.0.0.1", "--no-dashboard", *known],
+            [*dask, "scheduler", "--port", "0", "--host", "127.0.0.1", "--no-dashboard", *options],
             [
                 *dask, "worker", "--nworkers", "2", "--nthreads", "1", "--no-dashboard",
-                "--local-directory", str(here), "--preload", "slow_worker", *known,
+                "--local-directory", str(folder), "--preload", "slow_worker", *options,
             ],
         ):  # fmt: skip
             process = stack.enter_context(subprocess.Popen(command, stderr=log, **quiet))
             stack.callback(_end, process)
             wait_until(file.exists)
         wait_until(lambda: _address(file))
-        found = Workers(_address(file), slow)
-        found.await_two()
-        yield found
+        worker_pool = Workers(_address(file), slow)
+        worker_pool.await_two()
+        yield worker_pool
 
 
 def _address(file: Path) -> str:
@@ -138,20 +138,20 @@ def _end(process: "subprocess.Popen[Any]") -> None:
 @pytest.fixture(scope="module")
 def reference_batch(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, bytes]]:
     """A folder with a manifest, and what its batch leaves that this process does alone."""
-    here = tmp_path_factory.mktemp("looks")
-    write_room(here)
+    folder = tmp_path_factory.mktemp("looks")
+    write_room(folder)
     for name, light in (("bright", 0.8), ("dark", 0.2)):
-        write_rgb(here / f"{name}.exr", np.full((20, 24, 3), light, np.float32))
-    (here / "looks.toml").write_text(LOOKS, encoding="utf-8")
+        write_rgb(folder / f"{name}.exr", np.full((20, 24, 3), light, np.float32))
+    (folder / "looks.toml").write_text(LOOKS, encoding="utf-8")
     with pytest.MonkeyPatch.context() as patch:
-        render_small_parts(patch, here / "cache-alone")
+        render_small_parts(patch, folder / "cache-alone")
         limit_threads(1)
         try:
-            outcome = run_batch(plan(here / "looks.toml", here / "alone"))
+            outcome = run_batch(plan(folder / "looks.toml", folder / "alone"))
         finally:
             limit_threads(None)
     assert not outcome.failed
-    return here, contents(here / "alone")
+    return folder, contents(folder / "alone")
 
 
 def render_small_parts(patch: pytest.MonkeyPatch, cache: Path) -> None:
@@ -177,8 +177,8 @@ class ItemListener:
 
     note = say
 
-    def at_work(self, worker: str, what: str | None) -> None:
-        self.workers[worker] = what
+    def at_work(self, worker: str, task: str | None) -> None:
+        self.workers[worker] = task
 
     @property
     def starts(self) -> Counter[str]:
@@ -187,12 +187,12 @@ class ItemListener:
 
 
 def run_item(
-    here: Path, name: str, workers: Workers, hears: ItemListener, **how: Any
+    folder: Path, name: str, workers: Workers, listener: ItemListener, **options: Any
 ) -> BatchOutcome:
     with pytest.MonkeyPatch.context() as patch:
-        render_small_parts(patch, here / f"cache-{name}")
-        planned = plan(here / "looks.toml", here / name)
-        outcome = run_batch(planned, RunOptions(cluster=workers.address, **how), hears)  # type: ignore[arg-type]
+        render_small_parts(patch, folder / f"cache-{name}")
+        planned = plan(folder / "looks.toml", folder / name)
+        outcome = run_batch(planned, RunOptions(cluster=workers.address, **options), listener)  # type: ignore[arg-type]
     assert not outcome.failed
     return outcome
 
@@ -227,41 +227,43 @@ class Killer:
 def test_a_cluster_does_what_one_process_does(
     workers: Workers, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:
-    here, expected = reference_batch
-    hears = ItemListener()
-    run_item(here, "all", workers, hears)
-    assert contents(here / "all") == expected
-    parts = [name for name in hears.starts if name.startswith("part ")]
-    assert len(parts) == len(plan_of_parts(here)) >= 4
-    assert all(hears.starts[name] == 1 for name in parts)
+    folder, expected = reference_batch
+    listener = ItemListener()
+    run_item(folder, "all", workers, listener)
+    assert contents(folder / "all") == expected
+    parts = [name for name in listener.starts if name.startswith("part ")]
+    assert len(parts) == len(plan_of_parts(folder)) >= 4
+    assert all(listener.starts[name] == 1 for name in parts)
     # One for the basis, and one for the lighting that is had by sums.
-    assert hears.starts["training"] == 2
-    assert all(hears.starts[f"{name}: answer"] == 1 for name in ("bright", "third", "third-warmer"))
+    assert listener.starts["training"] == 2
+    assert all(
+        listener.starts[f"{name}: answer"] == 1 for name in ("bright", "third", "third-warmer")
+    )
     # The only final render is one of both workers.
-    assert hears.starts["bright 0"] == hears.starts["bright 1"] == 1
-    assert hears.starts["bright: render"] == 0
-    assert list(hears.workers.values()) == [None, None]
-    assert len({text.split()[-1] for text in hears.said if " begun by " in text}) == 2
+    assert listener.starts["bright 0"] == listener.starts["bright 1"] == 1
+    assert listener.starts["bright: render"] == 0
+    assert list(listener.workers.values()) == [None, None]
+    assert len({text.split()[-1] for text in listener.said if " begun by " in text}) == 2
     # Again nothing is done; and on a shared disk it is the same.
-    assert run_item(here, "all", workers, hears).done == []
-    run_item(here, "shared", workers, ItemListener(), shared_fs=True)
-    assert contents(here / "shared") == expected
+    assert run_item(folder, "all", workers, listener).done == []
+    run_item(folder, "shared", workers, ItemListener(), shared_fs=True)
+    assert contents(folder / "shared") == expected
 
 
 def test_a_worker_killed_in_the_middle_of_a_basis_costs_one_part(
     workers: Workers, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:
     workers.await_two()
-    here, expected = reference_batch
-    spool = here / "cache-killed" / "parts"
+    folder, expected = reference_batch
+    spool = folder / "cache-killed" / "parts"
     killer = Killer(workers, "part 3", lambda: len(list(spool.glob("*/[0-9]*-*.npz"))) >= 2)
-    hears = ItemListener(killer.hear)
-    run_item(here, "killed", workers, hears)
+    listener = ItemListener(killer.hear)
+    run_item(folder, "killed", workers, listener)
     assert killer.thread is not None
-    assert contents(here / "killed") == expected
-    again = {name: count for name, count in hears.starts.items() if count > 1}
-    assert again == {"training": 2, "part 3": 2}
-    assert any("is lost; trying elsewhere" in text for text in hears.said)
+    assert contents(folder / "killed") == expected
+    repeated = {name: count for name, count in listener.starts.items() if count > 1}
+    assert repeated == {"training": 2, "part 3": 2}
+    assert any("is lost; trying elsewhere" in text for text in listener.said)
     # What was kept of the parts has gone.
     assert list(spool.iterdir()) == []
 
@@ -270,27 +272,27 @@ def test_a_worker_killed_in_the_middle_of_a_look_costs_one_try(
     workers: Workers, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:
     workers.await_two()
-    here, expected = reference_batch
-    journal = here / "look" / "journal.jsonl"
+    folder, expected = reference_batch
+    journal = folder / "look" / "journal.jsonl"
 
     def others_are_done() -> bool:
         """Bright waits, and third is done meanwhile."""
         return journal.is_file() and len(journal.read_text().splitlines()) >= 2
 
     killer = Killer(workers, "bright", others_are_done)
-    hears = ItemListener(killer.hear)
-    run_item(here, "look", workers, hears)
+    listener = ItemListener(killer.hear)
+    run_item(folder, "look", workers, listener)
     assert killer.thread is not None
-    assert contents(here / "look") == expected
-    again = {name: count for name, count in hears.starts.items() if count > 1}
-    assert again == {"training": 2, "bright: answer": 2}
+    assert contents(folder / "look") == expected
+    repeated = {name: count for name, count in listener.starts.items() if count > 1}
+    assert repeated == {"training": 2, "bright: answer": 2}
 
 
 def test_a_worker_that_hangs_and_one_without_memory_are_replaced(
     workers: Workers, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:
     workers.await_two()
-    here, expected = reference_batch
+    folder, expected = reference_batch
     (workers.slow / "wait-part 2").touch()
     (workers.slow / "memory-third").touch()
 
@@ -298,20 +300,20 @@ def test_a_worker_that_hangs_and_one_without_memory_are_replaced(
         if text.startswith("part 2: ") and " takes more than " in text:
             (workers.slow / "wait-part 2").unlink()
 
-    hears = ItemListener(free)
-    run_item(here, "hung", workers, hears, task_limit_s=5.0)
-    assert contents(here / "hung") == expected
+    listener = ItemListener(free)
+    run_item(folder, "hung", workers, listener, task_limit_s=5.0)
+    assert contents(folder / "hung") == expected
     # On a busy machine others may take too long as well.
-    assert hears.starts["part 2"] >= 2
-    assert hears.starts["third: answer"] >= 2
+    assert listener.starts["part 2"] >= 2
+    assert listener.starts["third: answer"] >= 2
 
 
 def test_a_batch_that_was_killed_goes_on_with_the_parts_that_it_has(
     workers: Workers, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:
     workers.await_two()
-    here, expected = reference_batch
-    spool = here / "cache-stopped" / "parts"
+    folder, expected = reference_batch
+    spool = folder / "cache-stopped" / "parts"
 
     def stop(text: str) -> None:
         if text.startswith("part ") and len(list(spool.glob("*/[0-9]*-*.npz"))) >= 2:
@@ -319,46 +321,46 @@ def test_a_batch_that_was_killed_goes_on_with_the_parts_that_it_has(
 
     first, second = ItemListener(stop), ItemListener()
     with pytest.raises(KeyboardInterrupt):
-        run_item(here, "stopped", workers, first)
-    kept = len(list(spool.glob("*/[0-9]*-*.npz")))
-    assert kept >= 2
-    run_item(here, "stopped", workers, second)
-    assert contents(here / "stopped") == expected
+        run_item(folder, "stopped", workers, first)
+    part_count = len(list(spool.glob("*/[0-9]*-*.npz")))
+    assert part_count >= 2
+    run_item(folder, "stopped", workers, second)
+    assert contents(folder / "stopped") == expected
     parts = sum(name.startswith("part ") for name in second.starts)
-    assert parts == len(plan_of_parts(here)) - kept
+    assert parts == len(plan_of_parts(folder)) - part_count
     assert "training" not in second.starts
 
 
-def plan_of_parts(here: Path) -> list[Any]:
+def plan_of_parts(folder: Path) -> list[Any]:
     from lightpaint.scene.scene_reader import load_scene
 
     with pytest.MonkeyPatch.context() as patch:
-        render_small_parts(patch, here / "none")
-        return parts_module.plan_parts(load_scene(here / "room.xml"), 16)
+        render_small_parts(patch, folder / "none")
+        return parts_module.plan_parts(load_scene(folder / "room.xml"), 16)
 
 
 def test_what_is_wrong_with_a_cluster_is_one_line(folder: Path, workers: Workers) -> None:
-    for options, said in (
+    for options, message in (
         (("--cluster", "tcp://127.0.0.1:9"), "no scheduler answers at tcp://127.0.0.1:9"),
         (("--cluster", "nowhere"), "no scheduler answers at nowhere"),
         (("--cluster", workers.address, "--workers", "2"), "give one of them"),
         (("--shared-fs",), "give --cluster ADDRESS, too"),
         (("--task-limit", "3"), "give --cluster ADDRESS, too"),
     ):
-        found = run(folder, "batch", "looks.toml", "-o", "wrong", "-q", *options)
-        assert found.returncode == 2
-        [line] = found.stderr.splitlines()
+        completed = run(folder, "batch", "looks.toml", "-o", "wrong", "-q", *options)
+        assert completed.returncode == 2
+        [line] = completed.stderr.splitlines()
         assert line.startswith("lightpaint batch: ")
-        assert said in line
+        assert message in line
 
 
 def test_without_dask_the_line_is_said_that_installs_it(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    found = run(folder, "batch", "looks.toml", "-o", "wrong", "--cluster", "tcp://127.0.0.1:9")
-    assert found.returncode == 2
-    assert "pip install 'lightpaint[cluster]'" in found.stderr
+    completed = run(folder, "batch", "looks.toml", "-o", "wrong", "--cluster", "tcp://127.0.0.1:9")
+    assert completed.returncode == 2
+    assert "pip install 'lightpaint[cluster]'" in completed.stderr
 
 
 def test_workers_of_another_version_are_left_out(
@@ -367,12 +369,12 @@ def test_workers_of_another_version_are_left_out(
     from lightpaint.batch.cluster import worker as cluster_worker
 
     workers.await_two()
-    mine = {**cluster_worker.versions(), "lightpaint": "other"}
+    own_versions = {**cluster_worker.versions(), "lightpaint": "other"}
     # Workers find the function by its name, and theirs is not changed.
-    monkeypatch.setattr("lightpaint.batch.cluster.workers.own_versions", lambda: mine)
-    hears = ItemListener()
-    with Cluster(workers.address, hears):  # type: ignore[arg-type]
-        assert sum("is left out: it has lightpaint" in text for text in hears.said) == 2
+    monkeypatch.setattr("lightpaint.batch.cluster.workers.own_versions", lambda: own_versions)
+    listener = ItemListener()
+    with Cluster(workers.address, listener):  # type: ignore[arg-type]
+        assert sum("is left out: it has lightpaint" in text for text in listener.said) == 2
 
 
 @pytest.fixture

@@ -31,12 +31,12 @@ class SecureScheduler:
 
     def reached(self, address: str, **files: str) -> list[str]:
         """Workers at an address; files: of Dask's configuration."""
-        named = {
+        settings = {
             f"distributed.comm.tls.{'client.' if name in ('cert', 'key') else ''}"
             f"{name.replace('_', '-')}": str(self.folder / file) if "." in file else file
             for name, file in files.items()
         }
-        with dask.config.set(named):
+        with dask.config.set(settings):
             workers = ClusterWorkers(address, SilentListener(), "topic")  # type: ignore[arg-type]
             try:
                 return workers.addresses
@@ -46,7 +46,7 @@ class SecureScheduler:
 
 @pytest.fixture(scope="module")
 def secure_scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SecureScheduler]:
-    here = tmp_path_factory.mktemp("tls")
+    folder = tmp_path_factory.mktemp("tls")
     for name in ("right", "wrong"):
         subprocess.run(
             [
@@ -54,20 +54,26 @@ def secure_scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Secur
                 "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1",
                 "-keyout", f"{name}-key.pem", "-out", f"{name}.pem",
             ],
-            cwd=here, check=True, capture_output=True,
+            cwd=folder, check=True, capture_output=True,
         )  # fmt: skip
-    (here / "junk.pem").write_text("no certificate", "utf-8")
+    (folder / "junk.pem").write_text("no certificate", "utf-8")
     files = ["--tls-ca-file", "right.pem", "--tls-cert", "right.pem", "--tls-key", "right-key.pem"]
     words = [sys.executable, "-m", "dask", "scheduler", "--host", "127.0.0.1", "--port", "0"]
     started, addresses = [], []
-    for name, more in (("tls", ["--protocol", "tls", *files]), ("plain", [])):
-        said = [*words, "--no-dashboard", "--scheduler-file", f"{name}.json", *more]
-        with (here / f"{name}.log").open("w") as log:
-            started.append(subprocess.Popen(said, cwd=here, stdout=log, stderr=log))
+    for name, protocol_options in (("tls", ["--protocol", "tls", *files]), ("plain", [])):
+        command_line = [
+            *words,
+            "--no-dashboard",
+            "--scheduler-file",
+            f"{name}.json",
+            *protocol_options,
+        ]
+        with (folder / f"{name}.log").open("w") as log:
+            started.append(subprocess.Popen(command_line, cwd=folder, stdout=log, stderr=log))
     try:
         for name in ("tls", "plain"):
-            addresses.append(_address(here / f"{name}.json"))
-        yield SecureScheduler(here, *addresses)
+            addresses.append(_address(folder / f"{name}.json"))
+        yield SecureScheduler(folder, *addresses)
     finally:
         for process in started:
             process.terminate()
@@ -97,7 +103,7 @@ def test_the_right_certificates_open_a_scheduler(secure_scheduler: SecureSchedul
 
 
 @pytest.mark.parametrize(
-    ("files", "said"),
+    ("files", "message"),
     [
         ({}, "needs certificates: DASK_DISTRIBUTED__COMM__TLS__CA_FILE"),
         ({"ca_file": "right.pem"}, "needs certificates: DASK_DISTRIBUTED__COMM__TLS__CA_FILE"),
@@ -112,12 +118,12 @@ def test_the_right_certificates_open_a_scheduler(secure_scheduler: SecureSchedul
     ],
 )
 def test_what_is_wrong_with_certificates_is_one_line(
-    secure_scheduler: SecureScheduler, files: dict[str, str], said: str
+    secure_scheduler: SecureScheduler, files: dict[str, str], message: str
 ) -> None:
     begin = time.monotonic()
     with pytest.raises(BatchError) as refusal:
         secure_scheduler.reached(secure_scheduler.tls, **files)
-    assert said in str(refusal.value)
+    assert message in str(refusal.value)
     assert "\n" not in str(refusal.value)
     assert time.monotonic() - begin < 10  # a client of Dask's own would wait for half a minute
 

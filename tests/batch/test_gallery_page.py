@@ -27,21 +27,21 @@ from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighti
 @pytest.fixture
 def page(browser: Any) -> Iterator[Any]:
     """A page that may load nothing from a network and complain of nothing."""
-    made, said = browser.new_page(viewport={"width": 1100, "height": 800}), []
-    made.on("console", lambda message: said.append(message.text))
-    made.on("pageerror", lambda error: said.append(str(error)))
-    made.route("http*://**", lambda route: said.append(route.request.url) or route.abort())
-    yield made
-    made.close()
-    assert said == []
+    new_page, messages = browser.new_page(viewport={"width": 1100, "height": 800}), []
+    new_page.on("console", lambda message: messages.append(message.text))
+    new_page.on("pageerror", lambda error: messages.append(str(error)))
+    new_page.route("http*://**", lambda route: messages.append(route.request.url) or route.abort())
+    yield new_page
+    new_page.close()
+    assert messages == []
 
 
 @pytest.fixture(scope="module")
 def batch(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a batch of three lights."""
-    here = tmp_path_factory.mktemp("batch")
-    run_whole_batch(str(write_batch(here)), str(here / "out"))
-    return here / "out"
+    folder = tmp_path_factory.mktemp("batch")
+    run_whole_batch(str(write_batch(folder)), str(folder / "out"))
+    return folder / "out"
 
 
 def _names(page: Any) -> list[str]:
@@ -129,34 +129,34 @@ def test_every_look_can_be_mixed_from_planes_that_are_there_once(page: Any, batc
         page.locator(".mixer:not([hidden]) .mixer-body").wait_for()
         assert page.locator("#from option:checked").text_content() == name
         weights = read_lighting(batch / name / "lighting.json").weights_for(basis)
-        wanted = to_8_bit(ViewTransform(*views[name]).encode(basis.mix(weights)))
+        expected = to_8_bit(ViewTransform(*views[name]).encode(basis.mix(weights)))
         # Until what has begun is drawn: another look's picture is far off.
         page.wait_for_function("document.querySelectorAll('.mixer-light').length === 3")
         for _ in range(50):
-            off = np.abs(pixels(page) - wanted.astype(np.int16))
-            if off.max() <= 2:
+            difference = np.abs(pixels(page) - expected.astype(np.int16))
+            if difference.max() <= 2:
                 break
             page.wait_for_timeout(100)
-        assert off.max() <= 2  # a code of rounding of the planes, and of their sum
+        assert difference.max() <= 2  # a code of rounding of the planes, and of their sum
         page.get_by_role("tab", name="Looks").click()
 
 
 def test_of_many_lights_those_that_do_most_have_sliders(page: Any, tmp_path: Path) -> None:
-    few = small_basis()
-    lights = tuple(replace(few.lights[0], name=f"lamp {k}") for k in range(60))
-    images = np.repeat(few.images, 20, 0)
-    made = replace(few, lights=lights, planes=images, noise=0 * images)
+    small = small_basis()
+    lights = tuple(replace(small.lights[0], name=f"lamp {k}") for k in range(60))
+    images = np.repeat(small.images, 20, 0)
+    large_basis = replace(small, lights=lights, planes=images, noise=0 * images)
     key = '{"view": 0}'
-    write_planes(tmp_path, key, made)
+    write_planes(tmp_path, key, large_basis)
     run_whole_batch(str(write_batch(tmp_path)), str(tmp_path / "out"))
     (tmp_path / "many").mkdir()
     text = (tmp_path / "out" / "p0" / "lighting.json").read_text(encoding="utf-8")
     (tmp_path / "many" / "lighting.json").write_text(text, encoding="utf-8")
-    told = tuple(
+    light_rows = tuple(
         LightRow(light.name, 0.0 if k < 20 else 1.0, (1.0, 1.0, 1.0))
         for k, light in enumerate(lights)
     )
-    rows = [SummaryRow("many", "done", "", "many", lights=told)]
+    rows = [SummaryRow("many", "done", "", "many", lights=light_rows)]
     name = planes_name(tmp_path, key)
     page_text = gallery_page(tmp_path, "many", rows, {"many": name})
     (tmp_path / "index.html").write_text(page_text, encoding="utf-8")
@@ -173,7 +173,7 @@ def two_mixers(folder: Path) -> tuple[Path, dict[str, str]]:
     for name in ("slow", "quick"):
         basis, key = small_basis(), json.dumps({"view": name})
         write_planes(folder, key, basis)
-        lights = tuple(LightRow(one.name, 1.0, (1.0, 1.0, 1.0)) for one in basis.lights)
+        lights = tuple(LightRow(light.name, 1.0, (1.0, 1.0, 1.0)) for light in basis.lights)
         (folder / name).mkdir()
         write_lighting(folder / name / "lighting.json", Lighting.current(basis))
         rows.append(SummaryRow(name, "done", "", name, lights=lights))
@@ -212,7 +212,7 @@ def test_of_two_mixers_the_one_that_was_asked_for_last_is_shown(page: Any, tmp_p
     page.locator(".mixer-body").wait_for()
     page.evaluate("() => go()")
     visible = page.locator(".mixer:visible")
-    assert [one.get_attribute("data-basis") for one in visible.all()] == [names["quick"]]
+    assert [mixer.get_attribute("data-basis") for mixer in visible.all()] == [names["quick"]]
 
 
 def test_what_a_browser_lacks_for_a_mixer_is_said(page: Any, tmp_path: Path) -> None:
@@ -226,12 +226,12 @@ def test_planes_are_written_once_and_follow_their_basis(tmp_path: Path) -> None:
     basis, key = small_basis(), json.dumps({"basis": {"path": f"{tmp_path}/b.basis.exr"}})
     path = tmp_path / "out" / "thumbnails" / f"{planes_name(tmp_path / 'out', key)}.planes.json"
     write_planes(tmp_path / "out", key, basis)
-    told, before = read_planes(path), path.stat().st_ino
-    assert [x["name"] for x in told["lights"]] == list(basis.names)
+    planes, before = read_planes(path), path.stat().st_ino
+    assert [x["name"] for x in planes["lights"]] == list(basis.names)
     write_planes(tmp_path / "out", key, basis)
     assert path.stat().st_ino == before
     write_planes(tmp_path / "out", key, small_basis(seed=1))
-    assert read_planes(path)["planes"] != told["planes"]
+    assert read_planes(path)["planes"] != planes["planes"]
     # Found again where all of it was moved.
     other = json.dumps({"basis": {"path": f"{tmp_path}/there/b.basis.exr"}})
     assert planes_name(tmp_path / "there" / "out", other) == path.name.split(".")[0]
@@ -310,7 +310,7 @@ def test_pictures_of_few_looks_fill_a_window(tmp_path: Path, widest: int, width:
     write_estimate(tmp_path / "p0" / "predicted.exr", Estimate(image, 0 * image), {})
     row = SummaryRow("p0", "done", "", "p0")
     for _ in range(2):  # made, and found
-        made = summary._with_picture(row, tmp_path, tmp_path / "p0", None, "key", widest)
-        assert made.size[0] == width
-    with Image.open(tmp_path / made.picture) as picture:
-        assert picture.size == made.size
+        picture_row = summary._with_picture(row, tmp_path, tmp_path / "p0", None, "key", widest)
+        assert picture_row.size[0] == width
+    with Image.open(tmp_path / picture_row.picture) as picture:
+        assert picture.size == picture_row.size

@@ -55,80 +55,90 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def run_looks(here: Path, *how: Any) -> dict[str, Any]:
+def run_looks(folder: Path, *arguments: Any) -> dict[str, Any]:
     """What the batch says of itself."""
-    return dict(json.loads(succeed(here, "batch", "looks.toml", "-o", "out", "--json", "-q", *how)))
+    return dict(
+        json.loads(succeed(folder, "batch", "looks.toml", "-o", "out", "--json", "-q", *arguments))
+    )
 
 
 def test_light_groups_stand_for_a_scene(folder: Path) -> None:
-    told = run_looks(folder, "--workers", "2")
-    assert told["failed"] == 0
+    summary = run_looks(folder, "--workers", "2")
+    assert summary["failed"] == 0
     names = ["dim", "bright", "dim-warmer", "dim-white-only", "by hand", "on-0", "on-1", "on-2"]
-    assert sorted(x["look"] for x in told["looks"]) == sorted(names)
-    out = folder / "out"
+    assert sorted(x["look"] for x in summary["looks"]) == sorted(names)
+    output_folder = folder / "out"
     # As solve answers them, with what it leaves for other programs.
-    lock_folder, many = (
-        read_lighting(x / "lighting.json") for x in (folder / "solved", out / "dim")
+    lock_folder, batch_answer = (
+        read_lighting(x / "lighting.json") for x in (folder / "solved", output_folder / "dim")
     )
-    assert lock_folder.emission == many.emission
+    assert lock_folder.emission == batch_answer.emission
     for name in ("dim", "dim-warmer", "by hand", "on-1"):
-        assert (out / name / "relit.nk").is_file()
-    assert sorted(x.name for x in (out / "dim-warmer" / "export").iterdir()) == [
+        assert (output_folder / name / "relit.nk").is_file()
+    assert sorted(x.name for x in (output_folder / "dim-warmer" / "export").iterdir()) == [
         *("fixtures.csv", "relit.nk", "result.json")
     ]
-    assert (out / "on-1" / "export" / "fixtures.json").is_file()
-    assert not (out / "by hand" / "export").exists()
-    by_name = {look["look"]: look for look in told["looks"]}
+    assert (output_folder / "on-1" / "export" / "fixtures.json").is_file()
+    assert not (output_folder / "by hand" / "export").exists()
+    by_name = {look["look"]: look for look in summary["looks"]}
     assert "dim/export/fixtures.csv" in by_name["dim"]["files"]
     # The same to the last byte by one process.
-    before = contents(out)
+    before = contents(output_folder)
     assert "done earlier" in run(folder, "batch", "looks.toml", "-o", "out").stderr
-    assert contents(out) == before
+    assert contents(output_folder) == before
 
 
 def test_what_other_programs_get_is_made_again_alone(folder: Path) -> None:
     run_looks(folder)
-    out = folder / "out"
-    kept = {name: (out / name / "lighting.json").stat().st_ino for name in ("dim", "bright")}
+    output_folder = folder / "out"
+    inodes = {
+        name: (output_folder / name / "lighting.json").stat().st_ino for name in ("dim", "bright")
+    }
     text = LOOKS.replace('"csv", "nuke"', '"json"')
     (folder / "looks.toml").write_text(text, encoding="utf-8")
     run_looks(folder)
-    assert sorted(x.name for x in (out / "dim" / "export").iterdir()) == [
+    assert sorted(x.name for x in (output_folder / "dim" / "export").iterdir()) == [
         *("fixtures.json", "result.json")
     ]
-    for name, inode in kept.items():
-        assert (out / name / "lighting.json").stat().st_ino == inode
+    for name, inode in inodes.items():
+        assert (output_folder / name / "lighting.json").stat().st_ino == inode
     # What somebody has deleted, and what follows from another painting, comes again.
-    (out / "bright" / "export" / "fixtures.json").unlink()
+    (output_folder / "bright" / "export" / "fixtures.json").unlink()
     write_rgb(folder / "dim.exr", 3 * pictures()[1])
-    before = (out / "dim" / "export" / "fixtures.json").read_bytes()
+    before = (output_folder / "dim" / "export" / "fixtures.json").read_bytes()
     run_looks(folder)
-    assert (out / "bright" / "export" / "fixtures.json").is_file()
-    assert (out / "dim" / "export" / "fixtures.json").read_bytes() != before
+    assert (output_folder / "bright" / "export" / "fixtures.json").is_file()
+    assert (output_folder / "dim" / "export" / "fixtures.json").read_bytes() != before
     # As if nothing had been there.
-    again = contents(out)
+    second_contents = contents(output_folder)
     (folder / "looks.toml").write_text(text, encoding="utf-8")
     succeed(folder, "batch", "looks.toml", "-o", "fresh", "-q")
-    assert contents(folder / "fresh").keys() == again.keys()
+    assert contents(folder / "fresh").keys() == second_contents.keys()
 
 
 def test_forms_that_a_look_has_nothing_for_are_told_before(folder: Path) -> None:
     write_room(folder)
-    groups, want = 'light_groups = "groups.exr"\n', 'want = ["export"]\n'
-    for more, said in (
+    groups, want_export = 'light_groups = "groups.exr"\n', 'want = ["export"]\n'
+    for extra_lines, message in (
         ('light_groups = "gone.exr"\n', "light_groups: no such file or folder: gone.exr"),
         (groups + 'basis = "groups.exr"\n', "light_groups stand for scene and basis: give them"),
         ('scene = "room.xml"\npattern = "{name}"\n', "pattern is of light_groups"),
         (groups + 'sensors = ["a"]\n', "a basis has only one view"),
         (groups + "settings = { spp = 4 }\n", "spp"),
-        (groups + want + 'export = { to = ["mitsuba"] }\n', "'mitsuba' is of a scene, and no"),
-        (groups + want + 'export = { to = ["maya"] }\n', "to is ['maya']: expected a list of"),
-        (groups + want + 'export = { stage = "a.usda" }\n', "stage is of the form 'usd'"),
+        (
+            groups + want_export + 'export = { to = ["mitsuba"] }\n',
+            "'mitsuba' is of a scene, and no",
+        ),
+        (
+            groups + want_export + 'export = { to = ["maya"] }\n',
+            "to is ['maya']: expected a list of",
+        ),
+        (groups + want_export + 'export = { stage = "a.usda" }\n', "stage is of the form 'usd'"),
         (groups + 'want = ["predict"]\nexport = {}\n', "want does not have 'export'"),
     ):
-        text = f'[[look]]\npainting = "dim.exr"\n{more}'
+        text = f'[[look]]\npainting = "dim.exr"\n{extra_lines}'
         (folder / "looks.toml").write_text(text, encoding="utf-8")
         line = run_refused(folder, "batch", "looks.toml", "-o", "none")
         assert line.startswith("lightpaint batch: looks.toml: look 'dim.exr'"), line
-        assert said in line
+        assert message in line
         assert not (folder / "none").exists()

@@ -31,8 +31,8 @@ def test_cut_off_anywhere_it_has_the_lines_before_and_goes_on(tmp_path: Path) ->
         (tmp_path / JOURNAL).write_bytes(data[:cut])
         journal = Journal(tmp_path)
         # A line without its end is whole, too.
-        whole = sum(end - 1 <= cut for end in ends)
-        expected = {(line.look, line.kind): line for line in LINES[:whole]}
+        whole_lines = sum(end - 1 <= cut for end in ends)
+        expected = {(line.look, line.kind): line for line in LINES[:whole_lines]}
         assert journal.lines == expected
         journal.add(LINES[-1])
         assert Journal(tmp_path).lines == {**expected, ("evening", "answer"): LINES[-1]}
@@ -42,14 +42,14 @@ def test_settled_it_does_not_tell_how_it_came_about(tmp_path: Path) -> None:
     (tmp_path / "one").mkdir()
     (tmp_path / "other").mkdir()
     order = [("Ærø · 夜", "answer"), ("evening", "answer"), ("evening", "render")]
-    found = []
+    journals = []
     for folder, lines in ((tmp_path / "one", LINES), (tmp_path / "other", LINES[1:])):
         journal = Journal(folder)
         for line in lines:
             journal.add(line)
         journal.rewrite(order)  # type: ignore[arg-type]
-        found.append((folder / JOURNAL).read_bytes())
-    assert found[0] == found[1]
+        journals.append((folder / JOURNAL).read_bytes())
+    assert journals[0] == journals[1]
     journal.rewrite(order[:1])  # type: ignore[arg-type]
     assert [*Journal(tmp_path / "other").lines] == order[:1]
 
@@ -70,12 +70,12 @@ def test_what_somebody_else_wrote_is_passed_over(junk: bytes) -> None:
 def test_a_damaged_byte_costs_no_more_than_the_lines_it_touches(place: int, flip: int) -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        whole = write_journal(folder)
-        data, place = bytearray(whole), place % len(whole)
+        journal_bytes = write_journal(folder)
+        data, place = bytearray(journal_bytes), place % len(journal_bytes)
         data[place] ^= flip
         (folder / JOURNAL).write_bytes(data)
         hit = {data[:place].count(b"\n")}
-        if whole[place] == ord("\n"):  # the line behind it is joined
+        if journal_bytes[place] == ord("\n"):  # the line behind it is joined
             hit.add(max(hit) + 1)
         journal = Journal(folder)
         for key, line in {(x.look, x.kind): x for k, x in enumerate(LINES) if k not in hit}.items():

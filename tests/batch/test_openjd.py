@@ -25,22 +25,22 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def _template(here: Path) -> Any:
-    return json.loads((here / "job" / "template.json").read_text())
+def _template(folder: Path) -> Any:
+    return json.loads((folder / "job" / "template.json").read_text())
 
 
 def test_each_look_is_in_one_task_after_all_that_it_is_made_of(folder: Path) -> None:
     steps = _template(folder)["steps"]
     assert [step["name"] for step in steps] == ["Bases", "Looks", "Made 1", "Gallery"]
-    done: list[str] = []
+    finished: list[str] = []
     for k, step in enumerate(steps[:-1]):
         [look] = step["parameterSpace"]["taskParameterDefinitions"]
         for pattern in look["range"]:
-            done += [name for name in NAMES if fnmatchcase(name, pattern)]
-        waits = [one["dependsOn"] for one in step.get("dependencies", [])]
-        assert waits == [one["name"] for one in steps[:k]]
-    assert sorted(done) == sorted(NAMES)
-    assert done[0] == "p0"
+            finished += [name for name in NAMES if fnmatchcase(name, pattern)]
+        waits = [dependency["dependsOn"] for dependency in step.get("dependencies", [])]
+        assert waits == [dependency["name"] for dependency in steps[:k]]
+    assert sorted(finished) == sorted(NAMES)
+    assert finished[0] == "p0"
 
 
 def test_its_commands_done_one_by_one_leave_what_one_batch_leaves(folder: Path) -> None:
@@ -53,8 +53,8 @@ def test_its_commands_done_one_by_one_leave_what_one_batch_leaves(folder: Path) 
         space = step.get("parameterSpace", {"taskParameterDefinitions": [{"range": [""]}]})
         for look in space["taskParameterDefinitions"][0]["range"]:
             filled = {**values, "{{Task.Param.Look}}": look}
-            done = run(folder, *(filled.get(word, word) for word in action["args"]), "-q")
-            assert done.returncode == 0, done.stderr
+            completed = run(folder, *(filled.get(word, word) for word in action["args"]), "-q")
+            assert completed.returncode == 0, completed.stderr
     assert contents(folder / "out") == contents(folder / "once")
 
 
@@ -64,35 +64,40 @@ def test_those_that_share_a_folder_keep_others_out(folder: Path) -> None:
     from lightpaint.batch.run_options import RunOptions
     from lightpaint.errors import OutputError
 
-    planned, told = plan(folder / "looks.toml", folder / "out"), []
+    planned, remarks = plan(folder / "looks.toml", folder / "out"), []
 
-    def meanwhile(*_: Any) -> None:
+    def occupy(*_: Any) -> None:
         with pytest.raises(OutputError, match="another batch is at work"):
             run_batch(planned)
-        told.append(run_batch(planned.select("p1"), RunOptions(shares_folder=True)).done)
+        remarks.append(run_batch(planned.select("p1"), RunOptions(shares_folder=True)).done)
 
-    run_batch(planned.select("p0"), RunOptions(shares_folder=True), on_step=meanwhile)
-    assert told == [["p1"]]
+    run_batch(planned.select("p0"), RunOptions(shares_folder=True), on_step=occupy)
+    assert remarks == [["p1"]]
     assert not (folder / "out" / "index.html").exists()
     assert set(run_batch(plan(folder / "looks.toml", folder / "out")).skipped) == {"p0", "p1"}
 
 
 def test_files_in_the_folder_of_the_job_go_with_it(folder: Path) -> None:
     def kinds(template: Any) -> dict[str, tuple[str, str]]:
-        given = template["parameterDefinitions"][:3]
-        return {one["name"]: (one["type"], one["default"]) for one in given}
+        own_parameters = template["parameterDefinitions"][:3]
+        return {
+            parameter["name"]: (parameter["type"], parameter["default"])
+            for parameter in own_parameters
+        }
 
     outside = {"Manifest": "looks.toml", "Output": "out", "Cache": "out/.cache"}
-    whole = {name: ("STRING", str((folder / file).resolve())) for name, file in outside.items()}
-    assert kinds(_template(folder)) == whole
+    folder_parameters = {
+        name: ("STRING", str((folder / file).resolve())) for name, file in outside.items()
+    }
+    assert kinds(_template(folder)) == folder_parameters
     succeed(folder, "batch", "looks.toml", "-o", "out", "--export", "openjd", ".")
-    inside = json.loads((folder / "template.json").read_text())
-    assert kinds(inside) == {name: ("PATH", file) for name, file in outside.items()}
+    template_inside = json.loads((folder / "template.json").read_text())
+    assert kinds(template_inside) == {name: ("PATH", file) for name, file in outside.items()}
 
 
 def test_a_template_that_is_there_is_kept(folder: Path) -> None:
-    said = run_refused(folder, "batch", "looks.toml", "--export", "openjd", "job")
-    assert "template.json is there" in said
+    refusal = run_refused(folder, "batch", "looks.toml", "--export", "openjd", "job")
+    assert "template.json is there" in refusal
     assert "folder of the job is missing" in run_refused(
         folder, "batch", "looks.toml", "--export", "openjd"
     )
@@ -104,18 +109,22 @@ def test_openjd_runs_it(folder: Path) -> None:
     program = folder / "lightpaint.sh"
     program.write_text(f'#!/bin/sh\nexec {sys.executable} -m lightpaint "$@"\n', encoding="utf-8")
     program.chmod(0o755)
-    done = subprocess.run(
+    completed = subprocess.run(
         [OPENJD, "run", "job/template.json", "-p", f"Lightpaint={program}"],
         cwd=folder,
         capture_output=True,
         text=True,
         check=False,
     )
-    assert done.returncode == 0, done.stdout + done.stderr
-    found = contents(folder / "out")
-    assert b"p1-warmer" in found["summary.csv"]
+    assert completed.returncode == 0, completed.stdout + completed.stderr
+    final_contents = contents(folder / "out")
+    assert b"p1-warmer" in final_contents["summary.csv"]
     run_whole_batch(str(folder / "looks.toml"), str(folder / "once"))
-    once = contents(folder / "once")
+    reference_contents = contents(folder / "once")
     # The command, and so the sums of files with it, is that of the farm.
-    same = [name for name in once if Path(name).name in ("lighting.json", "predicted.exr")]
-    assert {name: found[name] for name in same} == {name: once[name] for name in same}
+    comparable = [
+        name for name in reference_contents if Path(name).name in ("lighting.json", "predicted.exr")
+    ]
+    assert {name: final_contents[name] for name in comparable} == {
+        name: reference_contents[name] for name in comparable
+    }

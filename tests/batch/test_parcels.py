@@ -32,8 +32,10 @@ def store(tmp_path: Path) -> ParcelStore:
     return ParcelStore(tmp_path / "worker")
 
 
-def task(manifest: Path, out: Path, look: str = "p0") -> Task:
-    return next(x.steps[0].task for x in plan(manifest, out).looks if x.entry.name == look)
+def task(manifest: Path, output_folder: Path, look: str = "p0") -> Task:
+    return next(
+        x.steps[0].task for x in plan(manifest, output_folder).looks if x.entry.name == look
+    )
 
 
 def run_item_locally(item: WorkItem) -> ItemResult:
@@ -42,46 +44,46 @@ def run_item_locally(item: WorkItem) -> ItemResult:
 
 def send_parcel(store: ParcelStore, parcel: Parcel) -> None:
     """Send what is lacking, as the engine does."""
-    files = {its: file for file, its in (*parcel.files, *parcel.local_files)}
+    files = {parcel_name: file for file, parcel_name in (*parcel.files, *parcel.local_files)}
     for sum_ in store.missing(parcel):
         for data, is_first, is_last in pieces(Path(files[sum_]).read_bytes()):
             store.put(sum_, data, is_first=is_first, is_last=is_last)
     assert store.missing(parcel) == []
 
 
-@pytest.mark.parametrize("whole", [False, True])
+@pytest.mark.parametrize("is_whole", [False, True])
 def test_a_look_done_elsewhere_is_the_look_done_here(
-    folder: Path, store: ParcelStore, whole: bool
+    folder: Path, store: ParcelStore, is_whole: bool
 ) -> None:
-    base = folder if whole else Path()
+    base = folder if is_whole else Path()
     run_batch(plan(base / "looks.toml", base / "expected").select("p0"))
     item = task(base / "looks.toml", base / "expected")
-    elsewhere = task(base / "looks.toml", base / "out")
-    parcel = pack(elsewhere, FileHashes(), run="a", is_shared=False)
+    remote_task = task(base / "looks.toml", base / "out")
+    parcel = pack(remote_task, FileHashes(), run="a", is_shared=False)
     assert len(store.missing(parcel)) == 2  # basis and painting
     send_parcel(store, parcel)
-    done = store.run_parcel(parcel, run_item_locally)
-    assert (done.failure, done.files and sorted(done.files)) == (
+    outcome = store.run_parcel(parcel, run_item_locally)
+    assert (outcome.failure, outcome.files and sorted(outcome.files)) == (
         "",
         ["lighting.json", "predicted.exr", "report.json", "result.json"],
     )
     assert not (folder / "out").exists()
-    assert done.files is not None
-    unpack(elsewhere, done.files)
+    assert outcome.files is not None
+    unpack(remote_task, outcome.files)
     assert contents(folder / "out/p0") == contents(folder / item.output_folder)
     # And again, as the same answer; but not over what was changed by hand.
-    unpack(elsewhere, done.files)
+    unpack(remote_task, outcome.files)
     (folder / "out/p0/lighting.json").write_text("mine", encoding="utf-8")
     with pytest.raises(OutputError, match="was changed since lightpaint wrote it"):
-        unpack(elsewhere, done.files)
-    unpack(force(elsewhere), done.files)
+        unpack(remote_task, outcome.files)
+    unpack(force(remote_task), outcome.files)
 
 
-@pytest.mark.parametrize("whole", [False, True])
+@pytest.mark.parametrize("is_whole", [False, True])
 def test_light_groups_in_a_folder_among_paintings_are_the_same_elsewhere(
-    folder: Path, store: ParcelStore, whole: bool
+    folder: Path, store: ParcelStore, is_whole: bool
 ) -> None:
-    base, images = folder if whole else Path(), pictures()
+    base, images = folder if is_whole else Path(), pictures()
     (folder / "renders").mkdir()
     for name, image in zip("abc", images, strict=True):
         interleaved(folder / f"renders/{name}.exr", {"": image})
@@ -104,10 +106,10 @@ def test_light_groups_in_a_folder_among_paintings_are_the_same_elsewhere(
         assert contents(folder / f"out/{look}") == contents(folder / f"expected/{look}")
 
 
-def force(one: Task) -> Task:
-    job = json.loads(one.job)
+def force(task_: Task) -> Task:
+    job = json.loads(task_.job)
     job["settings"]["force"] = True
-    return replace(one, job=json.dumps(job))
+    return replace(task_, job=json.dumps(job))
 
 
 def test_other_content_under_the_same_name_is_sent_anew(folder: Path, store: ParcelStore) -> None:
@@ -117,16 +119,16 @@ def test_other_content_under_the_same_name_is_sent_anew(folder: Path, store: Par
     parcel = pack(item, contents_, run="a", is_shared=False)
     assert len(store.missing(parcel)) == 1
     send_parcel(store, parcel)
-    seen: list[bytes] = []
+    contents_seen: list[bytes] = []
 
-    def look(given: WorkItem) -> ItemResult:
-        assert isinstance(given, Task)
-        [painting] = [file for file in given.source_files if file.endswith("p0.exr")]
-        seen.append(Path(painting).read_bytes())
+    def look(work_item: WorkItem) -> ItemResult:
+        assert isinstance(work_item, Task)
+        [painting] = [file for file in work_item.source_files if file.endswith("p0.exr")]
+        contents_seen.append(Path(painting).read_bytes())
         return ItemResult("p0", "answer")
 
     store.run_parcel(parcel, look)
-    assert seen == [(folder / "p1.exr").read_bytes()]
+    assert contents_seen == [(folder / "p1.exr").read_bytes()]
 
 
 def test_what_comes_otherwise_than_it_was_sent_is_refused(store: ParcelStore) -> None:
@@ -156,10 +158,10 @@ def test_files_that_are_only_here_are_carried_to_a_shared_disk_too(
     assert len(store.missing(parcel)) == 1
     send_parcel(store, parcel)
 
-    def look(given: WorkItem) -> ItemResult:
-        assert isinstance(given, Task)
-        assert given.source_files == item.source_files
-        [file] = given.files
+    def look(work_item: WorkItem) -> ItemResult:
+        assert isinstance(work_item, Task)
+        assert work_item.source_files == item.source_files
+        [file] = work_item.files
         assert file != item.files[0]
         assert Path(file).read_bytes() == only_here.read_bytes()
         return ItemResult("p0", "answer")
@@ -169,10 +171,10 @@ def test_files_that_are_only_here_are_carried_to_a_shared_disk_too(
 
 @pytest.mark.parametrize("size", [0, 1, 2**26, 2**26 + 1])
 def test_pieces_make_the_whole(size: int) -> None:
-    some = list(pieces(bytes(size)))
-    assert sum(len(data) for data, _, _ in some) == size
-    assert [first for _, first, _ in some] == [True] + [False] * (len(some) - 1)
-    assert [last for _, _, last in some] == [False] * (len(some) - 1) + [True]
+    parts = list(pieces(bytes(size)))
+    assert sum(len(data) for data, _, _ in parts) == size
+    assert [first for _, first, _ in parts] == [True] + [False] * (len(parts) - 1)
+    assert [last for _, _, last in parts] == [False] * (len(parts) - 1) + [True]
 
 
 def test_a_file_that_is_gone_is_one_look_s_failure(folder: Path) -> None:

@@ -32,16 +32,16 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     ],
 )
 def test_they_find_what_glob_finds(folder: Path, pattern: str) -> None:
-    for given in (pattern, str(folder / pattern)):
-        expected = {x for x in glob(given, recursive=True) if Path(x).is_file()}
-        found = files_matching(given)
-        assert {os.path.normpath(x) for x in found} == {os.path.normpath(x) for x in expected}
-        assert len(set(found)) == len(found)
+    for glob_pattern in (pattern, str(folder / pattern)):
+        expected = {x for x in glob(glob_pattern, recursive=True) if Path(x).is_file()}
+        matches = files_matching(glob_pattern)
+        assert {os.path.normpath(x) for x in matches} == {os.path.normpath(x) for x in expected}
+        assert len(set(matches)) == len(matches)
 
 
 def test_brackets_of_the_manifests_folder_are_no_pattern(folder: Path) -> None:
-    found = files_matching("*.exr", folder / "x[1]")
-    assert found == [str(folder / "x[1]" / "g.exr")]
+    matches = files_matching("*.exr", folder / "x[1]")
+    assert matches == [str(folder / "x[1]" / "g.exr")]
     assert files_matching(str(folder / "x" / "*.exr"), folder / "x[1]") == [
         str(folder / "x" / "c.exr")
     ]

@@ -74,39 +74,44 @@ class RemarkListener(Listener):
         self.said.append(text)
 
 
-def run_all(here: Path, **how: Any) -> tuple[Any, RemarkListener]:
-    heard = RemarkListener()
-    return run_batch(plan(here / "looks.toml", here / "out"), RunOptions(**how), heard), heard
+def run_all(folder: Path, **options: Any) -> tuple[Any, RemarkListener]:
+    listener = RemarkListener()
+    return run_batch(
+        plan(folder / "looks.toml", folder / "out"), RunOptions(**options), listener
+    ), listener
 
 
-def directions(here: Path) -> dict[str, np.ndarray]:
+def directions(folder: Path) -> dict[str, np.ndarray]:
     """Where the spot of each look points."""
-    found = {}
+    directions_by_name = {}
     for name in NAMES:
-        places = read_lighting(here / "out" / name / "lighting.json").places
+        places = read_lighting(folder / "out" / name / "lighting.json").places
         [beam] = [place for place in places if place.name == "beam"]
-        found[name] = np.array(beam.site.direction)
-    return found
+        directions_by_name[name] = np.array(beam.site.direction)
+    return directions_by_name
 
 
 def test_looks_hang_their_lights_once_and_dim_them_each(folder: Path) -> None:
-    outcome, heard = run_all(folder)
+    outcome, listener = run_all(folder)
     assert sorted(outcome.done) == sorted(NAMES)
-    assert heard.labels.count("poses") == 1
+    assert listener.labels.count("poses") == 1
     # The basis of all lights, and once the plane of the spot.
-    assert heard.labels.count("basis") == 2
-    found = directions(folder)
+    assert listener.labels.count("basis") == 2
+    directions_by_name = directions(folder)
     painted = (
         lp.load_scene(folder / "room.xml").moved({"beam": THERE}).light("beam").members[0].site
     )
-    assert all(np.array_equal(its, found["day"]) for its in found.values())
-    assert np.dot(found["day"], painted.direction) > np.cos(np.radians(5))
+    assert all(
+        np.array_equal(direction, directions_by_name["day"])
+        for direction in directions_by_name.values()
+    )
+    assert np.dot(directions_by_name["day"], painted.direction) > np.cos(np.radians(5))
     day, night = (read_lighting(folder / "out" / x / "lighting.json") for x in ("day", "night"))
     assert night["beam"].emission[0] == pytest.approx(day["beam"].emission[0] / 100, rel=0.05)
     assert read_placement(folder / "out" / "places" / "day.json").looks == ("day", "night")
-    said = [text for text in heard.said if "beam turned by" in text]
-    assert len(said) == 1
-    assert said[0].startswith("day, night: ")
+    remarks = [text for text in listener.said if "beam turned by" in text]
+    assert len(remarks) == 1
+    assert remarks[0].startswith("day, night: ")
     # The gallery shows the plan once, and each report says who shares the places.
     page = (folder / "out" / "index.html").read_text(encoding="utf-8")
     assert page.count("Plan and elevation of the room") == 1
@@ -116,17 +121,17 @@ def test_looks_hang_their_lights_once_and_dim_them_each(folder: Path) -> None:
         assert report["placement"]["looks"] == ["day", "night"]
     # Nothing is left to do; another painting of one look moves the lights of all.
     write_rgb(folder / "night.exr", np.full((20, 24, 3), 0.01, np.float32))
-    again, heard = run_all(folder)
-    assert sorted(again.done) == sorted(NAMES)
-    assert heard.labels.count("poses") == 1
+    second_outcome, listener = run_all(folder)
+    assert sorted(second_outcome.done) == sorted(NAMES)
+    assert listener.labels.count("poses") == 1
 
 
 def test_places_that_were_found_are_not_searched_for_again(folder: Path) -> None:
     """A batch that was stopped after its search goes on from there."""
     first = plan(folder / "looks.toml", folder / "out")
     run_batch(first.select("day"), RunOptions(shares_folder=True))
-    outcome, heard = run_all(folder)
-    assert "poses" not in heard.labels
+    outcome, listener = run_all(folder)
+    assert "poses" not in listener.labels
     assert sorted(outcome.done) == sorted(set(NAMES) - {"day"})
     # Half a file counts as none.
     (folder / "out" / "places" / "day.json").write_text('{"moves": [', encoding="utf-8")
@@ -136,10 +141,13 @@ def test_places_that_were_found_are_not_searched_for_again(folder: Path) -> None
 @pytest.mark.nightly
 def test_workers_place_as_one_process_does(folder: Path) -> None:
     run_all(folder)
-    alone = directions(folder)
+    reference_directions = directions(folder)
     (folder / "out").rename(folder / "alone")
     run_all(folder, workers=2)
-    assert all(np.array_equal(alone[name], its) for name, its in directions(folder).items())
+    assert all(
+        np.array_equal(reference_directions[name], direction)
+        for name, direction in directions(folder).items()
+    )
 
 
 @pytest.mark.parametrize(
@@ -165,10 +173,10 @@ def test_looks_that_cannot_share_places(folder: Path, change: tuple[str, str], w
 def test_a_job_with_places_is_sent_and_read_again(folder: Path) -> None:
     first = plan(folder / "looks.toml", folder / "out")
     [task] = [x.steps[0].task for x in first.looks if x.entry.name == "day"]
-    moved = task.with_paths(lambda text: text.replace(str(folder), "/elsewhere"))
-    assert moved.places == "/elsewhere/out/places/day.json"
-    assert json.loads(moved.job)["placement"] == {"path": moved.places}
-    assert moved == replace(type(task).from_json(moved.to_json()))
+    moved_task = task.with_paths(lambda text: text.replace(str(folder), "/elsewhere"))
+    assert moved_task.places == "/elsewhere/out/places/day.json"
+    assert json.loads(moved_task.job)["placement"] == {"path": moved_task.places}
+    assert moved_task == replace(type(task).from_json(moved_task.to_json()))
 
 
 def test_an_interrupt_amid_the_search_leaves_no_places(folder: Path) -> None:

@@ -72,17 +72,19 @@ def batch_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def batch_record(batch_folder: Path) -> dict[str, Any]:
     """What the batch says of itself; and how often a basis was asked for."""
-    asked: list[str] = []
+    requests: list[str] = []
     obtain = task_bases.obtain
 
-    def counting(scene: Any, *others: Any, **how: Any) -> Any:
-        asked.append(scene.sensor_names[scene.sensor])
-        return obtain(scene, *others, **how)
+    def counting(scene: Any, *rest: Any, **options: Any) -> Any:
+        requests.append(scene.sensor_names[scene.sensor])
+        return obtain(scene, *rest, **options)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(task_bases, "obtain", counting)
-        told = json.loads(succeed(batch_folder, "batch", "looks.toml", "-o", "out", "--json", "-q"))
-    return {**told, "asked": asked}
+        summary = json.loads(
+            succeed(batch_folder, "batch", "looks.toml", "-o", "out", "--json", "-q")
+        )
+    return {**summary, "asked": requests}
 
 
 def test_each_basis_is_obtained_once_for_all_its_looks(
@@ -95,8 +97,8 @@ def test_each_basis_is_obtained_once_for_all_its_looks(
         *("both-warmer", "both-warmer", "final", "final-warmer", "preset"),
         *("path-0", "path-1", "path-2"),
     ]
-    seen = [look["sensor"] for look in batch_record["looks"] if look["look"].startswith("path")]
-    assert seen == ["camera", "side", "camera"]
+    sensors = [look["sensor"] for look in batch_record["looks"] if look["look"].startswith("path")]
+    assert sensors == ["camera", "side", "camera"]
     bright, path = (read_lighting(batch_folder / "out" / x / "lighting.json") for x in NAMED)
     assert bright.emission == path.emission
     # The first sensor by its name, by default, and both for the design in two views.
@@ -108,22 +110,22 @@ def test_each_basis_is_obtained_once_for_all_its_looks(
 
 
 def test_only_what_is_wanted_is_rendered(batch_folder: Path, batch_record: dict[str, Any]) -> None:
-    out = batch_folder / "out"
-    assert not (out / "dark-side" / "verified.exr").exists()
-    assert not (out / "dark-side" / "report.html").exists()
-    assert (out / "final" / "report.html").is_file()
+    output_folder = batch_folder / "out"
+    assert not (output_folder / "dark-side" / "verified.exr").exists()
+    assert not (output_folder / "dark-side" / "report.html").exists()
+    assert (output_folder / "final" / "report.html").is_file()
     for name in ("both", "both-warmer"):
-        assert (out / name / "side" / "predicted.exr").is_file()
+        assert (output_folder / name / "side" / "predicted.exr").is_file()
     for name in ("final", "final-warmer"):
-        render = read_estimate(out / name / "relit.exr")[0]
+        render = read_estimate(output_folder / name / "relit.exr")[0]
         assert render.size == (10, 12)
-        assert (out / name / "relit.png").is_file()
+        assert (output_folder / name / "relit.png").is_file()
     # Of several views one through each sensor, which shows what was predicted there.
     for name in ("both", "both-warmer"):
-        assert not (out / name / "relit.exr").exists()
+        assert not (output_folder / name / "relit.exr").exists()
         for view in ("camera", "side"):
             render, predicted = (
-                read_estimate(out / name / view / file)[0].image.mean()
+                read_estimate(output_folder / name / view / file)[0].image.mean()
                 for file in ("relit.exr", "predicted.exr")
             )
             assert render == pytest.approx(predicted, rel=0.15)  # noise of 8 samples
@@ -139,10 +141,10 @@ def test_relit_scenes_load_in_plain_mitsuba_with_their_lights(
 
     for name in ("dark-side", "both", "final-warmer", "preset"):
         path = batch_folder / "out" / name / "relit.xml"
-        wanted = read_lighting(path.with_name("lighting.json")).emission
-        found = {light.name: light.emission for light in load_scene(path).lights}
-        for light, emission in wanted.items():
-            np.testing.assert_allclose(found[light], emission, rtol=1e-6)  # float32
+        expected = read_lighting(path.with_name("lighting.json")).emission
+        actual = {light.name: light.emission for light in load_scene(path).lights}
+        for light, emission in expected.items():
+            np.testing.assert_allclose(actual[light], emission, rtol=1e-6)  # float32
         loaded = mi.load_file(str(path))
         assert len(loaded.emitters()) == 2
         del loaded
@@ -156,24 +158,24 @@ def test_other_samples_of_a_final_render_render_it_alone_again(
     (batch_folder / "looks.toml").write_text(
         LOOKS.replace("spp = 4,", "spp = 6,"), encoding="utf-8"
     )
-    again = run(batch_folder, "batch", "looks.toml", "-o", "out")
-    assert again.returncode == 0, again.stderr
-    assert "steps: 2 steps" in again.stderr
-    assert "final: render done" in again.stderr
-    assert "answer done" not in again.stderr
+    second_run = run(batch_folder, "batch", "looks.toml", "-o", "out")
+    assert second_run.returncode == 0, second_run.stderr
+    assert "steps: 2 steps" in second_run.stderr
+    assert "final: render done" in second_run.stderr
+    assert "answer done" not in second_run.stderr
 
 
 def test_a_scene_is_checked_before_its_first_sample(batch_folder: Path) -> None:
-    for text, said in (
+    for text, message in (
         (LOOKS.replace('side = "dark', 'back = "dark'), "back"),
         (LOOKS.replace('resolution = "1/2"', 'resolution = "7x5"'), "7x5"),
         (LOOKS.replace("preset.json", "other.json"), "other.json"),
     ):
         (batch_folder / "looks.toml").write_text(text, encoding="utf-8")
-        found = run(batch_folder, "batch", "looks.toml", "-o", "none")
-        assert found.returncode == 2, found.stderr
-        assert all(x.startswith("lightpaint batch: ") for x in found.stderr.splitlines())
-        assert said in found.stderr
+        completed = run(batch_folder, "batch", "looks.toml", "-o", "none")
+        assert completed.returncode == 2, completed.stderr
+        assert all(x.startswith("lightpaint batch: ") for x in completed.stderr.splitlines())
+        assert message in completed.stderr
         assert not (batch_folder / "none").exists()
 
 
@@ -196,11 +198,11 @@ def test_looks_get_the_samples_that_an_error_needs(
     (batch_folder / "by-error.toml").write_text(BY_ERROR, encoding="utf-8")
     succeed(batch_folder, "batch", "by-error.toml", "-o", str(tmp_path / "out"), "-q")
     for name in ("bright", "dark"):
-        given = ("room.xml", f"{name}.exr", "--error", "5%", "--no-cache", "--no-verify")
-        told = run(batch_folder, "solve", *given, "-o", tmp_path / name)
-        assert "where the painting needs them" in told.stderr
-        alone, of_batch = (
+        arguments = ("room.xml", f"{name}.exr", "--error", "5%", "--no-cache", "--no-verify")
+        completed = run(batch_folder, "solve", *arguments, "-o", tmp_path / name)
+        assert "where the painting needs them" in completed.stderr
+        single, of_batch = (
             read_lighting(tmp_path / folder / "lighting.json") for folder in (name, f"out/{name}")
         )
-        assert of_batch.emission == alone.emission
-        assert [x.interval for x in of_batch.lights] == [x.interval for x in alone.lights]
+        assert of_batch.emission == single.emission
+        assert [x.interval for x in of_batch.lights] == [x.interval for x in single.lights]

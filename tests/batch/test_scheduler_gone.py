@@ -31,14 +31,14 @@ SOON_S = 25.0
 def fake_server(with_bytes: bytes | None) -> Iterator[str]:
     """A server that says that much to each who comes, and ends; None: never anything."""
     server = socket.create_server(("127.0.0.1", 0))
-    held = []
+    connections = []
 
     def serve() -> None:
         with contextlib.suppress(OSError):
             while True:
                 connection, _ = server.accept()
                 if with_bytes is None:
-                    held.append(connection)
+                    connections.append(connection)
                     continue
                 with connection, contextlib.suppress(OSError):
                     connection.sendall(with_bytes)
@@ -48,18 +48,18 @@ def fake_server(with_bytes: bytes | None) -> Iterator[str]:
         yield f"tcp://127.0.0.1:{server.getsockname()[1]}"
     finally:
         server.close()
-        for connection in held:
+        for connection in connections:
             connection.close()
 
 
-@pytest.mark.parametrize("said", [b"", b"\0" * 7, b"\1" + b"\0" * 30, b"GET / HTTP/1.1\r\n", None])
+@pytest.mark.parametrize("reply", [b"", b"\0" * 7, b"\1" + b"\0" * 30, b"GET / HTTP/1.1\r\n", None])
 def test_one_that_ends_while_it_is_reached(
-    said: bytes | None, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    reply: bytes | None, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(workers, "ANSWER_S", 1.0)
     monkeypatch.setattr(workers, "GONE_S", 0.5)
     began_s = time.monotonic()
-    with fake_server(said) as address, pytest.raises(BatchError) as refusal:
+    with fake_server(reply) as address, pytest.raises(BatchError) as refusal:
         ClusterWorkers(address, SilentListener(), "topic")  # type: ignore[arg-type]
     assert time.monotonic() - began_s < SOON_S
     assert f"no scheduler answers at {address}" in str(refusal.value)
@@ -77,29 +77,29 @@ LATER: dict[str, Callable[[ClusterWorkers], object]] = {
 
 @pytest.mark.parametrize("call", LATER)
 def test_one_that_ends_later(call: str, caplog: pytest.LogCaptureFixture) -> None:
-    how = {"n_workers": 0, "processes": False, "protocol": "tcp://", "dashboard_address": None}
-    with distributed.LocalCluster(**how) as cluster:
-        at = ClusterWorkers(cluster.scheduler_address, SilentListener(), "topic")  # type: ignore[arg-type]
+    options = {"n_workers": 0, "processes": False, "protocol": "tcp://", "dashboard_address": None}
+    with distributed.LocalCluster(**options) as cluster:
+        cluster_workers = ClusterWorkers(cluster.scheduler_address, SilentListener(), "topic")  # type: ignore[arg-type]
     caplog.clear()
     began_s = time.monotonic()
 
     def ask() -> None:
         while time.monotonic() - began_s < SOON_S:  # it may take a moment to be heard of
-            LATER[call](at)
+            LATER[call](cluster_workers)
 
     with pytest.raises(BatchError, match=r"is gone .*run the same command to continue") as refusal:
         ask()
     assert time.monotonic() - began_s < SOON_S
     assert "\n" not in str(refusal.value)
-    assert at.is_gone
-    at.close()
+    assert cluster_workers.is_gone
+    cluster_workers.close()
     assert [x for x in caplog.records if x.levelno >= logging.WARNING] == []
 
 
 def test_what_a_worker_answers_that_is_no_answer_is_its_own_failure() -> None:
     cluster = Cluster("tcp://127.0.0.1:1", SilentListener())  # type: ignore[arg-type]
     item: Any = SimpleNamespace(name="look", kind="answer")
-    for came, is_told in (
+    for reply, is_told in (
         (ItemResult("look", "answer", ""), False),
         (["0" * 64], False),
         ([1], True),
@@ -108,15 +108,18 @@ def test_what_a_worker_answers_that_is_no_answer_is_its_own_failure() -> None:
         (ItemResult("look", "answer", "", files={"a": "text"}), True),  # type: ignore[dict-item]
     ):
 
-        def result(timeout: float, its: Any = came) -> Any:
+        def result(timeout: float, its: Any = reply) -> Any:
             return its
 
-        sent: Any = SimpleNamespace(
+        future: Any = SimpleNamespace(
             item=item, worker="w", future=SimpleNamespace(result=result, status="finished")
         )
-        found = cluster._result_of(sent)
-        told = isinstance(found, ItemResult) and "answers with something else" in found.failure
-        assert told is is_told
+        item_result = cluster._result_of(future)
+        is_reported = (
+            isinstance(item_result, ItemResult)
+            and "answers with something else" in item_result.failure
+        )
+        assert is_reported is is_told
 
 
 def test_what_others_say_under_our_topic_is_passed_over() -> None:

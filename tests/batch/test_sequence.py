@@ -35,8 +35,8 @@ def lighting(weights: Any) -> Lighting:
     return Lighting.of_weights(small_basis(), np.array(weights, dtype=np.float64))
 
 
-def emissions(of: Lighting) -> Any:
-    return np.array(list(of.emission.values()))
+def emissions(lighting_: Lighting) -> Any:
+    return np.array(list(lighting_.emission.values()))
 
 
 @given(WEIGHTS, WEIGHTS, st.sampled_from(["log", "oklab"]))
@@ -54,9 +54,9 @@ def test_in_stops_brightness_is_the_geometric_mean(one: Any, other: Any, share: 
     # Within OFF_STOPS stops of each other, beyond which the darker one is cut off.
     logs = np.log2(luminance(emissions(ends[0]))), np.log2(luminance(emissions(ends[1])))
     near = np.abs(logs[0] - logs[1]) < OFF_STOPS - 0.01
-    found = np.log2(luminance(emissions(interpolate(ends, share, space="log"))))
+    mean_stops = np.log2(luminance(emissions(interpolate(ends, share, space="log"))))
     expected = (1 - share) * logs[0] + share * logs[1]
-    np.testing.assert_allclose(found[near], expected[near], atol=1e-6)  # Duv of round trips
+    np.testing.assert_allclose(mean_stops[near], expected[near], atol=1e-6)  # Duv of round trips
 
 
 def test_red_to_blue_lamps_pass_no_green_and_whites_stay_white() -> None:
@@ -64,14 +64,14 @@ def test_red_to_blue_lamps_pass_no_green_and_whites_stay_white() -> None:
     whites = [np.array(kelvin_to_rgb(kelvin)) for kelvin in (2200, 9000)]
     ends = [lighting([red, whites[0], red]), lighting([blue, 5 * whites[1], (0, 0, 0)])]
     for share in np.linspace(0.05, 0.95, 10):
-        mixed, white, off = emissions(interpolate(ends, share, space="log"))
+        mixed, white, blackout = emissions(interpolate(ends, share, space="log"))
         # Channel by channel the first one is (0.3, 0.9, 0.1) somewhere on its way.
         assert mixed[1] < 0.9 * mixed.max()
         kelvin, duv = cct_and_duv(white)  # type: ignore[misc]
         assert abs(duv) < 1e-4
         assert 1e6 / kelvin == pytest.approx((1 - share) * 1e6 / 2200 + share * 1e6 / 9000, 1e-4)
         # A lamp that goes off keeps its colour to the end.
-        np.testing.assert_allclose(off / off[0], np.array(red) / red[0], atol=PRECISION)
+        np.testing.assert_allclose(blackout / blackout[0], np.array(red) / red[0], atol=PRECISION)
 
 
 @given(WEIGHTS, st.floats(1e-3, 1e3), SHARE)
@@ -82,19 +82,19 @@ def test_the_colour_on_the_way_does_not_depend_on_brightness(
     assume(np.ptp(np.log2(luminance(ends[0]))) < OFF_STOPS - abs(np.log2(gain)) - 0.01)
     hues = []
     for factor in (1.0, gain):
-        found = emissions(
+        colours = emissions(
             interpolate([lighting(ends[0]), lighting(factor * ends[1])], share, space="log")
         )
-        hues.append(found / luminance(found)[:, None])
+        hues.append(colours / luminance(colours)[:, None])
     np.testing.assert_allclose(*hues, atol=1e-6)
 
 
 @given(WEIGHTS, st.floats(0.05, 0.95), st.sampled_from(["log", "oklab"]))
 def test_there_and_back_are_the_same_frames(one: Any, share: float, space: Any) -> None:
     ends = [lighting(one), lighting(np.array(one)[::-1] * 1.5)]
-    there = emissions(interpolate(ends, share, space=space))
-    back = emissions(interpolate(ends[::-1], 1 - share, space=space))
-    np.testing.assert_allclose(there, back, rtol=1e-6, atol=1e-9 * there.max())
+    forwards = emissions(interpolate(ends, share, space=space))
+    backwards = emissions(interpolate(ends[::-1], 1 - share, space=space))
+    np.testing.assert_allclose(forwards, backwards, rtol=1e-6, atol=1e-9 * forwards.max())
 
 
 @pytest.mark.parametrize("space", ["log", "oklab"])
@@ -120,28 +120,28 @@ def test_oklab_is_that_of_its_paper() -> None:
 
 @given(st.integers(2, 200), st.integers(2, 9))
 def test_frames_go_evenly_from_the_first_to_the_last(frames: int, keys: int) -> None:
-    found = [sum(frame_position(k, frames, keys)) for k in range(frames)]
-    np.testing.assert_allclose(found, np.linspace(0, keys - 1, frames), atol=PRECISION)
+    positions = [sum(frame_position(k, frames, keys)) for k in range(frames)]
+    np.testing.assert_allclose(positions, np.linspace(0, keys - 1, frames), atol=PRECISION)
     firsts = [frame_position(k, frames, keys)[0] for k in range(frames)]
     assert min(firsts) == 0
     assert max(firsts) == keys - 2
 
 
 def test_other_lights_are_refused() -> None:
-    one = lighting(np.ones((3, 3)))
-    other = Lighting(one.lights[:2])
+    lit = lighting(np.ones((3, 3)))
+    other = Lighting(lit.lights[:2])
     with pytest.raises(LightingError, match="of different lights"):
-        interpolate([one, other], 0.5, space="log")
+        interpolate([lit, other], 0.5, space="log")
 
 
 @given(WEIGHTS, st.sampled_from(sorted(SHIFTED_WORDS)))
 def test_warmer_is_as_bright_and_redder(weights: Any, word: str) -> None:
     before = lighting(weights)
     after = shift(before, SHIFTED_WORDS[word], dimmer_lights={"lamp 2"})
-    one, other = emissions(before), emissions(after)
-    np.testing.assert_allclose(luminance(other), luminance(one), rtol=PRECISION)
-    np.testing.assert_array_equal(one[2], other[2])
-    redder = np.log(other[:2, 0] / other[:2, 2]) - np.log(one[:2, 0] / one[:2, 2])
+    original, other = emissions(before), emissions(after)
+    np.testing.assert_allclose(luminance(other), luminance(original), rtol=PRECISION)
+    np.testing.assert_array_equal(original[2], other[2])
+    redder = np.log(other[:2, 0] / other[:2, 2]) - np.log(original[:2, 0] / original[:2, 2])
     assert (redder * SHIFTED_WORDS[word] >= -PRECISION).all()
     # A white of the middle of the range does turn.
     white = shift(lighting([[1.0, 0.8, 0.6]] * 3), SHIFTED_WORDS[word])
@@ -151,11 +151,11 @@ def test_warmer_is_as_bright_and_redder(weights: Any, word: str) -> None:
 
 def test_words_that_ask_for_another_solve() -> None:
     assert set(VARIATIONS) == {*SHIFTED_WORDS, *SOLVED_WORDS}
-    settings, asked = Settings(hold=2.0, unpainted=0.0), Constraints()
-    assert vary("fewer lights", settings, asked, 5)[1].sparse == 3
-    assert vary("fewer lights", settings, asked, 1)[1].sparse == 1
-    few = Constraints.of(sparse=2)
-    assert vary("fewer lights", settings, few, 12)[1].sparse == 2
-    assert vary("white only", settings, asked, 5)[0].colors == "white"
-    assert vary("held harder", settings, asked, 5)[0].hold == 8.0
-    assert vary("held harder", Settings(unpainted=0.5), asked, 5)[0].hold == 4 * DEFAULT_HOLD
+    settings, constraints = Settings(hold=2.0, unpainted=0.0), Constraints()
+    assert vary("fewer lights", settings, constraints, 5)[1].sparse == 3
+    assert vary("fewer lights", settings, constraints, 1)[1].sparse == 1
+    sparse_constraints = Constraints.of(sparse=2)
+    assert vary("fewer lights", settings, sparse_constraints, 12)[1].sparse == 2
+    assert vary("white only", settings, constraints, 5)[0].colors == "white"
+    assert vary("held harder", settings, constraints, 5)[0].hold == 8.0
+    assert vary("held harder", Settings(unpainted=0.5), constraints, 5)[0].hold == 4 * DEFAULT_HOLD

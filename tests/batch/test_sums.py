@@ -40,15 +40,15 @@ def cut_rows(basis: Basis, rows: slice) -> Basis:
     )
 
 
-def solve_sums(basis: Basis, sums: Sums, **asked: Any) -> np.ndarray:
-    constraints = asked.pop("constraints", Constraints())
-    fit = Fit(literal=True, **asked)
+def solve_sums(basis: Basis, sums: Sums, **constraint_words: Any) -> np.ndarray:
+    constraints = constraint_words.pop("constraints", Constraints())
+    fit = Fit(literal=True, **constraint_words)
     problem = summed_problem(basis.lights, "it", sums, constraints=constraints, fit=fit)
     return solve_linear(problem, problem.start).weights
 
 
 @pytest.mark.parametrize(
-    "asked",
+    "settings",
     [
         {},
         {"constraints": Constraints.of({"light 1": {"limits": {"max": 0.4}}}, prefer_current=0.1)},
@@ -58,22 +58,22 @@ def solve_sums(basis: Basis, sums: Sums, **asked: Any) -> np.ndarray:
     ],
 )
 def test_the_lighting_is_that_of_the_whole_basis(
-    make_basis: BasisFactory, asked: dict[str, Any]
+    make_basis: BasisFactory, settings: dict[str, Any]
 ) -> None:
-    seen = np.zeros((12, 10), bool)
-    seen[3:6, 2:4] = True
-    basis = make_basis(3, seen=seen)
+    emitter_mask = np.zeros((12, 10), bool)
+    emitter_mask[3:6, 2:4] = True
+    basis = make_basis(3, seen=emitter_mask)
     rng = np.random.default_rng(2)
     mix = np.einsum("nhwc,n->hwc", basis.images, [0.7, 0.9, 0.0]).astype(np.float32)
     image = mix + 0.2 * rng.random(mix.shape, np.float32)
     importance = rng.random((12, 10), np.float32) * (np.arange(12) > 1)[:, None]
     target = Target.of(image, importance.astype(np.float32))
-    fit = Fit(literal=True, **{k: v for k, v in asked.items() if k != "constraints"})
+    fit = Fit(literal=True, **{k: v for k, v in settings.items() if k != "constraints"})
     assert reason_against_sums(target, fit) == ""
     first, second = (sum_rows(cut_rows(basis, rows), target, rows, fit) for rows in ROWS)
-    expected = solve(basis, target, literal=True, **asked).weights
+    expected = solve(basis, target, literal=True, **settings).weights
     # Sums of float64 in another order.
-    np.testing.assert_allclose(solve_sums(basis, first + second, **asked), expected, atol=1e-9)
+    np.testing.assert_allclose(solve_sums(basis, first + second, **settings), expected, atol=1e-9)
 
 
 def test_what_needs_pictures_says_so() -> None:
@@ -134,41 +134,44 @@ def test_a_batch_of_lightings(batch_folder: Path, monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(render_parts, "PART_SAMPLES", 2**10)
     monkeypatch.setattr(guide_training, "TRAINING_SAMPLES", (2**12,))
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(batch_folder / "cache"))
-    found = {}
-    for want in ("lights", "solve"):
-        (batch_folder / "looks.toml").write_text(LOOKS.replace("WANT", want), encoding="utf-8")
-        out = batch_folder / want
-        outcome = run_batch(plan(batch_folder / "looks.toml", out))
+    lightings = {}
+    for step in ("lights", "solve"):
+        (batch_folder / "looks.toml").write_text(LOOKS.replace("WANT", step), encoding="utf-8")
+        output_folder = batch_folder / step
+        outcome = run_batch(plan(batch_folder / "looks.toml", output_folder))
         assert not outcome.failed
-        assert run_batch(plan(batch_folder / "looks.toml", out)).done == []
-        answers = {name: read_lighting(out / name / "lighting.json") for name in ("bright", "dark")}
-        found[want] = {name: lighting_of(answer) for name, answer in answers.items()}
-    written = {file.name for file in (batch_folder / "lights" / "bright").iterdir()}
-    assert written == {"lighting.json", "relit.xml", "result.json"}
-    for name, lights in found["lights"].items():
+        assert run_batch(plan(batch_folder / "looks.toml", output_folder)).done == []
+        answers = {
+            name: read_lighting(output_folder / name / "lighting.json")
+            for name in ("bright", "dark")
+        }
+        lightings[step] = {name: lighting_of(answer) for name, answer in answers.items()}
+    file_names = {file.name for file in (batch_folder / "lights" / "bright").iterdir()}
+    assert file_names == {"lighting.json", "relit.xml", "result.json"}
+    for name, lights in lightings["lights"].items():
         # A basis in a file is rounded where a sixteenth of its noise hides it; sums are not.
         errors = np.array([light.standard_error for light in answers[name].lights])
-        assert (np.abs(lights - found["solve"][name]) < errors / 8).all()
+        assert (np.abs(lights - lightings["solve"][name]) < errors / 8).all()
     # Of a basis that is kept by now the same comes without rendering.
     text = LOOKS.replace("WANT", "lights")
     (batch_folder / "looks.toml").write_text(text, encoding="utf-8")
-    heard: list[str] = []
+    labels: list[str] = []
     outcome = run_batch(
-        plan(batch_folder / "looks.toml", batch_folder / "kept"), None, label_listener(heard)
+        plan(batch_folder / "looks.toml", batch_folder / "kept"), None, label_listener(labels)
     )
     assert outcome.done == ["bright", "dark"]
-    assert "basis" not in heard
+    assert "basis" not in labels
     for name in ("bright", "dark"):
-        kept = lighting_of(read_lighting(batch_folder / "kept" / name / "lighting.json"))
+        kept_weights = lighting_of(read_lighting(batch_folder / "kept" / name / "lighting.json"))
         # Sums of float64 in another order.
-        np.testing.assert_allclose(kept, found["solve"][name], rtol=1e-9)
+        np.testing.assert_allclose(kept_weights, lightings["solve"][name], rtol=1e-9)
     # Of one that nobody has, nothing is kept.
     cache = [file for file in (batch_folder / "cache").rglob("*.basis.exr") if file.is_file()]
     assert len(cache) == 1
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "message"),
     [
         ("literal = true", "settings need literal = true"),
         ('want = ["lights"]', "leave the rest out"),
@@ -176,16 +179,16 @@ def test_a_batch_of_lightings(batch_folder: Path, monkeypatch: pytest.MonkeyPatc
     ],
 )
 def test_what_does_not_go_with_it_is_said_before_anything_is_rendered(
-    batch_folder: Path, change: str, said: str
+    batch_folder: Path, change: str, message: str
 ) -> None:
-    instead = {
+    replacements = {
         "literal = true": "literal = false",
         'want = ["lights"]': 'want = ["lights", "verify"]',
         "spp = 16": "spp = 16, refine = 1",
     }[change]
-    text = LOOKS.replace("WANT", "lights").replace(change, instead)
+    text = LOOKS.replace("WANT", "lights").replace(change, replacements)
     (batch_folder / "wrong.toml").write_text(text, encoding="utf-8")
-    with pytest.raises(BatchError, match=said):
+    with pytest.raises(BatchError, match=message):
         plan(batch_folder / "wrong.toml", batch_folder / "wrong")
 
 
@@ -196,22 +199,22 @@ def test_light_groups_are_lit_without_a_picture_too(tmp_path: Path) -> None:
     interleaved(tmp_path / "groups.exr", layers)
     write_rgb(tmp_path / "bright.exr", 2 * images[0] + images[2])
     write_rgb(tmp_path / "dark.exr", np.maximum(images.sum(axis=0) / 4 - 0.05, 0))
-    found, left = {}, {}
-    for want in ("lights", "solve"):
+    lightings, left = {}, {}
+    for step in ("lights", "solve"):
         text = LOOKS.replace('scene = "room.xml"', 'light_groups = "groups.exr"')
-        text = text.replace("spp = 16, ", "").replace("WANT", want)
+        text = text.replace("spp = 16, ", "").replace("WANT", step)
         (tmp_path / "looks.toml").write_text(text, encoding="utf-8")
-        outcome = run_batch(plan(tmp_path / "looks.toml", tmp_path / want))
+        outcome = run_batch(plan(tmp_path / "looks.toml", tmp_path / step))
         assert (outcome.done, outcome.failed) == (["bright", "dark"], {})
-        assert run_batch(plan(tmp_path / "looks.toml", tmp_path / want)).done == []
+        assert run_batch(plan(tmp_path / "looks.toml", tmp_path / step)).done == []
         for name in outcome.done:
-            folder = tmp_path / want / name
-            found[want, name] = read_lighting(folder / "lighting.json")
-            left[want, name] = {file.name for file in folder.iterdir()}
+            folder = tmp_path / step / name
+            lightings[step, name] = read_lighting(folder / "lighting.json")
+            left[step, name] = {file.name for file in folder.iterdir()}
     for name in ("bright", "dark"):
-        assert found["lights", name].emission == found["solve", name].emission
+        assert lightings["lights", name].emission == lightings["solve", name].emission
         assert left["lights", name] == {"lighting.json", "result.json"}
         assert left["solve", name] > left["lights", name]
-    bright = np.array(list(found["lights", "bright"].emission.values()))
+    bright = np.array(list(lightings["lights", "bright"].emission.values()))
     # float32 pixels.
     np.testing.assert_allclose(bright, [[2.0] * 3, [0.0] * 3, [1.0] * 3], atol=1e-6)

@@ -258,24 +258,24 @@ def test_there_are_forty() -> None:
 
 @pytest.mark.parametrize("name", WRONG)
 def test_it_is_one_line_and_nothing_is_done(batch_folder: Path, name: str) -> None:
-    text, said = WRONG[name]
+    text, message = WRONG[name]
     (batch_folder / "looks.toml").write_text(text, encoding="utf-8")
     line = run_refused(batch_folder, "batch", "looks.toml", "-o", "out")
     assert line.startswith("lightpaint batch: looks.toml")
-    for words in said:
+    for words in message:
         assert words in line
 
 
 @pytest.mark.parametrize("name", SEVERAL)
 def test_several_mistakes_are_told_at_once_and_no_others(batch_folder: Path, name: str) -> None:
-    text, said = SEVERAL[name]
+    text, message = SEVERAL[name]
     (batch_folder / "looks.toml").write_text(text, encoding="utf-8")
-    done = run(batch_folder, "batch", "looks.toml", "-o", "out")
-    assert done.returncode == 2
-    lines = done.stderr.splitlines()
-    for words in said:
-        assert any(words in line for line in lines), done.stderr
-    assert len(lines) == len(said), done.stderr
+    completed = run(batch_folder, "batch", "looks.toml", "-o", "out")
+    assert completed.returncode == 2
+    lines = completed.stderr.splitlines()
+    for words in message:
+        assert any(words in line for line in lines), completed.stderr
+    assert len(lines) == len(message), completed.stderr
     assert not (batch_folder / "out").exists()
 
 
@@ -304,9 +304,9 @@ def test_all_mistakes_are_told_at_once(batch_folder: Path) -> None:
     looks = '[[look]]\nname = "a"\npainting = "x.exr"\nmask = "y.png"\n'
     looks += '[[look]]\nname = "b"\npainting = "p0.exr"\n[look.settings]\nholds = 1\nseed = -1\n'
     (batch_folder / "looks.toml").write_text(HEAD + looks, encoding="utf-8")
-    done = run(batch_folder, "batch", "looks.toml", "-o", "out")
-    assert done.returncode == 2
-    lines = done.stderr.splitlines()
+    completed = run(batch_folder, "batch", "looks.toml", "-o", "out")
+    assert completed.returncode == 2
+    lines = completed.stderr.splitlines()
     assert len(lines) == 4
     assert all(line.startswith("lightpaint batch: looks.toml: look '") for line in lines)
     assert not (batch_folder / "out").exists()

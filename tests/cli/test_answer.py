@@ -46,16 +46,16 @@ def _row(output: str, name: str) -> str:
 
 
 def test_the_table_is_in_stops_and_fits_80_columns(folder: Path):
-    said = succeed(folder, *SOLVE)
-    lines = said.splitlines()
+    output = succeed(folder, *SOLVE)
+    lines = output.splitlines()
     start = next(k for k, line in enumerate(lines) if line.startswith("light "))
     # With room for the swatch.
     assert max(cell_len(line) for line in lines[start : start + 5]) <= 77
-    assert _row(said, "key").split()[1:4] == ["+1.0", "6504", "K"]
-    assert _row(said, "a lamp").split("…")[1].split()[0] == "off"
-    assert _row(said, "fill").split()[1] == "0.0"
-    assert _row(said, "red").split()[1] == "on"
-    assert not re.search(r"W/|\bplugin\b|KKT|RMS", said)
+    assert _row(output, "key").split()[1:4] == ["+1.0", "6504", "K"]
+    assert _row(output, "a lamp").split("…")[1].split()[0] == "off"
+    assert _row(output, "fill").split()[1] == "0.0"
+    assert _row(output, "red").split()[1] == "on"
+    assert not re.search(r"W/|\bplugin\b|KKT|RMS", output)
     full = succeed(folder, *SOLVE, "--table", "full")
     for word in (NAMES[1], "plugin", "emission now", "unit"):
         assert word in full
@@ -92,21 +92,21 @@ def test_swatches_only_where_the_terminal_has_colours(
         monkeypatch.setenv(name, value)
     monkeypatch.setattr(sys.stdout, "isatty", lambda: isatty)
     assert main([*SOLVE]) == 0
-    said = capsys.readouterr().out
-    assert len(re.findall(r"\x1b\[38;2;\d+;\d+;\d+m██\x1b\[0m ", said)) == swatches
-    assert (said.count("\x1b") > 0) == (swatches > 0)
+    output = capsys.readouterr().out
+    assert len(re.findall(r"\x1b\[38;2;\d+;\d+;\d+m██\x1b\[0m ", output)) == swatches
+    assert (output.count("\x1b") > 0) == (swatches > 0)
     if isatty:
-        plain = re.sub(r"\x1b\[[\d;]*m", "", said)
+        plain = re.sub(r"\x1b\[[\d;]*m", "", output)
         assert max(map(cell_len, plain.splitlines())) <= 80
 
 
 def test_a_swatch_is_the_colour_that_is_named(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
-    made = terminal.table("light")
-    made.row("lamp")
+    table = terminal.table("light")
+    table.row("lamp")
     monkeypatch.setattr(terminal, "has_truecolour", lambda: True)
-    terminal.print_table(made, ["#ff8000"])
+    terminal.print_table(table, ["#ff8000"])
     assert capsys.readouterr().out.splitlines() == [
         "   light",
         "\x1b[38;2;255;128;0m██\x1b[0m lamp",
@@ -121,19 +121,19 @@ def test_of_many_lights_the_ten_that_matter_and_what_the_others_do(tmp_path: Pat
     basis = make_basis(images=images, names=names, emission=[[0.1] * 3] * 302)
     write_basis(tmp_path / "b.basis.exr", basis)
     write_rgb(tmp_path / "p.exr", basis.mix(np.full((302, 3), 0.2)))
-    said = succeed(tmp_path, *SOLVE)
-    rows = [line for line in said.splitlines() if line.startswith("light_")]
+    output = succeed(tmp_path, *SOLVE)
+    rows = [line for line in output.splitlines() if line.startswith("light_")]
     assert [row.split()[0] for row in rows] == [f"light_{k:03d}" for k in range(5, 302, 31)]
-    [rest] = [line for line in said.splitlines() if line.startswith("and 292 more")]
-    shown = sum(float(re.findall(r"([\d.]+) %", row)[-1]) for row in rows)
-    told = float(re.findall(r"together ([\d.]+) % of the picture", rest)[0])
-    assert shown + told == pytest.approx(100, abs=1.2)
+    [rest] = [line for line in output.splitlines() if line.startswith("and 292 more")]
+    listed_share = sum(float(re.findall(r"([\d.]+) %", row)[-1]) for row in rows)
+    stated_share = float(re.findall(r"together ([\d.]+) % of the picture", rest)[0])
+    assert listed_share + stated_share == pytest.approx(100, abs=1.2)
     counts = re.findall(r"(\d+) (?:off|switched|fixed|brighter|dimmer|as)", rest)
     assert sum(map(int, counts)) == 292
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "sentence"),
     [
         ((), "The painting is fitted literally: linear light, nothing held, any colour."),
         (
@@ -149,16 +149,16 @@ def test_of_many_lights_the_ten_that_matter_and_what_the_others_do(tmp_path: Pat
         ),
     ],
 )
-def test_one_line_says_what_else_was_asked(folder: Path, options: tuple[str, ...], said: str):
-    assert said in succeed(folder, *SOLVE, *options).splitlines()
+def test_one_line_says_what_else_was_asked(folder: Path, options: tuple[str, ...], sentence: str):
+    assert sentence in succeed(folder, *SOLVE, *options).splitlines()
 
 
 def test_a_picture_of_eight_bits_says_what_it_was_fitted_in(folder: Path):
     (folder / "p.png").write_bytes(png_bytes(np.full((16, 20, 3), 120, np.uint8)))
-    said = succeed(folder, "solve", "b.basis.exr", "p.png", "-o", "out")
-    [line] = [x for x in said.splitlines() if "--literal" in x]
-    said = "Fitted as the eye sees it (srgb); lights are pulled to their own colour (gentle)"
-    assert line.startswith(said)
+    output = succeed(folder, "solve", "b.basis.exr", "p.png", "-o", "out")
+    [line] = [x for x in output.splitlines() if "--literal" in x]
+    output = "Fitted as the eye sees it (srgb); lights are pulled to their own colour (gentle)"
+    assert line.startswith(output)
 
 
 def test_one_line_says_what_the_painting_leaves_open(tmp_path: Path, make_basis: Any):
@@ -171,16 +171,16 @@ def test_one_line_says_what_the_painting_leaves_open(tmp_path: Path, make_basis:
     mask = np.zeros((8, 8, 3), np.uint8)
     mask[:, :4] = 255
     (tmp_path / "m.png").write_bytes(png_bytes(mask))
-    done = run(tmp_path, *SOLVE, "--mask", "m.png")
-    assert done.returncode == 0, done.stderr
-    [line] = [x for x in done.stderr.splitlines() if "leaves lights open" in x]
+    completed = run(tmp_path, *SOLVE, "--mask", "m.png")
+    assert completed.returncode == 0, completed.stderr
+    [line] = [x for x in completed.stderr.splitlines() if "leaves lights open" in x]
     for words in (
         "the picture shows nothing of dark: left unchanged",
         "no painted pixel sees right: left unchanged",
         "one and twin light the painted part alike",
     ):
         assert words in line
-    assert "left unchanged" not in done.stderr.replace(line, "")
+    assert "left unchanged" not in completed.stderr.replace(line, "")
 
 
 def _setting(r: float, g: float, b: float) -> LightSetting:
@@ -188,7 +188,7 @@ def _setting(r: float, g: float, b: float) -> LightSetting:
 
 
 @pytest.mark.parametrize(
-    ("now", "new", "said"),
+    ("current", "new", "sentence"),
     [
         ((1.0, 1.0, 1.0), (2, 2, 2), "+1.0"),
         ((1.0, 1.0, 1.0), (0.5, 0.5, 0.5), "−1.0"),
@@ -199,14 +199,14 @@ def _setting(r: float, g: float, b: float) -> LightSetting:
         ((0.0, 0.0, 0.0), (0, 0, 0), "off"),
     ],
 )
-def test_what_became_of_a_light(now: Any, new: Any, said: str):
-    light = BasisLight("x", "area", "radiance", "W/(m² sr)", now)
-    assert change(light, _setting(*new)) == said
+def test_what_became_of_a_light(current: Any, new: Any, sentence: str):
+    light = BasisLight("x", "area", "radiance", "W/(m² sr)", current)
+    assert change(light, _setting(*new)) == sentence
     assert change(light, replace(_setting(*new), reached=(False,) * 3)) == "unchanged"
 
 
 @pytest.mark.parametrize(
-    ("reason", "where", "said"),
+    ("reason", "option_place", "line"),
     [
         (Reason("off", ("cove",), 0.57), BY_OPTION, ": leave out --off co*."),
         (Reason("limits", ("key",), 0.5), BY_OPTION, ": leave out --limit key."),
@@ -219,12 +219,14 @@ def test_what_became_of_a_light(now: Any, new: Any, said: str):
         (Reason("colors", (), 0.5), "", "; --colors free would remove 50 % of the difference."),
     ],
 )
-def test_what_holds_the_lights_is_said_with_its_option(reason: Reason, where: str, said: str):
-    asked = {"co*": {"off": True}, "key": {"limits": {"max": 1}}}
-    constraints = Constraints.of(asked, where=where)
+def test_what_holds_the_lights_is_said_with_its_option(
+    reason: Reason, option_place: str, line: str
+):
+    constraint_words = {"co*": {"off": True}, "key": {"limits": {"max": 1}}}
+    constraints = Constraints.of(constraint_words, where=option_place)
     look = SimpleNamespace(
         solution=SimpleNamespace(problem=SimpleNamespace(constraints=constraints)),
         analysis=SimpleNamespace(appearance=SimpleNamespace(reasons=(reason,))),
     )
     [sentence] = _limit_sentences(look)  # type: ignore[arg-type]
-    assert said in spoken(sentence)
+    assert line in spoken(sentence)

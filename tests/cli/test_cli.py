@@ -77,20 +77,22 @@ def test_the_command_that_a_report_shows_works_from_any_folder(
     basis_file: Path, tmp_path: Path
 ) -> None:
     """Also where paths were given from the folder it was, which has a name that shells part."""
-    there, elsewhere = tmp_path / "it's a room", tmp_path / "elsewhere"
-    for folder in (there, elsewhere):
+    room_folder, elsewhere = tmp_path / "it's a room", tmp_path / "elsewhere"
+    for folder in (room_folder, elsewhere):
         folder.mkdir()
-    shutil.copy(basis_file, there / "a room.basis.exr")
-    shutil.copy(WARM, there / "warm & cosy.exr")
-    succeed(there, "solve", "a room.basis.exr", "warm & cosy.exr", "-o", "out", "-q")
-    answer = (there / "out" / "lighting.json").read_bytes()
-    command = json.loads((there / "out" / "report.json").read_text(encoding="utf-8"))["command"]
-    assert escape(command) in (there / "out" / "report.html").read_text(encoding="utf-8")
-    shutil.rmtree(there / "out")
+    shutil.copy(basis_file, room_folder / "a room.basis.exr")
+    shutil.copy(WARM, room_folder / "warm & cosy.exr")
+    succeed(room_folder, "solve", "a room.basis.exr", "warm & cosy.exr", "-o", "out", "-q")
+    answer = (room_folder / "out" / "lighting.json").read_bytes()
+    command = json.loads((room_folder / "out" / "report.json").read_text(encoding="utf-8"))[
+        "command"
+    ]
+    assert escape(command) in (room_folder / "out" / "report.html").read_text(encoding="utf-8")
+    shutil.rmtree(room_folder / "out")
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    how: dict[str, Any] = {"cwd": elsewhere, "env": {**os.environ, "PATH": path}}
-    subprocess.run(["sh", "-c", command], **how, check=True, capture_output=True)
-    assert (there / "out" / "lighting.json").read_bytes() == answer
+    options: dict[str, Any] = {"cwd": elsewhere, "env": {**os.environ, "PATH": path}}
+    subprocess.run(["sh", "-c", command], **options, check=True, capture_output=True)
+    assert (room_folder / "out" / "lighting.json").read_bytes() == answer
     assert not [*elsewhere.iterdir()]
 
 
@@ -105,8 +107,8 @@ def test_verify_and_relight_take_the_result(solved_job: tuple[Path, str], tmp_pa
         copies[-1].write_text(json.dumps(data), encoding="utf-8")
     succeed(tmp_path, "relight", CORNELL, *copies, "-o", "looks", "--spp", 4)
     for name in ("one", "two"):
-        made = {p.name for p in (tmp_path / "looks" / name).iterdir()}
-        assert made == {"relit.xml", "relit.exr", "relit.png", "result.json"}
+        file_names = {p.name for p in (tmp_path / "looks" / name).iterdir()}
+        assert file_names == {"relit.xml", "relit.exr", "relit.png", "result.json"}
 
 
 def test_verify_tells_a_tampered_scene(solved_job: tuple[Path, str], tmp_path: Path) -> None:
@@ -118,13 +120,13 @@ def test_verify_tells_a_tampered_scene(solved_job: tuple[Path, str], tmp_path: P
     lines = relit.read_text(encoding="utf-8").splitlines()
     lines = [f'<path value="{origin}"/>' if "<path " in line else line for line in lines]
     relit.write_text("\n".join(lines).replace('max_depth" value="6"', 'max_depth" value="3"'))
-    done = run(tmp_path, "verify", folder)
-    assert done.returncode == 1
-    assert "DISAGREE" in done.stdout
+    completed = run(tmp_path, "verify", folder)
+    assert completed.returncode == 1
+    assert "DISAGREE" in completed.stdout
 
 
 def test_several_targets_share_one_basis(tmp_path: Path) -> None:
-    done = run(
+    completed = run(
         tmp_path,
         "solve",
         CORNELL,
@@ -138,10 +140,10 @@ def test_several_targets_share_one_basis(tmp_path: Path) -> None:
         "-o",
         "out",
     )
-    assert done.returncode == 0, done.stderr
+    assert completed.returncode == 0, completed.stderr
     for name in ("warm", "cool"):
         assert {p.name for p in (tmp_path / "out" / name).iterdir()} == RESULTS
-    assert done.stderr.count("basis:") == 1
+    assert completed.stderr.count("basis:") == 1
 
 
 def test_each_target_with_its_own_mask(basis_file: Path, tmp_path: Path) -> None:
@@ -176,9 +178,9 @@ def test_a_basis_of_another_view_is_noticed(tmp_path: Path) -> None:
     look = paint_with_light(side, target, tmp_path / "out", basis=basis)
     assert look.verification is not None
     assert look.verification.agrees
-    again = verify_result(tmp_path / "out")
-    assert again.agrees
-    assert np.abs(again.verified.image - look.verification.verified.image).max() > 0
+    second_result = verify_result(tmp_path / "out")
+    assert second_result.agrees
+    assert np.abs(second_result.verified.image - look.verification.verified.image).max() > 0
 
 
 def test_solving_from_a_basis_needs_no_mitsuba(basis_file: Path, tmp_path: Path) -> None:
@@ -191,14 +193,14 @@ def test_solving_from_a_basis_needs_no_mitsuba(basis_file: Path, tmp_path: Path)
         "from lightpaint.cli import main\n"
         "sys.exit(main(sys.argv[1:]))"
     )
-    done = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-c", code, "solve", str(basis_file), str(WARM)],
         cwd=tmp_path,
         capture_output=True,
         text=True,
         check=False,
     )
-    assert done.returncode == 0, done.stderr
+    assert completed.returncode == 0, completed.stderr
     assert {p.name for p in (tmp_path / "warm").iterdir()} == RESULTS - {
         "relit.xml",
         "verified.exr",
@@ -220,13 +222,13 @@ def test_lights_in_candela_and_lumen_where_the_scene_has_a_unit(tmp_path: Path) 
     data = json.loads(succeed(tmp_path, "lights", CORNELL, "--json", "--unit", 100))
     assert data["cd_per_unit"] == 100
     lamp = next(light for light in data["lights"] if light["name"] == "lamp")
-    found, y = lamp["photometry"], np.dot(lamp["emission"], [0.2126, 0.7152, 0.0722])
-    assert found["luminous_unit"] == "cd"
-    assert found["luminous"] == pytest.approx(100 * y)
-    assert found["flux_lm"] == pytest.approx(4 * np.pi * 100 * y, rel=1e-6)
-    assert lamp["members"][0]["photometry"] == found
-    for wrong in ("0", "-1", "bright", "inf"):
-        assert "cd/m²" in run_refused(tmp_path, "lights", CORNELL, f"--unit={wrong}")
+    photometry, y = lamp["photometry"], np.dot(lamp["emission"], [0.2126, 0.7152, 0.0722])
+    assert photometry["luminous_unit"] == "cd"
+    assert photometry["luminous"] == pytest.approx(100 * y)
+    assert photometry["flux_lm"] == pytest.approx(4 * np.pi * 100 * y, rel=1e-6)
+    assert lamp["members"][0]["photometry"] == photometry
+    for value in ("0", "-1", "bright", "inf"):
+        assert "cd/m²" in run_refused(tmp_path, "lights", CORNELL, f"--unit={value}")
 
 
 def test_template_is_the_current_look(tmp_path: Path) -> None:
@@ -249,8 +251,8 @@ def test_a_painting_is_not_painted_over(tmp_path: Path) -> None:
 
 
 def test_painted_over_the_template_in_8_bits_and_solved(tmp_path: Path) -> None:
-    said = succeed(tmp_path, "template", CORNELL, "--resolution", "1/4", "--spp", 64)
-    assert "template/template.png" in said
+    output = succeed(tmp_path, "template", CORNELL, "--resolution", "1/4", "--spp", 64)
+    assert "template/template.png" in output
     folder = tmp_path / "template"
     names = {str(file.relative_to(folder)) for file in folder.rglob("*") if file.is_file()}
     plain = {"template.exr", "template.png", "albedo.exr", "normals.exr", "depth.exr"}
@@ -263,18 +265,18 @@ def test_painted_over_the_template_in_8_bits_and_solved(tmp_path: Path) -> None:
     # Whatever a program calls it, and whatever it forgets of the view.
     Image.fromarray(pixels).save(folder / "warmer.png")
     command = ("solve", CORNELL, "template/warmer.png", "--resolution", "1/4", "--spp", 16)
-    done = run(tmp_path, *command, "-o", "out")
-    assert done.returncode == 0, done.stderr
+    completed = run(tmp_path, *command, "-o", "out")
+    assert completed.returncode == 0, completed.stderr
     # 12 x 12 of 32 x 32 pixels.
-    assert "warmer: 14.1 % painted: what differs from template/template.png" in done.stderr
+    assert "warmer: 14.1 % painted: what differs from template/template.png" in completed.stderr
     itself = run_refused(tmp_path, *command[:2], "template/template.png", *command[3:])
     assert "template/template.png is the template itself" in itself
     Image.open(folder / "template.png").save(folder / "same.png")
-    same = run_refused(tmp_path, *command[:2], "template/same.png", *command[3:])
-    assert "nothing in template/same.png differs from template/template.png" in same
-    about = folder / "template.json"
-    other = about.read_text(encoding="utf-8").replace('"camera"', '"balcony"')
-    about.write_text(other, encoding="utf-8")
+    refusal = run_refused(tmp_path, *command[:2], "template/same.png", *command[3:])
+    assert "nothing in template/same.png differs from template/template.png" in refusal
+    template_record = folder / "template.json"
+    other = template_record.read_text(encoding="utf-8").replace('"camera"', '"balcony"')
+    template_record.write_text(other, encoding="utf-8")
     assert "a template of the sensor balcony, not of camera" in run_refused(tmp_path, *command)
 
 
@@ -309,23 +311,23 @@ def test_results_of_two_solves_never_stand_together(
 
 def test_whoever_reads_may_leave(basis_file: Path, tmp_path: Path) -> None:
     command = f"{sys.executable} -m lightpaint solve {basis_file} {WARM} {COOL} -o out"
-    done = subprocess.run(
+    completed = subprocess.run(
         ["bash", "-c", f"set -o pipefail; {command} | true"],
         cwd=tmp_path,
         capture_output=True,
         text=True,
         check=False,
     )
-    assert done.returncode == 0, done.stderr
-    assert "Traceback" not in done.stderr
+    assert completed.returncode == 0, completed.stderr
+    assert "Traceback" not in completed.stderr
     for name in ("warm", "cool"):
         assert (tmp_path / "out" / name / "report.html").is_file()
 
 
 def test_a_terminal_without_unicode_loses_no_result(tmp_path: Path) -> None:
-    done = spawn(tmp_path, "lights", CORNELL, "--no-sheet", PYTHONIOENCODING="ascii")
-    assert done.returncode == 0, done.stderr
-    assert "W/(m? sr)" in done.stdout
+    completed = spawn(tmp_path, "lights", CORNELL, "--no-sheet", PYTHONIOENCODING="ascii")
+    assert completed.returncode == 0, completed.stderr
+    assert "W/(m? sr)" in completed.stdout
 
 
 def test_a_lighting_cannot_name_a_folder_elsewhere(
@@ -339,9 +341,9 @@ def test_a_lighting_cannot_name_a_folder_elsewhere(
 
 
 def test_doctor_fails_where_something_is_missing(tmp_path: Path) -> None:
-    done = spawn(tmp_path, "doctor", "-m", "llvm_nonsense_rgb")
-    assert done.returncode == 2
-    assert "MISSING" in done.stdout
+    completed = spawn(tmp_path, "doctor", "-m", "llvm_nonsense_rgb")
+    assert completed.returncode == 2
+    assert "MISSING" in completed.stdout
 
 
 def test_resize_does_not_stretch(basis_file: Path, tmp_path: Path) -> None:
@@ -353,9 +355,9 @@ def test_resize_does_not_stretch(basis_file: Path, tmp_path: Path) -> None:
 
 def test_scalar_variant_says_so_and_serves(tmp_path: Path) -> None:
     room = write_room(tmp_path)
-    done = spawn(tmp_path, "basis", room, "-m", "scalar_rgb", "--spp", 4, "-D", "width=8")
-    assert done.returncode == 0, done.stderr
-    assert "5 times the work; a variant like llvm_ad_rgb renders all in one" in done.stderr
+    completed = spawn(tmp_path, "basis", room, "-m", "scalar_rgb", "--spp", 4, "-D", "width=8")
+    assert completed.returncode == 0, completed.stderr
+    assert "5 times the work; a variant like llvm_ad_rgb renders all in one" in completed.stderr
     assert (tmp_path / "room.basis.exr").is_file()
 
 
@@ -367,9 +369,11 @@ def test_doctor_names_what_it_found(tmp_path: Path) -> None:
 
 def test_help_does_not_wait_for_mitsuba(tmp_path: Path) -> None:
     code = "import sys, lightpaint.cli as c\ntry: c.main(['--help'])\nfinally: print(*sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert "solve" in done.stdout
-    loaded = done.stdout.split()
+    completed = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False
+    )
+    assert "solve" in completed.stdout
+    loaded = completed.stdout.split()
     assert "mitsuba" not in loaded
     assert "drjit" not in loaded
     for command in ("lights", "basis", "template", "solve", "relight", "verify", "doctor"):
@@ -378,19 +382,21 @@ def test_help_does_not_wait_for_mitsuba(tmp_path: Path) -> None:
 
 def test_nothing_is_printed_but_one_line_for_mistakes(basis_file: Path, tmp_path: Path) -> None:
     image = np.ones((128, 128, 3), np.float32)
-    bad = tmp_path / "bad"
-    bad.mkdir()
-    write_rgb(bad / "small.exr", image[:64])
+    bad_folder = tmp_path / "bad"
+    bad_folder.mkdir()
+    write_rgb(bad_folder / "small.exr", image[:64])
     write_parts(
-        bad / "unpainted.exr", [ExrPart("", {**rgb_channels(image), "A": image[..., 0] * 0})]
+        bad_folder / "unpainted.exr", [ExrPart("", {**rgb_channels(image), "A": image[..., 0] * 0})]
     )
-    write_parts(bad / "negative.exr", [ExrPart("", {**rgb_channels(image), "W": -image[..., 0]})])
-    write_rgb(bad / "nan.exr", image * np.nan)
-    whole = WARM.read_bytes()
-    (bad / "cut.exr").write_bytes(whole[: len(whole) // 2])
-    (bad / "text.exr").write_text("no picture")
-    (bad / "file").write_text("in the way")
-    here = tmp_path
+    write_parts(
+        bad_folder / "negative.exr", [ExrPart("", {**rgb_channels(image), "W": -image[..., 0]})]
+    )
+    write_rgb(bad_folder / "nan.exr", image * np.nan)
+    content = WARM.read_bytes()
+    (bad_folder / "cut.exr").write_bytes(content[: len(content) // 2])
+    (bad_folder / "text.exr").write_text("no picture")
+    (bad_folder / "file").write_text("in the way")
+    folder = tmp_path
     for target, words in {
         "gone.exr": "no such image file",
         "bad/small.exr": "128x64",
@@ -401,29 +407,31 @@ def test_nothing_is_printed_but_one_line_for_mistakes(basis_file: Path, tmp_path
         "bad/text.exr": "is not a picture that can be read",
         "bad": "is a folder",
     }.items():
-        assert words in run_refused(here, "solve", basis_file, target)
-        assert words in run_refused(here, "solve", CORNELL, target)
+        assert words in run_refused(folder, "solve", basis_file, target)
+        assert words in run_refused(folder, "solve", CORNELL, target)
     assert "cannot write into bad/file" in run_refused(
-        here, "solve", basis_file, WARM, "-o", "bad/file"
+        folder, "solve", basis_file, WARM, "-o", "bad/file"
     )
-    assert "cannot write" in run_refused(here, "solve", basis_file, WARM, "-o", "bad/file/deeper")
-    assert "no layers named like" in run_refused(here, "solve", WARM, WARM)
-    assert "no such scene" in run_refused(here, "solve", "gone.xml", WARM)
-    assert "not a scene" in run_refused(here, "lights", "bad/text.exr")
-    assert "is a folder" in run_refused(here, "lights", "bad")
-    assert "refuses" in run_refused(here, "lights", "bad/file")
-    assert "nothing to render" in run_refused(here, "lights", GALLERY, "-D", "width=0")
-    assert "cannot change a saved basis" in run_refused(here, "solve", basis_file, WARM, "--spp", 9)
-    assert "no sensor 'nobody'" in run_refused(here, "lights", CORNELL, "-s", "nobody")
-    assert "not key=value" in run_refused(here, "lights", CORNELL, "-D", "spp")
-    assert "spp" in run_refused(here, "basis", CORNELL, "--spp", "1")
-    assert "seed" in run_refused(here, "basis", CORNELL, "--seed", "-1")
-    assert "unpainted" in run_refused(here, "solve", basis_file, WARM, "--unpainted", "nan")
-    assert "overwrite" in run_refused(here, "solve", basis_file, WARM, WARM)
-    assert "must end in .exr" in run_refused(here, "basis", CORNELL, "-o", "basis.png")
-    assert "no such lighting" in run_refused(here, "relight", CORNELL, "gone.json")
-    assert "not a JSON" in run_refused(here, "relight", CORNELL, "bad/file")
-    assert "not a result folder" in run_refused(here, "verify", "bad")
+    assert "cannot write" in run_refused(folder, "solve", basis_file, WARM, "-o", "bad/file/deeper")
+    assert "no layers named like" in run_refused(folder, "solve", WARM, WARM)
+    assert "no such scene" in run_refused(folder, "solve", "gone.xml", WARM)
+    assert "not a scene" in run_refused(folder, "lights", "bad/text.exr")
+    assert "is a folder" in run_refused(folder, "lights", "bad")
+    assert "refuses" in run_refused(folder, "lights", "bad/file")
+    assert "nothing to render" in run_refused(folder, "lights", GALLERY, "-D", "width=0")
+    assert "cannot change a saved basis" in run_refused(
+        folder, "solve", basis_file, WARM, "--spp", 9
+    )
+    assert "no sensor 'nobody'" in run_refused(folder, "lights", CORNELL, "-s", "nobody")
+    assert "not key=value" in run_refused(folder, "lights", CORNELL, "-D", "spp")
+    assert "spp" in run_refused(folder, "basis", CORNELL, "--spp", "1")
+    assert "seed" in run_refused(folder, "basis", CORNELL, "--seed", "-1")
+    assert "unpainted" in run_refused(folder, "solve", basis_file, WARM, "--unpainted", "nan")
+    assert "overwrite" in run_refused(folder, "solve", basis_file, WARM, WARM)
+    assert "must end in .exr" in run_refused(folder, "basis", CORNELL, "-o", "basis.png")
+    assert "no such lighting" in run_refused(folder, "relight", CORNELL, "gone.json")
+    assert "not a JSON" in run_refused(folder, "relight", CORNELL, "bad/file")
+    assert "not a result folder" in run_refused(folder, "verify", "bad")
     # Another variant, nothing but parsing, and a scene that is loaded: by processes of their own.
     for arguments, words in (
         (("lights", CORNELL, "-m", "llvm_ad_nonsense_rgb"), "no variant"),
@@ -431,7 +439,7 @@ def test_nothing_is_printed_but_one_line_for_mistakes(basis_file: Path, tmp_path
         (("basis", CORNELL, "--spp", "1"), "spp"),
         (("solve", CORNELL, "bad/nan.exr"), "NaN or Inf in every pixel"),
     ):
-        assert words in run_refused(here, *arguments, by=spawn)
+        assert words in run_refused(folder, *arguments, by=spawn)
 
 
 def test_deep_images_are_refused_by_name(tmp_path: Path) -> None:
@@ -459,14 +467,19 @@ def test_resize_and_unpainted(basis_file: Path, tmp_path: Path) -> None:
             answers[0][light]["emission"], answers[1][light]["emission"], rtol=1e-4, atol=1e-5
         )
     succeed(tmp_path, "solve", basis_file, WARM, "-o", "held", "--unpainted", "100")
-    held = json.loads((tmp_path / "held" / "lighting.json").read_text(encoding="utf-8"))["lights"]
+    held_lights = json.loads((tmp_path / "held" / "lighting.json").read_text(encoding="utf-8"))[
+        "lights"
+    ]
     current = json.loads(succeed(tmp_path, "lights", CORNELL, "--json"))["lights"]
-    now = {light["name"]: light["emission"] for light in current}
+    current_lights = {light["name"]: light["emission"] for light in current}
 
     def gap(lights: dict[str, dict[str, list[float]]]) -> float:
-        return sum(float(np.abs(np.subtract(lights[n]["emission"], now[n])).sum()) for n in now)
+        return sum(
+            float(np.abs(np.subtract(lights[n]["emission"], current_lights[n])).sum())
+            for n in current_lights
+        )
 
-    assert gap(held) < gap(answers[1])
+    assert gap(held_lights) < gap(answers[1])
 
 
 def test_missing_parameter_tells_the_option(tmp_path: Path) -> None:
@@ -479,9 +492,9 @@ def test_missing_parameter_tells_the_option(tmp_path: Path) -> None:
 
 def test_the_cache_is_listed_and_cleared(tmp_path: Path) -> None:
     def call(*arguments: object) -> str:
-        done = run(tmp_path, *arguments, LIGHTPAINT_CACHE=str(tmp_path / "cache"))
-        assert done.returncode == 0, done.stderr
-        return done.stdout
+        completed = run(tmp_path, *arguments, LIGHTPAINT_CACHE=str(tmp_path / "cache"))
+        assert completed.returncode == 0, completed.stderr
+        return completed.stdout
 
     call("basis", CORNELL, "--spp", "2", "--no-cache")
     assert "scene.xml" not in call("cache")
@@ -499,9 +512,9 @@ CHECKERS = """<shape type="rectangle" id="screen"><transform name="to_world"><sc
 def test_groups_and_kept_lights_from_solve_to_relight(tmp_path: Path) -> None:
     room = write_room(tmp_path, lights="".join(LIGHTS.values()) + CHECKERS)
     choice = ("--group", "warm=panel,bulb", "--lights", "warm,s*")
-    done = run(tmp_path, "lights", room, *choice, "--json")
-    assert "not adjusted: 'screen' has a textured radiance" in done.stderr
-    listed = {light["name"]: light for light in json.loads(done.stdout)["lights"]}
+    completed = run(tmp_path, "lights", room, *choice, "--json")
+    assert "not adjusted: 'screen' has a textured radiance" in completed.stderr
+    listed = {light["name"]: light for light in json.loads(completed.stdout)["lights"]}
     members = {name: [m["name"] for m in light["members"]] for name, light in listed.items()}
     assert members == {
         "warm": ["panel", "bulb"],
@@ -518,8 +531,8 @@ def test_groups_and_kept_lights_from_solve_to_relight(tmp_path: Path) -> None:
     assert re.search(r"^rest .* fixed ", output, re.MULTILINE)
     assert "agree within noise" in succeed(tmp_path, "verify", "out")
     succeed(tmp_path, "relight", room, "out/lighting.json", "-o", "again", "--spp", 4)
-    again, relit = (tmp_path / name / "relit.xml" for name in ("again", "out"))
-    assert again.read_bytes() == relit.read_bytes()
+    second_relit, relit = (tmp_path / name / "relit.xml" for name in ("again", "out"))
+    assert second_relit.read_bytes() == relit.read_bytes()
 
     # The same from a basis of its own, which keeps what it was made with.
     succeed(tmp_path, "basis", room, *choice, "--spp", 64, "-o", "b.basis.exr")
@@ -537,8 +550,8 @@ def test_groups_and_kept_lights_from_solve_to_relight(tmp_path: Path) -> None:
 
 def test_a_lights_file_beside_the_scene(tmp_path: Path) -> None:
     room = write_room(tmp_path)
-    beside = tmp_path / "room.lights.toml"
-    beside.write_text('lights = ["pair"]\n[groups]\npair = ["sun", "sky"]\n', encoding="utf-8")
+    lights_file = tmp_path / "room.lights.toml"
+    lights_file.write_text('lights = ["pair"]\n[groups]\npair = ["sun", "sky"]\n', encoding="utf-8")
 
     def names(*arguments: object) -> list[str]:
         text = succeed(tmp_path, "lights", room, "--json", *arguments)
@@ -556,7 +569,7 @@ def test_a_lights_file_beside_the_scene(tmp_path: Path) -> None:
     other.write_text('[groups]\nall = ["*"]\n', encoding="utf-8")
     assert names("--lights-file", other) == ["all"]
 
-    beside.write_text("lights = [", encoding="utf-8")
+    lights_file.write_text("lights = [", encoding="utf-8")
     line = run_refused(tmp_path, "basis", room)
     assert "room.lights.toml is not TOML" in line
     assert "line 1" in line
@@ -584,8 +597,8 @@ def test_wrong_choices_are_refused_in_one_line(
 
 
 def test_solved_small_and_verified_large(tmp_path: Path) -> None:
-    few = ("--resolution", "1/4", "--spp", 16, "--seed", 8)
-    arguments = ("solve", CORNELL, WARM, *few, "--verify-spp", 16)
+    few_samples = ("--resolution", "1/4", "--spp", 16, "--seed", 8)
+    arguments = ("solve", CORNELL, WARM, *few_samples, "--verify-spp", 16)
     output = succeed(tmp_path, *arguments)
     assert "A render confirms it." in output
     sizes = {}
@@ -597,11 +610,22 @@ def test_solved_small_and_verified_large(tmp_path: Path) -> None:
     page = (tmp_path / "warm" / "report.html").read_text(encoding="utf-8")
     assert "32 × 32 pixels, verified at 128 × 128" in page
     # A saved basis of that size takes the painting of full size as well, and says so.
-    same = ("basis", CORNELL, "--resolution", "32x32", "--spp", 16, "--seed", 8, "-o", "s.exr")
-    assert "kept from an earlier run" in run(tmp_path, *same).stderr
-    done = run(tmp_path, "solve", "s.exr", WARM, "-o", "saved")
-    assert done.returncode == 0, done.stderr
-    assert "128x128 pixels averaged to the basis's 32x32" in done.stderr
+    basis_command = (
+        "basis",
+        CORNELL,
+        "--resolution",
+        "32x32",
+        "--spp",
+        16,
+        "--seed",
+        8,
+        "-o",
+        "s.exr",
+    )
+    assert "kept from an earlier run" in run(tmp_path, *basis_command).stderr
+    completed = run(tmp_path, "solve", "s.exr", WARM, "-o", "saved")
+    assert completed.returncode == 0, completed.stderr
+    assert "128x128 pixels averaged to the basis's 32x32" in completed.stderr
     answers = [
         json.loads((tmp_path / name / "lighting.json").read_text(encoding="utf-8"))["lights"]
         for name in ("warm", "saved")
@@ -620,9 +644,9 @@ def test_a_tampered_scene_is_told_from_a_small_prediction_too(tmp_path: Path) ->
     relit = tmp_path / "warm" / "relit.xml"
     text = relit.read_text(encoding="utf-8").replace('max_depth" value="6"', 'max_depth" value="3"')
     relit.write_text(text, encoding="utf-8")
-    done = run(tmp_path, "verify", "warm")
-    assert done.returncode == 1
-    assert "DISAGREE" in done.stdout
+    completed = run(tmp_path, "verify", "warm")
+    assert completed.returncode == 1
+    assert "DISAGREE" in completed.stdout
 
 
 def test_a_basis_for_a_time(tmp_path: Path) -> None:
@@ -632,18 +656,18 @@ def test_a_basis_for_a_time(tmp_path: Path) -> None:
     room = write_room(tmp_path, lights=LIGHTS["panel"] + LIGHTS["bulb"])
     write_rgb(tmp_path / "warm.exr", np.full((20, 24, 3), 0.3, np.float32))
     arguments = ("basis", room, "--time", "0.05", "--resolution", "1/2", "--seed", 9)
-    done = run(tmp_path, *arguments)
-    assert done.stderr == "basis: 1 second\n"
-    first = spp_of(done.stdout)
+    completed = run(tmp_path, *arguments)
+    assert completed.stderr == "basis: 1 second\n"
+    first = spp_of(completed.stdout)
     assert spp_of(succeed(tmp_path, *arguments)) > first
     # The verification has as many samples as the basis: a quarter in each pixel, or the fewer in
     # each of a smaller film.
     solved = ("solve", room, "warm.exr", *arguments[2:], "--quality", "final")
     assert "A render confirms it." in succeed(tmp_path, *solved)
     [part] = read_parts(tmp_path / "warm" / "predicted.exr")
-    has = spp_of(succeed(tmp_path, "basis", room, *arguments[4:], "--spp", 2))
-    seen = json.loads(part.attributes["lightpaint.view"])
-    assert seen["spp"] * seen["width"] * seen["height"] == pytest.approx(has * 12 * 10, rel=0.1)
+    spp = spp_of(succeed(tmp_path, "basis", room, *arguments[4:], "--spp", 2))
+    view = json.loads(part.attributes["lightpaint.view"])
+    assert view["spp"] * view["width"] * view["height"] == pytest.approx(spp * 12 * 10, rel=0.1)
 
 
 def test_budgets_that_contradict_each_other_are_refused(basis_file: Path, tmp_path: Path) -> None:
@@ -654,13 +678,13 @@ def test_budgets_that_contradict_each_other_are_refused(basis_file: Path, tmp_pa
     assert "will do" in run_refused(*refuse, "--resolution", "100x100")
     solve = [tmp_path, "solve", CORNELL, WARM]
     assert "error is 0.02 and spp 4" in run_refused(*solve, "--error", "2%", "--spp", 4)
-    for wrong in ("0", "nan", "100%"):
-        assert "expected a share of at least" in run_refused(*solve, "--error", wrong)
+    for budget in ("0", "nan", "100%"):
+        assert "expected a share of at least" in run_refused(*solve, "--error", budget)
     assert "not a share like 2%" in run_refused(*solve, "--error", "two")
-    given = (("--time", 3), ("--error", "2%"), ("--quality", "final"), ("--resolution", "1/2"))
-    for option in given:
-        told = run_refused(tmp_path, "solve", basis_file, WARM, *option)
-        assert f"{option[0]} cannot change a saved basis" in told
+    options = (("--time", 3), ("--error", "2%"), ("--quality", "final"), ("--resolution", "1/2"))
+    for option in options:
+        refusal = run_refused(tmp_path, "solve", basis_file, WARM, *option)
+        assert f"{option[0]} cannot change a saved basis" in refusal
 
 
 def test_a_film_that_no_blocks_fit_into_is_solved_small_and_verified_whole(
@@ -680,19 +704,19 @@ def test_a_film_that_no_blocks_fit_into_is_solved_small_and_verified_whole(
     mask[50:] = 1
     write_parts(tmp_path / "mask.exr", [ExrPart("mask", {"Y": mask})])
     solve = ("solve", "room.xml", "look.exr", "--mask", "mask.exr", *size, "--quality", "preview")
-    done = run(tmp_path, *solve, "--spp", 8, "--verify-spp", 8)
-    assert done.returncode == 0, done.stderr
+    completed = run(tmp_path, *solve, "--spp", 8, "--verify-spp", 8)
+    assert completed.returncode == 0, completed.stderr
     assert (
         "film of 171x128 reduced to 42x32 blocks of 4x4 pixels: 3 columns of pixels at the right "
-        "are left over and ignored" in done.stderr
+        "are left over and ignored" in completed.stderr
     )
-    assert "A render confirms it." in done.stdout
+    assert "A render confirms it." in completed.stdout
     assert read_estimate(tmp_path / "look" / "predicted.exr")[0].size == (32, 42)
     assert read_estimate(tmp_path / "look" / "verified.exr")[0].size == (128, 171)
     # Fewer samples, of what is kept or exactly; both say what they used.
     for option, spp in ((), 8), (("--exact-spp",), 4):
-        done = run(tmp_path, *solve, "--spp", 4, *option)
-        assert ("more than the 4 requested" in done.stderr) == (spp == 8)
+        completed = run(tmp_path, *solve, "--spp", 4, *option)
+        assert ("more than the 4 requested" in completed.stderr) == (spp == 8)
         answer = json.loads((tmp_path / "look" / "lighting.json").read_text())
         assert answer["solve"]["basis_spp"] == spp
         _, attributes = read_estimate(tmp_path / "look" / "predicted.exr")

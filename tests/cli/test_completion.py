@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 
-def completions(folder: Path, line: str, **more: str) -> list[str]:
+def completions(folder: Path, line: str, **environment: str) -> list[str]:
     """What bash is told when TAB is pressed behind `line`."""
     answer = folder / ".answer"
     answer.unlink(missing_ok=True)
@@ -21,15 +21,15 @@ def completions(folder: Path, line: str, **more: str) -> list[str]:
         "COMP_LINE": line,
         "COMP_POINT": str(len(line)),
     }
-    done = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-c", "import sys; from lightpaint.cli import main; sys.exit(main())"],
         cwd=folder,
-        env={**os.environ, **variables, **more},
+        env={**os.environ, **variables, **environment},
         capture_output=True,
         text=True,
         check=False,
     )
-    assert done.stdout == done.stderr == ""
+    assert completed.stdout == completed.stderr == ""
     return sorted(answer.read_text(encoding="utf-8").split("\n")) if answer.is_file() else []
 
 
@@ -42,7 +42,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("line", "offered"),
+    ("line", "completions_offered"),
     [
         ("lightpaint so", ["solve"]),
         ("lightpaint cache c", ["clear"]),
@@ -61,8 +61,8 @@ def folder(tmp_path: Path) -> Path:
         ("lightpaint solve hall.xml --seed 1 --qual", ["--quality"]),
     ],
 )
-def test_what_is_offered(folder: Path, line: str, offered: list[str]) -> None:
-    assert [x for x in completions(folder, line) if x] == offered
+def test_what_is_offered(folder: Path, line: str, completions_offered: list[str]) -> None:
+    assert [x for x in completions(folder, line) if x] == completions_offered
 
 
 def test_nothing_is_rendered_or_loaded_for_it(folder: Path) -> None:
@@ -72,8 +72,10 @@ def test_nothing_is_rendered_or_loaded_for_it(folder: Path) -> None:
         "try: c.main(['--help'])\n"
         "finally: print('argcomplete' in sys.modules)"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.stdout.endswith("False\n")
+    completed = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False
+    )
+    assert completed.stdout.endswith("False\n")
 
 
 def test_without_argcomplete_there_is_no_answer_and_no_noise(folder: Path) -> None:

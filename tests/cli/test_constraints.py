@@ -170,9 +170,9 @@ def test_a_lights_file_with_a_wrong_value_names_file_light_and_key(
     room: Path, tmp_path: Path
 ) -> None:
     (tmp_path / "l.toml").write_text('[light.bulb]\ncolor = "blue"\n', encoding="utf-8")
-    done = run(
+    completed = run(
         tmp_path, "solve", room / "room.xml", room / "t.exr", "--lights-file", tmp_path / "l.toml"
     )
-    assert done.returncode == 2
-    assert f"{tmp_path / 'l.toml'}: light.bulb.color is 'blue': expected" in done.stderr
-    assert "basis:" not in done.stderr
+    assert completed.returncode == 2
+    assert f"{tmp_path / 'l.toml'}: light.bulb.color is 'blue': expected" in completed.stderr
+    assert "basis:" not in completed.stderr

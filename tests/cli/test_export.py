@@ -29,8 +29,8 @@ def answer_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A room whose lights are in it and in a file that it includes, and an answer for it."""
     folder = tmp_path_factory.mktemp("export")
     (folder / "lamps").mkdir()
-    more = f'<scene version="3.0.0">{LIGHTS["bulb"]}</scene>\n'
-    (folder / "lamps" / "bulb.xml").write_text(more, encoding="utf-8")
+    bulb_scene = f'<scene version="3.0.0">{LIGHTS["bulb"]}</scene>\n'
+    (folder / "lamps" / "bulb.xml").write_text(bulb_scene, encoding="utf-8")
     included = '<include filename="lamps/bulb.xml"/>'
     write_room(folder, lights=LIGHTS["panel"] + LIGHTS["sun"] + included)
     write_rgb(folder / "look.exr", np.full((20, 24, 3), 0.4, np.float32) * [1, 0.8, 0.5])
@@ -42,26 +42,26 @@ def answer_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def exported_values(here: Path) -> Any:
+def exported_values(folder: Path) -> Any:
     """What other programs get: of lights whose colour four samples do not tell, their own."""
-    current = {light.name: light.emission for light in load_scene(here / "room.xml").lights}
-    return with_own_colors(read_lighting(here / "look" / "lighting.json"), current)[0].emission
+    current = {light.name: light.emission for light in load_scene(folder / "room.xml").lights}
+    return with_own_colors(read_lighting(folder / "look" / "lighting.json"), current)[0].emission
 
 
 def test_a_patch_changes_the_lights_and_nothing_else(answer_folder: Path, tmp_path: Path) -> None:
     if shutil.which("patch") is None:
         pytest.skip("patch")
-    given = ("look/lighting.json", "--to", "mitsuba", "--scene", "room.xml")
-    succeed(answer_folder, "export", *given, "-o", tmp_path / "out")
+    arguments = ("look/lighting.json", "--to", "mitsuba", "--scene", "room.xml")
+    succeed(answer_folder, "export", *arguments, "-o", tmp_path / "out")
     patch = (tmp_path / "out" / "relit.patch").read_text()
     shutil.copy(answer_folder / "room.xml", tmp_path)
     shutil.copytree(answer_folder / "lamps", tmp_path / "lamps")
     subprocess.run(["patch", "-p1"], input=patch, text=True, cwd=tmp_path, check=True)
-    wanted = read_lighting(answer_folder / "look" / "lighting.json").emission
-    found = {light.name: light.emission for light in load_scene(tmp_path / "room.xml").lights}
-    assert set(found) == set(wanted)
-    for name, emission in wanted.items():
-        np.testing.assert_allclose(found[name], emission, rtol=FLOAT32)
+    expected = read_lighting(answer_folder / "look" / "lighting.json").emission
+    actual = {light.name: light.emission for light in load_scene(tmp_path / "room.xml").lights}
+    assert set(actual) == set(expected)
+    for name, emission in expected.items():
+        np.testing.assert_allclose(actual[name], emission, rtol=FLOAT32)
     changed = [x for x in patch.splitlines() if x[0] in "+-" and x[:3] not in ("+++", "---")]
     assert all("rgb" in line or "sampling_weight" in line for line in changed)
 
@@ -76,8 +76,8 @@ def _blender() -> Any:
     modules = fake_blender()
     bpy, objects = modules[0], modules[0].data.objects
 
-    def lamp(name: str, kind: str, **how: Any) -> None:
-        item = objects.new(name, SimpleNamespace(type=kind, **how))
+    def lamp(name: str, kind: str, **settings: Any) -> None:
+        item = objects.new(name, SimpleNamespace(type=kind, **settings))
         item.matrix_world = np.diag([2.0, 3.0, 1.0, 1.0])
 
     inputs = {name: _Socket() for name in ("Color", "Strength")}
@@ -92,9 +92,9 @@ def _blender() -> Any:
 
 
 def test_blender_is_given_watts_of_the_same_light(answer_folder: Path, tmp_path: Path) -> None:
-    given = ("look/lighting.json", "--to", "blender,csv", "--scene", "room.xml")
-    succeed(answer_folder, "export", *given, "-o", tmp_path)
-    wanted = exported_values(answer_folder)
+    arguments = ("look/lighting.json", "--to", "blender,csv", "--scene", "room.xml")
+    succeed(answer_folder, "export", *arguments, "-o", tmp_path)
+    expected = exported_values(answer_folder)
     text = (tmp_path / "set_scene.py").read_text()
     ast.parse(text)
     blender, modules = _blender()
@@ -104,18 +104,18 @@ def test_blender_is_given_watts_of_the_same_light(answer_folder: Path, tmp_path:
     point = objects["bulb"].data
     # Intensity is flux over all directions, 4π; a sun's irradiance is its own.
     np.testing.assert_allclose(
-        np.array(point.color) * point.energy / (4 * math.pi), wanted["bulb"], rtol=FLOAT32
+        np.array(point.color) * point.energy / (4 * math.pi), expected["bulb"], rtol=FLOAT32
     )
     sun = objects["sun"].data
-    np.testing.assert_allclose(np.array(sun.color) * sun.energy, wanted["sun"], rtol=FLOAT32)
+    np.testing.assert_allclose(np.array(sun.color) * sun.energy, expected["sun"], rtol=FLOAT32)
     sockets = objects["panel"].material_slots[0].material.node_tree.nodes[0].inputs
     color, strength = sockets["Color"].default_value, sockets["Strength"].default_value
-    np.testing.assert_allclose(np.array(color[:3]) * strength, wanted["panel"], rtol=FLOAT32)
+    np.testing.assert_allclose(np.array(color[:3]) * strength, expected["panel"], rtol=FLOAT32)
 
 
 def test_light_groups_go_to_nuke_and_blender(answer_folder: Path, tmp_path: Path) -> None:
-    given = ("grouped/lighting.json", "--to", "nuke", "--to", "csv,blender")
-    succeed(answer_folder, "export", *given, "--lights", "groups.exr", "-o", tmp_path)
+    arguments = ("grouped/lighting.json", "--to", "nuke", "--to", "csv,blender")
+    succeed(answer_folder, "export", *arguments, "--lights", "groups.exr", "-o", tmp_path)
     names = sorted(path.name for path in tmp_path.iterdir())
     assert names == ["fixtures.csv", "relit.nk", "set_lights.py"]
     assert (tmp_path / "relit.nk").read_text().startswith("version 12.0")
@@ -129,32 +129,38 @@ def test_a_layer_of_usd_relights_a_stage(answer_folder: Path, tmp_path: Path) ->
     UsdLux.RectLight.Define(stage, "/hall/panel")
     UsdLux.SphereLight.Define(stage, "/hall/bulb")
     stage.Save()
-    given = ("look/lighting.json", "--to", "usd", "--scene", "room.xml")
-    done = run(
-        answer_folder, "export", *given, "--stage", tmp_path / "hall.usda", "-o", tmp_path / "out"
+    arguments = ("look/lighting.json", "--to", "usd", "--scene", "room.xml")
+    completed = run(
+        answer_folder,
+        "export",
+        *arguments,
+        "--stage",
+        tmp_path / "hall.usda",
+        "-o",
+        tmp_path / "out",
     )
-    assert done.returncode == 0, done.stderr
-    assert "hall.usda has no single light for sun: set it by hand" in done.stderr
-    wanted = exported_values(answer_folder)
+    assert completed.returncode == 0, completed.stderr
+    assert "hall.usda has no single light for sun: set it by hand" in completed.stderr
+    expected = exported_values(answer_folder)
     relit = pxr.Stage.Open(str(tmp_path / "out" / "lights.usda"))
     for name, factor in (("panel", 1.0), ("bulb", 4.0)):
         light = UsdLux.LightAPI(relit.GetPrimAtPath(f"/hall/{name}"))
-        found = light.GetIntensityAttr().Get() * np.array(light.GetColorAttr().Get())
-        np.testing.assert_allclose(found / factor, wanted[name], rtol=FLOAT32)
+        radiance = light.GetIntensityAttr().Get() * np.array(light.GetColorAttr().Get())
+        np.testing.assert_allclose(radiance / factor, expected[name], rtol=FLOAT32)
     assert "--stage belongs to the form usd" in run_refused(
-        answer_folder, "export", *given[:1], "--to", "csv", "--stage", "hall.usda"
+        answer_folder, "export", *arguments[:1], "--to", "csv", "--stage", "hall.usda"
     )
     (tmp_path / "torn.usda").write_text("#usda 1.0\n(", encoding="utf-8")
-    for name, said in (("gone.usda", "no such stage"), ("torn.usda", "is not a USD stage")):
+    for name, message in (("gone.usda", "no such stage"), ("torn.usda", "is not a USD stage")):
         line = run_refused(
-            answer_folder, "export", *given, "--stage", tmp_path / name, "-o", "none"
+            answer_folder, "export", *arguments, "--stage", tmp_path / name, "-o", "none"
         )
-        assert said in line
+        assert message in line
 
 
 def test_what_it_lacks_is_one_line(answer_folder: Path) -> None:
     lighting = "look/lighting.json"
-    wrong = {
+    mistakes = {
         (lighting, "--to", "maya"): "no form 'maya': known are csv, json, mitsuba, usd",
         (lighting, "--to", "mitsuba"): "mitsuba needs the scene: give it with --scene",
         (lighting, "--to", "nuke"): "give them with --lights",
@@ -163,8 +169,8 @@ def test_what_it_lacks_is_one_line(answer_folder: Path) -> None:
         ("room.xml", "--to", "csv"): "is not a JSON file",
         ("gone.json", "--to", "csv"): "no such lighting file",
     }
-    for given, said in wrong.items():
-        assert said in run_refused(answer_folder, "export", *given, "-o", "none")
+    for arguments, message in mistakes.items():
+        assert message in run_refused(answer_folder, "export", *arguments, "-o", "none")
     (answer_folder / "kept").mkdir()
     (answer_folder / "kept" / "fixtures.csv").write_text("mine", encoding="utf-8")
     assert "exists: name another" in run_refused(

@@ -40,35 +40,35 @@ def make_fail(monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
 
 def test_a_recursion_without_end_is_no_error_of_mitsuba() -> None:
     """RecursionError is a RuntimeError, as all that Mitsuba throws."""
-    there = {"__name__": "lightpaint.somewhere"}
-    exec("def endless(): endless()", there)
+    module_globals = {"__name__": "lightpaint.somewhere"}
+    exec("def endless(): endless()", module_globals)
     with pytest.raises(RecursionError), render_errors(Path("room.xml")):
-        there["endless"]()  # type: ignore[operator]
+        module_globals["endless"]()  # type: ignore[operator]
 
 
 def test_what_nobody_foresaw_has_a_code_a_line_and_a_private_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     make_fail(monkeypatch, KeyError("a\x1b[31m name\nof two lines"))
-    done = run(
+    completed = run(
         tmp_path, "doctor", "--json", XDG_STATE_HOME=str(tmp_path / "state"), HOME=str(tmp_path)
     )
-    assert done.returncode == FAULT == 70
-    assert done.stdout == ""
-    [line] = done.stderr.splitlines()
+    assert completed.returncode == FAULT == 70
+    assert completed.stdout == ""
+    [line] = completed.stderr.splitlines()
     assert line.startswith("lightpaint doctor: a bug in lightpaint: KeyError: ")
     assert "\x1b" not in line
-    found = re.search(r"the details are in (.*\.txt)$", line)
-    assert found is not None
-    file = Path(found[1])
+    match = re.search(r"the details are in (.*\.txt)$", line)
+    assert match is not None
+    file = Path(match[1])
     assert tmp_path in file.parents
     assert stat.S_IMODE(file.stat().st_mode) == 0o600
     assert stat.S_IMODE(file.parent.stat().st_mode) == 0o700
-    told = file.read_text(encoding="utf-8")
-    assert "Traceback" in told
-    assert "'doctor', '--json'" in told
-    assert "raise error" in told
-    assert "\x1b" not in told
+    details_text = file.read_text(encoding="utf-8")
+    assert "Traceback" in details_text
+    assert "'doctor', '--json'" in details_text
+    assert "raise error" in details_text
+    assert "\x1b" not in details_text
 
 
 def test_too_little_memory_is_no_fault(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -83,9 +83,9 @@ def test_where_nothing_can_be_written_it_is_one_line_still(
 ) -> None:
     make_fail(monkeypatch, ZeroDivisionError())
     monkeypatch.setattr("lightpaint.cli.crash_report._folders", lambda: [Path("/dev/null/logs")])
-    done = run(tmp_path, "doctor")
-    assert done.returncode == FAULT
-    [line] = done.stderr.splitlines()
+    completed = run(tmp_path, "doctor")
+    assert completed.returncode == FAULT
+    [line] = completed.stderr.splitlines()
     assert line.endswith("bug in lightpaint: ZeroDivisionError; the details could not be written")
 
 
@@ -96,7 +96,7 @@ def test_a_fault_before_there_is_a_command_is_told_too(
         raise ImportError("half an installation")
 
     monkeypatch.setattr(dispatcher, "command_parser", broken)
-    done = run(tmp_path, "doctor", XDG_STATE_HOME=str(tmp_path), HOME=str(tmp_path))
-    assert done.returncode == FAULT
-    assert "lightpaint: a bug in lightpaint: ImportError: half an inst" in done.stderr
-    assert len(done.stderr.splitlines()) == 1
+    completed = run(tmp_path, "doctor", XDG_STATE_HOME=str(tmp_path), HOME=str(tmp_path))
+    assert completed.returncode == FAULT
+    assert "lightpaint: a bug in lightpaint: ImportError: half an inst" in completed.stderr
+    assert len(completed.stderr.splitlines()) == 1

@@ -37,7 +37,7 @@ def small_disk(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[tuple
 
 def run(folder: Path, before: str, *arguments: object, **variables: str) -> tuple[int, str, str]:
     command = 'exec "$@"' if before == "true" else f'{before}; exec "$@"'
-    done = subprocess.run(
+    completed = subprocess.run(
         ["bash", "-c", command, "bash", sys.executable, "-m", "lightpaint"]
         + [str(argument) for argument in arguments],
         cwd=folder,
@@ -46,8 +46,8 @@ def run(folder: Path, before: str, *arguments: object, **variables: str) -> tupl
         text=True,
         check=False,
     )
-    assert "Traceback" not in done.stderr, done.stderr
-    return done.returncode, done.stdout, done.stderr
+    assert "Traceback" not in completed.stderr, completed.stderr
+    return completed.returncode, completed.stdout, completed.stderr
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -100,14 +100,14 @@ def test_a_full_disk_leaves_earlier_results_as_they_were(
         for name in ("lighting.json", "relit.xml", "predicted.exr", "comparison.png"):
             (folder / name).write_text(f"the earlier {name}", encoding="utf-8")
         (folder / "notes.txt").write_text("mine", encoding="utf-8")
-    was = contents(disk)
-    how = ("-o", folder, "--force")
-    code, output, errors = run(tmp_path, before, *SMALL_SOLVE, *how, LIGHTPAINT_CACHE=cache)
+    contents_before = contents(disk)
+    options = ("-o", folder, "--force")
+    code, output, errors = run(tmp_path, before, *SMALL_SOLVE, *options, LIGHTPAINT_CACHE=cache)
     assert code == 2, output + errors
     [line] = [x for x in errors.splitlines() if x.startswith("lightpaint solve: ")]
     assert f"cannot write {folder}" in line
     assert "results in" not in output
-    assert contents(disk) == was
+    assert contents(disk) == contents_before
     assert list(disk.rglob(".*")) == []
 
 

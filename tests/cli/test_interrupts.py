@@ -67,8 +67,8 @@ def basis_versions(folder: Path, cache: str) -> list[tuple[int, int]]:
 
 def samples(basis: Basis) -> int:
     """Samples per pixel of all lights together."""
-    each = basis.origin.each_light or ((*basis.origin.halves, 0, 0),) * len(basis.lights)
-    return sum(a + b for a, b, _, _ in each)
+    sample_counts = basis.origin.each_light or ((*basis.origin.halves, 0, 0),) * len(basis.lights)
+    return sum(a + b for a, b, _, _ in sample_counts)
 
 
 def three_lights(folder: Path, method: str) -> Path:
@@ -101,8 +101,8 @@ def uninterrupted(
 def test_stopped_and_gone_on_is_as_if_never_stopped(
     tmp_path: Path, uninterrupted: tuple[str, Path, Basis], signals: tuple[signal.Signals, ...]
 ) -> None:
-    method, room, whole = uninterrupted
-    spp, done = SPP[method], 0
+    method, room, reference = uninterrupted
+    spp, samples_done = SPP[method], 0
     for number in signals:
         before = basis_versions(tmp_path, "stopped")
         with start(tmp_path, room, spp, "stopped", SLOWLY="yes") as process:
@@ -117,22 +117,22 @@ def test_stopped_and_gone_on_is_as_if_never_stopped(
             assert process.poll() is None
             stopped_s = time.monotonic()
             process.send_signal(number)
-            said = process.stderr.read()
+            errors = process.stderr.read()
             code = process.wait(timeout=60)
         if number == signal.SIGINT:
             assert time.monotonic() - stopped_s < 3
             assert code == 130
-            assert said.startswith("lightpaint basis: interrupted")
-            assert "are kept; run the same command to continue" in said
-            assert said.count("\n") == 1
+            assert errors.startswith("lightpaint basis: interrupted")
+            assert "are kept; run the same command to continue" in errors
+            assert errors.count("\n") == 1
         [path] = kept_bases(tmp_path, "stopped")
         part = read_basis(path)
         assert part.origin.method == method
         # Nothing of what was kept is lost, and there is more to do.
-        assert done < samples(part) < spp * len(part.lights)
-        done = samples(part)
+        assert samples_done < samples(part) < spp * len(part.lights)
+        samples_done = samples(part)
         if number == signal.SIGINT and method == ONE_PASS:
-            assert f"{part.origin.spp} of {spp}" in said
+            assert f"{part.origin.spp} of {spp}" in errors
     assert {p.name for p in tmp_path.iterdir()} == {"stopped"}
 
     # The same command goes on.
@@ -140,7 +140,7 @@ def test_stopped_and_gone_on_is_as_if_never_stopped(
         assert process.wait(timeout=120) == 0
     stopped = read_basis(tmp_path / "stopped.exr")
     assert stopped.origin.spp == spp
-    assert_equal_bits(stopped, whole)
+    assert_equal_bits(stopped, reference)
     assert len(kept_bases(tmp_path, "stopped")) == 1
 
 
@@ -205,16 +205,16 @@ sys.exit(main())
 )
 def test_interrupted_while_it_imports(tmp_path: Path, module: str, number: signal.Signals) -> None:
     arguments = [module, str(int(number)), "lights", str(CORNELL)]
-    done = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-c", AT_IMPORT, *arguments],
         cwd=tmp_path,
         capture_output=True,
         text=True,
         check=False,
     )
-    assert done.returncode == 128 + number
-    assert done.stderr in ("lightpaint: interrupted\n", "lightpaint lights: interrupted\n")
-    assert done.stdout == ""
+    assert completed.returncode == 128 + number
+    assert completed.stderr in ("lightpaint: interrupted\n", "lightpaint lights: interrupted\n")
+    assert completed.stdout == ""
 
 
 def _ignoring(*numbers: signal.Signals) -> None:
@@ -275,6 +275,6 @@ obtain_basis(scene, spp=100_000)
     assert basis.origin.spp >= 2
     # And the next run goes on from there, like one that was never interrupted.
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path))
-    more = basis.origin.spp + 32
-    assert more <= obtain_basis(load_scene(CORNELL), spp=more).origin.spp <= more + 1
-    assert more <= read_basis(path).origin.spp <= more + 1
+    more_spp = basis.origin.spp + 32
+    assert more_spp <= obtain_basis(load_scene(CORNELL), spp=more_spp).origin.spp <= more_spp + 1
+    assert more_spp <= read_basis(path).origin.spp <= more_spp + 1

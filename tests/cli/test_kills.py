@@ -18,7 +18,7 @@ def stage(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
 
 
 @pytest.mark.parametrize(
-    ("until", "number"),
+    ("wait_until", "number"),
     [
         nightly(wait_for_seconds(0.5), signal.SIGKILL),
         (wait_for_staging(0.0), signal.SIGTERM),
@@ -27,9 +27,9 @@ def stage(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     ],
 )
 def test_the_earlier_or_the_new(
-    stage: Stage, until: Callable[[Stage], None], number: signal.Signals
+    stage: Stage, wait_until: Callable[[Stage], None], number: signal.Signals
 ) -> None:
-    outcome = stage.killed(until, number)
+    outcome = stage.killed(wait_until, number)
     assert outcome.kind in ("earlier", "new"), outcome
     if number == signal.SIGTERM:
         assert outcome.code == 143

@@ -33,33 +33,36 @@ def test_the_sheet_is_drawn_and_drawn_anew(room: Path, monkeypatch: pytest.Monke
     with Image.open(sheet) as picture:
         assert picture.info["lightpaint.denoised"]
         assert picture.width > picture.height
-    drawn = sheet.read_bytes()
+    first_sheet = sheet.read_bytes()
     # Its own is replaced, from the basis that was kept.
-    again = run(folder, "lights", room)
-    assert again.stdout == first.stdout
-    assert "basis:" not in again.stderr
-    assert sheet.read_bytes() == drawn
-    told = run(folder, "lights", room, "--json", "-o", "other.png")
-    assert json.loads(told.stdout)["sheet"] == "other.png"
-    assert (folder / "other.png").read_bytes() == drawn
+    second_run = run(folder, "lights", room)
+    assert second_run.stdout == first.stdout
+    assert "basis:" not in second_run.stderr
+    assert sheet.read_bytes() == first_sheet
+    json_run = run(folder, "lights", room, "--json", "-o", "other.png")
+    assert json.loads(json_run.stdout)["sheet"] == "other.png"
+    assert (folder / "other.png").read_bytes() == first_sheet
 
     # Somebody else's is not, and is no reason to list nothing.
     sheet.write_bytes(b"mine")
-    kept = run(folder, "lights", room)
-    assert (kept.returncode, kept.stdout) == (0, "\n".join([*lines[:-1], ""]))
-    assert "no lights.png: lights.png exists and is not a light sheet" in kept.stderr
-    assert "choose another name with -o, or pass --force" in kept.stderr
+    run_without_change = run(folder, "lights", room)
+    assert (run_without_change.returncode, run_without_change.stdout) == (
+        0,
+        "\n".join([*lines[:-1], ""]),
+    )
+    assert "no lights.png: lights.png exists and is not a light sheet" in run_without_change.stderr
+    assert "choose another name with -o, or pass --force" in run_without_change.stderr
     assert sheet.read_bytes() == b"mine"
     assert "is not a light sheet" in run_refused(folder, "lights", room, "-o", "lights.png")
     assert run(folder, "lights", room, "--force").returncode == 0
-    assert sheet.read_bytes() == drawn
+    assert sheet.read_bytes() == first_sheet
 
 
 def test_only_where_it_is_wanted(room: Path) -> None:
-    for how in ("--no-sheet", "--json"):
-        done = run(room.parent, "lights", room, how)
-        assert done.returncode == 0
-        assert "sheet" not in done.stdout
+    for option in ("--no-sheet", "--json"):
+        completed = run(room.parent, "lights", room, option)
+        assert completed.returncode == 0
+        assert "sheet" not in completed.stdout
     assert [path.name for path in room.parent.iterdir()] == ["room.xml"]
     assert "must end in .png" in run_refused(room.parent, "lights", room, "-o", "a.jpg")
     (room.parent / "link.png").symlink_to(room)
@@ -77,10 +80,10 @@ def test_where_rendering_is_slow_the_list_is_all(
     slow = replace(use_variant(), note="rendering is slow here")
     monkeypatch.setattr(light_sheets, "use_variant", lambda: slow)
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(room.parent / "cache"))
-    done = run(room.parent, "lights", room)
-    assert done.returncode == 0
-    assert len(done.stdout.splitlines()) == 3
-    assert done.stderr == "lightpaint: no lights.png: rendering is slow here\n"
+    completed = run(room.parent, "lights", room)
+    assert completed.returncode == 0
+    assert len(completed.stdout.splitlines()) == 3
+    assert completed.stderr == "lightpaint: no lights.png: rendering is slow here\n"
 
 
 def test_a_render_for_each_light_is_not_made_just_to_look(
@@ -89,6 +92,6 @@ def test_a_render_for_each_light_is_not_made_just_to_look(
     monkeypatch.setattr(light_sheets, "why_not_one_pass", lambda _scene: "fog")
     monkeypatch.setattr(light_sheets, "MAX_RENDERS", 1)
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(room.parent / "cache"))
-    done = run(room.parent, "lights", room)
-    assert "no lights.png: fog, so that each light needs a render of its own" in done.stderr
+    completed = run(room.parent, "lights", room)
+    assert "no lights.png: fog, so that each light needs a render of its own" in completed.stderr
     assert not (room.parent / "lights.png").exists()

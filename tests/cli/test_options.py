@@ -40,17 +40,17 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, make_basis: Any) -> 
     return tmp_path
 
 
-def _options(*given: str) -> Any:
-    return command_parser().parse_args(["solve", *given])
+def _options(*arguments: str) -> Any:
+    return command_parser().parse_args(["solve", *arguments])
 
 
-def _jobs(*given: str) -> Any:
-    options = _options(*given)
-    return jobs_of(options, settings_of(options, given))
+def _jobs(*arguments: str) -> Any:
+    options = _options(*arguments)
+    return jobs_of(options, settings_of(options, arguments))
 
 
 @pytest.mark.parametrize(
-    ("given", "path", "targets"),
+    ("arguments", "path", "targets"),
     [
         ("painting.exr --lights groups.exr", "groups.exr", ["painting.exr"]),
         ("a.exr b.exr --lights groups.exr", "groups.exr", ["a.exr", "b.exr"]),
@@ -61,15 +61,15 @@ def _jobs(*given: str) -> Any:
     ],
 )
 @pytest.mark.usefixtures("folder")
-def test_light_groups_by_either_spelling(given: str, path: str, targets: list[str]):
-    options = _options(*given.split())
+def test_light_groups_by_either_spelling(arguments: str, path: str, targets: list[str]):
+    options = _options(*arguments.split())
     # A painting may lie in the folder of the lights.
     assert basis_of(options) == GroupsFile(path, leave_out=tuple(targets))
     assert options.targets == targets
 
 
 @pytest.mark.parametrize(
-    ("given", "basis"),
+    ("arguments", "basis"),
     [
         ("scene.xml painting.exr", None),
         ("scene.xml painting.exr --lights key,window_*", None),
@@ -79,12 +79,12 @@ def test_light_groups_by_either_spelling(given: str, path: str, targets: list[st
     ],
 )
 @pytest.mark.usefixtures("folder")
-def test_everything_else_is_what_it_was(given: str, basis: BasisFile | None):
-    assert basis_of(_options(*given.split())) == basis
+def test_everything_else_is_what_it_was(arguments: str, basis: BasisFile | None):
+    assert basis_of(_options(*arguments.split())) == basis
 
 
 @pytest.mark.parametrize(
-    ("given", "says"),
+    ("arguments", "message"),
     [
         ("painting.exr --lights nowhere.exr", "no such file .* nowhere.exr"),
         ("painting.exr --lights a.basis.exr", "holds no light groups"),
@@ -93,27 +93,27 @@ def test_everything_else_is_what_it_was(given: str, basis: BasisFile | None):
     ],
 )
 @pytest.mark.usefixtures("folder")
-def test_slips_are_said(given: str, says: str):
-    with pytest.raises(BasisError, match=says):
-        basis_of(_options(*given.split()))
+def test_slips_are_said(arguments: str, message: str):
+    with pytest.raises(BasisError, match=message):
+        basis_of(_options(*arguments.split()))
 
 
 @pytest.mark.usefixtures("folder")
 def test_the_mask_is_no_light_either():
-    found = basis_of(_options("a.exr", "--mask", "m.exr", "--lights", "key"))
-    assert found == GroupsFile("key", leave_out=("a.exr", "m.exr"))
+    source = basis_of(_options("a.exr", "--mask", "m.exr", "--lights", "key"))
+    assert source == GroupsFile("key", leave_out=("a.exr", "m.exr"))
 
 
 @pytest.mark.parametrize("name", ["groups", "groups.exr.tmp", "groups.EXR"])
-@pytest.mark.parametrize("given", ["{} a.exr", "a.exr --lights {}"])
-def test_light_groups_are_known_by_how_they_begin(folder: Path, name: str, given: str):
+@pytest.mark.parametrize("arguments", ["{} a.exr", "a.exr --lights {}"])
+def test_light_groups_are_known_by_how_they_begin(folder: Path, name: str, arguments: str):
     (folder / "groups.exr").rename(folder / name)
-    found = basis_of(_options(*given.format(name).split()))
-    assert found == GroupsFile(name, leave_out=("a.exr",))
+    source = basis_of(_options(*arguments.format(name).split()))
+    assert source == GroupsFile(name, leave_out=("a.exr",))
 
 
 @pytest.mark.parametrize(
-    ("made", "says"),
+    ("content", "message"),
     [
         (lambda c: c[:200], r"^x\.exr is cut off or damaged in its header: export it again$"),
         (
@@ -125,16 +125,18 @@ def test_light_groups_are_known_by_how_they_begin(folder: Path, name: str, given
         (lambda c: b"\x89PNG\r\n\x1a\n" + c[8:], r"^x\.exr is a PNG file"),
     ],
 )
-@pytest.mark.parametrize("given", ["x.exr painting.exr", "painting.exr --lights x.exr"])
-def test_what_is_wrong_with_a_file_is_said(folder: Path, made: Any, says: str, given: str):
-    (folder / "x.exr").write_bytes(made((folder / "groups.exr").read_bytes()))
+@pytest.mark.parametrize("arguments", ["x.exr painting.exr", "painting.exr --lights x.exr"])
+def test_what_is_wrong_with_a_file_is_said(
+    folder: Path, content: Any, message: str, arguments: str
+):
+    (folder / "x.exr").write_bytes(content((folder / "groups.exr").read_bytes()))
     with pytest.raises((BasisError, ImageError)) as raised:
-        _jobs(*given.split())
-    assert re.search(says, str(raised.value)), raised.value
+        _jobs(*arguments.split())
+    assert re.search(message, str(raised.value)), raised.value
 
 
 @pytest.mark.parametrize(
-    ("given", "named"),
+    ("arguments", "option"),
     [
         ("--spp 64", "--spp"),
         ("--refine 1 --correct-noise", "--refine, --correct-noise"),
@@ -147,11 +149,11 @@ def test_what_is_wrong_with_a_file_is_said(folder: Path, made: Any, says: str, g
     ],
 )
 @pytest.mark.usefixtures("folder")
-def test_options_that_need_a_renderer_are_refused(given: str, named: str):
-    painting = [] if "--target" in given else ["painting.exr"]
-    with pytest.raises(BasisError) as refused:
-        _jobs("groups.exr", *painting, *given.split())
-    assert spoken(str(refused.value)).startswith(f"{named} cannot be used with groups.exr")
+def test_options_that_need_a_renderer_are_refused(arguments: str, option: str):
+    painting = [] if "--target" in arguments else ["painting.exr"]
+    with pytest.raises(BasisError) as refusal:
+        _jobs("groups.exr", *painting, *arguments.split())
+    assert spoken(str(refusal.value)).startswith(f"{option} cannot be used with groups.exr")
 
 
 @pytest.mark.usefixtures("folder")
@@ -169,11 +171,11 @@ def test_holes_are_taken_from_the_painting(tmp_path: Path):
     groups = read_light_groups(interleaved(tmp_path / "a.exr", layers))
     importance = np.ones(images.shape[1:3], np.float32)
     target = Target("t", images[1], importance, everything=True, not_finite=2)
-    counted = target.without(groups.holes)
-    assert (counted.importance == 0).sum() == 1
-    assert counted.importance[1, 2] == 0
-    assert counted.not_finite == 3
-    assert counted.without(groups.holes) is counted
+    visible_target = target.without(groups.holes)
+    assert (visible_target.importance == 0).sum() == 1
+    assert visible_target.importance[1, 2] == 0
+    assert visible_target.not_finite == 3
+    assert visible_target.without(groups.holes) is visible_target
 
 
 @pytest.mark.parametrize(
@@ -188,9 +190,9 @@ def test_a_target_that_names_no_folder(tmp_path: Path, make_basis: Any, name: st
     write_lighting(tmp_path / "l.json", lighting)
     write_lighting(tmp_path / "m.json", lighting.for_target("good"))
     if name:  # which is then called as its file is
-        said = run_refused(tmp_path, "relight", "scene.xml", "l.json")
-        assert "cannot be the name of a folder: choose one with -o" in said
-        assert len(said) < 600
+        refusal = run_refused(tmp_path, "relight", "scene.xml", "l.json")
+        assert "cannot be the name of a folder: choose one with -o" in refusal
+        assert len(refusal) < 600
         several = run_refused(tmp_path, "relight", "scene.xml", "l.json", "m.json", "-o", "looks")
         assert "cannot be the name of a folder: solve it alone, with -o" in several
     # Named otherwise, it is only looked for where it is not.
@@ -211,13 +213,18 @@ def test_numbers_beyond_any_light_are_one_line(tmp_path: Path, make_basis: Any):
             light = {**data["lights"]["a"], key: [1, huge, 1]}
             bent = {**data, "lights": {**data["lights"], "a": light}}
             (tmp_path / "huge.json").write_text(json.dumps(bent), encoding="utf-8")
-            said = run_refused(tmp_path, "relight", room, "huge.json")
-            assert "huge.json" in said
-            assert "from 0 to 1e+30" in said
+            refusal = run_refused(tmp_path, "relight", room, "huge.json")
+            assert "huge.json" in refusal
+            assert "from 0 to 1e+30" in refusal
     toml = tmp_path / "huge.toml"
-    for asked in ("lock = 1e39", "lock = [1, 1e39, 1]", "limits = {max = 1e39}", 'lock = "1e41%"'):
-        toml.write_text(f"[light.a]\n{asked}\n", encoding="utf-8")
-        said = run_refused(tmp_path, "solve", "b.basis.exr", "p.exr", "--lights-file", toml)
-        assert "at most 1e+30" in said
+    for constraint in (
+        "lock = 1e39",
+        "lock = [1, 1e39, 1]",
+        "limits = {max = 1e39}",
+        'lock = "1e41%"',
+    ):
+        toml.write_text(f"[light.a]\n{constraint}\n", encoding="utf-8")
+        refusal = run_refused(tmp_path, "solve", "b.basis.exr", "p.exr", "--lights-file", toml)
+        assert "at most 1e+30" in refusal
     for option in ("--unit", "--unpainted", "--prefer-current"):
         assert "<= 1e+30" in run_refused(tmp_path, "solve", "b.basis.exr", "p.exr", option, "1e39")

@@ -49,9 +49,9 @@ def test_every_order_is_the_same_line() -> None:
     ],
 )
 def test_an_optional_number_takes_no_path(line: str, suggest: int, paths: list[str]) -> None:
-    found = parse("solve", *line.split())
-    assert found["suggest"] == suggest
-    assert [found["source"], *found["targets"]] == paths
+    values = parse("solve", *line.split())
+    assert values["suggest"] == suggest
+    assert [values["source"], *values["targets"]] == paths
 
 
 @pytest.mark.parametrize(
@@ -74,19 +74,19 @@ def test_an_optional_number_takes_no_path(line: str, suggest: int, paths: list[s
     ],
 )
 def test_values_that_look_like_something_else(line: list[str], name: str, value: object) -> None:
-    for before, behind in (([], ["r.xml", "a.png"]), (["r.xml"], ["a.png"])):
-        assert parse("solve", *before, *line, *behind)[name] == value
+    for before, paths_after in (([], ["r.xml", "a.png"]), (["r.xml"], ["a.png"])):
+        assert parse("solve", *before, *line, *paths_after)[name] == value
 
 
 def test_behind_two_dashes_everything_is_a_path() -> None:
-    found = parse("solve", "--spp", "8", "r.xml", "--", "--spp", "-a.png")
-    assert (found["spp"], found["source"], found["targets"]) == (8, "r.xml", ["--spp", "-a.png"])
-    found = parse("relight", "--", "-r.xml", "a.json")
-    assert (found["scene"], found["lightings"]) == ("-r.xml", ["a.json"])
+    values = parse("solve", "--spp", "8", "r.xml", "--", "--spp", "-a.png")
+    assert (values["spp"], values["source"], values["targets"]) == (8, "r.xml", ["--spp", "-a.png"])
+    values = parse("relight", "--", "-r.xml", "a.json")
+    assert (values["scene"], values["lightings"]) == ("-r.xml", ["a.json"])
 
 
 @pytest.mark.parametrize(
-    ("line", "says"),
+    ("line", "message"),
     [
         ("solve r.xml --sp a.png", "ambiguous option: --sp"),
         ("solve r.xml --bogus a.png", "unrecognized arguments: --bogus (see lightpaint solve -"),
@@ -105,8 +105,8 @@ def test_behind_two_dashes_everything_is_a_path() -> None:
         ("slove r.xml", "invalid choice: 'slove'"),
     ],
 )
-def test_slips_name_the_help_of_their_command(tmp_path: Path, line: str, says: str) -> None:
-    assert says in run_refused(tmp_path, *line.split())
+def test_slips_name_the_help_of_their_command(tmp_path: Path, line: str, message: str) -> None:
+    assert message in run_refused(tmp_path, *line.split())
 
 
 @pytest.mark.parametrize("line", ["--help", "r.xml --help", "r.xml --spp 4 --help --bogus"])

@@ -56,8 +56,8 @@ def work_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, make_basis: Any
 
 def painter_arguments(line: str) -> dict[str, Any]:
     """What the command is called with."""
-    given = ["paint", *line.split()]
-    return values_of(command_parser().parse_args(given), given)
+    arguments = ["paint", *line.split()]
+    return values_of(command_parser().parse_args(arguments), arguments)
 
 
 @pytest.mark.parametrize(
@@ -89,9 +89,9 @@ def test_the_command_for_what_is_exported_has_the_options_that_solve_has() -> No
     values = painter_arguments(f"{line} --group g=a,b* --view agx --host 127.0.0.1")
     words = ("--spp=8", "--lock=a=40%", "-s", "1", "--hold=0.5", "'--group=g=a,b*'")
     assert values["options"] == words
-    given = ["solve", "scene.xml", "painting.exr", *shlex.split(" ".join(words))]
-    options = command_parser().parse_args(given)
-    assert settings_of(options, given).hold == values["settings"].hold == 0.5
+    arguments = ["solve", "scene.xml", "painting.exr", *shlex.split(" ".join(words))]
+    options = command_parser().parse_args(arguments)
+    assert settings_of(options, arguments).hold == values["settings"].hold == 0.5
     assert painter_arguments("--lights groups.exr --lock a")["options"] == ("--lock=a",)
     assert (values["new"], values["port"], values["host"]) == (True, 0, "127.0.0.1")
 
@@ -99,7 +99,7 @@ def test_the_command_for_what_is_exported_has_the_options_that_solve_has() -> No
 @pytest.mark.usefixtures("work_folder")
 def test_several_views_are_named_by_sensors_or_are_bases(make_basis: Any) -> None:
     values = painter_arguments("scene.xml --spp 8 -s a --sensor b")
-    assert [(one.path, one.sensor) for one in values["sources"]] == [
+    assert [(source.path, source.sensor) for source in values["sources"]] == [
         ("scene.xml", "a"),
         ("scene.xml", "b"),
     ]
@@ -114,14 +114,14 @@ def test_several_views_are_named_by_sensors_or_are_bases(make_basis: Any) -> Non
     values = painter_arguments("room.basis.exr side.basis.exr")
     assert values["folder"] == Path("room.paint")
     subjects = make_subjects(values["sources"], Path("x"))
-    found = [
+    views = [
         (subject.basis.origin.sensor, subject.view_count) for subject in subjects if subject.basis
     ]
-    assert found == [(basis.origin.sensor, 2), ("side", 2)]
+    assert views == [(basis.origin.sensor, 2), ("side", 2)]
 
 
 @pytest.mark.parametrize(
-    ("line", "said"),
+    ("line", "message"),
     [
         ("room.basis.exr room.basis.exr", "a view is there twice"),
         ("room.basis.exr groups.exr", "several must be bases of the views of one scene"),
@@ -140,9 +140,9 @@ def test_several_views_are_named_by_sensors_or_are_bases(make_basis: Any) -> Non
     ],
 )
 def test_what_cannot_be_painted_is_said_in_one_line(
-    work_folder: Path, line: str, said: str
+    work_folder: Path, line: str, message: str
 ) -> None:
-    assert re.search(said, run_refused(work_folder, "paint", *line.split(), "--no-browser"))
+    assert re.search(message, run_refused(work_folder, "paint", *line.split(), "--no-browser"))
 
 
 @pytest.mark.usefixtures("work_folder")
@@ -165,9 +165,9 @@ sys.exit(main(sys.argv[1:]))
 
 
 @contextmanager
-def start_painting(folder: Path, *given: str) -> Iterator[tuple["subprocess.Popen[str]", str]]:
+def start_painting(folder: Path, *arguments: str) -> Iterator[tuple["subprocess.Popen[str]", str]]:
     """The process, and the address that it said."""
-    command = [sys.executable, "-c", WITHOUT, "paint", *given, "--no-browser", "--port", "0"]
+    command = [sys.executable, "-c", WITHOUT, "paint", *arguments, "--no-browser", "--port", "0"]
     process = subprocess.Popen(
         command,
         cwd=folder,
@@ -181,9 +181,9 @@ def start_painting(folder: Path, *given: str) -> Iterator[tuple["subprocess.Pope
         try:
             assert process.stdout is not None
             assert process.stderr is not None
-            found = re.search(r"http://\S+", process.stdout.readline())
-            assert found is not None, process.stderr.read()
-            yield process, found[0]
+            match = re.search(r"http://\S+", process.stdout.readline())
+            assert match is not None, process.stderr.read()
+            yield process, match[0]
         finally:
             process.kill()
 
@@ -196,14 +196,14 @@ def test_it_serves_until_it_is_told_to_end_and_keeps_the_session(
         assert url.startswith("http://127.0.0.1:")
         assert key_of(url)
         # Another process is told, and leaves it alone.
-        again = run_refused(work_folder, "paint", "room.basis.exr", "--no-browser", "--port", "0")
-        assert re.search(r"session.db is in use: .* folder \(-o\)$", again)
+        refusal = run_refused(work_folder, "paint", "room.basis.exr", "--no-browser", "--port", "0")
+        assert re.search(r"session.db is in use: .* folder \(-o\)$", refusal)
         process.send_signal(signal.SIGTERM)
         assert process.wait(timeout=60) == 0
         assert process.stderr is not None
-        said = process.stderr.read()
-        assert "Traceback" not in said
-        assert said.endswith("the session is kept in room.paint\n")
+        errors = process.stderr.read()
+        assert "Traceback" not in errors
+        assert errors.endswith("the session is kept in room.paint\n")
     identity = Identity.of([make_basis(2)])
     with Store.open(path, identity) as store:
         store.append(Step("stroke", "mine"))
@@ -230,12 +230,12 @@ def test_a_program_connects_by_one_line_or_by_a_file_of_its_owner(work_folder: P
         ) as process:
             try:
                 assert process.stdout is not None
-                told = json.loads(process.stdout.readline())
-                assert told.keys() >= {"address", "token", "version", "protocol"}
-                assert told["version"] == __version__
+                announcement = json.loads(process.stdout.readline())
+                assert announcement.keys() >= {"address", "token", "version", "protocol"}
+                assert announcement["version"] == __version__
                 with connect(
-                    f"{told['address'].replace('http', 'ws')}live",
-                    additional_headers={"Authorization": f"Bearer {told['token']}"},
+                    f"{announcement['address'].replace('http', 'ws')}live",
+                    additional_headers={"Authorization": f"Bearer {announcement['token']}"},
                     max_size=None,
                 ) as socket:
                     state = ask(socket, 0, "observe", version=VERSION)
@@ -244,15 +244,15 @@ def test_a_program_connects_by_one_line_or_by_a_file_of_its_owner(work_folder: P
                     assert state["kind"] == "state"
                     names = [light["name"] for light in state["lights"]]
                     lights = {names[0]: [1.0, 1.0, 1.0]}
-                    kept = ask(socket, 1, "propose", name="evening", lights=lights)
-                    assert kept["looks"][-1]["is_proposal"]
+                    reply = ask(socket, 1, "propose", name="evening", lights=lights)
+                    assert reply["looks"][-1]["is_proposal"]
                     assert ask(socket, 2, "undo")["kind"] == "failed"
                 # That of the killed painter was replaced.
-                found = json.loads(file.read_text())
-                assert found == {key: told[key] for key in found}
-                assert found["token"] != killed
+                connection = json.loads(file.read_text())
+                assert connection == {key: announcement[key] for key in connection}
+                assert connection["token"] != killed
                 assert file.stat().st_mode & 0o777 == 0o600
-                killed = found["token"]
+                killed = connection["token"]
                 process.send_signal(ends)
                 process.wait(timeout=60)
                 assert process.stdout.read() == ""
@@ -285,17 +285,17 @@ def test_who_asks_twice_for_the_end_gets_one(work_folder: Path, second: signal.S
         process.send_signal(second)
         assert process.wait(timeout=60) == 0
         assert process.stderr is not None
-        said = process.stderr.read()
-    assert "Traceback" not in said
-    assert said.endswith("the session is kept in room.paint\n")
+        errors = process.stderr.read()
+    assert "Traceback" not in errors
+    assert errors.endswith("the session is kept in room.paint\n")
 
 
 def connect_page(url: str) -> ClientConnection:
     """The socket of a page that was opened at `url`."""
     base = url.partition("/#")[0]
-    speaks = [Subprotocol(word) for word in offered(key_of(url))]
-    where = f"{base.replace('http', 'ws')}/live"
-    return connect(where, origin=Origin(base), subprotocols=speaks, max_size=None)
+    protocols = [Subprotocol(word) for word in offered(key_of(url))]
+    address = f"{base.replace('http', 'ws')}/live"
+    return connect(address, origin=Origin(base), subprotocols=protocols, max_size=None)
 
 
 def ask(socket: ClientConnection, seq: int, kind: str, **fields: Any) -> dict[str, Any]:
@@ -374,24 +374,24 @@ def test_a_host_is_told_what_it_means_and_a_closed_terminal_ends_it(
         process.send_signal(signal.SIGHUP)
         assert process.wait(timeout=60) == 0
         assert process.stderr is not None
-        said = process.stderr.read()
-    assert open_to in said
-    is_risk = "anyone who has its address with the token can paint here" in said
+        errors = process.stderr.read()
+    assert open_to in errors
+    is_risk = "anyone who has its address with the token can paint here" in errors
     assert is_risk == (host == "0.0.0.0")
-    assert "Traceback" not in said
-    assert said.endswith("the session is kept in groups.paint\n")
+    assert "Traceback" not in errors
+    assert errors.endswith("the session is kept in groups.paint\n")
 
 
 @pytest.mark.parametrize("host", ["", "no.such.name.invalid", "203.0.113.7"])
 def test_a_host_that_this_machine_has_not_is_one_line(work_folder: Path, host: str) -> None:
-    said = run_refused(work_folder, "paint", "room.basis.exr", "--no-browser", "--host", host)
-    assert "give an address of this machine, 0.0.0.0 for all of them" in said
+    refusal = run_refused(work_folder, "paint", "room.basis.exr", "--no-browser", "--host", host)
+    assert "give an address of this machine, 0.0.0.0 for all of them" in refusal
 
 
 def test_a_session_of_another_basis_is_refused(work_folder: Path, make_basis: Any) -> None:
     folder = work_folder / "room.paint"
     Store.open(folder / "session.db", Identity.of([make_basis(2, (6, 5))])).close()
-    said = run_refused(work_folder, "paint", "room.basis.exr", "--no-browser")
-    assert "is a session of 5x6 pixels, and scene.xml has 10x12" in said
-    assert "(-o)" in said
-    assert "(--new)" in said
+    refusal = run_refused(work_folder, "paint", "room.basis.exr", "--no-browser")
+    assert "is a session of 5x6 pixels, and scene.xml has 10x12" in refusal
+    assert "(-o)" in refusal
+    assert "(--new)" in refusal

@@ -23,18 +23,18 @@ def work_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A room, and a painting of it with its spot turned."""
     folder = tmp_path_factory.mktemp("room")
     scene = lp.load_scene(write_room(folder))
-    turned = scene.moved({"beam": lp.Pose(target=(-0.6, 0, -0.3))})
-    write_rgb(folder / "p.exr", lp.render_basis(turned, spp=16).current_look)
+    turned_scene = scene.moved({"beam": lp.Pose(target=(-0.6, 0, -0.3))})
+    write_rgb(folder / "p.exr", lp.render_basis(turned_scene, spp=16).current_look)
     (folder / "room.lights.toml").write_text(LIGHTS_FILE, encoding="utf-8")
     return folder
 
 
-def run_refused(here: Path, *options: str) -> str:
+def run_refused(folder: Path, *options: str) -> str:
     """The one line that a command with these options ends in."""
-    done = run(here, "solve", "room.xml", "p.exr", "-o", "out", *options)
-    assert done.returncode == 2
-    assert not (here / "out").exists()
-    [line] = [x for x in done.stderr.splitlines() if x.startswith("lightpaint solve: ")]
+    completed = run(folder, "solve", "room.xml", "p.exr", "-o", "out", *options)
+    assert completed.returncode == 2
+    assert not (folder / "out").exists()
+    [line] = [x for x in completed.stderr.splitlines() if x.startswith("lightpaint solve: ")]
     return line.removeprefix("lightpaint solve: ")
 
 

@@ -33,14 +33,14 @@ def test_what_cannot_be_written_is_said_before_anything_is_rendered(
     for folder in (tmp_path, *tmp_path.parents):
         if folder.is_relative_to("/tmp") and folder != Path("/tmp"):
             folder.chmod(0o755)
-    around = {**os.environ, "HOME": "/nonexistent", "PYTHONDONTWRITEBYTECODE": "1"}
+    environment = {**os.environ, "HOME": "/nonexistent", "PYTHONDONTWRITEBYTECODE": "1"}
     for command in ("template", "basis", "paint"):
-        done = subprocess.run(
+        completed = subprocess.run(
             [*as_nobody, command, room.name, "--spp", "2"] if command != "paint"
             else [*as_nobody, command, room.name, "--no-browser"],
-            cwd=tmp_path, env=around, capture_output=True, text=True, check=False, timeout=100,
+            cwd=tmp_path, env=environment, capture_output=True, text=True, check=False, timeout=100,
         )  # fmt: skip
-        assert done.returncode == 2, done.stderr
-        [line] = done.stderr.splitlines()
+        assert completed.returncode == 2, completed.stderr
+        [line] = completed.stderr.splitlines()
         assert "cannot write into" in line
         assert "Permission denied" in line

@@ -36,8 +36,8 @@ def shot(tmp_path: Path) -> Path:
 
 def save(path: Path, light: np.ndarray, view: ViewTransform | None = None) -> None:
     """Write a picture as another program shows it, in 8 bits."""
-    shown = (view or ViewTransform()).encode(light)
-    Image.fromarray(np.round(255 * shown).astype(np.uint8)).save(path)
+    display = (view or ViewTransform()).encode(light)
+    Image.fromarray(np.round(255 * display).astype(np.uint8)).save(path)
 
 
 def brighten_key(shot: Path) -> np.ndarray:
@@ -48,12 +48,12 @@ def brighten_key(shot: Path) -> np.ndarray:
 
 
 def test_light_groups_are_painted_on_and_answered(shot: Path, tmp_path: Path):
-    said = succeed(tmp_path, "template", "--lights", "shot.exr")
+    output = succeed(tmp_path, "template", "--lights", "shot.exr")
     first = (
         "template/template.png: the current look; paint over it in any program, "
         "save that under another name beside it, and solve for it\n"
     )
-    assert first in said
+    assert first in output
     basis = read_light_groups(shot).basis
     template = read_template(tmp_path / "template")
     np.testing.assert_array_equal(template.image, basis.current_look)
@@ -61,9 +61,9 @@ def test_light_groups_are_painted_on_and_answered(shot: Path, tmp_path: Path):
     names = {path.name for path in (tmp_path / "template" / "lights").iterdir()}
     assert names == {"key.png", "fill.png", "rim.png"}
     save(tmp_path / "template" / "warm.png", brighten_key(shot))
-    done = run(tmp_path, "solve", "shot.exr", "template/warm.png")
-    assert done.returncode == 0, done.stderr
-    assert "painted: what differs from template/template.png" in done.stderr
+    completed = run(tmp_path, "solve", "shot.exr", "template/warm.png")
+    assert completed.returncode == 0, completed.stderr
+    assert "painted: what differs from template/template.png" in completed.stderr
     report = json.loads((tmp_path / "warm" / "report.json").read_text())
     assert report["lights"]["key"]["stops"] > 0.3
 
@@ -74,9 +74,9 @@ def test_a_painting_over_the_beauty_is_known_as_such(
 ):
     """It was read as sRGB, and all of it counted: `3.6 (3.4 as the scene is now)`."""
     save(tmp_path / "warm.png", brighten_key(shot), view)
-    done = run(tmp_path, "solve", "shot.exr", "warm.png", "--hold", "3")
-    assert done.returncode == 0, done.stderr
-    assert f"what differs from the look of shot.exr through {view.spoken}" in done.stderr
+    completed = run(tmp_path, "solve", "shot.exr", "warm.png", "--hold", "3")
+    assert completed.returncode == 0, completed.stderr
+    assert f"what differs from the look of shot.exr through {view.spoken}" in completed.stderr
     report = json.loads((tmp_path / "warm" / "report.json").read_text())
     assert report["view"]["name"] == view.name
     assert report["painting"]["importance_mean"] < 0.5
@@ -84,8 +84,8 @@ def test_a_painting_over_the_beauty_is_known_as_such(
     assert report["lights"]["key"]["stops"] > 0.3
     # Nobody looks for a look where a view is said, or that all of it counts.
     for option in (("--no-template",), ("--view", "linear", "--exposure", "0")):
-        done = run(tmp_path, "solve", "shot.exr", "warm.png", *option, "--force")
-        assert "the look of" not in done.stderr
+        completed = run(tmp_path, "solve", "shot.exr", "warm.png", *option, "--force")
+        assert "the look of" not in completed.stderr
 
 
 def test_a_saved_basis_is_painted_on(shot: Path, tmp_path: Path):
@@ -98,8 +98,8 @@ def test_a_saved_basis_is_painted_on(shot: Path, tmp_path: Path):
 
 def test_what_is_no_template_of_groups_is_refused(shot: Path, tmp_path: Path):
     assert "give a scene, a basis, or light groups" in run_refused(tmp_path, "template")
-    both = run_refused(tmp_path, "template", "room.xml", "--lights", "shot.exr")
-    assert "room.xml and --lights shot.exr at once" in both
+    refusal = run_refused(tmp_path, "template", "room.xml", "--lights", "shot.exr")
+    assert "room.xml and --lights shot.exr at once" in refusal
     assert "--spp cannot be used" in run_refused(tmp_path, "template", "shot.exr", "--spp", 4)
     assert "shot.exr" in run_refused(tmp_path, "template", "shot.exr", "-o", "shot.exr", "--force")
     assert "no such file" in run_refused(tmp_path, "template", "--lights", "none.exr")

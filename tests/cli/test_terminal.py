@@ -32,9 +32,9 @@ STEERS = re.compile(
 def write_room_with_bulb(folder: Path, name: str) -> Path:
     """The small room, its bulb called `name`."""
     path = write_room(folder)
-    written = "".join(f"&#{ord(c)};" for c in name)
+    escaped_name = "".join(f"&#{ord(c)};" for c in name)
     text = path.read_text(encoding="utf-8")
-    path.write_text(text.replace('id="bulb"', f'id="{written}"'), encoding="utf-8")
+    path.write_text(text.replace('id="bulb"', f'id="{escaped_name}"'), encoding="utf-8")
     return path
 
 
@@ -43,21 +43,21 @@ def test_what_is_seen_is_left_alone() -> None:
     assert visible(plain) == plain
     assert visible(BAD) == SHOWN
     for code in range(0x110000):
-        shown = visible(chr(code))
-        assert shown == chr(code) or shown.isascii()
-        assert not STEERS.search(shown)
-        shown.encode()  # halves of surrogate pairs, too
+        visible_text = visible(chr(code))
+        assert visible_text == chr(code) or visible_text.isascii()
+        assert not STEERS.search(visible_text)
+        visible_text.encode()  # halves of surrogate pairs, too
 
 
 def test_lists_are_cut_with_a_count() -> None:
     assert some_names(["a", "b"]) == "a, b"
     assert some_names([]) == ""
     names = [f"light_{k}" for k in range(30_000)]
-    told = some_names(names)
-    assert len(told) < 400
-    shown = told.split(", ")
-    assert shown[:-1] == names[: len(shown) - 1]
-    assert shown[-1] == f"… and {30_000 - len(shown) + 1} more"
+    cut_list = some_names(names)
+    assert len(cut_list) < 400
+    listed_names = cut_list.split(", ")
+    assert listed_names[:-1] == names[: len(listed_names) - 1]
+    assert listed_names[-1] == f"… and {30_000 - len(listed_names) + 1} more"
     assert some_names(["x" * 10**6, "y"]).startswith("x" * 100)
     assert len(some_names(["x" * 10**6, "y"])) < 400
 
@@ -71,23 +71,23 @@ def test_lights_and_errors(tmp_path: Path) -> None:
     listed = json.loads(succeed(tmp_path, "lights", room, "--json"))["lights"]
     assert listed[1]["name"] == BAD
     assert not STEERS.search(succeed(tmp_path, "lights", room, "--json"))
-    said = run_refused(tmp_path, "lights", room, "--lights", "nope\x1b[1m")
-    assert r"no light 'nope\x1b[1m'" in said
-    assert SHOWN in said
-    assert not STEERS.search(said)
+    refusal = run_refused(tmp_path, "lights", room, "--lights", "nope\x1b[1m")
+    assert r"no light 'nope\x1b[1m'" in refusal
+    assert SHOWN in refusal
+    assert not STEERS.search(refusal)
 
 
 @pytest.mark.parametrize("command", ["lights", "basis", "template", "solve", "relight", "verify"])
 def test_paths_and_options(tmp_path: Path, command: str) -> None:
     for line in ([f"no\n{BAD}.xml", f"{BAD}.png"], [f"--{BAD}", "a", "b"], ["a.xml", "--spp", BAD]):
-        said = run_refused(tmp_path, command, *line)
-        assert not STEERS.search(said)
-        assert r"\x1b[31m" in said or "not a whole number" in said
+        refusal = run_refused(tmp_path, command, *line)
+        assert not STEERS.search(refusal)
+        assert r"\x1b[31m" in refusal or "not a whole number" in refusal
 
 
 def test_a_path_that_is_no_unicode(tmp_path: Path) -> None:
-    said = run_refused(tmp_path, "lights", "a\udcff\x1b.xml")
-    assert r"a\udcff\x1b.xml" in said
+    refusal = run_refused(tmp_path, "lights", "a\udcff\x1b.xml")
+    assert r"a\udcff\x1b.xml" in refusal
 
 
 def test_the_cache_and_solve(tmp_path: Path, make_basis: Any) -> None:
@@ -96,36 +96,36 @@ def test_the_cache_and_solve(tmp_path: Path, make_basis: Any) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("LIGHTPAINT_CACHE", str(folder))
         assert cache.keep(basis)
-    done = run(tmp_path, "cache", "list", LIGHTPAINT_CACHE=str(folder))
-    assert done.returncode == 0
-    assert not STEERS.search(done.stdout)
+    completed = run(tmp_path, "cache", "list", LIGHTPAINT_CACHE=str(folder))
+    assert completed.returncode == 0
+    assert not STEERS.search(completed.stdout)
     write_basis(tmp_path / "b.basis.exr", basis)
     write_rgb(tmp_path / "p.exr", basis.images.sum(axis=0))
-    done = run(tmp_path, "solve", "b.basis.exr", "p.exr", "-o", "out")
-    assert done.returncode == 0, done.stderr
-    assert SHOWN[:20] in done.stdout
-    assert not STEERS.search(done.stdout + done.stderr)
+    completed = run(tmp_path, "solve", "b.basis.exr", "p.exr", "-o", "out")
+    assert completed.returncode == 0, completed.stderr
+    assert SHOWN[:20] in completed.stdout
+    assert not STEERS.search(completed.stdout + completed.stderr)
     full = ("--table", "full")
-    done = run(tmp_path, "solve", "b.basis.exr", "p.exr", "-o", "again", *full)
-    assert SHOWN in done.stdout
-    assert not STEERS.search(done.stdout + done.stderr)
+    completed = run(tmp_path, "solve", "b.basis.exr", "p.exr", "-o", "again", *full)
+    assert SHOWN in completed.stdout
+    assert not STEERS.search(completed.stdout + completed.stderr)
 
 
 def test_relight_of_names_that_steer(tmp_path: Path, make_basis: Any) -> None:
     lighting = Lighting.current(make_basis(2, names=["a", BAD])).for_target("evening")
     write_lighting(tmp_path / "l.json", lighting)
-    said = run_refused(tmp_path, "relight", write_room(tmp_path), "l.json")
-    assert SHOWN in said
-    assert not STEERS.search(said)
+    refusal = run_refused(tmp_path, "relight", write_room(tmp_path), "l.json")
+    assert SHOWN in refusal
+    assert not STEERS.search(refusal)
 
 
 def test_thousands_of_names_are_not_repeated(tmp_path: Path, make_basis: Any) -> None:
     names = [f"light_{k}" for k in range(3000)]
     basis = make_basis(images=[[[[1.0] * 3]]] * 3000, names=names)
     write_lighting(tmp_path / "l.json", Lighting.current(basis).for_target("evening"))
-    said = run_refused(tmp_path, "relight", write_room(tmp_path), "l.json")
-    assert "more that the scene does not have" in said
-    assert len(said) < 1000
+    refusal = run_refused(tmp_path, "relight", write_room(tmp_path), "l.json")
+    assert "more that the scene does not have" in refusal
+    assert len(refusal) < 1000
 
 
 def test_progress_and_remarks_on_a_terminal(
@@ -160,24 +160,24 @@ def test_each_worker_has_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     monkeypatch.setenv("TERM", "dumb")
 
-    def shown(listen: terminal.TerminalListener) -> list[str]:
+    def lines_of(listen: terminal.TerminalListener) -> list[str]:
         assert listen._bars is not None
         return [task.description for task in listen._bars.tasks if task.visible]
 
     with terminal.TerminalListener() as listen:
         listen.at_work("worker 1", f"{BAD}: answer")
         listen.at_work("worker 2", "night: answer")
-        assert shown(listen) == [f"worker 1: {SHOWN}: answer", "worker 2: night: answer"]
+        assert lines_of(listen) == [f"worker 1: {SHOWN}: answer", "worker 2: night: answer"]
         listen.at_work("worker 1", None)
         listen.at_work("worker 2", "dawn: answer")
-        assert shown(listen) == ["worker 2: dawn: answer"]
+        assert lines_of(listen) == ["worker 2: dawn: answer"]
         for k in range(3, 20):
             listen.at_work(f"worker {k}", "dusk: answer")
-        assert len(shown(listen)) == terminal.MAX_WORKER_LINES + 1
-        assert shown(listen)[-1] == "and 10 more at work"
+        assert len(lines_of(listen)) == terminal.MAX_WORKER_LINES + 1
+        assert lines_of(listen)[-1] == "and 10 more at work"
         for k in range(2, 20):
             listen.at_work(f"worker {k}", None)
-        assert shown(listen) == []
+        assert lines_of(listen) == []
     listen.at_work("worker 1", "night: answer")  # in a log nothing is said of it
 
 
@@ -200,8 +200,8 @@ def test_a_fault_of_its_own_is_one_line_and_steers_nothing(tmp_path: Path) -> No
         "c.doctor = fails\n"
     )
     path = ":".join([str(tmp_path), *filter(None, sys.path)])
-    done = spawn(tmp_path, "doctor", PYTHONPATH=path, XDG_STATE_HOME=str(tmp_path))
-    assert done.returncode == 70
-    assert len(done.stderr.splitlines()) == 1
-    assert r"RuntimeError: \x1b[2J told" in done.stderr
-    assert not STEERS.search(done.stderr)
+    completed = spawn(tmp_path, "doctor", PYTHONPATH=path, XDG_STATE_HOME=str(tmp_path))
+    assert completed.returncode == 70
+    assert len(completed.stderr.splitlines()) == 1
+    assert r"RuntimeError: \x1b[2J told" in completed.stderr
+    assert not STEERS.search(completed.stderr)

@@ -36,10 +36,10 @@ def texts(file: Path) -> Iterator[tuple[int, str]]:
     for node in ast.walk(tree):
         if isinstance(node, ast.JoinedStr):
             parts |= {id(value) for value in node.values}
-            said = "".join(
+            message = "".join(
                 str(x.value) if isinstance(x, ast.Constant) else _value(x) for x in node.values
             )
-            yield node.lineno, said
+            yield node.lineno, message
         elif (
             isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in parts
         ):
@@ -48,15 +48,15 @@ def texts(file: Path) -> Iterator[tuple[int, str]]:
 
 def _value(node: ast.expr) -> str:
     """What stands for a value: as `!r` would show it, or not."""
-    shown = isinstance(node, ast.FormattedValue) and node.conversion == ord("r")
-    return "'V'" if shown else "V"
+    is_quoted = isinstance(node, ast.FormattedValue) and node.conversion == ord("r")
+    return "'V'" if is_quoted else "V"
 
 
 def _docstrings(file: Path) -> set[str]:
     tree = ast.parse(file.read_text(encoding="utf-8"))
     kinds = ast.Module | ast.ClassDef | ast.FunctionDef
-    found = (ast.get_docstring(x, clean=False) for x in ast.walk(tree) if isinstance(x, kinds))
-    return {text for text in found if text}
+    docstrings = (ast.get_docstring(x, clean=False) for x in ast.walk(tree) if isinstance(x, kinds))
+    return {text for text in docstrings if text}
 
 
 LIBRARY = [
@@ -66,8 +66,8 @@ LIBRARY = [
 
 @pytest.mark.parametrize("file", LIBRARY, ids=lambda x: str(x.relative_to(PACKAGE)))
 def test_the_library_names_no_option(file: Path) -> None:
-    told = [(line, text) for line, text in texts(file) if OPTION.search(text)]
-    assert told == []
+    texts_with_options = [(line, text) for line, text in texts(file) if OPTION.search(text)]
+    assert texts_with_options == []
 
 
 @pytest.mark.parametrize("file", LIBRARY, ids=lambda x: str(x.relative_to(PACKAGE)))
@@ -99,25 +99,25 @@ def test_every_option_of_the_table_is_there() -> None:
         for action in command_parser()._actions
         if isinstance(action, argparse._SubParsersAction)
     ]
-    there = {
+    options_in_use = {
         option
         for command in commands.choices.values()
         for action in command._actions
         for option in action.option_strings
     }
-    assert set(OPTIONS.values()) <= there
-    assert {spelling.split()[-1] for spelling in SPELLINGS.values()} <= there
+    assert set(OPTIONS.values()) <= options_in_use
+    assert {spelling.split()[-1] for spelling in SPELLINGS.values()} <= options_in_use
 
 
 def test_every_word_of_the_table_is_an_argument_of_the_library() -> None:
-    known = {*inspect.signature(Settings).parameters, *inspect.signature(read_target).parameters}
-    known |= {*inspect.signature(lightpaint.load_scene).parameters}
-    known |= {*inspect.signature(lightpaint.read_light_groups).parameters}
-    known |= {*inspect.signature(lightpaint.paint_with_light).parameters}
-    known |= {*inspect.signature(paint_in_browser).parameters}
-    known |= {*inspect.signature(Source).parameters, *inspect.signature(RunOptions).parameters}
+    keywords = {*inspect.signature(Settings).parameters, *inspect.signature(read_target).parameters}
+    keywords |= {*inspect.signature(lightpaint.load_scene).parameters}
+    keywords |= {*inspect.signature(lightpaint.read_light_groups).parameters}
+    keywords |= {*inspect.signature(lightpaint.paint_with_light).parameters}
+    keywords |= {*inspect.signature(paint_in_browser).parameters}
+    keywords |= {*inspect.signature(Source).parameters, *inspect.signature(RunOptions).parameters}
     assert {*NOT_IN_GROUPS, *LOADING} <= set(OPTIONS)
-    assert {*OPTIONS, *(text.partition("=")[0] for text in SPELLINGS)} <= known
+    assert {*OPTIONS, *(text.partition("=")[0] for text in SPELLINGS)} <= keywords
 
 
 @pytest.mark.parametrize(

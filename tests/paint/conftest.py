@@ -12,11 +12,11 @@ from moving import MovingStudio
 @pytest.fixture
 def serving(caplog: pytest.LogCaptureFixture) -> Iterator[RunningServer]:
     """What the terminal would show beside, is an error as well."""
-    made = RunningServer()
+    server = RunningServer()
     with caplog.at_level(logging.WARNING):
-        yield made
-        made.end()
-    for connection in made.connections:
+        yield server
+        server.end()
+    for connection in server.connections:
         connection.close()
     records = [*caplog.get_records("call"), *caplog.records]
     assert [record.getMessage() for record in records] == []
@@ -25,6 +25,6 @@ def serving(caplog: pytest.LogCaptureFixture) -> Iterator[RunningServer]:
 @pytest.fixture
 def moving(tmp_path: Path) -> Iterator[MovingStudio]:
     """A studio of the test room."""
-    made = MovingStudio(tmp_path)
-    yield made
-    made.close()
+    studio = MovingStudio(tmp_path)
+    yield studio
+    studio.close()

@@ -40,8 +40,8 @@ def test_an_added_light_has_the_plane_of_its_place(moving: MovingStudio, kind: A
     assert len(state.weights) == len(state.answer.lights) == len(state.views[0].scales) == 6
     quick = moving.plane(name)
     moving.rendered()
-    [there] = moving.studio.rig.moved_scene(session.requests.placed).added
-    basis = lp.render_basis(moving.scene.with_new_emitters([there]), spp=512, seed=7)
+    [added_light] = moving.studio.rig.moved_scene(session.requests.placed).added
+    basis = lp.render_basis(moving.scene.with_new_emitters([added_light]), spp=512, seed=7)
     # A panel itself is seen once it is rendered.
     truth, is_lit = basis.image(name), ~basis.emitters_seen
     for plane in (quick, moving.plane(name)):
@@ -56,19 +56,23 @@ def test_an_added_light_has_the_plane_of_its_place(moving: MovingStudio, kind: A
 
 def test_the_painting_finds_a_light_that_is_missing(moving: MovingStudio) -> None:
     """The painting is the look with one light more; the search shows what it tries."""
-    there = lp.NewEmitter("lamp", "point", lp.Pose(position=(-0.2, 0.5, 0.7)), emission=(2, 2, 2))
-    wanted = lp.render_basis(moving.scene.with_new_emitters([there]), spp=128, seed=5)
-    look = wanted.mix(wanted.current_weights)
-    whole = (0, look.shape[0], 0, look.shape[1])
+    new_light = lp.NewEmitter(
+        "lamp", "point", lp.Pose(position=(-0.2, 0.5, 0.7)), emission=(2, 2, 2)
+    )
+    painted_basis = lp.render_basis(moving.scene.with_new_emitters([new_light]), spp=128, seed=5)
+    look = painted_basis.mix(painted_basis.current_weights)
+    whole_picture = (0, look.shape[0], 0, look.shape[1])
     moving.send(
-        protocol.Paint(0, whole, True), image=look, importance=np.ones(look.shape[:2], np.float32)
+        protocol.Paint(0, whole_picture, True),
+        image=look,
+        importance=np.ones(look.shape[:2], np.float32),
     )
     moving.send(protocol.PlaceLights(new_type="point"))
     result = place_lights(moving)
     assert result["names"] == ["point_1"], result
     assert any("point_1" in m.positions for m in moving.messages if m.kind == "trial")
-    found = moving.studio.session.requests.added["point_1"]
-    assert math.dist(found["position"], there.pose.position or ()) < 0.3
+    added_light = moving.studio.session.requests.added["point_1"]
+    assert math.dist(added_light["position"], new_light.pose.position or ()) < 0.3
     assert names(moving)[-1] == "point_1"
     assert moving.studio.session.store.position == 2
     moving.send(protocol.Undo())
@@ -107,14 +111,14 @@ def test_undo_looks_and_the_file_keep_added_lights(moving: MovingStudio) -> None
     assert names(moving) == before
     moving.send(protocol.Undo())
     moving.close()
-    again = MovingStudio(moving.folder)
+    reopened = MovingStudio(moving.folder)
     try:
-        assert names(again) == (*before, "point_1")
-        assert again.studio.session.weights[light] == pytest.approx((0.3, 0.2, 0.1))
-        again.rendered()
-        assert np.allclose(again.plane("point_1"), plane)
+        assert names(reopened) == (*before, "point_1")
+        assert reopened.studio.session.weights[light] == pytest.approx((0.3, 0.2, 0.1))
+        reopened.rendered()
+        assert np.allclose(reopened.plane("point_1"), plane)
     finally:
-        again.close()
+        reopened.close()
 
 
 def test_an_added_light_moves_is_named_anew_and_goes(moving: MovingStudio) -> None:
@@ -122,17 +126,17 @@ def test_an_added_light_moves_is_named_anew_and_goes(moving: MovingStudio) -> No
     for _ in range(2):
         add_light(moving, protocol.AddLight("point", position=AIR))
     assert names(moving)[-2:] == ("point_1", "point_2")
-    here = moving.plane("point_2")
-    there = [0.4, 1.2, 0.1]
-    moving.send(protocol.MoveLights({"point_2": {"position": there}}))
-    assert not np.array_equal(moving.plane("point_2"), here)
+    old_plane = moving.plane("point_2")
+    position = [0.4, 1.2, 0.1]
+    moving.send(protocol.MoveLights({"point_2": {"position": position}}))
+    assert not np.array_equal(moving.plane("point_2"), old_plane)
     moving.send(protocol.TieLights((("point_1", "point_2"),)))
     moving.send(protocol.RemoveLight("point_1"))
     assert names(moving) == (*before, "point_2")
     assert session.requests.ties == ()
-    assert opened_rig(moving).lights[-1].position == pytest.approx(there)
+    assert opened_rig(moving).lights[-1].position == pytest.approx(position)
     moving.send(protocol.MoveLights({"point_2": {}}))
-    assert np.array_equal(moving.plane("point_2"), here)
+    assert np.array_equal(moving.plane("point_2"), old_plane)
     moving.send(protocol.RemoveLight("point_2"))
     assert session.requests.placed == {}
     moving.send(protocol.Undo())
@@ -171,10 +175,10 @@ def test_lights_that_cannot_be_added_or_removed(
     moving: MovingStudio, request_: Any, text: str
 ) -> None:
     version, before = moving.studio.session.version, names(moving)
-    with pytest.raises(LightpaintError) as caught:
+    with pytest.raises(LightpaintError) as refusal:
         moving.send(request_)
-    assert text in str(caught.value)
-    assert "\n" not in str(caught.value)
+    assert text in str(refusal.value)
+    assert "\n" not in str(refusal.value)
     assert (moving.studio.session.version, names(moving)) == (version, before)
 
 
@@ -222,7 +226,7 @@ def test_searches_for_impossible_lights(moving: MovingStudio, request_: Any, tex
     with pytest.raises(LightpaintError, match="nothing is painted yet"):
         moving.send(request_)
     stroke(moving)
-    with pytest.raises(LightpaintError) as caught:
+    with pytest.raises(LightpaintError) as refusal:
         moving.send(request_)
-    assert text in str(caught.value)
-    assert "\n" not in str(caught.value)
+    assert text in str(refusal.value)
+    assert "\n" not in str(refusal.value)

@@ -27,25 +27,27 @@ IPV6 = pytest.mark.skipif(not has_ipv6(), reason="no IPv6")
 
 
 def test_a_taken_port_is_told_and_the_usual_one_given_up() -> None:
-    taken, its = listen("127.0.0.1", 0)
-    with taken:
-        with pytest.raises(PaintError, match=f"cannot listen at 127.0.0.1:{its.port}: .*port="):
-            listen("127.0.0.1", its.port)
+    taken_socket, taken_address = listen("127.0.0.1", 0)
+    with taken_socket:
+        with pytest.raises(
+            PaintError, match=f"cannot listen at 127.0.0.1:{taken_address.port}: .*port="
+        ):
+            listen("127.0.0.1", taken_address.port)
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(address, "DEFAULT_PORT", its.port)
-            other, there = listen()
+            patch.setattr(address, "DEFAULT_PORT", taken_address.port)
+            other, next_address = listen()
             other.close()
-            assert there.port not in (0, its.port)
+            assert next_address.port not in (0, taken_address.port)
     with pytest.raises(PaintError, match="cannot listen"):
         listen("127.0.0.1", 70000)
 
 
 def test_by_itself_it_listens_to_the_machine_only() -> None:
-    made = Server(FakeSession(), port=0)
-    assert made._socket.getsockname()[0] == "127.0.0.1"
-    assert made.url.startswith(f"http://127.0.0.1:{made.port}/#token=")
-    assert made.one_time_url() != made.url
-    made.close()
+    server = Server(FakeSession(), port=0)
+    assert server._socket.getsockname()[0] == "127.0.0.1"
+    assert server.url.startswith(f"http://127.0.0.1:{server.port}/#token=")
+    assert server.one_time_url() != server.url
+    server.close()
 
 
 @pytest.mark.parametrize(
@@ -66,27 +68,27 @@ def test_by_itself_it_listens_to_the_machine_only() -> None:
 def test_who_can_reach_it_is_known_and_its_address_leads_there(
     host: str | None, name: str, reach: Reach
 ) -> None:
-    made, its = listen(host, 0)
-    with made:
-        made.settimeout(60)
-        made.accept()[0].close()  # it has been tried
-        assert its.reach is reach
-        assert its.name == (name or its.name)
-        assert its.name not in ("", "0.0.0.0", "[::]", "::")
-        for url in (its.url, its.local_url):
+    listener, its_address = listen(host, 0)
+    with listener:
+        listener.settimeout(60)
+        listener.accept()[0].close()  # it has been tried
+        assert its_address.reach is reach
+        assert its_address.name == (name or its_address.name)
+        assert its_address.name not in ("", "0.0.0.0", "[::]", "::")
+        for url in (its_address.url, its_address.local_url):
             place = url.removeprefix("http://").rstrip("/").rpartition(":")[0].strip("[]")
-            with closing(socket.create_connection((place, its.port), 60)):
-                made.accept()[0].close()
+            with closing(socket.create_connection((place, its_address.port), 60)):
+                listener.accept()[0].close()
 
 
 @IPV6
 def test_an_address_of_ipv6_alone_leads_there_too(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(socket, "has_dualstack_ipv6", lambda: False)
-    made, its = listen("::", 0)
-    with made:
-        for url in (its.url, its.local_url):
+    listener, bound_address = listen("::", 0)
+    with listener:
+        for url in (bound_address.url, bound_address.local_url):
             place = url.removeprefix("http://").rstrip("/").rpartition(":")[0].strip("[]")
-            socket.create_connection((place, its.port), 60).close()
+            socket.create_connection((place, bound_address.port), 60).close()
 
 
 @pytest.mark.parametrize(
@@ -113,23 +115,23 @@ def test_an_address_of_ipv6_alone_leads_there_too(monkeypatch: pytest.MonkeyPatc
 def test_a_wrong_host_is_one_line_that_says_what_to_give(host: str) -> None:
     with pytest.raises(PaintError) as refusal:
         listen(host, 0)
-    said = str(refusal.value)
-    assert "give an address of this machine, 0.0.0.0 for all of them, or leave it out" in said
-    assert "\n" not in said
-    assert len(said) < 300
+    message = str(refusal.value)
+    assert "give an address of this machine, 0.0.0.0 for all of them, or leave it out" in message
+    assert "\n" not in message
+    assert len(message) < 300
 
 
 def test_the_page_is_there_where_the_address_says(monkeypatch: pytest.MonkeyPatch) -> None:
     """Also where this machine has a name that leads nowhere."""
     monkeypatch.setattr(socket, "gethostname", lambda: "no.such.name.invalid")
-    made: Any = Server(FakeSession(), host="0.0.0.0", port=0)
-    serving = threading.Thread(target=made.run, daemon=True)
+    server: Any = Server(FakeSession(), host="0.0.0.0", port=0)
+    serving = threading.Thread(target=server.run, daemon=True)
     serving.start()
     try:
-        for url in (made.url, made.one_time_url()):
+        for url in (server.url, server.one_time_url()):
             with urllib.request.urlopen(url, timeout=60) as answer:
                 assert answer.status == 200
     finally:
-        made.stop()
+        server.stop()
         serving.join(60)
-        made.close()
+        server.close()

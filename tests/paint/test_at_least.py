@@ -136,7 +136,7 @@ def test_a_stroke_may_change_its_mind(basis: lp.Basis):
     _set(session, target)
     before = session.views[0].pixels(BRUSH)
 
-    def back(image: Any, importance: Any) -> None:
+    def erase(image: Any, importance: Any) -> None:
         image[...], importance[...] = before.image, before.importance
         image[-1], importance[-1] = 0.25, 1
 
@@ -144,7 +144,7 @@ def test_a_stroke_may_change_its_mind(basis: lp.Basis):
     assert not _marks(session)[2:4, 3:12].any()
     session.improve([basis], [basis.current_look])  # more samples come meanwhile
     assert not _marks(session)[2:4, 3:12].any()
-    _paint(session, 1, BRUSH, back)
+    _paint(session, 1, BRUSH, erase)
     expected = target.at_least.copy()
     expected[8, 3:12] = False
     np.testing.assert_array_equal(_marks(session), expected)
@@ -170,10 +170,10 @@ def test_any_sequence_is_a_rebuild_and_never_says_it_of_paint(done: Any):
     store = MemoryStore(Identity.of([basis]))
     target, session = _clip(basis), _session(basis, store)
     _set(session, target)
-    for stroke, (what, (top, rows, left, columns), is_done) in enumerate(done):
+    for stroke, (action, (top, rows, left, columns), is_done) in enumerate(done):
         region = top, min(top + rows, SIZE[0]), left, min(left + columns, SIZE[1])
         try:
-            match what:
+            match action:
                 case "paint":
                     _paint(session, stroke, region, _corner, is_final=is_done)
                 case "erase":
@@ -192,8 +192,8 @@ def test_any_sequence_is_a_rebuild_and_never_says_it_of_paint(done: Any):
         except lp.LightpaintError:
             pass
     session.handle(protocol.DropStroke(0), {})
-    canvas, again = session.views[0], _session(basis, store).views[0]
-    assert canvas.pixels(canvas.full_region).equals(again.pixels(again.full_region))
+    canvas, rebuilt = session.views[0], _session(basis, store).views[0]
+    assert canvas.pixels(canvas.full_region).equals(rebuilt.pixels(rebuilt.full_region))
     _, importance, at_least = canvas.pixels(canvas.full_region)
     if at_least is not None:
         assert (importance > 0)[at_least.any(axis=-1)].all()
@@ -222,8 +222,8 @@ def test_it_is_in_files_and_looks(basis: lp.Basis, tmp_path: Path):
         looks.handle(protocol.MixLooks(first.id, second.id, 0.5, "between"))
         looks.load(protocol.LoadLook(looks.infos()[-1].id))
         np.testing.assert_array_equal(_marks(session), marks)
-    read = lp.read_target(tmp_path / "a.exr")
-    np.testing.assert_array_equal(read.at_least, marks)
+    exported_target = lp.read_target(tmp_path / "a.exr")
+    np.testing.assert_array_equal(exported_target.at_least, marks)
 
 
 def test_any_exr_may_say_so(tmp_path: Path):

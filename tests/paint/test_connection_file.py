@@ -44,16 +44,16 @@ def test_what_a_killed_painter_left_is_replaced_whoever_could_read_it(tmp_path: 
 
 
 def test_a_link_is_replaced_and_not_followed(tmp_path: Path) -> None:
-    elsewhere, folder = tmp_path / "elsewhere", tmp_path / "room.paint"
-    elsewhere.write_text("mine")
+    other_folder, folder = tmp_path / "elsewhere", tmp_path / "room.paint"
+    other_folder.write_text("mine")
     folder.mkdir()
-    (folder / CONNECTION_FILE).symlink_to(elsewhere)
+    (folder / CONNECTION_FILE).symlink_to(other_folder)
     file = ConnectionFile(folder, connection_fields("a"))
     file.write()
-    assert elsewhere.read_text() == "mine"
+    assert other_folder.read_text() == "mine"
     assert not file.path.is_symlink()
     file.remove()
-    assert elsewhere.read_text() == "mine"
+    assert other_folder.read_text() == "mine"
 
 
 def test_that_of_another_painter_stays(tmp_path: Path) -> None:

@@ -47,9 +47,9 @@ def test_hundreds_of_half_sent_requests_shut_nobody_out(serving: RunningServer) 
     assert status(serving, "/data/present", serving.key) == 200
     assert status(serving, "/") == 200  # a page that is being opened
     another = Page(serving)
-    for one in (page, another):
-        one.says("hello", version=VERSION)
-        assert one.hears()[0]["kind"] in ("state", "closed")
+    for client in (page, another):
+        client.says("hello", version=VERSION)
+        assert client.hears()[0]["kind"] in ("state", "closed")
     assert len(connected_sockets(serving)) <= http_connections.MAX_UNAUTHENTICATED + 4
     # The latest have the best chance of being people.
     assert is_cut(serving.connections[1])
@@ -59,16 +59,16 @@ def test_a_request_comes_in_time_or_its_connection_is_closed(
     serving: RunningServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(http_connections, "REQUEST_TIMEOUT_S", 0.3)
-    silent, half, second, slow, known = (serving.connection() for _ in range(5))
+    silent, half, second, slow, trusted = (serving.connection() for _ in range(5))
     page = Page(serving)
     half.sendall(HALF)
     second.sendall(f"GET / HTTP/1.1\r\nHost: {serving.here}\r\n\r\n".encode())
     assert second.recv(12) == b"HTTP/1.1 200"
     second.sendall(HALF)
-    shown = f"Host: {serving.here}\r\n{serving.key_header}\r\n\r\n"
-    known.sendall(f"GET /data/present HTTP/1.1\r\n{shown}".encode())
-    assert known.recv(12) == b"HTTP/1.1 200"
-    known.sendall(HALF)
+    headers = f"Host: {serving.here}\r\n{serving.key_header}\r\n\r\n"
+    trusted.sendall(f"GET /data/present HTTP/1.1\r\n{headers}".encode())
+    assert trusted.recv(12) == b"HTTP/1.1 200"
+    trusted.sendall(HALF)
     # Who sends it in drops has no longer.
     begin = time.monotonic()
     with suppress(OSError):
@@ -76,15 +76,15 @@ def test_a_request_comes_in_time_or_its_connection_is_closed(
             slow.sendall(b"GET / HTTP/1.1\r\n"[drop : drop + 1] or b"x")
             time.sleep(0.05)
     assert time.monotonic() - begin < 3
-    for one in (silent, half, slow):
-        assert is_cut(one)
+    for connection in (silent, half, slow):
+        assert is_cut(connection)
     while second.recv(1 << 16):
         pass  # what it had asked for comes whole
     # Who has shown the key, and a page, have all the time they want.
     page.says("hello", version=VERSION)
     assert page.hears()[0]["kind"] == "state"
-    known.sendall(f".0.1:{serving.server.port}\r\n{serving.key_header}\r\n\r\n".encode())
-    wait_until(lambda: b"HTTP/1.1 200" in known.recv(1 << 16), "it is not answered again")
+    trusted.sendall(f".0.1:{serving.server.port}\r\n{serving.key_header}\r\n\r\n".encode())
+    wait_until(lambda: b"HTTP/1.1 200" in trusted.recv(1 << 16), "it is not answered again")
 
 
 def test_an_answer_that_is_taken_slowly_is_not_cut(
@@ -105,17 +105,17 @@ def test_an_answer_that_is_taken_slowly_is_not_cut(
         if line.startswith(b"content-length")
     ]
     time.sleep(0.5)
-    got = len(head.partition(b"\r\n\r\n")[2])
-    while got < length:
+    received = len(head.partition(b"\r\n\r\n")[2])
+    while received < length:
         data = asking.recv(1 << 16)
-        assert data, f"{got} of {length} bytes"
-        got += len(data)
+        assert data, f"{received} of {length} bytes"
+        received += len(data)
 
 
 def test_what_is_sent_goes_at_once(serving: RunningServer) -> None:
     """Nothing waits until what was sent before it is acknowledged (RFC 896): 40 ms an answer."""
-    kept, page = serving.connection(), Page(serving)
-    kept.sendall(HALF)
+    keeper, page = serving.connection(), Page(serving)
+    keeper.sendall(HALF)
     page.says("hello", version=VERSION)
     wait_until(lambda: len(connected_sockets(serving)) >= 2, "they are not there")
     for connection in connected_sockets(serving):
@@ -137,10 +137,10 @@ def test_junk_of_strangers_is_no_news(
         b"POST / HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\nffffffff\r\nx",
         b"\0" * 100,
     ):
-        one = serving.connection()
-        one.sendall(junk)
+        connection = serving.connection()
+        connection.sendall(junk)
         with suppress(ConnectionResetError):
-            one.recv(1 << 16)
+            connection.recv(1 << 16)
     assert status(serving, "/data/present", serving.key) == 200
     assert capfd.readouterr() == ("", "")
 

@@ -25,16 +25,16 @@ def test_a_verifying_render_writes_nothing_beside_the_scene(tmp_path: Path) -> N
     subject = make_subject(SceneFile(str(path)), tmp_path / "s", settings=Settings(spp=4))
     basis = lp.render_basis(subject.loaded_scene, spp=4)
     lighting = Lighting.of_weights(basis, 2 * basis.current_weights)
-    there, seen = set(path.parent.iterdir()), []
+    files_before, progress_seen = set(path.parent.iterdir()), []
 
-    def hears(label: str, done: int, total: int, unit: str = "passes") -> None:
-        seen.append(set(path.parent.iterdir()))
+    def listen(label: str, done: int, total: int, unit: str = "passes") -> None:
+        progress_seen.append(set(path.parent.iterdir()))
 
-    picture, said, _ = render_verification(subject, basis, lighting, hears)
-    assert seen
-    assert all(files == there for files in seen)
+    picture, verdict, _ = render_verification(subject, basis, lighting, listen)
+    assert progress_seen
+    assert all(files == files_before for files in progress_seen)
     # It may end when it can tell, before all four samples.
-    assert "samples per pixel confirms it" in said
+    assert "samples per pixel confirms it" in verdict
     np.testing.assert_allclose(picture.mean(), 2 * basis.current_look.mean(), rtol=0.1)  # noise
 
 
@@ -49,10 +49,10 @@ def test_a_picture_of_the_answer_is_what_the_view_shows(
     lighting = Lighting.of_weights(basis, np.array([[0.5, 0.4, 0.3], [0.2, 0.2, 0.6]]))
     path = tmp_path / "answer.png"
     path.write_bytes(answer_png(basis, lighting, transform))
-    shown = np.asarray(Image.open(path)) / 255
-    answered = lp.combine(basis, lighting).image
-    clean = denoised(answered, basis.features)
-    np.testing.assert_allclose(shown, transform.encode(clean), atol=0.5 / 255 + 1e-6)  # 8 bits
-    again = lp.read_target(path)
-    assert again.transform == transform
-    np.testing.assert_allclose(transform.encode(again.image), shown, atol=1e-3)
+    display = np.asarray(Image.open(path)) / 255
+    combined = lp.combine(basis, lighting).image
+    clean = denoised(combined, basis.features)
+    np.testing.assert_allclose(display, transform.encode(clean), atol=0.5 / 255 + 1e-6)  # 8 bits
+    target = lp.read_target(path)
+    assert target.transform == transform
+    np.testing.assert_allclose(transform.encode(target.image), display, atol=1e-3)

@@ -50,9 +50,9 @@ def test_a_picture_that_nobody_takes_and_half_a_question_are_not_waited_for(
     serving: RunningServer,
 ) -> None:
     asking, _, half = (serving.connection() for _ in range(3))
-    here = f"Host: {serving.here}\r\n"
-    asking.sendall(f"GET /data/large HTTP/1.1\r\n{here}{serving.key_header}\r\n\r\n".encode())
-    half.sendall(f"GET /data/large HTTP/1.1\r\n{here}".encode())
+    host_line = f"Host: {serving.here}\r\n"
+    asking.sendall(f"GET /data/large HTTP/1.1\r\n{host_line}{serving.key_header}\r\n\r\n".encode())
+    half.sendall(f"GET /data/large HTTP/1.1\r\n{host_line}".encode())
     assert asking.recv(12) == b"HTTP/1.1 200"
     wait_until(lambda: any(unsent_bytes(serving)), "the system takes it all")
     serving.end()

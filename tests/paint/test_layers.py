@@ -38,19 +38,19 @@ def pixels_of(coverage: Any, colour: Any = 0.0) -> LayerPixels:
 
 
 def target_of(*layers: tuple[Layer, LayerPixels], region: Any = WHOLE) -> Pixels:
-    kept = [
-        ShownLayer(layer, pixels, by)
-        for (layer, pixels), by in zip(layers, accents(layers), strict=True)
+    shown_layers = [
+        ShownLayer(layer, pixels, weight)
+        for (layer, pixels), weight in zip(layers, accents(layers), strict=True)
     ]
-    return compose(kept, CURRENT, region)
+    return compose(shown_layers, CURRENT, region)
 
 
 # What each layer does
 
 
 def test_an_adjustment_scales_luminance_and_its_strength_counts_in_stops() -> None:
-    wish = Layer(1, "adjust", gain=2.0, tint=(1.2, 1.0, 0.8), strength=1.5)
-    image, importance, _ = target_of((wish, pixels_of(1)))
+    adjustment = Layer(1, "adjust", gain=2.0, tint=(1.2, 1.0, 0.8), strength=1.5)
+    image, importance, _ = target_of((adjustment, pixels_of(1)))
     luminance = np.array([0.2126, 0.7152, 0.0722])
     np.testing.assert_allclose(image @ luminance, 2**1.5 * (CURRENT @ luminance), rtol=1e-6)
     ratio = image / CURRENT
@@ -61,10 +61,10 @@ def test_an_adjustment_scales_luminance_and_its_strength_counts_in_stops() -> No
 def test_two_adjustments_multiply_and_lie_relative_to_what_is_below() -> None:
     colour = np.float32([0.3, 0.2, 0.1])
     paint = (Layer(1, "paint"), pixels_of(1, colour))
-    one, other = (Layer(k, "adjust", gain=g) for k, g in ((2, 4.0), (3, 0.5)))
-    image = target_of(paint, (one, pixels_of(1)), (other, pixels_of(1))).image
+    first, other = (Layer(k, "adjust", gain=g) for k, g in ((2, 4.0), (3, 0.5)))
+    image = target_of(paint, (first, pixels_of(1)), (other, pixels_of(1))).image
     np.testing.assert_allclose(image, np.broadcast_to(2 * colour, image.shape), rtol=1e-6)
-    below = target_of((one, pixels_of(1)), paint).image
+    below = target_of((first, pixels_of(1)), paint).image
     np.testing.assert_allclose(below, np.broadcast_to(colour, below.shape), rtol=1e-6)
 
 
@@ -90,11 +90,11 @@ def test_a_small_wish_over_a_whole_one_counts_more_in_either_order() -> None:
     mask = np.zeros(SIZE)
     mask[:4, :5] = 1
     part = 20 / (SIZE[0] * SIZE[1])
-    whole, small = (
+    strong, small = (
         (Layer(1, "adjust", gain=0.25), pixels_of(1)),
         (Layer(2, "paint"), pixels_of(mask)),
     )
-    for layers in ((whole, small), (small, whole)):
+    for layers in ((strong, small), (small, strong)):
         importance = target_of(*layers).importance
         assert importance[0, 0] == np.float32(accent(part)) > 1
         assert importance[-1, -1] == 1
@@ -138,12 +138,12 @@ def test_any_partition_of_the_picture_gives_the_same_bits(seed: int) -> None:
             number, kind, strength=rng.uniform(0.1, 2), gain=2 ** rng.uniform(-2, 2), times=3.0
         )
         layers.append((layer, pixels_of(random_mask(rng, SIZE), rng.random((*SIZE, 3)))))
-    whole = target_of(*layers)
+    target = target_of(*layers)
     y, x = rng.integers(1, SIZE[0]), rng.integers(1, SIZE[1])
     for rows in ((0, y), (y, SIZE[0])):
         for columns in ((0, x), (x, SIZE[1])):
             region = (int(rows[0]), int(rows[1]), int(columns[0]), int(columns[1]))
-            assert target_of(*layers, region=region).equals(whole.part(region))
+            assert target_of(*layers, region=region).equals(target.part(region))
 
 
 # A session
@@ -160,12 +160,14 @@ def test_whatever_the_hand_did_the_target_is_that_of_the_layers_built_afresh(see
         pairs = [(layer, LayerPixels(view.size)) for layer in session.views.layers.shown()]
         for layer, pixels in pairs:
             pixels.put(view.full_region, view.layer(layer.id).part(view.full_region))
-        shown = [ShownLayer(*pair, by) for pair, by in zip(pairs, accents(pairs), strict=True)]
-        assert view.painting.equals(compose(shown, view.current, view.full_region))
+        shown_layers = [
+            ShownLayer(*pair, weight) for pair, weight in zip(pairs, accents(pairs), strict=True)
+        ]
+        assert view.painting.equals(compose(shown_layers, view.current, view.full_region))
     # Opened again it is the same, and undo and redo lead through all of it.
-    again = open_session(session.store)
-    assert again.views.layers == session.views.layers
-    assert hand.state(again) == hand.state()
+    reopened = open_session(session.store)
+    assert reopened.views.layers == session.views.layers
+    assert hand.state(reopened) == hand.state()
     for position in range(session.store.position - 1, -1, -1):
         session.handle(protocol.Undo(), {})
         assert hand.state() == hand.states[position]
@@ -196,14 +198,14 @@ def test_a_look_keeps_its_layers_and_undo_leads_back() -> None:
         hand.act()
     session = hand.session
     looks = LookLibrary(session, PictureTable())
-    kept = hand.state()
+    state = hand.state()
     looks.handle(protocol.SaveLook("one"))
     layers = [layer.kind for layer in session.views.layers]
     for _ in range(5):
         hand.act()
     before = hand.state()
     looks.load(protocol.LoadLook(1))
-    assert hand.pixels() == kept[1]
+    assert hand.pixels() == state[1]
     assert [layer.kind for layer in session.views.layers] == layers
     assert hand.state(open_session(session.store)) == hand.state()
     session.handle(protocol.Undo(), {})
@@ -240,14 +242,14 @@ def test_killed_at_any_moment_the_layers_of_all_acknowledged_steps_are_there(
         command = [sys.executable, str(program), str(path)]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
             assert process.stdout is not None
-            heard = [process.stdout.readline() for _ in range(delay)]
+            lines = [process.stdout.readline() for _ in range(delay)]
             process.kill()
-        known = int(heard[-1])
+        acknowledged = int(lines[-1])
         with Store.open(path, identity_of()) as store:
-            assert store.position >= known
-            found = open_session(store)
+            assert store.position >= acknowledged
+            reopened = open_session(store)
             hand = RandomEditor(7)
             while hand.session.store.position < store.position:
                 hand.act(with_undo=False)
-            assert hand.state(found) == hand.state()
+            assert hand.state(reopened) == hand.state()
             assert stack_after(store.steps) == hand.session.views.layers

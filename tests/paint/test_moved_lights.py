@@ -35,10 +35,10 @@ def test_a_moved_light_has_the_plane_of_its_place(moving: MovingStudio) -> None:
     quick = moving.plane("bulb")
     moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}))
     moving.rendered()
-    moved = moving.scene.moved({"bulb": lp.Pose(position=POSITION)})
-    truth = lp.render_basis(moved, spp=512, seed=7).image("bulb")
-    for plane, most in ((quick, 0.15), (moving.plane("bulb"), 0.15)):  # noise of few samples
-        assert np.square(plane - truth).sum() < most * np.square(truth).sum()
+    moved_scene = moving.scene.moved({"bulb": lp.Pose(position=POSITION)})
+    truth = lp.render_basis(moved_scene, spp=512, seed=7).image("bulb")
+    for plane, bound in ((quick, 0.15), (moving.plane("bulb"), 0.15)):  # noise of few samples
+        assert np.square(plane - truth).sum() < bound * np.square(truth).sum()
         assert plane.mean() == pytest.approx(truth.mean(), rel=0.1)
     assert np.square(before["bulb"] - truth).sum() > 0.3 * np.square(truth).sum()
     for name in session.basis.names:
@@ -72,26 +72,26 @@ def test_undo_looks_and_the_file_know_places(moving: MovingStudio) -> None:
     session, at_rest = moving.studio.session, moving.plane("bulb")
     moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}))
     moving.rendered()
-    there = moving.plane("bulb")
+    moved_plane = moving.plane("bulb")
     moving.send(protocol.SaveLook("moved"))
     moving.send(protocol.Undo())
     assert session.requests.poses == {}
     assert np.array_equal(moving.plane("bulb"), at_rest)
     moving.send(protocol.Redo())
-    assert np.array_equal(moving.plane("bulb"), there)
+    assert np.array_equal(moving.plane("bulb"), moved_plane)
     moving.send(protocol.MoveLights({"bulb": {}}))
     assert np.array_equal(moving.plane("bulb"), at_rest)
     moving.send(protocol.LoadLook(1))
     assert session.requests.poses == {"bulb": {"position": POSITION}}
-    assert np.array_equal(moving.plane("bulb"), there)
+    assert np.array_equal(moving.plane("bulb"), moved_plane)
     moving.close()
-    again = MovingStudio(moving.folder)
+    reopened = MovingStudio(moving.folder)
     try:
-        assert again.studio.session.requests.poses == {"bulb": {"position": POSITION}}
-        again.rendered()
-        assert np.allclose(again.plane("bulb"), there)
+        assert reopened.studio.session.requests.poses == {"bulb": {"position": POSITION}}
+        reopened.rendered()
+        assert np.allclose(reopened.plane("bulb"), moved_plane)
     finally:
-        again.close()
+        reopened.close()
 
 
 def test_a_drag_that_is_given_up_moves_nothing(moving: MovingStudio) -> None:
@@ -134,10 +134,10 @@ def test_poses_that_no_light_can_have(
     moving: MovingStudio, light: str, pose: Any, text: str
 ) -> None:
     version = moving.studio.session.version
-    with pytest.raises(LightpaintError) as caught:
+    with pytest.raises(LightpaintError) as refusal:
         moving.send(protocol.MoveLights({light: pose}))
-    assert text in str(caught.value)
-    assert "\n" not in str(caught.value)
+    assert text in str(refusal.value)
+    assert "\n" not in str(refusal.value)
     assert (moving.studio.session.version, moving.studio.session.requests.poses) == (version, {})
 
 
@@ -157,15 +157,15 @@ def test_the_rig_says_where_lights_hang_and_what_cannot_move(moving: MovingStudi
 def test_a_light_in_a_wall_is_told_of(moving: MovingStudio) -> None:
     """It may be meant, as on the way through one; undo brings it back."""
     moving.send(protocol.MoveLights({"bulb": {"position": [0, 1, -1.5]}}))
-    warned = moving.wait(lambda: [m for m in moving.messages if m.kind == "notice"])
-    assert warned[0].fields["text"].startswith("bulb lights nothing that is seen from there")
+    notices = moving.wait(lambda: [m for m in moving.messages if m.kind == "notice"])
+    assert notices[0].fields["text"].startswith("bulb lights nothing that is seen from there")
 
 
-def point_light(moving: MovingStudio, name: str, how: Any, at: Any, **more: Any) -> Any:
+def point_light(moving: MovingStudio, name: str, click: Any, place: Any, **fields: Any) -> Any:
     """The place of a light after it was pointed by a click."""
     opened_rig(moving)
     light = moving.light(name)
-    moving.send(protocol.PointLight(light, how, pixel_of(moving, at), **more))
+    moving.send(protocol.PointLight(light, click, pixel_of(moving, place), **fields))
     return rig_state(moving.studio.rig, moving.studio.session.requests.poses).lights[light]
 
 
@@ -186,27 +186,29 @@ def test_a_spot_is_aimed_at_what_was_clicked(moving: MovingStudio) -> None:
 
 def test_a_highlight_is_the_mirrored_ray_of_the_eye(moving: MovingStudio) -> None:
     """On the floor: the mirror image of the eye, the place and the light are on one line."""
-    at = np.array([0.0, 0.0, 0.6])
-    place = point_light(moving, "beam", "highlight", at)
+    floor_point = np.array([0.0, 0.0, 0.6])
+    place = point_light(moving, "beam", "highlight", floor_point)
     mirrored_eye = np.array([0, -1, 3.5])
-    way, towards = at - mirrored_eye, np.array(place.position) - at
+    way, towards = floor_point - mirrored_eye, np.array(place.position) - floor_point
     assert np.linalg.norm(np.cross(way, towards)) < 2e-3 * np.linalg.norm(way)
     assert way @ towards > 0
-    assert place.target == pytest.approx(at, abs=2e-3)
+    assert place.target == pytest.approx(floor_point, abs=2e-3)
 
 
 def test_a_shadow_ends_on_the_line_through_its_edge(moving: MovingStudio) -> None:
-    edge, at = np.array([0.3, 0.6, 0.2]), np.array([-0.6, 0, 0.6])
-    seen = pixel_of(moving, edge - (0, 0.01, 0))
-    place = point_light(moving, "bulb", "shadow", at, edge=seen)
-    line = np.array(place.position) - at
+    edge, floor_point = np.array([0.3, 0.6, 0.2]), np.array([-0.6, 0, 0.6])
+    pixel = pixel_of(moving, edge - (0, 0.01, 0))
+    place = point_light(moving, "bulb", "shadow", floor_point, edge=pixel)
+    line = np.array(place.position) - floor_point
     hit = BALL + 0.3 * (edge - BALL) / 0.3
-    assert np.linalg.norm(np.cross(line, hit - at)) < 0.12 * np.linalg.norm(line)  # a pixel is .1
-    assert line @ (hit - at) > (hit - at) @ (hit - at)
+    assert np.linalg.norm(np.cross(line, hit - floor_point)) < 0.12 * np.linalg.norm(
+        line
+    )  # a pixel is .1
+    assert line @ (hit - floor_point) > (hit - floor_point) @ (hit - floor_point)
 
 
 @pytest.mark.parametrize(
-    ("name", "how", "at", "text"),
+    ("name", "click", "place", "text"),
     [
         ("bulb", "aim", (12.0, 12.0), "bulb shines all around"),
         ("sun", "aim", (12.0, 12.0), "infinitely far away"),
@@ -218,34 +220,36 @@ def test_a_shadow_ends_on_the_line_through_its_edge(moving: MovingStudio) -> Non
     ],
 )
 def test_clicks_that_point_no_light(
-    moving: MovingStudio, name: str, how: Any, at: Any, text: str
+    moving: MovingStudio, name: str, click: Any, place: Any, text: str
 ) -> None:
-    with pytest.raises(LightpaintError) as caught:
-        moving.send(protocol.PointLight(moving.light(name), how, at))
-    assert text in str(caught.value)
-    assert "\n" not in str(caught.value)
+    with pytest.raises(LightpaintError) as refusal:
+        moving.send(protocol.PointLight(moving.light(name), click, place))
+    assert text in str(refusal.value)
+    assert "\n" not in str(refusal.value)
     assert moving.studio.session.requests.poses == {}
 
 
 @pytest.fixture
 def dim_room(tmp_path: Path) -> Iterator[MovingStudio]:
     """The room with a bulb, and a sky that shows what is in it."""
-    made = MovingStudio(tmp_path, LIGHTS["bulb"].replace("0.5 0.6 0.7", "5 6 7") + LIGHTS["sky"])
-    yield made
-    made.close()
+    room = MovingStudio(tmp_path, LIGHTS["bulb"].replace("0.5 0.6 0.7", "5 6 7") + LIGHTS["sky"])
+    yield room
+    room.close()
 
 
 def test_lights_that_may_move_come_closer_in_one_step(dim_room: MovingStudio) -> None:
     """The painting is the look with the bulb elsewhere."""
     moving = dim_room
     session = moving.studio.session
-    there = (-0.1, 1.2, 0.6)
-    moved = moving.scene.moved({"bulb": lp.Pose(position=there)})
-    wanted = lp.render_basis(moved, spp=256, seed=5)
-    look = wanted.mix(wanted.current_weights)
-    whole = (0, look.shape[0], 0, look.shape[1])
+    position = (-0.1, 1.2, 0.6)
+    moved_scene = moving.scene.moved({"bulb": lp.Pose(position=position)})
+    painted_basis = lp.render_basis(moved_scene, spp=256, seed=5)
+    look = painted_basis.mix(painted_basis.current_weights)
+    whole_picture = (0, look.shape[0], 0, look.shape[1])
     moving.send(
-        protocol.Paint(0, whole, True), image=look, importance=np.ones(look.shape[:2], np.float32)
+        protocol.Paint(0, whole_picture, True),
+        image=look,
+        importance=np.ones(look.shape[:2], np.float32),
     )
     before = exact_answer(moving)
     moving.send(protocol.PlaceLights())
@@ -270,8 +274,8 @@ def test_what_cannot_be_placed_is_said(moving: MovingStudio) -> None:
     with pytest.raises(LightpaintError, match="nothing is painted yet"):
         moving.send(protocol.PlaceLights())
     stroke(moving)
-    held = {name: {"lock": True} for name in ("bulb", "beam", "sun")}
-    moving.send(protocol.ConstrainLights(held))
+    locks = {name: {"lock": True} for name in ("bulb", "beam", "sun")}
+    moving.send(protocol.ConstrainLights(locks))
     with pytest.raises(LightpaintError, match="no light is free to move"):
         moving.send(protocol.PlaceLights())
 
@@ -282,14 +286,16 @@ def test_what_comes_no_closer_to_the_eye_is_not_done(
     """The painting is the current look: every move is a step away, whatever a search says."""
     session = dim_room.studio.session
     look = session.basis.current_look.copy()
-    whole = (0, look.shape[0], 0, look.shape[1])
+    whole_picture = (0, look.shape[0], 0, look.shape[1])
     dim_room.send(
-        protocol.Paint(0, whole, True), image=look, importance=np.ones(look.shape[:2], np.float32)
+        protocol.Paint(0, whole_picture, True),
+        image=look,
+        importance=np.ones(look.shape[:2], np.float32),
     )
     old = dim_room.scene.light("bulb").members[0].site
     move = lp.Move("bulb", old, Site((0.8, 0.2, -0.5)), gain_share=0.1)
-    found = lp.Placement((dim_room.scene,), (move,), (), 0.1, 0.05)
-    monkeypatch.setattr("lightpaint.paint.rig.light_placer.place", lambda *_, **__: found)
+    placement = lp.Placement((dim_room.scene,), (move,), (), 0.1, 0.05)
+    monkeypatch.setattr("lightpaint.paint.rig.light_placer.place", lambda *_, **__: placement)
     dim_room.send(protocol.PlaceLights())
     assert "no closer to the eye" in place_lights(dim_room)["text"]
     assert session.requests.placed == {}

@@ -15,8 +15,10 @@ from lightpaint.paint.store.canvas_pixels import Pixels, Region
 HEIGHT, WIDTH = 21, 34
 
 
-def spans(most: int) -> st.SearchStrategy[tuple[int, int]]:
-    return st.tuples(st.integers(0, most), st.integers(0, most)).map(lambda s: (min(s), max(s)))
+def spans(maximum: int) -> st.SearchStrategy[tuple[int, int]]:
+    return st.tuples(st.integers(0, maximum), st.integers(0, maximum)).map(
+        lambda s: (min(s), max(s))
+    )
 
 
 REGIONS = st.builds(lambda y, x: (*y, *x), spans(HEIGHT), spans(WIDTH))
@@ -39,13 +41,13 @@ def test_what_was_before_is_given_back(regions: list[Region], is_marked: bool, s
         for k, region in enumerate(regions):
             stroke.touch(region, layer)
             layer.put(region, picture(k + 1).part(region))
-        found = stroke.pixels_before(layer)
+        pixels_before = stroke.pixels_before(layer)
     real = [(a, b, c, d) for a, b, c, d in regions if a < b and c < d]
     assert bool(stroke) == bool(real)
     if real:
         tops, bottoms, lefts, rights = zip(*real, strict=True)
         assert stroke.region == (min(tops), max(bottoms), min(lefts), max(rights))
-    assert found.equals(before.part(stroke.region))
+    assert pixels_before.equals(before.part(stroke.region))
     # However often a stroke goes over a place, it is kept once.
-    kept = sum(pixels.importance.size for pixels in stroke._before.values())
-    assert kept <= HEIGHT * WIDTH
+    saved_values = sum(pixels.importance.size for pixels in stroke._before.values())
+    assert saved_values <= HEIGHT * WIDTH

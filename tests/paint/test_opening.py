@@ -48,7 +48,7 @@ def open_subject(path: Path, **settings: Any) -> Subject:
 
 
 def keep_basis(
-    path: Path, make_basis: Any, meanwhile: Callable[[], object] = lambda: None
+    path: Path, make_basis: Any, before_keeping: Callable[[], object] = lambda: None
 ) -> lp.Basis:
     """A made-up basis, kept as a first session leaves it, and what was known then.
 
@@ -58,9 +58,9 @@ def keep_basis(
     assert session_identity([first]) is None
     scene, opening = first.loaded_scene, first.scene
     assert isinstance(opening, LazyScene)
-    made = make_basis(len(scene.lights), scene.size)
+    new_basis = make_basis(len(scene.lights), scene.size)
     origin = replace(
-        made.origin,
+        new_basis.origin,
         scene_identity=scene.identity,
         sensor=scene.sensor_names[0],
         scene=path.name,
@@ -68,7 +68,7 @@ def keep_basis(
     )
     flat = np.zeros((*scene.size, 3), np.float32)
     basis: lp.Basis = replace(
-        made,
+        new_basis,
         lights=basis_lights(scene),
         origin=origin,
         features=Features(flat, flat),
@@ -77,7 +77,7 @@ def keep_basis(
     assert cache.keep(basis)
     opening._began_s = time.time() + 60  # as if its files were older
     opening.remarks = ("a remark",)
-    meanwhile()
+    before_keeping()
     opening.remember(basis)
     return basis
 
@@ -87,8 +87,8 @@ def test_previews_of_more_and_more_samples_come_to_the_bits_of_one_render(path: 
     bases = list(open_subject(path, spp=48).bases())
     assert [basis.origin.spp for basis in bases] == [2, 8, 32, 48]
     assert_equal_bits(bases[-1], solved)
-    [found] = open_subject(path, spp=48).bases()
-    assert_equal_bits(found, solved)
+    [final_basis] = open_subject(path, spp=48).bases()
+    assert_equal_bits(final_basis, solved)
 
 
 @pytest.mark.parametrize("set_by", [-3600.0, 3600.0])
@@ -96,9 +96,11 @@ def test_nothing_is_known_of_a_scene_where_the_clock_was_set_meanwhile(
     path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch, set_by: float
 ) -> None:
     """A file that was written since it was read could then look older."""
-    now = time.time
-    keep_basis(path, make_basis, lambda: monkeypatch.setattr(time, "time", lambda: now() + set_by))
-    monkeypatch.setattr(time, "time", now)
+    real_time = time.time
+    keep_basis(
+        path, make_basis, lambda: monkeypatch.setattr(time, "time", lambda: real_time() + set_by)
+    )
+    monkeypatch.setattr(time, "time", real_time)
     assert session_identity([open_subject(path)]) is None
 
 
@@ -118,15 +120,15 @@ def test_a_known_scene_is_painted_without_being_loaded(
         assert subject.target_spp == basis.origin.spp
         assert isinstance(subject.scene, LazyScene)
         assert subject.scene.remarks == ("a remark",)
-        [found] = subject.bases()
-        assert found.lights == basis.lights
-        np.testing.assert_array_equal(found.images, basis.images)
+        [cached_basis] = subject.bases()
+        assert cached_basis.lights == basis.lights
+        np.testing.assert_array_equal(cached_basis.images, basis.images)
         # Of more samples than there are it has to be loaded, as for what is asked of no light.
         with pytest.raises(AssertionError):
             next(open_subject(path, spp=4 * basis.origin.spp).bases())
-        asked = lp.Constraints.of({"nobody": {"lock": True}})
+        constraints = lp.Constraints.of({"nobody": {"lock": True}})
         with pytest.raises(ConstraintError, match="nobody"):
-            make_subject(SceneFile(str(path)), path.parent / "s", constraints=asked)
+            make_subject(SceneFile(str(path)), path.parent / "s", constraints=constraints)
     # Whoever exports gets the scene that was painted, or is told.
     assert subject.loaded_scene.identity == basis.origin.scene_identity
     other = open_subject(path)
@@ -137,11 +139,11 @@ def test_a_known_scene_is_painted_without_being_loaded(
 
 def test_what_is_wrong_with_a_scene_ends_the_painter_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "scene.xml").write_text("<scene version='3.0.0'><bsdf type='no'/></scene>")
-    done = spawn(tmp_path, "paint", "scene.xml", "--no-browser", "--port", "0")
-    assert done.returncode == 2
-    [line] = done.stderr.strip().splitlines()
+    completed = spawn(tmp_path, "paint", "scene.xml", "--no-browser", "--port", "0")
+    assert completed.returncode == 2
+    [line] = completed.stderr.strip().splitlines()
     assert "scene.xml" in line
-    assert "http://127.0.0.1" in done.stdout  # the page was open by then
+    assert "http://127.0.0.1" in completed.stdout  # the page was open by then
     assert not list(tmp_path.glob("*.paint"))
 
 
@@ -150,10 +152,10 @@ def test_a_session_of_other_lights_is_refused_when_the_scene_tells(
 ) -> None:
     folder = path.parent / "s"
     Store.open(folder / "session.db", Identity.of([make_basis(2)])).close()
-    done = spawn(path.parent, "paint", path.name, "-o", "s", "--no-browser", "--port", "0")
-    assert done.returncode == 2
-    assert "session.db is a session of" in done.stderr
-    assert "(--new)" in done.stderr
+    completed = spawn(path.parent, "paint", path.name, "-o", "s", "--no-browser", "--port", "0")
+    assert completed.returncode == 2
+    assert "session.db is a session of" in completed.stderr
+    assert "(--new)" in completed.stderr
 
 
 def test_a_basis_that_no_page_can_hold_says_what_to_do(

@@ -19,5 +19,5 @@ def test_thumbnails_of_any_shape_are_small_and_show_its_mean(size: tuple[int, in
     shape = np.divide(small.shape[:2], max(small.shape[:2]))
     np.testing.assert_allclose(shape, np.divide(size, max(size)), atol=1 / max(small.shape[:2]))
     # Half a code of rounding each, and of a few pixels the parts of blocks that a box leaves out.
-    found, mean = small.mean(axis=(0, 1)), 255 * light.mean(axis=(0, 1))
-    np.testing.assert_allclose(found, mean, atol=0.6)
+    mean_code, mean = small.mean(axis=(0, 1)), 255 * light.mean(axis=(0, 1))
+    np.testing.assert_allclose(mean_code, mean, atol=0.6)

@@ -63,19 +63,19 @@ def test_what_a_session_says_arrives(fields: Any, given_arrays: Any, reply: int 
     described = content.pop("buffers")
     assert content == json.loads(json.dumps(_finite(fields)))
     assert len(frame) % 8 == 0
-    for (name, array), about, buffer in zip(given_arrays.items(), described, buffers, strict=True):
-        assert (about["name"], about["shape"]) == (name, list(array.shape))
-        got = np.frombuffer(buffer, DTYPES[about["dtype"]]).reshape(array.shape)
-        np.testing.assert_array_equal(got, array)
-        assert got.dtype.name == array.dtype.name
+    for (name, array), header, buffer in zip(given_arrays.items(), described, buffers, strict=True):
+        assert (header["name"], header["shape"]) == (name, list(array.shape))
+        received = np.frombuffer(buffer, DTYPES[header["dtype"]]).reshape(array.shape)
+        np.testing.assert_array_equal(received, array)
+        assert received.dtype.name == array.dtype.name
 
 
 def _finite(value: Any) -> Any:
     """NaN and Inf have no word in JSON."""
     if isinstance(value, dict):
-        return {key: _finite(one) for key, one in value.items()}
+        return {key: _finite(item) for key, item in value.items()}
     if isinstance(value, list):
-        return [_finite(one) for one in value]
+        return [_finite(item) for item in value]
     return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
@@ -83,15 +83,17 @@ def _finite(value: Any) -> Any:
 def test_paint_arrives_to_the_last_bit(seq: int, image: Any, stroke: int, is_final: bool) -> None:
     fields = {"seq": seq, "stroke": stroke, "region": [1, 3, 0, 3], "is_final": is_final}
     message = RawMessage("paint", fields, {"image": image, "importance": image[..., 0]})
-    number, said, got = parse_request(*from_frame(to_frame(message.content(), message.buffers())))
+    number, request, received = parse_request(
+        *from_frame(to_frame(message.content(), message.buffers()))
+    )
     assert number == seq
-    assert said == Paint(stroke, (1, 3, 0, 3), is_final)
-    assert got["image"].tobytes() == image.tobytes()
-    assert not got["importance"].flags.writeable
+    assert request == Paint(stroke, (1, 3, 0, 3), is_final)
+    assert received["image"].tobytes() == image.tobytes()
+    assert not received["importance"].flags.writeable
 
 
 def test_what_is_said_is_read_as_it_is_meant() -> None:
-    for kind, fields, meant in (
+    for kind, fields, meaning in (
         ("take_over", {}, TakeOver()),
         ("tie", {"ties": [["a", "b"], []]}, TieLights((("a", "b"), ()))),
         (
@@ -100,7 +102,7 @@ def test_what_is_said_is_read_as_it_is_meant() -> None:
             ChangeSettings({"hold": None, "space": "display"}),
         ),
     ):
-        assert parse_request({"kind": kind, "seq": 0, **fields}, [])[1] == meant
+        assert parse_request({"kind": kind, "seq": 0, **fields}, [])[1] == meaning
     names = {name.replace("_", ""): kind.__name__.lower() for name, kind in REQUESTS.items()}
     assert all(kind.startswith(name) for name, kind in names.items())
 
@@ -171,18 +173,18 @@ def test_what_is_no_number_is_refused(value: float, dtype: str) -> None:
 
 
 def test_two_buffers_of_one_name_are_refused() -> None:
-    about = {"name": "image", "dtype": "uint8", "shape": [1]}
+    header = {"name": "image", "dtype": "uint8", "shape": [1]}
     with pytest.raises(PaintError, match="image"):
-        parse_request({"kind": "undo", "seq": 1, "buffers": [about, about]}, [b"a", b"b"])
+        parse_request({"kind": "undo", "seq": 1, "buffers": [header, header]}, [b"a", b"b"])
 
 
 def test_lengths_that_nobody_has_are_refused_at_once() -> None:
     for length in (MAX_TEXT + 1, 2**32 - 1):
         with pytest.raises(PaintError):
             from_frame(struct.pack("<I", length) + bytes(16))
-    about = {"name": "image", "dtype": "float64", "shape": [65536] * 4}
+    header = {"name": "image", "dtype": "float64", "shape": [65536] * 4}
     with pytest.raises(PaintError, match="shorter"):
-        from_frame(to_frame({"kind": "paint", "seq": 1, "buffers": [about]}, []))
+        from_frame(to_frame({"kind": "paint", "seq": 1, "buffers": [header]}, []))
     deep = b"[" * 50_000
     with pytest.raises(PaintError, match="no JSON"):
         from_frame(struct.pack("<I", len(deep)) + deep)
@@ -208,8 +210,10 @@ def test_every_message_says_what_it_is() -> None:
 
 
 def test_what_is_left_out_and_what_is_null() -> None:
-    found = Findings(lights=(LightAnswer((1.0, 0.5, float("inf")), None, None, "#fff", True, 1.0),))
-    fields = fake_answer(**{"lights": found.lights}).fields
+    findings = Findings(
+        lights=(LightAnswer((1.0, 0.5, float("inf")), None, None, "#fff", True, 1.0),)
+    )
+    fields = fake_answer(**{"lights": findings.lights}).fields
     assert "headline" not in fields
     assert fields["lights"] == [
         {
@@ -230,7 +234,7 @@ def test_the_document_has_every_message_as_it_is() -> None:
     for kind in (*REQUESTS, *EVENTS):
         assert f"### `{kind}`" in text
     assert f'"protocol": {VERSION}' in text
-    for most in (MAX_OBSERVERS, MAX_PROPOSALS):
-        assert re.search(rf"\b{most}\b", text)
+    for limit in (MAX_OBSERVERS, MAX_PROPOSALS):
+        assert re.search(rf"\b{limit}\b", text)
     for dtype in DTYPES:
         assert f"`{dtype}`" in text

@@ -35,9 +35,9 @@ def subject(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Subject:
 
 
 def wait_until(is_so: Callable[[], Any], seconds: float = 120) -> None:
-    until = time.monotonic() + seconds
+    end = time.monotonic() + seconds
     while not is_so():
-        assert time.monotonic() < until
+        assert time.monotonic() < end
         time.sleep(0.02)
 
 
@@ -51,8 +51,8 @@ def paint(studio: Studio, stroke: int, light: tuple[float, float, float]) -> Non
 
 def test_paint_is_answered_as_surely_as_was_asked_for(subject: Subject):
     studio = Studio([subject], MemoryStore)
-    heard: list[Any] = []
-    studio.on_message = heard.append
+    messages: list[Any] = []
+    studio.on_message = messages.append
     studio.start()
     try:
         wait_until(lambda: studio.store is not None)
@@ -67,16 +67,16 @@ def test_paint_is_answered_as_surely_as_was_asked_for(subject: Subject):
         wait_until(is_sure)
         basis = studio.snapshot().bases[0]
         # Most of them are where the paint is.
-        where = np.zeros(basis.size, bool)
-        where[9:15, 4:12] = True
-        assert basis.extra[where].mean() > 2 * basis.extra[~where].mean()
+        painted_mask = np.zeros(basis.size, bool)
+        painted_mask[9:15, 4:12] = True
+        assert basis.extra[painted_mask].mean() > 2 * basis.extra[~painted_mask].mean()
         # Nothing more is taken then.
         time.sleep(1)
         assert studio.snapshot().bases[0].origin == basis.origin
 
         # Pages hear of it, and of its end.
         def shares() -> list[float]:
-            reports = [x for x in heard if isinstance(x, protocol.ProgressReport)]
+            reports = [x for x in messages if isinstance(x, protocol.ProgressReport)]
             return [x.done / x.total for x in reports if x.task == SAMPLING]
 
         assert 0 < shares()[0] < 1
@@ -135,23 +135,23 @@ def test_a_round_gives_way_to_the_brush(subject: Subject):
 
 
 def test_only_the_latest_is_worked_on():
-    seen: list[int] = []
-    begun, may_go_on = threading.Event(), threading.Event()
+    jobs_done: list[int] = []
+    first_begun, may_go_on = threading.Event(), threading.Event()
 
-    def work(which: int) -> None:
-        seen.append(which)
-        begun.set()
+    def work(job_number: int) -> None:
+        jobs_done.append(job_number)
+        first_begun.set()
         may_go_on.wait(60)
 
     loop = LatestWork(work, lambda _: None)
     thread = threading.Thread(target=loop.run)
     thread.start()
     loop.give(1)
-    begun.wait(60)
+    first_begun.wait(60)
     loop.give(2)
     loop.give(3)
     may_go_on.set()
-    wait_until(lambda: len(seen) == 2)
+    wait_until(lambda: len(jobs_done) == 2)
     loop.stop()
     thread.join(60)
-    assert seen == [1, 3]
+    assert jobs_done == [1, 3]

@@ -72,9 +72,9 @@ class ServedSession:
 
 @pytest.fixture
 def unknown_browser(tmp_path: Path) -> Iterator[ServedSession]:
-    served = ServedSession(tmp_path / "page")
-    with served.browser:
-        yield served
+    new_session = ServedSession(tmp_path / "page")
+    with new_session.browser:
+        yield new_session
 
 
 @pytest.fixture
@@ -88,10 +88,12 @@ def frame(kind: str, seq: int, arrays: dict[str, Any] | None = None, **fields: A
     return to_frame(message.content(), message.buffers())
 
 
-def paint(seq: int, stroke: int = 1, region: tuple[int, ...] = (0, 1, 0, 1), **how: Any) -> bytes:
+def paint(
+    seq: int, stroke: int = 1, region: tuple[int, ...] = (0, 1, 0, 1), **options: Any
+) -> bytes:
     size = region[1] - region[0], region[3] - region[2]
     arrays = {"image": np.ones((*size, 3), np.float32), "importance": np.ones(size, np.float32)}
-    return frame("paint", seq, arrays, stroke=stroke, region=list(region), **how)
+    return frame("paint", seq, arrays, stroke=stroke, region=list(region), **options)
 
 
 def receive(socket: WebSocketTestSession) -> dict[str, Any]:
@@ -133,10 +135,10 @@ def test_the_token_is_exchanged_for_a_key_and_for_nothing_that_a_browser_keeps(
     assert unknown_browser.browser.get("/data/present", headers=bearer(key)).status_code == 200
     # What opens the door is no key to the rooms; and an address grants nothing.
     assert unknown_browser.browser.get("/data/present", headers=bearer(token)).status_code == 410
-    for given in (token, key):
-        for path in (f"/key?token={given}", f"/data/present?token={given}&key={given}"):
+    for secret in (token, key):
+        for path in (f"/key?token={secret}", f"/data/present?token={secret}&key={secret}"):
             assert unknown_browser.browser.get(path).status_code == 403
-        cookie = {"cookie": f"lightpaint_{DEFAULT_PORT}={given}; key={given}"}
+        cookie = {"cookie": f"lightpaint_{DEFAULT_PORT}={secret}; key={secret}"}
         assert unknown_browser.browser.get("/data/present", headers=cookie).status_code == 403
 
 
@@ -150,19 +152,22 @@ def test_the_token_of_a_command_line_is_good_once(unknown_browser: ServedSession
 def test_the_token_of_a_command_line_is_good_soon_whatever_the_clock_says(
     unknown_browser: ServedSession, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    early, late = unknown_browser.guard.one_time_token(), unknown_browser.guard.one_time_token()
-    now = time.monotonic()
+    early_token, late_token = (
+        unknown_browser.guard.one_time_token(),
+        unknown_browser.guard.one_time_token(),
+    )
+    now_s = time.monotonic()
     monkeypatch.setattr(time, "time", lambda: 0.0)
-    assert unknown_browser.exchange(early).status_code == 200
-    monkeypatch.setattr(time, "monotonic", lambda: now + 121)
-    assert unknown_browser.exchange(late).status_code == 410
+    assert unknown_browser.exchange(early_token).status_code == 200
+    monkeypatch.setattr(time, "monotonic", lambda: now_s + 121)
+    assert unknown_browser.exchange(late_token).status_code == 410
 
 
 @pytest.mark.parametrize(
-    "shown", ["", "wrong", "é", '"', "Bearer", "Bearer ", "Basic {}", "{}", "Bearer {} {}"]
+    "credential", ["", "wrong", "é", '"', "Bearer", "Bearer ", "Basic {}", "{}", "Bearer {} {}"]
 )
-def test_what_is_no_key_opens_nothing(known_browser: ServedSession, shown: str) -> None:
-    headers = {"authorization": shown.format(known_browser.key, known_browser.key).encode()}
+def test_what_is_no_key_opens_nothing(known_browser: ServedSession, credential: str) -> None:
+    headers = {"authorization": credential.format(known_browser.key, known_browser.key).encode()}
     assert known_browser.browser.get("/data/present", headers=headers).status_code in (403, 410)
 
 
@@ -175,8 +180,8 @@ def test_a_socket_without_the_key_is_refused(known_browser: ServedSession) -> No
 
 
 def test_two_keys_are_none(known_browser: ServedSession) -> None:
-    one = ("authorization", f"Bearer {known_browser.key}")
-    asking = known_browser.browser.build_request("GET", "/data/present", headers=[one, one])
+    header = ("authorization", f"Bearer {known_browser.key}")
+    asking = known_browser.browser.build_request("GET", "/data/present", headers=[header, header])
     assert known_browser.browser.send(asking).status_code == 403
 
 
@@ -249,12 +254,12 @@ def test_a_socket_speaks_the_protocol_that_is_no_secret(known_browser: ServedSes
 def test_where_others_are_let_in_addresses_are_right_and_foreign_names_are_not(
     tmp_path: Path,
 ) -> None:
-    everywhere = Address("192.168.1.2", DEFAULT_PORT, Reach.ALL, frozenset({"studio"}))
-    served = ServedSession(tmp_path / "page", everywhere)
-    with served.browser:
+    wide_address = Address("192.168.1.2", DEFAULT_PORT, Reach.ALL, frozenset({"studio"}))
+    session = ServedSession(tmp_path / "page", wide_address)
+    with session.browser:
         for host in ("192.168.1.2:8421", "[fe80::1]:8421", "Studio:8421", "127.0.0.1:8421"):
-            assert served.exchange(served.guard.token, host=host).status_code == 200
-        assert served.exchange(served.guard.token, host="evil.net").status_code == 403
+            assert session.exchange(session.guard.token, host=host).status_code == 200
+        assert session.exchange(session.guard.token, host="evil.net").status_code == 403
 
 
 def test_only_reading_is_answered(known_browser: ServedSession) -> None:
@@ -307,9 +312,9 @@ def test_the_page_as_it_ships_is_whole_and_keeps_its_policy() -> None:
     table = page_files()
     page = table["/"].content.decode()
     assert not re.search(r"<script(?![^>]* src=)|<style|\s(?:style|on\w+)=", page)
-    named = re.findall(r'(?:src|href)="(?!data:)([^"]+)"', page)
-    assert named
-    for name in named:
+    links = re.findall(r'(?:src|href)="(?!data:)([^"]+)"', page)
+    assert links
+    for name in links:
         assert f"/{name}" in table, name
     imports = re.compile(
         r"""(?:^|\n)(?:import|export)\b[^'"\n;]*?(?:\n[^'";]*?)?from ['"]([^'"]+)"""
@@ -335,8 +340,8 @@ def test_pictures_are_raw_bytes_by_name(known_browser: ServedSession) -> None:
         answer = known_browser.browser.get(f"/data/{name}")
         assert answer.headers["x-dtype"] == picture.dtype.name
         shape = tuple(map(int, answer.headers["x-shape"].split(",")))
-        got = np.frombuffer(answer.content, picture.dtype.newbyteorder("<")).reshape(shape)
-        np.testing.assert_array_equal(got, picture)
+        received = np.frombuffer(answer.content, picture.dtype.newbyteorder("<")).reshape(shape)
+        np.testing.assert_array_equal(received, picture)
     for name in ("none", "../present", "%2e%2e/present", "present/", "x" * 999, "plane/%00"):
         assert known_browser.browser.get(f"/data/{name}").status_code == 404
 
@@ -344,11 +349,11 @@ def test_pictures_are_raw_bytes_by_name(known_browser: ServedSession) -> None:
 def test_a_picture_is_kept_by_its_generation_only(known_browser: ServedSession) -> None:
     with known_browser.socket() as socket:
         greet(socket)
-        kept = known_browser.browser.get("/data/present?g=1").headers
-        assert "immutable" in kept["cache-control"]
-        assert kept["vary"] == "Authorization"
-        for asked in ("", "?g=0", "?g=2", "?g=x"):
-            answer = known_browser.browser.get(f"/data/present{asked}")
+        headers = known_browser.browser.get("/data/present?g=1").headers
+        assert "immutable" in headers["cache-control"]
+        assert headers["vary"] == "Authorization"
+        for query in ("", "?g=0", "?g=2", "?g=x"):
+            answer = known_browser.browser.get(f"/data/present{query}")
             assert answer.headers["cache-control"] == "no-store"
         assert known_browser.session.on_message is not None
         known_browser.session.on_message(PictureUpdate(resources={"present": 2}))
@@ -364,9 +369,9 @@ def test_a_picture_is_kept_by_its_generation_only(known_browser: ServedSession) 
 
 def test_each_message_is_answered_by_its_number(known_browser: ServedSession) -> None:
     with known_browser.socket() as socket:
-        told = greet(socket, 7)
-        assert (told["reply"], told["kind"], told["is_back"]) == (7, "state", False)
-        assert greet(socket, 7) == told | {"is_back": True}
+        message = greet(socket, 7)
+        assert (message["reply"], message["kind"], message["is_back"]) == (7, "state", False)
+        assert greet(socket, 7) == message | {"is_back": True}
         socket.send_bytes(paint(8))
         content, [weights] = from_frame(socket.receive_bytes())
         assert (content["kind"], content["reply"]) == ("answer", 8)
@@ -519,9 +524,9 @@ def test_the_session_is_free_when_its_tab_has_gone(known_browser: ServedSession)
 def test_a_page_that_is_back_after_a_dropped_connection_has_its_session(
     known_browser: ServedSession,
 ) -> None:
-    with known_browser.socket("same") as first, known_browser.socket("same") as again:
+    with known_browser.socket("same") as first, known_browser.socket("same") as second:
         greet(first)
-        assert greet(again)["kind"] == "state"
+        assert greet(second)["kind"] == "state"
         with pytest.raises(WebSocketDisconnect):  # and is not told that another has it
             first.receive_bytes()
 
@@ -551,10 +556,10 @@ def test_all_are_told_of_the_end(unknown_browser: ServedSession) -> None:
 class ScriptedSocket:
     """A socket whose other end has said all it will say at once."""
 
-    def __init__(self, *frames: bytes, leaves: bool = True) -> None:
-        goodbye = [{"type": "websocket.disconnect", "code": 1001}] if leaves else []
-        said = [{"type": "websocket.receive", "bytes": frame} for frame in frames]
-        self.to_hear, self.sent = [*said, *goodbye], list[dict[str, Any]]()
+    def __init__(self, *frames: bytes, with_goodbye: bool = True) -> None:
+        goodbye = [{"type": "websocket.disconnect", "code": 1001}] if with_goodbye else []
+        events = [{"type": "websocket.receive", "bytes": frame} for frame in frames]
+        self.to_hear, self.sent = [*events, *goodbye], list[dict[str, Any]]()
 
     async def receive(self) -> Any:
         if not self.to_hear:
@@ -572,7 +577,7 @@ HELLO = frame("hello", 0, version=VERSION)
 
 
 def strokes_of(session: FakeSession) -> list[int]:
-    return [said.stroke for said in session.heard if isinstance(said, Paint)]
+    return [request.stroke for request in session.heard if isinstance(request, Paint)]
 
 
 def test_what_a_page_says_last_is_done_though_it_has_gone() -> None:
@@ -580,19 +585,21 @@ def test_what_a_page_says_last_is_done_though_it_has_gone() -> None:
     session.before_paint = lambda: time.sleep(0.02)
 
     async def trial() -> None:
-        its = Connections(session, None)
-        its.attach()
+        connections = Connections(session, None)
+        connections.attach()
         strokes = [paint(k, stroke=k, is_final=True) for k in (1, 2, 3)]
-        page = asyncio.ensure_future(its.serve(client.Client(ScriptedSocket(HELLO, *strokes), "a")))
+        page = asyncio.ensure_future(
+            connections.serve(client.Client(ScriptedSocket(HELLO, *strokes), "a"))
+        )
         await asyncio.sleep(0.03)  # it has left, and is not done with
-        after = ScriptedSocket(HELLO, paint(4, stroke=4, is_final=True), leaves=False)
-        other = asyncio.ensure_future(its.serve(client.Client(after, "b")))
+        after = ScriptedSocket(HELLO, paint(4, stroke=4, is_final=True), with_goodbye=False)
+        other = asyncio.ensure_future(connections.serve(client.Client(after, "b")))
         await page
         while len(after.sent) < 2:  # what is done may not have been sent yet
             await asyncio.sleep(0.01)
         other.cancel()
         assert after.sent[0]["kind"] == "state"  # and not that it is open in another tab
-        await its.close()
+        await connections.close()
 
     run_in_loop(trial)
     assert strokes_of(session) == [1, 2, 3, 4]
@@ -602,10 +609,10 @@ def test_a_page_that_greets_and_goes_is_not_waited_for() -> None:
     session = FakeSession()
 
     async def trial() -> None:
-        its = Connections(session, None)
-        its.attach()
-        await its.serve(client.Client(ScriptedSocket(HELLO, HELLO, paint(1), HELLO), "a"))
-        await its.close()
+        connections = Connections(session, None)
+        connections.attach()
+        await connections.serve(client.Client(ScriptedSocket(HELLO, HELLO, paint(1), HELLO), "a"))
+        await connections.close()
 
     run_in_loop(trial)
     assert strokes_of(session) == [1]
@@ -616,15 +623,15 @@ def test_what_was_said_before_the_end_is_done() -> None:
     session.before_paint = lambda: time.sleep(0.02)
 
     async def trial() -> None:
-        its = Connections(session, None)
-        its.attach()
+        connections = Connections(session, None)
+        connections.attach()
         socket = ScriptedSocket(
-            HELLO, *(paint(k, stroke=k, is_final=True) for k in (1, 2, 3)), leaves=False
+            HELLO, *(paint(k, stroke=k, is_final=True) for k in (1, 2, 3)), with_goodbye=False
         )
-        serving = asyncio.ensure_future(its.serve(client.Client(socket, "a")))
+        serving = asyncio.ensure_future(connections.serve(client.Client(socket, "a")))
         while not strokes_of(session):
             await asyncio.sleep(0.001)
-        await its.close()
+        await connections.close()
         serving.cancel()
         assert socket.sent[-1]["reason"] == "ended"
 
@@ -635,25 +642,25 @@ def test_what_was_said_before_the_end_is_done() -> None:
 def test_a_page_can_be_given_up_at_any_step() -> None:
     """Whoever gives it up, as a test client does when it leaves, hears of its own word alone."""
 
-    async def given_up_after(steps: int, *, leaves: bool) -> None:
-        its = Connections(FakeSession(), None)
-        its.attach()
-        page = client.Client(ScriptedSocket(HELLO, leaves=leaves), "a")
-        serving = asyncio.ensure_future(its.serve(page))
+    async def given_up_after(steps: int, *, with_goodbye: bool) -> None:
+        connections = Connections(FakeSession(), None)
+        connections.attach()
+        page = client.Client(ScriptedSocket(HELLO, with_goodbye=with_goodbye), "a")
+        serving = asyncio.ensure_future(connections.serve(page))
         for _ in range(steps):
             await asyncio.sleep(0)
         serving.cancel("given up")
         try:
             await serving
             words: tuple[str, ...] = ("given up",)  # it has ended before
-        except asyncio.CancelledError as heard:
-            words = heard.args
+        except asyncio.CancelledError as cancellation:
+            words = cancellation.args
         assert words == ("given up",), steps
-        await its.close()
+        await connections.close()
 
     for steps in range(40):
-        for leaves in (False, True):
-            run_in_loop(partial(given_up_after, steps, leaves=leaves))
+        for with_goodbye in (False, True):
+            run_in_loop(partial(given_up_after, steps, with_goodbye=with_goodbye))
 
 
 # Pages that are slow
@@ -693,7 +700,7 @@ class SlowSocket(ScriptedSocket):
     """A socket whose other end asks for much, and takes one answer when it is let."""
 
     def __init__(self, *frames: bytes) -> None:
-        super().__init__(*frames, leaves=False)
+        super().__init__(*frames, with_goodbye=False)
         self.is_let = asyncio.Event()
 
     async def send_bytes(self, data: bytes) -> None:
@@ -707,30 +714,30 @@ def test_a_page_that_asks_and_does_not_listen_is_answered_no_further(
     """Else pictures without number would wait for it in memory."""
     monkeypatch.setattr(client, "MAX_UNSENT_BYTES", 1000)
     count = 50
-    session, asked = FakeSession(), list[Any]()
+    session, requests = FakeSession(), list[Any]()
 
-    def said(said: Any, arrays: Any) -> list[Message]:
-        asked.append(said)
-        return [PictureData(name=said.name, data=np.zeros(100, np.float64))]
+    def handle(request: Any, arrays: Any) -> list[Message]:
+        requests.append(request)
+        return [PictureData(name=request.name, data=np.zeros(100, np.float64))]
 
-    session.handle = said  # type: ignore[method-assign]
+    session.handle = handle  # type: ignore[method-assign]
 
     async def trial() -> None:
-        its = Connections(session, None)
-        its.attach()
+        connections = Connections(session, None)
+        connections.attach()
         socket = SlowSocket(HELLO, *(frame("fetch", k, name="x") for k in range(1, count + 1)))
-        page = asyncio.ensure_future(its.serve(client.Client(socket, "a")))
-        while len(asked) < 2:
+        page = asyncio.ensure_future(connections.serve(client.Client(socket, "a")))
+        while len(requests) < 2:
             await asyncio.sleep(0.001)
         for _ in range(20):
             await asyncio.sleep(0.005)
-        assert len(asked) <= 3
+        assert len(requests) <= 3
         socket.is_let.set()
         while len(socket.sent) <= count:
             await asyncio.sleep(0.001)
         page.cancel()
-        assert [one["reply"] for one in socket.sent] == list(range(count + 1))
-        await its.close()
+        assert [message["reply"] for message in socket.sent] == list(range(count + 1))
+        await connections.close()
 
     run_in_loop(trial)
 
@@ -742,42 +749,42 @@ def test_what_a_page_has_said_at_length_is_answered_before_it_says_more(
     monkeypatch.setattr(client, "MAX_QUEUED_BYTES", 3 * len(frames[0]))
 
     async def trial() -> None:
-        socket = ScriptedSocket(*frames, leaves=False)
+        socket = ScriptedSocket(*frames, with_goodbye=False)
         page = client.Client(socket)
         signals_as_interrupts = asyncio.ensure_future(page.receive_all())
         for _ in range(50):
             await asyncio.sleep(0)
         assert len(frames) - len(socket.to_hear) == 4
         for stroke in range(1, 20):  # none is lost
-            heard = await page.next_message()
-            assert isinstance(heard.request, Paint)
-            assert heard.request.stroke == stroke
+            message = await page.next_message()
+            assert isinstance(message.request, Paint)
+            assert message.request.stroke == stroke
         signals_as_interrupts.cancel()
 
     run_in_loop(trial)
 
 
 def test_two_pages_that_fight_over_the_session_harm_nobody(known_browser: ServedSession) -> None:
-    with known_browser.socket("a") as one, known_browser.socket("b") as other:
-        greet(one)
-        pages = [one, other]
+    with known_browser.socket("a") as first, known_browser.socket("b") as other:
+        greet(first)
+        pages = [first, other]
         for turn in range(40):
             page, loser = pages[turn % 2], pages[1 - turn % 2]
             page.send_bytes(frame("take_over", 2 * turn))
             page.send_bytes(paint(2 * turn + 1, stroke=turn, is_final=True))
             kinds = list[str]()
             while kinds[-1:] != ["answer"]:
-                told = receive(page)
-                kinds.append(told["kind"])
-                assert told["kind"] in ("state", "answer", "closed")
-                assert told["kind"] != "closed" or "reply" not in told
+                message = receive(page)
+                kinds.append(message["kind"])
+                assert message["kind"] in ("state", "answer", "closed")
+                assert message["kind"] != "closed" or "reply" not in message
             loser.send_bytes(paint(10_000 + turn, stroke=turn, is_final=True))
-            while (told := receive(loser)).get("reply") != 10_000 + turn:
-                assert told["kind"] == "closed"
-            assert told["reason"] == "taken"
-    assert [said.stroke for said in known_browser.session.heard if isinstance(said, Paint)] == [
-        *range(40)
-    ]
+            while (message := receive(loser)).get("reply") != 10_000 + turn:
+                assert message["kind"] == "closed"
+            assert message["reason"] == "taken"
+    assert [
+        request.stroke for request in known_browser.session.heard if isinstance(request, Paint)
+    ] == [*range(40)]
 
 
 def test_answers_to_what_was_asked_are_not_dropped_and_who_is_too_slow_is_sent_away() -> None:

@@ -73,20 +73,20 @@ def basis() -> lp.Basis:
     return overlapping_lights()
 
 
-def session_of(basis: lp.Basis, store: MemoryStore | None = None, **how: Any) -> Session:
+def session_of(basis: lp.Basis, store: MemoryStore | None = None, **options: Any) -> Session:
     """A session as the command line makes it."""
-    return session_of_views([basis], store, **how)
+    return session_of_views([basis], store, **options)
 
 
 def session_of_views(
-    bases: list[lp.Basis], store: MemoryStore | None = None, **how: Any
+    bases: list[lp.Basis], store: MemoryStore | None = None, **options: Any
 ) -> Session:
     """The same, of several views."""
     return Session(
         bases,
         [basis.current_look for basis in bases],
         store or MemoryStore(Identity.of(bases)),
-        settings=Settings(**how),
+        settings=Settings(**options),
         transform=lp.ViewTransform(),
     )
 
@@ -118,8 +118,8 @@ def test_an_answer_is_that_of_solve(basis: lp.Basis):
     assert solution is not None
     [target] = snapshot.targets
     assert target is not None
-    asked = Constraints.of({basis.names[2]: {"lock": "80%"}})
-    expected = lp.solve(basis, target, constraints=asked)
+    constraints = Constraints.of({basis.names[2]: {"lock": "80%"}})
+    expected = lp.solve(basis, target, constraints=constraints)
     np.testing.assert_array_equal(solution.weights, expected.weights)
     assert solution.space == "display"
     assert solution.problem.fit.hold == DEFAULT_HOLD
@@ -140,10 +140,10 @@ def test_under_the_brush_it_is_near_the_exact_answer(basis: lp.Basis, space: Any
     solution = session.snapshot().solution()
     assert solution is not None
     size = np.sqrt(basis.power) * solution.weights
-    apart = np.sqrt(basis.power) * np.abs(answer.arrays["weights"] - solution.weights)
+    error = np.sqrt(basis.power) * np.abs(answer.arrays["weights"] - solution.weights)
     # In linear light the sums are those of the exact answer; a film of few pixels and two rounds
     # are as near as their averages.
-    assert apart.max() < (1e-6 if space == "linear" else 2e-2) * size.max()
+    assert error.max() < (1e-6 if space == "linear" else 2e-2) * size.max()
 
 
 @pytest.mark.parametrize("space", ["linear", "display"])
@@ -173,13 +173,13 @@ def test_several_views_have_one_answer_that_of_solve(space: Any):
     bases = two_views()
     session = session_of_views(bases, space=space)
     session.handle(*paint(1, (2, 9, 3, 12), 0.9))
-    alone = session.snapshot().solution()
-    assert alone is not None
+    single_solution = session.snapshot().solution()
+    assert single_solution is not None
     # A view counts as soon as something is painted in it.
     first = session.snapshot().targets[0]
     assert first is not None
     expected = lp.solve(bases[0], first, space=space)
-    np.testing.assert_array_equal(alone.weights, expected.weights)
+    np.testing.assert_array_equal(single_solution.weights, expected.weights)
     answer = None
     for k in range(4):
         [answer] = session.handle(*paint(2, (1, 6, 2, 4 + 2 * k), 0.3, is_final=k == 3, view=1))
@@ -192,11 +192,11 @@ def test_several_views_have_one_answer_that_of_solve(space: Any):
     joint_progress = lp.solve(bases, targets, space=space)
     np.testing.assert_array_equal(solution.weights, joint_progress.weights)
     size = np.sqrt(bases[0].power + bases[1].power)
-    apart = size * np.abs(answer.arrays["weights"] - joint_progress.weights)
+    error = size * np.abs(answer.arrays["weights"] - joint_progress.weights)
     # As of one view: sums are exact, and a film of few pixels is as near as its averages.
     limit = 1e-6 if space == "linear" else 2e-2
-    assert apart.max() < limit * (size * joint_progress.weights).max()
-    assert np.abs(size * (joint_progress.weights - alone.weights)).max() > 4 * apart.max()
+    assert error.max() < limit * (size * joint_progress.weights).max()
+    assert np.abs(size * (joint_progress.weights - single_solution.weights)).max() > 4 * error.max()
 
 
 def test_undo_goes_through_views_in_order():
@@ -214,8 +214,8 @@ def test_undo_goes_through_views_in_order():
         view.view: Pixels(np.full((*view.size, 3), 0.5), np.ones(view.size))
         for view in session.views
     }
-    made = session.load(paintings, session.requests, "look")
-    assert [message.fields["view"] for message in made] == [0, 1]
+    pictures = session.load(paintings, session.requests, "look")
+    assert [message.fields["view"] for message in pictures] == [0, 1]
     assert len(session.store.steps) == 1
     session.handle(protocol.Undo(), {})
     assert not session.is_painted
@@ -259,28 +259,33 @@ def test_any_sequence_equals_a_rebuild(actions: list[Any]):
     bases = two_views()
     store = MemoryStore(Identity.of(bases))
     session, stroke = session_of_views(bases, store), 0
-    for what, *its in actions:
+    for action, *values in actions:
         try:
-            match what:
+            match action:
                 case "paint":
                     stroke += 1
-                    message, arrays = paint(stroke, its[0], its[1], is_final=its[2], view=its[3])
+                    message, arrays = paint(
+                        stroke, values[0], values[1], is_final=values[2], view=values[3]
+                    )
                     session.handle(message, arrays)
                 case "ask":
-                    session.handle(protocol.ConstrainLight(its[0], its[1]), {})
+                    session.handle(protocol.ConstrainLight(values[0], values[1]), {})
                 case "slide":
                     session.handle(
-                        protocol.ConstrainLight(its[0], {"lock": its[1]}, is_final=its[2]), {}
+                        protocol.ConstrainLight(values[0], {"lock": values[1]}, is_final=values[2]),
+                        {},
                     )
                 case "load":
-                    pixels = Pixels(np.full((*SIZE, 3), its[0]), np.ones(SIZE))
+                    pixels = Pixels(np.full((*SIZE, 3), values[0]), np.ones(SIZE))
                     session.load(
-                        {0: pixels}, SessionRequests({"lamp 0": its[1]} if its[1] else {}), "look"
+                        {0: pixels},
+                        SessionRequests({"lamp 0": values[1]} if values[1] else {}),
+                        "look",
                     )
                 case "leave":
-                    session.client_left(with_stroke=its[0])
+                    session.client_left(with_stroke=values[0])
                 case "set":
-                    session.handle(protocol.ChangeSettings({"colors": its[0]}), {})
+                    session.handle(protocol.ChangeSettings({"colors": values[0]}), {})
                 case "undo":
                     session.handle(protocol.Undo(), {})
                 case "redo":
@@ -290,16 +295,16 @@ def test_any_sequence_equals_a_rebuild(actions: list[Any]):
         except lp.LightpaintError:
             pass
     session.handle(protocol.DropStroke(stroke), {})
-    again = session_of_views(bases, store)
-    for one, other, basis in zip(session.views, again.views, bases, strict=True):
-        np.testing.assert_array_equal(one.image, other.image)
-        np.testing.assert_array_equal(one.importance, other.importance)
-        unpainted = one.importance == 0
-        assert (one.image[unpainted] == basis.current_look[unpainted]).all()
-    assert session.requests == again.requests
-    assert session.snapshot().constraints == again.snapshot().constraints
-    assert session.snapshot().settings == again.snapshot().settings
-    assert session.is_painted == again.is_painted
+    rebuilt = session_of_views(bases, store)
+    for session_view, other, basis in zip(session.views, rebuilt.views, bases, strict=True):
+        np.testing.assert_array_equal(session_view.image, other.image)
+        np.testing.assert_array_equal(session_view.importance, other.importance)
+        unpainted = session_view.importance == 0
+        assert (session_view.image[unpainted] == basis.current_look[unpainted]).all()
+    assert session.requests == rebuilt.requests
+    assert session.snapshot().constraints == rebuilt.snapshot().constraints
+    assert session.snapshot().settings == rebuilt.snapshot().settings
+    assert session.is_painted == rebuilt.is_painted
     # All the way back is the beginning.
     while store.position:
         session.handle(protocol.Undo(), {})
@@ -310,7 +315,7 @@ def test_any_sequence_equals_a_rebuild(actions: list[Any]):
 
 
 @pytest.mark.parametrize(
-    ("message", "arrays", "said"),
+    ("message", "arrays", "message_text"),
     [
         (paint(1, (0, 99, 0, 4), 1)[0], paint(1, (0, 9, 0, 4), 1)[1], "the picture is 32x18"),
         (paint(1, (0, 9, 0, 4), 1)[0], {}, "without its image"),
@@ -327,11 +332,11 @@ def test_any_sequence_equals_a_rebuild(actions: list[Any]):
     ],
 )
 def test_what_cannot_be_is_said_and_changes_nothing(
-    basis: lp.Basis, message: Any, arrays: Any, said: str
+    basis: lp.Basis, message: Any, arrays: Any, message_text: str
 ):
     session = session_of(basis)
     before = session.views[0].image.copy(), session.requests, session.version
-    with pytest.raises(lp.LightpaintError, match=said):
+    with pytest.raises(lp.LightpaintError, match=message_text):
         session.handle(message, arrays)
     np.testing.assert_array_equal(session.views[0].image, before[0])
     assert (session.requests, session.version) == before[1:]
@@ -376,40 +381,40 @@ def test_several_lights_are_asked_in_one_step(basis: lp.Basis):
     session = session_of(basis)
     for light in (0, 1):
         session.handle(protocol.ConstrainLight(light, {"lock": True}), {})
-    held = session.requests
+    requests_before = session.requests
     session.handle(
         protocol.ConstrainLights({"lamp 0": {}, "lamp 1": {"limits": {"max": "150%"}}}), {}
     )
     assert session.requests.lights == {"lamp 1": {"limits": {"max": "150%"}}}
     session.handle(protocol.Undo(), {})
-    assert session.requests == held
+    assert session.requests == requests_before
     with pytest.raises(lp.LightpaintError, match="nobody"):
         session.handle(protocol.ConstrainLights({"nobody": {}}), {})
-    assert session.requests == held
+    assert session.requests == requests_before
 
 
 @pytest.mark.parametrize("space", ["linear", "display"])
 def test_a_hand_on_one_of_tied_lights_moves_all_of_them(basis: lp.Basis, space: Any):
     """One holds them at a time, and undo gives it back to the one before."""
     session = session_of(basis, space=space)
-    zero, one = (np.array(light.emission) for light in basis.lights[:2])
+    zero, emission = (np.array(light.emission) for light in basis.lights[:2])
     session.handle(*paint(1, (2, 9, 3, 12), 0.9))
     ask, tie = protocol.ConstrainLight, protocol.TieLights((("lamp 0", "lamp 1"),))
-    session.handle(ask(1, {"lock": (3 * one).tolist()}), {})
+    session.handle(ask(1, {"lock": (3 * emission).tolist()}), {})
     session.handle(ask(0, {"off": True}), {})
     session.handle(tie, {})  # of both the first stands
     assert not session.weights[:2].any()
     session.handle(ask(0, {"lock": (2 * zero).tolist()}, is_final=False), {})
-    np.testing.assert_allclose(session.weights[:2], [2 * zero, 2 * one], rtol=1e-9)
+    np.testing.assert_allclose(session.weights[:2], [2 * zero, 2 * emission], rtol=1e-9)
     session.handle(ask(0, {"lock": (2 * zero).tolist()}), {})
-    session.handle(ask(1, {"lock": (4 * one).tolist()}), {})
-    np.testing.assert_allclose(session.weights[:2], [4 * zero, 4 * one], rtol=1e-9)
+    session.handle(ask(1, {"lock": (4 * emission).tolist()}), {})
+    np.testing.assert_allclose(session.weights[:2], [4 * zero, 4 * emission], rtol=1e-9)
     assert list(session.requests.lights) == ["lamp 1"]
     session.handle(protocol.Undo(), {})
-    np.testing.assert_allclose(session.weights[:2], [2 * zero, 2 * one], rtol=1e-9)
+    np.testing.assert_allclose(session.weights[:2], [2 * zero, 2 * emission], rtol=1e-9)
     session.handle(ask(0, {}), {})
     assert session.requests.lights == {}
-    share = session.weights[:2] / [zero, one]
+    share = session.weights[:2] / [zero, emission]
     np.testing.assert_allclose(share, share[0, 0], rtol=1e-9)  # they still go together
 
 
@@ -429,8 +434,8 @@ def test_what_is_held_is_let_go_of_by_zero(basis: lp.Basis):
 
 def test_a_setting_is_undone_by_the_name_that_the_page_has_for_it():
     page = REPOSITORY / "lightpaint" / "paint" / "page" / "ui" / "settings_panel.js"
-    shown = re.findall(r'<\$\{Row\} title="([^"]+)"', page.read_text("utf-8"))
-    assert list(TITLES.values()) == shown
+    titles = re.findall(r'<\$\{Row\} title="([^"]+)"', page.read_text("utf-8"))
+    assert list(TITLES.values()) == titles
     assert set(TITLES) == {*FIT_KEYS, *ALL_LIGHTS_KEYS}
 
 

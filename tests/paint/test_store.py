@@ -67,38 +67,38 @@ def test_any_sequence_is_there_again(
         if action == "append":
             steps = [*steps[:position], step(value)]
             position += 1
-            for one in (store, memory):
-                one.append(step(value))
+            for each_store in (store, memory):
+                each_store.append(step(value))
         elif action in ("undo", "redo"):
             position = min(max(position + (1 if action == "redo" else -1), 0), len(steps))
-            for one in (store, memory):
-                one.move_to(position)
+            for each_store in (store, memory):
+                each_store.move_to(position)
         elif action == "reopen":
             store.close()
             store = Store.open(path, IDENTITY)
         elif action == "put":
             looks[value] = look(value, k)
-            for one in (store, memory):
-                one.put_look(look(value, k))
+            for each_store in (store, memory):
+                each_store.put_look(look(value, k))
         elif action == "drop" and value in looks:
             del looks[value]
-            for one in (store, memory):
-                one.drop_look(value)
+            for each_store in (store, memory):
+                each_store.drop_look(value)
         elif action in ("rename", "copy") and value in looks:
             number = value if action == "rename" else value + 10
             looks[number] = replace(looks[value], id=number, fields={"name": f"other {k}"})
-            for one in (store, memory):
-                [kept] = [x for x in one.looks() if x.id == value]
-                one.put_look(replace(kept, id=number, fields={"name": f"other {k}"}))
+            for each_store in (store, memory):
+                [kept_look] = [x for x in each_store.looks() if x.id == value]
+                each_store.put_look(replace(kept_look, id=number, fields={"name": f"other {k}"}))
     expected = Plain(steps, position, looks)
     assert content(store)[:2] == content(memory)[:2] == content(expected)[:2]
-    for one in (store, memory):
-        assert sorted(content(one)[2]) == sorted(content(expected)[2])
-    was = content(store)
+    for each_store in (store, memory):
+        assert sorted(content(each_store)[2]) == sorted(content(expected)[2])
+    content_before = content(store)
     store.close()
     store = Store.open(path, IDENTITY)
-    assert content(store)[:2] == was[:2]
-    assert content(store)[2] == sorted(was[2])
+    assert content(store)[:2] == content_before[:2]
+    assert content(store)[2] == sorted(content_before[2])
     store.close()
     memory.close()
 
@@ -110,15 +110,17 @@ def test_the_canvas_is_every_patch_put_down_in_order(seeds: list[int], view: int
     start = Pixels.unpainted(rng.random((*SIZE, 3)).astype(np.float32))
     image, importance, _ = start.copy()
     at_least = np.zeros(image.shape, bool)
-    for one in steps:
-        for its in one.patches:
-            if its.view == view:
-                top, bottom, left, right = its.region
-                here, after = np.s_[top:bottom, left:right], its.after
-                image[here], importance[here] = after.image, after.importance
-                at_least[here] = False if after.at_least is None else after.at_least
-    got = replay([its for one in steps for its in one.patches if its.view == view], start)
-    assert got.equals(Pixels(image, importance, at_least))
+    for a_step in steps:
+        for a_patch in a_step.patches:
+            if a_patch.view == view:
+                top, bottom, left, right = a_patch.region
+                area, after = np.s_[top:bottom, left:right], a_patch.after
+                image[area], importance[area] = after.image, after.importance
+                at_least[area] = False if after.at_least is None else after.at_least
+    replayed = replay(
+        [a_patch for a_step in steps for a_patch in a_step.patches if a_patch.view == view], start
+    )
+    assert replayed.equals(Pixels(image, importance, at_least))
 
 
 def test_every_bit_of_a_number_is_kept(tmp_path: Path) -> None:
@@ -129,10 +131,10 @@ def test_every_bit_of_a_number_is_kept(tmp_path: Path) -> None:
         before, after = Pixels(odd, amount), Pixels(-odd, amount, marks)
         change = Patch((0, 1, 0, 2), before, after)
         store.append(Step("stroke", "odd", {}, (change,)))
-        [kept] = store.steps[0].patches
-        assert told(kept.before) == told(before)
-        assert told(kept.after) == told(after)
-        assert not kept.after[0].flags.writeable
+        [read_patch] = store.steps[0].patches
+        assert told(read_patch.before) == told(before)
+        assert told(read_patch.after) == told(after)
+        assert not read_patch.after[0].flags.writeable
 
 
 def test_what_is_unpacked_is_no_longer_than_it_says() -> None:
@@ -177,29 +179,33 @@ def test_killed_at_any_moment_all_that_was_acknowledged_is_there(tmp_path: Path)
         with start_writer(path) as process:
             assert process.stdout is not None
             assert process.stdout.readline() == f"open {steps}\n"
-            heard = "".join(process.stdout.readline() for _ in range(chance.randrange(3, 12)))
+            output = "".join(process.stdout.readline() for _ in range(chance.randrange(3, 12)))
             time.sleep(chance.uniform(0, 0.02))  # in the middle of whatever comes next
             process.kill()
             # It may have been killed in the middle of a line.
-            lines = (heard + process.stdout.read()).splitlines(keepends=True)
-            said = [line.split() for line in lines if line.endswith("\n")]
-        acknowledged = [int(words[1]) for words in said if words[0] == "step"]
-        looks = {int(words[1]) % 7: int(words[1]) for words in said if words[0] == "look"}
+            lines = (output + process.stdout.read()).splitlines(keepends=True)
+            acknowledged_lines = [line.split() for line in lines if line.endswith("\n")]
+        acknowledged = [int(words[1]) for words in acknowledged_lines if words[0] == "step"]
+        looks = {
+            int(words[1]) % 7: int(words[1]) for words in acknowledged_lines if words[0] == "look"
+        }
         with Store.open(path, IDENTITY) as store:
             # One more may have been written, and not been told of yet.
-            there = len(store.steps)
+            step_count = len(store.steps)
             least = steps + len(acknowledged)
-            assert there in (least, least + 1)
-            assert store.position == there
-            assert content(store)[1] == content(Plain([step(k) for k in range(there)], 0, {}))[1]
-            kept = {one.id: one for one in store.looks()}
-            for number, of in looks.items():
-                latest = int(kept[number].fields["name"].split()[1])
-                assert latest >= of
-                assert told(kept[number].arrays.values()) == told(
+            assert step_count in (least, least + 1)
+            assert store.position == step_count
+            assert (
+                content(store)[1] == content(Plain([step(k) for k in range(step_count)], 0, {}))[1]
+            )
+            kept_looks = {kept_look.id: kept_look for kept_look in store.looks()}
+            for number, steps_then in looks.items():
+                latest = int(kept_looks[number].fields["name"].split()[1])
+                assert latest >= steps_then
+                assert told(kept_looks[number].arrays.values()) == told(
                     look(number, latest).arrays.values()
                 )
-        steps = there
+        steps = step_count
     assert steps > 6
 
 
@@ -245,28 +251,28 @@ def test_a_full_disk_loses_nothing_and_is_written_when_there_is_room(disk: Path)
         number += 1
         assert number < 1000
     assert f"since {path} cannot be written (database or disk is full)" in store.unsaved
-    written = number - 1
+    written_steps = number - 1
     # Life goes on in memory: paint, undo, looks.
     store.append(big(number))
     store.put_look(look(1, 1))
     store.move_to(number)
     assert store.flush() is not None
-    was = content(store)
-    assert len(was[1]) == number + 1
+    content_before = content(store)
+    assert len(content_before[1]) == number + 1
     copy = disk.parent / "copy.db"
     for ending in ("", "-wal"):
         shutil.copy(f"{path}{ending}", f"{copy}{ending}")
     with Store.open(copy, IDENTITY) as left:  # as if it were killed now
-        assert content(left)[1] == was[1][:written]
+        assert content(left)[1] == content_before[1][:written_steps]
         assert left.looks() == []
     subprocess.run(["mount", "-o", "remount,size=8m", str(disk)], check=True)
     assert store.flush() is None
     assert store.unsaved is None
     store.append(big(0))
-    was = content(store)
+    content_before = content(store)
     store.close()
-    with Store.open(path, IDENTITY) as again:
-        assert content(again) == was
+    with Store.open(path, IDENTITY) as reopened:
+        assert content(reopened) == content_before
 
 
 def test_what_cannot_be_written_at_the_end_is_said(disk: Path) -> None:
@@ -305,14 +311,14 @@ with Store.open(Path(sys.argv[1]), IDENTITY) as again:
 
 
 def test_a_limit_of_file_sizes_loses_nothing_either(tmp_path: Path) -> None:
-    done = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-c", LIMITED, str(tmp_path / "session.db")],
         env=PLACES,
         capture_output=True,
         text=True,
         check=False,
     )
-    assert done.returncode == 0, done.stderr
+    assert completed.returncode == 0, completed.stderr
 
 
 # What is no session of this picture
@@ -323,7 +329,7 @@ def identity_of_views(*views: ViewIdentity) -> Identity:
 
 
 @pytest.mark.parametrize(
-    ("other", "said"),
+    ("other", "message"),
     [
         (
             identity_of_views(ViewIdentity("camera", (12, 20))),
@@ -334,12 +340,12 @@ def identity_of_views(*views: ViewIdentity) -> Identity:
     ],
 )
 def test_a_session_of_something_else_is_refused_and_can_be_put_aside(
-    tmp_path: Path, other: Identity, said: str
+    tmp_path: Path, other: Identity, message: str
 ) -> None:
     path = tmp_path / "session.db"
     with Store.open(path, IDENTITY) as store:
         store.append(step(1))
-    with pytest.raises(PaintError, match=said) as refusal:
+    with pytest.raises(PaintError, match=message) as refusal:
         Store.open(path, other)
     assert "(folder=...)" in str(refusal.value)
     assert "(new=True)" in str(refusal.value)
@@ -349,7 +355,7 @@ def test_a_session_of_something_else_is_refused_and_can_be_put_aside(
     assert set_aside(path) == tmp_path / "session-2.db"
     assert set_aside(path) is None
     with Store.open(tmp_path / "session-1.db", IDENTITY) as store:
-        assert [one.label for one in store.steps] == ["stroke 1"]
+        assert [a_step.label for a_step in store.steps] == ["stroke 1"]
 
 
 def test_a_scene_that_has_changed_keeps_its_session(tmp_path: Path) -> None:
@@ -360,13 +366,13 @@ def test_a_scene_that_has_changed_keeps_its_session(tmp_path: Path) -> None:
 
 
 def test_a_view_may_come_later_and_none_may_go(tmp_path: Path) -> None:
-    path, both = (
+    path, path_of_both = (
         tmp_path / "session.db",
         identity_of_views(*IDENTITY.views, ViewIdentity("side", (4, 6))),
     )
     with Store.open(path, IDENTITY) as store:
         store.append(step(1))
-    with Store.open(path, both) as store:
+    with Store.open(path, path_of_both) as store:
         assert len(store.steps) == 1
     with pytest.raises(PaintError, match="a session of 2 views, and this is of 1"):
         Store.open(path, IDENTITY)
@@ -409,7 +415,7 @@ def test_a_damaged_file_is_said_in_one_line_and_can_be_put_aside(
 
 
 @pytest.mark.parametrize(
-    ("damage", "lost"),
+    ("damage", "loss"),
     [
         ("UPDATE step SET fields='{' WHERE id = 2", "1 step could not be read"),
         ("UPDATE step SET fields='{}x'", "4 steps could not be read"),
@@ -424,7 +430,7 @@ def test_a_damaged_file_is_said_in_one_line_and_can_be_put_aside(
     ],
 )
 def test_what_can_be_read_of_a_damaged_session_is_there(
-    tmp_path: Path, damage: str, lost: str
+    tmp_path: Path, damage: str, loss: str
 ) -> None:
     path = tmp_path / "session.db"
     with Store.open(path, IDENTITY) as store:
@@ -438,14 +444,14 @@ def test_what_can_be_read_of_a_damaged_session_is_there(
     with Store.open(path, IDENTITY) as store:
         if not store.remarks:  # what nobody has looked at yet
             store.recover()
-        position, left, kept = content(store)
-        [said] = store.remarks
-        assert lost in said
-        assert "\n" not in said
-        assert f"is kept as {tmp_path / 'session-1.db'}" in said
+        position, left, kept_looks = content(store)
+        [remark] = store.remarks
+        assert loss in remark
+        assert "\n" not in remark
+        assert f"is kept as {tmp_path / 'session-1.db'}" in remark
         assert position == len(left)
-        assert all(one in steps for one in left)
-        assert {one[0] for one in kept} <= {one[0] for one in looks}
+        assert all(item in steps for item in left)
+        assert {item[0] for item in kept_looks} <= {item[0] for item in looks}
         store.append(step(5))
     # But for the header, where it counts how often it was opened to be written.
     assert (tmp_path / "session-1.db").read_bytes()[100:] == before[100:]
@@ -457,24 +463,24 @@ def test_what_can_be_read_of_a_damaged_session_is_there(
 @pytest.mark.usefixtures("without_process_check")
 def test_bytes_and_pages_that_are_others_never_end_in_more_than_a_line(tmp_path: Path) -> None:
     """All over the file: what is there afterwards is as it was, and what is not is said."""
-    whole, path = tmp_path / "whole.db", tmp_path / "session.db"
-    with Store.open(whole, IDENTITY) as store:
+    whole_file, path = tmp_path / "whole.db", tmp_path / "session.db"
+    with Store.open(whole_file, IDENTITY) as store:
         for number in range(12):
             store.append(step(number))
         for number in (1, 2, 3):
             store.put_look(look(number, number))
         _, steps, looks = content(store)
-    data, rng = whole.read_bytes(), np.random.default_rng(0)
-    page, refused, recover, lines = 16384, 0, 0, []
+    data, rng = whole_file.read_bytes(), np.random.default_rng(0)
+    page, refusals, recover, lines = 16384, 0, 0, []
     for k in range(60):
         damaged = bytearray(data)
-        at = int(rng.integers(0, len(data)))
+        offset = int(rng.integers(0, len(data)))
         if k % 3 == 0:
-            damaged[at] ^= int(rng.integers(1, 256))
+            damaged[offset] ^= int(rng.integers(1, 256))
         elif k % 3 == 1:
-            damaged[at : at + 100] = rng.bytes(min(100, len(data) - at))
+            damaged[offset : offset + 100] = rng.bytes(min(100, len(data) - offset))
         else:
-            begin = at // page * page
+            begin = offset // page * page
             damaged[begin : begin + page] = bytes(page)
         for old in tmp_path.glob("session*"):
             old.unlink()
@@ -482,7 +488,7 @@ def test_bytes_and_pages_that_are_others_never_end_in_more_than_a_line(tmp_path:
         try:
             store = Store.open(path, IDENTITY)
         except PaintError as error:
-            refused += 1
+            refusals += 1
             lines.append(str(error))
             assert path.read_bytes() == damaged
             continue
@@ -491,29 +497,29 @@ def test_bytes_and_pages_that_are_others_never_end_in_more_than_a_line(tmp_path:
                 content(store)
             except (PaintError, KeyError):
                 store.recover()
-            _, left, kept = content(store)
-            is_whole = len(left) == len(steps) and len(kept) == len(looks)
+            _, left, kept_looks = content(store)
+            is_whole = len(left) == len(steps) and len(kept_looks) == len(looks)
             assert is_whole or store.remarks
-            for one in left:
+            for a_step in left:
                 # Labels have no check of their own: a byte of one may be another.
-                assert any(one[3] == was[3] for was in steps)
+                assert any(a_step[3] == original[3] for original in steps)
             if store.remarks:
                 recover += 1
                 assert list(tmp_path.glob("session-*.db"))
     assert not any("\n" in line for line in lines)
-    assert refused < 20
+    assert refusals < 20
     assert recover > 15
 
 
 @pytest.mark.parametrize(
-    ("tables", "left", "lost"),
+    ("tables", "left", "lost_text"),
     [
         (("step", "pixels"), (0, 2), "an unknown number of steps could not be read"),
         (("look", "look_array"), (4, 0), "an unknown number of looks could not be read"),
     ],
 )
 def test_what_nobody_can_count_is_not_called_nothing(
-    tmp_path: Path, tables: tuple[str, str], left: tuple[int, int], lost: str
+    tmp_path: Path, tables: tuple[str, str], left: tuple[int, int], lost_text: str
 ) -> None:
     """The first pages of two tables lie side by side: one bad block of a disk takes both."""
     path = tmp_path / "session.db"
@@ -531,8 +537,8 @@ def test_what_nobody_can_count_is_not_called_nothing(
     with Store.open(path, IDENTITY) as store:
         _, steps, looks = content(store)
         assert (len(steps), len(looks)) == left
-        [said] = store.remarks
-        assert lost in said
+        [remark] = store.remarks
+        assert lost_text in remark
 
 
 def test_of_a_file_that_was_cut_off_its_beginning_is_read(tmp_path: Path) -> None:
@@ -549,8 +555,8 @@ def test_of_a_file_that_was_cut_off_its_beginning_is_read(tmp_path: Path) -> Non
     with Store.open(path, IDENTITY) as store:
         _, left, looks = content(store)
         assert (left, looks) == (steps, [])
-        [said] = store.remarks
-        assert "an unknown number of looks could not be read" in said
+        [remark] = store.remarks
+        assert "an unknown number of looks could not be read" in remark
 
 
 def test_a_painting_is_reached_though_a_look_is_damaged(tmp_path: Path, make_basis: Any) -> None:
@@ -570,14 +576,14 @@ def test_a_painting_is_reached_though_a_look_is_damaged(tmp_path: Path, make_bas
     ):
         _execute(path, damage)
     with Store.open(path, IDENTITY) as store:
-        about: dict[str, Any] = {"settings": Settings(), "transform": ViewTransform("srgb")}
-        session = Session([basis], [basis.current_look], store, **about)
+        look_fields: dict[str, Any] = {"settings": Settings(), "transform": ViewTransform("srgb")}
+        session = Session([basis], [basis.current_look], store, **look_fields)
         importance = session.views[0].pixels(session.views[0].full_region).importance
         np.testing.assert_array_equal(importance[:, 0], [1] * 4 + [0] * 4 + [1] * 4)
-        found = LookLibrary(session, PictureTable())
-        assert [one.name for one in found.infos()] == ["look 2"]
-        [said] = store.remarks
-        assert "1 step, the look look 1 could not be read" in said
+        library = LookLibrary(session, PictureTable())
+        assert [info.name for info in library.infos()] == ["look 2"]
+        [remark] = store.remarks
+        assert "1 step, the look look 1 could not be read" in remark
 
 
 # A file that is removed while it is painted on
@@ -592,16 +598,16 @@ def test_a_session_whose_file_is_removed_is_written_anew(tmp_path: Path, is_all:
         shutil.rmtree(path.parent) if is_all else path.unlink()
         store.append(step(2))
         assert store.unsaved is None
-        was = content(store)
+        content_before = content(store)
         copy = tmp_path / "copy.db"
         for ending in ("", "-wal"):  # as if it were killed now
             shutil.copy(f"{path}{ending}", f"{copy}{ending}")
         with Store.open(copy, IDENTITY) as left:
-            assert content(left) == was
+            assert content(left) == content_before
         path.unlink()  # at the end, too
-    with Store.open(path, IDENTITY) as again:
-        assert content(again) == was
-        again.append(step(3))
+    with Store.open(path, IDENTITY) as reopened:
+        assert content(reopened) == content_before
+        reopened.append(step(3))
     assert [file.name for file in path.parent.iterdir()] == ["session.db"]
 
 
@@ -617,10 +623,10 @@ def test_another_file_in_its_place_is_left_alone_and_said(tmp_path: Path) -> Non
     assert path.read_bytes() == b"of somebody else"
     path.unlink()
     assert store.flush() is None
-    was = content(store)
+    content_before = content(store)
     store.close()
-    with Store.open(path, IDENTITY) as again:
-        assert content(again) == was
+    with Store.open(path, IDENTITY) as reopened:
+        assert content(reopened) == content_before
 
 
 def test_a_place_that_is_gone_and_cannot_be_made_is_said(tmp_path: Path) -> None:
@@ -643,14 +649,14 @@ def test_one_array_of_a_look_is_read_alone(tmp_path: Path) -> None:
     with Store.open(path, IDENTITY) as store:
         store.put_look(look(1, 1))
     with Store.open(path, IDENTITY) as store:
-        asked: list[str] = []
-        store._database.set_trace_callback(asked.append)
-        [kept] = store.looks()
-        assert kept.arrays["weights"].size
-        [one] = asked
-        assert "name = 'weights'" in one
+        statements: list[str] = []
+        store._database.set_trace_callback(statements.append)
+        [read_look] = store.looks()
+        assert read_look.arrays["weights"].size
+        [statement] = statements
+        assert "name = 'weights'" in statement
         with pytest.raises(KeyError):
-            kept.arrays["no such array"]
+            read_look.arrays["no such array"]
 
 
 def test_a_place_that_cannot_be_written_is_said(tmp_path: Path) -> None:
@@ -669,23 +675,23 @@ def test_room_of_what_was_cut_off_is_used_again(tmp_path: Path) -> None:
     with Store.open(path, IDENTITY) as store:
         for number in range(20):
             store.append(big(number))
-    most = path.stat().st_size
+    size = path.stat().st_size
     for _ in range(3):
         with Store.open(path, IDENTITY) as store:
             store.move_to(0)
             for number in range(20):
                 store.append(big(number))
-    assert path.stat().st_size < 1.2 * most
+    assert path.stat().st_size < 1.2 * size
     with Store.open(path, IDENTITY) as store:
         store.move_to(0)
         store.append(step(3))
     Store.open(path, IDENTITY).close()
-    assert path.stat().st_size < 0.3 * most
+    assert path.stat().st_size < 0.3 * size
 
 
 def test_what_nobody_should_keep_is_refused_before_anything_changes() -> None:
     with MemoryStore(IDENTITY) as store:
-        for wrong in (
+        for bad_step in (
             Step("requests", "", {"x": float("nan")}),
             Step("requests", "", {"x": object()}),
             Step(
@@ -693,7 +699,7 @@ def test_what_nobody_should_keep_is_refused_before_anything_changes() -> None:
             ),
         ):
             with pytest.raises(PaintError):
-                store.append(wrong)
+                store.append(bad_step)
         with pytest.raises(PaintError):
             store.move_to(1)
         with pytest.raises(PaintError):

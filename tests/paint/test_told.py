@@ -31,7 +31,7 @@ PLACE = Place((1, 1), 0.9, (0, 0, 8, 8), (0.4, 0.4, 0.4), (0.1, 0.1, 0.1), "floo
 
 
 @pytest.mark.parametrize(
-    ("missed", "about", "said"),
+    ("miss", "fields", "sentence"),
     [
         (
             18.0,
@@ -77,14 +77,14 @@ PLACE = Place((1, 1), 0.9, (0, 0, 8, 8), (0.4, 0.4, 0.4), (0.1, 0.1, 0.1), "floo
         ),
     ],
 )
-def test_a_sketch_is_helped_and_not_judged(missed: float, about: Any, said: str):
-    appearance = replace(Appearance(missed, 0.0, 20.0, PLACE), **about)
-    assert sketch_headline(appearance) == said
-    assert "cannot" not in said
+def test_a_sketch_is_helped_and_not_judged(miss: float, fields: Any, sentence: str):
+    appearance = replace(Appearance(miss, 0.0, 20.0, PLACE), **fields)
+    assert sketch_headline(appearance) == sentence
+    assert "cannot" not in sentence
 
 
 @pytest.mark.parametrize(
-    ("about", "helps"),
+    ("verdict_fields", "helps"),
     [
         ({"reasons": (HOLD,)}, "hold"),
         ({"reasons": (COLORS, SIDE)}, "colors"),
@@ -96,14 +96,18 @@ def test_a_sketch_is_helped_and_not_judged(missed: float, about: Any, said: str)
         ({"reasons": (HOLD,), "delta_e": 2.0}, None),
     ],
 )
-def test_what_a_sentence_advises_is_said_as_data(about: Any, helps: str | None):
-    appearance = replace(Appearance(10.0, 0.0, 20.0, PLACE), **about)
+def test_what_a_sentence_advises_is_said_as_data(verdict_fields: Any, helps: str | None):
+    appearance = replace(Appearance(10.0, 0.0, 20.0, PLACE), **verdict_fields)
     cause, fields = removable_reason(appearance), advice(appearance)
     # Moving lights is advised where no setting is the cause.
     assert (cause and cause.kind) == (None if helps == "reach" else helps)
     assert (fields and fields.kind) == helps
-    advised = [held for held, words in ADVICE_TEXTS.items() if words in sketch_headline(appearance)]
-    assert advised == [one for one in (helps,) if one in ADVICE_TEXTS]
+    advised = [
+        advice_kinds
+        for advice_kinds, words in ADVICE_TEXTS.items()
+        if words in sketch_headline(appearance)
+    ]
+    assert advised == [kind for kind in (helps,) if kind in ADVICE_TEXTS]
 
 
 def test_a_button_says_what_it_lets_go_and_what_that_brings():
@@ -112,27 +116,27 @@ def test_a_button_says_what_it_lets_go_and_what_that_brings():
     fields = Advice("off", ("annex_window",), gain=0.57, hold=None)
     assert advice(appearance) == fields
     weaker = Loosening(0.8, 0.35, UnpaintedChange(2.0, 12.0, "annex"))
-    held = replace(appearance, reasons=(replace(HOLD, loosening=weaker),))
-    assert advice(held) == Advice("hold", (), gain=0.35, hold=0.8)
-    assert spoken_cause(held.reasons[0]) == (
+    hold_reason = replace(appearance, reasons=(replace(HOLD, loosening=weaker),))
+    assert advice(hold_reason) == Advice("hold", (), gain=0.35, hold=0.8)
+    assert spoken_cause(hold_reason.reasons[0]) == (
         "A weaker hold on unpainted parts (a hold of 0.8) would remove 35 % of the difference, and "
         "change the annex by ΔE 12."
     )
     # Of what takes several, none closes a share by itself.
     joint = replace(appearance, reasons=(replace(OFF, is_joint=True), replace(HOLD, is_joint=True)))
-    told = advice(joint)
-    assert told is not None
-    assert told.gain is None
+    advice_given = advice(joint)
+    assert advice_given is not None
+    assert advice_given.gain is None
 
 
 def test_a_preview_says_what_it_brings_and_what_it_costs():
     annex = UnpaintedChange(2.0, 12.0, "annex")
-    its = {"delta_e": (17.2, 6.9), "is_at_cost": False}
-    told = "Removes 57 % of the difference (ΔE 17 becomes 6.9), and changes the annex by ΔE 12."
-    assert preview_text(0.57, annex, **its) == (told, False)
-    costly = preview_text(0.57, annex, **{**its, "is_at_cost": True})
-    assert costly == (f"{told} That is more than it gains.", True)
-    none = preview_text(0.004, None, **its)[0]
+    fields = {"delta_e": (17.2, 6.9), "is_at_cost": False}
+    sentence = "Removes 57 % of the difference (ΔE 17 becomes 6.9), and changes the annex by ΔE 12."
+    assert preview_text(0.57, annex, **fields) == (sentence, False)
+    costly = preview_text(0.57, annex, **{**fields, "is_at_cost": True})
+    assert costly == (f"{sentence} That is more than it gains.", True)
+    none = preview_text(0.004, None, **fields)[0]
     assert none == "The answer comes no closer."
 
 
@@ -146,8 +150,8 @@ def test_what_harms_the_rest_is_not_praised():
         local_lights=("lamp",),
         unpainted_change=UnpaintedChange(19.0, 51.0, "annex"),
     )
-    said = sketch_headline(appearance)
-    assert said.startswith("57 % of the way, at the cost of the annex (ΔE 51). ")
+    text = sketch_headline(appearance)
+    assert text.startswith("57 % of the way, at the cost of the annex (ΔE 51). ")
     mild = sketch_headline(replace(appearance, unpainted_change=UnpaintedChange(2.0, 7.0, "annex")))
     assert mild.startswith("About half way (57 %), and changes the annex by ΔE 7.0. ")
 
@@ -166,28 +170,31 @@ def test_why_it_is_not_closer_is_said_to_who_paints(make_basis: Any, colors: Any
     image[..., 1] *= 0.6  # which is pinker than any white
     target = lp.Target("t", image, np.ones(size, np.float32), everything=False)
     [analysis] = lp.analyse(lp.solve(basis, target, colors=colors))
-    first, *rest = why_not_closer(analysis)
+    first, *others = why_not_closer(analysis)
     assert "% is out of reach of these lights" in first
     assert "% is render noise" in first
     colours = "% would need colours or levels that the lights may not have"
     assert (colours in first) == (colors == "white")
-    said = " ".join([first, *rest])
+    text = " ".join([first, *others])
     for word in ("energy", "basis", "renders have", "below zero", "Most of that"):
-        assert word not in said
+        assert word not in text
     # A page has settings, and no arguments of Python.
-    kept = replace(analysis, appearance=replace(analysis.appearance, reasons=(COLORS,)))
-    assert "Lights keep their colours; any colour would remove 50 %" in why_not_closer(kept)[-1]
+    colors_reason = replace(analysis, appearance=replace(analysis.appearance, reasons=(COLORS,)))
+    assert (
+        "Lights keep their colours; any colour would remove 50 %"
+        in why_not_closer(colors_reason)[-1]
+    )
     # Where it is missed most is told once: of a whole, or of a place that is seen.
-    unseen = replace(analysis, appearance=replace(analysis.appearance, place=None))
-    assert "Most of what is out of reach is" in why_not_closer(unseen)[1]
-    met = replace(analysis, diagnosis=replace(analysis.diagnosis, missed=0.009))
-    assert why_not_closer(met) == ["The lights can make what is painted."]
+    placeless = replace(analysis, appearance=replace(analysis.appearance, place=None))
+    assert "Most of what is out of reach is" in why_not_closer(placeless)[1]
+    close = replace(analysis, diagnosis=replace(analysis.diagnosis, missed=0.009))
+    assert why_not_closer(close) == ["The lights can make what is painted."]
 
 
 @pytest.mark.parametrize("is_asked", [False, True])
 def test_lamps_that_became_white_are_not_called_the_present_lighting(is_asked: bool):
-    said = unpainted_text(is_asked=is_asked, is_white=True)
-    assert "nearest to its colour" in said
-    assert "current lighting" not in said
+    sentence = unpainted_text(is_asked=is_asked, is_white=True)
+    assert "nearest to its colour" in sentence
+    assert "current lighting" not in sentence
     plain = unpainted_text(is_asked=is_asked, is_white=False)
     assert ("current lighting" in plain) != is_asked

@@ -40,7 +40,7 @@ class Site:
 @pytest.fixture(scope="session")
 def site() -> Iterator[Site]:
     """On a port of its own."""
-    made = Site()
+    new_site = Site()
 
     class Handler(BaseHTTPRequestHandler):
         protocol_version = "HTTP/1.1"  # one connection for many files
@@ -48,7 +48,7 @@ def site() -> Iterator[Site]:
 
         def do_GET(self) -> None:
             path = unquote(urlsplit(self.path).path)
-            headers, content = served_file(made, path)
+            headers, content = served_file(new_site, path)
             self.send_response(200 if headers else 404)
             for name, value in headers.items():
                 self.send_header(name, value)
@@ -64,8 +64,8 @@ def site() -> Iterator[Site]:
 
     server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
     threading.Thread(target=server.serve_forever, daemon=True).start()
-    made.url = f"http://127.0.0.1:{server.server_port}"
-    yield made
+    new_site.url = f"http://127.0.0.1:{server.server_port}"
+    yield new_site
     server.shutdown()
     server.server_close()
 
@@ -90,21 +90,21 @@ def served_file(site: Site, path: str) -> tuple[dict[str, str], bytes]:
 @pytest.fixture(scope="session")
 def tab(browser: Any) -> tuple[Any, list[str]]:
     """One page for all tests, which start a process less; and what goes wrong on it."""
-    opened = browser.new_page(viewport={"width": 800, "height": 600})
-    wrong: list[str] = []
-    opened.on("pageerror", lambda error: wrong.append(str(error)))
-    opened.on("console", lambda line: wrong.append(line.text) if line.type == "error" else None)
-    return opened, wrong
+    new_page = browser.new_page(viewport={"width": 800, "height": 600})
+    errors: list[str] = []
+    new_page.on("pageerror", lambda error: errors.append(str(error)))
+    new_page.on("console", lambda line: errors.append(line.text) if line.type == "error" else None)
+    return new_page, errors
 
 
 @pytest.fixture
 def page(tab: Any, site: Site) -> Iterator[Any]:
     """An empty page of the site. What a test leaves on its console as an error fails it."""
-    opened, wrong = tab
-    opened.goto(f"{site.url}/empty.html")
-    yield opened
+    blank_page, errors = tab
+    blank_page.goto(f"{site.url}/empty.html")
+    yield blank_page
     site.arrays.clear()
-    left, wrong[:] = wrong[:], []
+    left, errors[:] = errors[:], []
     assert left == []
 
 
@@ -152,9 +152,9 @@ class Tabs:
 @pytest.fixture(scope="session")
 def tabs(browser: Any, site: Site) -> Iterator[Tabs]:
     """Tabs for the painters of all tests."""
-    made = Tabs(browser, site)
-    yield made
-    made.close()
+    new_tabs = Tabs(browser, site)
+    yield new_tabs
+    new_tabs.close()
 
 
 @pytest.fixture
@@ -164,13 +164,13 @@ def new_painter(tabs: Tabs) -> Iterator[Any]:
     is_fresh: in a context of its own, for a test that changes what cannot be changed back, such as
     a clock. So is every painter with a script that runs first, or options beside the viewport.
     """
-    taken: list[tuple[Any, bool]] = []
+    pages_in_use: list[tuple[Any, bool]] = []
     errors: list[str] = []
 
-    def wrong(error: Any) -> None:
+    def note_error(error: Any) -> None:
         errors.append(str(error))
 
-    def said(line: Any) -> None:
+    def note_console(line: Any) -> None:
         if line.type in ("error", "warning"):
             errors.append(line.text)
 
@@ -181,16 +181,16 @@ def new_painter(tabs: Tabs) -> Iterator[Any]:
         *,
         is_fresh: bool = False,
         viewport: dict[str, int] = VIEWPORT,
-        **about: Any,
+        **options: Any,
     ) -> Painter:
-        if is_fresh or init or about:
-            page = tabs.browser.new_context(viewport=viewport, **about).new_page()
-            taken.append((page, True))
+        if is_fresh or init or options:
+            page = tabs.browser.new_context(viewport=viewport, **options).new_page()
+            pages_in_use.append((page, True))
         else:
             page = tabs.take(viewport)
-            taken.append((page, False))
-        page.on("pageerror", wrong)
-        page.on("console", said)
+            pages_in_use.append((page, False))
+        page.on("pageerror", note_error)
+        page.on("console", note_console)
         if init:
             page.add_init_script(init)
         page.goto(f"{tabs.site.url}/fake/index.html?{query}&size=48x27")
@@ -198,13 +198,13 @@ def new_painter(tabs: Tabs) -> Iterator[Any]:
         return Painter(page)
 
     yield open_painter
-    for page, is_own in taken:
+    for page, is_own in pages_in_use:
         if is_own or errors:
             page.context.close()
         else:
             tabs.give_back(page)
-            page.remove_listener("pageerror", wrong)
-            page.remove_listener("console", said)
+            page.remove_listener("pageerror", note_error)
+            page.remove_listener("console", note_console)
     assert not errors
 
 

@@ -10,7 +10,7 @@ def test_what_was_said_of_the_answer_before_is_marked(painter: Painter) -> None:
     painter.stroke()
     painter.still()
     line, badge = painter.page.locator(".headline"), painter.page.locator(".headline .live")
-    said = line.locator(".said").inner_text()
+    sentence = line.locator(".said").inner_text()
     assert badge.count() == 0
     box = line.locator(".said").bounding_box()
     lights = painter.page.evaluate("() => window.host.exact().lights")
@@ -20,9 +20,9 @@ def test_what_was_said_of_the_answer_before_is_marked(painter: Painter) -> None:
     assert badge.inner_text() == "analysing"
     assert line.locator(".said").bounding_box() == box
     assert "is-old" in line.get_attribute("class")
-    assert line.locator(".said").inner_text() == said
-    about = {"lights": lights, "delta_e": 2.0, "sentences": []}
-    painter.tell(kind="answer", version=101, exact=True, headline="Nearly.", **about)
+    assert line.locator(".said").inner_text() == sentence
+    answer = {"lights": lights, "delta_e": 2.0, "sentences": []}
+    painter.tell(kind="answer", version=101, exact=True, headline="Nearly.", **answer)
     assert line.locator(".said").inner_text() == "Nearly."
     assert badge.count() == 0
     assert "is-old" not in line.get_attribute("class")
@@ -38,18 +38,23 @@ def test_names_from_files_are_text(painter: Painter) -> None:
 
 
 def test_an_answer_to_what_was_undone_says_nothing(painter: Painter) -> None:
-    asked, history = {"key": {"lock": 1}}, {"undo": ["brush"], "redo": []}
-    painter.tell(kind="answer", version=6, constraints=asked, history=history)
-    assert (painter.ui("constraints"), painter.ui("history")) == (asked, history)
+    constraints, history = {"key": {"lock": 1}}, {"undo": ["brush"], "redo": []}
+    painter.tell(kind="answer", version=6, constraints=constraints, history=history)
+    assert (painter.ui("constraints"), painter.ui("history")) == (constraints, history)
     undone = {"undo": [], "redo": ["brush"]}
     painter.tell(kind="patch", version=7, constraints={}, history=undone)
     painter.tell(
-        kind="answer", version=6, exact=True, constraints=asked, history=history, headline="Old"
+        kind="answer",
+        version=6,
+        exact=True,
+        constraints=constraints,
+        history=history,
+        headline="Old",
     )
     assert (painter.ui("constraints"), painter.ui("history")) == ({}, undone)
     painter.page.evaluate("() => host.tell({ ...host.state(), headline: '' })")  # counts anew
-    painter.tell(kind="answer", version=1, constraints=asked, history=history)
-    assert (painter.ui("constraints"), painter.ui("history")) == (asked, history)
+    painter.tell(kind="answer", version=1, constraints=constraints, history=history)
+    assert (painter.ui("constraints"), painter.ui("history")) == (constraints, history)
 
 
 def test_overlays_by_their_key_say_what_their_colours_mean(painter: Painter) -> None:
@@ -60,15 +65,16 @@ def test_overlays_by_their_key_say_what_their_colours_mean(painter: Painter) -> 
     assert "too dark" in legend.inner_text()
     press("o")  # asks for what it shows
     painter.page.get_by_text("Out of reach", exact=True).wait_for()
-    asked = len(painter.said("explain"))
-    assert asked == 1
+    request_count = len(painter.said("explain"))
+    assert request_count == 1
     # An answer to an earlier painting is none.
     painter.tell(kind="explained", sentences=["Old"], view=0, is_old=True)
     painter.page.wait_for_function(
-        "(asked) => host.said.filter(({ kind }) => kind === 'explain').length > asked", arg=asked
+        "(asked) => host.said.filter(({ kind }) => kind === 'explain').length > asked",
+        arg=request_count,
     )
     painter.page.get_by_text("Out of reach", exact=True).wait_for()
-    assert len(painter.said("explain")) == asked + 1
+    assert len(painter.said("explain")) == request_count + 1
     press("o")
     assert "grey" in legend.inner_text()
     press("o")
@@ -99,19 +105,19 @@ def test_a_legend_lies_on_no_picture_where_there_is_room(
         " return [pane.left, pane.top, w * pane.scale, h * pane.scale]; }"
     )
     x, y = box["x"] - stage["x"], box["y"] - stage["y"]
-    apart = x + box["width"] <= left or x >= left + width or y >= top + height
-    assert apart == has_room
+    is_apart = x + box["width"] <= left or x >= left + width or y >= top + height
+    assert is_apart == has_room
     assert box["height"] <= (60 if has_room else 24)
     assert 0 <= x <= stage["width"] - box["width"]
     assert 0 <= y <= stage["height"] - box["height"]
 
 
 def test_truth(painter: Painter) -> None:
-    how = painter.page.locator(".answer").get_by_role("button", name="Analysis")
-    box = how.bounding_box()
-    how.click()
-    assert how.bounding_box() == box  # or Save look, and its tip, would be under the pointer
-    assert how.get_attribute("aria-pressed") == "true"
+    button = painter.page.locator(".answer").get_by_role("button", name="Analysis")
+    box = button.bounding_box()
+    button.click()
+    assert button.bounding_box() == box  # or Save look, and its tip, would be under the pointer
+    assert button.get_attribute("aria-pressed") == "true"
     painter.button("False colour").click()
     assert painter.ui("show")["overlay"] == "falsecolor"
     painter.button("Out of reach").click()  # asks for what it shows
@@ -152,7 +158,7 @@ def test_looks(painter: Painter) -> None:
     painter.button("Save look").click()
     painter.stroke()
     painter.page.keyboard.press("Control+s")
-    assert [one["name"] for one in painter.said("save_look")] == ["Look 1", "Look 2"]
+    assert [request["name"] for request in painter.said("save_look")] == ["Look 1", "Look 2"]
     painter.button("Look 2", exact=True).click()
     painter.page.get_by_label("Name of Look 2").fill("Dawn")
     painter.page.get_by_label("Name of Look 2").press("Enter")
@@ -161,11 +167,11 @@ def test_looks(painter: Painter) -> None:
     assert painter.said("load_look")[-1]["look"] == 1
     painter.button("Compare looks").click()
     painter.type("Crossfade", "25")
-    one, two = (look["weights"] for look in painter.ui("looks"))
-    shown = painter.page.evaluate("() => window.engine.shown")
-    assert shown["instead"] == two  # what is there now lies on the right
-    between = [0.75 * a + 0.25 * b for a, b in zip(two[0], one[0], strict=True)]
-    assert shown["other"][0] == pytest.approx(between)
+    request, two = (look["weights"] for look in painter.ui("looks"))
+    shown_picture = painter.page.evaluate("() => window.engine.shown")
+    assert shown_picture["instead"] == two  # what is there now lies on the right
+    mixture = [0.75 * a + 0.25 * b for a, b in zip(two[0], request[0], strict=True)]
+    assert shown_picture["other"][0] == pytest.approx(mixture)
     painter.stroke()
     painter.page.get_by_text("The painting is not shown: press Back to the painting").wait_for()
     assert len(painter.calls("begin")) == 1  # the one before
@@ -205,11 +211,11 @@ def test_looks_are_compared_while_both_are_there(new_painter: Any, way: str) -> 
     painter.stroke()
     assert painter.calls("begin")
     painter.button("Compare looks").click()
-    chosen = [
+    selected = [
         painter.page.get_by_role("combobox", name=name).input_value()
         for name in ("First look", "Second look")
     ]
-    assert chosen == ["2", "3"]
+    assert selected == ["2", "3"]
     painter.page.evaluate("() => painter.session.send('drop_look', { look: 3 })")
     painter.still()
     assert painter.page.get_by_role("combobox", name="First look").count() == 0
@@ -223,7 +229,7 @@ def test_what_is_said_while_looks_are_compared_is_of_the_answer(painter: Painter
         painter.still()
         painter.page.keyboard.press("Control+s")
         painter.still()
-    badge, whose = painter.page.locator(".live"), painter.page.locator(".whose")
+    badge, caption = painter.page.locator(".live"), painter.page.locator(".whose")
     places = painter.page.locator(".stage, .said, .answer button, .light, .fold-head")
 
     def boxes() -> Any:
@@ -231,21 +237,21 @@ def test_what_is_said_while_looks_are_compared_is_of_the_answer(painter: Painter
 
     before = boxes()
     painter.button("Compare looks").click()
-    assert (badge.count(), whose.inner_text()) == (0, "of Look 3")
+    assert (badge.count(), caption.inner_text()) == (0, "of Look 3")
     assert boxes() == before
     painter.type("Crossfade", "25")  # which no answer is
     assert badge.inner_text() == "answer not shown"
-    assert whose.inner_text() == "of the answer (not shown)"
-    assert whose.evaluate("(one) => one.scrollWidth <= one.clientWidth")
+    assert caption.inner_text() == "of the answer (not shown)"
+    assert caption.evaluate("(one) => one.scrollWidth <= one.clientWidth")
     assert boxes() == before
     assert painter.page.locator(".is-unseen .light").count() == 7
     painter.choose("Second look", "1")
     painter.type("Crossfade", "100")
     assert badge.inner_text() == "answer not shown"
     painter.choose("First look", "3")
-    assert (badge.count(), whose.inner_text()) == (0, "of Look 3")
+    assert (badge.count(), caption.inner_text()) == (0, "of Look 3")
     painter.button("Back to the painting").click()
-    assert (badge.count(), whose.count()) == (0, 0)
+    assert (badge.count(), caption.count()) == (0, 0)
 
 
 def test_a_render_of_before_is_offered_again(painter: Painter) -> None:
@@ -285,18 +291,20 @@ def test_pictures_stay_as_large_whatever_is_done_with_looks(
     assert stage.bounding_box() == before
     slider = painter.page.get_by_role("slider", name="Crossfade").bounding_box()
     assert slider["width"] >= 160
-    around = strip.bounding_box()
-    assert around["height"] <= 56
+    strip_box = strip.bounding_box()
+    assert strip_box["height"] <= 56
     for control in painter.page.locator(".mix :is(select, input, button)").all():
         if control.is_visible():
             box = control.bounding_box()
-            assert around["x"] <= box["x"]
-            assert box["x"] + box["width"] <= around["x"] + around["width"]
-            assert around["y"] <= box["y"]
-            assert box["y"] + box["height"] <= around["y"] + around["height"]
+            assert strip_box["x"] <= box["x"]
+            assert box["x"] + box["width"] <= strip_box["x"] + strip_box["width"]
+            assert strip_box["y"] <= box["y"]
+            assert box["y"] + box["height"] <= strip_box["y"] + strip_box["height"]
     # The pointer is where it goes back.
-    back = painter.button("Back to the painting").bounding_box()
-    assert back["x"] <= place["x"] + place["width"] / 2 <= back["x"] + back["width"]
+    button_box = painter.button("Back to the painting").bounding_box()
+    assert (
+        button_box["x"] <= place["x"] + place["width"] / 2 <= button_box["x"] + button_box["width"]
+    )
     painter.button("Back to the painting").click()
     for look in range(1, 13):
         painter.page.evaluate("(look) => painter.session.send('drop_look', { look })", look)
@@ -321,19 +329,19 @@ def test_what_lies_between_two_looks_is_kept_under_a_name_that_says_so(painter: 
     painter.button("Compare looks").click()
     painter.type("Crossfade", "60")
     painter.button("Save as look").click()
-    said = painter.said("mix_looks")[-1]
-    assert (said["first"], said["second"], said["part"]) == (1, 2, 0.6)
-    assert said["name"] == "Look 1 → Look 2, 60 %"
+    request = painter.said("mix_looks")[-1]
+    assert (request["first"], request["second"], request["part"]) == (1, 2, 0.6)
+    assert request["name"] == "Look 1 → Look 2, 60 %"
     painter.button("Back to the painting").click()
-    name = painter.page.get_by_role("button", name=said["name"], exact=True)
-    assert said["name"] in name.get_attribute("data-tip")
+    name = painter.page.get_by_role("button", name=request["name"], exact=True)
+    assert request["name"] in name.get_attribute("data-tip")
 
 
 def test_the_look_that_is_seen_is_marked(painter: Painter) -> None:
     def marked() -> list[str]:
         painter.still()
-        found = painter.page.locator("[aria-current=true]").all()
-        return [str(one.get_attribute("aria-label")) for one in found]
+        elements = painter.page.locator("[aria-current=true]").all()
+        return [str(element.get_attribute("aria-label")) for element in elements]
 
     painter.page.keyboard.press("Control+s")
     assert marked() == ["Load Look 1"]
@@ -370,7 +378,7 @@ def test_a_key_that_is_held_down_keeps_one_look(painter: Painter) -> None:
         painter.page.keyboard.down("s")
     painter.page.keyboard.up("s")
     painter.page.keyboard.up("Control")
-    assert [said["name"] for said in painter.said("save_look")] == ["Look 1"]
+    assert [request["name"] for request in painter.said("save_look")] == ["Look 1"]
     painter.page.keyboard.down("]")
     size = painter.ui("size")
     painter.page.keyboard.down("]")  # what goes by steps goes on
@@ -411,10 +419,10 @@ def test_settings(painter: Painter) -> None:
     painter.type("At most", "3")
     painter.button("Stay", exact=True).click()
     painter.type("Pull", "0.02")
-    asked: dict[str, Any] = {}
-    for said in painter.said("change_settings"):
-        asked |= said["settings"]
-    assert asked == {
+    settings_asked: dict[str, Any] = {}
+    for request in painter.said("change_settings"):
+        settings_asked |= request["settings"]
+    assert settings_asked == {
         "hold": 2.5, "space": "linear", "colors": "white", "literal": True,
         "prefer_current": 0.02, "sparse": 3,
     }  # fmt: skip
@@ -428,19 +436,19 @@ def test_settings_leave_the_pictures_seen_and_the_keys_alone(painter: Painter) -
     stage, panel = painter.page.locator(".stage"), painter.page.locator(".settings")
     opener = painter.button("Solve settings")
     before = stage.bounding_box()
-    for close in ("Escape", "button", "pictures"):
+    for way_out in ("Escape", "button", "pictures"):
         opener.click()
         assert stage.bounding_box() == before
         box = panel.bounding_box()
         assert box["x"] >= before["x"] + before["width"]
         assert panel.evaluate("(panel) => panel === document.activeElement")
         painter.page.keyboard.press("Tab")
-        painter.page.keyboard.press("e" if close == "Escape" else "b")
-        assert painter.ui("tool") == ("eraser" if close == "Escape" else "brush")
+        painter.page.keyboard.press("e" if way_out == "Escape" else "b")
+        assert painter.ui("tool") == ("eraser" if way_out == "Escape" else "brush")
         strokes = len(painter.calls("end"))
-        if close == "Escape":
+        if way_out == "Escape":
             painter.page.keyboard.press("Escape")
-        elif close == "button":
+        elif way_out == "button":
             panel.get_by_role("button", name="Close").click()
         else:
             painter.stroke()
@@ -448,7 +456,7 @@ def test_settings_leave_the_pictures_seen_and_the_keys_alone(painter: Painter) -
             assert panel.is_visible()
             painter.page.keyboard.press("Escape")
         panel.wait_for(state="detached")
-        if close != "pictures":
+        if way_out != "pictures":
             assert opener.evaluate("(button) => button === document.activeElement")
     assert painter.page.locator(".side").is_visible()
 
@@ -500,12 +508,18 @@ HELPS: list[tuple[dict[str, Any], str, str, dict[str, Any]]] = [
 def test_what_is_advised_is_seen_before_it_is_done(
     painter: Painter, help_: dict[str, Any], label: str, kind: str, change: dict[str, Any]
 ) -> None:
-    asked = {"key": {"off": True}, "cove": {"kelvin": 2700, "limits": {"max": 2}}}
-    said = {"kind": "answer", "exact": True, "lights": [], "delta_e": 11.2, "constraints": asked}
-    how = painter.button("Analysis").bounding_box()
+    constraints = {"key": {"off": True}, "cove": {"kelvin": 2700, "limits": {"max": 2}}}
+    answer = {
+        "kind": "answer",
+        "exact": True,
+        "lights": [],
+        "delta_e": 11.2,
+        "constraints": constraints,
+    }
+    button_box = painter.button("Analysis").bounding_box()
     help_ = {"names": [], "hold": None, **help_}
-    painter.tell(**said, version=2, headline="A first step, 10 %.", help=help_)
-    assert painter.button("Analysis").bounding_box() == how
+    painter.tell(**answer, version=2, headline="A first step, 10 %.", help=help_)
+    assert painter.button("Analysis").bounding_box() == button_box
     button = painter.page.get_by_role("button", name=label, exact=True)
     button.focus()
     painter.page.keyboard.press("Enter")
@@ -525,9 +539,9 @@ def test_what_is_advised_is_seen_before_it_is_done(
 
 
 def test_a_preview_of_before_is_none(painter: Painter) -> None:
-    said = {"kind": "answer", "exact": True, "lights": [], "delta_e": 11.2, "version": 2}
+    answer = {"kind": "answer", "exact": True, "lights": [], "delta_e": 11.2, "version": 2}
     help_ = {"kind": "hold", "names": [], "hold": 0.8, "gain": 0.35}
-    painter.tell(**said, headline="A first step, 10 %.", help=help_)
+    painter.tell(**answer, headline="A first step, 10 %.", help=help_)
     painter.page.evaluate("() => { window.host.preview = () => ({ kind: 'started' }); }")
     painter.button("Loosen").click()
     number = painter.said("preview")[-1]["number"]
@@ -548,8 +562,8 @@ def test_a_preview_of_before_is_none(painter: Painter) -> None:
     ],
 )
 def test_what_cannot_be_let_go_here_has_no_button(painter: Painter, help_: dict[str, Any]) -> None:
-    said = {"kind": "answer", "exact": True, "lights": [], "delta_e": 11.2, "version": 2}
-    painter.tell(**said, headline="A first step, 10 %.", help={"hold": None, **help_})
+    answer = {"kind": "answer", "exact": True, "lights": [], "delta_e": 11.2, "version": 2}
+    painter.tell(**answer, headline="A first step, 10 %.", help={"hold": None, **help_})
     painter.still()
     assert painter.page.locator(".answer .help").count() == 0
 
@@ -591,8 +605,8 @@ def test_looks_that_are_kept_at_once_have_names_of_their_own(painter: Painter) -
             "() => window.dispatchEvent("
             "new KeyboardEvent('keydown', { key: 's', ctrlKey: true, bubbles: true }))"
         )
-    assert [one["name"] for one in painter.said("save_look")] == ["Look 1", "Look 2"]
-    kinds = [one["kind"] for one in painter.page.evaluate("() => host.said")]
+    assert [request["name"] for request in painter.said("save_look")] == ["Look 1", "Look 2"]
+    kinds = [request["kind"] for request in painter.page.evaluate("() => host.said")]
     assert kinds.index("constrain_light") < kinds.index("save_look")
 
 

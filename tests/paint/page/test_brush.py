@@ -25,11 +25,11 @@ def run_brush(page: Any, script: str, *, light: float = 0, objects: Any = None) 
 
 
 def stroke_script(use: str, begin: str, *moves: str) -> str:
-    moved = "".join(f"stroke.move([{move}]);" for move in moves)
+    moves_script = "".join(f"stroke.move([{move}]);" for move in moves)
     return f"""
         const use = {{ ...hand.DEFAULT_TOOL, size: 20, hardness: 1, flow: 1, {use} }};
         const stroke = new hand.Stroke(canvas, use, {begin}, 1);
-        stroke.begin(); {moved}
+        stroke.begin(); {moves_script}
         if (use.end !== false) canvas.end();
     """
 
@@ -78,10 +78,10 @@ def test_stamps_flow_together(page: Any):
 
 def test_a_path_is_the_same_whatever_points_it_goes_through(page: Any):
     ends = place_script(15, 20), place_script(60, 44)
-    whole, _ = run_brush(page, stroke_script("flow: 0.4", ends[0], ends[1]))
+    whole_path, _ = run_brush(page, stroke_script("flow: 0.4", ends[0], ends[1]))
     parts = [place_script(15 + 45 * t, 20 + 24 * t) for t in (0.1, 0.13, 0.5, 0.9, 1)]
-    many, _ = run_brush(page, stroke_script("flow: 0.4", ends[0], *parts))
-    np.testing.assert_allclose(many, whole, atol=1e-5)  # float64 places, float32 light
+    split_path, _ = run_brush(page, stroke_script("flow: 0.4", ends[0], *parts))
+    np.testing.assert_allclose(split_path, whole_path, atol=1e-5)  # float64 places, float32 light
 
 
 def test_a_line_covers_a_capsule(page: Any):
@@ -118,8 +118,8 @@ def test_fill_is_one_object(page: Any):
 
 def test_the_eraser_brings_the_present_look_back(page: Any):
     spot = stroke_script("size: 50, rgb: [3, 3, 3]", place_script(40, 32))
-    again = "{" + stroke_script("tool: 'eraser', size: 30", place_script(40, 32)) + "}"
-    image, importance = run_brush(page, "{" + spot + "}" + again, light=0.25)
+    eraser_script = "{" + stroke_script("tool: 'eraser', size: 30", place_script(40, 32)) + "}"
+    image, importance = run_brush(page, "{" + spot + "}" + eraser_script, light=0.25)
     assert importance[32, 40] == 0
     np.testing.assert_array_equal(image[32, 40], 0.25)
     np.testing.assert_array_equal(image[32, 20], 3)
@@ -132,19 +132,19 @@ def test_on_a_whole_that_was_asked_for_the_eraser_brings_that_back(page: Any, mi
     all_ = f"hand.adjustArea(canvas, {{ stops: -2, mired: {mired}, object: null }});"
     path = stroke_script("rgb: [3, 1, 1], size: 16", place_script(30, 30), place_script(50, 30))
     erase = stroke_script("tool: 'eraser', size: 30", place_script(30, 30), place_script(60, 30))
-    alone, counts = run_brush(page, all_, light=0.5)
+    fill_alone, counts = run_brush(page, all_, light=0.5)
     image, importance = run_brush(page, all_ + "{" + path + "}{" + erase + "}", light=0.5)
-    np.testing.assert_allclose(image[25:35, 25:60], alone[25:35, 25:60], rtol=2e-3)  # halves
+    np.testing.assert_allclose(image[25:35, 25:60], fill_alone[25:35, 25:60], rtol=2e-3)  # halves
     np.testing.assert_array_equal(importance[25:35, 25:60], 1)
     assert counts.min() == 1
 
 
 def test_a_whole_stays_one_though_some_of_it_counts_less(page: Any):
     all_ = "hand.adjustArea(canvas, { stops: -2, mired: 0, object: null });"
-    less = "{" + stroke_script("tool: 'weight', importance: 0.5", place_script(5, 5)) + "}"
+    weight_script = "{" + stroke_script("tool: 'weight', importance: 0.5", place_script(5, 5)) + "}"
     erase = "{" + stroke_script("tool: 'eraser', size: 20", place_script(60, 40)) + "}"
     accent = "{" + stroke_script("rgb: [1, 1, 1], size: 8", place_script(30, 30)) + "}"
-    image, importance = run_brush(page, all_ + less + erase + accent, light=0.5)
+    image, importance = run_brush(page, all_ + weight_script + erase + accent, light=0.5)
     assert importance[5, 5] == 0.5
     np.testing.assert_allclose(image[40, 60], 0.125, rtol=2e-3)  # halves
     assert (importance[40, 60], importance[30, 30]) == (1, 10)
@@ -165,8 +165,10 @@ def test_on_a_patchwork_the_eraser_brings_the_present_look_back(page: Any):
 
 def test_the_importance_brush_leaves_light_alone(page: Any):
     fill = stroke_script("tool: 'fill', rgb: [3, 2, 1]", place_script(1, 1))
-    again = "{" + stroke_script("tool: 'weight', importance: 0.25", place_script(40, 32)) + "}"
-    image, importance = run_brush(page, "{" + fill + "}" + again)
+    second_stroke = (
+        "{" + stroke_script("tool: 'weight', importance: 0.25", place_script(40, 32)) + "}"
+    )
+    image, importance = run_brush(page, "{" + fill + "}" + second_stroke)
     assert (importance[32, 40], importance[0, 0]) == (0.25, 1)
     np.testing.assert_array_equal(image, np.tile([3.0, 2, 1], (H, W, 1)))
 
@@ -174,16 +176,18 @@ def test_the_importance_brush_leaves_light_alone(page: Any):
 def test_the_importance_brush_goes_by_what_counts_already(page: Any):
     """Accents on a picture of which all is painted count 10: more of that is more."""
     path = stroke_script("rgb: [1, 1, 1], size: 8", place_script(30, 30), place_script(50, 30))
-    more = stroke_script("tool: 'weight', importance: 4, size: 8", place_script(40, 30))
+    heavier = stroke_script("tool: 'weight', importance: 4, size: 8", place_script(40, 30))
     all_ = "hand.adjustArea(canvas, { stops: -1, mired: 0, object: null });"
-    _, importance = run_brush(page, all_ + "{" + path + "}{" + more + "}{" + more + "}", light=0.5)
+    _, importance = run_brush(
+        page, all_ + "{" + path + "}{" + heavier + "}{" + heavier + "}", light=0.5
+    )
     assert importance[30, 40] == 160
     assert importance[30, 31] == 10
     # What is not painted is kept as it is, as a stroke would be; and never is anything forgotten.
-    _, importance = run_brush(page, more, light=0.5)
+    _, importance = run_brush(page, heavier, light=0.5)
     assert importance[30, 40] == 4
-    less = more.replace("importance: 4", "importance: 0.1")
-    image, importance = run_brush(page, "{" + path + "}" + f"{{{less}}}" * 5, light=0.5)
+    lighter = heavier.replace("importance: 4", "importance: 0.1")
+    image, importance = run_brush(page, "{" + path + "}" + f"{{{lighter}}}" * 5, light=0.5)
     assert 0 < importance[30, 40] < 0.1
     assert image[30, 40, 0] == 1
 
@@ -191,9 +195,9 @@ def test_the_importance_brush_goes_by_what_counts_already(page: Any):
 def test_what_counts_less_is_never_more(page: Any):
     """Not at the soft end of a stroke either, of which hardly anything is left."""
     soft = stroke_script("rgb: [1, 1, 1], size: 40, hardness: 0, flow: 0.02", place_script(40, 32))
-    less = stroke_script("tool: 'weight', importance: 0.1, size: 60", place_script(40, 32))
+    lighter = stroke_script("tool: 'weight', importance: 0.1, size: 60", place_script(40, 32))
     _, before = run_brush(page, "{" + soft + "}")
-    _, after = run_brush(page, "{" + soft + "}{" + less + "}")
+    _, after = run_brush(page, "{" + soft + "}{" + lighter + "}")
     is_there = before > 0
     assert (before[is_there] < 0.01).any()
     assert (after[is_there] <= before[is_there]).all()
@@ -263,8 +267,8 @@ def test_strokes_over_what_was_asked_of_all_count_more_than_it(page: Any):
     assert importance[5, 70] == 1
     script = all_(-1) + "hand.adjustArea(canvas, { stops: 1, mired: 0, object: 1 });"
     _, importance = run_brush(page, script, light=0.5, objects=objects)
-    rest, its = importance[objects == 0], importance[objects == 1]
-    np.testing.assert_allclose(rest.sum() / its.sum(), 4, rtol=1e-6)
+    unpainted, painted = importance[objects == 0], importance[objects == 1]
+    np.testing.assert_allclose(unpainted.sum() / painted.sum(), 4, rtol=1e-6)
     # Where something is not painted, that is held, and paint counts as it is.
     assert run_brush(page, path, light=0.5)[1].max() == 1
 
@@ -282,8 +286,8 @@ def test_strokes_before_all_is_asked_stay_accents(page: Any):
     assert 1 < expected < 10
     np.testing.assert_allclose(importance[accent], expected, rtol=1e-6)
     # Once: what is asked of all again changes no importance.
-    again = run_brush(page, "{" + path + "}" + all_ + all_, light=0.5)[1]
-    np.testing.assert_array_equal(again, importance)
+    repeated_fill = run_brush(page, "{" + path + "}" + all_ + all_, light=0.5)[1]
+    np.testing.assert_array_equal(repeated_fill, importance)
 
 
 @pytest.mark.parametrize("tool", ["brush", "eraser", "weight", "fill", "line", "adjust"])
@@ -301,8 +305,8 @@ def test_a_dropped_stroke_has_never_been(page: Any, tool: str):
         place_script(20, 20),
     )
     after = run_brush(page, first + second + "canvas.drop();", light=0.5)
-    for one, other in zip(before, after, strict=True):
-        np.testing.assert_array_equal(one, other)
+    for old, other in zip(before, after, strict=True):
+        np.testing.assert_array_equal(old, other)
 
 
 def test_at_the_border_nothing_is_written_elsewhere(page: Any):
@@ -323,15 +327,15 @@ def test_at_the_border_nothing_is_written_elsewhere(page: Any):
 def test_a_stroke_may_leave_the_picture_on_any_side(page: Any):
     """Or begin beside it: what it touches lies within, also where that is nothing."""
     for way in ((-60, 0), (60, 0), (0, -60), (0, 60), (70, 70), (-70, -70)):
-        inside, outside = place_script(40, 32), place_script(40 + 2 * way[0], 32 + 2 * way[1])
-        for begin, to in ((inside, outside), (outside, inside), (outside, outside)):
+        inner, outside = place_script(40, 32), place_script(40 + 2 * way[0], 32 + 2 * way[1])
+        for begin, end in ((inner, outside), (outside, inner), (outside, outside)):
             regions = page.evaluate(
                 f"""async ([H, W]) => {{
                     const hand = await import("/engine/stroke.js");
                     const canvas = bench.plain(H, W, 0, null);
                     const use = {{ ...hand.DEFAULT_TOOL, size: 20 }};
                     const stroke = new hand.Stroke(canvas, use, {begin}, 1);
-                    return [...stroke.begin(), ...stroke.move([{to}]), canvas.end()];
+                    return [...stroke.begin(), ...stroke.move([{end}]), canvas.end()];
                 }}""",
                 [H, W],
             )

@@ -35,23 +35,23 @@ ASKED = {
 RIG = {"move", "point", "show_rig", "place", "add_light", "remove_light", "change_layers"}
 
 
-def check(told: dict[str, Any]) -> None:
+def check(message: dict[str, Any]) -> None:
     """Fail unless the dataclass of its kind could have said it."""
-    event = EVENTS[told["kind"]]
-    hints, known = get_type_hints(event), {one.name: one for one in fields(event)}
-    arrays = {name for name in known if get_origin(hints[name]) is np.ndarray}
-    plain = {k: v for k, v in told.items() if k not in ("kind", "reply", "arrays")}
-    assert set(plain) <= set(known), (told["kind"], set(plain) - set(known))
-    assert set(told["arrays"]) <= arrays
+    event = EVENTS[message["kind"]]
+    hints, known_fields = get_type_hints(event), {spec.name: spec for spec in fields(event)}
+    arrays = {name for name in known_fields if get_origin(hints[name]) is np.ndarray}
+    plain = {k: v for k, v in message.items() if k not in ("kind", "reply", "arrays")}
+    assert set(plain) <= set(known_fields), (message["kind"], set(plain) - set(known_fields))
+    assert set(message["arrays"]) <= arrays
     for name, value in plain.items():
         read_record(make_dataclass("One", [(name, hints[name])]), {name: value})
-    needed = {k for k, one in known.items() if one.default is MISSING and k not in arrays}
-    assert needed <= set(plain), (told["kind"], needed - set(plain))
+    needed = {k for k, spec in known_fields.items() if spec.default is MISSING and k not in arrays}
+    assert needed <= set(plain), (message["kind"], needed - set(plain))
 
 
 def test_a_made_up_session_says_what_a_real_one_could(painter: Any) -> None:
     assert set(ASKED) == set(REQUESTS) - {"hello", "fetch", "observe", "propose", *RIG}
-    told = painter.page.evaluate(
+    messages = painter.page.evaluate(
         """async (asked) => {
             const told = [];
             const tell = host.tell.bind(host);
@@ -65,7 +65,13 @@ def test_a_made_up_session_says_what_a_real_one_could(painter: Any) -> None:
         }""",
         ASKED,
     )
-    assert {one["kind"] for one in told} >= {"state", "answer", "patch", "looks", "exported"}
-    assert [one for one in told if one["kind"] == "failed"] == []
-    for one in told:
-        check(one)
+    assert {message["kind"] for message in messages} >= {
+        "state",
+        "answer",
+        "patch",
+        "looks",
+        "exported",
+    }
+    assert [message for message in messages if message["kind"] == "failed"] == []
+    for message in messages:
+        check(message)

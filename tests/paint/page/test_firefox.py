@@ -47,11 +47,11 @@ class Firefox:
         self.number += 1
         self.socket.send(json.dumps({"id": self.number, "method": method, "params": params}))
         while True:
-            said = json.loads(self.socket.recv(timeout=PATIENCE_S))
-            if said.get("id") == self.number:
-                assert said["type"] == "success", said
-                return said["result"]
-            self.heard.append(said)
+            message = json.loads(self.socket.recv(timeout=PATIENCE_S))
+            if message.get("id") == self.number:
+                assert message["type"] == "success", message
+                return message["result"]
+            self.heard.append(message)
 
     def open(self, url: str) -> None:
         self.ask("browsingContext.navigate", context=self.tab, url=url, wait="complete")
@@ -59,13 +59,13 @@ class Firefox:
     def look(self, script: str) -> Any:
         """What a script finds in the page, None while there is none."""
         names = f"const {{ engine }} = {PAINTER}; const {{ mirror, screen }} = engine;"
-        found = self.ask(
+        answer = self.ask(
             "script.evaluate",
             expression=f"JSON.stringify((() => {{ {names} {script} }})() ?? null)",
             target={"context": self.tab},
             awaitPromise=True,
         )
-        return json.loads(found["result"]["value"]) if found["type"] == "success" else None
+        return json.loads(answer["result"]["value"]) if answer["type"] == "success" else None
 
     def new_tab(self) -> None:
         self.tab = self.ask("browsingContext.create", type="tab")["context"]
@@ -76,8 +76,8 @@ class Firefox:
 
     def errors(self) -> list[str]:
         """What the console has shown."""
-        said = [one.get("params", {}) for one in self.heard]
-        return [one["text"] for one in said if one.get("level") == "error"]
+        events = [event.get("params", {}) for event in self.heard]
+        return [event["text"] for event in events if event.get("level") == "error"]
 
     def press(self, *keys: str) -> None:
         actions = [{"type": x, "value": key} for key in keys for x in ("keyDown", "keyUp")]
@@ -126,8 +126,10 @@ def firefox(tmp_path: Path) -> Iterator[Firefox]:
     with process:
         try:
             assert process.stderr is not None
-            said = (line.partition("WebDriver BiDi listening on ")[2] for line in process.stderr)
-            address = next(filter(None, said), "").strip()
+            addresses = (
+                line.partition("WebDriver BiDi listening on ")[2] for line in process.stderr
+            )
+            address = next(filter(None, addresses), "").strip()
             assert address, "Firefox has not begun"
             threading.Thread(target=process.stderr.read, daemon=True).start()
             with connect(f"{address}/session", max_size=2**26, proxy=None) as socket:
@@ -153,10 +155,10 @@ def serve_painter(basis: lp.Basis, folder: Path) -> Iterator[tuple[Studio, str]]
         studio.close()
 
 
-def wait_until(is_so: Callable[[], Any], what: str) -> None:
+def wait_until(is_so: Callable[[], Any], description: str) -> None:
     end = time.monotonic() + PATIENCE_S
     while not is_so():
-        assert time.monotonic() < end, what
+        assert time.monotonic() < end, description
         time.sleep(0.1)
 
 
@@ -185,9 +187,9 @@ def test_what_is_painted_is_answered_and_shown(
         code = to_8_bit(studio.session.transform.encode(light))[0].astype(int)
 
         def is_answered() -> bool:
-            shown = firefox.look("return Array.from(mirror.weights)")
+            weights = firefox.look("return Array.from(mirror.weights)")
             is_exact = "headline" in studio.state().fields["answer"]
-            return is_exact and shown == studio.session.weights.ravel().tolist()
+            return is_exact and weights == studio.session.weights.ravel().tolist()
 
         wait_until(is_answered, "the exact answer does not come")
         wait_until(
@@ -201,7 +203,7 @@ def test_what_is_painted_is_answered_and_shown(
         with closing(ForeignServer()) as neighbour:
             firefox.open(f"{neighbour.url}?of={painter}")
             assert neighbour.has_tried.wait(PATIENCE_S)
-            assert {how: what for how, what in neighbour.tried.items() if what} == {}
+            assert {path: outcome for path, outcome in neighbour.tried.items() if outcome} == {}
             assert neighbour.collected
             assert url.partition("=")[2] not in str(neighbour.collected)
             assert neighbour.replay(painter) == []
@@ -214,9 +216,11 @@ def test_what_is_painted_is_answered_and_shown(
         )
         # The address alone opens nothing; with its token it opens a second tab.
         firefox.new_tab()
-        for address, said in (
+        for address, address_or_error in (
             (painter, "belongs to a painter that has ended"),
             (url, "open in another tab"),
         ):
             firefox.open(address)
-            wait_until(partial(firefox.reads, said), f"it does not say: {said}")
+            wait_until(
+                partial(firefox.reads, address_or_error), f"it does not say: {address_or_error}"
+            )

@@ -105,8 +105,8 @@ def test_one_finger_paints_and_two_move_and_zoom(new_painter: Any) -> None:
     x, y = painter.place()
 
     def send(kind: str, *points: tuple[float, float]) -> None:
-        made = [{"x": a, "y": b, "id": k} for k, (a, b) in enumerate(points)]
-        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": made})
+        touches = [{"x": a, "y": b, "id": k} for k, (a, b) in enumerate(points)]
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": touches})
 
     send("touchStart", (x, y))
     send("touchMove", (x + 20, y))
@@ -199,8 +199,8 @@ def test_the_colour_panel(painter: Painter) -> None:
     assert warm[0] > warm[1] > warm[2]
     below = painter.page.locator(".is-ask").bounding_box()
     painter.stroke()
-    lately = painter.page.get_by_role("group", name="Recent colours")
-    assert lately.get_by_role("button").count() == 1
+    recent_colours = painter.page.get_by_role("group", name="Recent colours")
+    assert recent_colours.get_by_role("button").count() == 1
     assert painter.page.locator(".is-ask").bounding_box() == below  # its room was there
     painter.button("Colour", exact=True).click()
     assert painter.ui("as") == "colour"
@@ -224,11 +224,11 @@ def test_how_bright_a_colour_is_is_seen_and_said(painter: Painter) -> None:
     assert patch() == ["#808080", "rgb(239 239 239)"]
     painter.type("Brightness", "-2.5")
     painter.stroke()
-    lately = painter.page.get_by_role("group", name="Recent colours").get_by_role("button")
-    names = [one.get_attribute("aria-label") for one in lately.all()]
-    said = ["1: #808080, \u22122.5 stops", "2: #808080, +1 stops"]
-    assert names == [f"Recent {one}" for one in said]
-    assert lately.all_inner_texts() == ["\u22122.5", "+1"]
+    recent_colours = painter.page.get_by_role("group", name="Recent colours").get_by_role("button")
+    names = [button.get_attribute("aria-label") for button in recent_colours.all()]
+    labels = ["1: #808080, \u22122.5 stops", "2: #808080, +1 stops"]
+    assert names == [f"Recent {button}" for button in labels]
+    assert recent_colours.all_inner_texts() == ["\u22122.5", "+1"]
 
 
 #: What the hand has.
@@ -244,7 +244,7 @@ def reopen(painter: Painter, query: str = "") -> None:
 
 
 def test_a_page_that_is_loaded_anew_knows_what_was_in_the_hand(painter: Painter) -> None:
-    fresh = {name: painter.ui(name) for name in HELD}
+    reloaded = {name: painter.ui(name) for name in HELD}
     painter.type("Hex", "#336699")
     painter.type("Brightness", "1.5")
     painter.stroke()
@@ -256,12 +256,12 @@ def test_a_page_that_is_loaded_anew_knows_what_was_in_the_hand(painter: Painter)
     painter.page.keyboard.press("Shift+}")
     painter.page.keyboard.press("g")
     painter.page.keyboard.press("6")
-    held = {name: painter.ui(name) for name in HELD}
-    assert all(held[name] != fresh[name] for name in HELD)
+    held_values = {name: painter.ui(name) for name in HELD}
+    assert all(held_values[name] != reloaded[name] for name in HELD)
     reopen(painter)
-    assert {name: painter.ui(name) for name in HELD} == held
+    assert {name: painter.ui(name) for name in HELD} == held_values
     reopen(painter, "size=96x54")
-    assert painter.ui("size") == 2 * held["size"]  # it is a part of the picture
+    assert painter.ui("size") == 2 * held_values["size"]  # it is a part of the picture
 
 
 @pytest.mark.parametrize(
@@ -277,31 +277,33 @@ def test_a_page_that_is_loaded_anew_knows_what_was_in_the_hand(painter: Painter)
 )
 def test_what_is_remembered_is_not_believed(painter: Painter, junk: str) -> None:
     names = (*HELD, "open")
-    fresh = {name: painter.ui(name) for name in names}
+    reloaded = {name: painter.ui(name) for name in names}
     painter.page.evaluate(
         "(junk) => { for (const key of ['hand', 'open'])"
         " localStorage[`lightpaint.${key}`] = junk; }",
         junk,
     )
     reopen(painter)
-    assert {name: painter.ui(name) for name in names} == fresh
+    assert {name: painter.ui(name) for name in names} == reloaded
 
 
 def test_what_was_used_in_painters_beside_each_other_is_remembered(painter: Painter) -> None:
     """A notebook has several, and a browser several tabs."""
     assert painter.page.evaluate("() => localStorage['lightpaint.hand']") is None
     painter.type("Hex", "#112233")
-    beside = Painter(painter.page.context.new_page())
-    beside.page.goto(painter.page.url)
-    beside.page.wait_for_selector(".lightpaint .tag")
-    beside.type("Hex", "#445566")
-    beside.stroke()
+    second_painter = Painter(painter.page.context.new_page())
+    second_painter.page.goto(painter.page.url)
+    second_painter.page.wait_for_selector(".lightpaint .tag")
+    second_painter.type("Hex", "#445566")
+    second_painter.stroke()
     painter.stroke()
     painter.type("Hex", "#778899")
     painter.stroke()
-    reopen(beside)
-    lately = beside.page.get_by_role("group", name="Recent colours").get_by_role("button")
-    names = [str(one.get_attribute("aria-label")) for one in lately.all()]
+    reopen(second_painter)
+    recent_colours = second_painter.page.get_by_role("group", name="Recent colours").get_by_role(
+        "button"
+    )
+    names = [str(button.get_attribute("aria-label")) for button in recent_colours.all()]
     assert [name.split(": ")[1] for name in names] == ["#778899", "#112233", "#445566"]
 
 
@@ -312,15 +314,15 @@ def test_warm_is_right(painter: Painter) -> None:
         red, green, blue = painter.ui("colour")
         return float(red - blue - 0.1 * green)  # the warmest have no blue, and less green
 
-    found = []
+    kelvins = []
     for key in ("Home", "ArrowRight", "ArrowRight", "End"):
         painter.slide("CCT", key)
-        found.append(warmth())
-    assert found == sorted(set(found))
+        kelvins.append(warmth())
+    assert kelvins == sorted(set(kelvins))
     for swatch in painter.page.locator(".swatch").all()[:7]:
         swatch.click()
-        found.append(warmth())
-    assert found[4:] == sorted(set(found[4:]))
+        kelvins.append(warmth())
+    assert kelvins[4:] == sorted(set(kelvins[4:]))
     kelvin = painter.page.get_by_role("slider", name="CCT", exact=True)
     track = kelvin.evaluate("(one) => one.style.getPropertyValue('--track')")
     first, last = re.findall("#(..)..(..)", track)[:: len(re.findall("#", track)) - 1]
@@ -414,11 +416,13 @@ def test_what_is_under_the_pointer(painter: Painter) -> None:
     painter.page.locator(".here", has_text="back wall").wait_for()
     painter.page.evaluate("() => { engine.lightAt = () => [0.25, 0.25, 0.25]; }")
     painter.page.mouse.move(*painter.place(0.1))
-    here = painter.page.locator(".light-here")
-    here.get_by_text("\u22122.0 st · 6500 K", exact=True).wait_for()  # D65, two stops below white
+    readout = painter.page.locator(".light-here")
+    readout.get_by_text(
+        "\u22122.0 st · 6500 K", exact=True
+    ).wait_for()  # D65, two stops below white
     assert painter.page.locator(".near").count() == 0
     painter.page.keyboard.press("i")
-    here.get_by_text("RGB 0.25 0.25 0.25").wait_for()
+    readout.get_by_text("RGB 0.25 0.25 0.25").wait_for()
     assert painter.page.locator(".near").inner_text() == "\u22122.0 st · 6500 K"
     painter.page.evaluate("() => { engine.lightAt = () => [0, 0.5, 0]; }")
     painter.page.mouse.move(*painter.place())
@@ -429,7 +433,7 @@ def test_what_is_under_the_pointer(painter: Painter) -> None:
 
 def test_a_pointer_that_has_left_is_over_nothing(painter: Painter) -> None:
     """Also where it moved and left within one frame, and where it moved twice."""
-    moved = """([[x, y], [to, across], leaves]) => {
+    move_script = """([[x, y], [to, across], leaves]) => {
         const stage = document.querySelector('.stage');
         const tell = (kind, clientX, clientY) =>
           stage.dispatchEvent(new PointerEvent(kind, { clientX, clientY, bubbles: true }));
@@ -438,14 +442,14 @@ def test_a_pointer_that_has_left_is_over_nothing(painter: Painter) -> None:
         if (leaves) tell('pointerleave', to, across);
         return new Promise((done) => requestAnimationFrame(() => setTimeout(done)));
     }"""
-    one, other = painter.place(-0.3), painter.place(0.3)
-    painter.page.evaluate(moved, [other, other, False])
-    there = painter.ui("pointed")
-    painter.page.evaluate(moved, [one, one, False])
-    assert painter.ui("pointed") != there
-    painter.page.evaluate(moved, [one, other, False])
-    assert painter.ui("pointed") == there
-    painter.page.evaluate(moved, [one, one, True])
+    place, other = painter.place(-0.3), painter.place(0.3)
+    painter.page.evaluate(move_script, [other, other, False])
+    pointed_place = painter.ui("pointed")
+    painter.page.evaluate(move_script, [place, place, False])
+    assert painter.ui("pointed") != pointed_place
+    painter.page.evaluate(move_script, [place, other, False])
+    assert painter.ui("pointed") == pointed_place
+    painter.page.evaluate(move_script, [place, place, True])
     assert painter.ui("pointed") is None
 
 
@@ -470,44 +474,44 @@ def test_what_is_said_beside_the_brush_lies_in_the_picture(painter: Painter, too
             page.mouse.up()
             assert left - 1 <= box["x"] <= box["x"] + box["width"] <= left + wide + 1
             assert top - 1 <= box["y"] <= box["y"] + box["height"] <= top + high + 1
-            across = max(box["x"] - x, x - box["x"] - box["width"], 0)
+            gap = max(box["x"] - x, x - box["x"] - box["width"], 0)
             down = max(box["y"] - y, y - box["y"] - box["height"], 0)
-            assert 8 < max(across, down) < 40
-            assert box["y"] + box["height"] <= y or across
+            assert 8 < max(gap, down) < 40
+            assert box["y"] + box["height"] <= y or gap
 
 
 def test_what_a_drag_asks_about_stays_where_it_began(painter: Painter) -> None:
     """Ring, readout, and what is said of the place; they are at the pointer before and after."""
     page = painter.page
     page.keyboard.press("a")
-    seen = """() => [...document.querySelectorAll('.ring')].map((one) => one.style.transform)
+    rings = """() => [...document.querySelectorAll('.ring')].map((one) => one.style.transform)
         .concat(document.querySelector('#lp-status').textContent)"""
     page.mouse.move(*painter.place())
     painter.still()
-    before = page.evaluate(seen)
+    before = page.evaluate(rings)
     page.mouse.down()
     painter.still()
     readout = page.locator(".asking").bounding_box()
-    for further in (0.1, 0.7, 1.2):  # on the other picture, too
-        page.mouse.move(*painter.place(further))
+    for offset in (0.1, 0.7, 1.2):  # on the other picture, too
+        page.mouse.move(*painter.place(offset))
         painter.still()
-        assert page.evaluate(seen) == before
+        assert page.evaluate(rings) == before
         box = page.locator(".asking").bounding_box()
         middle = (box["x"] + box["width"] / 2, box["y"])
         assert middle == pytest.approx((readout["x"] + readout["width"] / 2, readout["y"]), abs=1)
     page.mouse.up()
     painter.still()
-    assert page.evaluate(seen) != before
+    assert page.evaluate(rings) != before
     page.mouse.move(*painter.place())
     page.mouse.down()
     page.mouse.move(*painter.place(0.3))
     page.keyboard.press("Escape")
     page.mouse.move(*painter.place(0.4))  # it asks no more
     painter.still()
-    after = page.evaluate(seen)
+    after = page.evaluate(rings)
     page.mouse.move(*painter.place())
     painter.still()
-    assert after != page.evaluate(seen) == before
+    assert after != page.evaluate(rings) == before
 
 
 def test_numbers_that_were_typed_stay_while_other_panels_are_open(painter: Painter) -> None:
@@ -537,8 +541,8 @@ def test_numbers_that_were_typed_stay_while_other_panels_are_open(painter: Paint
     )
     painter.still()
     assert ask.is_disabled()
-    where = page.get_by_role("combobox", name="Area")
-    assert where.evaluate("(one) => one.selectedOptions[0].text") == "red ball: not in this view"
+    area_box = page.get_by_role("combobox", name="Area")
+    assert area_box.evaluate("(one) => one.selectedOptions[0].text") == "red ball: not in this view"
 
 
 def test_keys_among_numbers_are_none_of_the_pictures(painter: Painter) -> None:
@@ -546,8 +550,8 @@ def test_keys_among_numbers_are_none_of_the_pictures(painter: Painter) -> None:
     page.keyboard.press("a")
     painter.button("By numbers", exact=True).click()
     ask = painter.button("Apply")
-    for where in (page.get_by_role("combobox", name="Area"), ask):
-        where.focus()
+    for element in (page.get_by_role("combobox", name="Area"), ask):
+        element.focus()
         page.keyboard.press("e")
         assert painter.ui("tool") == "adjust"
     ask.press("Enter")
@@ -622,8 +626,8 @@ def test_the_object_that_would_be_filled_has_an_outline(new_painter: Any, engine
     page.mouse.move(*painter.place(0.05))
     outline.wait_for()
     wall = painter.ui("pointed")["index"]
-    wrong, white = page.evaluate(OUTLINE, wall)
-    assert wrong == 0
+    miscoloured, white = page.evaluate(OUTLINE, wall)
+    assert miscoloured == 0
     assert white > 400
     assert page.evaluate("() => drawn") == 2  # on each picture, once
     page.mouse.move(*painter.place(0.1))
@@ -683,33 +687,33 @@ def test_fill_has_a_flow_of_its_own(painter: Painter) -> None:
 
 
 def test_zoom_is_said_in_pixels_of_the_picture(painter: Painter) -> None:
-    def told() -> tuple[str, float]:
+    def zoom() -> tuple[str, float]:
         painter.still()
         scale = painter.page.evaluate("() => engine.panes()[0].scale")
         return painter.page.locator(".zoom").first.inner_text(), scale
 
-    label, fitted = told()
+    label, fitted = zoom()
     assert label == "Fit"
     painter.page.keyboard.press("+")
-    label, scale = told()
+    label, scale = zoom()
     assert scale == pytest.approx(1.25 * fitted)
     assert label == f"{round(100 * scale)} %"
     painter.page.keyboard.press("Shift+F")
-    assert told() == ("100 %", pytest.approx(1))
+    assert zoom() == ("100 %", pytest.approx(1))
     painter.page.set_viewport_size({"width": 1600, "height": 900})  # a larger one to fit into
     painter.page.wait_for_function("() => engine.panes()[0].scale > 1.05")
-    label, scale = told()
+    label, scale = zoom()
     assert label == f"{round(100 * scale)} %"
     painter.page.keyboard.press("f")
-    assert told()[0] == "Fit"
+    assert zoom()[0] == "Fit"
     painter.page.mouse.move(*painter.place())
     painter.stroke(modifiers="Space")
-    label, scale = told()
+    label, scale = zoom()
     assert label == f"{round(100 * scale)} %"  # all of it is seen no more
     painter.button("1:1", exact=True).click()
-    assert told() == ("100 %", pytest.approx(1))
+    assert zoom() == ("100 %", pytest.approx(1))
     painter.page.locator(".zoom").first.click()
-    assert told()[0] == "Fit"
+    assert zoom()[0] == "Fit"
 
 
 @pytest.mark.parametrize("width", [1600, 1280, 1024])
@@ -719,16 +723,16 @@ def test_what_is_under_the_pointer_has_room_beside_what_goes_on(
     painter = new_painter("first&lights=12", viewport={"width": width, "height": 720})
     painter.tell(kind="progress", task="basis", done=128, total=1024, unit="samples")
     painter.page.mouse.move(*painter.place())
-    here, working = painter.page.locator(".here"), painter.page.locator(".working")
-    here.locator(".light-here").wait_for()
+    readout, working = painter.page.locator(".here"), painter.page.locator(".working")
+    readout.locator(".light-here").wait_for()
     assert working.inner_text() == "12 %"
-    row, room = here.bounding_box(), working.bounding_box()
+    row, room = readout.bounding_box(), working.bounding_box()
     assert room["x"] + room["width"] <= painter.page.locator(".status").bounding_box()["x"] + width
     assert row["x"] + row["width"] <= room["x"]
-    shown = 0
-    for one in here.locator("> span").all():
-        box = one.bounding_box()
+    shown_count = 0
+    for span in readout.locator("> span").all():
+        box = span.bounding_box()
         if box["y"] < row["y"] + row["height"]:  # the others are not seen at all
-            shown += 1
+            shown_count += 1
             assert box["x"] + box["width"] <= row["x"] + row["width"]
-    assert shown >= 4
+    assert shown_count >= 4

@@ -27,22 +27,22 @@ def server(make_basis: Any, tmp_path: Path) -> Iterator[Server]:
     """A painter on a port of its own."""
     subject = Subject("room.basis.exr", tmp_path / "room", basis=make_basis(2, (27, 48)))
     studio = Studio([subject], MemoryStore)
-    made = Server(studio, port=0)
-    thread = threading.Thread(target=made.run, daemon=True)
+    new_server = Server(studio, port=0)
+    thread = threading.Thread(target=new_server.run, daemon=True)
     thread.start()
     studio.start()
-    yield made
-    made.stop()
+    yield new_server
+    new_server.stop()
     thread.join()
-    made.close()
+    new_server.close()
     studio.close()
 
 
 @pytest.fixture
 def foreign_server() -> Iterator[ForeignServer]:
-    made = ForeignServer()
-    yield made
-    made.close()
+    foreign = ForeignServer()
+    yield foreign
+    foreign.close()
 
 
 @pytest.fixture
@@ -69,14 +69,14 @@ def test_a_neighbour_that_is_visited_gets_nothing_that_opens_the_session(
     page.goto(server.url)
     has_painter(page)
     assert page.url == server.address.url  # the token is seen no longer
-    where = f"{foreign_server.url}?of={server.address.url}"
-    page.evaluate("(url) => { location.href = url; }", where)  # as a link would
+    address = f"{foreign_server.url}?of={server.address.url}"
+    page.evaluate("(url) => { location.href = url; }", address)  # as a link would
     assert foreign_server.has_tried.wait(60)
-    beside = open_tab()
-    beside.goto(where)
-    beside.wait_for_function("() => document.title === 'done'")
+    second_tab = open_tab()
+    second_tab.goto(address)
+    second_tab.wait_for_function("() => document.title === 'done'")
     assert len(foreign_server.collected) >= 3
-    assert {how: what for how, what in foreign_server.tried.items() if what} == {}
+    assert {attempt: outcome for attempt, outcome in foreign_server.tried.items() if outcome} == {}
     token = server.url.partition("=")[2]
     for headers in foreign_server.collected:
         assert token not in str(headers)

@@ -24,10 +24,10 @@ PAINTER = "document.getElementById('lightpaint').painter"
 
 def wait_until(is_so: Callable[[], Any], seconds: float = 60) -> Any:
     end = time.monotonic() + seconds
-    while not (found := is_so()):
+    while not (value := is_so()):
         assert time.monotonic() < end
         time.sleep(0.02)
-    return found
+    return value
 
 
 class PaintedRoom:
@@ -37,7 +37,9 @@ class PaintedRoom:
         self.page, self.scene = page, load_scene(write_room(folder))
         settings = Settings(spp=4, use_cache=False)
         subject = Subject("room", folder, scene=self.scene, settings=settings)
-        self.studio = Studio([subject], lambda its: Store.open(folder / "session.db", its))
+        self.studio = Studio(
+            [subject], lambda identity: Store.open(folder / "session.db", identity)
+        )
         self.server = Server(self.studio, port=0)
         self.thread = threading.Thread(target=self.server.run, daemon=True)
         self.thread.start()
@@ -92,14 +94,14 @@ class PaintedRoom:
 @pytest.fixture
 def room(browser: Any, tmp_path: Path) -> Iterator[PaintedRoom]:
     context = browser.new_context(viewport={"width": 1280, "height": 720})
-    page, wrong = context.new_page(), []
-    page.on("pageerror", lambda error: wrong.append(str(error)))
-    page.on("console", lambda said: wrong.append(said.text) if said.type == "error" else None)
-    made = PaintedRoom(page, tmp_path)
-    yield made
+    page, errors = context.new_page(), []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.on("console", lambda line: errors.append(line.text) if line.type == "error" else None)
+    painted_room = PaintedRoom(page, tmp_path)
+    yield painted_room
     context.close()
-    made.close()
-    assert wrong == []
+    painted_room.close()
+    assert errors == []
 
 
 @pytest.mark.long
@@ -158,14 +160,14 @@ def test_a_light_is_added_by_a_click_dragged_and_removed(room: PaintedRoom) -> N
     assert not session.is_painted
     room.drag(room.mark("spot_1"), 40, 0)
     room.until_step(2)
-    moved = room.poses["spot_1"]["position"]
-    assert moved[0] > place[0]
+    position = room.poses["spot_1"]["position"]
+    assert position[0] > place[0]
     row = page.get_by_role("group", name="spot_1", exact=True)
     row.get_by_role("button", name="Remove").click()
     page.wait_for_selector('[data-lamp="spot_1"]', state="detached")
     page.keyboard.press("Control+z")
     page.wait_for_selector('[data-lamp="spot_1"]')
-    wait_until(lambda: room.mark("spot_1") == pytest.approx(room.seen(moved), abs=1))
+    wait_until(lambda: room.mark("spot_1") == pytest.approx(room.seen(position), abs=1))
     # In the plan it hangs below the ceiling, where it was clicked.
     page.get_by_label("New light").select_option("point")
     page.get_by_role("button", name="Add a light").click()

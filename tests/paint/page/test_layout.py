@@ -19,16 +19,18 @@ def test_a_button_that_is_on_is_seen_under_the_pointer(painter: Painter) -> None
 
 def test_by_keyboard_alone(painter: Painter) -> None:
     """All controls are reached by Tab, each says what it is, and the pictures take paint."""
-    reached = []
+    names_reached = []
     for _ in range(110):
         painter.page.keyboard.press("Tab")
-        reached.append(painter.page.evaluate("() => document.activeElement.outerHTML.slice(0, 90)"))
+        names_reached.append(
+            painter.page.evaluate("() => document.activeElement.outerHTML.slice(0, 90)")
+        )
     controls = painter.page.evaluate(
         "() => [...document.querySelectorAll('.lightpaint :is(button, input, select)')]"
         ".filter((one) => !one.disabled && one.checkVisibility()).map((one) =>"
         " one.outerHTML.slice(0, 90))"
     )
-    assert set(controls) <= set(reached)
+    assert set(controls) <= set(names_reached)
     painter.page.locator(".stage").focus()
     for key in ("ArrowRight", "ArrowDown", "Enter"):
         painter.page.keyboard.press(key)
@@ -99,33 +101,33 @@ def test_around_it_nothing_hears_its_keys(new_painter: Any) -> None:
         " window.addEventListener('keydown', (event) => window.heard.push(event.key)); }"
     )
 
-    def heard(*keys: str) -> list[str]:
+    def keys_heard(*keys: str) -> list[str]:
         painter.page.evaluate("() => { window.heard = []; }")
         for key in keys:
             painter.page.keyboard.press(key)
         return [key for key in painter.page.evaluate("() => window.heard") if key != "Control"]
 
     painter.stroke()  # the pictures have the focus
-    assert heard("b", "Delete", "7", "d", "Escape", "Shift+Enter", "Alt+ArrowUp") == []
-    assert heard("Control+z", "Control+s", "Control+x", "Control+v", "Control+Enter") == []
-    assert heard("Control+k", "F2") == ["k", "F2"]
+    assert keys_heard("b", "Delete", "7", "d", "Escape", "Shift+Enter", "Alt+ArrowUp") == []
+    assert keys_heard("Control+z", "Control+s", "Control+x", "Control+v", "Control+Enter") == []
+    assert keys_heard("Control+k", "F2") == ["k", "F2"]
     painter.stroke(modifiers="Space")
     assert painter.ui("show")["pan"][0] < 0
     painter.page.get_by_role("textbox").first.focus()
-    assert heard("f", "Delete", "Control+v") == ["v"]
+    assert keys_heard("f", "Delete", "Control+v") == ["v"]
     painter.page.locator(".top").click(position={"x": 3, "y": 3})  # nothing is there
-    assert heard("e") == []
+    assert keys_heard("e") == []
     assert painter.ui("tool") == "eraser"
     # Nor where what had the focus is gone.
     painter.page.evaluate("() => document.activeElement.shadowRoot.activeElement.blur()")
     assert painter.page.evaluate("() => document.activeElement === document.body")
-    assert heard("b", "Delete", "?", "Escape", "Delete") == []
+    assert keys_heard("b", "Delete", "?", "Escape", "Delete") == []
     assert painter.ui("tool") == "brush"
     painter.page.evaluate(
         "() => { const cell = document.body.appendChild(document.createElement('textarea'));"
         " cell.focus(); cell.blur(); }"
     )
-    assert heard("e") == ["e"]
+    assert keys_heard("e") == ["e"]
     assert painter.ui("tool") == "brush"
 
 
@@ -144,33 +146,33 @@ def test_a_look_is_kept_from_anywhere(new_painter: Any, query: str) -> None:
         painter.still()
         return str(painter.page.evaluate("() => window.prevented.at(-1)"))
 
-    def kept() -> int:
+    def kept_looks() -> int:
         return len(painter.said("save_look"))
 
     level = painter.page.get_by_role("textbox", name="key, level")
     level.fill("-1")
     assert press("Control+s") == "strue"
-    said = [one["kind"] for one in painter.page.evaluate("() => window.host.said")]
-    assert said[-2:] == ["constrain_light", "save_look"]
+    kinds = [request["kind"] for request in painter.page.evaluate("() => window.host.said")]
+    assert kinds[-2:] == ["constrain_light", "save_look"]
     assert level.input_value() == "\u22121.0 st"
     assert level.evaluate("(one) => one.getRootNode().activeElement === one")
     assert press("Control+a") == "afalse"  # marks what is in the field
     painter.page.locator(".look-name").click()
     assert press("Control+s") == "strue"
-    assert kept() == 2
+    assert kept_looks() == 2
     painter.button("Solve settings").click()
     painter.page.get_by_role("textbox", name="At most").focus()
     assert press("Control+s") == "strue"
-    assert kept() == 3
+    assert kept_looks() == 3
     painter.page.locator(".stage").focus()
     assert press("Control+s") == "strue"
-    assert kept() == 4
+    assert kept_looks() == 4
     assert press("Control+a") == "atrue"
     assert painter.page.evaluate("() => String(getSelection())") == ""
     painter.page.keyboard.press("?")
     painter.page.get_by_role("dialog").wait_for()
     assert press("Control+s") == "strue"
-    assert kept() == 4
+    assert kept_looks() == 4
 
 
 def test_a_window_is_open_before_the_next_key(new_painter: Any) -> None:
@@ -194,7 +196,7 @@ def test_windows_lie_over_it(new_painter: Any) -> None:
     """In a frame as high as all of a notebook; over the frame where hardly any of it is seen."""
     painter = new_painter("shadow", viewport={"width": 1280, "height": 5000})
 
-    def shown(key: str, top: int) -> tuple[Any, Any]:
+    def open_window(key: str, top: int) -> tuple[Any, Any]:
         painter.page.evaluate(
             "(top) => { document.getElementById('lightpaint').style = 'position: absolute;"
             " left: 50px; width: 800px; height: 560px; top: ' + top + 'px'; }",
@@ -212,13 +214,13 @@ def test_windows_lie_over_it(new_painter: Any) -> None:
         assert not window.is_visible()
         return boxes
 
-    window, around = shown("?", 4000)
-    assert window["x"] > around["x"]
-    assert window["x"] + window["width"] < around["x"] + around["width"]
-    assert window["y"] > around["y"]
-    assert window["y"] + window["height"] < around["y"] + around["height"]
+    window, surroundings = open_window("?", 4000)
+    assert window["x"] > surroundings["x"]
+    assert window["x"] + window["width"] < surroundings["x"] + surroundings["width"]
+    assert window["y"] > surroundings["y"]
+    assert window["y"] + window["height"] < surroundings["y"] + surroundings["height"]
     painter.page.set_viewport_size({"width": 1280, "height": 720})
-    window, around = shown("?", 500)
+    window, surroundings = open_window("?", 500)
     assert 0 < window["y"] < window["y"] + window["height"] < 720
     assert window["height"] > 300
 
@@ -269,8 +271,8 @@ def clipped_elements(painter: Painter) -> list[str]:
 @pytest.mark.parametrize("size", SIZES + COLUMNS + LOW)
 def test_nothing_is_cut_off(new_painter: Any, size: tuple[int, int]) -> None:
     painter = new_painter("lights=12", viewport={"width": size[0], "height": size[1]})
-    about = {"headline": SENTENCE, "help": HELP, "delta_e": 11.2, "delta_e_present": 20.5}
-    painter.tell(kind="answer", version=2, exact=True, lights=[], **about)
+    answer = {"headline": SENTENCE, "help": HELP, "delta_e": 11.2, "delta_e_present": 20.5}
+    painter.tell(kind="answer", version=2, exact=True, lights=[], **answer)
     painter.page.keyboard.press("Control+s")
     for key in "bwa":
         painter.page.keyboard.press(key)
@@ -303,8 +305,8 @@ def test_of_a_low_painter_the_sentence_comes_first(new_painter: Any, size: tuple
     """Nothing that is needed lies below what is seen, and panels scroll."""
     painter = new_painter("lights=12", viewport={"width": size[0], "height": size[1]})
     stage = painter.page.locator(".stage").bounding_box()
-    said = painter.page.locator(".said").bounding_box()
-    assert said["y"] + said["height"] <= stage["y"]
+    sentence_box = painter.page.locator(".said").bounding_box()
+    assert sentence_box["y"] + sentence_box["height"] <= stage["y"]
     assert stage["height"] > 60
     for name in (".stage", ".tools .two-colours", ".answer button", ".options input >> nth=-1"):
         box = painter.page.locator(name).first.bounding_box()
@@ -384,6 +386,6 @@ def test_a_picture_at_the_right_edge_is_named_on_one_line(painter: Painter) -> N
     """In the wipe the name of the right picture ends where the window does."""
     painter.button("Wipe").click()
     painter.still()
-    boxes = [one.bounding_box() for one in painter.page.locator(".tag").all()]
+    boxes = [tag.bounding_box() for tag in painter.page.locator(".tag").all()]
     left, right = sorted(boxes, key=lambda box: box["x"])
     assert right["height"] == left["height"]

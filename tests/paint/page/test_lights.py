@@ -14,11 +14,11 @@ def newest_constraints(painter: Painter) -> Any:
 
 def test_a_light_is_moved_by_hand_and_freed(painter: Painter) -> None:
     painter.slide("key, stops from now", "ArrowRight", 20)
-    asked = painter.said("constrain_light")
-    assert asked[-1]["light"] == 0
-    assert asked[-1]["is_final"] is True
+    requests = painter.said("constrain_light")
+    assert requests[-1]["light"] == 0
+    assert requests[-1]["is_final"] is True
     current = painter.page.evaluate("() => window.painter.store.value.lights[0].present")
-    lock = asked[-1]["constraints"]["lock"]
+    lock = requests[-1]["constraints"]["lock"]
     assert lock == pytest.approx([x * 2 for x in current], rel=1e-6)  # 20 steps of a twentieth
     painter.button("Unlock key").click()
     assert newest_constraints(painter) == {}
@@ -53,9 +53,9 @@ def test_a_level_is_typed_in_stops_or_percent(painter: Painter) -> None:
         if text[-1].isdigit():
             words = "could be stops or percent: add the unit (12 st, 80 %)."
         assert painter.ui("toasts")[-1]["text"] == f"{text} {words}"
-    said = len(painter.ui("toasts"))
+    toast_count = len(painter.ui("toasts"))
     painter.type("key, level", " ")
-    assert len(painter.ui("toasts")) == said
+    assert len(painter.ui("toasts")) == toast_count
     assert len(painter.said("constrain_light")) == count
     level = painter.page.get_by_role("textbox", name="key, level")
     assert level.input_value() == "\u22129.0 st"
@@ -127,11 +127,11 @@ def test_what_is_asked_of_a_level_stands_in_one_row(
     room = panel.bounding_box()
 
     def in_a_row(*labels: str) -> None:
-        named = [
+        controls = [
             panel.get_by_role("combobox" if label == "Unit" else "textbox", name=label, exact=True)
             for label in labels
         ]
-        boxes = [one.bounding_box() for one in named]
+        boxes = [control.bounding_box() for control in controls]
         assert len({box["y"] + box["height"] for box in boxes}) == 1
         for box, after in zip(boxes, [*boxes[1:], None], strict=True):
             assert box["width"] > 40
@@ -196,13 +196,13 @@ def test_what_a_light_may_do(painter: Painter) -> None:
     assert newest_constraints(painter) == {"limits": {"min": "20%", "max": "150%"}}
     painter.choose("Colour", "kelvin")
     painter.type("From", "3000")
-    asked = newest_constraints(painter)
-    assert asked == {"limits": {"min": "20%", "max": "150%"}, "kelvin": [3000, 6500]}
+    constraints = newest_constraints(painter)
+    assert constraints == {"limits": {"min": "20%", "max": "150%"}, "kelvin": [3000, 6500]}
     panel = page.get_by_role("group", name="Constraints on key")
     panel.get_by_role("button", name="Off", exact=True).click()
     assert newest_constraints(painter) == {"off": True}
     panel.get_by_role("button", name="Free", exact=True).click()
-    assert newest_constraints(painter) == asked  # as it was before it was off
+    assert newest_constraints(painter) == constraints  # as it was before it was off
     painter.choose("Colour", "color")
     painter.type("Hex or kelvin", "3200K")
     assert newest_constraints(painter)["color"] == "3200K"
@@ -246,18 +246,20 @@ def test_who_holds_a_light_holds_its_dimmer(painter: Painter) -> None:
 
 def test_a_light_is_said_to_be_held_back_by_what_is_asked_of_it_alone(painter: Painter) -> None:
     badge = painter.page.locator(".badge")
-    held = (
+    hold_script = (
         "(constraints) => host.tell({ kind: 'answer', exact: true, constraints, arrays: {}, lights:"
     )
-    held += " painter.store.value.lights.map(() => ({ share: 0.1, is_constrained: true })) })"
-    painter.page.evaluate(held, {})
+    hold_script += (
+        " painter.store.value.lights.map(() => ({ share: 0.1, is_constrained: true })) })"
+    )
+    painter.page.evaluate(hold_script, {})
     assert badge.count() == 0
-    painter.page.evaluate(held, {"key": {"limits": {"max": "150%"}, "kelvin": [2700, 3000]}})
+    painter.page.evaluate(hold_script, {"key": {"limits": {"max": "150%"}, "kelvin": [2700, 3000]}})
     assert badge.all_inner_texts() == ["held back"]
     assert "This keeps it from what the painting asks" in badge.get_attribute("data-tip")
     within = "(one) => one.scrollWidth <= one.clientWidth"
     assert badge.evaluate(within)
-    painter.page.evaluate(held, {"key": {"lock": [1, 1, 1]}})
+    painter.page.evaluate(hold_script, {"key": {"lock": [1, 1, 1]}})
     assert badge.all_inner_texts() == ["locked"]
 
 
@@ -278,8 +280,8 @@ def test_names_that_differ_at_their_end_are_told_apart(new_painter: Any) -> None
     assert (start.inner_text(), end.inner_text()) == ("ceiling_window", "_12_3")
     widths = start.evaluate("(its) => [its.clientWidth, its.scrollWidth]")
     assert 12 < widths[0] < widths[1]  # something is left out, and it is not all of it
-    its = end.bounding_box()
-    assert its["x"] + its["width"] <= box["x"] + box["width"] + 0.5
+    end_box = end.bounding_box()
+    assert end_box["x"] + end_box["width"] <= box["x"] + box["width"] + 0.5
     assert end.evaluate("(its) => its.scrollWidth <= its.clientWidth + 1")
     assert painter.page.get_by_role("button", name="key", exact=True).inner_text() == "key"
 
@@ -290,9 +292,9 @@ def test_a_light_says_its_unit_in_its_tip_and_keeps_its_height_while_it_is_sough
     painter = new_painter(viewport={"width": 1280, "height": 720})
     row = painter.page.locator(".light").first
     value, error = row.locator(".values"), row.locator(".error")
-    said = value.inner_text(), "W/(m² sr)", error.inner_text()
-    assert all(said)
-    assert value.get_attribute("data-tip") == " ".join(said)
+    texts = value.inner_text(), "W/(m² sr)", error.inner_text()
+    assert all(texts)
+    assert value.get_attribute("data-tip") == " ".join(texts)
     before = row.bounding_box()
     painter.tell(kind="answer", version=100, exact=False)
     assert not error.is_visible()
@@ -368,9 +370,9 @@ def test_solo_and_mute_ask_nothing_of_the_solve(painter: Painter) -> None:
     assert not painter.said("constrain_light")
     painter.page.locator(".light-thumb").nth(1).hover()
     painter.still()
-    shown = painter.page.evaluate("() => window.engine.shown")
-    assert shown["right"] == "other"
-    assert [max(rgb) > 0 for rgb in shown["other"]] == [k == 1 for k in range(7)]
+    shown_view = painter.page.evaluate("() => window.engine.shown")
+    assert shown_view["right"] == "other"
+    assert [max(rgb) > 0 for rgb in shown_view["other"]] == [k == 1 for k in range(7)]
 
 
 @pytest.mark.parametrize("way", ["panels", "fold", "search"])
@@ -405,8 +407,8 @@ def test_64_lights_are_found_sorted_and_folded(new_painter: Any) -> None:
         "() => Object.fromEntries(painter.store.value.lights.map((one, k) =>"
         " [one.name, painter.store.value.lit[k].share]))"
     )
-    alone = [shares[name] for name in names[:3]]
-    assert alone == sorted(alone, reverse=True)
+    sole_shares = [shares[name] for name in names[:3]]
+    assert sole_shares == sorted(sole_shares, reverse=True)
 
 
 def test_a_number_is_taken_as_it_is_shown(painter: Painter) -> None:
@@ -430,8 +432,8 @@ def test_a_finger_scrolls_lights_and_moves_none(new_painter: Any) -> None:
 
     def mark(x: float) -> float:
         """How far from there the slider's mark is."""
-        at = "(one) => (one.value - one.min) / (one.max - one.min)"
-        return float(slider.bounding_box()["x"] + slider.evaluate(at) * place()[2] - x)
+        share_script = "(one) => (one.value - one.min) / (one.max - one.min)"
+        return float(slider.bounding_box()["x"] + slider.evaluate(share_script) * place()[2] - x)
 
     x, y, _ = place()
     scrolled = "() => document.querySelector('.is-lights .fold-body').scrollTop"
@@ -443,18 +445,20 @@ def test_a_finger_scrolls_lights_and_moves_none(new_painter: Any) -> None:
     assert slider.input_value() == value
     x, y, _ = place()
     finger.goes(*((x + 6 * k, y + k) for k in range(8)))
-    asked = painter.said("constrain_light")
-    assert {one["light"] for one in asked} == {4}
-    assert [one["is_final"] for one in asked][:: len(asked) - 1] == [False, True]
+    requests = painter.said("constrain_light")
+    assert {request["light"] for request in requests} == {4}
+    assert [request["is_final"] for request in requests][:: len(requests) - 1] == [False, True]
     assert mark(x + 42) == pytest.approx(0, abs=10)  # half of the mark, which stays on the track
     search = painter.page.get_by_role("searchbox", name="Search lights")
     search.focus()
     finger.goes((x, y))
     assert slider.evaluate("(one) => one === document.activeElement")
-    assert [one["is_final"] for one in painter.said("constrain_light")[len(asked) :]] == [True]
+    assert [
+        request["is_final"] for request in painter.said("constrain_light")[len(requests) :]
+    ] == [True]
     assert mark(x) == pytest.approx(0, abs=10)
     slider.press("ArrowRight")  # keys are heard as before
-    assert len(painter.said("constrain_light")) > len(asked) + 1
+    assert len(painter.said("constrain_light")) > len(requests) + 1
     painter.page.mouse.click(x + 30, y)  # and so is a mouse
     assert mark(x + 30) == pytest.approx(0, abs=10)
 
@@ -491,7 +495,7 @@ def test_levels_far_below_one_are_not_off(painter: Painter) -> None:
 
 
 @pytest.mark.parametrize(
-    ("limits", "shown", "turned"),
+    ("limits", "words", "position"),
     [
         ({"min": 0.05, "max": "150%"}, ("0.05", 1.5), ("share", 0.05, "150%")),
         ({"max": [0.3, 0.3, 0.3]}, ("", 0.3), ("share", None, 0.3)),
@@ -499,31 +503,35 @@ def test_levels_far_below_one_are_not_off(painter: Painter) -> None:
     ],
 )
 def test_limits_of_a_lights_file_are_shown_in_one_unit(
-    painter: Painter, limits: Any, shown: Any, turned: Any
+    painter: Painter, limits: Any, words: Any, position: Any
 ) -> None:
     painter.page.evaluate("(limits) => painter.session.constrainLight(0, { limits })", limits)
     painter.still()
     panel = open_key_panel(painter)
     red, green, blue = painter.ui("lights")[0]["present"]
-    now = 0.2126 * red + 0.7152 * green + 0.0722 * blue
+    current = 0.2126 * red + 0.7152 * green + 0.0722 * blue
     is_share = panel.get_by_role("combobox", name="Unit").input_value() == "share"
     assert is_share == all(isinstance(x, str) for x in limits.values())
     fields = [panel.get_by_role("textbox", name=name) for name in ("Min", "Max")]
-    assert fields[0].input_value() == shown[0]
-    most = shown[1] * (now if isinstance(limits["max"], str) and not is_share else 1)
-    assert float(fields[1].input_value()) == pytest.approx(most, rel=1e-3)
-    unit, *ends = turned
+    assert fields[0].input_value() == words[0]
+    maximum = words[1] * (current if isinstance(limits["max"], str) and not is_share else 1)
+    assert float(fields[1].input_value()) == pytest.approx(maximum, rel=1e-3)
+    unit, *ends = position
     painter.choose("Unit", unit)
-    asked = newest_constraints(painter)["limits"]
+    limits_asked = newest_constraints(painter)["limits"]
     for key, end in zip(("min", "max"), ends, strict=True):
         if isinstance(end, str):
-            assert float(asked[key].rstrip("%")) == pytest.approx(float(end.rstrip("%")), rel=1e-3)
+            assert float(limits_asked[key].rstrip("%")) == pytest.approx(
+                float(end.rstrip("%")), rel=1e-3
+            )
         elif end is None:
-            assert key not in asked
+            assert key not in limits_asked
         elif unit == "share":
-            assert float(asked[key].rstrip("%")) == pytest.approx(100 * end / now, rel=1e-3)
+            assert float(limits_asked[key].rstrip("%")) == pytest.approx(
+                100 * end / current, rel=1e-3
+            )
         else:
-            assert asked[key] == pytest.approx(end * now, rel=1e-3)
+            assert limits_asked[key] == pytest.approx(end * current, rel=1e-3)
 
 
 def test_all_lights_are_let_go_of_in_one_step(painter: Painter) -> None:
@@ -538,20 +546,20 @@ def test_all_lights_are_let_go_of_in_one_step(painter: Painter) -> None:
     steps = painter.ui("history")["count"]
     free.click()
     free.wait_for(state="detached")
-    [said] = painter.said("constrain_lights")
-    assert said["constraints"] == {"key": {"limits": {"max": "150%"}}, "cove": {}}
+    [request] = painter.said("constrain_lights")
+    assert request["constraints"] == {"key": {"limits": {"max": "150%"}}, "cove": {}}
     assert painter.ui("history")["count"] == steps + 1
     assert painter.page.locator(".dimmer.is-held").count() == 0
 
 
 def test_a_white_that_is_green_or_pink_is_said_to_be(painter: Painter) -> None:
-    def said(rgb: list[float]) -> str:
+    def tint_text(rgb: list[float]) -> str:
         painter.page.evaluate("(rgb) => painter.session.lockLight(0, rgb, true)", rgb)
         painter.still()
         return str(painter.page.locator('[data-light="key"] .values').inner_text())
 
     white = [1.0, 0.98, 0.95]
-    assert " K" in said(white)
-    assert "green" not in said(white)
-    assert "K green" in said([1.0, 1.12, 0.95])
-    assert "K pink" in said([1.0, 0.75, 0.95])
+    assert " K" in tint_text(white)
+    assert "green" not in tint_text(white)
+    assert "K green" in tint_text([1.0, 1.12, 0.95])
+    assert "K pink" in tint_text([1.0, 0.75, 0.95])

@@ -8,16 +8,16 @@ from painter_page import Painter
 
 def test_a_tab_that_comes_second_says_where_the_painter_is(new_painter: Any) -> None:
     painter = new_painter("elsewhere", until=".lightpaint .banner")
-    said = painter.page.get_by_role("alert")
-    assert "the painter is open in another tab" in said.inner_text().lower()
+    notice = painter.page.get_by_role("alert")
+    assert "the painter is open in another tab" in notice.inner_text().lower()
     assert painter.page.get_by_role("progressbar").count() == 0
     assert painter.page.get_by_text("Opening the scene").count() == 0
-    box, view = said.bounding_box(), painter.page.locator(".view").bounding_box()
+    box, view = notice.bounding_box(), painter.page.locator(".view").bounding_box()
     assert abs(box["x"] + box["width"] / 2 - view["x"] - view["width"] / 2) < 2
-    said.get_by_role("button", name="Take over").click()
+    notice.get_by_role("button", name="Take over").click()
     painter.page.locator(".lightpaint .tag").first.wait_for()
     assert painter.said("take_over")
-    assert said.count() == 0
+    assert notice.count() == 0
 
 
 def test_what_fails_is_said_and_the_painter_lives(painter: Painter) -> None:
@@ -86,12 +86,12 @@ def test_what_is_refused_is_shown_no_longer(painter: Painter) -> None:
     painter.still()
     assert at_most.input_value() == ""
     painter.choose("Colour", "kelvin")
-    asked = {"limits": {"min": "20%"}, "kelvin": [2700, 6500]}
-    assert painter.said("constrain_light")[-1]["constraints"] == asked
+    constraints = {"limits": {"min": "20%"}, "kelvin": [2700, 6500]}
+    assert painter.said("constrain_light")[-1]["constraints"] == constraints
     fail_next_request(painter)
     painter.choose("Colour", "any")
     painter.still()
-    assert painter.ui("constraints") == {"key": asked}
+    assert painter.ui("constraints") == {"key": constraints}
     before["constraints"] = painter.ui("constraints")
     for act in (
         lambda: painter.choose("Tie to", "cove"),
@@ -209,10 +209,10 @@ def test_what_fails_is_under_way_no_more_and_the_rest_is(painter: Painter) -> No
     painter.tell(kind="notice", text="The scene does not load.", tone="warn")
     painter.tell(kind="failed", text="A stroke is too large.")
     assert running_tasks(painter) == {"export", "verify", "explain"}
-    for what in ("verify", "explain", "export"):
-        assert what in running_tasks(painter)
-        painter.tell(kind="notice", text="It does not render.", tone="warn", task=what)
-        assert what not in running_tasks(painter)
+    for task in ("verify", "explain", "export"):
+        assert task in running_tasks(painter)
+        painter.tell(kind="notice", text="It does not render.", tone="warn", task=task)
+        assert task not in running_tasks(painter)
 
 
 def test_what_ended_while_the_connection_was_lost_is_not_waited_for(painter: Painter) -> None:

@@ -25,63 +25,63 @@ SIZE = (36, 64)
 EVIL = "</script><script>document.title='x'</script>"
 
 
-def light_basis(make_basis: Any, n: int, **how: Any) -> lp.Basis:
+def light_basis(make_basis: Any, n: int, **options: Any) -> lp.Basis:
     """Soft spots of light of whitish colours, over 12 stops."""
     rng = np.random.default_rng(4)
     y, x = np.mgrid[: SIZE[0], : SIZE[1]] / SIZE[0]
     cy, cx = rng.uniform(0, 1, (2, n, 1, 1))
-    away = np.hypot(y - cy, x - 1.7 * cx)
-    images = np.exp(-7 * away)[..., None] * rng.uniform(0.6, 1, (n, 1, 1, 3))
+    distance = np.hypot(y - cy, x - 1.7 * cx)
+    images = np.exp(-7 * distance)[..., None] * rng.uniform(0.6, 1, (n, 1, 1, 3))
     emission = rng.uniform(0.5, 1, (n, 3))
     emission[:, 0] = 1.2
-    return make_basis(images=images, emission=emission, **how)
+    return make_basis(images=images, emission=emission, **options)
 
 
-def solve_painting(basis: lp.Basis, **how: Any) -> tuple[lp.Target, lp.Solution]:
+def solve_painting(basis: lp.Basis, **options: Any) -> tuple[lp.Target, lp.Solution]:
     """The answer to a painting of other weights."""
     weights = np.random.default_rng(1).uniform(0.1, 1.5, (len(basis.lights), 3))
     image = basis.mix(weights).astype(np.float32)
-    target = lp.Target("evening", image, np.ones(SIZE, np.float32), everything=True, **how)
+    target = lp.Target("evening", image, np.ones(SIZE, np.float32), everything=True, **options)
     return target, lp.solve(basis, target)
 
 
-def report(basis: lp.Basis, **how: Any) -> str:
+def report(basis: lp.Basis, **options: Any) -> str:
     """A whole report."""
-    target, solution = solve_painting(basis, **how)
+    target, solution = solve_painting(basis, **options)
     predicted = lp.combine(basis, solution.lighting)
-    about: dict[str, Any] = {"target": target, "solution": solution, "predicted": predicted}
-    return report_page(basis=basis, verification=None, command="lightpaint solve", **about)
+    report_data: dict[str, Any] = {"target": target, "solution": solution, "predicted": predicted}
+    return report_page(basis=basis, verification=None, command="lightpaint solve", **report_data)
 
 
 @pytest.fixture(scope="module")
 def offline_tab(browser: Any) -> Iterator[tuple[Any, list[str]]]:
     """One tab without a network for all tests, and whatever goes wrong in it."""
-    wrong: list[str] = []
+    errors: list[str] = []
     context = browser.new_context(offline=True, viewport={"width": 1100, "height": 800})
     page = context.new_page()
-    page.on("pageerror", lambda error: wrong.append(str(error)))
-    page.on("console", lambda line: wrong.append(line.text) if line.type == "error" else None)
-    page.on("requestfailed", lambda request: wrong.append(request.url))
-    yield page, wrong
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.on("console", lambda line: errors.append(line.text) if line.type == "error" else None)
+    page.on("requestfailed", lambda request: errors.append(request.url))
+    yield page, errors
     context.close()
 
 
 @pytest.fixture
 def open_file(offline_tab: tuple[Any, list[str]], tmp_path: Path) -> Any:
     """Opens a page from a file; whatever goes wrong in it fails the test."""
-    page, wrong = offline_tab
+    page, errors = offline_tab
 
-    def open_(text: str) -> Any:
+    def open_text(text: str) -> Any:
         path = tmp_path / "report.html"
         path.write_text(text, encoding="utf-8")
         page.goto(path.as_uri())
         page.locator(".mixer-body").first.wait_for()
         return page
 
-    yield open_
+    yield open_text
     page.goto("about:blank")
     page.set_viewport_size({"width": 1100, "height": 800})
-    left, wrong[:] = wrong[:], []
+    left, errors[:] = errors[:], []
     assert left == []
 
 
@@ -123,9 +123,9 @@ def move(page: Any, light: int, slider: int, value: float) -> None:
 
 def check(page: Any, expected: Any) -> None:
     """Within a code of the display, but for what rounding of the planes adds up to."""
-    off = np.abs(pixels(page) - expected)
-    assert off.mean() < 0.5
-    assert off.max() <= 2
+    difference = np.abs(pixels(page) - expected)
+    assert difference.mean() < 0.5
+    assert difference.max() <= 2
 
 
 def test_sliders_solo_and_mute_show_the_sum_of_the_planes(make_basis: Any, open_file: Any) -> None:
@@ -141,8 +141,8 @@ def test_sliders_solo_and_mute_show_the_sum_of_the_planes(make_basis: Any, open_
     check(page, codes(basis, weights, transform))
     rows = page.locator(".mixer-light")
     rows.nth(1).get_by_text("S", exact=True).click()
-    alone = np.where(np.arange(3)[:, None] == 1, weights, 0)
-    check(page, codes(basis, alone, transform))
+    solo_weights = np.where(np.arange(3)[:, None] == 1, weights, 0)
+    check(page, codes(basis, solo_weights, transform))
     rows.nth(1).get_by_text("S", exact=True).click()
     rows.nth(0).get_by_text("M", exact=True).click()
     check(page, codes(basis, np.where(np.arange(3)[:, None] == 0, 0, weights), transform))
@@ -198,15 +198,15 @@ def test_a_finger_scrolls_past_sliders(make_basis: Any, open_file: Any, browser:
 def test_on_a_phone_nothing_parts_lights_and_buttons(make_basis: Any, open_file: Any) -> None:
     """But what is said of a copy, while it is; and nothing is wider than the phone."""
     page = open_file(report(light_basis(make_basis, 4)))
-    between = """() => document.querySelector('.mixer-light').getBoundingClientRect().top
+    gap_script = """() => document.querySelector('.mixer-light').getBoundingClientRect().top
         - document.querySelector('.mixer-buttons').getBoundingClientRect().bottom"""
     for width in (360, 400):
         page.set_viewport_size({"width": width, "height": 740})
-        assert 8 < page.evaluate(between) < 24
+        assert 8 < page.evaluate(gap_script) < 24
         assert page.evaluate("() => document.documentElement.scrollWidth") == width
     page.get_by_role("button", name="Copy as lighting.json").click()
-    said = page.locator(".mixer-said")
-    said.get_by_text("clipboard").or_(said.get_by_text("copy here")).wait_for()
+    sentence = page.locator(".mixer-said")
+    sentence.get_by_text("clipboard").or_(sentence.get_by_text("copy here")).wait_for()
     box, buttons, light = (
         page.locator(x).first.bounding_box()
         for x in (".mixer-said", ".mixer-buttons", ".mixer-light")
@@ -222,8 +222,8 @@ def test_through_other_transforms(make_basis: Any, open_file: Any, name: str) ->
     lighting = solve_painting(basis)[1].lighting
     text = mixer_html(basis, lighting, transform=transform) + mixer_assets()
     page = open_file(f"<!doctype html><body>{text}")
-    off = np.abs(pixels(page) - codes(basis, lighting.weights_for(basis), transform))
-    assert off.mean() < 1
+    difference = np.abs(pixels(page) - codes(basis, lighting.weights_for(basis), transform))
+    assert difference.mean() < 1
 
 
 def test_what_is_copied_is_read(make_basis: Any, open_file: Any, tmp_path: Path) -> None:
@@ -243,8 +243,8 @@ def test_what_is_copied_is_read(make_basis: Any, open_file: Any, tmp_path: Path)
     # As the answer has them to the last bit, but for the one that was moved.
     np.testing.assert_array_equal(weights[:2], answer[:2])
     level = weights[2] @ [0.2126, 0.7152, 0.0722]
-    now = basis.current_weights[2] @ [0.2126, 0.7152, 0.0722]
-    assert level == pytest.approx(now / 2, rel=1e-9)
+    luminance = basis.current_weights[2] @ [0.2126, 0.7152, 0.0722]
+    assert level == pytest.approx(luminance / 2, rel=1e-9)
     assert lighting.certificate is None
     page.get_by_text("Copy command").click()
     page.get_by_text("The command is on the clipboard").wait_for()
@@ -262,9 +262,9 @@ def test_of_hundreds_of_lights_the_rest_is_one(make_basis: Any, open_file: Any) 
     check(page, codes(basis, basis.current_weights, transform))
     data = json.loads(page.locator(".mixer script").inner_text())
     assert len(data["rest"]["answer"]) == 60 - ROWS_SHOWN
-    rest = [basis.names.index(name) for name in data["rest"]["present"]]
+    remaining = [basis.names.index(name) for name in data["rest"]["present"]]
     weights = basis.current_weights.copy()
-    weights[rest] *= 2
+    weights[remaining] *= 2
     move(page, ROWS_SHOWN, 0, 1)
     check(page, codes(basis, weights, transform))
 
@@ -331,13 +331,13 @@ def test_a_compact_picture_is_the_picture(dropped: int) -> None:
     rng = np.random.default_rng(0)
     image = np.exp2(rng.uniform(-12, 9, (7, 11, 3))).astype(np.float32)
     image[2, 3], image[4] = 0, [0, 5, 1e-9]
-    its = pack_picture(image, dropped=dropped)
-    assert its.scale * BRIGHTEST >= image.max()
-    made = _unpack(its)
+    packed = pack_picture(image, dropped=dropped)
+    assert packed.scale * BRIGHTEST >= image.max()
+    unpacked = _unpack(packed)
     # Rounded to the 11 bits of halves, then to those that are left; and there is a least value.
     rtol = 2.0**-11 + (2.0 ** (dropped - 11) if dropped else 0)
-    np.testing.assert_allclose(made, image, rtol=rtol, atol=its.scale * 2.0**-20)
-    assert not made[2, 3].any()
+    np.testing.assert_allclose(unpacked, image, rtol=rtol, atol=packed.scale * 2.0**-20)
+    assert not unpacked[2, 3].any()
 
 
 def test_a_lattice_has_what_the_transform_has_at_its_points() -> None:

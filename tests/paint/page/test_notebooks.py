@@ -97,25 +97,25 @@ def is_reachable(url: str) -> bool:
         return False
 
 
-def wait_for(what: Callable[[], Any], limit_s: float = SHOW_MS / 1000) -> Any:
+def wait_for(condition: Callable[[], Any], limit_s: float = SHOW_MS / 1000) -> Any:
     """What it gives, once it does."""
     end_s = time.monotonic() + limit_s
-    while not (found := what()):
+    while not (value := condition()):
         assert time.monotonic() < end_s
         time.sleep(0.1)
-    return found
+    return value
 
 
 @contextmanager
 def open_tab(browser: Any) -> Iterator[Any]:
     """A page on which nothing of the painter's goes wrong."""
     context = browser.new_context(viewport={"width": 1400, "height": 950})
-    page, wrong = context.new_page(), []
+    page, errors = context.new_page(), []
     page.set_default_timeout(SHOW_MS)
-    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("pageerror", lambda error: errors.append(str(error)))
     yield page
     context.close()
-    assert wrong == []
+    assert errors == []
 
 
 def paint(page: Any, folder: Path) -> None:
@@ -162,8 +162,8 @@ def has_painting(folder: Path) -> bool:
 @pytest.mark.skipif(find_spec("jupyterlab") is None, reason="JupyterLab")
 def test_in_jupyterlab(browser: Any, folder: Path) -> None:
     def cell(k: int, text: str) -> dict[str, Any]:
-        about = {"metadata": {}, "outputs": [], "execution_count": None}
-        return {"cell_type": "code", "id": f"c{k}", "source": text, **about}
+        cell_fields = {"metadata": {}, "outputs": [], "execution_count": None}
+        return {"cell_type": "code", "id": f"c{k}", "source": text, **cell_fields}
 
     kernel = {"name": "python3", "display_name": "Python 3", "language": "python"}
     notebook = {"metadata": {"kernelspec": kernel}, "nbformat": 4, "nbformat_minor": 5}
@@ -172,8 +172,8 @@ def test_in_jupyterlab(browser: Any, folder: Path) -> None:
     options = ["--no-browser", "--allow-root", "--ServerApp.token=", "--ServerApp.password="]
     with serve_notebooks(folder, "jupyterlab", *options) as url, open_tab(browser) as page:
         # A slow JupyterLab may ask which kernel it is, before it has read that: it knows by then.
-        asks = page.locator(".jp-Dialog .jp-mod-accept")
-        page.add_locator_handler(asks, lambda: asks.click())
+        dialog_button = page.locator(".jp-Dialog .jp-mod-accept")
+        page.add_locator_handler(dialog_button, lambda: dialog_button.click())
         page.goto(f"{url}/lab/tree/paint.ipynb?reset")
         run_cell(page, 0, lambda: page.locator(".lightpaint").count() == 1)
         paint(page, folder)
@@ -184,9 +184,9 @@ def test_in_jupyterlab(browser: Any, folder: Path) -> None:
         assert "is-dim" not in row.get_attribute("class")
         run_cell(page, 1, lambda: "is-dim" in row.get_attribute("class"))
         # What is painted for a kernel that is there no more would be lost.
-        page.remove_locator_handler(asks)
+        page.remove_locator_handler(dialog_button)
         page.locator('.jp-NotebookPanel-toolbar [data-jp-item-name="restart"] *').first.click()
-        asks.click()
+        dialog_button.click()
         page.get_by_text("The kernel has ended. Run the cell again to continue.").wait_for()
 
 
@@ -194,14 +194,14 @@ def test_in_jupyterlab(browser: Any, folder: Path) -> None:
 def test_in_marimo(browser: Any, folder: Path) -> None:
     state = ["import marimo as mo", "lighting, set_lighting = mo.state(painter.lighting)"]
     state += ['painter.observe(lambda change: set_lighting(change.new), "lighting")', "painter"]
-    told = ["mo.md(f\"for {lighting().target or 'nothing'}\")"]
+    label_cell = ["mo.md(f\"for {lighting().target or 'nothing'}\")"]
     text = "import marimo\napp = marimo.App()\n"
-    for head, cell, made in (
+    for head, cell, outcome in (
         ("", [*PAINTER.splitlines(), *state], "lighting, mo"),
-        ("lighting, mo", told, ""),
+        ("lighting, mo", label_cell, ""),
     ):
         lines = "".join(f"    {line}\n" for line in cell)
-        text += f"\n@app.cell\ndef _({head}):\n{lines}    return {made}\n"
+        text += f"\n@app.cell\ndef _({head}):\n{lines}    return {outcome}\n"
     (folder / "paint.py").write_text(text)
     options = ["--headless", "--no-token", "--host", "127.0.0.1"]
     with (

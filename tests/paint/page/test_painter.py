@@ -90,7 +90,7 @@ def code(*light: float) -> list[int]:
 
 @pytest.mark.parametrize("view", ["cpu", "gl"])
 def test_a_stroke_is_seen_and_said(run: Any, view: str):
-    before, after, beside, said = run(
+    before, after, neighbour_code, messages = run(
         """
         const before = codes(10, 10);
         engine.begin(at(10, 10)); engine.move([at(14, 10)]); engine.end();
@@ -98,18 +98,22 @@ def test_a_stroke_is_seen_and_said(run: Any, view: str):
         """,
         view,
     )
-    assert (before, after, beside) == (code(*[0.25] * 3), code(1, 0.5, 0.25), code(*[0.25] * 3))
-    assert {kind for kind, _ in said} == {"paint"}
-    assert {fields["stroke"] for _, fields in said} == {5}
-    assert [fields["is_final"] for _, fields in said][-1] is True
-    assert said[-1][1]["label"] == "brush"
+    assert (before, after, neighbour_code) == (
+        code(*[0.25] * 3),
+        code(1, 0.5, 0.25),
+        code(*[0.25] * 3),
+    )
+    assert {kind for kind, _ in messages} == {"paint"}
+    assert {fields["stroke"] for _, fields in messages} == {5}
+    assert [fields["is_final"] for _, fields in messages][-1] is True
+    assert messages[-1][1]["label"] == "brush"
 
 
 @pytest.mark.parametrize("view", ["cpu", "gl"])
 def test_solo_clean_and_other_weights_are_shown(run: Any, site: Any, view: str):
     planes = [np.float64(site.arrays[f"plane/{k}"][5, 7]) * 2**k for k in range(N)]
     weights = site.arrays["weights"]
-    whole, solo, instead, other, clean = run(
+    full, solo, replaced, other, clean = run(
         """
         const seen = (more) => { engine.show({ ...show, ...more }); return codes(7, 5, 1); };
         const made = [seen({}), seen({ gains: [false, true, false] }),
@@ -122,30 +126,30 @@ def test_solo_clean_and_other_weights_are_shown(run: Any, site: Any, view: str):
         """,
         view,
     )
-    want = [
+    expected = [
         code(*sum(p * w for p, w in zip(planes, weights, strict=True))),
         code(*planes[1] * weights[1]),
         code(*planes[2] * 0.1),
         code(*planes[0] * [0.5, 0, 0]),
         code(*sum(p * w / 2 for p, w in zip(planes, weights, strict=True))),
     ]
-    np.testing.assert_allclose([whole, solo, instead, other, clean], want, atol=1)
+    np.testing.assert_allclose([full, solo, replaced, other, clean], expected, atol=1)
 
 
 def test_a_dropped_stroke_leaves_the_picture_as_it_was(run: Any):
-    during, after, said = run(
+    mid_stroke, after, messages = run(
         """
         engine.begin(at(10, 10)); const during = codes(10, 10);
         engine.cancel();
         return [during, codes(10, 10), await rest()];
         """
     )
-    assert (during, after) == (code(1, 0.5, 0.25), code(*[0.25] * 3))
-    assert [kind for kind, _ in said] == ["paint", "drop_stroke"]
+    assert (mid_stroke, after) == (code(1, 0.5, 0.25), code(*[0.25] * 3))
+    assert [kind for kind, _ in messages] == ["paint", "drop_stroke"]
 
 
 def test_asking_by_drag_says_how_much(run: Any):
-    asked, colour, said = run(
+    requests, colour, messages = run(
         """
         const asked = [];
         engine.on("asking", (event) => asked.push(event));
@@ -157,13 +161,13 @@ def test_asking_by_drag_says_how_much(run: Any):
         return [asked, colour, await rest()];
         """
     )
-    assert asked == [{"stops": 1, "mired": 0}]
+    assert requests == [{"stops": 1, "mired": 0}]
     np.testing.assert_allclose(colour, 0.5)
-    assert [fields.get("label") for _, fields in said if fields.get("is_final")] == ["adjust"]
+    assert [fields.get("label") for _, fields in messages if fields.get("is_final")] == ["adjust"]
 
 
 def test_asking_by_numbers_line_fill_and_undo(run: Any):
-    wall, floor, back, line, said = run(
+    wall, floor, undone, line, messages = run(
         """
         engine.adjust({ stops: -1, mired: 0, object: 1 });
         const light = (x, y) => engine.lightAt("painting", x, y)[0];
@@ -177,9 +181,9 @@ def test_asking_by_numbers_line_fill_and_undo(run: Any):
         return [wall, floor, back, [light(2, 25), light(10, 25), light(10, 20)], await rest()];
         """
     )
-    assert (wall, floor, back) == (0.125, 0.25, 0.125)
+    assert (wall, floor, undone) == (0.125, 0.25, 0.125)
     assert line == [1, 1, 0.125]
-    assert [f["label"] for _, f in said if f.get("is_final")] == ["adjust", "brush"]
+    assert [f["label"] for _, f in messages if f.get("is_final")] == ["adjust", "brush"]
 
 
 def test_what_is_undone_while_the_painting_is_fetched_stays_undone(run: Any):
@@ -204,15 +208,15 @@ def test_what_is_undone_while_the_painting_is_fetched_stays_undone(run: Any):
 @pytest.mark.parametrize("stops", [0.0, -1.3])
 def test_paint_is_shown_beside_its_colour_as_the_pictures_show_it(run: Any, stops: float):
     light = [0.02, 0.4, 3.0]
-    got = run(f"return engine.codes({light}, {stops});")
-    want = ViewTransform("srgb", stops).encode(np.array(light)) * 255
-    np.testing.assert_allclose(got, want, atol=0.75)  # rounded, from a table
+    codes = run(f"return engine.codes({light}, {stops});")
+    expected = ViewTransform("srgb", stops).encode(np.array(light)) * 255
+    np.testing.assert_allclose(codes, expected, atol=0.75)  # rounded, from a table
 
 
 @pytest.mark.parametrize("view", ["cpu", "gl"])
 def test_what_is_picked_paints_the_same(run: Any, view: str):
     """As light it is what falls there, and not what comes back of it."""
-    picked, look, on_black = run(
+    picked_colour, look, on_black = run(
         """
         const { canvas } = engine.mirror;
         canvas.albedo = new Uint16Array(W * H * 3).fill(0x3400);  // a quarter
@@ -226,18 +230,18 @@ def test_what_is_picked_paints_the_same(run: Any, view: str):
         """,
         view,
     )
-    np.testing.assert_allclose(picked, [1, 0.5, 0.25], rtol=1e-3)
+    np.testing.assert_allclose(picked_colour, [1, 0.5, 0.25], rtol=1e-3)
     np.testing.assert_allclose(look, [0.25, 0.125, 0.0625], rtol=1e-3)
     np.testing.assert_allclose(on_black, np.outer([12.5, 0.25], [1, 1, 1]), rtol=1e-3)
 
 
 def test_what_is_pointed_at(run: Any, site: Any):
-    found, outside, (data, shape) = run(
+    pointed_light, outside, (data, shape) = run(
         "const { data, width, height } = engine.objects();"
         " return [engine.pointed(25.7, 8.1), engine.pointed(-1, 3), [[...data], [height, width]]];"
     )
     np.testing.assert_array_equal(np.reshape(data, shape), site.arrays["objects"])
-    assert found["index"] == site.arrays["objects"][8, 25]
+    assert pointed_light["index"] == site.arrays["objects"][8, 25]
     levels = [
         np.float64(site.arrays[f"plane/{k}"][8, 25])
         * 2**k
@@ -245,8 +249,8 @@ def test_what_is_pointed_at(run: Any, site: Any):
         @ [0.2126, 0.7152, 0.0722]
         for k in range(N)
     ]
-    assert (found["object"], outside) == ("wall", None)
-    np.testing.assert_allclose(found["shares"], np.array(levels) / sum(levels), rtol=1e-5)
+    assert (pointed_light["object"], outside) == ("wall", None)
+    np.testing.assert_allclose(pointed_light["shares"], np.array(levels) / sum(levels), rtol=1e-5)
 
 
 def test_places_stay_under_the_pointer_when_zoomed(run: Any):

@@ -41,13 +41,13 @@ UNPAINTED = "Nothing is painted: the answer is the current lighting."
 PAINTER = "document.getElementById('lightpaint').painter"
 
 
-def wait_until(is_so: Callable[[], Any], what: str, seconds: float = 60) -> Any:
+def wait_until(is_so: Callable[[], Any], description: str, seconds: float = 60) -> Any:
     """What is looked for, once it is so."""
     end = time.monotonic() + seconds
-    while not (found := is_so()):
-        assert time.monotonic() < end, what
+    while not (value := is_so()):
+        assert time.monotonic() < end, description
         time.sleep(0.02)
-    return found
+    return value
 
 
 #: Keys of a hard brush at full flow, whose middle leaves nothing of what was there.
@@ -86,23 +86,23 @@ class ServedPainter:
 class PainterUser:
     """Somebody at a page, and what they do and see."""
 
-    def __init__(self, page: Any, served: ServedPainter) -> None:
-        self.page, self.served = page, served
+    def __init__(self, page: Any, served_painter: ServedPainter) -> None:
+        self.page, self.served = page, served_painter
 
-    def look(self, script: str, given: Any = None) -> Any:
+    def look(self, script: str, argument: Any = None) -> Any:
         """What a script finds in the page."""
         names = f"const {{ host, engine }} = {PAINTER}; const {{ mirror, screen }} = engine;"
-        return self.page.evaluate(f"(given) => {{ {names} {script} }}", given)
+        return self.page.evaluate(f"(given) => {{ {names} {script} }}", argument)
 
     def ready(self) -> "PainterUser":
         """Wait until all pictures are there, and what was done before."""
         self.page.wait_for_selector(".lightpaint .tag")
-        there = (
+        condition = (
             "const { loader } = mirror; return mirror.isReady && !loader.missing().length"
             " && !loader.onTheWay.size"
             "&& screen.width > 0 && screen.width === engine.element.clientWidth"
         )
-        wait_until(lambda: self.look(there), "the page is not ready")
+        wait_until(lambda: self.look(condition), "the page is not ready")
         return self.still(*self.served.steps)
 
     def still(self, *steps: str) -> "PainterUser":
@@ -115,12 +115,12 @@ class PainterUser:
         def is_exact() -> bool:
             with studio._access.lock:
                 session = studio.session
-                known = studio.state().fields["answer"]
+                answer = studio.state().fields["answer"]
                 weights = session.weights.tolist()
-            if session.is_painted and "headline" not in known:
+            if session.is_painted and "headline" not in answer:
                 return False
-            shown = self.look("return Array.from(mirror.weights)")
-            return bool(shown == [x for rgb in weights for x in rgb])
+            page_weights = self.look("return Array.from(mirror.weights)")
+            return bool(page_weights == [x for rgb in weights for x in rgb])
 
         wait_until(is_exact, "there is no exact answer")
         wait_until(lambda: self.look(at_rest), "the answer is not on screen")
@@ -166,8 +166,8 @@ class PainterUser:
             self.page.keyboard.press(key)
         return self
 
-    def button(self, name: str, **about: Any) -> Any:
-        return self.page.get_by_role("button", name=name, **about).first
+    def button(self, name: str, **options: Any) -> Any:
+        return self.page.get_by_role("button", name=name, **options).first
 
     @property
     def paint(self) -> Any:
@@ -176,8 +176,10 @@ class PainterUser:
 
     def code(self, light: Any) -> Any:
         """What a display shows of light in this session."""
-        shown = self.served.studio.session.transform.encode(np.asarray(light, float).reshape(1, 3))
-        return to_8_bit(shown)[0].astype(int)
+        display = self.served.studio.session.transform.encode(
+            np.asarray(light, float).reshape(1, 3)
+        )
+        return to_8_bit(display)[0].astype(int)
 
     def answered(self, x: int, y: int, view: int = 0) -> Any:
         """Codes of the answer at a pixel, from the planes that the page is given."""
@@ -203,10 +205,12 @@ def basis(make_basis: Any) -> lp.Basis:
         ]
     )
     noise = 0.01 * images * rng.standard_normal(images.shape)
-    made = make_basis(images=images + noise, half_differences=noise, emission=[[0.5, 0.5, 0.5]] * N)
+    new_basis = make_basis(
+        images=images + noise, half_differences=noise, emission=[[0.5, 0.5, 0.5]] * N
+    )
     index = np.zeros((H, W), np.int32)
     index[H // 2 :] = 1
-    return replace(made, objects=Objects(index, ("wall", "floor")))  # type: ignore[no-any-return]
+    return replace(new_basis, objects=Objects(index, ("wall", "floor")))  # type: ignore[no-any-return]
 
 
 @pytest.fixture
@@ -226,39 +230,39 @@ def subject(basis: lp.Basis, tmp_path: Path) -> Subject:
 @pytest.fixture
 def served_painter(subject: Subject) -> Iterator[ServedPainter]:
     """A painter of it."""
-    made = ServedPainter(subject)
-    yield made
-    made.close()
+    painter = ServedPainter(subject)
+    yield painter
+    painter.close()
 
 
 @pytest.fixture
 def open_page(browser: Any) -> Iterator[Callable[..., PainterUser]]:
     """Opens pages of a painter; of the same browser, if they are to know each other."""
     contexts: list[Any] = []
-    wrong: list[str] = []
+    errors: list[str] = []
 
-    def open_(
+    def open_in_browser(
         served: ServedPainter,
         view: str | None = "cpu",
         beside: PainterUser | None = None,
-        **how: Any,
+        **options: Any,
     ) -> PainterUser:
-        about = {"viewport": {"width": 1280, "height": 720}, **how}
-        context = beside.page.context if beside else browser.new_context(**about)
+        context_options = {"viewport": {"width": 1280, "height": 720}, **options}
+        context = beside.page.context if beside else browser.new_context(**context_options)
         contexts.append(context)
         context.set_default_timeout(60_000)
         page = context.new_page()
-        page.on("response", lambda r: wrong.append(r.url) if r.status >= 400 else None)
-        page.on("pageerror", lambda error: wrong.append(str(error)))
-        page.on("console", lambda said: wrong.append(said.text) if is_wrong(said) else None)
+        page.on("response", lambda r: errors.append(r.url) if r.status >= 400 else None)
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.on("console", lambda line: errors.append(line.text) if is_wrong(line) else None)
         page.goto(served.server.url.replace("#", f"?view={view}#" if view else "#"))
         return PainterUser(page, served)
 
-    def is_wrong(said: Any) -> bool:
-        return said.type in ("error", "warning") and OURS not in said.text
+    def is_wrong(line: Any) -> bool:
+        return line.type in ("error", "warning") and OURS not in line.text
 
-    yield open_
-    left = wrong.copy()
+    yield open_in_browser
+    left = errors.copy()
     for context in contexts:
         context.close()
     assert left == []
@@ -268,83 +272,84 @@ def open_page(browser: Any) -> Iterator[Callable[..., PainterUser]]:
 def test_what_is_painted_and_answered_is_on_the_screen(
     served_painter: ServedPainter, open_page: Any, view: str
 ) -> None:
-    me = open_page(served_painter, view).ready()
-    assert me.look("return screen.view.name") == view
-    before, far, now = me.seen(30, 10), me.seen(90, 50), me.seen(30, 10, 1)
-    me.look("mirror.canvas.importance[5] = 2.5")
-    assert me.look("return engine.greatest()") == 2.5
-    me.look("mirror.canvas.importance[5] = 0")
-    assert me.look("return engine.greatest()") == 1
-    me.press("0").stroke((20, 10), (40, 10)).still("brush")
-    np.testing.assert_allclose(me.seen(30, 10), me.code(me.paint), atol=1)
-    assert me.seen(90, 50) == far
+    user = open_page(served_painter, view).ready()
+    assert user.look("return screen.view.name") == view
+    before, far, new_code = user.seen(30, 10), user.seen(90, 50), user.seen(30, 10, 1)
+    user.look("mirror.canvas.importance[5] = 2.5")
+    assert user.look("return engine.greatest()") == 2.5
+    user.look("mirror.canvas.importance[5] = 0")
+    assert user.look("return engine.greatest()") == 1
+    user.press("0").stroke((20, 10), (40, 10)).still("brush")
+    np.testing.assert_allclose(user.seen(30, 10), user.code(user.paint), atol=1)
+    assert user.seen(90, 50) == far
     for x, y in ((30, 10), (70, 40)):
-        np.testing.assert_allclose(me.seen(x, y, 1), me.answered(x, y), atol=1)
-    assert me.seen(30, 10, 1) != now
-    me.press("Control+z").still()
-    assert (me.seen(30, 10), me.seen(30, 10, 1)) == (before, now)
+        np.testing.assert_allclose(user.seen(x, y, 1), user.answered(x, y), atol=1)
+    assert user.seen(30, 10, 1) != new_code
+    user.press("Control+z").still()
+    assert (user.seen(30, 10), user.seen(30, 10, 1)) == (before, new_code)
     # While the brush is down, what is under it is taken back.
-    me.drag(me.at(60, 10), me.at(70, 10), hold=True)
-    me.press("Control+z").page.mouse.up()
-    me.still()
+    user.drag(user.at(60, 10), user.at(70, 10), hold=True)
+    user.press("Control+z").page.mouse.up()
+    user.still()
     assert (
-        me.seen(70, 10) == me.code(served_painter.studio.session.views[0].current[10, 70]).tolist()
+        user.seen(70, 10)
+        == user.code(served_painter.studio.session.views[0].current[10, 70]).tolist()
     )
-    me.press("Control+Shift+Z").still("brush")
-    np.testing.assert_allclose(me.seen(30, 10), me.code(me.paint), atol=1)
-    fill_and_ask(me)
-    me.page.keyboard.press("v")
-    box = me.page.locator(".wipe").bounding_box()
+    user.press("Control+Shift+Z").still("brush")
+    np.testing.assert_allclose(user.seen(30, 10), user.code(user.paint), atol=1)
+    fill_and_ask(user)
+    user.page.keyboard.press("v")
+    box = user.page.locator(".wipe").bounding_box()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     # The wipe paints nothing.
-    me.drag((x, y), (x - 150, y)).still("brush", "fill", "adjust")
-    assert me.look("return screen.panes().map((pane) => pane.kind)") == ["solution", "painting"]
-    np.testing.assert_allclose(me.seen(5, 50, 1), me.code(me.paint), atol=1)
-    np.testing.assert_allclose(me.seen(90, 50, 0), me.answered(90, 50), atol=1)
+    user.drag((x, y), (x - 150, y)).still("brush", "fill", "adjust")
+    assert user.look("return screen.panes().map((pane) => pane.kind)") == ["solution", "painting"]
+    np.testing.assert_allclose(user.seen(5, 50, 1), user.code(user.paint), atol=1)
+    np.testing.assert_allclose(user.seen(90, 50, 0), user.answered(90, 50), atol=1)
 
 
-def fill_and_ask(me: PainterUser) -> None:
+def fill_and_ask(user: PainterUser) -> None:
     """Fill the floor; then, by a drag, ask for a place of the wall to be two stops darker."""
-    wall = me.seen(10, H // 2 - 1)
-    me.press("g").stroke((50, 40)).still("brush", "fill")
-    np.testing.assert_allclose(me.seen(3, H // 2), me.code(me.paint), atol=1)
-    assert me.seen(10, H // 2 - 1) == wall
-    light = me.served.studio.session.views[0].image[15, 80] / 4
-    me.press("a")
-    x, y = me.at(80, 15)
-    me.drag((x, y), (x, y + 160), hold=True)
-    assert me.page.get_by_text("2.0 stops darker").is_visible()
-    me.page.mouse.up()
-    me.still("brush", "fill", "adjust")
-    np.testing.assert_allclose(me.seen(80, 15), me.code(light), atol=2)
+    wall = user.seen(10, H // 2 - 1)
+    user.press("g").stroke((50, 40)).still("brush", "fill")
+    np.testing.assert_allclose(user.seen(3, H // 2), user.code(user.paint), atol=1)
+    assert user.seen(10, H // 2 - 1) == wall
+    light = user.served.studio.session.views[0].image[15, 80] / 4
+    user.press("a")
+    x, y = user.at(80, 15)
+    user.drag((x, y), (x, y + 160), hold=True)
+    assert user.page.get_by_text("2.0 stops darker").is_visible()
+    user.page.mouse.up()
+    user.still("brush", "fill", "adjust")
+    np.testing.assert_allclose(user.seen(80, 15), user.code(light), atol=2)
 
 
 def test_a_light_is_held_and_moved_and_left(served_painter: ServedPainter, open_page: Any) -> None:
-    me = open_page(served_painter).ready()
+    user = open_page(served_painter).ready()
     session = served_painter.studio.session
-    me.press("0").stroke((60, 30), (80, 30)).still("brush")
-    slider = me.page.get_by_role("slider", name="light 1, stops from now", exact=True).first
+    user.press("0").stroke((60, 30), (80, 30)).still("brush")
+    slider = user.page.get_by_role("slider", name="light 1, stops from now", exact=True).first
     box = slider.bounding_box()
-    me.button("Lock light 1 as it is in the answer").click()
-    me.still("brush", "light 1")
-    held = session.weights[1].copy()
-    me.page.get_by_text("locked", exact=True).wait_for()
+    user.button("Lock light 1 as it is in the answer").click()
+    user.still("brush", "light 1")
+    held_weights = session.weights[1].copy()
+    user.page.get_by_text("locked", exact=True).wait_for()
     assert slider.bounding_box() == box  # what is said of a light moves no row
     slider.focus()
     slider.press("ArrowRight")
-    me.still("brush", "light 1", "light 1")
-    assert 1 < session.weights[1].max() / held.max() < 1.1
-    np.testing.assert_allclose(me.seen(40, 10, 1), me.answered(40, 10), atol=1)
-    me.press("Control+z", "Control+z", "Control+z")  # as fast as fingers are
-    me.still()
+    user.still("brush", "light 1", "light 1")
+    assert 1 < session.weights[1].max() / held_weights.max() < 1.1
+    np.testing.assert_allclose(user.seen(40, 10, 1), user.answered(40, 10), atol=1)
+    user.press("Control+z", "Control+z", "Control+z")  # as fast as fingers are
+    user.still()
     assert not session.requests.lights
     # A page that goes in the middle of it leaves nothing. Rows that need two lines have had theirs.
     box = slider.bounding_box()
     y = box["y"] + box["height"] / 2
-    me.drag((box["x"] + 40, y), (box["x"] + box["width"], y), hold=True)
+    user.drag((box["x"] + 40, y), (box["x"] + box["width"], y), hold=True)
     wait_until(lambda: session.is_open, "the slider is not heard")
-    me.page.reload()
-    me.ready()
+    user.page.reload()
+    user.ready()
     assert not session.is_open
     assert not session.requests.lights
 
@@ -352,151 +357,165 @@ def test_a_light_is_held_and_moved_and_left(served_painter: ServedPainter, open_
 def test_a_stroke_is_kept_though_the_page_is_closed_at_once(
     served_painter: ServedPainter, open_page: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    me = open_page(served_painter).ready().press("0")
-    said = served_painter.studio.handle
+    user = open_page(served_painter).ready().press("0")
+    handle = served_painter.studio.handle
 
-    def slowly(*given: Any) -> Any:
+    def slowly(*arguments: Any) -> Any:
         time.sleep(0.3)
-        return said(*given)
+        return handle(*arguments)
 
     monkeypatch.setattr(served_painter.studio, "handle", slowly)
-    me.stroke((60, 30), (80, 30))  # its end waits for the answer to what was said while it went on
-    me.page.goto("about:blank")
+    user.stroke(
+        (60, 30), (80, 30)
+    )  # its end waits for the answer to what was said while it went on
+    user.page.goto("about:blank")
     wait_until(lambda: served_painter.steps == ["brush"], "the stroke is lost")
 
 
 def test_what_is_said_while_nothing_is_painted(
     served_painter: ServedPainter, open_page: Any
 ) -> None:
-    me = open_page(served_painter).ready()
-    said, rows = me.page.locator(".headline"), me.page.locator(".lights")
-    wait_until(lambda: said.inner_text() == UNPAINTED, "it is not said at the start")
-    me.press("0").stroke((60, 30), (80, 30)).still("brush")
-    me.page.get_by_text("ΔE").first.wait_for()
+    user = open_page(served_painter).ready()
+    headline, rows = user.page.locator(".headline"), user.page.locator(".lights")
+    wait_until(lambda: headline.inner_text() == UNPAINTED, "it is not said at the start")
+    user.press("0").stroke((60, 30), (80, 30)).still("brush")
+    user.page.get_by_text("ΔE").first.wait_for()
     wait_until(lambda: "±" in rows.inner_text(), "it is not said how sure lights are")
-    me.page.reload()
-    me.ready().press("Control+z").still()
-    wait_until(lambda: said.inner_text() == UNPAINTED, "it is not said after all is undone")
+    user.page.reload()
+    user.ready().press("Control+z").still()
+    wait_until(lambda: headline.inner_text() == UNPAINTED, "it is not said after all is undone")
     assert "±" not in rows.inner_text()
-    slider = me.page.get_by_role("slider", name="light 1, stops from now", exact=True).first
+    slider = user.page.get_by_role("slider", name="light 1, stops from now", exact=True).first
     slider.press("ArrowRight")
-    me.still("light 1")
-    wait_until(lambda: "except for your constraints" in said.inner_text(), "it is said as before")
+    user.still("light 1")
+    wait_until(
+        lambda: "except for your constraints" in headline.inner_text(), "it is said as before"
+    )
 
 
 def test_a_pen_paints_with_its_pressure_and_fingers_paint_and_zoom(
     served_painter: ServedPainter, open_page: Any
 ) -> None:
-    me = open_page(served_painter, has_touch=True, viewport={"width": 1024, "height": 768}).ready()
-    me.press("0")
-    screen = me.page.context.new_cdp_session(me.page)
+    user = open_page(
+        served_painter, has_touch=True, viewport={"width": 1024, "height": 768}
+    ).ready()
+    user.press("0")
+    screen = user.page.context.new_cdp_session(user.page)
 
     def pen(y: float, force: float) -> None:
         for kind, x in (("Pressed", 20), ("Moved", 30), ("Moved", 40), ("Released", 40)):
-            at = dict(zip("xy", me.at(x, y), strict=True))
-            how = {"pointerType": "pen", "button": "left", "buttons": 1, "clickCount": 1}
-            about = {"type": f"mouse{kind}", **at, **how, "force": force}
-            screen.send("Input.dispatchMouseEvent", about)
+            point = dict(zip("xy", user.at(x, y), strict=True))
+            pen_options = {"pointerType": "pen", "button": "left", "buttons": 1, "clickCount": 1}
+            event = {"type": f"mouse{kind}", **point, **pen_options, "force": force}
+            screen.send("Input.dispatchMouseEvent", event)
 
     def touch(kind: str, *points: tuple[float, float]) -> None:
-        made = [{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(points)]
-        screen.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": made})
+        touches = [{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(points)]
+        screen.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": touches})
 
-    before = me.seen(30, 45)
+    before = user.seen(30, 45)
     pen(10, 1.0)
     pen(45, 0.25)
-    me.still("brush", "brush")
+    user.still("brush", "brush")
     hard, soft = (served_painter.studio.session.views[0].importance[y, 30] for y in (10, 45))
     assert 0 < soft < 0.8 * hard
-    np.testing.assert_allclose(me.seen(30, 10), me.code(me.paint), atol=1)
-    assert me.seen(30, 45) not in (before, me.seen(30, 10))
+    np.testing.assert_allclose(user.seen(30, 10), user.code(user.paint), atol=1)
+    assert user.seen(30, 45) not in (before, user.seen(30, 10))
     for kind, *places in (
         ("touchStart", (20, 27)), ("touchMove", (30, 27)), ("touchMove", (40, 27)), ("touchEnd",)
     ):  # fmt: skip
-        touch(kind, *(me.at(*place) for place in places))
-    me.still("brush", "brush", "brush")
-    np.testing.assert_allclose(me.seen(30, 27), me.code(me.paint), atol=1)
-    scale = me.look("return engine.panes()[0].scale")
-    x, y = me.at(30, 27)
+        touch(kind, *(user.at(*place) for place in places))
+    user.still("brush", "brush", "brush")
+    np.testing.assert_allclose(user.seen(30, 27), user.code(user.paint), atol=1)
+    scale = user.look("return engine.panes()[0].scale")
+    x, y = user.at(30, 27)
     touch("touchStart", (x - 20, y))
     touch("touchStart", (x - 20, y), (x + 20, y))
     touch("touchMove", (x - 40, y), (x + 40, y))
     touch("touchEnd")
-    me.still("brush", "brush", "brush")
-    assert me.look("return engine.panes()[0].scale") == pytest.approx(2 * scale, rel=0.1)
-    np.testing.assert_allclose(me.at(30, 27), (x, y), atol=3)
-    np.testing.assert_allclose(me.seen(30, 27), me.code(me.paint), atol=1)
+    user.still("brush", "brush", "brush")
+    assert user.look("return engine.panes()[0].scale") == pytest.approx(2 * scale, rel=0.1)
+    np.testing.assert_allclose(user.at(30, 27), (x, y), atol=3)
+    np.testing.assert_allclose(user.seen(30, 27), user.code(user.paint), atol=1)
 
 
 def test_strokes_outlive_their_connection(served_painter: ServedPainter, open_page: Any) -> None:
-    me = open_page(served_painter).ready()
-    lost = me.page.get_by_text("The connection is lost")
-    me.press(*FIRM).drag(me.at(20, 20), me.at(30, 20), hold=True)
-    me.look("host.socket.close()")
-    lost.wait_for()
-    me.page.mouse.move(*me.at(40, 20), steps=3)
-    me.page.mouse.up()
-    lost.wait_for(state="detached")
-    me.still("brush")
+    user = open_page(served_painter).ready()
+    lost_notice = user.page.get_by_text("The connection is lost")
+    user.press(*FIRM).drag(user.at(20, 20), user.at(30, 20), hold=True)
+    user.look("host.socket.close()")
+    lost_notice.wait_for()
+    user.page.mouse.move(*user.at(40, 20), steps=3)
+    user.page.mouse.up()
+    lost_notice.wait_for(state="detached")
+    user.still("brush")
     for x in (20, 30, 40):
-        np.testing.assert_allclose(me.seen(x, 20), me.code(me.paint), atol=1)
+        np.testing.assert_allclose(user.seen(x, 20), user.code(user.paint), atol=1)
         np.testing.assert_allclose(
-            served_painter.studio.session.views[0].image[20, x], me.paint, rtol=1e-6
+            served_painter.studio.session.views[0].image[20, x], user.paint, rtol=1e-6
         )
     # A stroke that was kept, and whose answer never came, comes again and is kept once.
-    me.look(
+    user.look(
         "const receive = host.receive.bind(host);"
         "host.receive = (message) => {"
         "  if (message.kind === 'answer' && message.history) {"
         "    host.receive = receive; host.socket.close();"
         "  } else receive(message); }"
     )
-    me.stroke((60, 40), (80, 40))
-    lost.wait_for()
-    lost.wait_for(state="detached")
-    me.still("brush", "brush")
-    me.press("Control+z", "Control+z")
-    me.still()
+    user.stroke((60, 40), (80, 40))
+    lost_notice.wait_for()
+    lost_notice.wait_for(state="detached")
+    user.still("brush", "brush")
+    user.press("Control+z", "Control+z")
+    user.still()
     assert not served_painter.studio.session.is_painted
 
 
 def test_what_is_kept_is_there_again_and_solved_alike_from_its_files(
     served_painter: ServedPainter, open_page: Any
 ) -> None:
-    me = open_page(served_painter, view=None).ready()  # as the terminal's address leads there
-    before = me.seen(60, 30)
-    me.press("0").stroke((20, 20), (40, 20)).still("brush")
-    me.press("Control+s")
-    me.button("Load Look 1").wait_for()
-    me.stroke((60, 20), (60, 40)).still("brush", "brush")
-    shown = [me.seen(x, 30, pane) for x in (30, 60) for pane in (0, 1)]
-    me.page.reload()
-    me.ready()
-    assert [me.seen(x, 30, pane) for x in (30, 60) for pane in (0, 1)] == shown
-    me.press("Control+z").still("brush")
-    assert me.seen(60, 30) == before
-    me.press("Control+Shift+Z").still("brush", "brush")
-    me.button("Load Look 1").click()
-    me.still("brush", "brush", "look Look 1")
-    me.button("Lock light 2 as it is in the answer").click()
-    me.still("brush", "brush", "look Look 1", "light 2")
-    np.testing.assert_allclose(me.seen(30, 20), me.code(me.paint), atol=1)
-    assert me.seen(60, 30) == before
-    me.button("Export").click()
-    me.page.get_by_label("Report").uncheck()
-    me.page.get_by_role("dialog").get_by_role("button", name="Export", exact=True).click()
-    command = shlex.split(me.page.locator(".command code").inner_text())
-    again = [sys.executable, "-m", *command, "--output", str(served_painter.folder / "again")]
-    made = subprocess.run(again, cwd=REPOSITORY, capture_output=True, text=True, check=False)
-    assert made.returncode == 0, made.stderr
+    user = open_page(served_painter, view=None).ready()  # as the terminal's address leads there
+    before = user.seen(60, 30)
+    user.press("0").stroke((20, 20), (40, 20)).still("brush")
+    user.press("Control+s")
+    user.button("Load Look 1").wait_for()
+    user.stroke((60, 20), (60, 40)).still("brush", "brush")
+    codes = [user.seen(x, 30, pane) for x in (30, 60) for pane in (0, 1)]
+    user.page.reload()
+    user.ready()
+    assert [user.seen(x, 30, pane) for x in (30, 60) for pane in (0, 1)] == codes
+    user.press("Control+z").still("brush")
+    assert user.seen(60, 30) == before
+    user.press("Control+Shift+Z").still("brush", "brush")
+    user.button("Load Look 1").click()
+    user.still("brush", "brush", "look Look 1")
+    user.button("Lock light 2 as it is in the answer").click()
+    user.still("brush", "brush", "look Look 1", "light 2")
+    np.testing.assert_allclose(user.seen(30, 20), user.code(user.paint), atol=1)
+    assert user.seen(60, 30) == before
+    user.button("Export").click()
+    user.page.get_by_label("Report").uncheck()
+    user.page.get_by_role("dialog").get_by_role("button", name="Export", exact=True).click()
+    command = shlex.split(user.page.locator(".command code").inner_text())
+    command_again = [
+        sys.executable,
+        "-m",
+        *command,
+        "--output",
+        str(served_painter.folder / "again"),
+    ]
+    completed = subprocess.run(
+        command_again, cwd=REPOSITORY, capture_output=True, text=True, check=False
+    )
+    assert completed.returncode == 0, completed.stderr
     session = served_painter.studio.session
     for path in (
         served_painter.folder / "lighting.json",
         served_painter.folder / "again" / "lighting.json",
     ):
         emission = lp.read_lighting(path).emission
-        found = [emission[name] for name in session.basis.names]
-        np.testing.assert_allclose(found, session.weights, rtol=1e-9)
+        weights = [emission[name] for name in session.basis.names]
+        np.testing.assert_allclose(weights, session.weights, rtol=1e-9)
 
 
 def test_a_second_tab_takes_over_and_the_first_takes_back(
@@ -517,8 +536,8 @@ def test_a_second_tab_takes_over_and_the_first_takes_back(
     second.page.get_by_text("another tab has taken this session over").wait_for(state="attached")
     first.ready()
     np.testing.assert_allclose(first.seen(70, 40), first.code(first.paint), atol=1)
-    now = served_painter.studio.session.views[0].current[5, 15]
-    np.testing.assert_allclose(first.seen(15, 5), first.code(now), atol=1)
+    current = served_painter.studio.session.views[0].current[5, 15]
+    np.testing.assert_allclose(first.seen(15, 5), first.code(current), atol=1)
 
 
 def test_a_stroke_that_was_taken_over_lies_over_nothing(
@@ -541,42 +560,42 @@ def test_a_stroke_that_was_taken_over_lies_over_nothing(
     first.ready()
     assert served_painter.steps == ["stroke", "brush"]
     np.testing.assert_allclose(first.seen(15, 5), first.code(second.paint), atol=1)
-    now = served_painter.studio.session.views[0].current[5, 58]
-    np.testing.assert_allclose(first.seen(58, 5), first.code(now), atol=1)
+    current = served_painter.studio.session.views[0].current[5, 58]
+    np.testing.assert_allclose(first.seen(58, 5), first.code(current), atol=1)
 
 
 def test_a_tab_of_an_earlier_start_says_what_to_do(subject: Subject, browser: Any) -> None:
     """Its errors on the console are what a server that is not there, or refuses it, makes."""
-    served = ServedPainter(subject)
+    first_painter = ServedPainter(subject)
     context = browser.new_context()
     try:
         page = context.new_page()
-        page.goto(served.server.url)
-        me = PainterUser(page, served).ready()
-        me.look("host.listeners.delete('closed')")  # one that is killed says no goodbye
+        page.goto(first_painter.server.url)
+        user = PainterUser(page, first_painter).ready()
+        user.look("host.listeners.delete('closed')")  # one that is killed says no goodbye
     finally:
-        served.close()
-    again = None
+        first_painter.close()
+    second_painter = None
     try:
         page.get_by_text("What you paint now is sent if the same painter comes back").wait_for()
-        me.stroke((10, 5), (20, 5))
-        me.stroke((10, 15), (20, 15))
-        again = ServedPainter(subject, port=served.server.port)
+        user.stroke((10, 5), (20, 5))
+        user.stroke((10, 15), (20, 15))
+        second_painter = ServedPainter(subject, port=first_painter.server.port)
         page.get_by_text("This page belongs to a painter that has ended").wait_for()
         page.get_by_text("2 strokes painted here could not be sent, and are lost").wait_for()
         # Nobody would hear more of them.
-        count = me.look("return mirror.strokes.count")
-        me.stroke((10, 25), (20, 25))
-        assert me.look("return mirror.strokes.count") == count
-        beside = context.new_page()
-        beside.goto(again.server.url)
+        count = user.look("return mirror.strokes.count")
+        user.stroke((10, 25), (20, 25))
+        assert user.look("return mirror.strokes.count") == count
+        second_page = context.new_page()
+        second_page.goto(second_painter.server.url)
         # The new tab has the new key, and the old one does not take the session by it.
-        PainterUser(beside, again).ready()
+        PainterUser(second_page, second_painter).ready()
         assert page.get_by_text("This page belongs to a painter that has ended").is_visible()
     finally:
         context.close()
-        if again:
-            again.close()
+        if second_painter:
+            second_painter.close()
 
 
 @pytest.fixture
@@ -589,57 +608,57 @@ def two_views(subject: Subject, basis: lp.Basis) -> Iterator[ServedPainter]:
         "objects": Objects(basis.objects.index[10:, :48], ("wall", "floor")),
         "origin": replace(basis.origin, sensor="side"),
     }
-    made = ServedPainter(subject, replace(subject, basis=replace(basis, **half)))
-    yield made
-    made.close()
+    painter = ServedPainter(subject, replace(subject, basis=replace(basis, **half)))
+    yield painter
+    painter.close()
 
 
 def test_two_views_are_painted_and_have_one_answer(
     two_views: ServedPainter, open_page: Any
 ) -> None:
-    me = open_page(two_views).ready()
+    user = open_page(two_views).ready()
     views = two_views.studio.session.views
-    me.press(*FIRM).stroke((20, 10), (40, 10)).still("brush")
-    before = me.answered(10, 30, 1)
-    me.press("n").ready()
-    assert me.look("return [engine.mirror.view, ...screen.size]") == [1, 44, 48]
-    assert me.button("side not painted").get_attribute("aria-pressed") == "true"
-    np.testing.assert_allclose(me.seen(10, 30, 1), before, atol=1)
-    me.page.get_by_text("Nothing is painted in this view").wait_for()
-    me.press("x").stroke((10, 30), (30, 30)).still("brush", "brush")
-    paint = me.paint
-    np.testing.assert_allclose(me.seen(20, 30), me.code(paint), atol=1)
+    user.press(*FIRM).stroke((20, 10), (40, 10)).still("brush")
+    before = user.answered(10, 30, 1)
+    user.press("n").ready()
+    assert user.look("return [engine.mirror.view, ...screen.size]") == [1, 44, 48]
+    assert user.button("side not painted").get_attribute("aria-pressed") == "true"
+    np.testing.assert_allclose(user.seen(10, 30, 1), before, atol=1)
+    user.page.get_by_text("Nothing is painted in this view").wait_for()
+    user.press("x").stroke((10, 30), (30, 30)).still("brush", "brush")
+    paint = user.paint
+    np.testing.assert_allclose(user.seen(20, 30), user.code(paint), atol=1)
     np.testing.assert_allclose(views[1].image[30, 20], paint, rtol=1e-6)
-    np.testing.assert_allclose(me.seen(10, 30, 1), me.answered(10, 30, 1), atol=1)
+    np.testing.assert_allclose(user.seen(10, 30, 1), user.answered(10, 30, 1), atol=1)
     assert not views[0].importance[30].any()
     # Fill takes the object of this view.
-    me.press("g").stroke((40, 40)).still("brush", "brush", "fill")
-    np.testing.assert_allclose(me.seen(3, 40), me.code(paint), atol=1)
-    me.page.reload()
-    me.ready()
-    np.testing.assert_allclose(me.seen(70, 40, 1), me.answered(70, 40), atol=1)
+    user.press("g").stroke((40, 40)).still("brush", "brush", "fill")
+    np.testing.assert_allclose(user.seen(3, 40), user.code(paint), atol=1)
+    user.page.reload()
+    user.ready()
+    np.testing.assert_allclose(user.seen(70, 40, 1), user.answered(70, 40), atol=1)
     # What is undone is seen.
-    me.press("Control+z")
-    wait_until(lambda: me.look("return engine.mirror.view") == 1, "the other view is shown")
-    me.ready().still("brush", "brush")
-    np.testing.assert_allclose(me.seen(20, 30), me.code(paint), atol=1)
-    me.press("Control+z").still("brush")
-    me.press("Control+z")
-    wait_until(lambda: me.look("return engine.mirror.view") == 0, "the first view is shown")
-    me.ready().still()
-    np.testing.assert_allclose(me.seen(30, 10), me.code(views[0].current[10, 30]), atol=1)
-    me.press("Control+Shift+Z", "Control+Shift+Z").still("brush", "brush")
-    wait_until(lambda: me.look("return engine.mirror.view") == 1, "the other view is shown")
-    me.ready()
-    me.button("Export").click()
-    assert not me.page.get_by_label("Report").is_visible()  # of bases without their scene
-    me.page.get_by_role("dialog").get_by_role("button", name="Export", exact=True).click()
-    me.page.locator(".exported li", has_text="painting-side.exr").wait_for()
+    user.press("Control+z")
+    wait_until(lambda: user.look("return engine.mirror.view") == 1, "the other view is shown")
+    user.ready().still("brush", "brush")
+    np.testing.assert_allclose(user.seen(20, 30), user.code(paint), atol=1)
+    user.press("Control+z").still("brush")
+    user.press("Control+z")
+    wait_until(lambda: user.look("return engine.mirror.view") == 0, "the first view is shown")
+    user.ready().still()
+    np.testing.assert_allclose(user.seen(30, 10), user.code(views[0].current[10, 30]), atol=1)
+    user.press("Control+Shift+Z", "Control+Shift+Z").still("brush", "brush")
+    wait_until(lambda: user.look("return engine.mirror.view") == 1, "the other view is shown")
+    user.ready()
+    user.button("Export").click()
+    assert not user.page.get_by_label("Report").is_visible()  # of bases without their scene
+    user.page.get_by_role("dialog").get_by_role("button", name="Export", exact=True).click()
+    user.page.locator(".exported li", has_text="painting-side.exr").wait_for()
     paintings = [two_views.folder / f"painting-{view.name}.exr" for view in views]
     bases = [view.basis for view in views]
     solution = correct_noise(lp.solve(bases, [lp.read_target(path) for path in paintings]))
-    found = lp.read_lighting(two_views.folder / "lighting.json").weights_for(bases[0])
-    np.testing.assert_allclose(found, solution.weights, rtol=1e-9)
+    weights = lp.read_lighting(two_views.folder / "lighting.json").weights_for(bases[0])
+    np.testing.assert_allclose(weights, solution.weights, rtol=1e-9)
 
 
 class Rendering(Subject):
@@ -648,7 +667,7 @@ class Rendering(Subject):
     steps: list[threading.Event]
 
     def bases(self, progress: Any = None) -> Iterator[lp.Basis]:
-        first, better, told = self.folder.events  # type: ignore[attr-defined]
+        first, better, announced = self.folder.events  # type: ignore[attr-defined]
         progress("rendering lights", 1, 4, "passes")
         first.wait(60)
         assert self.basis is not None
@@ -656,7 +675,7 @@ class Rendering(Subject):
         better.wait(60)
         images = self.basis.images * np.float32(1.25)
         yield replace(self.basis, planes=images)
-        told.set()
+        announced.set()
 
 
 class Folder(type(Path())):  # type: ignore[misc]
@@ -670,54 +689,54 @@ def test_one_waits_for_the_first_picture_and_paints_while_it_gets_better(
 ) -> None:
     folder = Folder(tmp_path)
     folder.events = threading.Event(), threading.Event(), threading.Event()
-    served = ServedPainter(Rendering("room.xml", folder, basis=basis))
+    painter = ServedPainter(Rendering("room.xml", folder, basis=basis))
     try:
-        me = open_page(served)
-        me.page.get_by_text("Rendering the first picture …").wait_for()
-        whole = me.page.get_by_role("button", name="1:1", exact=True)
-        assert whole.get_attribute("aria-pressed") != "true"  # there is no picture yet
-        me.page.reload()
-        me.page.get_by_text("Rendering the first picture …").wait_for()
-        assert me.page.get_by_role("progressbar").first.get_attribute("aria-valuenow") == "1"
+        user = open_page(painter)
+        user.page.get_by_text("Rendering the first picture …").wait_for()
+        full_size = user.page.get_by_role("button", name="1:1", exact=True)
+        assert full_size.get_attribute("aria-pressed") != "true"  # there is no picture yet
+        user.page.reload()
+        user.page.get_by_text("Rendering the first picture …").wait_for()
+        assert user.page.get_by_role("progressbar").first.get_attribute("aria-valuenow") == "1"
         folder.events[0].set()
-        me.ready()
-        now = me.seen(90, 50)
-        me.press(*FIRM).drag(me.at(20, 20), me.at(30, 20), hold=True)
+        user.ready()
+        code = user.seen(90, 50)
+        user.press(*FIRM).drag(user.at(20, 20), user.at(30, 20), hold=True)
         folder.events[1].set()
         folder.events[2].wait(60)
-        wait_until(lambda: me.seen(90, 50) != now, "the page has the old picture")
-        me.page.mouse.move(*me.at(40, 20), steps=3)
-        me.page.mouse.up()
-        me.still("brush").ready()
-        session = served.studio.session
+        wait_until(lambda: user.seen(90, 50) != code, "the page has the old picture")
+        user.page.mouse.move(*user.at(40, 20), steps=3)
+        user.page.mouse.up()
+        user.still("brush").ready()
+        session = painter.studio.session
         for x in (20, 30, 40):
-            np.testing.assert_allclose(me.seen(x, 20), me.code(me.paint), atol=1)
-            np.testing.assert_allclose(session.views[0].image[20, x], me.paint, rtol=1e-6)
-        np.testing.assert_allclose(me.seen(70, 40, 1), me.answered(70, 40), atol=1)
-        me.press("Control+z").still()
+            np.testing.assert_allclose(user.seen(x, 20), user.code(user.paint), atol=1)
+            np.testing.assert_allclose(session.views[0].image[20, x], user.paint, rtol=1e-6)
+        np.testing.assert_allclose(user.seen(70, 40, 1), user.answered(70, 40), atol=1)
+        user.press("Control+z").still()
         np.testing.assert_allclose(
-            me.seen(30, 20), me.code(session.views[0].current[20, 30]), atol=1
+            user.seen(30, 20), user.code(session.views[0].current[20, 30]), atol=1
         )
     finally:
         for event in folder.events:
             event.set()
-        served.close()
+        painter.close()
 
 
 def test_what_comes_at_rest_is_drawn_sharply_at_once(
     served_painter: ServedPainter, open_page: Any
 ) -> None:
     """As each round of samples does: a picture that is looked at does not turn coarse for it."""
-    me = open_page(served_painter).ready()
-    me.stroke((20, 20), (40, 20)).still("brush")
-    me.look(
+    user = open_page(served_painter).ready()
+    user.stroke((20, 20), (40, 20)).still("brush")
+    user.look(
         "const draw = screen.view.draw.bind(screen.view); window.drawn = [];"
         "screen.view.draw = (params) => { window.drawn.push(params.live); draw(params); }"
     )
     served_painter.studio._exact_answers.notify()
-    wait_until(lambda: me.page.evaluate("() => window.drawn.length"), "nothing is drawn")
-    me.still("brush")
-    assert not any(me.page.evaluate("() => window.drawn"))
+    wait_until(lambda: user.page.evaluate("() => window.drawn.length"), "nothing is drawn")
+    user.still("brush")
+    assert not any(user.page.evaluate("() => window.drawn"))
 
 
 def test_in_a_browser_that_is_zoomed_it_is_sharp_and_in_its_place(
@@ -725,11 +744,11 @@ def test_in_a_browser_that_is_zoomed_it_is_sharp_and_in_its_place(
 ) -> None:
     """At 200 % a window of 1280x720 has half the room, and two pixels for each of its own."""
     size = {"width": 640, "height": 360}
-    me = open_page(served_painter, viewport=size, device_scale_factor=2).ready()
-    width = me.look("return screen.view.canvas.width / engine.element.clientWidth")
+    user = open_page(served_painter, viewport=size, device_scale_factor=2).ready()
+    width = user.look("return screen.view.canvas.width / engine.element.clientWidth")
     assert width == pytest.approx(2, rel=0.01)
-    me.press("0").stroke((20, 20), (40, 20)).still("brush")
-    np.testing.assert_allclose(me.seen(30, 20), me.code(me.paint), atol=1)
-    assert me.look("return document.documentElement.scrollWidth <= innerWidth")
-    me.button("Export").click()  # what does not fit is scrolled to
-    me.page.get_by_role("dialog", name="Export").wait_for()
+    user.press("0").stroke((20, 20), (40, 20)).still("brush")
+    np.testing.assert_allclose(user.seen(30, 20), user.code(user.paint), atol=1)
+    assert user.look("return document.documentElement.scrollWidth <= innerWidth")
+    user.button("Export").click()  # what does not fit is scrolled to
+    user.page.get_by_role("dialog", name="Export").wait_for()

@@ -32,7 +32,7 @@ def host_messages(page: Any) -> Any:
 
 
 def test_one_message_is_in_flight_and_the_rest_is_merged(host_messages: Any):
-    said, flights = host_messages(
+    messages, flights = host_messages(
         """
         const flights = [];
         strokes.begin();
@@ -50,22 +50,26 @@ def test_one_message_is_in_flight_and_the_rest_is_merged(host_messages: Any):
         """
     )
     assert flights == [1, 1, 1, 1, 0]
-    assert [one["region"] for one in said] == [[0, 2, 0, 3], [5, 11, 5, 12], [1, 2, 1, 2]]
-    assert [one["is_final"] for one in said] == [False, False, True]
-    assert {one["stroke"] for one in said} == {1}
-    assert said[1]["shapes"] == {"image": [6, 7, 3], "importance": [6, 7]}
-    assert said[2]["label"] == "brush"
+    assert [message["region"] for message in messages] == [
+        [0, 2, 0, 3],
+        [5, 11, 5, 12],
+        [1, 2, 1, 2],
+    ]
+    assert [message["is_final"] for message in messages] == [False, False, True]
+    assert {message["stroke"] for message in messages} == {1}
+    assert messages[1]["shapes"] == {"image": [6, 7, 3], "importance": [6, 7]}
+    assert messages[2]["label"] == "brush"
 
 
 def test_a_stroke_that_is_sent_already_still_ends(host_messages: Any):
-    said = host_messages(
+    messages = host_messages(
         """
         strokes.begin(); strokes.touch([3, 4, 5, 6]); await host.answer();
         strokes.end("brush"); await host.answer();
         return host.told;
         """
     )
-    assert [(one["region"], one["is_final"]) for one in said] == [
+    assert [(message["region"], message["is_final"]) for message in messages] == [
         ([3, 4, 5, 6], False),
         ([3, 3, 5, 5], True),
     ]
@@ -87,7 +91,7 @@ def test_what_is_done_is_sent_as_it_was_then(host_messages: Any):
 
 
 def test_a_lost_connection_loses_no_stroke(host_messages: Any):
-    said = host_messages(
+    messages = host_messages(
         """
         strokes.begin(); strokes.touch([0, 2, 0, 2]); await host.answer();
         strokes.touch([4, 6, 4, 6]); strokes.end("a");
@@ -100,7 +104,9 @@ def test_a_lost_connection_loses_no_stroke(host_messages: Any):
         return host.told;
         """
     )
-    assert [(one["stroke"], one["region"], one["is_final"]) for one in said] == [
+    assert [
+        (message["stroke"], message["region"], message["is_final"]) for message in messages
+    ] == [
         (1, [0, 6, 0, 6], True),  # whole, whatever was heard of it
         (2, [8, 9, 8, 9], True),
         (3, [1, 4, 1, 4], False),
@@ -108,7 +114,7 @@ def test_a_lost_connection_loses_no_stroke(host_messages: Any):
 
 
 def test_what_another_page_has_not_let_through_is_given_up(host_messages: Any):
-    said = host_messages(
+    messages = host_messages(
         """
         strokes.begin(); strokes.touch([0, 2, 0, 2]); strokes.end("a");
         host.emit("closed", { kind: "closed", reason: "taken" });
@@ -123,15 +129,17 @@ def test_what_another_page_has_not_let_through_is_given_up(host_messages: Any):
         return [lost, host.told];
         """
     )
-    assert said[0] == [2, False]
-    assert [(one["stroke"], one["region"], one["is_final"]) for one in said[1]] == [
+    assert messages[0] == [2, False]
+    assert [
+        (message["stroke"], message["region"], message["is_final"]) for message in messages[1]
+    ] == [
         (8, [1, 2, 1, 2], False),
         (8, [1, 1, 1, 1], True),
     ]
 
 
 def test_a_stroke_that_was_given_up_is_not_lost(host_messages: Any):
-    lost = host_messages(
+    lost_strokes = host_messages(
         """
         host.lost = null;
         strokes.begin(); strokes.touch([0, 2, 0, 2]); strokes.drop();
@@ -140,11 +148,11 @@ def test_a_stroke_that_was_given_up_is_not_lost(host_messages: Any):
         return host.lost;
         """
     )
-    assert lost is None
+    assert lost_strokes is None
 
 
 def test_nothing_of_a_stroke_is_sent_again_as_pictures_come(host_messages: Any):
-    said = host_messages(
+    messages = host_messages(
         """
         strokes.begin(); strokes.touch([0, 2, 0, 2]); await host.answer();
         host.emit("renewed", { kind: "renewed", resources: {} });
@@ -152,7 +160,7 @@ def test_nothing_of_a_stroke_is_sent_again_as_pictures_come(host_messages: Any):
         return host.told;
         """
     )
-    assert [one["region"] for one in said] == [[0, 2, 0, 2], [5, 6, 5, 6]]
+    assert [message["region"] for message in messages] == [[0, 2, 0, 2], [5, 6, 5, 6]]
 
 
 def test_strokes_go_on_counting_where_the_session_is(host_messages: Any):
@@ -160,7 +168,7 @@ def test_strokes_go_on_counting_where_the_session_is(host_messages: Any):
 
 
 def test_a_dropped_stroke_is_said_to_be_dropped_if_anything_of_it_was_said(host_messages: Any):
-    said = host_messages(
+    messages = host_messages(
         """
         strokes.begin(); strokes.drop();
         strokes.begin(); strokes.touch([0, 2, 0, 2]); strokes.drop();
@@ -168,11 +176,14 @@ def test_a_dropped_stroke_is_said_to_be_dropped_if_anything_of_it_was_said(host_
         return host.told;
         """
     )
-    assert [(one["kind"], one["stroke"]) for one in said] == [("paint", 2), ("drop_stroke", 2)]
+    assert [(message["kind"], message["stroke"]) for message in messages] == [
+        ("paint", 2),
+        ("drop_stroke", 2),
+    ]
 
 
 def test_an_error_does_not_end_painting(host_messages: Any):
-    said, refused = host_messages(
+    messages, refusals = host_messages(
         """
         strokes.begin(); strokes.touch([0, 2, 0, 2]); await host.answer("failed");
         const before = host.refused;
@@ -182,8 +193,8 @@ def test_an_error_does_not_end_painting(host_messages: Any):
         return [host.told, [before ?? false, host.refused]];
         """
     )
-    assert len(said) == 4
-    assert refused == [False, True]
+    assert len(messages) == 4
+    assert refusals == [False, True]
 
 
 def test_what_else_is_said_comes_after_strokes_that_are_done(host_messages: Any):
@@ -201,7 +212,7 @@ def test_what_else_is_said_comes_after_strokes_that_are_done(host_messages: Any)
 
 
 def test_what_another_page_did_not_let_through_waits(host_messages: Any):
-    said, pending = host_messages(
+    messages, pending = host_messages(
         """
         strokes.begin(); strokes.touch([0, 2, 0, 2]); strokes.end("a");
         await host.answer();
@@ -212,8 +223,8 @@ def test_what_another_page_did_not_let_through_waits(host_messages: Any):
         return [host.told, [pending, strokes.isPending]];
         """
     )
-    assert [one["is_final"] for one in said] == [False, True, True]
-    assert said[-1]["region"] == [0, 2, 0, 2]  # whole
+    assert [message["is_final"] for message in messages] == [False, True, True]
+    assert messages[-1]["region"] == [0, 2, 0, 2]  # whole
     assert pending == [True, False]
 
 
@@ -231,16 +242,16 @@ def test_frames_are_those_of_the_library(page: Any):
         }"""
     )
     content, buffers = from_frame(bytes(frame))
-    seq, said, arrays = parse_request(content, buffers)
-    assert (seq, said.stroke, said.region, said.is_final) == (7, 3, (1, 3, 2, 6), True)
-    assert said.label == "Pinsel – größer"
+    seq, request, arrays = parse_request(content, buffers)
+    assert (seq, request.stroke, request.region, request.is_final) == (7, 3, (1, 3, 2, 6), True)
+    assert request.label == "Pinsel – größer"
     np.testing.assert_array_equal(arrays["image"], image)
     np.testing.assert_array_equal(arrays["importance"], 1)
     # And back.
     weights = np.random.default_rng(0).random((3, 3))
     message = RawMessage("answer", {"stroke": 3, "name": "é"}, {"weights": weights, "b": image[0]})
-    sent = list(to_frame(message.content(7), message.buffers()))
-    got = page.evaluate(
+    sent_frame = list(to_frame(message.content(7), message.buffers()))
+    echoed = page.evaluate(
         """async (bytes) => {
             const { unframe } = await import("/engine/message_frames.js");
             const made = unframe(Uint8Array.from(bytes).buffer);
@@ -248,17 +259,17 @@ def test_frames_are_those_of_the_library(page: Any):
             return [made.kind, made.reply, made.name, Array.from(weights.data), weights.shape,
                 Array.from(b.data)];
         }""",
-        sent,
+        sent_frame,
     )
-    assert got[:3] == ["answer", 7, "é"]
-    np.testing.assert_array_equal(np.reshape(got[3], got[4]), weights)
-    np.testing.assert_array_equal(got[5], image[0].ravel())
+    assert echoed[:3] == ["answer", 7, "é"]
+    np.testing.assert_array_equal(np.reshape(echoed[3], echoed[4]), weights)
+    np.testing.assert_array_equal(echoed[5], image[0].ravel())
 
 
 def test_a_socket_says_hello_again_and_numbers_what_it_says(page: Any, tab: Any, site: Any):
     site.arrays["plane/0"] = np.arange(6, dtype=np.float16).reshape(1, 2, 3)
     site.arrays["lut/ocio:A B/c"] = np.zeros((2, 2), np.uint8)
-    heard = page.evaluate(
+    messages = page.evaluate(
         """async () => {
             const { FakeSocket, settle } = await import("/fake_host.js");
             const { frame, unframe } = await import("/engine/message_frames.js");
@@ -298,16 +309,16 @@ def test_a_socket_says_hello_again_and_numbers_what_it_says(page: Any, tab: Any,
                 picture: [picture.shape, Array.from(picture.data)], other: other.shape };
         }"""
     )
-    assert heard["heard"] == ["open", "answer 2", "lost", "open"]
-    assert heard["sent"] == [["hello", 1], ["undo", 2], ["redo", 3]]
-    assert (heard["reply"], heard["again"]) == (2, [["hello", VERSION]])
-    assert "no connection" in heard["early"]
-    assert "lost" in heard["lost"]
-    assert heard["urls"] == [f"{site.url.replace('http', 'ws')}/live?page"] * 2
+    assert messages["heard"] == ["open", "answer 2", "lost", "open"]
+    assert messages["sent"] == [["hello", 1], ["undo", 2], ["redo", 3]]
+    assert (messages["reply"], messages["again"]) == (2, [["hello", VERSION]])
+    assert "no connection" in messages["early"]
+    assert "lost" in messages["lost"]
+    assert messages["urls"] == [f"{site.url.replace('http', 'ws')}/live?page"] * 2
     bits = np.arange(6, dtype=np.float16).view(np.uint16).tolist()
-    assert heard["picture"] == [[1, 2, 3], bits]
-    assert heard["other"] == [2, 2]
-    assert "there is no such picture" in heard["none"]
+    assert messages["picture"] == [[1, 2, 3], bits]
+    assert messages["other"] == [2, 2]
+    assert "there is no such picture" in messages["none"]
     [line] = tab[1]
     assert "404" in line
     tab[1].clear()

@@ -9,8 +9,8 @@ import pytest
 from painter_page import Painter
 
 
-def progress(painter: Painter, what: str, done: int, total: int = 16) -> None:
-    painter.tell(kind="progress", task=what, done=done, total=total, unit="passes")
+def progress(painter: Painter, task: str, steps_done: int, total: int = 16) -> None:
+    painter.tell(kind="progress", task=task, done=steps_done, total=total, unit="passes")
 
 
 def test_files_that_are_written_are_seen_when_their_window_is_closed(painter: Painter) -> None:
@@ -47,9 +47,9 @@ def test_reasons_that_are_sought_are_said_to_be(painter: Painter) -> None:
     painter.page.evaluate("() => { host.explain = () => ({ kind: 'started', task: 'explain' }); }")
     painter.button("Analysis").click()
     painter.button("Why not closer?").click()
-    sought = painter.page.get_by_role("button", name="Finding reasons …")
-    sought.wait_for()
-    assert sought.is_disabled()
+    button = painter.page.get_by_role("button", name="Finding reasons …")
+    button.wait_for()
+    assert button.is_disabled()
     assert painter.page.get_by_role("progressbar", name="Finding reasons").is_visible()
     painter.button("Analysis").click()  # its panel closes
     painter.page.locator(".working").get_by_text("Finding reasons").wait_for()
@@ -62,12 +62,12 @@ def test_reasons_that_are_sought_are_said_to_be(painter: Painter) -> None:
 def test_all_that_goes_on_is_counted_alike(painter: Painter) -> None:
     """In percent, and after a while with the time that is left."""
     page = painter.page
-    for what, name in (
+    for task, name in (
         ("basis", "Rendering the lights"),
         ("verification", "Verifying"),
         ("export", "Exporting files"),
     ):
-        progress(painter, what, 2)
+        progress(painter, task, 2)
         page.locator(".working").get_by_text(f"{name}: 12 %").wait_for()
     page.evaluate(
         """() => {

@@ -22,7 +22,7 @@ def pictures(site: Any) -> dict[str, np.ndarray]:
     scales = rng.uniform(0.5, 8, N)
     planes = (shape / scales[:, None, None, None]).astype(np.float16)
     weights = rng.uniform(0, 2, (N, 3))
-    made = {
+    arrays = {
         "planes": planes.astype(np.float64) * scales[:, None, None, None],
         "scales": scales,
         "weights": weights,
@@ -31,18 +31,18 @@ def pictures(site: Any) -> dict[str, np.ndarray]:
         "beyond": rng.integers(0, 256, (H, W)).astype(np.uint8),
     }
     site.arrays |= {f"plane/{k}": plane for k, plane in enumerate(planes)}
-    site.arrays |= {name: made[name] for name in ("weights", "painting", "importance", "beyond")}
-    return made
+    site.arrays |= {name: arrays[name] for name in ("weights", "painting", "importance", "beyond")}
+    return arrays
 
 
 def draw_panes(
-    page: Any, which: str, pictures: dict[str, Any], params: Any = None, lut: Any = None
+    page: Any, kind: str, pictures: dict[str, Any], params: Any = None, lut: Any = None
 ) -> np.ndarray:
     """Codes of the left and the right picture, pixel by pixel, (2, H, W, 3)."""
-    asked = {"count": N, "scales": pictures["scales"].tolist(), "lut": lut}
-    asked |= {"width": 2 * W + GAP, "height": H}
-    got = page.evaluate("([which, asked]) => bench.viewOf(which, asked)", [which, asked])
-    assert got == which
+    parameters = {"count": N, "scales": pictures["scales"].tolist(), "lut": lut}
+    parameters |= {"width": 2 * W + GAP, "height": H}
+    drawn = page.evaluate("([which, asked]) => bench.viewOf(which, asked)", [kind, parameters])
+    assert drawn == kind
     rgba = page.evaluate("(params) => bench.shown(params)", params or {})
     codes = np.reshape(rgba, (H, 2 * W + GAP, 4))[..., :3]
     return np.stack([codes[:, :W], codes[:, W + GAP :]])
@@ -67,88 +67,90 @@ def lattice(name: str, side: int, low: float, high: float) -> np.ndarray:
 def interpolate(lut: np.ndarray, light: np.ndarray) -> np.ndarray:
     """Codes by a lattice, as SciPy has them."""
     axis = np.linspace(-14, 6, len(lut))
-    between = RegularGridInterpolator((axis, axis, axis), lut.astype(np.float64))
-    return np.round(255 * between(np.clip(np.log2(light), -14, 6)))
+    interpolator = RegularGridInterpolator((axis, axis, axis), lut.astype(np.float64))
+    return np.round(255 * interpolator(np.clip(np.log2(light), -14, 6)))
 
 
-@pytest.mark.parametrize("which", ["cpu", "gl"])
+@pytest.mark.parametrize("kind", ["cpu", "gl"])
 @pytest.mark.parametrize("stops", [0.0, -2.3])
-def test_both_pictures_are_shown_in_srgb(page: Any, pictures: Any, which: str, stops: float):
-    left, right = draw_panes(page, which, pictures, {"stops": stops})
+def test_both_pictures_are_shown_in_srgb(page: Any, pictures: Any, kind: str, stops: float):
+    left, right = draw_panes(page, kind, pictures, {"stops": stops})
     assert np.abs(left - codes(pictures["painting"], stops=stops)).max() <= 1
     assert np.abs(right - codes(mix_planes(pictures), stops=stops)).max() <= 1
 
 
-@pytest.mark.parametrize("which", ["cpu", "gl"])
+@pytest.mark.parametrize("kind", ["cpu", "gl"])
 @pytest.mark.parametrize("name", ["agx", "filmic"])
 def test_view_transforms_are_those_of_the_library(
-    page: Any, site: Any, pictures: Any, which: str, name: str
+    page: Any, site: Any, pictures: Any, kind: str, name: str
 ):
     lut = {"name": name, "side": 48, "low": -14.0, "high": 6.0}
     site.arrays["lut"] = lattice(name, 48, -14, 6)
-    for got, light in zip(
-        draw_panes(page, which, pictures, {"stops": 0.7}, lut),
+    for codes_of_view, light in zip(
+        draw_panes(page, kind, pictures, {"stops": 0.7}, lut),
         (pictures["painting"], mix_planes(pictures)),
         strict=True,
     ):
-        assert np.abs(got - interpolate(site.arrays["lut"], light * 2**0.7)).max() <= CODES
+        assert (
+            np.abs(codes_of_view - interpolate(site.arrays["lut"], light * 2**0.7)).max() <= CODES
+        )
         # Between its points a lattice is straight, which the transform is not.
-        assert np.abs(got - codes(light, name, 0.7)).mean() < 0.5
+        assert np.abs(codes_of_view - codes(light, name, 0.7)).mean() < 0.5
 
 
 @pytest.mark.parametrize("overlay", [None, "missed", "beyond", "importance", "falsecolor"])
 def test_views_agree(page: Any, pictures: Any, overlay: str | None):
     params = {"overlay": overlay, "stops": 0.4}
-    one, other = (draw_panes(page, which, pictures, params) for which in ("cpu", "gl"))
-    off = np.abs(one - other).max(axis=-1)
+    by_cpu, other = (draw_panes(page, kind, pictures, params) for kind in ("cpu", "gl"))
+    difference = np.abs(by_cpu - other).max(axis=-1)
     # On the border of two bands of false colour, or of too dark and too bright, they may differ.
-    assert (off <= 1).mean() > 0.99
+    assert (difference <= 1).mean() > 0.99
     if overlay:
         plain = draw_panes(page, "cpu", pictures, {"stops": 0.4})
-        changed = [bool((one[k] != plain[k]).any()) for k in (0, 1)]
+        changed = [bool((by_cpu[k] != plain[k]).any()) for k in (0, 1)]
         assert changed == [overlay in ("importance", "falsecolor"), overlay != "importance"]
 
 
-@pytest.mark.parametrize("which", ["cpu", "gl"])
-def test_wipe_blink_and_zoom(page: Any, pictures: Any, which: str):
-    draw_panes(page, which, pictures)
+@pytest.mark.parametrize("kind", ["cpu", "gl"])
+def test_wipe_blink_and_zoom(page: Any, pictures: Any, kind: str):
+    draw_panes(page, kind, pictures)
     painting, solution = codes(pictures["painting"]), codes(mix_planes(pictures))
     width = 2 * W + GAP
 
-    def whole(params: Any) -> np.ndarray:
+    def full_picture(params: Any) -> np.ndarray:
         rgba = page.evaluate("(params) => bench.shown(params)", params)
         return np.reshape(rgba, (H, width, 4))[..., :3]
 
-    at = (width - W) // 2  # one picture in the middle
-    blinked = whole({"layout": "blink", "blink": "left"})[:, at : at + W]
+    offset = (width - W) // 2  # one picture in the middle
+    blinked = full_picture({"layout": "blink", "blink": "left"})[:, offset : offset + W]
     assert np.abs(blinked - painting).max() <= 1
-    wiped = whole({"layout": "wipe", "wipe": 0.5})[:, at : at + W]
-    half = width // 2 - at
+    wiped = full_picture({"layout": "wipe", "wipe": 0.5})[:, offset : offset + W]
+    half = width // 2 - offset
     assert np.abs(wiped[:, :half] - painting[:, :half]).max() <= 1
     assert np.abs(wiped[:, half:] - solution[:, half:]).max() <= 1
     # Three times as large around pixel (12, 10): single pixels are squares.
     pan = [12.5 - W / 2, 10.5 - H / 2]
-    near = whole({"layout": "blink", "blink": "right", "zoom": 3, "pan": pan})
+    near = full_picture({"layout": "blink", "blink": "right", "zoom": 3, "pan": pan})
     middle = near[H // 2, width // 2]
     assert np.abs(middle - solution[10, 12]).max() <= 1
 
 
-@pytest.mark.parametrize("which", ["cpu", "gl"])
-def test_light_at_a_pixel_is_light(page: Any, pictures: Any, which: str):
-    draw_panes(page, which, pictures, {"stops": 3})
+@pytest.mark.parametrize("kind", ["cpu", "gl"])
+def test_light_at_a_pixel_is_light(page: Any, pictures: Any, kind: str):
+    draw_panes(page, kind, pictures, {"stops": 3})
     planes = page.evaluate("() => Array.from(view.planesAt(7, 9))")
-    want = pictures["planes"][:, 9, 7]
+    expected = pictures["planes"][:, 9, 7]
     # Halves times a scale, in float32.
-    np.testing.assert_allclose(np.reshape(planes, (N, 3)), want, rtol=1e-6)
+    np.testing.assert_allclose(np.reshape(planes, (N, 3)), expected, rtol=1e-6)
     solution = page.evaluate("() => view.lightAt('solution', 7, 9)")
     np.testing.assert_allclose(solution, mix_planes(pictures)[9, 7], rtol=1e-6)
     painting = page.evaluate("() => view.lightAt('painting', 7, 9)")
     np.testing.assert_array_equal(painting, pictures["painting"][9, 7].astype(float))
 
 
-@pytest.mark.parametrize("which", ["cpu", "gl"])
-def test_a_region_of_the_painting_changes_alone(page: Any, pictures: Any, which: str):
-    draw_panes(page, which, pictures)
+@pytest.mark.parametrize("kind", ["cpu", "gl"])
+def test_a_region_of_the_painting_changes_alone(page: Any, pictures: Any, kind: str):
+    draw_panes(page, kind, pictures)
     rgba = page.evaluate(
         """([H, W]) => {
             const image = new Float32Array(3 * H * W).fill(1), full = new Float32Array(H * W);
@@ -161,9 +163,9 @@ def test_a_region_of_the_painting_changes_alone(page: Any, pictures: Any, which:
         [H, W],
     )
     left = np.reshape(rgba, (H, 2 * W + GAP, 4))[:, :W, 0]
-    want = np.full((H, W), 255)
-    want[5:9, 3:20] = codes(np.array(0.25))
-    np.testing.assert_array_equal(left, want)
+    expected = np.full((H, W), 255)
+    expected[5:9, 3:20] = codes(np.array(0.25))
+    np.testing.assert_array_equal(left, expected)
 
 
 def test_what_is_added_to_a_mix_is_what_a_new_mix_has(page: Any, pictures: Any):
@@ -199,24 +201,24 @@ def test_half_size_is_every_second_pixel(page: Any, pictures: Any):
     assert step == 1
 
 
-@pytest.mark.parametrize("which", ["cpu", "gl"])
-def test_bright_halves_spread_nothing(page: Any, site: Any, pictures: Any, which: str):
+@pytest.mark.parametrize("kind", ["cpu", "gl"])
+def test_bright_halves_spread_nothing(page: Any, site: Any, pictures: Any, kind: str):
     plane = site.arrays["plane/0"].copy()
     plane[0, 0], plane[0, 1] = np.inf, np.nan
     site.arrays["plane/0"] = plane
     site.arrays["weights"] = np.zeros((N, 3))
-    _, right = draw_panes(page, which, pictures)
+    _, right = draw_panes(page, kind, pictures)
     np.testing.assert_array_equal(right, 0)  # and no Inf · 0
     site.arrays["weights"] = np.ones((N, 3))
-    _, right = draw_panes(page, which, pictures)
+    _, right = draw_panes(page, kind, pictures)
     np.testing.assert_array_equal(right[0, 0], 255)
-    rest = mix_planes(pictures | {"weights": np.ones((N, 3))})[1:]
-    assert np.abs(right[1:] - codes(rest)).max() <= 1
+    other_pictures = mix_planes(pictures | {"weights": np.ones((N, 3))})[1:]
+    assert np.abs(right[1:] - codes(other_pictures)).max() <= 1
 
 
 def test_a_lost_context_comes_back_empty(page: Any, pictures: Any):
     draw_panes(page, "gl", pictures)
-    lost = page.evaluate(
+    pixels_after = page.evaluate(
         """async () => {
             const away = view.gl.getExtension("WEBGL_lose_context");
             away.loseContext();
@@ -229,12 +231,12 @@ def test_a_lost_context_comes_back_empty(page: Any, pictures: Any):
             return [lost, view.lost(), view.planes.count];
         }"""
     )
-    assert lost == [True, False, 0]
+    assert pixels_after == [True, False, 0]
 
 
 def test_without_a_gpu_the_view_is_chosen_that_is_faster_there(page: Any):
     # WebGL2 in software says that it is slow; and where there is none, nothing else is left.
-    chosen = page.evaluate(
+    view_kind = page.evaluate(
         """async () => {
             const { chooseView } = await import("/viewer/drawing/choose_renderer.js");
             const names = [chooseView(document.body, [30, 40], 3).name];
@@ -247,14 +249,14 @@ def test_without_a_gpu_the_view_is_chosen_that_is_faster_there(page: Any):
             return [...names, document.querySelectorAll("canvas").length];
         }"""
     )
-    assert chosen == ["cpu", "cpu", 2]
+    assert view_kind == ["cpu", "cpu", 2]
 
 
-@pytest.mark.parametrize("which", ["cpu", "gl"])
-def test_memory_for_each_pixel_and_light_is_bounded(page: Any, pictures: Any, which: str):
-    draw_panes(page, which, pictures)
-    planes = {"cpu": 6, "gl": 8}[which] * N * H * W
-    rest = page.evaluate("() => view.memory()") - planes
-    rows = 8 * 2**18 if which == "gl" else 0  # on their way to the GPU
+@pytest.mark.parametrize("kind", ["cpu", "gl"])
+def test_memory_for_each_pixel_and_light_is_bounded(page: Any, pictures: Any, kind: str):
+    draw_panes(page, kind, pictures)
+    planes = {"cpu": 6, "gl": 8}[kind] * N * H * W
+    overhead = page.evaluate("() => view.memory()") - planes
+    rows = 8 * 2**18 if kind == "gl" else 0  # on their way to the GPU
     # Mix and two canvases of codes, or their textures; painting and codes; nothing by the light.
-    assert 0 < rest <= 40 * H * W + rows + 8 * (2 * W + GAP) * H
+    assert 0 < overhead <= 40 * H * W + rows + 8 * (2 * W + GAP) * H

@@ -21,8 +21,8 @@ CUT = """async (where) => {
 def crowded_page(browser: Any, site: Any) -> Iterator[Painter]:
     """One page for all panels and sizes; each of them is brought to how it begins."""
     page = browser.new_page()
-    wrong: list[str] = []
-    page.on("pageerror", lambda error: wrong.append(str(error)))
+    errors: list[str] = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
     page.goto(f"{site.url}/fake/index.html?crowd&lights=69&size=48x27")
     page.wait_for_selector(".lightpaint .tag")
     painter = Painter(page)
@@ -30,7 +30,7 @@ def crowded_page(browser: Any, site: Any) -> Iterator[Painter]:
     page.evaluate("() => { window.first = window.painter.store.value; }")
     yield painter
     page.close()
-    assert not wrong
+    assert not errors
 
 
 @pytest.fixture(scope="module", params=SIZES, ids=["1280x720", "1440x900"])
@@ -57,10 +57,10 @@ def painter(crowded_painter: Painter) -> Painter:
     return crowded_painter
 
 
-def clipped_elements(painter: Painter, where: str = ".lightpaint") -> list[str]:
+def clipped_elements(painter: Painter, selector: str = ".lightpaint") -> list[str]:
     painter.still()
-    found: list[str] = painter.page.evaluate(CUT, where)
-    return found
+    elements: list[str] = painter.page.evaluate(CUT, selector)
+    return elements
 
 
 def show_check(painter: Painter) -> None:
@@ -232,15 +232,15 @@ def test_a_sentence_with_its_button_is_whole(painter: Painter) -> None:
     )
     painter.still()
     assert painter.page.locator(".answer .help").is_visible()
-    said = painter.page.locator(".answer .said")
-    assert said.evaluate("(one) => one.scrollHeight - one.clientHeight") <= 1
+    sentence = painter.page.locator(".answer .said")
+    assert sentence.evaluate("(one) => one.scrollHeight - one.clientHeight") <= 1
 
 
 def test_numbers_stay_on_the_lines_of_their_units(painter: Painter) -> None:
     show_check(painter)
-    said = painter.page.locator(".truth").evaluate("(one) => one.textContent")
-    assert said.count("\u00a0%") >= 5
-    assert " %" not in said
+    truth_text = painter.page.locator(".truth").evaluate("(one) => one.textContent")
+    assert truth_text.count("\u00a0%") >= 5
+    assert " %" not in truth_text
 
 
 def test_lines_of_a_name_end_between_words(painter: Painter) -> None:
@@ -265,17 +265,17 @@ def test_axe_finds_nothing_in_a_crowd(painter: Painter, axe: str) -> None:
 def test_what_has_no_room_is_read_by_keyboard(painter: Painter) -> None:
     longest(painter)
     painter.still()
-    said = painter.page.locator(".answer .said")
+    sentence = painter.page.locator(".answer .said")
     # Tab leads there.
     painter.page.locator(".stage").focus()
     painter.page.keyboard.press("Tab")
     for _ in range(30):
-        if said.evaluate("(one) => one === document.activeElement"):
+        if sentence.evaluate("(one) => one === document.activeElement"):
             break
         painter.page.keyboard.press("Tab")
     tip = painter.page.locator(".tip")
     tip.wait_for()
-    assert tip.inner_text().strip() == said.inner_text().strip()
+    assert tip.inner_text().strip() == sentence.inner_text().strip()
     box = tip.bounding_box()
     assert box["x"] >= 0
     assert box["y"] >= 0
