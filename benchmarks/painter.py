@@ -94,7 +94,7 @@ WATCH = """() => {
 CLEAN = """() => {
   const { loader } = document.getElementById('lightpaint').painter.engine.mirror;
   const clean = Object.entries(loader.resources).filter(([name]) => name.startsWith('clean/'));
-  return clean.length && clean.every(([, count]) => count > 1) && !loader.missing().length;
+  return clean.length && clean.every(([, count]) => count > 1) && !loader.missingSlots().length;
 }"""
 
 
@@ -333,7 +333,7 @@ STAGES = {
     "picture": f"() => {PAINTER}?.engine.mirror.isReady"
     " && document.querySelector('.lightpaint .tag') && document.querySelector('.is-lights input')",
     "planes": f"() => {{ const {{ loader }} = {PAINTER}.engine.mirror;"
-    " return !loader.missing().length && !loader.onTheWay.size; }",
+    " return !loader.missingSlots().length && !loader.activeFetches.size; }",
 }
 
 

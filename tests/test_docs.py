@@ -122,7 +122,8 @@ def test_keys_of_the_painter_are_those_of_its_page():
         r"label: '(\w+)',\s*icon: '\w+',\s*keys: '(\w)'", (page / "tools.js").read_text()
     )
     others = re.findall(
-        r"shown: \[((?:'[^']*'(?:, )?)+)\],\s*does: '([^']*)'", (page / "shortcuts.js").read_text()
+        r"symbols: \[((?:'[^']*'(?:, )?)+)\],\s*description: '([^']*)'",
+        (page / "shortcuts.js").read_text(),
     )
     keys = [*((f"'{key}'", label) for label, key in tools), *others]
     assert len(keys) > 30
@@ -192,7 +193,7 @@ def test_numbers_in_other_words_of_the_help_are_those_of_the_code():
 def test_numbers_of_settings_are_the_same_in_documents_and_on_the_page():
     page = (ROOT / "lightpaint/paint/page/ui/settings_panel.js").read_text()
     solving, method = ((ROOT / "docs" / name).read_text() for name in ("solving.md", "method.md"))
-    assert f"const HOLD = {DEFAULT_HOLD:g};" in page
+    assert f"const DEFAULT_HOLD = {DEFAULT_HOLD:g};" in page
     assert f"`--hold {DEFAULT_HOLD:g}`" in solving
     assert f"It is {DEFAULT_HOLD:g} by default where something was painted over" in method
     for text in (page, solving):

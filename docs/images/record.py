@@ -211,9 +211,10 @@ def load(page: Page) -> None:
     page.wait_for_function(
         """() => {
           const { mirror } = document.getElementById('lightpaint').painter.engine;
-          const there = [...mirror.loader.there.values()].filter((one) => one.includes(' clean/'));
+          const loaded = [...mirror.loader.loadedVersions.values()];
+          const clean = loaded.filter((version) => version.includes(' clean/'));
           const isDone = !document.querySelector('.working');
-          return isDone && mirror.isReady && there.length === mirror.state.lights.length;
+          return isDone && mirror.isReady && clean.length === mirror.state.lights.length;
         }""",
         timeout=600_000,
     )

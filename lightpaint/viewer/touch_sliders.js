@@ -2,44 +2,44 @@
  * slide. */
 
 /** Pixels that a finger moves before its direction is known. */
-const SURE = 6;
+const MIN_DRAG_PIXELS = 6;
 
 /** Approximate width of a slider's thumb: its centre stays half of it away from the ends. */
-const MARK = 18;
+const THUMB_PIXELS = 18;
 
 /**
  * A slider that a touch moves only by a sideways drag or a tap; a scroll changes nothing. The
  * browser's own handling of touch, which begins at once, is suppressed; it keeps mouse, pen and
  * keys.
  * @param {HTMLInputElement} input
- * @param {(value: number, done: boolean) => void} move done: false while the finger is down
+ * @param {(value: number, isFinal: boolean) => void} move done: false while the finger is down
  * @param {() => void} restore have it show its value again
  * @param {AbortSignal} [signal] ends it
  */
 export function slideByTouch(input, move, restore, signal) {
-  /** @type {{id: number, x: number, y: number, isSure: boolean} | null} */
+  /** @type {{id: number, x: number, y: number, isSliding: boolean} | null} */
   let finger = null;
   // After a touch the browser also sends a change event and emulated mouse events.
   let isTouched = false;
-  const moveTo = (/** @type {PointerEvent} */ event, /** @type {boolean} */ done) => {
+  const moveTo = (/** @type {PointerEvent} */ event, /** @type {boolean} */ isFinal) => {
     const { left, width } = input.getBoundingClientRect();
-    const part = (event.clientX - left - MARK / 2) / (width - MARK);
+    const share = (event.clientX - left - THUMB_PIXELS / 2) / (width - THUMB_PIXELS);
     const [low, high] = [Number(input.min), Number(input.max)];
-    input.value = String(low + Math.min(1, Math.max(0, part)) * (high - low));
-    move(Number(input.value), done);
+    input.value = String(low + Math.min(1, Math.max(0, share)) * (high - low));
+    move(Number(input.value), isFinal);
   };
   const listen = (/** @type {string} */ name, /** @type {(event: any) => void} */ handler) =>
     input.addEventListener(name, handler, { capture: true, signal });
   listen('pointerdown', (/** @type {PointerEvent} */ event) => {
     isTouched = event.pointerType === 'touch';
     if (!isTouched || finger || input.disabled) return;
-    finger = { id: event.pointerId, x: event.clientX, y: event.clientY, isSure: false };
+    finger = { id: event.pointerId, x: event.clientX, y: event.clientY, isSliding: false };
   });
   listen('pointermove', (/** @type {PointerEvent} */ event) => {
     if (finger?.id !== event.pointerId) return;
-    const [across, down] = [event.clientX - finger.x, event.clientY - finger.y].map(Math.abs);
-    finger.isSure ||= across >= SURE && across > down;
-    if (finger.isSure) moveTo(event, false);
+    const [dx, dy] = [event.clientX - finger.x, event.clientY - finger.y].map(Math.abs);
+    finger.isSliding ||= dx >= MIN_DRAG_PIXELS && dx > dy;
+    if (finger.isSliding) moveTo(event, false);
   });
   listen('pointerup', (/** @type {PointerEvent} */ event) => {
     if (finger?.id !== event.pointerId) return;
@@ -50,7 +50,7 @@ export function slideByTouch(input, move, restore, signal) {
   listen('pointercancel', (/** @type {PointerEvent} */ event) => {
     if (finger?.id !== event.pointerId) return;
     // The movement so far stays.
-    if (finger.isSure) move(Number(input.value), true);
+    if (finger.isSliding) move(Number(input.value), true);
     else restore();
     finger = null;
   });
@@ -59,7 +59,7 @@ export function slideByTouch(input, move, restore, signal) {
     listen(name, (/** @type {Event} */ event) => {
       if (!isTouched) return;
       event.stopImmediatePropagation();
-      if (!finger?.isSure) restore();
+      if (!finger?.isSliding) restore();
     });
   listen('mousedown', (/** @type {Event} */ event) => isTouched && event.preventDefault());
 }

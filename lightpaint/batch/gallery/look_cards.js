@@ -18,11 +18,11 @@ const LINKS = {
 };
 
 /** The text in place of a picture. */
-const BLANK = { failed: 'failed', waiting: 'not done yet', done: 'no picture' };
+const BLANK_TEXTS = { failed: 'failed', waiting: 'not done yet', done: 'no picture' };
 
 /** Cards omit facts that all looks share. @param {'sensor' | 'scene'} key */
 const varies = (key) => new Set(looks.map((look) => look[key]).filter(Boolean)).size > 1;
-const VARYING = /** @type {const} */ (['sensor', 'scene']).filter(varies);
+const VARYING_FACTS = /** @type {const} */ (['sensor', 'scene']).filter(varies);
 
 /** @param {CardActions} actions @returns {Map<Look, HTMLElement>} */
 export function createCards(actions) {
@@ -34,7 +34,7 @@ function createCard(look, actions) {
   const card = createElement('li', `card ${look.state}`);
   card.style.setProperty('--aspect', aspectOf(look));
   const title = titleOf(look);
-  const blank = BLANK[look.state];
+  const blank = BLANK_TEXTS[look.state];
   card.append(look.picture ? pictureButton(look, actions) : createElement('div', 'blank', blank));
   const caption = createElement('div', 'says');
   caption.append(createElement('div', 'name', title), factsOf(look));
@@ -44,7 +44,9 @@ function createCard(look, actions) {
   if (look.picture) {
     for (const side of /** @type {const} */ (['a', 'b'])) {
       const letter = side.toUpperCase();
-      const choice = createButton(letter, `${title} as ${letter}`, () => actions.choose(side, look));
+      const choice = createButton(letter, `${title} as ${letter}`, () =>
+        actions.choose(side, look),
+      );
       choice.setAttribute('aria-pressed', 'false');
       choice.dataset.side = side;
       row.append(choice);
@@ -78,7 +80,7 @@ function factsOf(look) {
   if (look.delta_e !== undefined) facts.push(`ΔE ${look.delta_e.toFixed(1)}`);
   if (look.agrees) facts.push('verified');
   if (look.variation) facts.push(look.variation);
-  for (const key of VARYING) if (look[key]) facts.push(look[key]);
+  for (const key of VARYING_FACTS) if (look[key]) facts.push(look[key]);
   line.append(facts.join(' · '));
   if (look.agrees === false) line.append(createElement('span', 'warns', ' render disagrees'));
   return line;

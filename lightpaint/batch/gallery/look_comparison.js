@@ -21,7 +21,7 @@ export class LookComparison {
     /** Set once the cards are made. @type {Map<Look, HTMLElement>} */
     this.cards = new Map();
     /** @type {{a: Look | null, b: Look | null}} */
-    this.chosen = { a: null, b: null };
+    this.pair = { a: null, b: null };
     this.dialog = /** @type {HTMLDialogElement} */ (elementOf('wipe'));
     this.stage = /** @type {HTMLElement} */ (this.dialog.querySelector('.stage'));
     this.addListeners();
@@ -31,15 +31,15 @@ export class LookComparison {
     const { dialog, stage } = this;
     /** @param {PointerEvent} event */
     const follow = (event) => {
-      if (!(this.chosen.a && this.chosen.b)) return;
+      if (!(this.pair.a && this.pair.b)) return;
       const box = stage.getBoundingClientRect();
       const percent = (100 * (event.clientX - box.left)) / box.width;
       this.moveBorder(Math.min(100, Math.max(0, percent)));
     };
     stage.addEventListener('pointerdown', follow);
     stage.addEventListener('pointermove', follow);
-    const slide = inputOf('slide');
-    slide.addEventListener('input', () => this.moveBorder(Number(slide.value)));
+    const slider = inputOf('slide');
+    slider.addEventListener('input', () => this.moveBorder(Number(slider.value)));
     elementOf('before').addEventListener('click', () => this.step(-1));
     elementOf('next').addEventListener('click', () => this.step(1));
     elementOf('swap').addEventListener('click', () => this.swap());
@@ -56,15 +56,15 @@ export class LookComparison {
     });
     // An enlarged look is not part of a pair.
     dialog.addEventListener('close', () => {
-      if (!this.chosen.b) this.choose('a', null);
+      if (!this.pair.b) this.choose('a', null);
     });
   }
 
   /** @param {Side} side @param {Look | null} look */
   choose(side, look) {
-    const previous = this.chosen[side];
-    this.chosen[side] = look;
-    const { a, b } = this.chosen;
+    const previous = this.pair[side];
+    this.pair[side] = look;
+    const { a, b } = this.pair;
     for (const changedLook of [previous, look]) {
       const card = changedLook && this.cards.get(changedLook);
       if (!card) continue;
@@ -80,8 +80,8 @@ export class LookComparison {
   /** Choose a look or, if it is chosen already, no look; compare both once there are two.
    * @param {Side} side @param {Look} look */
   toggle(side, look) {
-    this.choose(side, this.chosen[side] === look ? null : look);
-    if (this.chosen.a && this.chosen.b) this.open();
+    this.choose(side, this.pair[side] === look ? null : look);
+    if (this.pair.a && this.pair.b) this.open();
   }
 
   /** Show one look, large. @param {Look} look */
@@ -96,7 +96,7 @@ export class LookComparison {
   }
 
   swap() {
-    const { a, b } = this.chosen;
+    const { a, b } = this.pair;
     this.choose('a', b);
     this.choose('b', a);
     this.open();
@@ -104,7 +104,7 @@ export class LookComparison {
 
   /** Show the chosen looks in the tray, where others can be chosen. */
   showTray() {
-    const { a, b } = this.chosen;
+    const { a, b } = this.pair;
     elementOf('tray').hidden = (!a && !b) || elementOf('looks-panel').hidden;
     elementOf('tray-a').textContent = a ? titleOf(a) : '—';
     elementOf('tray-b').textContent = b ? titleOf(b) : '—';
@@ -114,7 +114,7 @@ export class LookComparison {
   /** Fill the dialog with the chosen looks, and open it. */
   open() {
     const { dialog } = this;
-    const { a, b } = this.chosen;
+    const { a, b } = this.pair;
     const first = a ?? b;
     if (!first) return;
     const pictures = this.stage.querySelectorAll('img');
@@ -144,14 +144,14 @@ export class LookComparison {
 
   /** Go to the look before or after this one, among the visible ones. @param {number} count */
   step(count) {
-    const side = this.chosen.b ? 'b' : 'a';
+    const side = this.pair.b ? 'b' : 'a';
     const looks = this.shownLooks().filter((look) => look.picture);
     if (!looks.length) return;
-    const present = looks.indexOf(/** @type {Look} */ (this.chosen[side]));
+    const currentIndex = looks.indexOf(/** @type {Look} */ (this.pair[side]));
     const border = Number(inputOf('slide').value);
-    this.choose(side, looks[(present + count + looks.length) % looks.length]);
+    this.choose(side, looks[(currentIndex + count + looks.length) % looks.length]);
     this.open();
-    if (this.chosen.b) this.moveBorder(border);
+    if (this.pair.b) this.moveBorder(border);
   }
 }
 
@@ -173,7 +173,7 @@ function listLights(a, b) {
     return { row, weight: b ? Math.abs(stops) : 0 };
   });
   if (b) rows.sort((rowA, rowB) => rowB.weight - rowA.weight || 0);
-  const heads = b ? ['light', 'A', 'B', 'stops'] : ['light', 'luminance'];
-  elementOf('beside-head').replaceChildren(headRow(heads));
+  const headings = b ? ['light', 'A', 'B', 'stops'] : ['light', 'luminance'];
+  elementOf('beside-head').replaceChildren(headRow(headings));
   elementOf('beside-body').replaceChildren(...rows.map(({ row }) => row));
 }

@@ -44,8 +44,8 @@ export class LightsTable {
 
   /** @param {Look} look */
   rowOf(look) {
-    const earlier = this.rows.get(look);
-    if (earlier) return earlier;
+    const cachedRow = this.rows.get(look);
+    if (cachedRow) return cachedRow;
     const row = createElement('tr');
     const head = createElement('th', '', titleOf(look));
     head.title = titleOf(look);

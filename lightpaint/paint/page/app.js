@@ -5,7 +5,7 @@ import { ColourPanel } from './ui/colour_panel.js';
 import { Fold } from './ui/controls.js';
 import { Dialogs } from './ui/dialogs.js';
 import { PreviewDialog } from './ui/advice.js';
-import { counted } from './ui/format.js';
+import { countText } from './ui/format.js';
 import { handleKey, listenWithin } from './ui/keyboard.js';
 import { LightList, LightListActions } from './ui/light_list.js';
 import { LookStrip } from './ui/look_strip.js';
@@ -18,7 +18,7 @@ import { SettingsPanel } from './ui/settings_panel.js';
 import { SkipLinks } from './ui/skip_links.js';
 import { Stage } from './ui/picture_stage.js';
 import { Store } from './ui/ui_store.js';
-import { Ask, ToolBar, ToolOptions } from './ui/toolbar.js';
+import { AdjustPanel, ToolBar, ToolOptions } from './ui/toolbar.js';
 import { TopBar } from './ui/topbar.js';
 import { AnalysisPanel } from './ui/analysis_panel.js';
 import { AnswerLine, PointerStatus } from './ui/answer_line.js';
@@ -48,17 +48,17 @@ export async function mount(element, host, { global = false, engine }) {
   const session = new SessionController(host, store);
   const app = { store, session, engine };
   listen(app);
-  const ends = new AbortController();
-  const { signal } = ends;
+  const controller = new AbortController();
+  const { signal } = controller;
   if (global) window.addEventListener('keydown', (event) => handleKey(event, app), { signal });
   else listenWithin(root, app, signal);
   render(html`<${Painter} app=${app} root=${() => root} />`, root);
-  const folding = foldByItself(root, store);
-  const forget = storeChanges(store);
+  const observer = foldWhenNarrow(root, store);
+  const stopStoring = storeChanges(store);
   const close = () => {
-    ends.abort();
-    folding.disconnect();
-    forget();
+    controller.abort();
+    observer.disconnect();
+    stopStoring();
     render(null, root);
     engine.close();
     host.close();
@@ -71,24 +71,24 @@ export async function mount(element, host, { global = false, engine }) {
 function listen(app) {
   const { engine, session, store } = app;
   engine.on('message', (message) => session.receive(message));
-  engine.on('loading', (loading) => store.set({ loading }));
-  engine.on('asking', (asking) => store.set({ asking }));
+  engine.on('loading', (loadProgress) => store.set({ loadProgress }));
+  engine.on('adjustment', (dragAdjustment) => store.set({ dragAdjustment }));
   engine.on('view', ({ view }) => showView(app, view));
   engine.on('lost', ({ count, isStale }) => {
-    if (isStale) store.set({ unheard: count });
+    if (isStale) store.set({ lostStrokes: count });
     else session.toast(droppedText(count), 'warn');
   });
   engine.on('trouble', ({ text }) => session.toast(text, 'warn'));
   let isSized = false;
   store.listen(() => {
-    const { state, show } = store.value;
+    const { state, display } = store.value;
     if (!state || isSized) return;
     isSized = true;
     store.set({
       size: storedBrushSize(state.size[0]),
-      show: {
-        ...show,
-        transform: state.transform?.name ?? show.transform,
+      display: {
+        ...display,
+        transform: state.transform?.name ?? display.transform,
         stops: state.transform?.stops ?? 0,
       },
     });
@@ -96,16 +96,16 @@ function listen(app) {
 }
 
 /** Width in pixels below which panels overlay the pictures; style.css has the same number. */
-const NARROW = 760;
+const NARROW_MAX_PIXELS = 760;
 
 /** Hide panels while there is no room beside the pictures, and show them again when there is.
  * @param {HTMLElement} root @param {Store<Ui>} store */
-function foldByItself(root, store) {
+function foldWhenNarrow(root, store) {
   let isFolded = false;
   let wasNarrow = false;
   const observer = new ResizeObserver(() => {
     const { side } = store.value;
-    const isNarrow = root.clientWidth > 0 && root.clientWidth <= NARROW;
+    const isNarrow = root.clientWidth > 0 && root.clientWidth <= NARROW_MAX_PIXELS;
     if (isNarrow === wasNarrow) return;
     wasNarrow = isNarrow;
     if (isNarrow ? side : isFolded) store.set({ side: !isNarrow });
@@ -118,7 +118,7 @@ function foldByItself(root, store) {
 /** @param {number} count */
 function droppedText(count) {
   const [strokes, subject] =
-    count === 1 ? ['A stroke', 'It is'] : [counted(count, 'stroke'), 'They are'];
+    count === 1 ? ['A stroke', 'It is'] : [countText(count, 'stroke'), 'They are'];
   return `${strokes} in this tab had not been sent when another tab took over. ${subject} dropped, so as
     not to cover what was painted there.`.replace(/\s+/g, ' ');
 }
@@ -158,7 +158,7 @@ function Painter({ app, root }) {
 /** @param {{ui: Ui, app: App}} props */
 function Side({ ui, app }) {
   const { store } = app;
-  const fold = (
+  const renderFold = (
     /** @type {string} */ name,
     /** @type {string} */ title,
     /** @type {any} */ content,
@@ -167,15 +167,15 @@ function Side({ ui, app }) {
     html`<${Fold} title=${title} class=${`is-${name}`} open=${Boolean(ui.open[name])} extra=${extra}
       toggle=${() => store.set({ open: { ...ui.open, [name]: !ui.open[name] } })}>${content}</${Fold}>`;
   return html`<aside class="side" aria-label="Panels">
-    ${fold('colour', 'Colour', html`<${ColourPanel} ui=${ui} app=${app} />`)}
-    ${fold('ask', 'Adjust by numbers', html`<${Ask} ui=${ui} app=${app} />`)}
-    ${fold(
+    ${renderFold('colour', 'Colour', html`<${ColourPanel} ui=${ui} app=${app} />`)}
+    ${renderFold('ask', 'Adjust by numbers', html`<${AdjustPanel} ui=${ui} app=${app} />`)}
+    ${renderFold(
       'lights',
       'Lights',
       html`<${LightList} ui=${ui} app=${app} />`,
       html`<${LightListActions} ui=${ui} app=${app} />`,
     )}
-    ${ui.lamps && fold('plan', 'Plan', html`<${RoomPlan} ui=${ui} app=${app} />`)}
-    ${fold('truth', 'Analysis', html`<${AnalysisPanel} ui=${ui} app=${app} />`)}
+    ${ui.areLampsMarked && renderFold('plan', 'Plan', html`<${RoomPlan} ui=${ui} app=${app} />`)}
+    ${renderFold('truth', 'Analysis', html`<${AnalysisPanel} ui=${ui} app=${app} />`)}
   </aside>`;
 }

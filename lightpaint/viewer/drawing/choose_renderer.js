@@ -11,10 +11,10 @@ import { DEFAULTS } from './view.js';
 /** @typedef {import("./view.js").PictureView} PictureView */
 
 /** Frame time in milliseconds below which no comparison is needed. */
-const QUICK = 12;
+const QUICK_FRAME_MS = 12;
 
 /** Frame time in milliseconds below which no third frame is needed. */
-const SLOW = 100;
+const SLOW_FRAME_MS = 100;
 
 /**
  * Create a view in an element, on a canvas of its own.
@@ -27,16 +27,18 @@ const SLOW = 100;
 export function chooseView(element, size, count, options = {}) {
   const gl = options.view === 'cpu' ? null : glView(size, count, options);
   const isGl =
-    gl && (options.view === 'gl' || frameTime(gl, count) <= Math.max(QUICK, cpuTime(size, count)));
+    gl &&
+    (options.view === 'gl' ||
+      frameTime(gl, count) <= Math.max(QUICK_FRAME_MS, cpuTime(size, count)));
   if (gl && !isGl) gl.close();
   if (options.view === 'gl' && !gl) throw new Error('no WebGL2 that can show the planes');
-  const view = gl && isGl ? gl : new CpuView(canvasOf(), size);
+  const view = gl && isGl ? gl : new CpuView(createCanvas(), size);
   view.setCount(count);
   element.append(view.canvas);
   return view;
 }
 
-function canvasOf() {
+function createCanvas() {
   const canvas = document.createElement('canvas');
   canvas.className = 'lightpaint-pictures';
   return canvas;
@@ -46,7 +48,7 @@ function canvasOf() {
  * @param {{view?: 'gl' | 'cpu' | null, onRestored?: () => void}} options */
 function glView(size, count, { view, onRestored }) {
   try {
-    const glView = new GlView(canvasOf(), size, { isSlowRefused: view !== 'gl', onRestored });
+    const glView = new GlView(createCanvas(), size, { isSlowRefused: view !== 'gl', onRestored });
     glView.setCount(count);
     return glView;
   } catch {
@@ -65,7 +67,7 @@ function frameTime(view, count) {
     view.draw({ ...DEFAULTS, layout: 'blink', blink: 'right' });
     if (view.name === 'gl') view.read(0, 0, 1, 1); // Reading a pixel waits for the GPU.
     time = performance.now() - start;
-    if (frame > 0 && time > SLOW) break;
+    if (frame > 0 && time > SLOW_FRAME_MS) break;
   }
   return time;
 }
@@ -74,7 +76,7 @@ function frameTime(view, count) {
  * @param {[number, number]} size @param {number} count */
 function cpuTime([height, width], count) {
   const rows = Math.min(height, 64);
-  const view = new CpuView(canvasOf(), [rows, width]);
+  const view = new CpuView(createCanvas(), [rows, width]);
   view.setCount(count);
   const black = new Uint16Array(rows * width * 3);
   for (let k = 0; k < count; k++) view.setPlane(k, black, 1);

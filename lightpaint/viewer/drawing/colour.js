@@ -11,7 +11,7 @@ import { decodeSrgb, encodeSrgb } from './view_transform.js';
 export { decodeSrgb as decode, encodeSrgb as encode };
 
 /** Temperatures for which the locus below is good, in kelvin. */
-const KELVIN = { low: 1000, high: 15000 };
+const KELVIN_RANGE = { low: 1000, high: 15000 };
 
 /** Neutral temperature of warmer and cooler gains. */
 const NEUTRAL_MIRED = 200;
@@ -24,35 +24,39 @@ export function luminance(rgb) {
 /** Return the display colour; light brighter than 1 is scaled down.
  * @param {ArrayLike<number>} rgb linear */
 export function toHex(rgb) {
-  const most = Math.max(1, rgb[0], rgb[1], rgb[2]);
-  const codes = [0, 1, 2].map((c) => Math.round(255 * encodeSrgb(rgb[c] / most)));
+  const maxChannel = Math.max(1, rgb[0], rgb[1], rgb[2]);
+  const codes = [0, 1, 2].map((c) => Math.round(255 * encodeSrgb(rgb[c] / maxChannel)));
   return `#${codes.map((code) => code.toString(16).padStart(2, '0')).join('')}`;
 }
 
 /** Return the linear light of `#ffaa66` or `#fa6`; null for other text.
  * @param {string} text @returns {RGB | null} */
-export function ofHex(text) {
+export function fromHex(text) {
   const match = /^#?([0-9a-f]{3}|[0-9a-f]{6})$/i.exec(text.trim());
   if (!match) return null;
   const digits = match[1].length === 6 ? match[1] : match[1].replace(/./g, '$&$&');
-  return three((c) => decodeSrgb(parseInt(digits.slice(2 * c, 2 * c + 2), 16) / 255));
+  return mapChannels((c) => decodeSrgb(parseInt(digits.slice(2 * c, 2 * c + 2), 16) / 255));
 }
 
 /** Return hue in degrees, saturation and value in [0, 1] of the display colour.
  * @param {ArrayLike<number>} rgb linear @returns {RGB} */
 export function toHsv(rgb) {
-  const [r, g, b] = three((c) => encodeSrgb(rgb[c]));
-  const most = Math.max(r, g, b);
-  const range = most - Math.min(r, g, b);
-  if (range < 1e-9) return [0, 0, most];
+  const [r, g, b] = mapChannels((c) => encodeSrgb(rgb[c]));
+  const maxChannel = Math.max(r, g, b);
+  const range = maxChannel - Math.min(r, g, b);
+  if (range < 1e-9) return [0, 0, maxChannel];
   const sixths =
-    most === r ? (g - b) / range : most === g ? 2 + (b - r) / range : 4 + (r - g) / range;
-  return [(60 * sixths + 360) % 360, range / most, most];
+    maxChannel === r
+      ? (g - b) / range
+      : maxChannel === g
+        ? 2 + (b - r) / range
+        : 4 + (r - g) / range;
+  return [(60 * sixths + 360) % 360, range / maxChannel, maxChannel];
 }
 
 /** Return the linear light of hue, saturation and value. @param {RGB} hsv @returns {RGB} */
-export function ofHsv([hue, saturation, value]) {
-  return three((c) => {
+export function fromHsv([hue, saturation, value]) {
+  return mapChannels((c) => {
     const k = ([5, 3, 1][c] + hue / 60) % 6;
     return decodeSrgb(value * (1 - saturation * Math.max(0, Math.min(k, 4 - k, 1))));
   });
@@ -60,53 +64,55 @@ export function ofHsv([hue, saturation, value]) {
 
 /** Return the linear light of a temperature, its largest channel 1 and none below 0.
  * @param {number} kelvin @param {number} [green] @returns {RGB} */
-export function ofKelvin(kelvin, green = 0) {
-  const { at, along } = locus(kelvin);
-  const normal = towardsGreen(along);
-  const [u, v] = [0, 1].map((i) => at[i] + (green / 1000) * normal[i]);
+export function fromKelvin(kelvin, green = 0) {
+  const { uv, tangent } = locus(kelvin);
+  const normal = greenNormal(tangent);
+  const [u, v] = [0, 1].map((i) => uv[i] + (green / 1000) * normal[i]);
   const [X, Z] = [(3 * u) / (2 * v), (4 - u - 10 * v) / (2 * v)];
-  const rgb = three((c) => Math.max(0, FROM_XYZ[c][0] * X + FROM_XYZ[c][1] + FROM_XYZ[c][2] * Z));
-  const most = Math.max(...rgb);
-  return three((c) => rgb[c] / most);
+  const rgb = mapChannels((c) =>
+    Math.max(0, FROM_XYZ[c][0] * X + FROM_XYZ[c][1] + FROM_XYZ[c][2] * Z),
+  );
+  const maxChannel = Math.max(...rgb);
+  return mapChannels((c) => rgb[c] / maxChannel);
 }
 
 /** Return the correlated temperature (Ohno 2013) and green of a colour; null for black, for colours
  * farther than 0.05 from the locus, and beyond its ends.
  * @param {ArrayLike<number>} rgb linear @returns {{kelvin: number, green: number} | null} */
 export function toKelvin(rgb) {
-  const [X, Y, Z] = three((c) => TO_XYZ[c].reduce((sum, part, i) => sum + part * rgb[i], 0));
+  const [X, Y, Z] = mapChannels((c) => TO_XYZ[c].reduce((sum, part, i) => sum + part * rgb[i], 0));
   const sum = X + 15 * Y + 3 * Z;
   if (!(sum > 0)) return null;
   const [u, v] = [(4 * X) / sum, (6 * Y) / sum];
   /** @param {number} mired */
-  const far = (mired) => {
-    const { at } = locus(1e6 / mired);
-    return Math.hypot(u - at[0], v - at[1]);
+  const distance = (mired) => {
+    const { uv } = locus(1e6 / mired);
+    return Math.hypot(u - uv[0], v - uv[1]);
   };
-  let [low, high] = [1e6 / KELVIN.high, 1e6 / KELVIN.low];
+  let [low, high] = [1e6 / KELVIN_RANGE.high, 1e6 / KELVIN_RANGE.low];
   for (let round = 0; round < 60; round++) {
     const third = (high - low) / 3;
-    if (far(low + third) < far(high - third)) high -= third;
+    if (distance(low + third) < distance(high - third)) high -= third;
     else low += third;
   }
   const mired = (low + high) / 2;
-  const isEnd = mired < 1e6 / KELVIN.high + 0.01 || mired > 1e6 / KELVIN.low - 0.01;
-  if (far(mired) > 0.05 || (isEnd && far(mired) > 0.002)) return null;
-  const { at, along } = locus(1e6 / mired);
-  const normal = towardsGreen(along);
-  const green = 1000 * ((u - at[0]) * normal[0] + (v - at[1]) * normal[1]);
+  const isEnd = mired < 1e6 / KELVIN_RANGE.high + 0.01 || mired > 1e6 / KELVIN_RANGE.low - 0.01;
+  if (distance(mired) > 0.05 || (isEnd && distance(mired) > 0.002)) return null;
+  const { uv, tangent } = locus(1e6 / mired);
+  const normal = greenNormal(tangent);
+  const green = 1000 * ((u - uv[0]) * normal[0] + (v - uv[1]) * normal[1]);
   return { kelvin: 1e6 / mired, green };
 }
 
 /** Return the factor of luminance 1 that makes light warmer by some mireds (below 0: cooler), along
  * Planck's locus around 5000 K. @param {number} mired @returns {RGB} */
 export function warmer(mired) {
-  const least = 1e6 / KELVIN.high - NEUTRAL_MIRED;
-  const most = 500 - NEUTRAL_MIRED; // Below 2000 K hardly any blue is left.
-  const target = ofKelvin(1e6 / (NEUTRAL_MIRED + Math.min(most, Math.max(least, mired))));
-  const neutral = ofKelvin(1e6 / NEUTRAL_MIRED);
-  const gains = three((c) => target[c] / neutral[c]);
-  return three((c) => gains[c] / luminance(gains));
+  const minShift = 1e6 / KELVIN_RANGE.high - NEUTRAL_MIRED;
+  const maxShift = 500 - NEUTRAL_MIRED; // Below 2000 K hardly any blue is left.
+  const target = fromKelvin(1e6 / (NEUTRAL_MIRED + Math.min(maxShift, Math.max(minShift, mired))));
+  const neutral = fromKelvin(1e6 / NEUTRAL_MIRED);
+  const gains = mapChannels((c) => target[c] / neutral[c]);
+  return mapChannels((c) => gains[c] / luminance(gains));
 }
 
 /** CIE XYZ of linear Rec.709 and back (IEC 61966-2-1's primaries and white). */
@@ -125,7 +131,7 @@ const FROM_XYZ = [
  * Planck's locus in CIE 1960 (u, v), and its direction towards lower temperatures: the rational
  * approximation of M. Krystek, "An algorithm to calculate correlated colour temperature", Color
  * Research & Application 10 (1985), good to 1e-4 from 1000 to 15,000 K.
- * @param {number} kelvin @returns {{at: [number, number], along: [number, number]}}
+ * @param {number} kelvin @returns {{uv: [number, number], tangent: [number, number]}}
  */
 function locus(kelvin) {
   const t = kelvin;
@@ -136,18 +142,18 @@ function locus(kelvin) {
   const [da, db] = [1.54118254e-4 + 2 * 1.28641212e-7 * t, 8.42420235e-4 + 2 * 7.08145163e-7 * t];
   const [dc, dd] = [4.22806245e-5 + 2 * 4.20481691e-8 * t, 2 * 1.61456053e-7 * t - 2.89741816e-5];
   return {
-    at: [a / b, c / d],
-    along: [-(da * b - a * db) / b ** 2, -(dc * d - c * dd) / d ** 2],
+    uv: [a / b, c / d],
+    tangent: [-(da * b - a * db) / b ** 2, -(dc * d - c * dd) / d ** 2],
   };
 }
 
 /** Unit vector at a right angle to the locus. @param {[number, number]} along */
-function towardsGreen([u, v]) {
+function greenNormal([u, v]) {
   const length = Math.hypot(u, v);
   return [-v / length, u / length];
 }
 
 /** @param {(channel: number) => number} value @returns {RGB} */
-function three(value) {
+function mapChannels(value) {
   return [value(0), value(1), value(2)];
 }

@@ -5,11 +5,11 @@
  * the budget, only every second row and column is mixed while the brush is down, and all when it
  * rests.
  */
-import { VALUES, finite, toFloats } from './half_floats.js';
+import { VALUES, replaceNonFinite, toFloats } from './half_floats.js';
 import { Layer } from './cpu_picture.js';
 import { SRGB } from './view_transform.js';
 import { Mix } from './mix.js';
-import { INKS, falseColour, fullOf, inkOf, inked, missed } from './overlay.js';
+import { INKS, drawFalseColour, maxImportance, inkOf, drawInk, drawMissed } from './overlay.js';
 import { GROUND, SQUARES, panes } from './view.js';
 
 /** @typedef {import("./view.js").Kind} Kind */
@@ -18,8 +18,8 @@ import { GROUND, SQUARES, panes } from './view.js';
 
 /** Milliseconds of a live frame above which it is mixed at reduced size, and the number of values
  * (pixels times lights) that take about as long, for use before any timing. */
-const BUDGET = 14;
-const MANY = 3e6;
+const FRAME_BUDGET_MS = 14;
+const BUDGET_VALUES = 3e6;
 
 /** @implements {PictureView} @typedef {import("./view.js").PictureView} PictureView */
 export class CpuView {
@@ -44,7 +44,7 @@ export class CpuView {
     /** @type {Uint8Array | null} */
     this.beyond = null;
     /** Milliseconds of the last whole mix. */
-    this.pace = 0;
+    this.mixMs = 0;
     this.step = 1;
     this.wasLive = false;
   }
@@ -54,7 +54,7 @@ export class CpuView {
     this.planes = Array.from({ length: count }, () => ({ halves: null, scale: 1 }));
     for (const mix of Object.values(this.mixes)) {
       mix.weights = new Float64Array(3 * count);
-      mix.forget();
+      mix.invalidate();
     }
   }
 
@@ -64,8 +64,8 @@ export class CpuView {
       throw new Error(
         `a plane of ${halves.length} numbers on a picture of ${this.size.join(' × ')}`,
       );
-    this.planes[light] = { halves: finite(halves), scale };
-    for (const mix of Object.values(this.mixes)) mix.forget();
+    this.planes[light] = { halves: replaceNonFinite(halves), scale };
+    for (const mix of Object.values(this.mixes)) mix.invalidate();
   }
 
   /** @param {ArrayLike<number>} weights @param {'solution' | 'other'} [kind] */
@@ -88,7 +88,7 @@ export class CpuView {
   /** @param {Uint8Array | null} beyond */
   setBeyond(beyond) {
     this.beyond = beyond;
-    for (const layer of this.layers.values()) layer.forget();
+    for (const layer of this.layers.values()) layer.invalidate();
   }
 
   /** @param {import("./view_transform.js").Lut} lut */
@@ -123,48 +123,53 @@ export class CpuView {
 
   /** Return the step between the rows and columns that are mixed while the brush is down. */
   liveStep() {
-    const work = (this.planes.length * this.size[0] * this.size[1]) / MANY;
-    const frames = Math.max(work, this.pace / BUDGET);
+    const work = (this.planes.length * this.size[0] * this.size[1]) / BUDGET_VALUES;
+    const frames = Math.max(work, this.mixMs / FRAME_BUDGET_MS);
     return frames <= 1 ? 1 : frames <= 5 ? 2 : frames <= 9 ? 3 : 4;
   }
 
   /** Return the picture of a kind with current codes, or null.
    * @param {Kind} kind @param {Params} params @returns {Layer | null} */
   layerOf(kind, params) {
-    if (kind === 'solution' || kind === 'other') return this.mixedLayer(kind, params);
+    if (kind === 'solution' || kind === 'other') return this.updateMixLayer(kind, params);
     const layer = this.layers.get(kind);
     if (!layer) return null;
     const isImportance = kind === 'painting' && params.overlay === 'importance';
-    if (isImportance && layer.stale) layer.forget();
-    layer.show(this.lut, params.stops, isImportance ? 'importance' : falseOnly(params), (rgba) => {
-      if (!isImportance) return falseColour(rgba, layer.light, 2 ** params.stops);
-      const { importance } = this;
-      const full = fullOf(importance);
-      inked(rgba, (p) => inkOf(importance[p], full), INKS.importance, this.grid(1));
-    });
+    if (isImportance && layer.staleRegion) layer.invalidate();
+    layer.show(
+      this.lut,
+      params.stops,
+      isImportance ? 'importance' : falseColourOnly(params),
+      (rgba) => {
+        if (!isImportance) return drawFalseColour(rgba, layer.light, 2 ** params.stops);
+        const { importance } = this;
+        const maxInk = maxImportance(importance);
+        drawInk(rgba, (p) => inkOf(importance[p], maxInk), INKS.importance, this.grid(1));
+      },
+    );
     return layer;
   }
 
   /** @param {'solution' | 'other'} kind @param {Params} params */
-  mixedLayer(kind, params) {
+  updateMixLayer(kind, params) {
     const mix = this.mixes[kind];
     const startTime = performance.now();
     const isOther = mix.update(this.planes, this.step, params.live);
     const layer = this.layer(kind, this.step);
     if (isOther) layer.setLight(mix.light);
-    const overlay = kind === 'solution' ? params.overlay : falseOnly(params);
+    const overlay = kind === 'solution' ? params.overlay : falseColourOnly(params);
     // The difference depends on the painting, too.
-    if (overlay === 'missed') layer.forget();
+    if (overlay === 'missed') layer.invalidate();
     const painting = overlay === 'missed' ? this.codesOfPainting(params) : null;
     const { beyond } = this;
     layer.show(this.lut, params.stops, overlay === 'importance' ? null : overlay, (rgba) => {
       const grid = this.grid(this.step);
-      if (overlay === 'falsecolor') falseColour(rgba, layer.light, 2 ** params.stops);
+      if (overlay === 'falsecolor') drawFalseColour(rgba, layer.light, 2 ** params.stops);
       else if (overlay === 'beyond' && beyond)
-        inked(rgba, (p) => beyond[p] / 255, INKS.beyond, grid);
-      else if (painting) missed(rgba, painting, this.importance, grid);
+        drawInk(rgba, (p) => beyond[p] / 255, INKS.beyond, grid);
+      else if (painting) drawMissed(rgba, painting, this.importance, grid);
     });
-    if (isOther) this.pace = (performance.now() - startTime) * this.step ** 2;
+    if (isOther) this.mixMs = (performance.now() - startTime) * this.step ** 2;
     return layer;
   }
 
@@ -207,13 +212,13 @@ export class CpuView {
    * @returns {[number, number, number]} */
   lightAt(kind, x, y) {
     if (kind === 'solution' || kind === 'other')
-      return mixedAt(this.planesAt(x, y), this.mixes[kind].weights);
+      return mixPlanes(this.planesAt(x, y), this.mixes[kind].weights);
     const start = 3 * (y * this.size[1] + x);
     const light = this.layers.get(kind)?.light;
     return light ? [light[start], light[start + 1], light[start + 2]] : [0, 0, 0];
   }
 
-  lost() {
+  hasLostContext() {
     return false;
   }
 
@@ -235,7 +240,7 @@ export class CpuView {
 /** Return the light of a pixel with known planes.
  * @param {Float32Array} planes (n, 3) @param {ArrayLike<number>} weights (n, 3)
  * @returns {[number, number, number]} */
-export function mixedAt(planes, weights) {
+export function mixPlanes(planes, weights) {
   /** @type {[number, number, number]} */
   const sum = [0, 0, 0];
   planes.forEach((light, i) => (sum[i % 3] += light * weights[i]));
@@ -243,6 +248,6 @@ export function mixedAt(planes, weights) {
 }
 
 /** @param {Params} params */
-function falseOnly(params) {
+function falseColourOnly(params) {
   return params.overlay === 'falsecolor' ? params.overlay : null;
 }

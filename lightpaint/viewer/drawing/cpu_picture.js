@@ -21,49 +21,49 @@ export class Layer {
     this.context = context;
     this.encoder = new Encoder(SRGB, 0);
     /** Region whose codes are out of date. @type {Region | null} */
-    this.stale = null;
+    this.staleRegion = null;
     /** @type {string | null} */
-    this.laid = null;
+    this.drawnOverlay = null;
   }
 
   /** @param {Float32Array} light (h, w, 3), kept @param {Region} [region] what changed of it */
-  setLight(light, region = this.whole()) {
-    if (light !== this.light) region = this.whole();
+  setLight(light, region = this.wholeRegion()) {
+    if (light !== this.light) region = this.wholeRegion();
     this.light = light;
-    this.stale = union(this.stale, region);
+    this.staleRegion = union(this.staleRegion, region);
   }
 
   /** Mark all codes as out of date. */
-  forget() {
-    this.stale = this.whole();
+  invalidate() {
+    this.staleRegion = this.wholeRegion();
   }
 
   /** Bring codes and canvas up to date.
    * @param {import("./view_transform.js").Lut} lut @param {number} stops
    * @param {string | null} overlay its name, null for none
-   * @param {(rgba: Uint8ClampedArray) => void} lay draws it over all codes */
-  show(lut, stops, overlay, lay) {
+   * @param {(rgba: Uint8ClampedArray) => void} drawOverlay draws it over all codes */
+  show(lut, stops, overlay, drawOverlay) {
     if (lut !== this.encoder.lut || stops !== this.encoder.stops) {
       this.encoder = new Encoder(lut, stops);
-      this.forget();
+      this.invalidate();
     }
-    if (overlay !== this.laid || (overlay && this.stale)) this.forget();
-    this.laid = overlay;
-    if (!this.stale || !this.light.length) return;
-    const [top, bottom, left, right] = this.stale;
+    if (overlay !== this.drawnOverlay || (overlay && this.staleRegion)) this.invalidate();
+    this.drawnOverlay = overlay;
+    if (!this.staleRegion || !this.light.length) return;
+    const [top, bottom, left, right] = this.staleRegion;
     const { width } = this;
     const rgba = this.image.data;
     if (right - left === width) this.encoder.pixels(this.light, rgba, top * width, bottom * width);
     else
       for (let y = top; y < bottom; y++)
         this.encoder.pixels(this.light, rgba, y * width + left, y * width + right);
-    if (overlay) lay(rgba);
+    if (overlay) drawOverlay(rgba);
     this.context.putImageData(this.image, 0, 0, left, top, right - left, bottom - top);
-    this.stale = null;
+    this.staleRegion = null;
   }
 
   /** @returns {Region} */
-  whole() {
+  wholeRegion() {
     return [0, this.height, 0, this.width];
   }
 

@@ -4,10 +4,10 @@
  * The mix is rendered to a texture when weights change; exposure, zoom and overlays are only the
  * last pass. A lost context loses everything that was set.
  */
-import { mixedAt } from './cpu.js';
+import { mixPlanes } from './cpu.js';
 import { Planes } from './gpu.js';
 import { SRGB } from './view_transform.js';
-import { fullOf } from './overlay.js';
+import { maxImportance } from './overlay.js';
 import { GROUND, SQUARES, panes } from './view.js';
 
 /** @typedef {import("./view.js").Kind} Kind */
@@ -17,14 +17,16 @@ import { GROUND, SQUARES, panes } from './view.js';
 const OVERLAYS = { falsecolor: 1, missed: 2, importance: 3, beyond: 4 };
 
 /** Names of software renderers, which need no timed frame. */
-const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
+const SOFTWARE_RENDERERS = /swiftshader|llvmpipe|softpipe|software|basic render/i;
 
 /** @param {WebGL2RenderingContext} gl */
 function isSoftware(gl) {
   const renderer = String(gl.getParameter(gl.RENDERER));
   // Some browsers need an extension for the name, which others call deprecated.
   const info = renderer.startsWith('WebKit') ? gl.getExtension('WEBGL_debug_renderer_info') : null;
-  return SOFTWARE.test(info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : renderer);
+  return SOFTWARE_RENDERERS.test(
+    info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : renderer,
+  );
 }
 
 /** @implements {PictureView} @typedef {import("./view.js").PictureView} PictureView */
@@ -74,7 +76,7 @@ export class GlView {
     this.image = null;
     this.importance = /** @type {Float32Array} */ (new Float32Array(0));
     /** @type {Params | null} */
-    this.last = null;
+    this.lastParams = null;
   }
 
   /** State to restore after a lost context. */
@@ -107,7 +109,7 @@ export class GlView {
 
   /** @param {number} x @param {number} y */
   planesAt(x, y) {
-    return this.planes.at(x, y);
+    return this.planes.probe(x, y);
   }
 
   /** @param {Region} region @param {Float32Array} image @param {Float32Array} importance */
@@ -147,8 +149,8 @@ export class GlView {
   /** @param {Params} params */
   draw(params) {
     const { gl, canvas } = this;
-    this.last = params;
-    if (this.lost()) return;
+    this.lastParams = params;
+    if (this.hasLostContext()) return;
     const visiblePanes = panes(params, canvas, this.size);
     for (const { kind } of visiblePanes)
       if (kind === 'solution' || kind === 'other') this.planes.mix(kind);
@@ -174,10 +176,10 @@ export class GlView {
     const { gl, canvas, textures } = this;
     const picture = this.texture(pane.kind);
     if (!picture) return;
-    const { uniform } = this.planes.shower.use();
+    const { uniform } = this.planes.showProgram.use();
     const isSharp = pane.scale >= SQUARES || pane.scale === 1;
-    const { nothing } = textures;
-    const units = [picture, this.pictures.get('painting') ?? nothing, this.beyond ?? nothing];
+    const { blank } = textures;
+    const units = [picture, this.pictures.get('painting') ?? blank, this.beyond ?? blank];
     units.forEach((texture, i) => textures.bind(i, gl.TEXTURE_2D, texture));
     textures.bind(3, gl.TEXTURE_3D, this.lattice ?? textures.black);
     for (const [i, name] of ['picture', 'painting', 'beyond', 'lattice'].entries())
@@ -196,7 +198,7 @@ export class GlView {
     const overlay = overlayOf(pane.kind, params);
     gl.uniform1i(uniform('overlay'), overlay);
     const isImportance = overlay === OVERLAYS.importance;
-    gl.uniform1f(uniform('full'), isImportance ? fullOf(this.importance) : 1);
+    gl.uniform1f(uniform('full'), isImportance ? maxImportance(this.importance) : 1);
     gl.scissor(pane.x, canvas.height - pane.y - pane.height, pane.width, pane.height);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
@@ -205,24 +207,24 @@ export class GlView {
   read(x, y, width, height) {
     const { gl, canvas } = this;
     // The drawing buffer is valid only until the browser has shown it.
-    if (this.last) this.draw(this.last);
+    if (this.lastParams) this.draw(this.lastParams);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     const pixels = new Uint8Array(width * height * 4);
     gl.readPixels(x, canvas.height - y - height, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
-    const flipped = new Uint8Array(pixels.length);
+    const flippedPixels = new Uint8Array(pixels.length);
     for (let row = 0; row < height; row++)
-      flipped.set(
+      flippedPixels.set(
         pixels.subarray(row * width * 4, (row + 1) * width * 4),
         (height - 1 - row) * width * 4,
       );
-    return flipped;
+    return flippedPixels;
   }
 
   /** @param {Kind} kind @param {number} x @param {number} y
    * @returns {[number, number, number]} */
   lightAt(kind, x, y) {
     if (kind === 'solution' || kind === 'other')
-      return mixedAt(this.planesAt(x, y), this.planes.mixes[kind].weights);
+      return mixPlanes(this.planesAt(x, y), this.planes.mixes[kind].weights);
     const start = 3 * (y * this.size[1] + x);
     if (kind === 'painting' && this.image)
       return [this.image[start], this.image[start + 1], this.image[start + 2]];
@@ -234,7 +236,7 @@ export class GlView {
     return [rgba[0], rgba[1], rgba[2]];
   }
 
-  lost() {
+  hasLostContext() {
     return this.isLost || this.gl.isContextLost();
   }
 
@@ -250,8 +252,8 @@ export class GlView {
 /** Return the number of the overlay of a picture. @param {Kind} kind @param {Params} params */
 function overlayOf(kind, { overlay }) {
   if (!overlay) return 0;
-  const isHere =
+  const isShown =
     overlay === 'falsecolor' ||
     (overlay === 'importance' ? kind === 'painting' : kind === 'solution');
-  return isHere ? OVERLAYS[overlay] : 0;
+  return isShown ? OVERLAYS[overlay] : 0;
 }

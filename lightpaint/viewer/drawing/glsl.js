@@ -1,6 +1,6 @@
 /** Shaders of gl.js. They take their constants from overlay.js, so that each is defined once. */
-import { LARGEST } from './half_floats.js';
-import { BANDS, FULL, GREY, HATCH, INKS, LUMA } from './overlay.js';
+import { MAX_HALF } from './half_floats.js';
+import { BANDS, OPAQUE_DIFFERENCE, GREY, HATCH, INKS, LUMA } from './overlay.js';
 import { GROUND } from './view.js';
 
 const HEAD = `#version 300 es
@@ -30,7 +30,7 @@ void main() {
     vec3 weight = texelFetch(weights, ivec2(first + k, 0), 0).rgb;
     if (weight != vec3(0.0)) sum += weight * texelFetch(planes, ivec3(at, k), 0).rgb;
   }
-  mixed = vec4(clamp(sum, -${LARGEST}.0, ${LARGEST}.0), 1.0);
+  mixed = vec4(clamp(sum, -${MAX_HALF}.0, ${MAX_HALF}.0), 1.0);
 }`;
 
 /** One pixel of each plane of a texture, side by side. */
@@ -96,7 +96,7 @@ vec3 missed(vec3 display, ivec2 at) {
   vec4 painted = texelFetch(painting, at, 0);
   vec3 off = display - encode(painted.rgb);
   float most = max(max(abs(off.r), abs(off.g)), abs(off.b)) * 255.0;
-  float amount = painted.a > 0.0 ? min(1.0, most / ${FULL}.0) : 0.0;
+  float amount = painted.a > 0.0 ? min(1.0, most / ${OPAQUE_DIFFERENCE}.0) : 0.0;
   bool isDark = dot(LUMA, off) < 0.0;
   vec3 ink = isDark ? ${vec3(INKS.dark)} : ${vec3(INKS.bright)};
   return lay(display, ink, amount * hatch(at, isDark ? -1 : 1));

@@ -1,11 +1,11 @@
 /** Planes and mixes on a GPU: the state of the lights in one WebGL2 context. */
 import { MIX, PROBE, SHOW, VERTEX } from './glsl.js';
-import { Textures, program } from './textures.js';
+import { Textures, linkProgram } from './textures.js';
 
-/** @typedef {{weights: Float64Array, texture: WebGLTexture | null, isStale: boolean}} Mixed */
+/** @typedef {{weights: Float64Array, texture: WebGLTexture | null, isStale: boolean}} MixState */
 
 /** Bytes of one texture of planes; drivers refuse larger ones. */
-const LARGEST_TEXTURE = 512 * 2 ** 20;
+const MAX_TEXTURE_BYTES = 512 * 2 ** 20;
 
 export class Planes {
   /** Throws if the context cannot render to halves, or cannot hold a picture of that size.
@@ -18,19 +18,19 @@ export class Planes {
       throw new Error('this WebGL2 does not render to halves');
     if (Math.max(...size) > gl.getParameter(gl.MAX_TEXTURE_SIZE))
       throw new Error(`this WebGL2 holds no picture of ${size.join(' × ')}`);
-    this.mixer = program(gl, VERTEX, MIX);
-    this.shower = program(gl, VERTEX, SHOW);
-    this.prober = program(gl, VERTEX, PROBE);
+    this.mixProgram = linkProgram(gl, VERTEX, MIX);
+    this.showProgram = linkProgram(gl, VERTEX, SHOW);
+    this.probeProgram = linkProgram(gl, VERTEX, PROBE);
     this.textures = new Textures(gl, size);
     this.target = gl.createFramebuffer();
     this.count = 0;
-    this.perSlice = 1;
+    this.planesPerSlice = 1;
     /** @type {WebGLTexture[]} */
     this.slices = [];
     /** @type {number[]} */
     this.scales = [];
-    /** @type {Record<'solution' | 'other', Mixed>} */
-    this.mixes = { solution: mixed(0), other: mixed(0) };
+    /** @type {Record<'solution' | 'other', MixState>} */
+    this.mixes = { solution: createMix(0), other: createMix(0) };
   }
 
   /** @param {number} count */
@@ -38,19 +38,19 @@ export class Planes {
     const { gl, textures } = this;
     for (const slice of this.slices) textures.drop(slice);
     for (const { texture } of Object.values(this.mixes)) textures.drop(texture);
-    const layer = this.size[0] * this.size[1] * 8;
-    const most = Math.min(
+    const layerBytes = this.size[0] * this.size[1] * 8;
+    const maxLayers = Math.min(
       gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS),
       gl.getParameter(gl.MAX_TEXTURE_SIZE), // weights and probes, which are in one row
-      Math.max(1, Math.floor(LARGEST_TEXTURE / layer)),
+      Math.max(1, Math.floor(MAX_TEXTURE_BYTES / layerBytes)),
     );
     this.count = count;
-    this.perSlice = most;
+    this.planesPerSlice = maxLayers;
     this.scales = new Array(count).fill(1);
     this.slices = [];
-    for (let first = 0; first < count; first += most)
-      this.slices.push(textures.planes(Math.min(most, count - first)));
-    this.mixes = { solution: mixed(count), other: mixed(count) };
+    for (let first = 0; first < count; first += maxLayers)
+      this.slices.push(textures.planes(Math.min(maxLayers, count - first)));
+    this.mixes = { solution: createMix(count), other: createMix(count) };
     if (gl.getError() === gl.OUT_OF_MEMORY) throw new Error('the GPU has no room for the planes');
   }
 
@@ -60,8 +60,8 @@ export class Planes {
       throw new Error(
         `a plane of ${halves.length} numbers on a picture of ${this.size.join(' × ')}`,
       );
-    const slice = this.slices[Math.floor(light / this.perSlice)];
-    this.textures.setPlane(slice, light % this.perSlice, halves);
+    const slice = this.slices[Math.floor(light / this.planesPerSlice)];
+    this.textures.setPlane(slice, light % this.planesPerSlice, halves);
     this.scales[light] = scale;
     for (const mix of Object.values(this.mixes)) mix.isStale = true;
   }
@@ -74,15 +74,16 @@ export class Planes {
 
   /** Bring a mix up to date. @param {'solution' | 'other'} kind */
   mix(kind) {
-    const { gl, count, perSlice } = this;
+    const { gl, count, planesPerSlice } = this;
     const mix = this.mixes[kind];
     if (!mix.isStale) return;
     mix.texture ??= this.textures.halves();
-    const { uniform } = this.mixer.use();
-    const scaled = new Float32Array(4 * Math.max(1, count));
+    const { uniform } = this.mixProgram.use();
+    const scaledWeights = new Float32Array(4 * Math.max(1, count));
     for (let k = 0; k < count; k++)
-      for (let c = 0; c < 3; c++) scaled[4 * k + c] = mix.weights[3 * k + c] * this.scales[k];
-    this.textures.bind(1, gl.TEXTURE_2D, this.textures.weights(scaled));
+      for (let c = 0; c < 3; c++)
+        scaledWeights[4 * k + c] = mix.weights[3 * k + c] * this.scales[k];
+    this.textures.bind(1, gl.TEXTURE_2D, this.textures.weights(scaledWeights));
     gl.uniform1i(uniform('planes'), 0);
     gl.uniform1i(uniform('weights'), 1);
     this.bindTarget(mix.texture, this.size[1], this.size[0]);
@@ -92,8 +93,8 @@ export class Planes {
     gl.blendFunc(gl.ONE, gl.ONE);
     this.slices.forEach((slice, i) => {
       this.textures.bind(0, gl.TEXTURE_2D_ARRAY, slice);
-      gl.uniform1i(uniform('first'), i * perSlice);
-      gl.uniform1i(uniform('count'), Math.min(perSlice, count - i * perSlice));
+      gl.uniform1i(uniform('first'), i * planesPerSlice);
+      gl.uniform1i(uniform('count'), Math.min(planesPerSlice, count - i * planesPerSlice));
       gl.drawArrays(gl.TRIANGLES, 0, 3);
     });
     gl.disable(gl.BLEND);
@@ -112,14 +113,14 @@ export class Planes {
 
   /** Return the light of each plane at a pixel, at unit emission, (n, 3).
    * @param {number} x @param {number} y */
-  at(x, y) {
-    const { gl, count, perSlice } = this;
+  probe(x, y) {
+    const { gl, count, planesPerSlice } = this;
     const values = new Float32Array(3 * count);
-    const { uniform } = this.prober.use();
+    const { uniform } = this.probeProgram.use();
     gl.uniform1i(uniform('planes'), 0);
     gl.uniform2i(uniform('at'), x, y);
     this.slices.forEach((slice, i) => {
-      const sliceCount = Math.min(perSlice, count - i * perSlice);
+      const sliceCount = Math.min(planesPerSlice, count - i * planesPerSlice);
       this.textures.bind(0, gl.TEXTURE_2D_ARRAY, slice);
       this.bindTarget(this.textures.probe(sliceCount), sliceCount, 1);
       gl.drawArrays(gl.TRIANGLES, 0, 3);
@@ -127,13 +128,14 @@ export class Planes {
       gl.readPixels(0, 0, sliceCount, 1, gl.RGBA, gl.FLOAT, rgba);
       for (let k = 0; k < sliceCount; k++)
         for (let c = 0; c < 3; c++)
-          values[3 * (i * perSlice + k) + c] = rgba[4 * k + c] * this.scales[i * perSlice + k];
+          values[3 * (i * planesPerSlice + k) + c] =
+            rgba[4 * k + c] * this.scales[i * planesPerSlice + k];
     });
     return values;
   }
 }
 
-/** @param {number} count @returns {Mixed} */
-function mixed(count) {
+/** @param {number} count @returns {MixState} */
+function createMix(count) {
   return { weights: new Float64Array(3 * count), texture: null, isStale: true };
 }

@@ -14,11 +14,11 @@ export class Mix {
     this.size = size;
     this.weights = new Float64Array();
     /** Weights that `light` holds. @type {Float64Array | null} */
-    this.mixed = null;
+    this.appliedWeights = null;
     this.step = 1;
     this.isExact = true;
-    this.full = new Float32Array(0);
-    this.half = new Float32Array(0);
+    this.fullLight = new Float32Array(0);
+    this.halfLight = new Float32Array(0);
   }
 
   /** Height and width of the mix. @param {number} step */
@@ -28,12 +28,12 @@ export class Mix {
 
   /** (h, w, 3) linear, at the step of the last update. */
   get light() {
-    return this.step === 1 ? this.full : this.half;
+    return this.step === 1 ? this.fullLight : this.halfLight;
   }
 
   /** Note that planes have changed. */
-  forget() {
-    this.mixed = null;
+  invalidate() {
+    this.appliedWeights = null;
   }
 
   /** Update the mix. live: whether to update sums incrementally, which accumulates round-off.
@@ -41,7 +41,7 @@ export class Mix {
    * @returns {boolean} whether `light` is another one */
   update(planes, step, live) {
     const weights = this.weights;
-    const previous = step === this.step ? this.mixed : null;
+    const previous = step === this.step ? this.appliedWeights : null;
     const isSame = previous !== null && weights.every((w, i) => w === previous[i]);
     if (isSame && (live || this.isExact)) return false;
     const changedPlanes = previous
@@ -50,8 +50,8 @@ export class Mix {
           .filter((k) => [0, 1, 2].some((c) => weights[3 * k + c] !== previous[3 * k + c]))
       : [];
     this.step = step;
-    const isCarried = live && previous !== null && 2 * changedPlanes.length <= planes.length;
-    if (isCarried) {
+    const isIncremental = live && previous !== null && 2 * changedPlanes.length <= planes.length;
+    if (isIncremental) {
       const differences = weights.map((w, i) => w - previous[i]);
       this.add(planes, changedPlanes, differences, false);
     } else
@@ -61,16 +61,16 @@ export class Mix {
         weights,
         true,
       );
-    this.isExact = !isCarried;
-    this.mixed = weights.slice();
+    this.isExact = !isIncremental;
+    this.appliedWeights = weights.slice();
     return true;
   }
 
   /** @param {Plane[]} planes @param {number[]} indices @param {Float64Array} weights
-   * @param {boolean} fresh */
-  add(planes, indices, weights, fresh) {
+   * @param {boolean} startsFromBlack */
+  add(planes, indices, weights, startsFromBlack) {
     const [height, width] = this.sizeAt(this.step);
-    const name = this.step === 1 ? 'full' : 'half';
+    const name = this.step === 1 ? 'fullLight' : 'halfLight';
     if (this[name].length !== height * width * 3) this[name] = new Float32Array(height * width * 3);
     const terms = [];
     for (const k of indices) {
@@ -78,11 +78,11 @@ export class Mix {
       const [r, g, b] = [0, 1, 2].map((c) => weights[3 * k + c] * scale);
       if (halves && (r || g || b)) terms.push({ halves, weights: [r, g, b] });
     }
-    addPlanes(this[name], terms, this.size[1], width, this.step, fresh);
+    addPlanes(this[name], terms, this.size[1], width, this.step, startsFromBlack);
   }
 
   memory() {
-    return this.full.byteLength + this.half.byteLength;
+    return this.fullLight.byteLength + this.halfLight.byteLength;
   }
 }
 
@@ -90,10 +90,10 @@ export class Mix {
 
 /** Add planes to light, four at a time.
  * @param {Float32Array} light @param {Term[]} terms @param {number} planeWidth width of the planes
- * @param {number} width of the light @param {number} step @param {boolean} fresh whether light
+ * @param {number} width of the light @param {number} step @param {boolean} startsFromBlack whether light
  * starts from black */
-function addPlanes(light, terms, planeWidth, width, step, fresh) {
-  let isFresh = fresh;
+function addPlanes(light, terms, planeWidth, width, step, startsFromBlack) {
+  let isFresh = startsFromBlack;
   let next = 0;
   for (; next + 4 <= terms.length; next += 4) {
     addFour(light, terms.slice(next, next + 4), planeWidth, width, step, isFresh);
@@ -104,8 +104,8 @@ function addPlanes(light, terms, planeWidth, width, step, fresh) {
 }
 
 /** @param {Float32Array} light @param {Term[]} terms @param {number} planeWidth
- * @param {number} width @param {number} step @param {boolean} fresh */
-function addFour(light, terms, planeWidth, width, step, fresh) {
+ * @param {number} width @param {number} step @param {boolean} startsFromBlack */
+function addFour(light, terms, planeWidth, width, step, startsFromBlack) {
   const [a, b, c, d] = terms.map((term) => term.halves);
   const [[a0, a1, a2], [b0, b1, b2], [c0, c1, c2], [d0, d1, d2]] = terms.map((x) => x.weights);
   const values = VALUES;
@@ -118,7 +118,7 @@ function addFour(light, terms, planeWidth, width, step, fresh) {
       const r = a0 * values[a[i]] + b0 * values[b[i]] + c0 * values[c[i]] + d0 * values[d[i]];
       const g = a1 * values[a[j]] + b1 * values[b[j]] + c1 * values[c[j]] + d1 * values[d[j]];
       const e = a2 * values[a[k]] + b2 * values[b[k]] + c2 * values[c[k]] + d2 * values[d[k]];
-      if (fresh) {
+      if (startsFromBlack) {
         light[p] = r;
         light[p + 1] = g;
         light[p + 2] = e;

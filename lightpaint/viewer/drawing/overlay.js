@@ -34,7 +34,7 @@ export const INKS = {
 };
 
 /** Difference of codes at which ink is opaque. */
-export const FULL = 64;
+export const OPAQUE_DIFFERENCE = 64;
 
 /** Luma of codes, for the picture under ink. */
 export const LUMA = [0.2126, 0.7152, 0.0722];
@@ -43,7 +43,7 @@ export const LUMA = [0.2126, 0.7152, 0.0722];
 export const HATCH = { period: 8, thin: 4, strength: 0.55 };
 
 /** Return the false-colour band of a luminance, exposure included. @param {number} luminance */
-function band(luminance) {
+function bandIndex(luminance) {
   const stops = Math.log2(Math.max(luminance, 1e-9) / GREY);
   return Math.min(BANDS.length - 1, Math.max(0, Math.floor(stops + 0.5) + 6));
 }
@@ -58,7 +58,7 @@ export function hatch(x, y, slope) {
 /** Lay ink over a pixel of RGBA: the pixel below loses its colour and half its light.
  * @param {Uint8ClampedArray} rgba @param {number} index @param {number[]} ink
  * @param {number} amount 0 to 1 */
-export function lay(rgba, index, ink, amount) {
+export function blendInk(rgba, index, ink, amount) {
   const grey =
     (LUMA[0] * rgba[index] + LUMA[1] * rgba[index + 1] + LUMA[2] * rgba[index + 2]) * 0.6;
   for (let c = 0; c < 3; c++) rgba[index + c] = grey + (ink[c] - grey) * amount;
@@ -78,46 +78,46 @@ function visitPixels({ height, width, step }, visit) {
 /** Draw the difference of solution and painting, both as codes, where something is painted.
  * @param {Uint8ClampedArray} rgba of the solution, changed @param {Uint8ClampedArray} painting
  * @param {Float32Array} importance @param {Grid} grid of the solution */
-export function missed(rgba, painting, importance, grid) {
+export function drawMissed(rgba, painting, importance, grid) {
   visitPixels(grid, (index, x, y, p) => {
     const r = rgba[index] - painting[4 * p];
     const g = rgba[index + 1] - painting[4 * p + 1];
     const b = rgba[index + 2] - painting[4 * p + 2];
-    const most = Math.max(Math.abs(r), Math.abs(g), Math.abs(b));
+    const maxDifference = Math.max(Math.abs(r), Math.abs(g), Math.abs(b));
     const isDark = LUMA[0] * r + LUMA[1] * g + LUMA[2] * b < 0;
-    const amount = importance[p] > 0 ? Math.min(1, most / FULL) : 0;
-    lay(rgba, index, isDark ? INKS.dark : INKS.bright, amount * hatch(x, y, isDark ? -1 : 1));
+    const amount = importance[p] > 0 ? Math.min(1, maxDifference / OPAQUE_DIFFERENCE) : 0;
+    blendInk(rgba, index, isDark ? INKS.dark : INKS.bright, amount * hatch(x, y, isDark ? -1 : 1));
   });
 }
 
 /** Return the importance with full ink: the greatest, at least 1.
  * @param {Float32Array} importance */
-export function fullOf(importance) {
-  let full = 1;
-  for (const x of importance) if (x > full) full = x;
-  return full;
+export function maxImportance(importance) {
+  let maximum = 1;
+  for (const x of importance) if (x > maximum) maximum = x;
+  return maximum;
 }
 
 /** Return the share of full ink for an importance, on a scale of ratios, so that the rest stays
  * visible beside an accent ten times as important. @param {number} x
- * @param {number} most that is all */
-export const inkOf = (x, most) => Math.log1p(Math.max(0, x)) / Math.log1p(most);
+ * @param {number} maxInk the one with full ink */
+export const inkOf = (x, maxInk) => Math.log1p(Math.max(0, x)) / Math.log1p(maxInk);
 
 /** @param {Uint8ClampedArray} rgba changed @param {(p: number) => number} amount of ink at a pixel
  * @param {number[]} ink @param {Grid} grid */
-export function inked(rgba, amount, ink, grid) {
+export function drawInk(rgba, amount, ink, grid) {
   visitPixels(grid, (index, x, y, p) =>
-    lay(rgba, index, ink, 0.8 * Math.min(1, amount(p)) * hatch(x, y, 1)),
+    blendInk(rgba, index, ink, 0.8 * Math.min(1, amount(p)) * hatch(x, y, 1)),
   );
 }
 
 /** @param {Uint8ClampedArray} rgba changed @param {Float32Array} light (…, 3)
  * @param {number} gain of the exposure */
-export function falseColour(rgba, light, gain) {
+export function drawFalseColour(rgba, light, gain) {
   for (let p = 0; p < light.length / 3; p++) {
     const i = 3 * p;
     const y = LUMA[0] * light[i] + LUMA[1] * light[i + 1] + LUMA[2] * light[i + 2];
-    const [r, g, b] = BANDS[band(y * gain)];
+    const [r, g, b] = BANDS[bandIndex(y * gain)];
     rgba[4 * p] = r;
     rgba[4 * p + 1] = g;
     rgba[4 * p + 2] = b;

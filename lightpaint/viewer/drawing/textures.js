@@ -1,18 +1,18 @@
 /** Textures and programs of WebGL2, with their properties. */
-import { LARGEST } from './half_floats.js';
+import { MAX_HALF } from './half_floats.js';
 import { SRGB } from './view_transform.js';
 
 /** @typedef {import("./view.js").Region} Region */
 
 /** The half that is 1. */
-const ONE = 0x3c00;
+const HALF_ONE = 0x3c00;
 
 /** @typedef {{use: () => {uniform: (name: string) => WebGLUniformLocation | null}}} Program */
 
 /** @param {WebGL2RenderingContext} gl @param {string} vertex @param {string} fragment
  * @returns {Program} */
-export function program(gl, vertex, fragment) {
-  const linked = gl.createProgram();
+export function linkProgram(gl, vertex, fragment) {
+  const program = gl.createProgram();
   for (const [kind, source] of /** @type {const} */ ([
     [gl.VERTEX_SHADER, vertex],
     [gl.FRAGMENT_SHADER, fragment],
@@ -21,23 +21,23 @@ export function program(gl, vertex, fragment) {
     if (!shader) throw new Error('no shader: the context is lost');
     gl.shaderSource(shader, source);
     gl.compileShader(shader);
-    gl.attachShader(linked, shader);
+    gl.attachShader(program, shader);
     const log = gl.getShaderInfoLog(shader);
     if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(`a shader: ${log}`);
   }
-  gl.linkProgram(linked);
-  if (!gl.getProgramParameter(linked, gl.LINK_STATUS))
-    throw new Error(`a program: ${gl.getProgramInfoLog(linked)}`);
+  gl.linkProgram(program);
+  if (!gl.getProgramParameter(program, gl.LINK_STATUS))
+    throw new Error(`a program: ${gl.getProgramInfoLog(program)}`);
   /** @type {Map<string, WebGLUniformLocation | null>} */
-  const places = new Map();
+  const locations = new Map();
   /** @param {string} name */
   const uniform = (name) => {
-    if (!places.has(name)) places.set(name, gl.getUniformLocation(linked, name));
-    return places.get(name) ?? null;
+    if (!locations.has(name)) locations.set(name, gl.getUniformLocation(program, name));
+    return locations.get(name) ?? null;
   };
   return {
     use: () => {
-      gl.useProgram(linked);
+      gl.useProgram(program);
       return { uniform };
     },
   };
@@ -52,16 +52,16 @@ export class Textures {
     this.sizes = new Map();
     /** Upload some rows to the GPU. */
     this.rows = Math.max(1, Math.floor(2 ** 18 / size[1]));
-    this.rgba = new Uint16Array(4 * this.rows * size[1]).fill(ONE);
+    this.rgba = new Uint16Array(4 * this.rows * size[1]).fill(HALF_ONE);
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-    this.nothing = this.createTexture(gl.TEXTURE_2D, 8, gl.NEAREST, () =>
+    this.blank = this.createTexture(gl.TEXTURE_2D, 8, gl.NEAREST, () =>
       gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA16F, 1, 1),
     );
     this.black = this.lattice(SRGB);
     /** @type {WebGLTexture | null} */
-    this.row = null;
+    this.weightsTexture = null;
     /** @type {{count: number, texture: WebGLTexture} | null} */
-    this.probed = null;
+    this.probeTarget = null;
   }
 
   /** @param {number} kind @param {number} bytes @param {number} filter
@@ -110,7 +110,7 @@ export class Textures {
     const { gl } = this;
     const width = this.size[1];
     this.bind(0, gl.TEXTURE_2D_ARRAY, slice);
-    for (const { top, rows, rgba } of this.bands(halves))
+    for (const { top, rows, rgba } of this.rgbaBands(halves))
       gl.texSubImage3D(
         ...[gl.TEXTURE_2D_ARRAY, 0, 0, top, layer, width, rows, 1, gl.RGBA, gl.HALF_FLOAT],
         rgba,
@@ -131,13 +131,13 @@ export class Textures {
     const { gl } = this;
     const width = this.size[1];
     this.bind(0, gl.TEXTURE_2D, texture);
-    for (const { top, rows, rgba } of this.bands(halves))
+    for (const { top, rows, rgba } of this.rgbaBands(halves))
       gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, top, width, rows, gl.RGBA, gl.HALF_FLOAT, rgba);
   }
 
   /** Add a fourth channel to halves and remove Inf and NaN, some rows at a time.
    * @param {Uint16Array} halves (h, w, 3) */
-  *bands(halves) {
+  *rgbaBands(halves) {
     const [height, width] = this.size;
     const { rgba } = this;
     for (let top = 0; top < height; top += this.rows) {
@@ -147,8 +147,8 @@ export class Textures {
         for (let c = 0; c < 3; c++) {
           const bits = halves[source++];
           const magnitude = bits & 0x7fff;
-          const isFinite = magnitude < 0x7c00;
-          rgba[p++] = isFinite ? bits : magnitude > 0x7c00 ? 0 : (bits & 0x8000) | 0x7bff;
+          const isFiniteHalf = magnitude < 0x7c00;
+          rgba[p++] = isFiniteHalf ? bits : magnitude > 0x7c00 ? 0 : (bits & 0x8000) | 0x7bff;
         }
       yield { top, rows, rgba: rgba.subarray(0, 4 * rows * width) };
     }
@@ -163,9 +163,9 @@ export class Textures {
     const rgba = new Float32Array(4 * height * width);
     for (let y = top, destination = 0; y < bottom; y++)
       for (let p = y * this.size[1] + left, end = p + width; p < end; p++, destination += 4) {
-        rgba[destination] = Math.min(LARGEST, image[3 * p]);
-        rgba[destination + 1] = Math.min(LARGEST, image[3 * p + 1]);
-        rgba[destination + 2] = Math.min(LARGEST, image[3 * p + 2]);
+        rgba[destination] = Math.min(MAX_HALF, image[3 * p]);
+        rgba[destination + 1] = Math.min(MAX_HALF, image[3 * p + 1]);
+        rgba[destination + 2] = Math.min(MAX_HALF, image[3 * p + 2]);
         rgba[destination + 3] = importance[p];
       }
     this.bind(0, gl.TEXTURE_2D, texture);
@@ -203,25 +203,30 @@ export class Textures {
   /** Create a row of weights. @param {Float32Array} rgba (n, 4) */
   weights(rgba) {
     const { gl } = this;
-    this.row ??= this.createTexture(gl.TEXTURE_2D, rgba.byteLength, gl.NEAREST, () => {});
-    this.bind(1, gl.TEXTURE_2D, this.row);
+    this.weightsTexture ??= this.createTexture(
+      gl.TEXTURE_2D,
+      rgba.byteLength,
+      gl.NEAREST,
+      () => {},
+    );
+    this.bind(1, gl.TEXTURE_2D, this.weightsTexture);
     gl.texImage2D(
       ...[gl.TEXTURE_2D, 0, gl.RGBA32F, rgba.length / 4, 1, 0, gl.RGBA, gl.FLOAT],
       rgba,
     );
-    return this.row;
+    return this.weightsTexture;
   }
 
   /** Create a render target for one pixel of each plane. @param {number} count */
   probe(count) {
     const { gl } = this;
-    if (this.probed?.count !== count) {
-      this.drop(this.probed?.texture ?? null);
+    if (this.probeTarget?.count !== count) {
+      this.drop(this.probeTarget?.texture ?? null);
       const texture = this.createTexture(gl.TEXTURE_2D, 8 * count, gl.NEAREST, () =>
         gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA16F, count, 1),
       );
-      this.probed = { count, texture };
+      this.probeTarget = { count, texture };
     }
-    return this.probed.texture;
+    return this.probeTarget.texture;
   }
 }

@@ -62,7 +62,7 @@ export const DEFAULTS = Object.freeze({
  *   (n, 3) light of each plane at a pixel, at unit emission
  * @property {(kind: Kind, x: number, y: number) => [number, number, number]} lightAt
  *   linear light of a picture at a pixel
- * @property {() => boolean} lost whether the context lost all that was set, so that it has to be set again
+ * @property {() => boolean} hasLostContext whether the context lost all that was set, so that it has to be set again
  * @property {() => number} memory bytes held for pictures
  * @property {() => void} close
  */
@@ -88,56 +88,57 @@ export const GROUND = [24, 24, 26];
 export function panes(params, canvas, size) {
   const { width, height } = canvas;
   const area = { x: 0, y: 0, width, height };
-  if (params.layout === 'blink') return [placed(params[params.blink], area, area, params, size)];
+  if (params.layout === 'blink') return [fitPane(params[params.blink], area, area, params, size)];
   if (params.layout === 'wipe') {
-    const cut = Math.round(width * Math.min(1, Math.max(0, params.wipe)));
-    const front = { ...area, width: cut };
-    const back = { ...area, x: cut, width: width - cut };
+    const border = Math.round(width * Math.min(1, Math.max(0, params.wipe)));
+    const frontBox = { ...area, width: border };
+    const backBox = { ...area, x: border, width: width - border };
     return [
-      placed(params.right, back, area, params, size),
-      placed(params.left, front, area, params, size),
+      fitPane(params.right, backBox, area, params, size),
+      fitPane(params.left, frontBox, area, params, size),
     ].filter((pane) => pane.width > 0);
   }
   const columnWidth = Math.max(1, Math.floor((width - GAP) / 2));
   const rowHeight = Math.max(1, Math.floor((height - GAP) / 2));
-  const isBeside = fit([columnWidth, height], size) >= fit([width, rowHeight], size);
-  const first = isBeside ? { ...area, width: columnWidth } : { ...area, height: rowHeight };
-  const second = isBeside
+  const isSideBySide = fit([columnWidth, height], size) >= fit([width, rowHeight], size);
+  const first = isSideBySide ? { ...area, width: columnWidth } : { ...area, height: rowHeight };
+  const second = isSideBySide
     ? { ...first, x: width - columnWidth }
     : { ...first, y: height - rowHeight };
   return [
-    placed(params.left, first, first, params, size),
-    placed(params.right, second, second, params, size),
+    fitPane(params.left, first, first, params, size),
+    fitPane(params.right, second, second, params, size),
   ];
 }
 
 /** Return the picture and its pixel, not rounded, at a place of the canvas; null between pictures.
  * @param {Pane[]} visiblePanes @param {number} x @param {number} y */
-export function at(visiblePanes, x, y) {
+export function hitTest(visiblePanes, x, y) {
   for (const pane of [...visiblePanes].reverse()) {
-    const isIn = x >= pane.x && x < pane.x + pane.width && y >= pane.y && y < pane.y + pane.height;
-    if (isIn) return { pane, ...inPicture(pane, x, y) };
+    const isInside =
+      x >= pane.x && x < pane.x + pane.width && y >= pane.y && y < pane.y + pane.height;
+    if (isInside) return { pane, ...toPicture(pane, x, y) };
   }
   return null;
 }
 
 /** Return a place of the canvas in picture pixels of a pane, also outside it.
  * @param {Pane} pane @param {number} x @param {number} y */
-export function inPicture(pane, x, y) {
+export function toPicture(pane, x, y) {
   return { x: (x - pane.left) / pane.scale, y: (y - pane.top) / pane.scale };
 }
 
 /** Zoom by a factor around a place of a pane.
  * @param {Params} params @param {Pane} pane @param {number} x @param {number} y
  * @param {number} factor @returns {{zoom: number, pan: [number, number]}} */
-export function zoomed(params, pane, x, y, factor) {
+export function zoomAround(params, pane, x, y, factor) {
   const zoom = Math.min(64, Math.max(0.25, params.zoom * factor));
   const scale = (pane.scale * zoom) / params.zoom;
   const shift = 1 / pane.scale - 1 / scale;
-  const [across, down] = pane.middle;
+  const [middleX, middleY] = pane.middle;
   return {
     zoom,
-    pan: [params.pan[0] + (x - across) * shift, params.pan[1] + (y - down) * shift],
+    pan: [params.pan[0] + (x - middleX) * shift, params.pan[1] + (y - middleY) * shift],
   };
 }
 
@@ -147,7 +148,7 @@ export function zoomed(params, pane, x, y, factor) {
  * whole device pixel, so that at 100 % the pixels coincide.
  * @param {Kind} kind @param {Box} box @param {Box} area @param {Params} params
  * @param {[number, number]} size @returns {Pane} */
-function placed(kind, box, area, params, [height, width]) {
+function fitPane(kind, box, area, params, [height, width]) {
   const scale = fit([area.width, area.height], [height, width]) * params.zoom;
   /** @type {[number, number]} */
   const middle = [area.x + area.width / 2, area.y + area.height / 2];
@@ -158,6 +159,6 @@ function placed(kind, box, area, params, [height, width]) {
 
 /** Return device pixels per picture pixel when the whole picture fits.
  * @param {[width: number, height: number]} area @param {[height: number, width: number]} size */
-function fit([across, down], [height, width]) {
-  return Math.max(1e-6, Math.min(across / width, down / height));
+function fit([areaWidth, areaHeight], [height, width]) {
+  return Math.max(1e-6, Math.min(areaWidth / width, areaHeight / height));
 }

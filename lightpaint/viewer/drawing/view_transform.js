@@ -48,8 +48,8 @@ export function decodeSrgb(display) {
 }
 
 /** Steps of the table per doubling of light: 2^9 keep the error below a sixth of a code. */
-const BITS = 9;
-const SHIFT = 23 - BITS;
+const TABLE_BITS = 9;
+const SHIFT = 23 - TABLE_BITS;
 
 /**
  * Computes codes of many pixels. The upper bits of a float are a piecewise linear logarithm. They
@@ -65,15 +65,15 @@ export class Encoder {
     const float = new Float32Array(1);
     const bits = new Int32Array(float.buffer);
     float[0] = 2 ** Math.max(-126, Math.floor(low - stops));
-    this.first = bits[0] >> SHIFT;
+    this.firstIndex = bits[0] >> SHIFT;
     float[0] = 2 ** Math.min(127, Math.ceil(high - stops));
-    const length = (bits[0] >> SHIFT) - this.first + 1;
+    const length = (bits[0] >> SHIFT) - this.firstIndex + 1;
     this.isCurve = !lut.lattice || !!lut.curve;
     /** The lattice as codes, if needed. */
     this.codes = !this.isCurve && lut.lattice ? lut.lattice.map((value) => 255 * value) : null;
     this.table = this.isCurve ? new Uint8ClampedArray(length) : new Float32Array(length);
     for (let i = 0; i < length; i++) {
-      bits[0] = ((this.first + i) << SHIFT) | (1 << (SHIFT - 1)); // the middle of the step
+      bits[0] = ((this.firstIndex + i) << SHIFT) | (1 << (SHIFT - 1)); // the middle of the step
       this.table[i] = this.valueAt(Math.log2(float[0]) + stops);
     }
   }
@@ -82,12 +82,12 @@ export class Encoder {
   valueAt(log) {
     const { shaper, lattice, curve } = this.lut;
     if (!lattice) return 255 * encodeSrgb(2 ** log);
-    const last = shaper.side - 1;
-    const place = ((log - shaper.low) / (shaper.high - shaper.low)) * last;
-    const clamped = Math.min(last, Math.max(0, place));
-    if (!curve) return clamped;
-    const i = Math.min(last - 1, Math.floor(clamped));
-    return 255 * (curve[i] + (clamped - i) * (curve[i + 1] - curve[i]));
+    const lastIndex = shaper.side - 1;
+    const position = ((log - shaper.low) / (shaper.high - shaper.low)) * lastIndex;
+    const index = Math.min(lastIndex, Math.max(0, position));
+    if (!curve) return index;
+    const i = Math.min(lastIndex - 1, Math.floor(index));
+    return 255 * (curve[i] + (index - i) * (curve[i + 1] - curve[i]));
   }
 
   /** Write the codes of a range of pixels (…, 3) into RGBA.
@@ -102,15 +102,15 @@ export class Encoder {
   /** @param {Int32Array} bits @param {Uint8ClampedArray} rgba @param {number} start
    * @param {number} end */
   encodeByCurve(bits, rgba, start, end) {
-    const { table, first } = this;
-    const last = table.length - 1;
+    const { table, firstIndex } = this;
+    const lastIndex = table.length - 1;
     for (let p = start; p < end; p++) {
-      const r = (bits[3 * p] >> SHIFT) - first;
-      const g = (bits[3 * p + 1] >> SHIFT) - first;
-      const b = (bits[3 * p + 2] >> SHIFT) - first;
-      rgba[4 * p] = table[r < 0 ? 0 : r > last ? last : r];
-      rgba[4 * p + 1] = table[g < 0 ? 0 : g > last ? last : g];
-      rgba[4 * p + 2] = table[b < 0 ? 0 : b > last ? last : b];
+      const r = (bits[3 * p] >> SHIFT) - firstIndex;
+      const g = (bits[3 * p + 1] >> SHIFT) - firstIndex;
+      const b = (bits[3 * p + 2] >> SHIFT) - firstIndex;
+      rgba[4 * p] = table[r < 0 ? 0 : r > lastIndex ? lastIndex : r];
+      rgba[4 * p + 1] = table[g < 0 ? 0 : g > lastIndex ? lastIndex : g];
+      rgba[4 * p + 2] = table[b < 0 ? 0 : b > lastIndex ? lastIndex : b];
       rgba[4 * p + 3] = 255;
     }
   }
@@ -118,19 +118,19 @@ export class Encoder {
   /** @param {Int32Array} bits @param {Uint8ClampedArray} rgba @param {number} start
    * @param {number} end */
   encodeByLattice(bits, rgba, start, end) {
-    const { table, first } = this;
+    const { table, firstIndex } = this;
     const codes = /** @type {Float32Array} */ (this.codes);
     const side = this.lut.shaper.side;
-    const last = table.length - 1;
+    const lastIndex = table.length - 1;
     const red = side * side * 3;
     const green = side * 3;
     for (let p = start; p < end; p++) {
-      const i = (bits[3 * p] >> SHIFT) - first;
-      const j = (bits[3 * p + 1] >> SHIFT) - first;
-      const k = (bits[3 * p + 2] >> SHIFT) - first;
-      const r = table[i < 0 ? 0 : i > last ? last : i];
-      const g = table[j < 0 ? 0 : j > last ? last : j];
-      const b = table[k < 0 ? 0 : k > last ? last : k];
+      const i = (bits[3 * p] >> SHIFT) - firstIndex;
+      const j = (bits[3 * p + 1] >> SHIFT) - firstIndex;
+      const k = (bits[3 * p + 2] >> SHIFT) - firstIndex;
+      const r = table[i < 0 ? 0 : i > lastIndex ? lastIndex : i];
+      const g = table[j < 0 ? 0 : j > lastIndex ? lastIndex : j];
+      const b = table[k < 0 ? 0 : k > lastIndex ? lastIndex : k];
       const ir = r >= side - 1 ? side - 2 : r | 0;
       const ig = g >= side - 1 ? side - 2 : g | 0;
       const ib = b >= side - 1 ? side - 2 : b | 0;
@@ -148,9 +148,9 @@ export class Encoder {
       let a11 = a10 + green;
       for (let c = 4 * p; c < 4 * p + 3; c++, a00++, a01++, a10++, a11++) {
         const nearFace = w00 * codes[a00] + w01 * codes[a01] + w10 * codes[a10] + w11 * codes[a11];
-        const far =
+        const farFace =
           w00 * codes[a00 + 3] + w01 * codes[a01 + 3] + w10 * codes[a10 + 3] + w11 * codes[a11 + 3];
-        rgba[c] = nearFace + fb * (far - nearFace);
+        rgba[c] = nearFace + fb * (farFace - nearFace);
       }
       rgba[4 * p + 3] = 255;
     }

@@ -30,7 +30,7 @@ class Mixer {
     this.lut = lut;
     this.mix = new Mix(data.size);
     this.picture = canvasOfSize(data.size);
-    this.isWaiting = false;
+    this.isDrawScheduled = false;
     this.look = /** @type {'answer' | 'present'} */ ('answer');
     const kelvins = kelvinTable(data.kelvins);
     const redraw = () => this.draw();
@@ -51,31 +51,31 @@ class Mixer {
         answer: unit,
         kelvin: { present: null, answer: null },
       };
-      const rest = new Row(light, kelvins, redraw);
-      rest.plane = this.rows.length;
-      this.rows.push(rest);
+      const restRow = new Row(light, kelvins, redraw);
+      restRow.plane = this.rows.length;
+      this.rows.push(restRow);
     }
-    const view = this.stage();
-    view.append(...this.buttons());
+    const view = this.createStage();
+    view.append(...this.createButtons());
     const list = createElement('div', 'mixer-lights');
     list.append(...this.rows.map((row) => row.element));
     root.append(view, list);
-    for (const row of this.rows) this.thumb(row);
+    for (const row of this.rows) this.drawThumb(row);
     this.reset('answer');
   }
 
   /** Painting and mix, separated by a wipe. */
-  stage() {
+  createStage() {
     const [height, width] = this.data.size;
     const { painting } = this.data;
     const view = createElement('div', 'mixer-view');
-    const stage = createElement('div', 'mixer-stage');
-    stage.style.aspectRatio = `${width} / ${height}`;
+    const createStage = createElement('div', 'mixer-stage');
+    createStage.style.aspectRatio = `${width} / ${height}`;
     this.picture.className = 'mixer-mix';
     this.picture.setAttribute('role', 'img');
     this.picture.setAttribute('aria-label', 'The mix of the lights');
-    stage.append(this.picture);
-    view.append(stage);
+    createStage.append(this.picture);
+    view.append(createStage);
     if (!painting) return view;
     const image = createElement('img', 'mixer-painting');
     image.src = painting;
@@ -83,18 +83,18 @@ class Mixer {
     image.draggable = false;
     const edge = createElement('div', 'mixer-edge');
     edge.append(createElement('i'));
-    stage.append(image, edge, createElement('span', 'mixer-tag', 'painting'));
-    stage.append(createElement('span', 'mixer-tag is-right', 'mix'));
+    createStage.append(image, edge, createElement('span', 'mixer-tag', 'painting'));
+    createStage.append(createElement('span', 'mixer-tag is-right', 'mix'));
     // The whole mix is visible until the wipe moves, since a light may affect only one half.
     const wipe = createSlider('Wipe: how much of the painting', 0, 100);
     wipe.value = '0';
     const move = () => {
-      stage.style.setProperty('--p', `${wipe.value}%`);
-      stage.classList.toggle('is-mix', Number(wipe.value) < 1);
-      stage.classList.toggle('is-painting', Number(wipe.value) > 99);
+      createStage.style.setProperty('--p', `${wipe.value}%`);
+      createStage.classList.toggle('is-mix', Number(wipe.value) < 1);
+      createStage.classList.toggle('is-painting', Number(wipe.value) > 99);
     };
     wipe.addEventListener('input', move);
-    followDrag(stage, (share) => {
+    followDrag(createStage, (share) => {
       wipe.value = String(100 * share);
       move();
     });
@@ -106,14 +106,14 @@ class Mixer {
   }
 
   /** Buttons for all lights, and the line that reports their effect. */
-  buttons() {
+  createButtons() {
     this.status = createElement('p', 'mixer-said');
     this.status.setAttribute('role', 'status');
-    const buttons = createElement('div', 'mixer-buttons');
-    buttons.append(
-      button('Reset to answer', 'All lights as in the answer', () => this.reset('answer')),
-      button('Reset to now', 'All lights as in the scene', () => this.reset('present')),
-      button(
+    const createButtons = createElement('div', 'mixer-buttons');
+    createButtons.append(
+      createButton('Reset to answer', 'All lights as in the answer', () => this.reset('answer')),
+      createButton('Reset to now', 'All lights as in the scene', () => this.reset('present')),
+      createButton(
         'Copy as lighting.json',
         'The lights as the sliders set them; solo and mute do not count',
         () => this.copy(this.lighting(), 'lighting.json'),
@@ -121,12 +121,14 @@ class Mixer {
     );
     const { command } = this.data;
     if (command)
-      buttons.append(button('Copy command', command, () => this.copy(command, 'The command')));
+      createButtons.append(
+        createButton('Copy command', command, () => this.copy(command, 'The command')),
+      );
     this.text = createElement('textarea', 'mixer-text');
     this.text.readOnly = true;
     this.text.hidden = true;
     this.text.setAttribute('aria-label', 'To copy by hand');
-    return [buttons, this.status, this.text];
+    return [createButtons, this.status, this.text];
   }
 
   /** @param {'answer' | 'present'} look */
@@ -138,18 +140,19 @@ class Mixer {
   }
 
   /** Weights of all planes, (n, 3), under solo and mute. */
-  weights() {
+  currentWeights() {
     const isSolo = this.rows.some((row) => row.isSolo);
-    const weights = new Float64Array(3 * this.planes.length);
+    const currentWeights = new Float64Array(3 * this.planes.length);
     if (!isSolo)
-      for (const k of this.hiddenLights()) weights.set(this.data.lights[k][this.look], 3 * k);
+      for (const k of this.hiddenLights())
+        currentWeights.set(this.data.lights[k][this.look], 3 * k);
     for (const row of this.rows) {
       const isOn = isSolo ? row.isSolo : !row.isMute;
       // The rest has a plane per look; the last reset chose it.
       const plane = row.light.isRest && this.look === 'present' ? row.plane + 1 : row.plane;
-      if (isOn) weights.set(row.rgb, 3 * plane);
+      if (isOn) currentWeights.set(row.rgb, 3 * plane);
     }
-    return weights;
+    return currentWeights;
   }
 
   /** Lights with a plane but without sliders. @returns {number[]} */
@@ -159,26 +162,26 @@ class Mixer {
   }
 
   draw() {
-    if (this.isWaiting) return;
-    this.isWaiting = true;
+    if (this.isDrawScheduled) return;
+    this.isDrawScheduled = true;
     requestAnimationFrame(() => {
-      this.isWaiting = false;
-      this.mix.weights = this.weights();
+      this.isDrawScheduled = false;
+      this.mix.weights = this.currentWeights();
       this.mix.update(this.planes, 1, false);
       drawLight(this.picture, this.mix.light, this.encoder);
     });
   }
 
   /** Draw the small picture of one light alone. @param {Row} row */
-  thumb(row) {
+  drawThumb(row) {
     const [height, width] = this.data.size;
     const mix = new Mix(this.data.size);
     mix.weights = new Float64Array(3 * this.planes.length);
     const { rgb } = row;
     mix.weights.set(luminance(rgb) > 0 ? rgb : [1, 1, 1], 3 * row.plane);
     mix.update(this.planes, 1, false);
-    const bright = mix.light.filter((x) => x > 0).sort();
-    const white = bright[Math.floor(WHITE_SHARE * (bright.length - 1))] || 1;
+    const levels = mix.light.filter((x) => x > 0).sort();
+    const white = levels[Math.floor(WHITE_SHARE * (levels.length - 1))] || 1;
     const canvas = canvasOfSize(this.data.size);
     drawLight(canvas, mix.light, new Encoder(SRGB, -Math.log2(white)));
     const { thumb } = row;
@@ -231,7 +234,7 @@ class Mixer {
 }
 
 /** @param {string} text @param {string} title @param {() => void} act */
-function button(text, title, act) {
+function createButton(text, title, act) {
   const element = createElement('button', '', text);
   element.type = 'button';
   element.title = title;
@@ -246,9 +249,9 @@ export async function begin(root, look, isWanted = () => true) {
   root.dataset.ready = '';
   const body = createElement('div', 'mixer-body');
   try {
-    await fill(body, root, look);
+    await buildMixer(body, root, look);
   } catch (error) {
-    body.append(createElement('p', 'mixer-said', reasonAgainst(error)));
+    body.append(createElement('p', 'mixer-said', failureText(error)));
   }
   if (!isWanted()) return;
   root.querySelector('.mixer-body')?.remove();
@@ -257,7 +260,7 @@ export async function begin(root, look, isWanted = () => true) {
 }
 
 /** @param {HTMLElement} body @param {HTMLElement} root @param {Look} [look] */
-async function fill(body, root, look) {
+async function buildMixer(body, root, look) {
   let [data, planes] = await unpackMixer(root);
   if (look) {
     const lights = data.lights.map((light) => {
@@ -272,7 +275,7 @@ async function fill(body, root, look) {
 }
 
 /** @param {unknown} error */
-function reasonAgainst(error) {
+function failureText(error) {
   if (typeof DecompressionStream === 'undefined')
     return 'The mixer needs a newer browser, one that has DecompressionStream.';
   return `The mixer is not available: ${error instanceof Error ? error.message : error}`;

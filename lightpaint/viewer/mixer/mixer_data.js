@@ -1,7 +1,7 @@
 /** The data of a mixer, from JSON in the page, and their unpacked planes. */
 import { VALUES } from '../drawing/half_floats.js';
 import { SRGB } from '../drawing/view_transform.js';
-import { unpacked } from './packed_picture.js';
+import { unpack } from './packed_picture.js';
 
 /** @typedef {import("./packed_picture.js").Compact} Compact */
 /** @typedef {import("./mixer_light.js").Light} Light */
@@ -23,12 +23,12 @@ const unpackedMixers = new WeakMap();
 
 /** @param {HTMLElement} root @returns {Promise<[Data, Uint16Array[]]>} */
 export function unpackMixer(root) {
-  const earlier = unpackedMixers.get(root);
-  if (earlier) return earlier;
+  const cachedData = unpackedMixers.get(root);
+  if (cachedData) return cachedData;
   const text = root.querySelector('script[type="application/json"]')?.textContent ?? '';
   /** @type {Data} */
   const data = JSON.parse(text);
-  const promise = Promise.all(data.planes.map(unpacked)).then(
+  const promise = Promise.all(data.planes.map(unpack)).then(
     (planes) => /** @type {[Data, Uint16Array[]]} */ ([data, planes]),
   );
   unpackedMixers.set(root, promise);
@@ -43,7 +43,7 @@ export async function lutOf({ low, high, curve, lattice }) {
     return { shaper, lattice: new Float32Array(1), curve: Float32Array.from(curve) };
   }
   if (!lattice) return SRGB;
-  const halves = await unpacked(lattice);
+  const halves = await unpack(lattice);
   const values = Float32Array.from(halves, (bits) => VALUES[bits] * lattice.scale);
   return { shaper: { side: lattice.size[1], low, high }, lattice: values, curve: null };
 }

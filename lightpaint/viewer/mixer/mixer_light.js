@@ -9,7 +9,7 @@ import { createElement, createSlider } from './page_elements.js';
  *   present: RGB, answer: RGB, kelvin: {present: number | null, answer: number | null}}} Light */
 
 /** Ends of the dimmer, in stops from the current level; the left one is off. */
-const [DARKEST, BRIGHTEST] = [-8, 6];
+const [DIMMER_MIN_STOPS, DIMMER_MAX_STOPS] = [-8, 6];
 
 /** @param {ArrayLike<number>} rgb */
 export function luminance(rgb) {
@@ -24,12 +24,12 @@ export function kelvinTable(table) {
   /** @param {number} mired @returns {RGB} */
   const rgb = (mired) => {
     const step = (mireds[last] - mireds[0]) / last;
-    const place = Math.min(last, Math.max(0, (mired - mireds[0]) / step));
-    const k = Math.min(last - 1, Math.floor(place));
+    const position = Math.min(last, Math.max(0, (mired - mireds[0]) / step));
+    const k = Math.min(last - 1, Math.floor(position));
     const [a, b] = [table[k][1], table[k + 1][1]];
-    const blend = /** @type {RGB} */ (a.map((x, c) => x + (place - k) * (b[c] - x)));
-    const level = luminance(blend);
-    return /** @type {RGB} */ (blend.map((x) => x / level));
+    const blend = /** @type {RGB} */ (a.map((x, c) => x + (position - k) * (b[c] - x)));
+    const presentLevel = luminance(blend);
+    return /** @type {RGB} */ (blend.map((x) => x / presentLevel));
   };
   return { rgb, coolest: mireds[0], warmest: mireds[last] };
 }
@@ -50,20 +50,24 @@ export class Row {
     this.isSolo = false;
     this.isMute = false;
     const levels = [light.present, light.answer].map(luminance);
-    this.level = levels[0] || levels[1] || 1;
-    const stops = levels.filter((x) => x > 0).map((x) => Math.log2(x / this.level));
-    this.maxStops = Math.ceil(Math.max(BRIGHTEST, ...stops));
-    this.minStops = Math.floor(Math.min(DARKEST, ...stops.map((x) => x - 1)));
+    this.presentLevel = levels[0] || levels[1] || 1;
+    const stops = levels.filter((x) => x > 0).map((x) => Math.log2(x / this.presentLevel));
+    this.maxStops = Math.ceil(Math.max(DIMMER_MAX_STOPS, ...stops));
+    this.minStops = Math.floor(Math.min(DIMMER_MIN_STOPS, ...stops.map((x) => x - 1)));
     const { name } = light;
     this.element = createElement('div', 'mixer-light');
     this.thumb = document.createElement('canvas');
     this.swatch = createElement('i', 'mixer-swatch');
     this.solo = this.toggle('S', `Solo: show ${name} alone`, () => (this.isSolo = !this.isSolo));
     this.mute = this.toggle('M', `Mute: show all but ${name}`, () => (this.isMute = !this.isMute));
-    this.dimmer = createSlider(`${name}: stops from now`, this.minStops, this.maxStops);
-    this.dimmed = createElement('output');
-    this.white = createSlider(`${name}: colour temperature`, kelvins.coolest, kelvins.warmest);
-    this.whiteness = createElement('output');
+    this.dimmerSlider = createSlider(`${name}: stops from now`, this.minStops, this.maxStops);
+    this.dimmerOutput = createElement('output');
+    this.temperatureSlider = createSlider(
+      `${name}: colour temperature`,
+      kelvins.coolest,
+      kelvins.warmest,
+    );
+    this.temperatureOutput = createElement('output');
     this.build();
   }
 
@@ -84,17 +88,19 @@ export class Row {
       body.append(createElement('small', '', 'stays as it is in the scene'));
       return;
     }
-    body.append(this.dimmer, this.dimmed);
+    body.append(this.dimmerSlider, this.dimmerOutput);
     const restore = () => this.show();
-    this.dimmer.addEventListener('input', () => this.dim(Number(this.dimmer.value)));
-    slideByTouch(this.dimmer, (stops) => this.dim(stops), restore);
-    this.dimmer.addEventListener('dblclick', () => this.dim(0));
+    this.dimmerSlider.addEventListener('input', () => this.dim(Number(this.dimmerSlider.value)));
+    slideByTouch(this.dimmerSlider, (stops) => this.dim(stops), restore);
+    this.dimmerSlider.addEventListener('dblclick', () => this.dim(0));
     if (light.isScalar) return;
-    this.white.classList.add('is-white');
-    this.white.style.setProperty('--track', trackOf(kelvins));
-    body.append(this.white, this.whiteness);
-    this.white.addEventListener('input', () => this.setTemperature(Number(this.white.value)));
-    slideByTouch(this.white, (mired) => this.setTemperature(mired), restore);
+    this.temperatureSlider.classList.add('is-white');
+    this.temperatureSlider.style.setProperty('--track', trackOf(kelvins));
+    body.append(this.temperatureSlider, this.temperatureOutput);
+    this.temperatureSlider.addEventListener('input', () =>
+      this.setTemperature(Number(this.temperatureSlider.value)),
+    );
+    slideByTouch(this.temperatureSlider, (mired) => this.setTemperature(mired), restore);
   }
 
   /** @param {string} text @param {string} label @param {() => void} act */
@@ -113,16 +119,17 @@ export class Row {
 
   /** @param {number} stops */
   dim(stops) {
-    const level = stops <= this.minStops ? 0 : this.level * 2 ** stops;
-    const factor = level / luminance(this.hue);
+    const presentLevel = stops <= this.minStops ? 0 : this.presentLevel * 2 ** stops;
+    const factor = presentLevel / luminance(this.hue);
     this.set(/** @type {RGB} */ (this.hue.map((x) => x * factor)), this.kelvin);
   }
 
   /** @param {number} mired */
   setTemperature(mired) {
     const hue = this.kelvins.rgb(mired);
-    const level = luminance(this.rgb);
-    if (level > 0) this.set(/** @type {RGB} */ (hue.map((x) => x * level)), 1e6 / mired);
+    const presentLevel = luminance(this.rgb);
+    if (presentLevel > 0)
+      this.set(/** @type {RGB} */ (hue.map((x) => x * presentLevel)), 1e6 / mired);
     else {
       this.hue = hue;
       this.set(this.rgb, 1e6 / mired);
@@ -134,8 +141,8 @@ export class Row {
     const { light } = this;
     this.isSolo = this.isMute = false;
     const otherEmission = look === 'answer' ? light.present : light.answer;
-    const lit = [light[look], otherEmission].find((rgb) => luminance(rgb) > 0);
-    this.hue = lit ?? [1, 1, 1];
+    const litColour = [light[look], otherEmission].find((rgb) => luminance(rgb) > 0);
+    this.hue = litColour ?? [1, 1, 1];
     this.rgb = light[look];
     this.kelvin = light.kelvin[look];
     this.show();
@@ -151,24 +158,33 @@ export class Row {
   }
 
   show() {
-    const { dimmer, dimmed, white, whiteness, swatch, solo, mute, element: row } = this;
-    const level = luminance(this.rgb);
-    const stops = level > 0 ? Math.log2(level / this.level) : this.minStops;
+    const {
+      dimmerSlider,
+      dimmerOutput,
+      temperatureSlider,
+      temperatureOutput,
+      swatch,
+      solo,
+      mute,
+      element: row,
+    } = this;
+    const presentLevel = luminance(this.rgb);
+    const stops = presentLevel > 0 ? Math.log2(presentLevel / this.presentLevel) : this.minStops;
     const stopsText =
-      level > 0 ? `${stops < -0.005 ? '\u2212' : '+'}${Math.abs(stops).toFixed(2)}` : 'off';
-    dimmer.value = String(stops);
-    dimmer.setAttribute('aria-valuetext', level > 0 ? `${stopsText} stops` : 'off');
-    dimmed.textContent = stopsText;
+      presentLevel > 0 ? `${stops < -0.005 ? '\u2212' : '+'}${Math.abs(stops).toFixed(2)}` : 'off';
+    dimmerSlider.value = String(stops);
+    dimmerSlider.setAttribute('aria-valuetext', presentLevel > 0 ? `${stopsText} stops` : 'off');
+    dimmerOutput.textContent = stopsText;
     const { kelvin } = this;
     const temperature = kelvin === null ? 'own colour' : `${Math.round(kelvin / 10) * 10} K`;
     const { coolest, warmest } = this.kelvins;
     const mired = kelvin === null ? (coolest + warmest) / 2 : 1e6 / kelvin;
-    white.value = String(mired);
-    white.classList.toggle('is-none', kelvin === null);
-    white.setAttribute('aria-valuetext', temperature);
-    whiteness.textContent = kelvin === null ? 'colour' : temperature;
-    swatch.style.background = level > 0 ? hexOf(this.rgb) : 'none';
-    swatch.classList.toggle('is-off', !(level > 0));
+    temperatureSlider.value = String(mired);
+    temperatureSlider.classList.toggle('is-none', kelvin === null);
+    temperatureSlider.setAttribute('aria-valuetext', temperature);
+    temperatureOutput.textContent = kelvin === null ? 'colour' : temperature;
+    swatch.style.background = presentLevel > 0 ? hexOf(this.rgb) : 'none';
+    swatch.classList.toggle('is-off', !(presentLevel > 0));
     solo.setAttribute('aria-pressed', String(this.isSolo));
     mute.setAttribute('aria-pressed', String(this.isMute));
     row.classList.toggle('is-mute', this.isMute);
@@ -177,9 +193,9 @@ export class Row {
 
 /** Return the display colour of a light, its brightest channel at full. @param {RGB} rgb */
 function hexOf(rgb) {
-  const top = Math.max(...rgb) || 1;
+  const maxChannel = Math.max(...rgb) || 1;
   const codes = rgb.map((x) => {
-    const light = x / top;
+    const light = x / maxChannel;
     const display = light <= 0.0031308 ? 12.92 * light : 1.055 * light ** (1 / 2.4) - 0.055;
     return Math.round(255 * display);
   });
@@ -188,6 +204,6 @@ function hexOf(rgb) {
 
 /** @param {Kelvins} kelvins */
 function trackOf({ rgb, coolest, warmest }) {
-  const places = Array.from({ length: 9 }, (_, k) => coolest + (k / 8) * (warmest - coolest));
-  return `linear-gradient(to right, ${places.map((mired) => hexOf(rgb(mired))).join(', ')})`;
+  const stops = Array.from({ length: 9 }, (_, k) => coolest + (k / 8) * (warmest - coolest));
+  return `linear-gradient(to right, ${stops.map((mired) => hexOf(rgb(mired))).join(', ')})`;
 }

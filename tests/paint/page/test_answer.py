@@ -119,7 +119,7 @@ def test_truth(painter: Painter) -> None:
     assert button.bounding_box() == box  # or Save look, and its tip, would be under the pointer
     assert button.get_attribute("aria-pressed") == "true"
     painter.button("False colour").click()
-    assert painter.ui("show")["overlay"] == "falsecolor"
+    assert painter.ui("display")["overlay"] == "falsecolor"
     painter.button("Out of reach").click()  # asks for what it shows
     assert painter.said("explain")
     assert painter.page.get_by_text("The cove is at its limit").is_visible()
@@ -137,10 +137,10 @@ def test_truth(painter: Painter) -> None:
     assert painter.page.locator(".working").is_visible()  # what else is under way goes on
     painter.tell(kind="verified", agrees=True, text="The render agrees.")
     painter.button("Answer | Render").click()
-    show = painter.ui("show")
+    show = painter.ui("display")
     assert (show["left"], show["right"], show["layout"]) == ("solution", "verified", "wipe")
     painter.slide("Wipe", "ArrowRight")
-    assert painter.ui("show")["wipe"] == pytest.approx(0.52)
+    assert painter.ui("display")["wipe"] == pytest.approx(0.52)
 
 
 def test_how_pictures_are_shown(painter: Painter) -> None:
@@ -169,14 +169,14 @@ def test_looks(painter: Painter) -> None:
     painter.type("Crossfade", "25")
     request, two = (look["weights"] for look in painter.ui("looks"))
     shown_picture = painter.page.evaluate("() => window.engine.shown")
-    assert shown_picture["instead"] == two  # what is there now lies on the right
+    assert shown_picture["solutionWeights"] == two  # what is there now lies on the right
     mixture = [0.75 * a + 0.25 * b for a, b in zip(two[0], request[0], strict=True)]
-    assert shown_picture["other"][0] == pytest.approx(mixture)
+    assert shown_picture["otherWeights"][0] == pytest.approx(mixture)
     painter.stroke()
     painter.page.get_by_text("The painting is not shown: press Back to the painting").wait_for()
     assert len(painter.calls("begin")) == 1  # the one before
     painter.button("Back to the painting").click()
-    assert painter.ui("show")["left"] == "painting"
+    assert painter.ui("display")["left"] == "painting"
     painter.page.locator(".look").first.hover()
     painter.button("Duplicate Look 1").click()
     painter.button("Delete Look 1", exact=True).click()
@@ -205,7 +205,11 @@ def test_looks_are_compared_while_both_are_there(new_painter: Any, way: str) -> 
         painter.page.evaluate("() => { host.drop_look({ look: 1 }); host.tell(host.state()); }")
     painter.still()
     show = painter.page.evaluate("() => engine.shown")
-    assert [show[name] for name in ("left", "right", "instead")] == ["painting", "solution", None]
+    assert [show[name] for name in ("left", "right", "solutionWeights")] == [
+        "painting",
+        "solution",
+        None,
+    ]
     compared = painter.page.get_by_role("combobox", name="Compare")
     assert compared.input_value() == "painting solution"
     painter.stroke()
@@ -266,7 +270,7 @@ def test_a_render_of_before_is_offered_again(painter: Painter) -> None:
     painter.page.evaluate(begin, True)
     assert "of an earlier answer" in painter.page.locator(".verified").inner_text()
     render.click()
-    assert painter.ui("show")["right"] == "verified"
+    assert painter.ui("display")["right"] == "verified"
 
 
 #: Windows, a column beside panels, one without room for them.
@@ -585,7 +589,7 @@ def test_what_another_page_has_done_is_no_look_of_this_one(painter: Painter) -> 
     painter.button("Why not closer?").click()
     painter.still()
     assert painter.page.locator("[aria-current=true]").count() == 1
-    assert painter.ui("explained")
+    assert painter.ui("reasons")
     painter.tell(kind="closed", reason="taken", text="It is open on another page.")
     painter.page.evaluate(
         "() => { host.weights = host.weights.map((rgb) => rgb.map((x) => 3 * x));"
@@ -594,7 +598,7 @@ def test_what_another_page_has_done_is_no_look_of_this_one(painter: Painter) -> 
     painter.button("Take over").click()
     painter.still()
     assert painter.page.locator("[aria-current=true]").count() == 0
-    assert painter.ui("explained") == []
+    assert painter.ui("reasons") == []
 
 
 def test_looks_that_are_kept_at_once_have_names_of_their_own(painter: Painter) -> None:

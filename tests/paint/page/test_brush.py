@@ -66,7 +66,8 @@ def test_stamps_flow_together(page: Any):
             + f"""
             canvas.begin();
             brush.stamp(canvas, {spot}, use); brush.stamp(canvas, {spot}, use);
-            canvas.apply(canvas.whole, {{ kind: "paint", rgb: [1, 1, 1], as: "colour" }});
+            const effect = {{ kind: "paint", rgb: [1, 1, 1], paintMode: "colour" }};
+            canvas.apply(canvas.wholeRegion, effect);
         """
         )
         return float(run_brush(page, script)[0][32, 40, 0])
@@ -99,7 +100,7 @@ def test_a_line_covers_a_capsule(page: Any):
 def test_paint_as_light_is_on_the_albedo(page: Any):
     script = "canvas.albedo = new Uint16Array(3 * H * W).fill(0x3400);"  # a quarter
     image, _ = run_brush(
-        page, script + stroke_script('as: "light", rgb: [4, 2, 1]', place_script(40, 32))
+        page, script + stroke_script('paintMode: "light", rgb: [4, 2, 1]', place_script(40, 32))
     )
     np.testing.assert_allclose(image[32, 40], [1, 0.5, 0.25])
 

@@ -29,7 +29,7 @@ def test_kelvin_and_green(colour: Any):
     whites = [
         (k, d) for k in (1900, 2700, 3200, 4300, 5600, 6504, 10000, 14000) for d in (-15, 0, 12)
     ]
-    colours = colour("ofKelvin", [list(white) for white in whites])
+    colours = colour("fromKelvin", [list(white) for white in whites])
     expected = np.array([kelvin_to_rgb(kelvin, green / 1000) for kelvin, green in whites])
     np.testing.assert_allclose(colours.max(axis=1), 1)
     # Krystek's locus is good to 1e-4 in (u, v).
@@ -52,8 +52,8 @@ def test_kelvin_of_a_colour(colour: Any):
 def test_hex(colour: Any):
     texts = ["#ffaa66", "#fa6", "000000", "#0a0b0c"]
     expected = np.array([hex_to_rgb(text) for text in texts])
-    np.testing.assert_allclose(colour("ofHex", [[x] for x in texts]), expected, atol=1e-12)
-    assert colour("ofHex", [["#ffaa6"], ["red"], [""]]) == [None] * 3
+    np.testing.assert_allclose(colour("fromHex", [[x] for x in texts]), expected, atol=1e-12)
+    assert colour("fromHex", [["#ffaa6"], ["red"], [""]]) == [None] * 3
     bright = [[4, 1, 0.2], [1, 0.3, 0.3], [1, 0, 0]]
     assert colour("toHex", [[x] for x in bright]).tolist() == [
         rgb_to_hex(np.array(x)) for x in bright
@@ -63,7 +63,7 @@ def test_hex(colour: Any):
 def test_hsv_and_back(colour: Any):
     rgb = np.random.default_rng(1).random((50, 3))
     hsv = colour("toHsv", [[list(x)] for x in rgb])
-    np.testing.assert_allclose(colour("ofHsv", [[list(x)] for x in hsv]), rgb, atol=1e-9)
+    np.testing.assert_allclose(colour("fromHsv", [[list(x)] for x in hsv]), rgb, atol=1e-9)
     assert colour("toHsv", [[[0, 0, 1]], [[0.5, 0.5, 0.5]]])[:, :2].tolist() == [[240, 1], [0, 0]]
 
 

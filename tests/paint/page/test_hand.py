@@ -46,16 +46,16 @@ def test_keys_of_paint_programs(painter: Painter) -> None:
     assert painter.said("redo")
     for layout in ("wipe", "blink", "side"):
         press("v")
-        assert painter.ui("show")["layout"] == layout
+        assert painter.ui("display")["layout"] == layout
     press("c")
     press("o")
     press(".")
-    show = painter.ui("show")
+    show = painter.ui("display")
     assert (show["clean"], show["overlay"], show["stops"]) == (False, "missed", 0.5)
     press("+")
-    assert painter.ui("show")["zoom"] > 1
+    assert painter.ui("display")["zoom"] > 1
     press("f")
-    assert painter.ui("show")["zoom"] == 1
+    assert painter.ui("display")["zoom"] == 1
 
 
 def test_every_key_of_the_overlay_is_there(painter: Painter) -> None:
@@ -82,13 +82,13 @@ def test_mouse_with_modifiers(painter: Painter) -> None:
     assert len(painter.calls("line")) == 1
     painter.page.mouse.move(x, y)
     painter.stroke(modifiers="Space")
-    assert painter.ui("show")["pan"][0] < 0
+    assert painter.ui("display")["pan"][0] < 0
     assert len(painter.calls("begin")) == 1
     painter.page.keyboard.down("Control")
     painter.page.mouse.wheel(0, -240)
     painter.page.keyboard.up("Control")
     painter.still()
-    assert painter.ui("show")["zoom"] == pytest.approx(2, rel=1e-6)
+    assert painter.ui("display")["zoom"] == pytest.approx(2, rel=1e-6)
 
 
 def test_escape_leaves_a_stroke(painter: Painter) -> None:
@@ -119,7 +119,7 @@ def test_one_finger_paints_and_two_move_and_zoom(new_painter: Any) -> None:
     send("touchMove", (x - 25, y), (x + 75, y))
     send("touchEnd")
     painter.still()
-    assert painter.ui("show")["zoom"] == pytest.approx(2, rel=0.1)
+    assert painter.ui("display")["zoom"] == pytest.approx(2, rel=0.1)
     assert painter.calls("cancel")  # of what the first finger had begun
     assert len(painter.calls("end")) == 1
 
@@ -203,7 +203,7 @@ def test_the_colour_panel(painter: Painter) -> None:
     assert recent_colours.get_by_role("button").count() == 1
     assert painter.page.locator(".is-ask").bounding_box() == below  # its room was there
     painter.button("Colour", exact=True).click()
-    assert painter.ui("as") == "colour"
+    assert painter.ui("paintMode") == "colour"
 
 
 def test_how_bright_a_colour_is_is_seen_and_said(painter: Painter) -> None:
@@ -398,12 +398,12 @@ def test_what_is_picked_has_its_brightness_in_stops(painter: Painter) -> None:
 def test_what_is_under_a_pointer_that_rests_is_that_of_the_last_answer(painter: Painter) -> None:
     painter.page.mouse.move(*painter.place())
     painter.page.locator(".here", has_text="back wall").wait_for()
-    shares = painter.ui("pointed")["shares"]
+    shares = painter.ui("probe")["shares"]
     painter.page.evaluate(
         """() => {
-          const { pointed } = engine;
+          const { probe } = engine;
           const alone = window.painter.store.value.lights.map((_, k) => Number(k === 1));
-          engine.pointed = (x, y) => ({ ...pointed.call(engine, x, y), shares: alone });
+          engine.probe = (x, y) => ({ ...probe.call(engine, x, y), shares: alone });
         }"""
     )
     painter.tell(kind="answer", version=100, exact=False)
@@ -427,7 +427,7 @@ def test_what_is_under_the_pointer(painter: Painter) -> None:
     painter.page.evaluate("() => { engine.lightAt = () => [0, 0.5, 0]; }")
     painter.page.mouse.move(*painter.place())
     painter.page.locator(".near", has_text=re.compile(r"^\u22121.0 st$")).wait_for()  # no white
-    assert sum(painter.ui("pointed")["shares"]) == pytest.approx(1, abs=1e-6)
+    assert sum(painter.ui("probe")["shares"]) == pytest.approx(1, abs=1e-6)
     assert painter.page.locator(".share.is-here").count() == 7
 
 
@@ -444,13 +444,13 @@ def test_a_pointer_that_has_left_is_over_nothing(painter: Painter) -> None:
     }"""
     place, other = painter.place(-0.3), painter.place(0.3)
     painter.page.evaluate(move_script, [other, other, False])
-    pointed_place = painter.ui("pointed")
+    pointed_place = painter.ui("probe")
     painter.page.evaluate(move_script, [place, place, False])
-    assert painter.ui("pointed") != pointed_place
+    assert painter.ui("probe") != pointed_place
     painter.page.evaluate(move_script, [place, other, False])
-    assert painter.ui("pointed") == pointed_place
+    assert painter.ui("probe") == pointed_place
     painter.page.evaluate(move_script, [place, place, True])
-    assert painter.ui("pointed") is None
+    assert painter.ui("probe") is None
 
 
 @pytest.mark.parametrize("tool", ["adjust", "pick"])
@@ -625,7 +625,7 @@ def test_the_object_that_would_be_filled_has_an_outline(new_painter: Any, engine
     page.keyboard.press("g")
     page.mouse.move(*painter.place(0.05))
     outline.wait_for()
-    wall = painter.ui("pointed")["index"]
+    wall = painter.ui("probe")["index"]
     miscoloured, white = page.evaluate(OUTLINE, wall)
     assert miscoloured == 0
     assert white > 400
@@ -658,8 +658,8 @@ def test_the_object_that_would_be_filled_has_an_outline(new_painter: Any, engine
     outline.wait_for()
     page.evaluate(
         "() => { engine.objects = () => null;"
-        " const pointed = engine.pointed.bind(engine);"
-        " engine.pointed = (x, y) => ({ ...pointed(x, y), object: null, index: -1 }); }"
+        " const probe = engine.probe.bind(engine);"
+        " engine.probe = (x, y) => ({ ...probe(x, y), object: null, index: -1 }); }"
     )
     page.mouse.move(*painter.place(0.1))
     painter.still()

@@ -112,7 +112,7 @@ def test_around_it_nothing_hears_its_keys(new_painter: Any) -> None:
     assert keys_heard("Control+z", "Control+s", "Control+x", "Control+v", "Control+Enter") == []
     assert keys_heard("Control+k", "F2") == ["k", "F2"]
     painter.stroke(modifiers="Space")
-    assert painter.ui("show")["pan"][0] < 0
+    assert painter.ui("display")["pan"][0] < 0
     painter.page.get_by_role("textbox").first.focus()
     assert keys_heard("f", "Delete", "Control+v") == ["v"]
     painter.page.locator(".top").click(position={"x": 3, "y": 3})  # nothing is there

@@ -7,6 +7,12 @@ import pytest
 from painter_page import Finger, Painter
 
 
+def visible_lights(painter: Painter) -> list[bool] | None:
+    """Return which lights the engine shows, None for all."""
+    lights: list[bool] | None = painter.page.evaluate("() => window.engine.shown.visibleLights")
+    return lights
+
+
 def newest_constraints(painter: Painter) -> Any:
     """Return the constraints of the last request on one light."""
     return painter.said("constrain_light")[-1]["constraints"]
@@ -346,7 +352,7 @@ def test_a_light_is_held_at_a_white(painter: Painter) -> None:
     luminance = [0.2126, 0.7152, 0.0722]
     assert lock @ luminance == pytest.approx(np.array(before) @ luminance)
     white = painter.page.evaluate(
-        "async () => (await import('/ui/paint_colour.js')).ofKelvin(2700)",
+        "async () => (await import('/ui/paint_colour.js')).fromKelvin(2700)",
     )
     np.testing.assert_allclose(lock / lock[0], np.array(white) / white[0], rtol=1e-9)
 
@@ -355,7 +361,7 @@ def test_solo_and_mute_ask_nothing_of_the_solve(painter: Painter) -> None:
     solo, tag = painter.button("Solo: show pendant"), painter.page.locator(".tag.is-part")
     before = solo.bounding_box()
     solo.click()
-    assert painter.page.evaluate("() => window.engine.shown.gains") == [k == 2 for k in range(7)]
+    assert visible_lights(painter) == [k == 2 for k in range(7)]
     assert tag.inner_text().strip() == "Answer: only pendant"
     assert solo.bounding_box() == before  # a second click takes it back
     painter.button("Show all", exact=True).click()
@@ -363,16 +369,16 @@ def test_solo_and_mute_ask_nothing_of_the_solve(painter: Painter) -> None:
     assert tag.inner_text().strip() == "Answer: without key"
     painter.button("Show all lights").click()
     painter.still()
-    assert painter.page.evaluate("() => window.engine.shown.gains") is None
+    assert visible_lights(painter) is None
     assert not painter.calls("begin")
     painter.button("Mute: show the picture without key").click()
-    assert painter.page.evaluate("() => window.engine.shown.gains") == [k != 0 for k in range(7)]
+    assert visible_lights(painter) == [k != 0 for k in range(7)]
     assert not painter.said("constrain_light")
     painter.page.locator(".light-thumb").nth(1).hover()
     painter.still()
     shown_view = painter.page.evaluate("() => window.engine.shown")
     assert shown_view["right"] == "other"
-    assert [max(rgb) > 0 for rgb in shown_view["other"]] == [k == 1 for k in range(7)]
+    assert [max(rgb) > 0 for rgb in shown_view["otherWeights"]] == [k == 1 for k in range(7)]
 
 
 @pytest.mark.parametrize("way", ["panels", "fold", "search"])
@@ -405,7 +411,7 @@ def test_64_lights_are_found_sorted_and_folded(new_painter: Any) -> None:
     names = [row.get_attribute("data-light") for row in rows.all()]
     shares = painter.page.evaluate(
         "() => Object.fromEntries(painter.store.value.lights.map((one, k) =>"
-        " [one.name, painter.store.value.lit[k].share]))"
+        " [one.name, painter.store.value.lightAnswers[k].share]))"
     )
     sole_shares = [shares[name] for name in names[:3]]
     assert sole_shares == sorted(sole_shares, reverse=True)

@@ -63,7 +63,7 @@ def test_a_place_that_has_lost_the_painter_gets_its_pictures_when_it_has_it_agai
     take_over.click()
     painter.page.wait_for_function(f"() => ({THUMBS})()[1] === 7")
     painter.page.wait_for_function(
-        "() => engine.mirror.isReady && !engine.mirror.loader.missing().length"
+        "() => engine.mirror.isReady && !engine.mirror.loader.missingSlots().length"
     )
     painter.stroke()
     assert painter.said("paint")
@@ -169,14 +169,18 @@ def test_a_kernel_that_has_ended_is_said_to_have(new_painter: Any, model: str) -
 def running_tasks(painter: Painter) -> set[str]:
     """What is shown to be: writing files, rendering, finding out why it is not closer."""
     ui = painter.page.evaluate("() => painter.store.value")
-    flags = {"export": ui["isWriting"], "verify": ui["verifying"], "explain": ui["explaining"]}
+    flags = {
+        "export": ui["isExporting"],
+        "verify": ui["verificationProgress"],
+        "explain": ui["isExplaining"],
+    }
     return {name for name, is_so in flags.items() if is_so}
 
 
 def ask_for_all(painter: Painter) -> None:
     """Ask for everything that takes long."""
     painter.page.evaluate(
-        "() => { const { session, store } = painter; store.set({ isWriting: true });"
+        "() => { const { session, store } = painter; store.set({ isExporting: true });"
         " session.send('export', { outputs: [] }); session.verify(); session.explain(); }"
     )
     painter.still()
@@ -199,7 +203,7 @@ def test_what_could_not_be_asked_for_is_not_under_way(painter: Painter) -> None:
     painter.page.keyboard.press("Escape")
     painter.button("Analysis").click()
     painter.button("Out of reach").click()  # asks for what it shows, and once
-    painter.page.wait_for_function("() => painter.store.value.show.overlay === null")
+    painter.page.wait_for_function("() => painter.store.value.display.overlay === null")
 
 
 def test_what_fails_is_under_way_no_more_and_the_rest_is(painter: Painter) -> None:

@@ -40,8 +40,8 @@ def site_of(site: Any) -> dict[str, Any]:
 
 
 SHOW = """{ left: "painting", right: "solution", layout: "side", wipe: 0.5, blink: "left",
-    zoom: 1, pan: [0, 0], stops: 0, transform: "srgb", clean: false, overlay: null, gains: null,
-    instead: null, other: null }"""
+    zoom: 1, pan: [0, 0], stops: 0, transform: "srgb", clean: false, overlay: null,
+    visibleLights: null, solutionWeights: null, otherWeights: null }"""
 
 
 @pytest.fixture
@@ -57,7 +57,7 @@ def run(page: Any, site_of: Any) -> Any:
                 const engine = openEngine(host, {{ view }});
                 document.body.replaceChildren(engine.element);
                 const show = {SHOW};
-                const use = {{ tool: "brush", rgb: [1, 0.5, 0.25], as: "colour", size: 8,
+                const use = {{ tool: "brush", rgb: [1, 0.5, 0.25], paintMode: "colour", size: 8,
                     hardness: 1, flow: 1, importance: 1 }};
                 const loads = [];
                 engine.on("loading", ({{ done, total }}) => loads.push([done, total]));
@@ -65,7 +65,7 @@ def run(page: Any, site_of: Any) -> Any:
                 engine.resize(2 * W + 4, H);
                 engine.show(show);
                 await host.begin();
-                const isThere = await until(() => engine.place && loads.at(-1)[1] === 0);
+                const isThere = await until(() => engine.paintTarget && loads.at(-1)[1] === 0);
                 const at = (x, y) => ({{ x, y, pressure: 1 }});
                 const codes = (x, y, side = 0) => {{
                     engine.screen.drawNow();
@@ -116,9 +116,9 @@ def test_solo_clean_and_other_weights_are_shown(run: Any, site: Any, view: str):
     full, solo, replaced, other, clean = run(
         """
         const seen = (more) => { engine.show({ ...show, ...more }); return codes(7, 5, 1); };
-        const made = [seen({}), seen({ gains: [false, true, false] }),
-            seen({ instead: [[0, 0, 0], [0, 0, 0], [0.1, 0.1, 0.1]] }),
-            seen({ right: "other", other: [[0.5, 0, 0], [0, 0, 0], [0, 0, 0]] })];
+        const made = [seen({}), seen({ visibleLights: [false, true, false] }),
+            seen({ solutionWeights: [[0, 0, 0], [0, 0, 0], [0.1, 0.1, 0.1]] }),
+            seen({ right: "other", otherWeights: [[0.5, 0, 0], [0, 0, 0], [0, 0, 0]] })];
         engine.show({ ...show, clean: true });
         await until(() => host.fetched.filter((x) => x.startsWith("clean/")).length === 3
             && loads.at(-1)[1] === 0);
@@ -152,7 +152,7 @@ def test_asking_by_drag_says_how_much(run: Any):
     requests, colour, messages = run(
         """
         const asked = [];
-        engine.on("asking", (event) => asked.push(event));
+        engine.on("adjustment", (event) => asked.push(event));
         engine.setTool({ ...use, tool: "adjust" });
         engine.begin(at(20.5, 15.5)); engine.move([at(20.5, -64.5)]);
         const colour = engine.lightAt("painting", 20.2, 15.9);
@@ -221,7 +221,7 @@ def test_what_is_picked_paints_the_same(run: Any, view: str):
         const { canvas } = engine.mirror;
         canvas.albedo = new Uint16Array(W * H * 3).fill(0x3400);  // a quarter
         canvas.albedo.fill(0, 0, 3);
-        engine.setTool({ ...use, as: "light" });
+        engine.setTool({ ...use, paintMode: "light" });
         engine.begin(at(10, 10)); engine.end();
         const picked = [engine.paintAt("painting", 10, 10), engine.lightAt("painting", 10, 10)];
         const black = engine.paintAt("painting", 0, 0);
@@ -238,7 +238,7 @@ def test_what_is_picked_paints_the_same(run: Any, view: str):
 def test_what_is_pointed_at(run: Any, site: Any):
     pointed_light, outside, (data, shape) = run(
         "const { data, width, height } = engine.objects();"
-        " return [engine.pointed(25.7, 8.1), engine.pointed(-1, 3), [[...data], [height, width]]];"
+        " return [engine.probe(25.7, 8.1), engine.probe(-1, 3), [[...data], [height, width]]];"
     )
     np.testing.assert_array_equal(np.reshape(data, shape), site.arrays["objects"])
     assert pointed_light["index"] == site.arrays["objects"][8, 25]
@@ -292,7 +292,7 @@ def test_of_another_view_only_its_pictures_are_fetched(run: Any, site_of: Any):
         const before = host.fetched.length;
         host.fetch = (name) => { host.fetched.push(name); return array(name.replace("@1", "")); };
         engine.showView(1);
-        await until(() => loads.at(-1)[1] === 0 && engine.place);
+        await until(() => loads.at(-1)[1] === 0 && engine.paintTarget);
         return host.fetched.slice(before);
         """
     )
@@ -333,7 +333,7 @@ def test_a_gpu_that_comes_back_is_filled_again(run: Any):
         away.loseContext();
         await until(() => engine.screen.view.isLost);
         away.restoreContext();
-        await until(() => !engine.screen.view.lost() && loads.at(-1)[1] === 0);
+        await until(() => !engine.screen.view.hasLostContext() && loads.at(-1)[1] === 0);
         return [[before, codes(7, 5)], [codes(7, 5, 1), codes(7, 5)]];
         """,
         "gl",
@@ -346,7 +346,7 @@ def test_a_gpu_that_does_not_come_back_is_done_without(run: Any):
     before, after, name = run(
         """
         const before = [codes(7, 5, 1), codes(7, 5)];
-        engine.screen.patience = 1;
+        engine.screen.recoveryMs = 1;
         engine.screen.view.gl.getExtension("WEBGL_lose_context").loseContext();
         await until(() => engine.screen.view.name === "cpu" && loads.at(-1)[1] === 0);
         return [before, [codes(7, 5, 1), codes(7, 5)], engine.screen.view.name];
@@ -362,7 +362,7 @@ def test_a_view_that_is_closed_is_no_gpu_that_is_lost(run: Any):
     names, canvases = run(
         """
         const { screen } = engine;
-        screen.patience = 1;
+        screen.recoveryMs = 1;
         const [first, names] = [screen.view, []];
         screen.begin([H, W], 3, first.name);
         const second = screen.view;
@@ -388,11 +388,11 @@ def test_another_view_does_not_wait_for_the_gpu_of_the_one_before(run: Any):
         """
         const { screen } = engine;
         const before = screen.view;
-        screen.patience = 20;
+        screen.recoveryMs = 20;
         before.gl.getExtension("WEBGL_lose_context").loseContext();
         await until(() => before.isLost);
         screen.begin([H, W], 3, before.name);
-        await new Promise((done) => setTimeout(done, 2 * screen.patience));
+        await new Promise((done) => setTimeout(done, 2 * screen.recoveryMs));
         return screen.view.name;
         """,
         "gl",

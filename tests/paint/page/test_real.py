@@ -276,9 +276,9 @@ def test_what_is_painted_and_answered_is_on_the_screen(
     assert user.look("return screen.view.name") == view
     before, far, new_code = user.seen(30, 10), user.seen(90, 50), user.seen(30, 10, 1)
     user.look("mirror.canvas.importance[5] = 2.5")
-    assert user.look("return engine.greatest()") == 2.5
+    assert user.look("return engine.maxImportance()") == 2.5
     user.look("mirror.canvas.importance[5] = 0")
-    assert user.look("return engine.greatest()") == 1
+    assert user.look("return engine.maxImportance()") == 1
     user.press("0").stroke((20, 10), (40, 10)).still("brush")
     np.testing.assert_allclose(user.seen(30, 10), user.code(user.paint), atol=1)
     assert user.seen(90, 50) == far

@@ -144,7 +144,7 @@ def test_a_stroke_that_was_given_up_is_not_lost(host_messages: Any):
         host.lost = null;
         strokes.begin(); strokes.touch([0, 2, 0, 2]); strokes.drop();
         await host.lose();
-        strokes.forget(true);
+        strokes.dropUnsent(true);
         return host.lost;
         """
     )
@@ -164,7 +164,10 @@ def test_nothing_of_a_stroke_is_sent_again_as_pictures_come(host_messages: Any):
 
 
 def test_strokes_go_on_counting_where_the_session_is(host_messages: Any):
-    assert host_messages("await host.find(41); strokes.begin(); return strokes.live.stroke;") == 42
+    assert (
+        host_messages("await host.find(41); strokes.begin(); return strokes.currentStroke.stroke;")
+        == 42
+    )
 
 
 def test_a_dropped_stroke_is_said_to_be_dropped_if_anything_of_it_was_said(host_messages: Any):
@@ -232,13 +235,13 @@ def test_frames_are_those_of_the_library(page: Any):
     image = np.arange(24, dtype=np.float32).reshape(2, 4, 3)
     frame = page.evaluate(
         """async () => {
-            const { frame } = await import("/engine/message_frames.js");
+            const { encodeFrame } = await import("/engine/message_frames.js");
             const data = Float32Array.from({ length: 24 }, (_, i) => i);
             const image = { data, shape: [2, 4, 3] };
             const importance = { data: new Float32Array(8).fill(1), shape: [2, 4] };
             const fields = { kind: "paint", seq: 7, stroke: 3, region: [1, 3, 2, 6],
                 is_final: true, label: "Pinsel – größer" };
-            return Array.from(new Uint8Array(frame(fields, { image, importance })));
+            return Array.from(new Uint8Array(encodeFrame(fields, { image, importance })));
         }"""
     )
     content, buffers = from_frame(bytes(frame))
@@ -253,8 +256,8 @@ def test_frames_are_those_of_the_library(page: Any):
     sent_frame = list(to_frame(message.content(7), message.buffers()))
     echoed = page.evaluate(
         """async (bytes) => {
-            const { unframe } = await import("/engine/message_frames.js");
-            const made = unframe(Uint8Array.from(bytes).buffer);
+            const { decodeFrame } = await import("/engine/message_frames.js");
+            const made = decodeFrame(Uint8Array.from(bytes).buffer);
             const { weights, b } = made.arrays;
             return [made.kind, made.reply, made.name, Array.from(weights.data), weights.shape,
                 Array.from(b.data)];
@@ -272,7 +275,7 @@ def test_a_socket_says_hello_again_and_numbers_what_it_says(page: Any, tab: Any,
     messages = page.evaluate(
         """async () => {
             const { FakeSocket, settle } = await import("/fake_host.js");
-            const { frame, unframe } = await import("/engine/message_frames.js");
+            const { encodeFrame, decodeFrame } = await import("/engine/message_frames.js");
             const { SocketHost } = await import("/engine/socket_host.js");
             const real = window.WebSocket;
             window.WebSocket = FakeSocket;
@@ -284,21 +287,21 @@ def test_a_socket_says_hello_again_and_numbers_what_it_says(page: Any, tab: Any,
             await host.open();
             const [first] = FakeSocket.made;
             first.open();
-            first.receive(frame({ kind: "state", reply: 1, resources: { "plane/0": 4 } }));
+            first.receive(encodeFrame({ kind: "state", reply: 1, resources: { "plane/0": 4 } }));
             const answered = host.send("undo");
             const lost = host.send("redo").catch((error) => error.message);
             await settle();
-            const sent = first.sent.map(unframe).map(({ kind, seq }) => [kind, seq]);
-            first.receive(frame({ kind: "answer", reply: 2 }));
+            const sent = first.sent.map(decodeFrame).map(({ kind, seq }) => [kind, seq]);
+            first.receive(encodeFrame({ kind: "answer", reply: 2 }));
             const reply = (await answered).reply;
-            host.wait = 1;
+            host.retryDelay = 1;
             first.close();
             await new Promise((done) => setTimeout(done, 20));
             const second = FakeSocket.made[1];
             second.open();
             await settle();
-            const again = second.sent.map(unframe).map(({ kind, version }) => [kind, version]);
-            second.receive(frame({ kind: "state", reply: 4, resources: { "plane/0": 4 } }));
+            const again = second.sent.map(decodeFrame).map(({ kind, version }) => [kind, version]);
+            second.receive(encodeFrame({ kind: "state", reply: 4, resources: { "plane/0": 4 } }));
             const picture = await host.fetch("plane/0");
             const other = await host.fetch("lut/ocio:A B/c");
             const none = await host.fetch("nothing").catch((error) => error.message);

@@ -191,7 +191,7 @@ def test_what_is_added_to_a_mix_is_what_a_new_mix_has(page: Any, pictures: Any):
 def test_half_size_is_every_second_pixel(page: Any, pictures: Any):
     draw_panes(page, "cpu", pictures)
     light = page.evaluate(
-        "() => { view.pace = 60; bench.shown({ live: true }); "
+        "() => { view.mixMs = 60; bench.shown({ live: true }); "
         "return [Array.from(view.mixes.solution.light), view.step] }"
     )
     assert light[1] == 2
@@ -223,12 +223,12 @@ def test_a_lost_context_comes_back_empty(page: Any, pictures: Any):
             const away = view.gl.getExtension("WEBGL_lose_context");
             away.loseContext();
             await new Promise((done) => setTimeout(done, 50));
-            const lost = view.lost();
+            const lost = view.hasLostContext();
             const back = new Promise((done) =>
                 view.canvas.addEventListener("webglcontextrestored", done, { once: true }));
             away.restoreContext();
             await back;
-            return [lost, view.lost(), view.planes.count];
+            return [lost, view.hasLostContext(), view.planes.count];
         }"""
     )
     assert pixels_after == [True, False, 0]

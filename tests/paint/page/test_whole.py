@@ -130,8 +130,9 @@ def exporting(painter: Painter) -> None:
     painter.button("Export").click()
     painter.page.evaluate(
         """() => {
-          const writing = { task: 'export', done: 205, total: 1024, unit: 'samples per pixel' };
-          window.painter.store.set({ isWriting: true, writing });
+          const unit = 'samples per pixel';
+          const exportProgress = { task: 'export', done: 205, total: 1024, unit };
+          window.painter.store.set({ isExporting: true, exportProgress });
         }"""
     )
     folder = painter.page.locator(".export .folder").first
@@ -152,8 +153,8 @@ def messages(painter: Painter) -> None:
           const { TOAST } = await import('/fake/crowd.js');
           const basis = { task: 'basis', done: 128, total: 1024, unit: 'samples per pixel' };
           const toasts = [{ id: 1, text: TOAST, tone: 'warn' }];
-          const closed = { reason: 'taken', text: `${TOAST} ${TOAST}` };
-          window.painter.store.set({ basis, toasts, closed });
+          const closure = { reason: 'taken', text: `${TOAST} ${TOAST}` };
+          window.painter.store.set({ basis, toasts, closure });
         }"""
     )
 
@@ -198,7 +199,7 @@ def test_no_light_has_anything_cut(painter: Painter) -> None:
         painter.page.evaluate(
             """(k) => {
               const open = { colour: false, ask: false, lights: true, truth: false };
-              window.painter.store.set({ unfolded: [k], open });
+              window.painter.store.set({ openLights: [k], open });
             }""",
             k,
         )
@@ -226,7 +227,7 @@ def test_a_sentence_with_its_button_is_whole(painter: Painter) -> None:
             headline: 'Farther from the paint than the current lighting, which undo brings back, '
               + 'and changes the back wall by ΔE 6.2. Brighter light on the annex is missing: '
               + 'annex_window is switched off.',
-            help: HELP, deltaE: 23, deltaPresent: 6.9, isJudged: true,
+            advice: HELP, deltaE: 23, deltaPresent: 6.9, isJudgementCurrent: true,
           });
         }"""
     )
@@ -257,7 +258,7 @@ def test_lines_of_a_name_end_between_words(painter: Painter) -> None:
 
 def test_axe_finds_nothing_in_a_crowd(painter: Painter, axe: str) -> None:
     longest(painter)
-    painter.page.evaluate("() => window.painter.store.set({ unfolded: [0, 40] })")
+    painter.page.evaluate("() => window.painter.store.set({ openLights: [0, 40] })")
     painter.page.evaluate(axe)
     assert violations(painter.page, ".lightpaint") == []
 

@@ -11,7 +11,7 @@ export const PROTOCOL = 'lightpaint';
 
 /** Storage name of the key, which survives a reload. Storage belongs to one tab and one origin,
  * port included. */
-const KEPT = 'lightpaint-key';
+const STORAGE_KEY = 'lightpaint-key';
 
 /** HTTP statuses for a page from an earlier start of the server, or one without a key. */
 export const REFUSALS = [403, 410];
@@ -57,7 +57,7 @@ function tokenIn(fragment) {
 
 function storedKey() {
   try {
-    return sessionStorage.getItem(KEPT);
+    return sessionStorage.getItem(STORAGE_KEY);
   } catch {
     return null; // The browser may refuse to store anything.
   }
@@ -66,7 +66,7 @@ function storedKey() {
 /** @param {string} key */
 function storeKey(key) {
   try {
-    sessionStorage.setItem(KEPT, key);
+    sessionStorage.setItem(STORAGE_KEY, key);
   } catch {
     // Then a reloaded page needs the address with the token again.
   }

@@ -16,11 +16,11 @@ const SPACING = 0.12;
  * @param {number} distance in pixels @param {number} radius @param {number} hardness */
 function profile(distance, radius, hardness) {
   // A hard edge is one pixel wide and centred on the radius, which preserves the area.
-  const inner = hardness * Math.max(0, radius - 0.5);
-  const outer = radius + 0.5 * hardness;
-  if (distance <= inner) return 1;
-  if (distance >= outer) return 0;
-  return 0.5 + 0.5 * Math.cos((Math.PI * (distance - inner)) / (outer - inner));
+  const innerRadius = hardness * Math.max(0, radius - 0.5);
+  const outerRadius = radius + 0.5 * hardness;
+  if (distance <= innerRadius) return 1;
+  if (distance >= outerRadius) return 0;
+  return 0.5 + 0.5 * Math.cos((Math.PI * (distance - innerRadius)) / (outerRadius - innerRadius));
 }
 
 /** Apply one stamp. It moves the existing coverage towards 1.
@@ -29,16 +29,16 @@ function profile(distance, radius, hardness) {
 export function stamp(canvas, { x, y, pressure }, { size, hardness, flow }) {
   const radius = Math.max(0.5, size / 2);
   const reach = radius + 0.5;
-  const region = canvas.clipped(y - reach, y + reach, x - reach, x + reach);
+  const region = canvas.clip(y - reach, y + reach, x - reach, x + reach);
   const strength = flow * pressure;
-  const inner = hardness * Math.max(0, radius - 0.5);
-  const [outer2, inner2] = [(radius + 0.5 * hardness) ** 2, inner ** 2];
+  const innerRadius = hardness * Math.max(0, radius - 0.5);
+  const [outerSquare, innerSquare] = [(radius + 0.5 * hardness) ** 2, innerRadius ** 2];
   canvas.cover(region, (column, row, coverage) => {
     const [dx, dy] = [column + 0.5 - x, row + 0.5 - y];
     const square = dx * dx + dy * dy;
-    if (square >= outer2) return coverage;
-    const covered = square <= inner2 ? 1 : profile(Math.sqrt(square), radius, hardness);
-    return coverage + strength * covered * (1 - coverage);
+    if (square >= outerSquare) return coverage;
+    const stampCoverage = square <= innerSquare ? 1 : profile(Math.sqrt(square), radius, hardness);
+    return coverage + strength * stampCoverage * (1 - coverage);
   });
   return region;
 }
@@ -50,20 +50,20 @@ export class Path {
     this.canvas = canvas;
     this.brush = brush;
     /** @type {Point | null} */
-    this.last = null;
+    this.lastPoint = null;
     this.step = Math.max(0.5, SPACING * brush.size);
     /** Distance left to the next stamp. */
-    this.left = 0;
+    this.distanceToStamp = 0;
   }
 
   /** Continue the path to a point. @param {Point} point @returns {Region[]} what is covered anew */
   moveTo(point) {
-    const origin = this.last ?? point;
+    const origin = this.lastPoint ?? point;
     const length = Math.hypot(point.x - origin.x, point.y - origin.y);
     const regions = [];
     // The tolerance lets steps with round-off reach the end.
-    for (; this.left <= length + 1e-6; this.left += this.step) {
-      const t = length > 0 ? this.left / length : 0;
+    for (; this.distanceToStamp <= length + 1e-6; this.distanceToStamp += this.step) {
+      const t = length > 0 ? this.distanceToStamp / length : 0;
       const position = {
         x: origin.x + t * (point.x - origin.x),
         y: origin.y + t * (point.y - origin.y),
@@ -71,8 +71,8 @@ export class Path {
       };
       regions.push(stamp(this.canvas, position, this.brush));
     }
-    this.left -= length;
-    this.last = point;
+    this.distanceToStamp -= length;
+    this.lastPoint = point;
     return regions;
   }
 }
@@ -81,35 +81,35 @@ export class Path {
  * @param {number} flow @returns {Region} */
 export function fill(canvas, object, flow) {
   const { objects, width } = canvas;
-  const region = objects ? boundsOf(objects, width, object) : canvas.whole;
+  const region = objects ? boundsOf(objects, width, object) : canvas.wholeRegion;
   let count = 0;
   canvas.cover(region, (x, y, coverage) => {
     const isIn = !objects || objects[y * width + x] === object;
     if (isIn) count += 1;
     return isIn ? coverage + flow * (1 - coverage) : coverage;
   });
-  canvas.covers(count / canvas.importance.length);
+  canvas.setCoveredShare(count / canvas.importance.length);
   return region;
 }
 
 /** Cover everything. @param {PaintCanvas} canvas @returns {Region} */
 export function flood(canvas) {
-  canvas.cover(canvas.whole, () => 1);
-  canvas.coversAll();
-  return canvas.whole;
+  canvas.cover(canvas.wholeRegion, () => 1);
+  canvas.setFullyCovered();
+  return canvas.wholeRegion;
 }
 
 /** Return the bounding box of an object. @param {Int16Array} objects @param {number} width
  * @param {number} object @returns {Region} */
 function boundsOf(objects, width, object) {
-  let [top, bottom, left, right] = [Infinity, 0, Infinity, 0];
+  let [top, bottom, distanceToStamp, right] = [Infinity, 0, Infinity, 0];
   for (let p = 0; p < objects.length; p++) {
     if (objects[p] !== object) continue;
     const [y, x] = [Math.floor(p / width), p % width];
     top = Math.min(top, y);
     bottom = y + 1;
-    left = Math.min(left, x);
+    distanceToStamp = Math.min(distanceToStamp, x);
     right = Math.max(right, x + 1);
   }
-  return bottom ? [top, bottom, left, right] : [0, 0, 0, 0];
+  return bottom ? [top, bottom, distanceToStamp, right] : [0, 0, 0, 0];
 }

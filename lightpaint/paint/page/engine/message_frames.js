@@ -22,11 +22,11 @@ export const VERSION = 3;
 /** @typedef {import("./messages.js").LightInfo} Light */
 /** @typedef {import("../../../viewer/drawing/view_transform.js").Shaper} Shaper */
 
-/** @typedef {{name: string, dtype: string, shape: number[]}} About */
+/** @typedef {{name: string, dtype: string, shape: number[]}} BufferInfo */
 
 /** Return the name of a view's item: the plain name in the first view, `name@1` in the second.
  * @param {string} name @param {number} view */
-export function inView(name, view) {
+export function nameInView(name, view) {
   return view ? `${name}@${view}` : name;
 }
 
@@ -74,7 +74,7 @@ function dtypeOf(data) {
 }
 
 /** Return the `buffers` entries of some arrays.
- * @param {Arrays} arrays @returns {About[]} */
+ * @param {Arrays} arrays @returns {BufferInfo[]} */
 export function bufferInfo(arrays) {
   return Object.entries(arrays).map(([name, { data, shape }]) => ({
     name,
@@ -86,48 +86,48 @@ export function bufferInfo(arrays) {
 /** Encode a message as one binary frame.
  * @param {Record<string, unknown>} content @param {Arrays} [arrays]
  * @returns {ArrayBuffer} */
-export function frame(content, arrays = {}) {
+export function encodeFrame(content, arrays = {}) {
   const text = new TextEncoder().encode(
     JSON.stringify({ ...content, buffers: bufferInfo(arrays) }),
   );
   const pictures = Object.values(arrays);
-  const start = padded(4 + text.length);
-  const size = pictures.reduce((offset, { data }) => offset + padded(data.byteLength), start);
+  const start = padSize(4 + text.length);
+  const size = pictures.reduce((offset, { data }) => offset + padSize(data.byteLength), start);
   const buffer = new ArrayBuffer(size);
   new DataView(buffer).setUint32(0, text.length, true);
   const bytes = new Uint8Array(buffer);
   bytes.set(text, 4);
-  let place = start;
+  let offset = start;
   for (const { data } of pictures) {
-    bytes.set(new Uint8Array(data.buffer, data.byteOffset, data.byteLength), place);
-    place += padded(data.byteLength);
+    bytes.set(new Uint8Array(data.buffer, data.byteOffset, data.byteLength), offset);
+    offset += padSize(data.byteLength);
   }
   return buffer;
 }
 
 /** Decode a binary frame. Throws if it is not one.
  * @param {ArrayBuffer} buffer @returns {Message} */
-export function unframe(buffer) {
+export function decodeFrame(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
   if (4 + length > buffer.byteLength) throw new Error('a frame that is cut short');
   const content = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
-  return withArrays(content, buffer, padded(4 + length));
+  return attachArrays(content, buffer, padSize(4 + length));
 }
 
 /** Decode a message whose buffers are consecutive, each padded.
  * @param {Record<string, any>} content @param {ArrayBuffer} buffer @param {number} offset
  * @returns {Message} */
-function withArrays(content, buffer, offset) {
+function attachArrays(content, buffer, offset) {
   /** @type {Arrays} */
   const arrays = {};
-  for (const { name, dtype, shape } of /** @type {About[]} */ (content.buffers ?? [])) {
+  for (const { name, dtype, shape } of /** @type {BufferInfo[]} */ (content.buffers ?? [])) {
     arrays[name] = pictureOf(dtype, shape, buffer, offset);
-    offset += padded(arrays[name].data.byteLength);
+    offset += padSize(arrays[name].data.byteLength);
   }
   return { ...content, kind: String(content.kind), arrays };
 }
 
 /** @param {number} size */
-function padded(size) {
+function padSize(size) {
   return (size + 7) & ~7;
 }

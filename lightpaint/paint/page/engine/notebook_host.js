@@ -15,7 +15,7 @@ import { VERSION, bufferInfo, pictureOf } from './message_frames.js';
  *   void}} Model */
 
 /** Message numbers of this page; other pages of the same model use others. */
-const MESSAGES = 2 ** 32;
+const MESSAGES_PER_PAGE = 2 ** 32;
 
 /** Milliseconds without an answer before the page reports it. */
 const SILENCE_MS = 10_000;
@@ -29,16 +29,16 @@ export class ModelHost extends Emitter {
     super();
     this.model = model;
     this.page = 1 + Math.floor(Math.random() * (2 ** 20 - 1));
-    this.seq = this.page * MESSAGES;
+    this.seq = this.page * MESSAGES_PER_PAGE;
     /** @type {Map<number, {resolve: (message: Message) => void, reject: (error: Error) => void}>} */
-    this.asked = new Map();
+    this.requests = new Map();
     /** @type {(content: any, buffers: DataView[]) => void} */
     this.onContent = (content, buffers) => this.receive(content, buffers);
     model.on('msg:custom', this.onContent);
     // A comm is open from the start and can only close, for example when the kernel restarts. Later
     // messages are lost.
-    this.end = () => this.handleEnd();
-    model.on('comm_live_update', this.end);
+    this.onEnd = () => this.handleEnd();
+    model.on('comm_live_update', this.onEnd);
     this.isOver = false;
     this.isSilent = false;
     /** @type {ReturnType<typeof setTimeout> | undefined} */
@@ -68,44 +68,44 @@ export class ModelHost extends Emitter {
       },
     );
     const message = /** @type {Message} */ ({ ...content, arrays });
-    this.hush(false);
+    this.setSilent(false);
     this.emit(message.kind, message);
     if (message.kind === 'state') this.emit('connection', { kind: 'connection', state: 'open' });
     if (message.reply === undefined) return;
-    this.asked.get(message.reply)?.resolve(message);
-    this.asked.delete(message.reply);
-    this.listen(message.reply);
+    this.requests.get(message.reply)?.resolve(message);
+    this.requests.delete(message.reply);
+    this.awaitAnswer(message.reply);
   }
 
   /** Wait for the next answer, if one is pending. A busy kernel answers late; one that has ended
    * never answers, and the model may not learn of it. A message older than an answered one may have
    * been lost, which says nothing about the kernel.
    * @param {number} answeredSeq */
-  listen(answeredSeq) {
+  awaitAnswer(answeredSeq) {
     clearTimeout(this.timer);
-    const isWaiting = [...this.asked.keys()].some((seq) => seq > answeredSeq);
-    this.timer = isWaiting ? setTimeout(() => this.hush(true), SILENCE_MS) : undefined;
+    const isWaiting = [...this.requests.keys()].some((seq) => seq > answeredSeq);
+    this.timer = isWaiting ? setTimeout(() => this.setSilent(true), SILENCE_MS) : undefined;
   }
 
   /** @param {boolean} isSilent */
-  hush(isSilent) {
+  setSilent(isSilent) {
     if (isSilent !== this.isSilent) this.emit('silence', { kind: 'silence', isSilent });
     this.isSilent = isSilent;
   }
 
   /** Handle the end of the kernel. */
   handleEnd() {
-    this.leave(ENDED_TEXT);
-    this.hush(false);
+    this.rejectAll(ENDED_TEXT);
+    this.setSilent(false);
     this.emit('closed', { kind: 'closed', reason: 'ended', text: ENDED_TEXT });
   }
 
-  /** Reject pending and later requests. @param {string} why */
-  leave(why) {
+  /** Reject pending and later requests. @param {string} reason */
+  rejectAll(reason) {
     this.isOver = true;
     clearTimeout(this.timer);
-    for (const { reject } of this.asked.values()) reject(new Error(why));
-    this.asked.clear();
+    for (const { reject } of this.requests.values()) reject(new Error(reason));
+    this.requests.clear();
   }
 
   /** @template {keyof import("./messages.js").Requests} K @param {K} kind
@@ -116,8 +116,8 @@ export class ModelHost extends Emitter {
     return new Promise((resolve, reject) => {
       if (this.isOver) return reject(new Error(ENDED_TEXT));
       const seq = ++this.seq;
-      this.asked.set(seq, { resolve, reject });
-      if (this.timer === undefined) this.listen(seq - 1);
+      this.requests.set(seq, { resolve, reject });
+      if (this.timer === undefined) this.awaitAnswer(seq - 1);
       const content = { kind, seq, ...fields, buffers: bufferInfo(arrays) };
       // Copied, since painting continues in these arrays.
       const bytes = Object.values(arrays).map(({ data }) =>
@@ -137,7 +137,7 @@ export class ModelHost extends Emitter {
 
   close() {
     this.model.off('msg:custom', this.onContent);
-    this.model.off('comm_live_update', this.end);
-    this.leave('the painter is closed');
+    this.model.off('comm_live_update', this.onEnd);
+    this.rejectAll('the painter is closed');
   }
 }

@@ -46,7 +46,7 @@ export class PaintCanvas {
     /** (h, w, 3) halves. @type {Uint16Array | null} */
     this.albedo = null;
     /** Whether every pixel had paint before the stroke. */
-    this.isAll = false;
+    this.isFullyPainted = false;
     /** Index of the object at each pixel, -1 for none. @type {Int16Array | null} */
     this.objects = null;
     /** @type {Map<number, Tile> | null} */
@@ -54,20 +54,20 @@ export class PaintCanvas {
     /** Bounding box of the stroke. @type {Region | null} */
     this.region = null;
     /** Importance of what the stroke paints. */
-    this.full = 1;
+    this.strokeImportance = 1;
     /** Factor on the importance of earlier paint. */
-    this.lift = 1;
+    this.importanceFactor = 1;
   }
 
   /** @returns {Region} */
-  get whole() {
+  get wholeRegion() {
     return [0, this.height, 0, this.width];
   }
 
   /** A region of whole pixels within the picture.
    * @param {number} top @param {number} bottom @param {number} left @param {number} right
    * @returns {Region} */
-  clipped(top, bottom, left, right) {
+  clip(top, bottom, left, right) {
     const clamp = (/** @type {number} */ x, /** @type {number} */ maximum) =>
       Math.min(maximum, Math.max(0, x));
     const [y0, x0] = [clamp(Math.floor(top), this.height), clamp(Math.floor(left), this.width)];
@@ -78,9 +78,9 @@ export class PaintCanvas {
   begin() {
     this.tiles = new Map();
     this.region = null;
-    this.isAll = this.importance.every((x) => x > 0);
-    this.lift = 1;
-    this.covers(0);
+    this.isFullyPainted = this.importance.every((x) => x > 0);
+    this.importanceFactor = 1;
+    this.setCoveredShare(0);
   }
 
   /**
@@ -88,18 +88,18 @@ export class PaintCanvas {
    * picture (darkened as a whole, say) a stroke should have the same effect as over an unpainted
    * one, whose rest is held. @param {number} part
    */
-  covers(part) {
-    this.full = this.isAll ? accent(part) : 1;
+  setCoveredShare(part) {
+    this.strokeImportance = this.isFullyPainted ? accent(part) : 1;
   }
 
   /**
    * Mark the stroke as covering everything. Earlier strokes keep the effect that they had while the
    * rest was held.
    */
-  coversAll() {
+  setFullyCovered() {
     const total = this.importance.reduce((sum, x) => sum + x, 0);
-    this.lift = this.isAll ? 1 : accent(total / this.importance.length);
-    this.covers(1);
+    this.importanceFactor = this.isFullyPainted ? 1 : accent(total / this.importance.length);
+    this.setCoveredShare(1);
   }
 
   /** Cover pixels with the stroke.
@@ -117,7 +117,7 @@ export class PaintCanvas {
     const { region } = this;
     if (region)
       this.visitTiles(region, false, (tile, q, p) => {
-        this.restore(tile, q, p);
+        this.restorePixel(tile, q, p);
         tile.coverage[q] = 0;
       });
     return region;
@@ -129,9 +129,9 @@ export class PaintCanvas {
     const change = pixelChange(this, effect);
     const { importance, image, present } = this;
     this.visitTiles(region, false, (tile, q, p) => {
-      const covered = tile.coverage[q];
-      if (covered <= 0) return;
-      change(tile, q, p, covered);
+      const coverage = tile.coverage[q];
+      if (coverage <= 0) return;
+      change(tile, q, p, coverage);
       if (importance[p] < MIN_IMPORTANCE) importance[p] = 0;
       for (let i = 3 * p; i < 3 * p + 3; i++)
         image[i] = importance[p] ? Math.min(MAX_HALF, Math.max(0, image[i])) : VALUES[present[i]];
@@ -163,7 +163,7 @@ export class PaintCanvas {
     }
     if (this.tiles)
       this.visitTiles([top, bottom, left, right], false, (tile, q, p) => {
-        this.keep(tile, q, p);
+        this.storePixel(tile, q, p);
         tile.coverage[q] = 0;
       });
   }
@@ -175,12 +175,12 @@ export class PaintCanvas {
     for (let p = 0; p < this.importance.length; p++)
       if (!this.importance[p])
         for (let i = 3 * p; i < 3 * p + 3; i++) this.image[i] = VALUES[present[i]];
-    for (const tile of this.tiles?.values() ?? []) this.follow(tile);
+    for (const tile of this.tiles?.values() ?? []) this.updateTile(tile);
   }
 
   /** @param {Tile} tile */
-  follow(tile) {
-    const region = this.clipped(tile.top, tile.top + TILE, tile.left, tile.left + TILE);
+  updateTile(tile) {
+    const region = this.clip(tile.top, tile.top + TILE, tile.left, tile.left + TILE);
     this.visitTiles(region, false, (_, q, p) => {
       if (!tile.importance[q])
         for (let c = 0; c < 3; c++) tile.image[3 * q + c] = VALUES[this.present[3 * p + c]];
@@ -206,23 +206,23 @@ export class PaintCanvas {
   /** Return the object at a pixel, -1 for none. @param {number} x @param {number} y */
   objectAt(x, y) {
     const [column, row] = [Math.floor(x), Math.floor(y)];
-    const isIn = column >= 0 && row >= 0 && column < this.width && row < this.height;
-    return isIn && this.objects ? this.objects[row * this.width + column] : -1;
+    const isInside = column >= 0 && row >= 0 && column < this.width && row < this.height;
+    return isInside && this.objects ? this.objects[row * this.width + column] : -1;
   }
 
   /** Visit the pixels of a region, tile by tile of the stroke. isNew: create missing tiles instead
    * of skipping them.
-   * @param {Region} region @param {boolean} isNew
+   * @param {Region} region @param {boolean} createsTiles
    * @param {(tile: Tile, q: number, p: number, x: number, y: number) => void} visit q: place in
    * the tile, p: in the picture */
-  visitTiles([top, bottom, left, right], isNew, visit) {
+  visitTiles([top, bottom, left, right], createsTiles, visit) {
     const { tiles } = this;
     if (!tiles) return;
     const tilesPerRow = Math.ceil(this.width / TILE);
     for (let row = Math.floor(top / TILE); row * TILE < bottom; row++)
       for (let column = Math.floor(left / TILE); column * TILE < right; column++) {
         const key = row * tilesPerRow + column;
-        const tile = tiles.get(key) ?? (isNew ? this.tile(row * TILE, column * TILE) : null);
+        const tile = tiles.get(key) ?? (createsTiles ? this.tile(row * TILE, column * TILE) : null);
         if (!tile) continue;
         tiles.set(key, tile);
         const [y1, x1] = [Math.min(bottom, tile.top + TILE), Math.min(right, tile.left + TILE)];
@@ -244,18 +244,18 @@ export class PaintCanvas {
     const [y1, x1] = [Math.min(this.height, top + TILE), Math.min(this.width, left + TILE)];
     for (let y = top; y < y1; y++)
       for (let x = left; x < x1; x++)
-        this.keep(tile, (y - top) * TILE + x - left, y * this.width + x);
+        this.storePixel(tile, (y - top) * TILE + x - left, y * this.width + x);
     return tile;
   }
 
   /** @param {Tile} tile @param {number} q @param {number} p */
-  keep(tile, q, p) {
+  storePixel(tile, q, p) {
     for (let c = 0; c < 3; c++) tile.image[3 * q + c] = this.image[3 * p + c];
     tile.importance[q] = this.importance[p];
   }
 
   /** @param {Tile} tile @param {number} q @param {number} p */
-  restore(tile, q, p) {
+  restorePixel(tile, q, p) {
     for (let c = 0; c < 3; c++) this.image[3 * p + c] = tile.image[3 * q + c];
     this.importance[p] = tile.importance[q];
   }

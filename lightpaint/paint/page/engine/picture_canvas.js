@@ -7,10 +7,10 @@ import { DEFAULTS, panes } from '../../../viewer/drawing/view.js';
 /** @typedef {import("../../../viewer/drawing/view.js").Pane} Pane */
 
 /** Milliseconds without changes before a quick draft is redrawn sharply. */
-const REST = 180;
+const DRAFT_PAUSE_MS = 180;
 
 /** Milliseconds that a GPU has to come back. */
-const PATIENCE = 3000;
+const GPU_RECOVERY_MS = 3000;
 
 export class Screen {
   /** @param {HTMLElement} element
@@ -31,27 +31,27 @@ export class Screen {
     this.frame = 0;
     this.isLive = false;
     /** Whether a brush is down; slow work waits until it is lifted. */
-    this.isHeld = false;
+    this.isBrushDown = false;
     /** Whether the solution equals the current look. */
     this.isPresent = false;
     /** @type {ReturnType<typeof setTimeout> | undefined} */
-    this.rest = undefined;
+    this.pauseTimer = undefined;
     /** Milliseconds that a GPU has to come back. */
-    this.patience = PATIENCE;
+    this.recoveryMs = GPU_RECOVERY_MS;
     /** @type {ReturnType<typeof setTimeout> | undefined} */
-    this.waiting = undefined;
+    this.recoveryTimer = undefined;
   }
 
   /** Start a view for pictures of a size and a number of lights.
    * @param {[height: number, width: number]} size @param {number} count
    * @param {'gl' | 'cpu' | null} [viewName] */
   begin(size, count, viewName = this.options.view ?? null) {
-    clearTimeout(this.waiting);
+    clearTimeout(this.recoveryTimer);
     this.view?.close();
     this.view?.canvas.remove();
     this.size = size;
     this.count = count;
-    const onRestored = () => this.restored(view);
+    const onRestored = () => this.handleRestore(view);
     const view = chooseView(this.element, size, count, { view: viewName, onRestored });
     view.canvas.addEventListener('webglcontextlost', () => this.handleLoss(view));
     this.view = view;
@@ -69,17 +69,17 @@ export class Screen {
   handleLoss(view) {
     // A closed view releases its context, and its event arrives after the next view has started.
     if (view !== this.view) return;
-    clearTimeout(this.waiting);
-    this.waiting = setTimeout(() => {
+    clearTimeout(this.recoveryTimer);
+    this.recoveryTimer = setTimeout(() => {
       this.begin(this.size, this.count, 'cpu');
       this.options.refill();
-    }, this.patience);
+    }, this.recoveryMs);
   }
 
   /** @param {PictureView} view */
-  restored(view) {
+  handleRestore(view) {
     if (view !== this.view) return;
-    clearTimeout(this.waiting);
+    clearTimeout(this.recoveryTimer);
     view.setCount(this.count);
     this.options.refill();
   }
@@ -119,41 +119,41 @@ export class Screen {
 
   /** Draw in the next frame. isLive: draw a quick draft, and redraw sharply after a pause.
    * @param {boolean} [isLive] */
-  request(isLive = false) {
+  requestDraw(isLive = false) {
     if (isLive) {
       this.isLive = true;
-      this.wait();
+      this.scheduleSharpDraw();
     }
     this.frame ||= requestAnimationFrame(() => this.drawNow());
   }
 
   /** Draw sharply after a pause. */
-  wait() {
-    clearTimeout(this.rest);
-    this.rest = setTimeout(() => {
-      if (this.isHeld) return this.wait();
+  scheduleSharpDraw() {
+    clearTimeout(this.pauseTimer);
+    this.pauseTimer = setTimeout(() => {
+      if (this.isBrushDown) return this.scheduleSharpDraw();
       this.isLive = false;
-      this.request();
-    }, REST);
+      this.requestDraw();
+    }, DRAFT_PAUSE_MS);
   }
 
   drawNow() {
     cancelAnimationFrame(this.frame);
     this.frame = 0;
     const { left, right } = this.params;
-    const kinds = { left: this.standIn(left), right: this.standIn(right) };
+    const kinds = { left: this.substitute(left), right: this.substitute(right) };
     this.view?.draw({ ...this.params, ...kinds, live: this.isLive });
   }
 
   /** Return the picture shown in place of another.
    * @param {import('../../../viewer/drawing/view.js').Kind} kind */
-  standIn(kind) {
+  substitute(kind) {
     return kind === 'solution' && this.isPresent ? 'present' : kind;
   }
 
   close() {
-    clearTimeout(this.rest);
-    clearTimeout(this.waiting);
+    clearTimeout(this.pauseTimer);
+    clearTimeout(this.recoveryTimer);
     cancelAnimationFrame(this.frame);
     this.view?.close();
     this.view?.canvas.remove();

@@ -10,9 +10,9 @@ import { DEFAULT_TOOL, LABELS, Stroke, adjustArea } from './stroke.js';
 import { Emitter, SocketHost } from './socket_host.js';
 import { union } from '../../../viewer/drawing/cpu_picture.js';
 import { Encoder } from '../../../viewer/drawing/view_transform.js';
-import { fullOf } from '../../../viewer/drawing/overlay.js';
+import { maxImportance } from '../../../viewer/drawing/overlay.js';
 import { Screen } from './picture_canvas.js';
-import { at, zoomed } from '../../../viewer/drawing/view.js';
+import { hitTest, zoomAround } from '../../../viewer/drawing/view.js';
 import { SessionMirror } from './session_mirror.js';
 
 /** @typedef {import("./brush.js").Point} Point */
@@ -65,9 +65,9 @@ class PictureEngine extends Emitter {
     this.screen.resize(width, height);
   }
 
-  /** @param {import("./picture_slots.js").Show} show */
-  show(show) {
-    this.mirror.show(show);
+  /** @param {import("./picture_slots.js").Display} display */
+  show(display) {
+    this.mirror.show(display);
   }
 
   /** In CSS pixels of the element. @returns {(Omit<Pane, 'middle'>)[]} */
@@ -92,7 +92,7 @@ class PictureEngine extends Emitter {
     const { ratio, params } = this.screen;
     const panes = this.screen.panes();
     const [px, py] = [x * ratio, y * ratio];
-    return zoomed(params, at(panes, px, py)?.pane ?? panes[0], px, py, factor);
+    return zoomAround(params, hitTest(panes, px, py)?.pane ?? panes[0], px, py, factor);
   }
 
   /** Return the light of a picture at a pixel. @param {Kind} kind @param {number} x
@@ -110,7 +110,7 @@ class PictureEngine extends Emitter {
   paintAt(kind, x, y, light = this.lightAt(kind, x, y)) {
     const place = this.pixelAt(x, y);
     const { albedo, width } = this.mirror.canvas ?? {};
-    if (this.tool.as === 'colour' || !place || !albedo || !width) return light;
+    if (this.tool.paintMode === 'colour' || !place || !albedo || !width) return light;
     const index = 3 * (place[1] * width + place[0]);
     return /** @type {RGB} */ (
       light.map((x, c) => x / Math.max(MIN_ALBEDO, VALUES[albedo[index + c]]))
@@ -121,7 +121,7 @@ class PictureEngine extends Emitter {
    * there.
    * @param {number} x @param {number} y
    * @returns {{object: string | null, index: number, shares: number[]} | null} */
-  pointed(x, y) {
+  probe(x, y) {
     const place = this.pixelAt(x, y);
     const { canvas, state, weights } = this.mirror;
     if (!place || !this.screen.view || !canvas || !state) return null;
@@ -143,8 +143,8 @@ class PictureEngine extends Emitter {
   }
 
   /** Return the greatest painted importance, at least 1: full ink in the overlay. */
-  greatest() {
-    return fullOf(this.mirror.canvas?.importance ?? new Float32Array(0));
+  maxImportance() {
+    return maxImportance(this.mirror.canvas?.importance ?? new Float32Array(0));
   }
 
   /** Return the display codes of light at an exposure. @param {RGB} rgb @param {number} stops */
@@ -187,10 +187,10 @@ class PictureEngine extends Emitter {
   begin(point) {
     if (this.stroke) this.end();
     const { place } = this;
-    if (!place || place.strokes.isTaken || this.tool.tool === 'pick') return;
+    if (!place || place.strokes.isSessionLost || this.tool.tool === 'pick') return;
     const scale = this.panes()[0]?.scale ?? 1;
     this.stroke = new Stroke(place.canvas, this.tool, point, scale);
-    this.mirror.isPainting = this.screen.isHeld = true;
+    this.mirror.isPainting = this.screen.isBrushDown = true;
     place.strokes.begin();
     this.drawChange(this.stroke.begin());
   }
@@ -199,13 +199,13 @@ class PictureEngine extends Emitter {
   move(points) {
     if (!this.stroke) return;
     this.drawChange(this.stroke.move(points));
-    if (this.stroke.settings.tool === 'adjust') this.emit('asking', this.stroke.asked);
+    if (this.stroke.settings.tool === 'adjust') this.emit('adjustment', this.stroke.adjustment);
   }
 
   end() {
     const { stroke, place } = this;
     if (!stroke || !place) return;
-    const { stops, mired } = stroke.asked;
+    const { stops, mired } = stroke.adjustment;
     if (stroke.settings.tool === 'adjust' && !stops && !mired) return void this.cancel();
     this.clearStroke();
     place.canvas.end();
@@ -234,7 +234,7 @@ class PictureEngine extends Emitter {
 
   clearStroke() {
     this.stroke = null;
-    this.mirror.isPainting = this.screen.isHeld = false;
+    this.mirror.isPainting = this.screen.isBrushDown = false;
   }
 
   /** Draw a whole straight stroke. @param {Point} start @param {Point} end */
@@ -249,7 +249,7 @@ class PictureEngine extends Emitter {
   adjust(adjustment) {
     if (this.stroke) this.end();
     const { place } = this;
-    if (!place || place.strokes.isTaken) return;
+    if (!place || place.strokes.isSessionLost) return;
     place.strokes.begin();
     this.drawChange([adjustArea(place.canvas, adjustment)]);
     place.canvas.end();
@@ -264,7 +264,7 @@ class PictureEngine extends Emitter {
   }
 
   close() {
-    this.mirror.strokes?.hurry();
+    this.mirror.strokes?.flush();
     this.mirror.strokes?.close();
     this.mirror.loader.close();
     this.screen.close();

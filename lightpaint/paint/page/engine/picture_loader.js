@@ -25,100 +25,104 @@ export class PictureLoader {
     /** @type {Record<string, number>} */
     this.resources = {};
     /** Name of the picture wanted in each slot. @type {Map<string, string>} */
-    this.wanted = new Map();
+    this.wantedNames = new Map();
     /** Name and generation of the picture in each slot. @type {Map<string, string>} */
-    this.there = new Map();
+    this.loadedVersions = new Map();
     /** @type {Set<string>} */
-    this.onTheWay = new Set();
+    this.activeFetches = new Set();
     this.total = 0;
     /** Whether fetching is paused, since another page has the session. */
-    this.isHeld = false;
+    this.isPaused = false;
     this.isOver = false;
   }
 
   /** Existing pictures by name. @param {Record<string, number>} resources */
-  know(resources) {
+  addResources(resources) {
     this.resources = { ...this.resources, ...resources };
     this.pump();
   }
 
   /** Replace the list of existing pictures. @param {Record<string, number>} resources */
   begin(resources) {
-    this.isHeld = false;
+    this.isPaused = false;
     this.resources = {};
-    this.know(resources);
+    this.addResources(resources);
   }
 
   /** Pause until the session lists its pictures again. */
-  hold() {
-    this.isHeld = true;
+  pause() {
+    this.isPaused = true;
   }
 
   /** Set the wanted pictures of slots, and keep them up to date. Fetching begins once all are
    * named, since it could otherwise fetch a slot's earlier picture.
    * @param {[slot: string, name: string | null][]} names null for none any more */
-  want(names) {
+  setWanted(names) {
     for (const [slot, name] of names)
-      if (name === null) this.wanted.delete(slot);
-      else this.wanted.set(slot, name);
+      if (name === null) this.wantedNames.delete(slot);
+      else this.wantedNames.set(slot, name);
     this.pump();
   }
 
   /** Note that a picture has changed. @param {string} name */
   renew(name) {
-    this.know({ [name]: (this.resources[name] ?? 0) + 0.5 });
+    this.addResources({ [name]: (this.resources[name] ?? 0) + 0.5 });
   }
 
   /** Forget the pictures in slots, which the view has lost.
    * @param {(slot: string) => boolean} [isLost] */
   forget(isLost = () => true) {
-    for (const slot of [...this.there.keys()]) if (isLost(slot)) this.there.delete(slot);
+    for (const slot of [...this.loadedVersions.keys()])
+      if (isLost(slot)) this.loadedVersions.delete(slot);
   }
 
   /** Return the slots without their wanted picture. */
-  missing() {
-    return [...this.wanted].filter(
-      ([slot, name]) => name in this.resources && this.there.get(slot) !== this.version(name),
+  missingSlots() {
+    return [...this.wantedNames].filter(
+      ([slot, name]) =>
+        name in this.resources && this.loadedVersions.get(slot) !== this.versionOf(name),
     );
   }
 
   /** @param {string} name */
-  version(name) {
+  versionOf(name) {
     return `${this.resources[name]} ${name}`;
   }
 
   pump() {
-    if (this.isOver || this.isHeld) return;
-    const missing = this.missing();
-    this.total = missing.length ? Math.max(this.total, missing.length) : 0;
-    const isFirst = missing.some(([slot]) => slot.startsWith('plane ') && !this.there.has(slot));
-    this.onProgress(this.total - missing.length, this.total, isFirst);
-    for (const [slot, name] of missing) {
-      if (this.onTheWay.size >= MAX_FETCHES) return;
-      if (!this.onTheWay.has(slot)) this.load(slot, name);
+    if (this.isOver || this.isPaused) return;
+    const slots = this.missingSlots();
+    this.total = slots.length ? Math.max(this.total, slots.length) : 0;
+    const isFirst = slots.some(
+      ([slot]) => slot.startsWith('plane ') && !this.loadedVersions.has(slot),
+    );
+    this.onProgress(this.total - slots.length, this.total, isFirst);
+    for (const [slot, name] of slots) {
+      if (this.activeFetches.size >= MAX_FETCHES) return;
+      if (!this.activeFetches.has(slot)) this.load(slot, name);
     }
   }
 
   /** @param {string} slot @param {string} name */
   async load(slot, name) {
-    this.onTheWay.add(slot);
-    const version = this.version(name);
-    let wait = 0;
+    this.activeFetches.add(slot);
+    const versionOf = this.versionOf(name);
+    let delay = 0;
     try {
       const picture = await this.host.fetch(name);
-      if (this.wanted.get(slot) === name && !this.isOver) {
-        this.there.set(slot, version);
+      if (this.wantedNames.get(slot) === name && !this.isOver) {
+        this.loadedVersions.set(slot, versionOf);
         this.use(slot, name, picture);
       }
     } catch (error) {
       // If it was refused since another page has the session, it comes when this page has it again.
-      if (!this.isHeld) {
-        wait = RETRY_MS;
+      if (!this.isPaused) {
+        delay = RETRY_MS;
         console.warn(error);
       }
     }
-    if (wait) await new Promise((resolve) => setTimeout(resolve, wait));
-    this.onTheWay.delete(slot);
+    if (delay) await new Promise((resolve) => setTimeout(resolve, delay));
+    this.activeFetches.delete(slot);
     this.pump();
   }
 

@@ -2,11 +2,11 @@
  * The page's copy of the session: painting, weights and pictures, kept up to date by its messages.
  */
 import { PaintCanvas } from './paint_canvas.js';
-import { union } from '../../../viewer/drawing/cpu_picture.js';
 import { PictureLoader } from './picture_loader.js';
+import { PictureState } from './picture_state.js';
 import { SRGB, lutOf } from '../../../viewer/drawing/view_transform.js';
-import { VERSION, inView, stateOfView } from './message_frames.js';
-import { showsPresent, sizes, wantedPictures } from './picture_slots.js';
+import { VERSION, nameInView, stateOfView } from './message_frames.js';
+import { showsPresent, sizesText, wantedPictures } from './picture_slots.js';
 import { StrokeSender } from './stroke_sender.js';
 
 /** @typedef {import("./socket_host.js").Host} Host */
@@ -15,69 +15,52 @@ import { StrokeSender } from './stroke_sender.js';
 /** @typedef {import("./message_frames.js").Region} Region */
 /** @typedef {import("./message_frames.js").RGB} RGB */
 /** @typedef {import("./picture_canvas.js").Screen} Screen */
-/** @typedef {import("./picture_slots.js").Show} Show */
+/** @typedef {import("./picture_slots.js").Display} Display */
 
-export class SessionMirror {
+export class SessionMirror extends PictureState {
   /** @param {Host} host @param {Screen} screen
    * @param {(kind: string, event: any) => void} emit */
   constructor(host, screen, emit) {
+    super(screen);
     this.host = host;
-    this.screen = screen;
     this.emit = emit;
     this.loader = new PictureLoader(
       host,
       (slot, name, picture) => this.takePicture(slot, name, picture),
       (done, total, isFirst) => emit('loading', { done, total, isFirst }),
     );
-    /** The last state from the session, and its part for the current view.
-     * @type {Message | null} */
+    /** The last state from the session, of all views. @type {Message | null} */
     this.latestState = null;
-    /** @type {Message | null} */
-    this.state = null;
     /** Index of the current view. */
     this.view = 0;
-    /** @type {PaintCanvas | null} */
-    this.canvas = null;
     /** @type {StrokeSender | null} */
     this.strokes = null;
-    /** @type {Show | null} */
-    this.shown = null;
-    this.weights = new Float64Array();
-    /** Whether lights have moved since the current look. */
-    this.isMoved = false;
     /** Revision of the session in its last message. */
     this.version = -1;
-    /** @type {import("../../../viewer/drawing/view_transform.js").Lut} */
-    this.lut = SRGB;
-    /** Whether the current look exists, and whether the view has it. */
-    this.knowsPresent = false;
-    this.hasPresent = false;
     /** Number of times that the session has sent the canvas. */
-    this.patches = 0;
+    this.patchCount = 0;
     /** Whether the canvas equals the session's. */
     this.isReady = false;
-    /** Whether a stroke is in progress. */
-    this.isPainting = false;
     host.on('state', (message) => this.begin(message));
     host.on('answer', (message) => this.takeAnswer(message));
-    host.on('patch', (message) => this.patched(message));
-    host.on('closed', () => this.loader.hold());
+    host.on('patch', (message) => this.takePatch(message));
+    host.on('closed', () => this.loader.pause());
     host.on('renewed', ({ resources }) => {
-      this.loader.know(resources);
-      this.want();
+      this.loader.addResources(resources);
+      this.requestPictures();
     });
-    host.on('verified', ({ view = 0 }) => this.loader.renew(inView('verified', view)));
-    host.on('explained', ({ view = 0 }) => this.loader.renew(inView('beyond', view)));
+    host.on('verified', ({ view = 0 }) => this.loader.renew(nameInView('verified', view)));
+    host.on('explained', ({ view = 0 }) => this.loader.renew(nameInView('beyond', view)));
   }
 
   /** @param {Message} state */
   begin(state) {
     this.version = -1;
     this.open(state, this.view);
-    this.mix(state);
+    this.takeWeights(state);
     this.loader.begin(state.resources);
-    this.want();
-    if (this.loader.there.has('present')) this.sync();
+    this.requestPictures();
+    if (this.loader.loadedVersions.has('present')) this.sync();
   }
 
   /** Show another view. @param {number} view */
@@ -86,16 +69,17 @@ export class SessionMirror {
     if (!latestState?.views?.[view] || view === this.view) return;
     // This is not the first state: later changes have to be requested.
     this.open({ ...latestState, first: false }, view);
-    this.weigh();
-    this.want();
+    this.showWeights();
+    this.requestPictures();
   }
 
   /** @param {Message} message @param {number} view */
   open(message, view) {
-    const previous = this.state;
+    const { state: previous } = this;
     const state = stateOfView(message, view);
-    const isOther = !previous || !this.latestState || sizes(this.latestState) !== sizes(message);
-    const isSame = !isOther && this.view === view;
+    const hasOtherSizes =
+      !previous || !this.latestState || sizesText(this.latestState) !== sizesText(message);
+    const isSame = !hasOtherSizes && this.view === view;
     this.latestState = message;
     this.state = state;
     this.view = view;
@@ -106,12 +90,12 @@ export class SessionMirror {
     const [height, width] = /** @type {[number, number]} */ (state.size);
     this.screen.begin([height, width], state.lights.length, this.screen.view?.name);
     this.canvas = new PaintCanvas([height, width], new Uint16Array(3 * height * width));
-    if (isOther || !this.strokes) {
-      const refused = () => this.host.send('hello', { version: VERSION }).catch(() => {});
+    if (hasOtherSizes || !this.strokes) {
+      const requestState = () => this.host.send('hello', { version: VERSION }).catch(() => {});
       this.strokes?.close();
       const reportLoss = (/** @type {number} */ count, /** @type {boolean} */ isStale) =>
         this.emit('lost', { count, isStale });
-      this.strokes = new StrokeSender(this.host, refused, reportLoss);
+      this.strokes = new StrokeSender(this.host, requestState, reportLoss);
       this.strokes.count = Math.max(0, Number(state.stroke) || 0);
     }
     this.strokes.paintOn(this.canvas, view);
@@ -125,7 +109,7 @@ export class SessionMirror {
    * @param {number} count */
   setLights(count) {
     const { loader, screen } = this;
-    for (let k = count; k < screen.count; k++) loader.want([[`plane ${k}`, null]]);
+    for (let k = count; k < screen.count; k++) loader.setWanted([[`plane ${k}`, null]]);
     screen.setCount(count);
     this.refill();
   }
@@ -135,30 +119,17 @@ export class SessionMirror {
   takeAnswer(message) {
     if (message.version < this.version) return;
     this.version = message.version ?? this.version;
-    this.mix(message);
-  }
-
-  /** Weights that come with a message. @param {Message} message */
-  mix(message) {
-    const { poses, added_lights: addedLights } = message;
-    if (poses && addedLights) this.isMoved = Object.keys(poses).length + addedLights.length > 0;
-    else if (poses) this.isMoved ||= Object.keys(poses).length > 0;
-    const weights = message.arrays?.weights?.data;
-    if (!weights) return;
-    this.weights = Float64Array.from(weights);
-    this.weigh();
-    // The exact answer comes when the brush rests, and should be drawn sharply.
-    this.screen.request(!message.exact);
+    this.takeWeights(message);
   }
 
   /** @param {Message} message */
-  patched(message) {
+  takePatch(message) {
     const { canvas, strokes } = this;
     this.takeAnswer(message);
     const { image, importance } = message.arrays;
-    const isOwn = strokes?.isDropping;
+    const isOwnDrop = strokes?.isDropping;
     if (strokes) strokes.isDropping = false;
-    if (!canvas || !image || !importance || isOwn) return;
+    if (!canvas || !image || !importance || isOwnDrop) return;
     const { view = 0, views = [] } = message;
     if (view !== this.view) {
       // Show the view in which undo changed something.
@@ -166,7 +137,7 @@ export class SessionMirror {
       return;
     }
     const region = /** @type {Region} */ (message.region);
-    this.patches++;
+    this.patchCount++;
     canvas.set(
       region,
       /** @type {Float32Array} */ (image.data),
@@ -179,39 +150,39 @@ export class SessionMirror {
   async sync() {
     const { canvas, strokes } = this;
     if (!canvas || !strokes) return;
-    await strokes.settled();
+    await strokes.settle();
     if (strokes.isPending) return;
-    const [{ count }, { patches }] = [strokes, this];
+    const [{ count }, { patchCount }] = [strokes, this];
     try {
       const [image, importance] = await Promise.all(
-        ['painting', 'importance'].map((name) => this.host.fetch(inView(name, this.view))),
+        ['painting', 'importance'].map((name) => this.host.fetch(nameInView(name, this.view))),
       );
       // Paint or undo since then is newer.
       if (strokes.isPending || canvas !== this.canvas) return;
-      if (strokes.count !== count || this.patches !== patches) {
+      if (strokes.count !== count || this.patchCount !== patchCount) {
         if (!this.isReady) this.sync();
         return;
       }
       canvas.set(
-        canvas.whole,
+        canvas.wholeRegion,
         /** @type {Float32Array} */ (image.data),
         /** @type {Float32Array} */ (importance.data),
       );
       this.isReady = true;
-      this.redraw([canvas.whole]);
+      this.redraw([canvas.wholeRegion]);
     } catch (error) {
       // A page without the session has been told so already.
-      if (this.loader.isHeld) return;
+      if (this.loader.isPaused) return;
       this.emit('trouble', { text: error instanceof Error ? error.message : String(error) });
     }
   }
 
   /** Tell the loader which pictures to keep up to date. */
-  want() {
-    const { state, shown, loader, view } = this;
+  requestPictures() {
+    const { state, display, loader, view } = this;
     if (!state) return;
-    loader.want(wantedPictures(state.lights.length, shown, view, loader.resources));
-    if ((shown?.transform ?? 'srgb') === 'srgb') this.setLut(SRGB);
+    loader.setWanted(wantedPictures(state.lights.length, display, view, loader.resources));
+    if ((display?.transform ?? 'srgb') === 'srgb') this.setLut(SRGB);
   }
 
   /** @param {string} slot @param {string} name @param {Picture} picture */
@@ -230,7 +201,7 @@ export class SessionMirror {
     else if (slot === 'objects') canvas.objects = /** @type {Int16Array} */ (data);
     else if (slot === 'verified') view.setPicture('verified', /** @type {Uint16Array} */ (data));
     else if (slot === 'beyond') view.setBeyond(/** @type {Uint8Array} */ (data));
-    this.screen.request();
+    this.screen.requestDraw();
   }
 
   /** @param {Uint16Array} present */
@@ -239,83 +210,34 @@ export class SessionMirror {
     if (!canvas || !state) return;
     canvas.setPresent(present);
     this.knowsPresent = true;
-    this.weigh();
+    this.showWeights();
     this.showPresent();
     if (!this.isReady && state.first) this.isReady = true;
     else if (!this.isReady) this.sync();
-    this.redraw([canvas.whole]);
-  }
-
-  /** @param {import("../../../viewer/drawing/view_transform.js").Lut} lut */
-  setLut(lut) {
-    this.lut = lut;
-    this.screen.view?.setLut(lut);
+    this.redraw([canvas.wholeRegion]);
   }
 
   /** Set all pictures again, in a new view or one that has lost them. */
   refill() {
     this.setLut(this.lut);
-    this.weigh();
+    this.showWeights();
     this.showPresent();
-    if (this.canvas) this.redraw([this.canvas.whole]);
+    if (this.canvas) this.redraw([this.canvas.wholeRegion]);
     this.loader.forget(
       (slot) => slot.startsWith('plane ') || slot === 'verified' || slot === 'beyond',
     );
-    this.want();
+    this.requestPictures();
   }
 
-  /** @param {Show} show */
-  show(show) {
-    const previous = this.shown;
-    this.shown = show;
-    this.screen.params = { ...show, live: false };
-    if (previous?.transform !== show.transform || previous?.clean !== show.clean) this.want();
-    this.weigh();
-    if (showsPresent(show) !== showsPresent(previous)) this.showPresent();
-    this.screen.request();
-  }
-
-  /** Tell the view which weights are shown. */
-  weigh() {
-    const { view } = this.screen;
-    if (!view || !this.state) return;
-    const { gains = null, instead = null, other = null } = this.shown ?? {};
-    const weights = Float64Array.from(instead?.flat() ?? this.weights);
-    if (gains) weights.forEach((weight, i) => (weights[i] = gains[Math.floor(i / 3)] ? weight : 0));
-    if (weights.length === 3 * this.state.lights.length) view.setWeights(weights);
-    if (other) view.setWeights(Float64Array.from(other.flat()), 'other');
-    this.stand(weights);
-  }
-
-  /** Unchanged lights give the current look, which arrives before the planes and is denoised.
-   * @param {Float64Array} weights */
-  stand(weights) {
-    const { screen, canvas, state, shown } = this;
-    const present =
-      state?.lights.flatMap((/** @type {{present: number[]}} */ light) => light.present) ?? [];
-    const isClean = shown?.clean ?? true;
-    const isPresent =
-      isClean &&
-      !this.isMoved &&
-      weights.every((weight, i) => Math.abs(weight - present[i]) <= 1e-9 * present[i]);
-    screen.isPresent = isPresent && this.knowsPresent;
-    if (screen.isPresent !== this.hasPresent && canvas) this.showPresent();
-  }
-
-  /** Give the view the current look while it is shown. */
-  showPresent() {
-    const { screen, canvas, shown } = this;
-    const isShown = screen.isPresent || showsPresent(shown);
-    this.hasPresent = screen.isPresent;
-    screen.view?.setPicture('present', isShown && canvas ? canvas.present : null);
-  }
-
-  /** @param {Region[]} regions */
-  redraw(regions) {
-    const { canvas } = this;
-    const region = regions.reduce((a, b) => /** @type {Region} */ (union(a, b)), regions[0]);
-    if (!canvas || !region) return;
-    this.screen.view?.setCanvas(region, canvas.image, canvas.importance);
-    this.screen.request(this.isPainting);
+  /** @param {Display} display */
+  show(display) {
+    const { display: previous } = this;
+    this.display = display;
+    this.screen.params = { ...display, live: false };
+    if (previous?.transform !== display.transform || previous?.clean !== display.clean)
+      this.requestPictures();
+    this.showWeights();
+    if (showsPresent(display) !== showsPresent(previous)) this.showPresent();
+    this.screen.requestDraw();
   }
 }

@@ -5,7 +5,7 @@
  * begins with `hello`.
  */
 import { AccessKey, PROTOCOL, REFUSALS, authorization } from './access_key.js';
-import { VERSION, frame, pictureOf, unframe } from './message_frames.js';
+import { VERSION, encodeFrame, pictureOf, decodeFrame } from './message_frames.js';
 
 /** @typedef {import("./message_frames.js").Arrays} Arrays */
 /** @typedef {import("./message_frames.js").Message} Message */
@@ -62,28 +62,28 @@ export class Emitter {
 }
 
 /** Milliseconds before a lost connection is retried: the first and the longest delay. */
-const WAITS = { first: 250, most: 5000 };
+const RETRY_DELAYS_MS = { first: 250, max: 5000 };
 
 /** @implements {Host} */
 export class SocketHost extends Emitter {
   /** The page's origin, and the holder of the server's key.
-   * @param {string | URL} [base] @param {{key: () => Promise<string | null>}} [entry] */
-  constructor(base = document.baseURI, entry = new AccessKey(base)) {
+   * @param {string | URL} [base] @param {{key: () => Promise<string | null>}} [keySource] */
+  constructor(base = document.baseURI, keySource = new AccessKey(base)) {
     super();
     this.base = new URL('.', base);
-    this.entry = entry;
+    this.keySource = keySource;
     /** Without the key the server answers nothing. @type {string | null} */
     this.key = null;
     /** Identifies this page to the session after a reconnection. */
     this.page = crypto.randomUUID?.() ?? String(Math.random());
     this.seq = 0;
     /** @type {Map<number, {resolve: (message: Message) => void, reject: (error: Error) => void}>} */
-    this.asked = new Map();
+    this.requests = new Map();
     /** @type {Record<string, number>} */
     this.generations = {};
     /** @type {WebSocket | null} */
     this.socket = null;
-    this.wait = WAITS.first;
+    this.retryDelay = RETRY_DELAYS_MS.first;
     this.isOver = false;
     /** @type {ReturnType<typeof setTimeout> | undefined} */
     this.timer = undefined;
@@ -92,12 +92,12 @@ export class SocketHost extends Emitter {
   /** Connect, now and whenever the connection is lost. */
   async open() {
     try {
-      this.key ??= await this.entry.key();
+      this.key ??= await this.keySource.key();
     } catch {
       return this.retry(); // The server is not running.
     }
     if (this.isOver) return;
-    if (this.key === null) this.refuse();
+    if (this.key === null) this.stopAsStale();
     else this.connect(this.key);
   }
 
@@ -113,11 +113,11 @@ export class SocketHost extends Emitter {
       wasOpen = true;
       this.send('hello', { version: VERSION }).catch(() => {});
     };
-    socket.onmessage = ({ data }) => this.receive(unframe(data));
+    socket.onmessage = ({ data }) => this.receive(decodeFrame(data));
     socket.onclose = () => {
       this.handleDrop(socket);
       // Browsers do not tell a page why a socket was refused.
-      if (!wasOpen && !this.isOver) void this.askWhy();
+      if (!wasOpen && !this.isOver) void this.checkRefusal();
     };
   }
 
@@ -126,8 +126,8 @@ export class SocketHost extends Emitter {
     if (socket !== this.socket) return;
     this.socket = null;
     const error = new Error('the connection to the painter is lost');
-    for (const { reject } of this.asked.values()) reject(error);
-    this.asked.clear();
+    for (const { reject } of this.requests.values()) reject(error);
+    this.requests.clear();
     this.retry();
   }
 
@@ -135,25 +135,25 @@ export class SocketHost extends Emitter {
   retry() {
     if (this.isOver) return;
     this.emit('connection', { kind: 'connection', state: 'lost' });
-    this.timer = setTimeout(() => void this.open(), this.wait);
-    this.wait = Math.min(WAITS.most, 2 * this.wait);
+    this.timer = setTimeout(() => void this.open(), this.retryDelay);
+    this.retryDelay = Math.min(RETRY_DELAYS_MS.max, 2 * this.retryDelay);
   }
 
   /** Report that the server does not know this page, and stop asking. */
-  refuse() {
+  stopAsStale() {
     this.close();
     this.emit('connection', { kind: 'connection', state: 'stale' });
   }
 
   /** Return whether a server runs that does not know this page. Asking it again would take the
    * session from the page at the new address. */
-  async askWhy() {
+  async checkRefusal() {
     try {
       const options = /** @type {RequestInit} */ ({ method: 'HEAD', cache: 'no-store' });
       const url = new URL('key', this.base);
       const { status } = await fetch(url, { ...options, ...authorization(this.key) });
       if (!REFUSALS.includes(status) || this.socket?.readyState === WebSocket.OPEN) return;
-      this.refuse();
+      this.stopAsStale();
     } catch {
       // The server is not running.
     }
@@ -164,16 +164,16 @@ export class SocketHost extends Emitter {
     const { kind, reply } = message;
     if (kind === 'state' || kind === 'renewed')
       this.generations = { ...this.generations, ...message.resources };
-    const isThere = kind === 'state' || kind === 'waiting';
-    if (isThere) this.wait = WAITS.first;
+    const isAlive = kind === 'state' || kind === 'waiting';
+    if (isAlive) this.retryDelay = RETRY_DELAYS_MS.first;
     if (kind === 'state') this.generations = { ...message.resources };
     // A page of another version, or one that was dismissed, does not reconnect by itself.
     if (kind === 'closed' && message.reason === 'version') this.isOver = true;
     this.emit(kind, message);
-    if (isThere) this.emit('connection', { kind: 'connection', state: 'open' });
+    if (isAlive) this.emit('connection', { kind: 'connection', state: 'open' });
     if (reply === undefined) return;
-    this.asked.get(reply)?.resolve(message);
-    this.asked.delete(reply);
+    this.requests.get(reply)?.resolve(message);
+    this.requests.delete(reply);
   }
 
   /** @template {keyof Requests} K @param {K} kind @param {Requests[K]} [fields]
@@ -185,8 +185,8 @@ export class SocketHost extends Emitter {
       if (this.socket?.readyState !== WebSocket.OPEN)
         return reject(new Error('there is no connection to the painter'));
       const seq = ++this.seq;
-      this.asked.set(seq, { resolve, reject });
-      this.socket.send(frame({ kind, seq, ...fields }, arrays));
+      this.requests.set(seq, { resolve, reject });
+      this.socket.send(encodeFrame({ kind, seq, ...fields }, arrays));
     });
   }
 

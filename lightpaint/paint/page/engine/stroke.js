@@ -12,13 +12,13 @@ import { wholeAdjustment } from './whole_adjustment.js';
 
 /**
  * rgb: linear light of the paint. size: diameter in pixels of the picture. importance: factor of
- * the importance brush. about: whether a drag adjusts a soft spot of that size (the default) or the
+ * the importance brush. adjustedArea: whether a drag adjusts a soft spot of that size (the default) or the
  * object under it.
- * @typedef {{tool: Tool, rgb: RGB, as: 'light' | 'colour', size: number, hardness: number,
- *   flow: number, importance: number, about?: 'spot' | 'object'}} ToolSettings */
+ * @typedef {{tool: Tool, rgb: RGB, paintMode: 'light' | 'colour', size: number, hardness: number,
+ *   flow: number, importance: number, adjustedArea?: 'spot' | 'object'}} ToolSettings */
 
 /** Screen pixels of a drag per stop and per mired. */
-const DRAG = { stop: 80, mired: 1 };
+const DRAG_PIXELS = { stop: 80, mired: 1 };
 
 /** Largest change of a drag, in stops. */
 const MAX_STOPS = 8;
@@ -27,7 +27,7 @@ const MAX_STOPS = 8;
 export const DEFAULT_TOOL = {
   tool: 'brush',
   rgb: [1, 1, 1],
-  as: 'colour',
+  paintMode: 'colour',
   size: 60,
   hardness: 0.5,
   flow: 1,
@@ -48,7 +48,7 @@ export const LABELS = {
 /** Return the effect that changes brightness and warmth. @param {number} stops
  * @param {number} mired
  * @returns {Effect} */
-export function adjustment(stops, mired) {
+export function adjustEffect(stops, mired) {
   return { kind: 'adjust', gain: 2 ** stops, tint: warmer(mired) };
 }
 
@@ -65,7 +65,7 @@ export class Stroke {
     this.effect = effectOf(canvas, settings);
     this.path = new Path(canvas, settings);
     /** The change that the drag asks for. */
-    this.asked = { stops: 0, mired: 0 };
+    this.adjustment = { stops: 0, mired: 0 };
   }
 
   /** @returns {Region[]} */
@@ -73,11 +73,11 @@ export class Stroke {
     const { canvas, settings, start } = this;
     if (settings.tool === 'fill') {
       const object = canvas.objectAt(start.x, start.y);
-      return this.applied([fill(canvas, object, settings.flow)]);
+      return this.apply([fill(canvas, object, settings.flow)]);
     }
-    if (settings.tool !== 'adjust') return this.applied(this.path.moveTo(start));
+    if (settings.tool !== 'adjust') return this.apply(this.path.moveTo(start));
     const object = canvas.objectAt(start.x, start.y);
-    if (settings.about === 'object' && object >= 0) fill(canvas, object, 1);
+    if (settings.adjustedArea === 'object' && object >= 0) fill(canvas, object, 1);
     else
       stamp(canvas, { ...start, pressure: 1 }, { size: 2 * settings.size, hardness: 0, flow: 1 });
     return [];
@@ -90,61 +90,61 @@ export class Stroke {
     if (!last || tool === 'fill') return [];
     if (tool === 'adjust') return this.adjust(last);
     if (tool === 'line') return this.line(last);
-    return this.applied(points.flatMap((point) => this.path.moveTo(point)));
+    return this.apply(points.flatMap((point) => this.path.moveTo(point)));
   }
 
   /** Draw a straight line from the start. @param {Point} end @returns {Region[]} */
   line(end) {
     const { canvas, settings, start } = this;
-    const uncovered = canvas.uncover();
+    const oldRegion = canvas.uncover();
     canvas.region = null;
     const path = new Path(canvas, settings);
     // The last stamp is at the end of the line.
     const length = Math.hypot(end.x - start.x, end.y - start.y);
     path.step = length / Math.max(1, Math.ceil(length / path.step)) || path.step;
-    const ends = [start, end].map((point) => path.moveTo({ ...point, pressure: 1 }));
-    const regions = ends.flat();
-    return [...(uncovered ? [uncovered] : []), ...this.applied(regions)];
+    const endRegions = [start, end].map((point) => path.moveTo({ ...point, pressure: 1 }));
+    const regions = endRegions.flat();
+    return [...(oldRegion ? [oldRegion] : []), ...this.apply(regions)];
   }
 
   /** @param {Point} point @returns {Region[]} */
   adjust(point) {
     const { start, scale, canvas } = this;
-    const stops = ((start.y - point.y) * scale) / DRAG.stop;
-    const mired = ((point.x - start.x) * scale) / DRAG.mired;
-    this.asked = { stops: Math.min(MAX_STOPS, Math.max(-MAX_STOPS, stops)), mired };
-    this.effect = adjustment(this.asked.stops, mired);
-    return this.applied(canvas.region ? [canvas.region] : []);
+    const stops = ((start.y - point.y) * scale) / DRAG_PIXELS.stop;
+    const mired = ((point.x - start.x) * scale) / DRAG_PIXELS.mired;
+    this.adjustment = { stops: Math.min(MAX_STOPS, Math.max(-MAX_STOPS, stops)), mired };
+    this.effect = adjustEffect(this.adjustment.stops, mired);
+    return this.apply(canvas.region ? [canvas.region] : []);
   }
 
   /** @param {Region[]} regions @returns {Region[]} */
-  applied(regions) {
-    for (const region of merged(regions)) this.canvas.apply(region, this.effect);
+  apply(regions) {
+    for (const region of mergeRegions(regions)) this.canvas.apply(region, this.effect);
     return regions;
   }
 }
 
 /** Make an object, or for null everything, brighter and warmer, as one stroke.
- * @param {PaintCanvas} canvas @param {{stops: number, mired: number, object: number | null}} asked
+ * @param {PaintCanvas} canvas @param {{stops: number, mired: number, object: number | null}} adjustment
  * @returns {Region} */
 export function adjustArea(canvas, { stops, mired, object }) {
   canvas.begin();
   const region = object === null ? flood(canvas) : fill(canvas, object, 1);
-  canvas.apply(region, adjustment(stops, mired));
+  canvas.apply(region, adjustEffect(stops, mired));
   return region;
 }
 
 /** @param {PaintCanvas} canvas @param {ToolSettings} settings @returns {Effect} */
 function effectOf(canvas, settings) {
   if (settings.tool === 'eraser') return { kind: 'erase', ground: wholeAdjustment(canvas) };
-  if (settings.tool === 'weight') return { kind: 'weigh', times: settings.importance };
-  if (settings.tool === 'adjust') return adjustment(0, 0);
-  return { kind: 'paint', rgb: settings.rgb, as: settings.as };
+  if (settings.tool === 'weight') return { kind: 'weigh', factor: settings.importance };
+  if (settings.tool === 'adjust') return adjustEffect(0, 0);
+  return { kind: 'paint', rgb: settings.rgb, paintMode: settings.paintMode };
 }
 
 /** Merge regions into a few that do not contain each other: stamps overlap, and shared pixels would
  * be computed several times. @param {Region[]} regions @returns {Region[]} */
-function merged(regions) {
+function mergeRegions(regions) {
   /** @type {Region[]} */
   const mergedRegions = [];
   for (const region of regions) {
@@ -159,16 +159,16 @@ function merged(regions) {
       last &&
       isNear &&
       mergedRegions.length > 0 &&
-      area(around(last, region)) < 2 * area(last) + area(region)
+      area(enclose(last, region)) < 2 * area(last) + area(region)
     )
-      mergedRegions[mergedRegions.length - 1] = around(last, region);
+      mergedRegions[mergedRegions.length - 1] = enclose(last, region);
     else mergedRegions.push(region);
   }
   return mergedRegions;
 }
 
 /** @param {Region} a @param {Region} b @returns {Region} */
-function around(a, b) {
+function enclose(a, b) {
   return [Math.min(a[0], b[0]), Math.max(a[1], b[1]), Math.min(a[2], b[2]), Math.max(a[3], b[3])];
 }
 

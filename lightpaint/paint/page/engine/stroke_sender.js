@@ -11,57 +11,57 @@ import { union } from '../../../viewer/drawing/cpu_picture.js';
 /** @typedef {import("./message_frames.js").Message} Message */
 /** @typedef {import("./paint_canvas.js").PaintCanvas} PaintCanvas */
 
-/** The stroke in progress. dirty: region not sent yet. whole: region of the stroke.
- * @typedef {{stroke: number, view: number, dirty: Region | null, whole: Region | null,
+/** The stroke in progress. dirty: region not sent yet. wholeRegion: region of the stroke.
+ * @typedef {{stroke: number, view: number, dirty: Region | null, wholeRegion: Region | null,
  *   isKnown: boolean}} CurrentStroke */
-/** A finished or cancelled stroke without an answer yet. cut: region to send.
- * @typedef {{stroke: number, view: number, cut: Region, whole: Region, arrays: Arrays,
+/** A finished or cancelled stroke without an answer yet. cutRegion: region to send.
+ * @typedef {{stroke: number, view: number, cutRegion: Region, wholeRegion: Region, arrays: Arrays,
  *   label: string} | {stroke: number, isDropped: true}} PendingStroke */
 
 export class StrokeSender {
   /** @param {import("./socket_host.js").Host} host
-   * @param {() => void} [refused] hears that the session has not taken a stroke
+   * @param {() => void} [onRefusal] hears that the session has not taken a stroke
    * @param {(count: number, isStale: boolean) => void} [onLoss] hears how many strokes are not sent
    * any more, since another page had the session in between; stale: since it is there no more */
-  constructor(host, refused = () => {}, onLoss = () => {}) {
+  constructor(host, onRefusal = () => {}, onLoss = () => {}) {
     this.host = host;
     /** @type {PaintCanvas | null} */
     this.canvas = null;
     this.view = 0;
-    this.refused = refused;
-    this.lost = onLoss;
+    this.onRefusal = onRefusal;
+    this.onLoss = onLoss;
     this.count = 0;
     /** @type {CurrentStroke | null} */
-    this.live = null;
+    this.currentStroke = null;
     /** @type {PendingStroke[]} */
-    this.left = [];
+    this.pendingStrokes = [];
     this.isBusy = false;
     this.isOpen = true;
     this.isOver = false;
     /** Whether painting is impossible: another page has the session, or it has ended. */
-    this.isTaken = false;
+    this.isSessionLost = false;
     /** @type {(() => void)[]} */
-    this.waiting = [];
+    this.waiters = [];
     /** Whether the next patch belongs to a stroke that the canvas has cancelled already. */
     this.isDropping = false;
-    this.leave = () => this.hurry();
-    addEventListener('pagehide', this.leave);
-    host.gate = () => this.settled();
+    this.onPageHide = () => this.flush();
+    addEventListener('pagehide', this.onPageHide);
+    host.gate = () => this.settle();
     host.on('connection', ({ state }) => {
-      this.connected(state === 'open');
+      this.setConnected(state === 'open');
       if (state === 'stale') {
-        this.isTaken = true;
-        this.forget(true);
+        this.isSessionLost = true;
+        this.dropUnsent(true);
       }
     });
     // Pause: another page has the session.
     host.on('closed', () => {
-      this.isTaken = true;
-      this.connected(false);
+      this.isSessionLost = true;
+      this.setConnected(false);
     });
     host.on('state', ({ is_back: isBack }) => {
-      this.isTaken = false;
-      if (isBack === false) this.forget();
+      this.isSessionLost = false;
+      if (isBack === false) this.dropUnsent();
     });
     host.on('state', ({ stroke }) => {
       this.count = Math.max(this.count, Number(stroke) || 0);
@@ -76,92 +76,110 @@ export class StrokeSender {
 
   /** Drop unsent strokes: they would overwrite what another page has painted meanwhile, or nobody
    * would receive them. */
-  forget(isStale = false) {
+  dropUnsent(isStale = false) {
     const count =
-      this.left.filter((stroke) => !('isDropped' in stroke)).length + (this.live?.whole ? 1 : 0);
-    this.left = [];
-    this.live = null;
+      this.pendingStrokes.filter((stroke) => !('isDropped' in stroke)).length +
+      (this.currentStroke?.wholeRegion ? 1 : 0);
+    this.pendingStrokes = [];
+    this.currentStroke = null;
     this.resolveWaiting();
-    if (count) this.lost(count, isStale);
+    if (count) this.onLoss(count, isStale);
   }
 
   /** Stop sending. */
   close() {
     this.isOver = true;
-    this.left = [];
-    removeEventListener('pagehide', this.leave);
+    this.pendingStrokes = [];
+    removeEventListener('pagehide', this.onPageHide);
     this.resolveWaiting();
   }
 
   /** The page closes: send finished strokes now, without waiting for answers. */
-  hurry() {
+  flush() {
     if (!this.isOpen || this.isOver) return;
-    for (const pending of this.left) {
+    for (const pending of this.pendingStrokes) {
       if ('isDropped' in pending) continue;
-      const { stroke, view, cut, label } = pending;
-      const fields = { stroke, view, region: cut, is_final: true, label };
+      const { stroke, view, cutRegion, label } = pending;
+      const fields = { stroke, view, region: cutRegion, is_final: true, label };
       // Earlier messages have arrived already.
-      this.host.send('paint', fields, cutOf(pending)).catch(() => {});
+      this.host.send('paint', fields, cutArrays(pending)).catch(() => {});
     }
   }
 
   /** Return whether parts of a stroke are pending. */
   get isPending() {
-    return this.isBusy || this.left.length > 0 || this.live !== null;
+    return this.isBusy || this.pendingStrokes.length > 0 || this.currentStroke !== null;
   }
 
   /** Resolve once all finished strokes are answered. @returns {Promise<void>} */
-  settled() {
+  settle() {
     return new Promise((resolve) => {
-      this.waiting.push(resolve);
+      this.waiters.push(resolve);
       this.resolveWaiting();
     });
   }
 
   resolveWaiting() {
-    if (!this.left.length) for (const resolve of this.waiting.splice(0)) resolve();
+    if (!this.pendingStrokes.length) for (const resolve of this.waiters.splice(0)) resolve();
   }
 
   begin() {
     const { view } = this;
-    this.live = { stroke: ++this.count, view, dirty: null, whole: null, isKnown: false };
+    this.currentStroke = {
+      stroke: ++this.count,
+      view,
+      dirty: null,
+      wholeRegion: null,
+      isKnown: false,
+    };
   }
 
   /** Queue changed pixels of the stroke. @param {Region} region */
   touch(region) {
-    if (!this.live || region[0] >= region[1] || region[2] >= region[3]) return;
-    this.live.dirty = union(this.live.dirty, region);
-    this.live.whole = union(this.live.whole, region);
+    if (!this.currentStroke || region[0] >= region[1] || region[2] >= region[3]) return;
+    this.currentStroke.dirty = union(this.currentStroke.dirty, region);
+    this.currentStroke.wholeRegion = union(this.currentStroke.wholeRegion, region);
     this.pump();
   }
 
   /** Finish the stroke. @param {string} label what undo calls it */
   end(label) {
-    const { live } = this;
-    this.live = null;
-    if (live?.whole && this.canvas) {
-      const { stroke, view, whole } = live;
-      const cut = live.dirty ?? /** @type {Region} */ ([whole[0], whole[0], whole[2], whole[2]]);
-      this.left.push({ stroke, view, cut, whole, arrays: this.canvas.copy(whole), label });
+    const { currentStroke } = this;
+    this.currentStroke = null;
+    if (currentStroke?.wholeRegion && this.canvas) {
+      const { stroke, view, wholeRegion } = currentStroke;
+      const cutRegion =
+        currentStroke.dirty ??
+        /** @type {Region} */ ([wholeRegion[0], wholeRegion[0], wholeRegion[2], wholeRegion[2]]);
+      this.pendingStrokes.push({
+        stroke,
+        view,
+        cutRegion,
+        wholeRegion,
+        arrays: this.canvas.copy(wholeRegion),
+        label,
+      });
     }
     this.pump();
   }
 
   /** Cancel the stroke; the canvas has done so already. */
   drop() {
-    const { live } = this;
-    this.live = null;
-    if (live?.isKnown) this.left.push({ stroke: live.stroke, isDropped: true });
+    const { currentStroke } = this;
+    this.currentStroke = null;
+    if (currentStroke?.isKnown)
+      this.pendingStrokes.push({ stroke: currentStroke.stroke, isDropped: true });
     this.pump();
   }
 
   /** @param {boolean} isOpen */
-  connected(isOpen) {
+  setConnected(isOpen) {
     this.isOpen = isOpen;
     if (!isOpen) {
       // It is unknown which of them arrived.
-      for (const stroke of this.left) if (!('isDropped' in stroke)) stroke.cut = stroke.whole;
-      if (this.live) this.live.dirty = this.live.whole;
+      for (const stroke of this.pendingStrokes)
+        if (!('isDropped' in stroke)) stroke.cutRegion = stroke.wholeRegion;
+      if (this.currentStroke) this.currentStroke.dirty = this.currentStroke.wholeRegion;
     }
     this.pump();
   }
@@ -169,15 +187,20 @@ export class StrokeSender {
   /** Send the next message, unless one is pending. */
   pump() {
     if (this.isBusy || !this.isOpen || this.isOver) return;
-    const [next] = this.left;
+    const [next] = this.pendingStrokes;
     if (next && 'isDropped' in next) this.send('drop_stroke', { stroke: next.stroke }, {}, next);
     else if (next) {
-      const { stroke, view, cut, label } = next;
-      this.send('paint', { stroke, view, region: cut, is_final: true, label }, cutOf(next), next);
-    } else if (this.live?.dirty && this.canvas) {
-      const { stroke, view, dirty } = this.live;
-      this.live.dirty = null;
-      this.live.isKnown = true;
+      const { stroke, view, cutRegion, label } = next;
+      this.send(
+        'paint',
+        { stroke, view, region: cutRegion, is_final: true, label },
+        cutArrays(next),
+        next,
+      );
+    } else if (this.currentStroke?.dirty && this.canvas) {
+      const { stroke, view, dirty } = this.currentStroke;
+      this.currentStroke.dirty = null;
+      this.currentStroke.isKnown = true;
       const fields = { stroke, view, region: dirty, is_final: false };
       this.send('paint', fields, this.canvas.copy(dirty), null);
     }
@@ -192,8 +215,8 @@ export class StrokeSender {
     try {
       const reply = await this.host.send(kind, fields, arrays);
       if (pending && reply.kind !== 'closed')
-        this.left = this.left.filter((stroke) => stroke !== pending);
-      if (pending && reply.kind === 'failed') this.refused();
+        this.pendingStrokes = this.pendingStrokes.filter((stroke) => stroke !== pending);
+      if (pending && reply.kind === 'failed') this.onRefusal();
     } catch {
       // Pause after a lost connection, until `connected` is called.
       this.isOpen = false;
@@ -206,19 +229,21 @@ export class StrokeSender {
 }
 
 /** Return the pixels of a finished stroke that have to be sent.
- * @param {{cut: Region, whole: Region, arrays: Arrays}} left @returns {Arrays} */
-function cutOf({ cut, whole, arrays }) {
-  const [height, width] = [cut[1] - cut[0], cut[3] - cut[2]];
-  if (cut === whole) return arrays;
-  const rowLength = whole[3] - whole[2];
+ * @param {{cutRegion: Region, wholeRegion: Region, arrays: Arrays}} stroke @returns {Arrays} */
+function cutArrays({ cutRegion, wholeRegion, arrays }) {
+  const [height, width] = [cutRegion[1] - cutRegion[0], cutRegion[3] - cutRegion[2]];
+  if (cutRegion === wholeRegion) return arrays;
+  const rowLength = wholeRegion[3] - wholeRegion[2];
   /** @type {Arrays} */
   const parts = {};
   for (const [name, { data, shape }] of Object.entries(arrays)) {
-    const depth = shape[2] ?? 1;
-    const part = new Float32Array(height * width * depth);
+    const channels = shape[2] ?? 1;
+    const part = new Float32Array(height * width * channels);
     for (let y = 0; y < height; y++) {
-      const start = ((cut[0] - whole[0] + y) * rowLength + cut[2] - whole[2]) * depth;
-      part.set(data.subarray(start, start + width * depth), y * width * depth);
+      const start =
+        ((cutRegion[0] - wholeRegion[0] + y) * rowLength + cutRegion[2] - wholeRegion[2]) *
+        channels;
+      part.set(data.subarray(start, start + width * channels), y * width * channels);
     }
     parts[name] = { data: part, shape: [height, width, ...shape.slice(2)] };
   }

@@ -18,42 +18,45 @@ const CLICK = 'click';
 const ANYWHERE = 'anywhere';
 
 /** Largest number of lights that one search on the page adds. */
-const MOST_FOUND = 4;
+const MAX_NEW_LIGHTS = 4;
 
 /** @param {{ui: Ui, app: App}} props */
 export function AddLight({ ui, app }) {
   const { store, session } = app;
-  const { adding, pointing, rig } = ui;
-  const isClick = adding.where === CLICK;
-  const isOn = pointing?.mode === 'hang';
-  const set = (/** @type {Partial<Ui["adding"]>} */ changed) =>
-    store.set({ adding: { ...adding, ...changed }, pointing: null });
+  const { newLight, clickAction, rig } = ui;
+  const isClick = newLight.surface === CLICK;
+  const isClicking = clickAction?.mode === 'hang';
+  const set = (/** @type {Partial<Ui["newLight"]>} */ changes) =>
+    store.set({ newLight: { ...newLight, ...changes }, clickAction: null });
   const places = [
     { value: CLICK, label: 'where I click' },
     { value: ANYWHERE, label: 'anywhere free' },
     ...(rig?.surfaces ?? []).map((name) => ({ value: name, label: `on ${name}` })),
   ];
-  const act = () =>
+  const addOrSearch = () =>
     isClick
-      ? store.set({ lamps: true, pointing: isOn ? null : { mode: 'hang', type: adding.type } })
-      : session.findLights(adding);
+      ? store.set({
+          areLampsMarked: true,
+          clickAction: isClicking ? null : { mode: 'hang', type: newLight.type },
+        })
+      : session.findLights(newLight);
   return html`<div class="add-light" role="group" aria-label="Add a light">
-    <${Select} label="New light" value=${adding.type} choices=${KINDS}
+    <${Select} label="New light" value=${newLight.type} choices=${KINDS}
       change=${(/** @type {NewKind} */ type) => set({ type })} />
-    <${Select} label="It hangs" value=${adding.where} choices=${places}
+    <${Select} label="It hangs" value=${newLight.surface} choices=${places}
       tip="Click its place, or let a search find the places that come closest to the painting"
-      change=${(/** @type {string} */ where) => set({ where })} />
+      change=${(/** @type {string} */ surface) => set({ surface })} />
     ${
       !isClick &&
-      html`<${NumberField} label="At most" value=${adding.count} least=${1} most=${MOST_FOUND}
+      html`<${NumberField} label="At most" value=${newLight.count} min=${1} max=${MAX_NEW_LIGHTS}
         step=${1} digits=${0} change=${(/** @type {number} */ count) => set({ count })} />`
     }
-    <${Button} label=${isClick ? 'Add a light' : 'Find places'} icon="plus" on=${isClick && isOn}
-      disabled=${ui.placing !== null}
+    <${Button} label=${isClick ? 'Add a light' : 'Find places'} icon="plus" pressed=${isClick && isClicking}
+      disabled=${ui.placementProgress !== null}
       tip=${
         isClick
           ? 'Then click the surface that it hangs on, or its place in the plan'
           : 'Adds only lights that surely come closer to the painting. One step that undo takes back.'
-      } act=${act} />
+      } act=${addOrSearch} />
   </div>`;
 }

@@ -2,7 +2,7 @@
 
 import { html, useEffect, useRef } from '../vendor/preact.js';
 import { Button, Dialog } from './controls.js';
-import { number, shortened } from './format.js';
+import { numberText, shortenName } from './format.js';
 import { Icon } from './icons.js';
 import { drawPicture } from './thumbnail.js';
 
@@ -12,7 +12,7 @@ import { drawPicture } from './thumbnail.js';
 /** @typedef {import("./shortcuts.js").App} App */
 
 /** Constraint keys of a light that each kind of advice removes. @type {Record<string, string[]>} */
-const KEYS = {
+const CONSTRAINT_KEYS = {
   off: ['off'],
   lock: ['lock'],
   limits: ['limits'],
@@ -29,7 +29,7 @@ const BUTTON_WORDS = {
 };
 
 /** Button text for advice on all lights. @type {Record<string, string>} */
-const OF_ALL = {
+const ALL_LIGHTS_WORDS = {
   hold: 'Loosen',
   colors: 'Any colour',
   sparse: 'More lights',
@@ -37,20 +37,20 @@ const OF_ALL = {
 };
 
 /** Characters of a light's name on a button, which shares its line with a sentence. */
-const BUTTON_CHARACTERS = 14;
+const BUTTON_NAME_MAX_LENGTH = 14;
 
 /** Return the button text with the names of its lights. @param {Cause} cause
- * @param {number} [most] characters of a light's name */
-function nameOf({ kind, names }, most = Infinity) {
-  if (kind in OF_ALL) return OF_ALL[kind];
-  const lights = names.length === 1 ? shortened(names[0], most) : `${names.length} lights`;
+ * @param {number} [maxLength] characters of a light's name */
+function nameOf({ kind, names }, maxLength = Infinity) {
+  if (kind in ALL_LIGHTS_WORDS) return ALL_LIGHTS_WORDS[kind];
+  const lights = names.length === 1 ? shortenName(names[0], maxLength) : `${names.length} lights`;
   return `${BUTTON_WORDS[kind][names.length === 1 ? 0 : 1]} ${lights}`;
 }
 
 /** Return the title of the preview. @param {Cause} cause @param {string} name */
 function titleOf({ kind, hold }, name) {
   if (kind !== 'hold') return name;
-  return hold ? `Loosen the hold to ${number(hold, 2)}` : 'Ignore unpainted parts';
+  return hold ? `Loosen the hold to ${numberText(hold, 2)}` : 'Ignore unpainted parts';
 }
 
 /** Return the request that removes the obstacle; null if this page did not set it, or it is gone
@@ -58,47 +58,53 @@ function titleOf({ kind, hold }, name) {
  * @param {Cause} cause @param {Ui} ui @param {App["session"]} session @returns {Change | null} */
 function changeOf({ kind, names, hold }, ui, session) {
   /** @param {string} key @param {any} value @returns {Change} */
-  const set = (key, value) => ({ kind: 'change_settings', fields: { settings: { [key]: value } } });
-  if (kind === 'hold') return ui.effectiveSettings.hold === hold ? null : set('hold', hold);
-  if (kind === 'colors') return ui.effectiveSettings.colors === 'free' ? null : set('colors', 'free');
+  const settingChange = (key, value) => ({
+    kind: 'change_settings',
+    fields: { settings: { [key]: value } },
+  });
+  if (kind === 'hold')
+    return ui.effectiveSettings.hold === hold ? null : settingChange('hold', hold);
+  if (kind === 'colors')
+    return ui.effectiveSettings.colors === 'free' ? null : settingChange('colors', 'free');
   if (kind === 'sparse' || kind === 'prefer_current')
-    return ui.settings[kind] ? set(kind, null) : null;
+    return ui.settings[kind] ? settingChange(kind, null) : null;
   if (kind === 'tie') {
     const ties = ui.ties.filter((tie) => !names.some((name) => tie.includes(name)));
     return ties.length < ui.ties.length ? { kind: 'tie', fields: { ties } } : null;
   }
-  const keys = KEYS[kind] ?? [];
+  const keys = CONSTRAINT_KEYS[kind] ?? [];
   if (!names.every((name) => keys.some((key) => key in (ui.constraints[name] ?? {})))) return null;
-  const constraints = names.map((name) => [name, without(name, keys, ui, session)]);
+  const constraints = names.map((name) => [name, remainingConstraints(name, keys, ui, session)]);
   return { kind: 'constrain_lights', fields: { constraints: Object.fromEntries(constraints) } };
 }
 
 /** Return the remaining constraints of a light; for one locked by hand, those from before.
  * @param {string} name @param {string[]} keys @param {Ui} ui @param {App["session"]} session */
-function without(name, keys, ui, session) {
-  const light = ui.lights.findIndex((one) => one.name === name);
-  const isLevel = keys.includes('off') || keys.includes('lock');
-  const constraints = (isLevel && session.unlockedConstraints.get(light)) || ui.constraints[name];
+function remainingConstraints(name, keys, ui, session) {
+  const light = ui.lights.findIndex((info) => info.name === name);
+  const removesLevel = keys.includes('off') || keys.includes('lock');
+  const constraints =
+    (removesLevel && session.unlockedConstraints.get(light)) || ui.constraints[name];
   return Object.fromEntries(Object.entries(constraints).filter(([key]) => !keys.includes(key)));
 }
 
 /** @param {{ui: Ui, app: App}} props */
 export function AdviceButton({ ui, app }) {
-  const { help } = ui;
-  if (help?.kind === 'reach') return html`<${MoveButton} ui=${ui} app=${app} />`;
-  const change = help && changeOf(help, ui, app.session);
-  if (!help || !change) return null;
-  const name = nameOf(help);
-  const gain = help.gain === null ? '' : `: ${Math.round(100 * help.gain)} % closer`;
-  return html`<${Button} label=${`${nameOf(help, BUTTON_CHARACTERS)}${gain}`} class="help"
+  const { advice } = ui;
+  if (advice?.kind === 'reach') return html`<${MoveButton} ui=${ui} app=${app} />`;
+  const change = advice && changeOf(advice, ui, app.session);
+  if (!advice || !change) return null;
+  const name = nameOf(advice);
+  const gain = advice.gain === null ? '' : `: ${Math.round(100 * advice.gain)} % closer`;
+  return html`<${Button} label=${`${nameOf(advice, BUTTON_NAME_MAX_LENGTH)}${gain}`} class="help"
     tip=${`${name}${gain}. Shows a preview first.`}
-    act=${() => app.session.preview(titleOf(help, name), change)} />`;
+    act=${() => app.session.preview(titleOf(advice, name), change)} />`;
 }
 
 /** The button that lets lights move, where their current places come no closer.
  * @param {{ui: Ui, app: App}} props */
 export function MoveButton({ ui, app }) {
-  if (!ui.state?.can_render || ui.placing) return null;
+  if (!ui.state?.can_render || ui.placementProgress) return null;
   return html`<${Button} label="Let lights move" class="help"
     tip="Search for places and directions of the lights that come closer. One step that undo takes back."
     act=${() => app.session.placeLights()} />`;
@@ -113,7 +119,7 @@ export function PreviewDialog({ ui, app }) {
   const { label, text, isAtCost, before, after } = preview;
   return html`<${Dialog} title=${label} close=${close} class="preview">
     <div class="pair">
-      <${Small} picture=${before} caption="Before" /><${Small} picture=${after} caption="After" />
+      <${PreviewPicture} picture=${before} caption="Before" /><${PreviewPicture} picture=${after} caption="After" />
     </div>
     <p class=${isAtCost ? 'is-bad' : ''} role="status">
       ${isAtCost && html`<${Icon} name="warn" />`}
@@ -125,7 +131,7 @@ export function PreviewDialog({ ui, app }) {
 }
 
 /** @param {{picture: import("./engine_interface.js").Picture | null, caption: string}} props */
-function Small({ picture, caption }) {
+function PreviewPicture({ picture, caption }) {
   const ref = useRef(/** @type {HTMLCanvasElement | null} */ (null));
   useEffect(() => {
     if (picture && ref.current) drawPicture(ref.current, picture);

@@ -3,10 +3,10 @@
 import { html, useEffect, useLayoutEffect, useMemo, useRef } from '../vendor/preact.js';
 import { ProgressBar } from './progress_bar.js';
 import { Button, Choice } from './controls.js';
-import { number, progressText, unbroken } from './format.js';
+import { numberText, progressText, joinUnits } from './format.js';
 import { Icon } from './icons.js';
 import { overlayOf } from './ui_state.js';
-import { updateShow } from './tools.js';
+import { updateDisplay } from './tools.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
@@ -20,52 +20,51 @@ const OVERLAYS = [
   { value: 'importance', label: 'Importance', tip: 'What is painted, and how much it counts' },
 ];
 
-const PAINTED = 'painted';
+const PAINTED_LABEL = 'painted';
 
 /** Legends of the overlays: colours and hatches. @type {Record<string, string[]>} */
-const MEANINGS = {
+const LEGEND_TEXTS = {
   missed: ['too dark', 'matches', 'too bright'],
   beyond: ['in reach', 'out of reach'],
   falsecolor: ['−6 stops', 'grey', '+6'],
-  importance: ['unpainted', PAINTED],
+  importance: ['unpainted', PAINTED_LABEL],
 };
 
 /** @param {{ui: Ui, app: App}} props */
 export function AnalysisPanel({ ui, app }) {
   const { session, store } = app;
-  const choose = (/** @type {any} */ overlay) => updateShow(store, { overlay });
+  const choose = (/** @type {any} */ overlay) => updateDisplay(store, { overlay });
   const frame = useRef(/** @type {HTMLElement | null} */ (null));
   // The reasons need more room than the text before them.
   useLayoutEffect(() => {
     const panel = /** @type {HTMLElement | null | undefined} */ (frame.current?.closest('.fold'));
-    if (panel && ui.explained.length && isInSight(panel))
-      panel.scrollIntoView({ block: 'nearest' });
-  }, [ui.explained]);
+    if (panel && ui.reasons.length && isVisible(panel)) panel.scrollIntoView({ block: 'nearest' });
+  }, [ui.reasons]);
   // The first reason is also below the pictures.
-  const sentences = (ui.explained.length ? ui.explained : ui.sentences).filter(
+  const sentences = (ui.reasons.length ? ui.reasons : ui.sentences).filter(
     (text) => text !== ui.headline,
   );
   return html`<div class="truth" ref=${frame}>
-    <${Choice} label="Overlay" value=${ui.show.overlay} choices=${OVERLAYS}
+    <${Choice} label="Overlay" value=${ui.display.overlay} choices=${OVERLAYS}
       change=${choose} />
-    ${sentences.map((text) => html`<p key=${text}>${unbroken(text)}</p>`)}
+    ${sentences.map((text) => html`<p key=${text}>${joinUnits(text)}</p>`)}
     <div class="row">
-      <${Button} label=${ui.explaining ? 'Finding reasons …' : 'Why not closer?'}
-        disabled=${ui.explaining} act=${() => session.explain()}
+      <${Button} label=${ui.isExplaining ? 'Finding reasons …' : 'Why not closer?'}
+        disabled=${ui.isExplaining} act=${() => session.explain()}
         tip="What keeps the answer from matching the painting" />
-      ${ui.explaining && html`<${ProgressBar} progress=${{ done: 0, total: 0 }} label="Finding reasons" />`}
-      ${ui.state?.can_render && html`<${Verify} ui=${ui} app=${app} />`}
+      ${ui.isExplaining && html`<${ProgressBar} progress=${{ done: 0, total: 0 }} label="Finding reasons" />`}
+      ${ui.state?.can_render && html`<${VerifyButton} ui=${ui} app=${app} />`}
     </div>
-    ${ui.verified && html`<${Verified} ui=${ui} app=${app} />`}
+    ${ui.verification && html`<${VerificationResult} ui=${ui} app=${app} />`}
   </div>`;
 }
 
 /** Return whether part of a panel is visible in the side bar. @param {HTMLElement} panel */
-function isInSight(panel) {
-  const [its, room] = [panel, /** @type {HTMLElement} */ (panel.parentElement)].map((one) =>
-    one.getBoundingClientRect(),
+function isVisible(panel) {
+  const [box, visibleBox] = [panel, /** @type {HTMLElement} */ (panel.parentElement)].map(
+    (element) => element.getBoundingClientRect(),
   );
-  return its.top < room.bottom - 60 && its.bottom > room.top + 60;
+  return box.top < visibleBox.bottom - 60 && box.bottom > visibleBox.top + 60;
 }
 
 /** CSS pixels: height of a legend, of one on a single line, and the gap to its picture. */
@@ -74,20 +73,20 @@ const LEGEND = { width: 210, height: 60, low: 22, gap: 8 };
 /** Place it where it covers nothing: below the picture, else beside it; without room for either, on
  * the picture, as a single line. @param {Pane} pane
  * @param {[height: number, width: number]} size */
-function placed(pane, [rows, columns]) {
+function placeLegend(pane, [rows, columns]) {
   const { width, height, low, gap } = LEGEND;
   const left = Math.max(pane.x, pane.left);
   // The handle of the wipe lies there.
-  const inside = left > Math.max(0, pane.left) ? 3 * gap : gap;
+  const margin = left > Math.max(0, pane.left) ? 3 * gap : gap;
   const right = Math.min(pane.x + pane.width, pane.left + columns * pane.scale);
   const bottom = Math.min(pane.y + pane.height, pane.top + rows * pane.scale);
-  const below = pane.y + pane.height - bottom;
-  if (below >= height + gap) return { left: left + inside, top: bottom + gap };
-  if (below >= low + 4) return { left: left + inside, top: bottom + 2, isLow: true };
-  const room = width + 2 * gap;
-  if (pane.x + pane.width - right >= room) return { left: right + gap, top: bottom - height };
-  if (left - pane.x >= room) return { left: left - gap - width, top: bottom - height };
-  return { left: left + inside, top: bottom - low - gap, isLow: true };
+  const roomBelow = pane.y + pane.height - bottom;
+  if (roomBelow >= height + gap) return { left: left + margin, top: bottom + gap };
+  if (roomBelow >= low + 4) return { left: left + margin, top: bottom + 2, isLow: true };
+  const neededRoom = width + 2 * gap;
+  if (pane.x + pane.width - right >= neededRoom) return { left: right + gap, top: bottom - height };
+  if (left - pane.x >= neededRoom) return { left: left - gap - width, top: bottom - height };
+  return { left: left + margin, top: bottom - low - gap, isLow: true };
 }
 
 /** The legend at a picture with an overlay. The overlay of what is out of reach is requested again
@@ -95,24 +94,25 @@ function placed(pane, [rows, columns]) {
  * @param {{ui: Ui, app: App, panes: Pane[]}} props */
 export function Legend({ ui, app, panes }) {
   const overlay = overlayOf(ui);
-  const isSought = overlay === 'beyond' && ui.deltaE !== null && !ui.isLive && !ui.explained.length;
+  const isOutdated = overlay === 'beyond' && ui.deltaE !== null && !ui.isLive && !ui.reasons.length;
   useEffect(() => {
-    if (isSought && !ui.explaining) app.session.explain();
-  }, [isSought, ui.explaining]);
-  const isCounted = overlay === 'importance';
-  const most = useMemo(
-    () => (isCounted ? app.engine.greatest() : 1),
-    [isCounted, ui.version, ui.weights, ui.view],
+    if (isOutdated && !ui.isExplaining) app.session.explain();
+  }, [isOutdated, ui.isExplaining]);
+  const showsImportance = overlay === 'importance';
+  const maxWeight = useMemo(
+    () => (showsImportance ? app.engine.maxImportance() : 1),
+    [showsImportance, ui.version, ui.weights, ui.view],
   );
-  const on = overlay === 'importance' ? 'painting' : 'solution';
+  const legendKind = overlay === 'importance' ? 'painting' : 'solution';
   const pane =
-    panes.find(({ kind }) => kind === on) ?? (overlay === 'falsecolor' ? panes[0] : undefined);
+    panes.find(({ kind }) => kind === legendKind) ??
+    (overlay === 'falsecolor' ? panes[0] : undefined);
   if (!overlay || !pane) return null;
   const { label } = OVERLAYS.find(({ value }) => value === overlay) ?? OVERLAYS[0];
-  const isOld = overlay === 'beyond' && !ui.explained.length;
-  const { left, top, isLow } = placed(pane, ui.state.size);
-  const words = MEANINGS[overlay].map((text) =>
-    text === PAINTED && most > 1 ? `weight ${number(most, 2)} ×` : text,
+  const isOld = overlay === 'beyond' && !ui.reasons.length;
+  const { left, top, isLow } = placeLegend(pane, ui.state.size);
+  const words = LEGEND_TEXTS[overlay].map((text) =>
+    text === PAINTED_LABEL && maxWeight > 1 ? `weight ${numberText(maxWeight, 2)} ×` : text,
   );
   return html`<div class=${`legend ${isLow ? 'is-low' : ''}`}
     style=${{ top: `${top}px`, left: `${left}px` }}>
@@ -123,40 +123,40 @@ export function Legend({ ui, app, panes }) {
 }
 
 /** @param {{ui: Ui, app: App}} props */
-function Verify({ ui, app }) {
+function VerifyButton({ ui, app }) {
   const { session } = app;
-  if (!ui.verifying) {
+  if (!ui.verificationProgress) {
     // Ignore the second click of a double click on "Analysis", under which the button appears.
     const begin = (/** @type {MouseEvent} */ { detail }) => detail < 2 && session.verify();
     return html`<${Button} label="Verify" icon="camera" act=${begin}
       tip="Render the scene with this lighting, and compare" />`;
   }
   return html`<${Button} label="Stop" icon="close" act=${() => session.verify(false)} />
-    <${ProgressBar} progress=${ui.verifying} label="Verifying" />
-    <span class="faint">${progressText(ui.verifying)}</span>`;
+    <${ProgressBar} progress=${ui.verificationProgress} label="Verifying" />
+    <span class="faint">${progressText(ui.verificationProgress)}</span>`;
 }
 
 /** @param {{ui: Ui, app: App}} props */
-function Verified({ ui, app }) {
-  const { verified, show } = ui;
+function VerificationResult({ ui, app }) {
+  const { verification, display } = ui;
   const frame = useRef(/** @type {HTMLElement | null} */ (null));
   // Scroll to it: it may be outside the visible part.
-  useLayoutEffect(() => frame.current?.scrollIntoView?.({ block: 'nearest' }), [verified]);
-  if (!verified) return null;
-  const isShown = show.left === 'solution' && show.right === 'verified';
+  useLayoutEffect(() => frame.current?.scrollIntoView?.({ block: 'nearest' }), [verification]);
+  if (!verification) return null;
+  const isShown = display.left === 'solution' && display.right === 'verified';
   const compare = () => {
     app.store.set({ mix: null });
-    updateShow(
+    updateDisplay(
       app.store,
       isShown
         ? { left: 'painting', right: 'solution', layout: 'side' }
-        : { left: 'solution', right: 'verified', layout: 'wipe', instead: null },
+        : { left: 'solution', right: 'verified', layout: 'wipe', solutionWeights: null },
     );
   };
-  return html`<div ref=${frame} class=${`verified ${verified.agrees ? 'is-good' : 'is-bad'}`}>
-    <p><${Icon} name=${verified.agrees ? 'check' : 'warn'} /><span>${verified.text}${
-      verified.isOld ? ' (of an earlier answer)' : ''
+  return html`<div ref=${frame} class=${`verified ${verification.agrees ? 'is-good' : 'is-bad'}`}>
+    <p><${Icon} name=${verification.agrees ? 'check' : 'warn'} /><span>${verification.text}${
+      verification.isOld ? ' (of an earlier answer)' : ''
     }</span></p>
-    <${Button} label="Answer | Render" icon="wipe" on=${isShown} act=${compare} />
+    <${Button} label="Answer | Render" icon="wipe" pressed=${isShown} act=${compare} />
   </div>`;
 }

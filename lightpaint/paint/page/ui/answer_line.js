@@ -3,7 +3,7 @@
 import { html } from '../vendor/preact.js';
 import { AdviceButton } from './advice.js';
 import { Button, TruncatedText, reveal } from './controls.js';
-import { lightText, number, shortened } from './format.js';
+import { lightText, numberText, shortenName } from './format.js';
 import { pointingHint } from './lamp_fields.js';
 import { isAnswerHidden, saveLook } from './look_actions.js';
 import { toolHint } from './tools.js';
@@ -12,10 +12,10 @@ import { exposureOf } from './ui_state.js';
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
 
-const DELTA_E =
+const DELTA_E_TIP =
   'Mean colour difference from the painting (ΔE 2000), and what it was with the current lighting. 1 is just visible, 5 is obvious.';
 
-const STATES = {
+const STATE_TIPS = {
   live: 'A quick answer while you paint. The exact one follows.',
   analysing: 'The lights are solved. The sentence still describes the previous answer.',
   'answer not shown': 'The sentence describes the answer, which is neither of the looks compared.',
@@ -27,27 +27,28 @@ export function AnswerLine({ ui, app }) {
   const { store } = app;
   const text = ui.headline || (ui.ready ? 'Solving …' : '');
   const isOpen = ui.side && !ui.panel && ui.open.truth;
-  const isOld = ui.headline !== '' && !ui.isJudged;
-  const busy = ui.isLive ? 'live' : isOld ? 'analysing' : null;
-  const isApart = isAnswerHidden(ui);
-  const state = isApart && text ? 'answer not shown' : busy;
-  const turn = (/** @type {MouseEvent} */ event) => {
+  const isOld = ui.headline !== '' && !ui.isJudgementCurrent;
+  const progressState = ui.isLive ? 'live' : isOld ? 'analysing' : null;
+  const isHidden = isAnswerHidden(ui);
+  const state = isHidden && text ? 'answer not shown' : progressState;
+  const toggleAnalysis = (/** @type {MouseEvent} */ event) => {
     const button = /** @type {HTMLElement} */ (event.currentTarget);
     store.set({ side: true, panel: null, open: { ...ui.open, truth: !isOpen } });
     if (!isOpen) reveal(button, '.is-truth');
   };
   return html`<div class="answer">
-    <p class=${`headline ${isOld || isApart ? 'is-old' : ''}`} role="status">
-      <${TruncatedText} class="said" text=${text} most=${100} />
+    <p class=${`headline ${isOld || isHidden ? 'is-old' : ''}`} role="status">
+      <${TruncatedText} class="said" text=${text} maxLength=${100} />
       ${
         // Always in the same place, so that the sentence does not rewrap.
-        state && html`<span class="live" data-tip=${STATES[state]}><b>${state}</b></span>`
+        state && html`<span class="live" data-tip=${STATE_TIPS[state]}><b>${state}</b></span>`
       }
       ${
         !state &&
         ui.deltaE !== null &&
-        html`<span class="faint" data-tip=${DELTA_E}>ΔE ${number(ui.deltaE, 2)}${
-          ui.deltaPresent !== null && html`<span class="was">, was ${number(ui.deltaPresent, 2)}</span>`
+        html`<span class="faint" data-tip=${DELTA_E_TIP}>ΔE ${numberText(ui.deltaE, 2)}${
+          ui.deltaPresent !== null &&
+          html`<span class="was">, was ${numberText(ui.deltaPresent, 2)}</span>`
         }</span>`
       }
     </p>
@@ -60,7 +61,7 @@ export function AnswerLine({ ui, app }) {
     }
     ${
       // The button keeps its place when pressed, so that nothing else slides under the pointer.
-      ui.ready && html`<${Button} label="Analysis" on=${isOpen} act=${turn} />`
+      ui.ready && html`<${Button} label="Analysis" pressed=${isOpen} act=${toggleAnalysis} />`
     }
   </div>`;
 }
@@ -68,27 +69,27 @@ export function AnswerLine({ ui, app }) {
 /** The light under the pointer and the lights that contribute to it, or else the tool's hint.
  * @param {{ui: Ui}} props */
 export function PointerStatus({ ui }) {
-  if (ui.pointing) {
-    const text = pointingHint(ui.pointing, ui.lights);
+  if (ui.clickAction) {
+    const text = pointingHint(ui.clickAction, ui.lights);
     return html`<p class="here" id="lp-status" role="status"><strong>${text}</strong></p>`;
   }
-  if (!ui.pointed) {
+  if (!ui.probe) {
     const text = ui.ready ? toolHint(ui.tool) : ''; // there is nothing to drag on yet
     return html`<p class="here" id="lp-status"><span class="hint-text">${text}</span></p>`;
   }
-  const { object, shares, light } = ui.pointed;
-  const exposed = light.map((x) => x * 2 ** exposureOf(ui.state));
-  const most = (isAnswerHidden(ui) ? [] : shares)
+  const { object, shares, light } = ui.probe;
+  const exposedLight = light.map((x) => x * 2 ** exposureOf(ui.state));
+  const largestShares = (isAnswerHidden(ui) ? [] : shares)
     .map((share, k) => ({ share, k }))
     .filter(({ share }) => share >= 0.01)
     .sort((a, b) => b.share - a.share)
     .slice(0, 5);
-  return html`<p class="here" id="lp-status">${object && html`<span class="object">${shortened(object, 40)}</span>`}
-    <span class="light-here">${lightText(exposed)}${
-      ui.tool === 'pick' && html` · RGB ${exposed.map((x) => number(x, 3)).join(' ')}`
+  return html`<p class="here" id="lp-status">${object && html`<span class="object">${shortenName(object, 40)}</span>`}
+    <span class="light-here">${lightText(exposedLight)}${
+      ui.tool === 'pick' && html` · RGB ${exposedLight.map((x) => numberText(x, 3)).join(' ')}`
     }</span>
-    ${most.map(
-      ({ share, k }) => html`<span key=${k}>${shortened(ui.lights[k]?.label ?? '', 24)}
+    ${largestShares.map(
+      ({ share, k }) => html`<span key=${k}>${shortenName(ui.lights[k]?.label ?? '', 24)}
       <b>${Math.round(100 * share)} %</b></span>`,
     )}</p>`;
 }

@@ -13,8 +13,8 @@ const [FOLDS_KEY, TOOL_KEY] = ['lightpaint.open', 'lightpaint.hand'];
 /** @param {string} key @returns {Record<string, unknown>} */
 function read(key) {
   try {
-    const found = JSON.parse(localStorage.getItem(key) ?? '{}');
-    return found && typeof found === 'object' ? found : {};
+    const value = JSON.parse(localStorage.getItem(key) ?? '{}');
+    return value && typeof value === 'object' ? value : {};
   } catch {
     return {};
   }
@@ -38,23 +38,25 @@ export function storedFolds() {
 /** Return the valid tool settings of the last time.
  * @returns {Partial<Ui>} the size as it is kept: as a part of the picture's height, in `share` */
 export function storedTool() {
-  const stored = read(TOOL_KEY);
-  const paint = validPaint(stored);
-  const second = validPaint(stored.second);
+  const storedValues = read(TOOL_KEY);
+  const paint = validPaint(storedValues);
+  const second = validPaint(storedValues.second);
   const shares = { flow: 0.01, fillFlow: 0.01, hardness: 0 };
-  const found = Object.entries(shares).filter(([key, least]) => isWithin(stored[key], least, 1));
+  const validEntries = Object.entries(shares).filter(([key, min]) =>
+    isWithin(storedValues[key], min, 1),
+  );
   return {
-    ...Object.fromEntries(found.map(([key]) => [key, stored[key]])),
+    ...Object.fromEntries(validEntries.map(([key]) => [key, storedValues[key]])),
     ...paint,
     ...(second ? { second } : {}),
-    recent: recentPaints(stored),
+    recent: recentPaints(storedValues),
   };
 }
 
 /** Return the recent colours. @param {Record<string, unknown>} kept @returns {Paint[]} */
 function recentPaints({ recent }) {
-  const all = Array.isArray(recent) ? recent.map(validPaint) : [];
-  return distinctPaints(/** @type {Paint[]} */ (all.filter((one) => one !== null)));
+  const paints = Array.isArray(recent) ? recent.map(validPaint) : [];
+  return distinctPaints(/** @type {Paint[]} */ (paints.filter((paint) => paint !== null)));
 }
 
 /** Return the brush size for a picture of a height: scaled from the last one, else a seventh.
@@ -65,9 +67,9 @@ export function storedBrushSize(height) {
   return Math.round(Math.min(MAX_BRUSH_SIZE, Math.max(MIN_BRUSH_SIZE, size)));
 }
 
-/** @param {any} kept @returns {Paint | null} */
-function validPaint(kept) {
-  const { colour, stops } = kept ?? {};
+/** @param {any} value @returns {Paint | null} */
+function validPaint(value) {
+  const { colour, stops } = value ?? {};
   const isColour =
     Array.isArray(colour) && colour.length === 3 && colour.every((x) => isWithin(x, 0, 1));
   return isColour && isWithin(stops, -32, 32)
@@ -75,19 +77,20 @@ function validPaint(kept) {
     : null;
 }
 
-/** @param {unknown} x @param {number} least @param {number} most */
-const isWithin = (x, least, most) => typeof x === 'number' && x >= least && x <= most;
+/** @param {unknown} x @param {number} min @param {number} max */
+const isWithin = (x, min, max) => typeof x === 'number' && x >= min && x <= max;
 
 /** Store the state from now on. @param {UiStore} store @returns {() => void} what ends it */
 export function storeChanges(store) {
-  let last = store.value;
+  let latest = store.value;
   return store.listen(() => {
-    const before = last;
-    last = store.value;
-    if (last.open !== before.open) write(FOLDS_KEY, last.open);
+    const previous = latest;
+    latest = store.value;
+    if (latest.open !== previous.open) write(FOLDS_KEY, latest.open);
     // A page starts with the tool that was read, maybe long before the scene is loaded.
-    if (!last.state || !before.state) return;
-    if (STORED_FIELDS.some((key) => last[key] !== before[key])) write(TOOL_KEY, storedFields(last));
+    if (!latest.state || !previous.state) return;
+    if (STORED_FIELDS.some((key) => latest[key] !== previous[key]))
+      write(TOOL_KEY, storedFields(latest));
   });
 }
 
@@ -109,7 +112,7 @@ function storedFields({
   colour,
   stops,
   second,
-  recent: own,
+  recent: ownRecent,
   flow,
   fillFlow,
   hardness,
@@ -117,6 +120,6 @@ function storedFields({
   state,
 }) {
   const share = size / state.size[0];
-  const recent = distinctPaints([...own, ...recentPaints(read(TOOL_KEY))]);
+  const recent = distinctPaints([...ownRecent, ...recentPaints(read(TOOL_KEY))]);
   return { colour, stops, second, recent, flow, fillFlow, hardness, share };
 }

@@ -12,7 +12,7 @@ import { paneAt } from './pointer_input.js';
  * @param {HTMLElement | null} rings @param {Engine} engine @param {Ui} ui
  * @param {number} [x] @param {number} [y]
  */
-export function ring(
+export function drawRings(
   rings,
   engine,
   ui,
@@ -25,17 +25,19 @@ export function ring(
   rings.dataset.x = String(x);
   rings.dataset.y = String(y);
   const pane = paneAt(engine, x, y);
-  const others = engine.panes().filter((one) => one !== pane && ui.show.layout === 'side');
-  const [own, twin] = /** @type {HTMLElement[]} */ ([...rings.children]);
+  const otherPanes = engine
+    .panes()
+    .filter((other) => other !== pane && ui.display.layout === 'side');
+  const [ownRing, twinRing] = /** @type {HTMLElement[]} */ ([...rings.children]);
   rings.hidden = !pane;
   if (!pane) return;
   const isPoint =
-    ['pick', 'fill'].includes(ui.tool) || (ui.tool === 'adjust' && ui.about === 'object');
+    ['pick', 'fill'].includes(ui.tool) || (ui.tool === 'adjust' && ui.adjustedArea === 'object');
   const size = isPoint ? 14 : Math.max(4, ui.size * pane.scale);
-  place(own, x, y, size, ui.hardness);
-  twin.hidden = !others.length;
-  if (others.length)
-    place(twin, x - pane.left + others[0].left, y - pane.top + others[0].top, size, 1);
+  place(ownRing, x, y, size, ui.hardness);
+  twinRing.hidden = !otherPanes.length;
+  if (otherPanes.length)
+    place(twinRing, x - pane.left + otherPanes[0].left, y - pane.top + otherPanes[0].top, size, 1);
 }
 
 /** @param {HTMLElement} element @param {number} x @param {number} y @param {number} size
@@ -48,48 +50,48 @@ function place(element, x, y, size, hardness) {
 
 /** Pointer places to report in the next frame.
  * @type {WeakMap<UiStore, {x: number, y: number, frame: number}>} */
-const waiting = new WeakMap();
+const pendingReports = new WeakMap();
 
 /** Last place of the pointer. @type {WeakMap<UiStore, {x: number, y: number}>} */
-const last = new WeakMap();
+const lastPlaces = new WeakMap();
 
 /** Report what is under the pointer, once per frame. @param {Engine} engine @param {UiStore} store
  * @param {number} x @param {number} y */
-export function point(engine, store, x, y) {
-  last.set(store, { x, y });
-  const place = waiting.get(store) ?? { x, y, frame: 0 };
+export function reportProbe(engine, store, x, y) {
+  lastPlaces.set(store, { x, y });
+  const place = pendingReports.get(store) ?? { x, y, frame: 0 };
   Object.assign(place, { x, y });
-  if (waiting.has(store)) return;
-  waiting.set(store, place);
+  if (pendingReports.has(store)) return;
+  pendingReports.set(store, place);
   place.frame = requestAnimationFrame(() => {
-    waiting.delete(store);
+    pendingReports.delete(store);
     const pane = paneAt(engine, place.x, place.y);
-    const pointed = pane && pointedIn(engine, pane, place.x, place.y);
-    if (pointed || store.value.pointed) store.set({ pointed });
+    const probe = pane && probePane(engine, pane, place.x, place.y);
+    if (probe || store.value.probe) store.set({ probe });
   });
 }
 
 /** The pointer has left the pictures. @param {UiStore} store */
-export function pointAway(store) {
-  cancelAnimationFrame(waiting.get(store)?.frame ?? 0);
-  waiting.delete(store);
-  last.delete(store);
-  store.set({ pointed: null });
+export function clearProbe(store) {
+  cancelAnimationFrame(pendingReports.get(store)?.frame ?? 0);
+  pendingReports.delete(store);
+  lastPlaces.delete(store);
+  store.set({ probe: null });
 }
 
 /** The pictures have changed under a resting pointer. @param {Engine} engine
  * @param {UiStore} store */
-export function pointAgain(engine, store) {
-  const place = last.get(store);
-  if (place) point(engine, store, place.x, place.y);
+export function refreshProbe(engine, store) {
+  const place = lastPlaces.get(store);
+  if (place) reportProbe(engine, store, place.x, place.y);
 }
 
 /** @param {Engine} engine @param {import('./engine_interface.js').Pane} pane @param {number} x
- * @param {number} y @returns {import('./engine_interface.js').Pointed | null} */
-function pointedIn(engine, { kind, left, top, scale }, x, y) {
+ * @param {number} y @returns {import('./engine_interface.js').Probe | null} */
+function probePane(engine, { kind, left, top, scale }, x, y) {
   const [px, py] = [(x - left) / scale, (y - top) / scale];
-  const found = engine.pointed(px, py);
-  if (!found) return null;
+  const result = engine.probe(px, py);
+  if (!result) return null;
   const light = engine.lightAt(kind, px, py);
-  return { ...found, light, paint: engine.paintAt(kind, px, py, light) };
+  return { ...result, light, paint: engine.paintAt(kind, px, py, light) };
 }

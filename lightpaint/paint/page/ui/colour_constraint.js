@@ -1,8 +1,8 @@
 /** Controls for the colours that one light may have. */
 
 import { html } from '../vendor/preact.js';
-import { Button, NumberField, Select, useTyped } from './controls.js';
-import { atFull, toHex, toKelvin } from './paint_colour.js';
+import { Button, NumberField, Select, useDraft } from './controls.js';
+import { atFullBrightness, toHex, toKelvin } from './paint_colour.js';
 
 /** @typedef {import("./ui_state.js").Constraints} Constraints */
 /** @typedef {import("./engine_interface.js").RGB} RGB */
@@ -15,97 +15,99 @@ const COLOURS = [
 ];
 
 /** Return the kind of colour constraint of a light. @param {Constraints} constraints */
-export const colourOf = (constraints) =>
+export const colourKind = (constraints) =>
   ['color', 'kelvin', 'primaries'].find((key) => constraints[key] !== undefined) ?? 'any';
 
 /** @param {import("./light_row.js").Props} props */
 export function ColourConstraint(props) {
   const { k, app, constraints = {}, rgb } = props;
-  const kind = colourOf(constraints);
-  const { color, kelvin, duv, primaries, ...rest } = constraints;
-  const change = (/** @type {string} */ to) => {
-    const made = {
+  const kind = colourKind(constraints);
+  const { color, kelvin, duv, primaries, ...otherConstraints } = constraints;
+  const change = (/** @type {string} */ newKind) => {
+    const constraint = {
       any: {},
       color: { color: hexOf(rgb) },
       kelvin: { kelvin: [2700, 6500] },
       primaries: { primaries: ['#ff0000', '#00ff00', '#0000ff'] },
-    }[to];
-    app.session.constrainLight(k, { ...rest, ...made });
+    }[newKind];
+    app.session.constrainLight(k, { ...otherConstraints, ...constraint });
   };
   return html`<div class="ask-row">
       <${Select} label="Colour" value=${kind} choices=${COLOURS} change=${change} /></div>
-    ${kind === 'color' && html`<${SingleColour} ...${props} rest=${rest} />`}
-    ${kind === 'kelvin' && html`<${WhiteRange} ...${props} rest=${rest} />`}
+    ${kind === 'color' && html`<${SingleColour} ...${props} otherConstraints=${otherConstraints} />`}
+    ${kind === 'kelvin' && html`<${WhiteRange} ...${props} otherConstraints=${otherConstraints} />`}
     ${
       kind === 'primaries' &&
       html`<${TextField} label="LEDs" value=${[...primaries].join(', ')}
       take=${(/** @type {string} */ text) =>
         app.session.constrainLight(k, {
-          ...rest,
+          ...otherConstraints,
           primaries: text.split(/[\s,]+/).filter(Boolean),
         })} />`
     }`;
 }
 
 /** @param {any} props */
-function SingleColour({ k, app, constraints, rest, rgb }) {
-  const text = Array.isArray(constraints.color) ? hexOf(constraints.color) : String(constraints.color);
-  const found = toKelvin(rgb);
+function SingleColour({ k, app, constraints, otherConstraints, rgb }) {
+  const text = Array.isArray(constraints.color)
+    ? hexOf(constraints.color)
+    : String(constraints.color);
+  const white = toKelvin(rgb);
   return html`<div class="ask-row">
     <${TextField} label="Hex or kelvin" value=${text}
-      take=${(/** @type {string} */ color) => app.session.constrainLight(k, { ...rest, color })} />
+      take=${(/** @type {string} */ color) => app.session.constrainLight(k, { ...otherConstraints, color })} />
     ${
-      found &&
-      html`<${Button} label=${`${Math.round(found.kelvin / 50) * 50}K`}
+      white &&
+      html`<${Button} label=${`${Math.round(white.kelvin / 50) * 50}K`}
       tip="The white nearest to its colour in the answer" act=${() =>
         app.session.constrainLight(k, {
-          ...rest,
-          color: `${Math.round(found.kelvin / 50) * 50}K`,
+          ...otherConstraints,
+          color: `${Math.round(white.kelvin / 50) * 50}K`,
         })} />`
     }
   </div>`;
 }
 
 /** @param {any} props */
-function WhiteRange({ k, app, constraints, rest }) {
-  const ends = [constraints.kelvin].flat();
-  const [low, high] = [ends[0], ends.at(-1)];
+function WhiteRange({ k, app, constraints, otherConstraints }) {
+  const range = [constraints.kelvin].flat();
+  const [low, high] = [range[0], range.at(-1)];
   const set = (/** @type {number} */ a, /** @type {number} */ b, /** @type {number} */ duv) =>
     app.session.constrainLight(k, {
-      ...rest,
+      ...otherConstraints,
       kelvin: a === b ? a : [Math.min(a, b), Math.max(a, b)],
       ...(duv ? { duv } : {}),
     });
   const duv = constraints.duv ?? 0;
   return html`<div class="ask-fields">
-    <${NumberField} label="From" value=${low} least=${1000} most=${25000} step=${100} digits=${0}
-      unit="K" change=${(/** @type {number} */ to) => set(to, high, duv)} />
-    <${NumberField} label="To" value=${high} least=${1000} most=${25000} step=${100} digits=${0}
-      unit="K" change=${(/** @type {number} */ to) => set(low, to, duv)} />
-    <${NumberField} label="Tint" value=${1000 * duv} least=${-20} most=${20} digits=${1}
+    <${NumberField} label="From" value=${low} min=${1000} max=${25000} step=${100} digits=${0}
+      unit="K" change=${(/** @type {number} */ kelvin) => set(kelvin, high, duv)} />
+    <${NumberField} label="To" value=${high} min=${1000} max=${25000} step=${100} digits=${0}
+      unit="K" change=${(/** @type {number} */ kelvin) => set(low, kelvin, duv)} />
+    <${NumberField} label="Tint" value=${1000 * duv} min=${-20} max=${20} digits=${1}
       tip="Duv × 1000: above 0 green, below 0 magenta"
-      change=${(/** @type {number} */ to) => set(low, high, to / 1000)} />
+      change=${(/** @type {number} */ tint) => set(low, high, tint / 1000)} />
   </div>`;
 }
 
 /** @param {{label: string, value: string, take: (text: string) => void}} props */
 function TextField({ label, value, take }) {
-  const [typed, setTyped, now] = useTyped();
-  const done = () => {
-    const text = now.current?.trim();
-    setTyped(null);
+  const [draft, setDraft, draftRef] = useDraft();
+  const commit = () => {
+    const text = draftRef.current?.trim();
+    setDraft(null);
     if (text && text !== value) take(text);
   };
   const press = (/** @type {KeyboardEvent} */ { key }) => {
-    if (key === 'Enter') done();
-    if (key === 'Escape') setTyped(null);
+    if (key === 'Enter') commit();
+    if (key === 'Escape') setDraft(null);
   };
   return html`<label class="field words" data-tip=${value.length > 16 ? value : undefined}
     ><span class="name">${label}</span>
-    <input type="text" value=${typed ?? value} data-typed=${typed === null ? 'no' : 'yes'} spellcheck=${false} autocomplete="off"
-      onInput=${(/** @type {any} */ event) => setTyped(event.currentTarget.value)} onBlur=${done}
+    <input type="text" value=${draft ?? value} data-typed=${draft === null ? 'no' : 'yes'} spellcheck=${false} autocomplete="off"
+      onInput=${(/** @type {any} */ event) => setDraft(event.currentTarget.value)} onBlur=${commit}
       onKeyDown=${press} /></label>`;
 }
 
 /** @param {RGB} rgb */
-const hexOf = (rgb) => toHex(atFull(rgb));
+const hexOf = (rgb) => toHex(atFullBrightness(rgb));

@@ -1,10 +1,19 @@
 /** The colour of the paint as white, HSV, RGB or hex, its brightness, and swatches. */
 
 import { html, useState } from '../vendor/preact.js';
-import { encode, decode, ofHex, ofHsv, ofKelvin, toHex, toHsv, toKelvin } from './paint_colour.js';
-import { Choice, Slider, useTyped } from './controls.js';
-import { signed } from './format.js';
-import { KelvinSlider, gradient, withinKelvin } from './kelvin_slider.js';
+import {
+  encode,
+  decode,
+  fromHex,
+  fromHsv,
+  fromKelvin,
+  toHex,
+  toHsv,
+  toKelvin,
+} from './paint_colour.js';
+import { Choice, Slider, useDraft } from './controls.js';
+import { signedText } from './format.js';
+import { KelvinSlider, gradient, clampKelvin } from './kelvin_slider.js';
 import { paintOf } from './ui_state.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
@@ -36,108 +45,108 @@ export function ColourPanel({ ui, app }) {
   return html`<div class="colour">
     <div class="colour-row">
       <span class="patch" data-tip="Left: the colour. Right: how the display shows it at this brightness."
-        style=${{ '--colour': toHex(ui.colour), '--shown': shownAs(ui, app) }}></span>
+        style=${{ '--colour': toHex(ui.colour), '--shown': displayColour(ui, app) }}></span>
       <${Hex} colour=${ui.colour} set=${set} />
       <${Choice} label="Colour model" value=${ui.mixer} choices=${MIXERS}
         change=${(/** @type {any} */ mixer) => store.set({ mixer })} />
     </div>
     <${Mixer} colour=${ui.colour} set=${set} />
-    <${Slider} label="Brightness" value=${ui.stops} least=${-8} most=${8} step=${0.1} digits=${1}
-      unit="st" rest=${0} tip="Stops above display white. Paint can be brighter than white."
+    <${Slider} label="Brightness" value=${ui.stops} min=${-8} max=${8} step=${0.1} digits=${1}
+      unit="st" resetValue=${0} tip="Stops above display white. Paint can be brighter than white."
       change=${(/** @type {number} */ stops) => store.set({ stops })} />
     <${Swatches} ui=${ui} app=${app} />
   </div>`;
 }
 
 /** Return the display colour of the current paint on white. @param {Ui} ui @param {App} app */
-export function shownAs(ui, { engine }) {
-  return `rgb(${engine.codes(paintOf(ui), ui.show.stops).join(' ')})`;
+export function displayColour(ui, { engine }) {
+  return `rgb(${engine.codes(paintOf(ui), ui.display.stops).join(' ')})`;
 }
 
 /** @param {{colour: RGB, set: (colour: RGB) => void}} props */
 function Hex({ colour, set }) {
-  const [typed, setTyped, now] = useTyped();
+  const [draft, setDraft, draftRef] = useDraft();
   const take = (/** @type {string} */ text) => {
-    const made = ofHex(text);
-    setTyped(null);
-    if (made) set(made);
+    const rgb = fromHex(text);
+    setDraft(null);
+    if (rgb) set(rgb);
   };
   const press = (/** @type {any} */ { key, currentTarget }) => {
     if (key === 'Enter') take(currentTarget.value);
-    if (key === 'Escape') setTyped(null);
+    if (key === 'Escape') setDraft(null);
   };
   return html`<label class="field hex"><span class="only-read">Hex</span>
-    <input type="text" value=${typed ?? toHex(colour)} data-typed=${typed === null ? 'no' : 'yes'} spellcheck=${false} autocomplete="off"
+    <input type="text" value=${draft ?? toHex(colour)} data-typed=${draft === null ? 'no' : 'yes'} spellcheck=${false} autocomplete="off"
       maxlength="7"
-      onInput=${(/** @type {any} */ event) => setTyped(event.currentTarget.value)}
-      onBlur=${() => now.current !== null && take(now.current)}
+      onInput=${(/** @type {any} */ event) => setDraft(event.currentTarget.value)}
+      onBlur=${() => draftRef.current !== null && take(draftRef.current)}
       onKeyDown=${press} /></label>`;
 }
 
 /** @param {{colour: RGB, set: (colour: RGB) => void}} props */
 function White({ colour, set }) {
   // For colours that are not white, and for black, the dials keep the last white.
-  const [last, setLast] = useState({ kelvin: 3200, green: 0 });
-  const found = toKelvin(colour);
-  const isLast = same(ofKelvin(last.kelvin, last.green), colour);
-  const dials = isLast ? last : (found ?? last);
-  const isWhite = isLast || found !== null || !Math.max(...colour);
+  const [lastWhite, setLastWhite] = useState({ kelvin: 3200, green: 0 });
+  const match = toKelvin(colour);
+  const isLast = isSameHue(fromKelvin(lastWhite.kelvin, lastWhite.green), colour);
+  const white = isLast ? lastWhite : (match ?? lastWhite);
+  const isWhite = isLast || match !== null || !Math.max(...colour);
   const level = Math.max(...colour) || 1;
-  const dial = (/** @type {{kelvin?: number, green?: number}} */ changed) => {
-    const made = { ...dials, ...changed };
-    setLast(made);
-    const rgb = ofKelvin(made.kelvin, made.green);
+  const setWhite = (/** @type {{kelvin?: number, green?: number}} */ changes) => {
+    const newWhite = { ...white, ...changes };
+    setLastWhite(newWhite);
+    const rgb = fromKelvin(newWhite.kelvin, newWhite.green);
     set(/** @type {RGB} */ (rgb.map((x) => x * level)));
   };
-  const kelvin = withinKelvin(dials.kelvin);
-  const green = Math.min(20, Math.max(-20, dials.green));
+  const kelvin = clampKelvin(white.kelvin);
+  const green = Math.min(20, Math.max(-20, white.green));
   return html`<div class=${`white ${isWhite ? '' : 'is-dim'}`}>
     <${KelvinSlider} value=${kelvin}
-      change=${(/** @type {number} */ made) => dial({ kelvin: made })} />
-    <${Slider} label="Tint" value=${green} least=${-20} most=${20} step=${1} digits=${0} rest=${0}
-      track=${gradient([-20, 0, 20].map((by) => ofKelvin(kelvin, by)))}
+      change=${(/** @type {number} */ value) => setWhite({ kelvin: value })} />
+    <${Slider} label="Tint" value=${green} min=${-20} max=${20} step=${1} digits=${0} resetValue=${0}
+      track=${gradient([-20, 0, 20].map((tint) => fromKelvin(kelvin, tint)))}
       tip="Duv × 1000: green to the right, magenta to the left"
-      change=${(/** @type {number} */ made) => dial({ green: made })} /></div>`;
+      change=${(/** @type {number} */ value) => setWhite({ green: value })} /></div>`;
 }
 
 /** Return whether two colours differ at most in brightness. @param {RGB} a @param {RGB} b */
-function same(a, b) {
+function isSameHue(a, b) {
   const [m, n] = [Math.max(...a), Math.max(...b)];
   return n > 0 && a.every((x, c) => Math.abs(x / m - b[c] / n) < 1e-4);
 }
 
 /** @param {{colour: RGB, set: (colour: RGB) => void}} props */
 function Hsv({ colour, set }) {
-  const now = toHsv(colour);
-  const [kept, keep] = useState(now);
+  const current = toHsv(colour);
+  const [lastHsv, setLastHsv] = useState(current);
   // Grey has no hue and black no saturation; the sliders keep theirs.
-  const hue = now[1] > 0.004 && now[2] > 0 ? now[0] : kept[0];
-  const hsv = /** @type {RGB} */ ([hue, now[2] > 0 ? now[1] : kept[1], now[2]]);
-  const to = (/** @type {number} */ at, /** @type {number} */ value) => {
-    const made = /** @type {RGB} */ (hsv.map((x, c) => (c === at ? value : x)));
-    keep(made);
-    set(ofHsv(made));
+  const hue = current[1] > 0.004 && current[2] > 0 ? current[0] : lastHsv[0];
+  const hsv = /** @type {RGB} */ ([hue, current[2] > 0 ? current[1] : lastHsv[1], current[2]]);
+  const setChannel = (/** @type {number} */ channel, /** @type {number} */ value) => {
+    const newHsv = /** @type {RGB} */ (hsv.map((x, c) => (c === channel ? value : x)));
+    setLastHsv(newHsv);
+    set(fromHsv(newHsv));
   };
-  const hues = Array.from({ length: 7 }, (_, i) => ofHsv([i * 60, 1, 1]));
-  return html`<${Slider} label="Hue" value=${hsv[0]} least=${0} most=${360} unit="°"
-      track=${gradient(hues)} change=${(/** @type {number} */ x) => to(0, x)} />
-    <${Slider} label="Saturation" value=${100 * hsv[1]} least=${0} most=${100} unit="%"
-      track=${gradient([ofHsv([hsv[0], 0, hsv[2]]), ofHsv([hsv[0], 1, hsv[2]])])}
-      change=${(/** @type {number} */ x) => to(1, x / 100)} />
-    <${Slider} label="Value" value=${100 * hsv[2]} least=${0} most=${100} unit="%"
-      track=${gradient([[0, 0, 0], ofHsv([hsv[0], hsv[1], 1])])}
-      change=${(/** @type {number} */ x) => to(2, x / 100)} />`;
+  const hues = Array.from({ length: 7 }, (_, i) => fromHsv([i * 60, 1, 1]));
+  return html`<${Slider} label="Hue" value=${hsv[0]} min=${0} max=${360} unit="°"
+      track=${gradient(hues)} change=${(/** @type {number} */ x) => setChannel(0, x)} />
+    <${Slider} label="Saturation" value=${100 * hsv[1]} min=${0} max=${100} unit="%"
+      track=${gradient([fromHsv([hsv[0], 0, hsv[2]]), fromHsv([hsv[0], 1, hsv[2]])])}
+      change=${(/** @type {number} */ x) => setChannel(1, x / 100)} />
+    <${Slider} label="Value" value=${100 * hsv[2]} min=${0} max=${100} unit="%"
+      track=${gradient([[0, 0, 0], fromHsv([hsv[0], hsv[1], 1])])}
+      change=${(/** @type {number} */ x) => setChannel(2, x / 100)} />`;
 }
 
 /** @param {{colour: RGB, set: (colour: RGB) => void}} props */
 function Rgb({ colour, set }) {
-  const to = (/** @type {number} */ at, /** @type {number} */ value) =>
-    /** @type {RGB} */ (colour.map((x, c) => (c === at ? decode(value / 255) : x)));
+  const replaceChannel = (/** @type {number} */ channel, /** @type {number} */ value) =>
+    /** @type {RGB} */ (colour.map((x, c) => (c === channel ? decode(value / 255) : x)));
   return html`${['Red', 'Green', 'Blue'].map(
     (label, c) => html`<${Slider} key=${label}
-    label=${label} value=${255 * encode(colour[c])} least=${0} most=${255}
-    track=${gradient([to(c, 0), to(c, 255)])}
-    change=${(/** @type {number} */ value) => set(to(c, value))} />`,
+    label=${label} value=${255 * encode(colour[c])} min=${0} max=${255}
+    track=${gradient([replaceChannel(c, 0), replaceChannel(c, 255)])}
+    change=${(/** @type {number} */ value) => set(replaceChannel(c, value))} />`,
   )}`;
 }
 
@@ -147,18 +156,18 @@ function Swatches({ ui, app }) {
   const swatch = (/** @type {RGB} */ rgb, /** @type {string} */ tip, /** @type {number} */ stops) =>
     html`<${Swatch} key=${tip} rgb=${rgb} tip=${tip}
       act=${() => store.set({ colour: rgb, stops })} />`;
-  const gels = GELS.map(([name, hex]) => ({ name, rgb: /** @type {RGB} */ (ofHex(hex)) }));
+  const gels = GELS.map(([name, hex]) => ({ name, rgb: /** @type {RGB} */ (fromHex(hex)) }));
   return html`<div class="swatches" role="group" aria-label="Swatches">
-    ${WHITES.map((kelvin) => swatch(ofKelvin(kelvin), `${kelvin} K`, ui.stops))}
+    ${WHITES.map((kelvin) => swatch(fromKelvin(kelvin), `${kelvin} K`, ui.stops))}
     ${gels.map(({ name, rgb }) => swatch(rgb, name, ui.stops))}
   </div>
   <div class="swatches is-recent" role="group" aria-label="Recent colours">
     ${!ui.recent.length && html`<span class="faint">Recent colours</span>`}
     ${ui.recent.map(({ colour, stops }, k) => {
-      const by = signed(stops, Math.abs(stops - Math.round(stops)) < 0.05 ? 0 : 1);
-      const bright = by === '0' ? '' : `, ${by} stops`;
-      return html`<${Swatch} key=${k} rgb=${colour} stops=${bright && by}
-        tip=${`Recent ${k + 1}: ${toHex(colour)}${bright}`}
+      const stopsLabel = signedText(stops, Math.abs(stops - Math.round(stops)) < 0.05 ? 0 : 1);
+      const brightness = stopsLabel === '0' ? '' : `, ${stopsLabel} stops`;
+      return html`<${Swatch} key=${k} rgb=${colour} stops=${brightness && stopsLabel}
+        tip=${`Recent ${k + 1}: ${toHex(colour)}${brightness}`}
         act=${() => store.set({ colour, stops })} />`;
     })}
   </div>`;

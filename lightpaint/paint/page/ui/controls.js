@@ -2,43 +2,49 @@
 
 import { slideByTouch } from '../../../viewer/touch_sliders.js';
 import { html, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
-import { asTyped } from './format.js';
+import { cleanNumberText } from './format.js';
 import { Icon } from './icons.js';
 
 /** The text being typed in a field, null if none, as state and as a ref. Event handlers read the
  * ref before the next render, so that text cancelled by Escape is not taken when the field loses
  * focus.
  * @returns {[string | null, (text: string | null) => void, {current: string | null}]} */
-export function useTyped() {
-  const [typed, set] = useState(/** @type {string | null} */ (null));
-  const now = useRef(typed);
-  const setTyped = (/** @type {string | null} */ text) => {
-    now.current = text;
+export function useDraft() {
+  const [draft, set] = useState(/** @type {string | null} */ (null));
+  const draftRef = useRef(draft);
+  const setDraft = (/** @type {string | null} */ text) => {
+    draftRef.current = text;
     set(text);
   };
-  return [typed, setTyped, now];
+  return [draft, setDraft, draftRef];
 }
 
-let counter = 0;
+let lastId = 0;
 
 /** @returns {string} an id that no other element of the page has */
 export function useId() {
-  const [id] = useState(() => `lp-${(counter += 1)}`);
+  const [id] = useState(() => `lp-${(lastId += 1)}`);
   return id;
 }
 
 /**
  * A button with an icon, a word, or both. `tip` is its label where it has no word.
- * @param {{icon?: string, label?: string, tip?: string, keys?: string, on?: boolean,
+ * @param {{icon?: string, label?: string, tip?: string, keys?: string, pressed?: boolean,
  *   disabled?: boolean, primary?: boolean, act: (event: MouseEvent) => void, class?: string}} props
  */
-export function Button({ icon, label, tip, keys, on, disabled, primary, act, class: name }) {
-  const kind = ['button', icon && !label && 'is-icon', on && 'is-on', primary && 'is-primary', name]
+export function Button({ icon, label, tip, keys, pressed, disabled, primary, act, class: name }) {
+  const kind = [
+    'button',
+    icon && !label && 'is-icon',
+    pressed && 'is-on',
+    primary && 'is-primary',
+    name,
+  ]
     .filter(Boolean)
     .join(' ');
   const hint = tip ?? (keys ? label : undefined);
   return html`<button type="button" class=${kind} disabled=${disabled} onClick=${act}
-    aria-label=${label && label.length > 1 ? undefined : tip} aria-pressed=${on === undefined ? undefined : String(on)}
+    aria-label=${label && label.length > 1 ? undefined : tip} aria-pressed=${pressed === undefined ? undefined : String(pressed)}
     aria-keyshortcuts=${keys} data-tip=${hint} data-keys=${keys}>
     ${icon && html`<${Icon} name=${icon} />`}${label && html`<span>${label}</span>`}
   </button>`;
@@ -53,16 +59,16 @@ export function Button({ icon, label, tip, keys, on, disabled, primary, act, cla
 export function Choice({ label, value, choices, change, icons }) {
   return html`<div class="choice" role="group" aria-label=${label}>
     ${choices.map(
-      (one) => html`<${Button} key=${String(one.value)} icon=${one.icon}
-      label=${icons ? undefined : one.label} tip=${one.tip ?? (icons ? one.label : undefined)}
-      keys=${one.keys} on=${one.value === value} disabled=${one.disabled}
-      act=${() => change(one.value)} />`,
+      (choice) => html`<${Button} key=${String(choice.value)} icon=${choice.icon}
+      label=${icons ? undefined : choice.label} tip=${choice.tip ?? (icons ? choice.label : undefined)}
+      keys=${choice.keys} pressed=${choice.value === value} disabled=${choice.disabled}
+      act=${() => change(choice.value)} />`,
     )}
   </div>`;
 }
 
 /** Characters that fit into a field or a list in any panel. */
-const FITS = 12;
+const MAX_VISIBLE_CHARACTERS = 12;
 
 /**
  * A choice of one among many. Its tip repeats text that may not fit.
@@ -70,25 +76,26 @@ const FITS = 12;
  *   change: (value: string) => void, hidden?: boolean, tip?: string}} props
  */
 export function Select({ label, value, choices, change, hidden, tip }) {
-  const chosen = choices.find((one) => one.value === value)?.label ?? '';
-  const whole = chosen.length > FITS && !tip?.includes(chosen) ? chosen : null;
-  return html`<label class="field" data-tip=${[tip, whole].filter(Boolean).join(': ') || undefined}>
+  const chosenLabel = choices.find((choice) => choice.value === value)?.label ?? '';
+  const fullText =
+    chosenLabel.length > MAX_VISIBLE_CHARACTERS && !tip?.includes(chosenLabel) ? chosenLabel : null;
+  return html`<label class="field" data-tip=${[tip, fullText].filter(Boolean).join(': ') || undefined}>
     <span class=${hidden ? 'only-read' : 'name'}>${label}</span>
     <select value=${value}
       onChange=${(/** @type {any} */ event) => change(event.currentTarget.value)}>
       ${choices.map(
-        (one) => html`<option key=${one.value} value=${one.value}
-        selected=${one.value === value}>${one.label}</option>`,
+        (choice) => html`<option key=${choice.value} value=${choice.value}
+        selected=${choice.value === value}>${choice.label}</option>`,
       )}
     </select>
   </label>`;
 }
 
-/** @param {{label: string, on: boolean, change: (on: boolean) => void, tip?: string,
+/** @param {{label: string, checked: boolean, change: (checked: boolean) => void, tip?: string,
  *   disabled?: boolean}} props */
-export function Check({ label, on, change, tip, disabled }) {
+export function Checkbox({ label, checked, change, tip, disabled }) {
   return html`<label class="check" data-tip=${tip}>
-    <input type="checkbox" checked=${on} disabled=${disabled}
+    <input type="checkbox" checked=${checked} disabled=${disabled}
       onChange=${(/** @type {any} */ event) => change(event.currentTarget.checked)} />
     <span>${label}</span>
   </label>`;
@@ -99,42 +106,42 @@ export function Check({ label, on, change, tip, disabled }) {
  * arrow keys. digits: after the point; figures: significant digits, instead. start: value from
  * which the keys step in an empty field.
  * @param {{label: string, value: number | null, change: (value: number | null) => void,
- *   least?: number, most?: number, step?: number, digits?: number, figures?: number, unit?: string,
- *   start?: number, hidden?: boolean, empty?: string, disabled?: boolean, tip?: string}} props
+ *   min?: number, max?: number, step?: number, digits?: number, figures?: number, unit?: string,
+ *   start?: number, hidden?: boolean, placeholder?: string, disabled?: boolean, tip?: string}} props
  */
 export function NumberField(props) {
-  const { label, value, change, step = 1, digits = 2, unit, hidden, empty, disabled } = props;
-  const { least = -Infinity, most = Infinity, figures, start = 0, tip } = props;
-  const [typed, setTyped, now] = useTyped();
+  const { label, value, change, step = 1, digits = 2, unit, hidden, placeholder, disabled } = props;
+  const { min = -Infinity, max = Infinity, figures, start = 0, tip } = props;
+  const [draft, setDraft, draftRef] = useDraft();
   const round = (/** @type {number} */ x) =>
     Number(figures ? x.toPrecision(figures) : x.toFixed(digits));
-  const shown = typed ?? (value === null ? '' : String(round(value)));
+  const displayText = draft ?? (value === null ? '' : String(round(value)));
   // Take the number as shown.
-  const within = (/** @type {number} */ x) => Math.min(most, Math.max(least, round(x)));
+  const clamp = (/** @type {number} */ x) => Math.min(max, Math.max(min, round(x)));
   const take = (/** @type {string} */ text) => {
-    setTyped(null);
-    const plain = asTyped(text);
-    const made = Number(plain);
-    if (!plain && empty !== undefined) change(null);
-    else if (plain && Number.isFinite(made)) change(within(made));
+    setDraft(null);
+    const cleanText = cleanNumberText(text);
+    const number = Number(cleanText);
+    if (!cleanText && placeholder !== undefined) change(null);
+    else if (cleanText && Number.isFinite(number)) change(clamp(number));
   };
   const press = (/** @type {any} */ event) => {
-    const way = { ArrowUp: 1, ArrowDown: -1 }[/** @type {string} */ (event.key)];
+    const sign = { ArrowUp: 1, ArrowDown: -1 }[/** @type {string} */ (event.key)];
     if (event.key === 'Enter') take(event.currentTarget.value);
-    if (event.key === 'Escape') setTyped(null);
-    if (!way) return;
+    if (event.key === 'Escape') setDraft(null);
+    if (!sign) return;
     event.preventDefault();
-    setTyped(null);
-    if (!shown && way < 0) return; // no negative amounts
-    const from = shown ? Number(asTyped(shown)) || 0 : start;
-    change(within(from + way * step * (event.shiftKey ? 10 : 1)));
+    setDraft(null);
+    if (!displayText && sign < 0) return; // no negative amounts
+    const base = displayText ? Number(cleanNumberText(displayText)) || 0 : start;
+    change(clamp(base + sign * step * (event.shiftKey ? 10 : 1)));
   };
   return html`<label class="field number" data-tip=${tip}>
     <span class=${hidden ? 'only-read' : 'name'}>${label}</span>
-    <input type="text" inputmode="decimal" value=${shown} placeholder=${empty} autocomplete="off"
-      data-typed=${typed === null ? 'no' : 'yes'} disabled=${disabled} onKeyDown=${press}
-      onInput=${(/** @type {any} */ event) => setTyped(event.currentTarget.value)}
-      onBlur=${() => now.current !== null && take(now.current)} />
+    <input type="text" inputmode="decimal" value=${displayText} placeholder=${placeholder} autocomplete="off"
+      data-typed=${draft === null ? 'no' : 'yes'} disabled=${disabled} onKeyDown=${press}
+      onInput=${(/** @type {any} */ event) => setDraft(event.currentTarget.value)}
+      onBlur=${() => draftRef.current !== null && take(draftRef.current)} />
     ${unit !== undefined && html`<span class="unit" aria-hidden="true">${unit}</span>`}
   </label>`;
 }
@@ -142,52 +149,52 @@ export function NumberField(props) {
 /**
  * A slider with its number beside it. `change(value, done)`: done is false while it moves. `curve`
  * maps a value to a place and back; if it decreases, the greatest value is left.
- * @param {{label: string, value: number, least: number, most: number, step?: number, unit?: string,
- *   digits?: number, change: (value: number, done: boolean) => void, track?: string, rest?: number,
- *   curve?: {to: (x: number) => number, of: (t: number) => number}, text?: string, plain?: boolean,
+ * @param {{label: string, value: number, min: number, max: number, step?: number, unit?: string,
+ *   digits?: number, change: (value: number, isFinal: boolean) => void, track?: string, resetValue?: number,
+ *   curve?: {toPosition: (x: number) => number, toValue: (t: number) => number}, text?: string, plain?: boolean,
  *   disabled?: boolean, keys?: string, tip?: string}} props
  */
 export function Slider(props) {
-  const { label, value, least, most, step = 1, unit, digits = 0, change, track, rest } = props;
+  const { label, value, min, max, step = 1, unit, digits = 0, change, track, resetValue } = props;
   const { curve, text, plain, disabled, keys, tip } = props;
-  const to = curve?.to ?? ((/** @type {number} */ x) => x);
-  const of = curve?.of ?? ((/** @type {number} */ x) => x);
-  const move = (/** @type {number} */ place, /** @type {boolean} */ done) =>
-    change(of(place), done);
-  const moveTo = (/** @type {any} */ event, /** @type {boolean} */ done) =>
-    move(Number(event.currentTarget.value), done);
+  const toPosition = curve?.toPosition ?? ((/** @type {number} */ x) => x);
+  const toValue = curve?.toValue ?? ((/** @type {number} */ x) => x);
+  const move = (/** @type {number} */ position, /** @type {boolean} */ isFinal) =>
+    change(toValue(position), isFinal);
+  const moveTo = (/** @type {any} */ event, /** @type {boolean} */ isFinal) =>
+    move(Number(event.currentTarget.value), isFinal);
   const input = useRef(/** @type {HTMLInputElement | null} */ (null));
-  const latest = useRef({ move, place: to(value) });
-  latest.current = { move, place: to(value) };
+  const latest = useRef({ move, position: toPosition(value) });
+  latest.current = { move, position: toPosition(value) };
   useLayoutEffect(() => {
     const element = input.current;
     if (!element) return undefined;
-    const ends = new AbortController();
+    const controller = new AbortController();
     slideByTouch(
       element,
-      (place, done) => latest.current.move(place, done),
-      () => (element.value = String(latest.current.place)),
-      ends.signal,
+      (position, isFinal) => latest.current.move(position, isFinal),
+      () => (element.value = String(latest.current.position)),
+      controller.signal,
     );
-    return () => ends.abort();
+    return () => controller.abort();
   }, []);
-  const [low, high] = [to(least), to(most)].sort((a, b) => a - b);
-  const at = Math.min(1, Math.max(0, (to(value) - low) / (high - low)));
+  const [low, high] = [toPosition(min), toPosition(max)].sort((a, b) => a - b);
+  const share = Math.min(1, Math.max(0, (toPosition(value) - low) / (high - low)));
   return html`<div class="slider" data-tip=${tip} data-keys=${keys}>
     ${!plain && html`<span class="name" aria-hidden="true">${label}</span>`}
     <input type="range" ref=${input} aria-label=${label} min=${low} max=${high}
-      step=${curve ? (high - low) / 200 : step} value=${to(value)} disabled=${disabled}
+      step=${curve ? (high - low) / 200 : step} value=${toPosition(value)} disabled=${disabled}
       aria-valuetext=${text ?? `${Number(value.toFixed(digits))} ${unit ?? ''}`.trim()}
       class=${track ? 'has-track' : ''}
-      style=${{ '--at': String(at), ...(track ? { '--track': track } : {}) }}
+      style=${{ '--at': String(share), ...(track ? { '--track': track } : {}) }}
       onInput=${(/** @type {any} */ event) => moveTo(event, false)}
       onChange=${(/** @type {any} */ event) => moveTo(event, true)}
-      onDblClick=${() => rest !== undefined && change(rest, true)} />
+      onDblClick=${() => resetValue !== undefined && change(resetValue, true)} />
     ${
       !plain &&
-      html`<${NumberField} label=${label} hidden value=${value} least=${least} most=${most}
+      html`<${NumberField} label=${label} hidden value=${value} min=${min} max=${max}
       step=${step} digits=${digits} unit=${unit ?? ''} disabled=${disabled}
-      change=${(/** @type {number} */ made) => change(made, true)} />`
+      change=${(/** @type {number} */ number) => change(number, true)} />`
     }
   </div>`;
 }
@@ -195,10 +202,10 @@ export function Slider(props) {
 /**
  * Text that may be truncated: if it is longer than a number of characters, its tip has all of it,
  * also for the keyboard.
- * @param {{text: string, most: number, class?: string, tag?: string}} props
+ * @param {{text: string, maxLength: number, class?: string, tag?: string}} props
  */
-export function TruncatedText({ text, most, class: name, tag: Tag = 'span' }) {
-  const isLong = text.length > most;
+export function TruncatedText({ text, maxLength, class: name, tag: Tag = 'span' }) {
+  const isLong = text.length > maxLength;
   return html`<${Tag} class=${name} data-tip=${isLong ? text : undefined}
     tabindex=${isLong ? 0 : undefined}>${text}</${Tag}>`;
 }
@@ -222,10 +229,10 @@ export function Fold({ title, open, toggle, children, extra, class: name }) {
 
 /**
  * Scroll a part of the painter into view once it exists, and optionally focus it.
- * @param {HTMLElement} beside whatever in the same painter @param {string} name @param {boolean} [isFocused]
+ * @param {HTMLElement} element whatever in the same painter @param {string} name @param {boolean} [isFocused]
  */
-export function reveal(beside, name, isFocused = false) {
-  const root = beside.closest('.lightpaint');
+export function reveal(element, name, isFocused = false) {
+  const root = element.closest('.lightpaint');
   requestAnimationFrame(() => {
     const part = /** @type {HTMLElement | null | undefined} */ (root?.querySelector(name));
     part?.scrollIntoView({ block: 'nearest' });
@@ -234,7 +241,7 @@ export function reveal(beside, name, isFocused = false) {
 }
 
 /** Height in pixels below which the visible part of a painter is too low for a dialog. */
-const LOW = 300;
+const MIN_DIALOG_HEIGHT = 300;
 
 /**
  * Place a dialog over the visible part of the painter. The centre of the frame may be far away: VS
@@ -247,7 +254,7 @@ function placeOver(element) {
   const { clientWidth, clientHeight } = document.documentElement;
   const [left, right] = [Math.max(0, box.left), Math.max(0, clientWidth - box.right)];
   let [top, bottom] = [Math.max(0, box.top), Math.max(0, clientHeight - box.bottom)];
-  if (clientHeight - top - bottom < LOW) top = bottom = 0;
+  if (clientHeight - top - bottom < MIN_DIALOG_HEIGHT) top = bottom = 0;
   const lengths = { top, right, bottom, left };
   for (const [name, length] of Object.entries(lengths)) {
     element.style.setProperty(`--${name}`, `${length}px`);
@@ -264,16 +271,16 @@ export function Dialog({ title, close, children, class: name }) {
   // At once, since the next key may be Escape.
   useLayoutEffect(() => {
     const element = ref.current;
-    const before = /** @type {HTMLElement | null} */ (
+    const previousFocus = /** @type {HTMLElement | null} */ (
       /** @type {Document | ShadowRoot | undefined} */ (element?.getRootNode())?.activeElement
     );
     if (element && !element.open) element.showModal();
-    const place = () => element && placeOver(element);
-    place();
-    window.addEventListener('resize', place);
+    const position = () => element && placeOver(element);
+    position();
+    window.addEventListener('resize', position);
     return () => {
-      window.removeEventListener('resize', place);
-      before?.focus?.();
+      window.removeEventListener('resize', position);
+      previousFocus?.focus?.();
     };
   }, []);
   return html`<dialog class=${`dialog ${name ?? ''}`} ref=${ref} aria-labelledby=${id}

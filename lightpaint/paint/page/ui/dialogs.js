@@ -2,8 +2,8 @@
 
 import { html, useState } from '../vendor/preact.js';
 import { ProgressBar } from './progress_bar.js';
-import { Button, Check, Dialog } from './controls.js';
-import { progressText, within } from './format.js';
+import { Button, Checkbox, Dialog } from './controls.js';
+import { progressText, relativePath } from './format.js';
 import { SHORTCUTS, MOD } from './shortcuts.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
@@ -19,14 +19,14 @@ export function Dialogs({ ui, app }) {
 
 /** @param {{close: () => void}} props */
 function ShortcutsDialog({ close }) {
-  const spoken = (/** @type {string} */ key) => (key === 'Ctrl' ? MOD : key);
+  const symbolOf = (/** @type {string} */ key) => (key === 'Ctrl' ? MOD : key);
   return html`<${Dialog} title="Keyboard shortcuts" close=${close} class="keys">
     ${SHORTCUTS.map(
       ({ title, keys }) => html`<section key=${title}><h3>${title}</h3><dl>
       ${keys.map(
-        ({ shown, does }) => html`<div key=${does}>
-        <dt>${shown.map((key, k) => html`<kbd key=${k}>${spoken(key)}</kbd>`)}</dt>
-        <dd>${does}</dd></div>`,
+        ({ symbols, description }) => html`<div key=${description}>
+        <dt>${symbols.map((key, k) => html`<kbd key=${k}>${symbolOf(key)}</kbd>`)}</dt>
+        <dd>${description}</dd></div>`,
       )}
     </dl></section>`,
     )}
@@ -35,57 +35,62 @@ function ShortcutsDialog({ close }) {
 }
 
 /** @type {{key: import("../engine/messages.js").Export["outputs"][number], label: string,
- *   about: string}[]} */
+ *   description: string}[]} */
 const EXPORTS = [
-  { key: 'target', label: 'Painting', about: 'painting.exr, for lightpaint solve' },
-  { key: 'picture', label: 'Picture', about: 'answer.png: the answer as a picture' },
-  { key: 'lighting', label: 'Lighting', about: 'lighting.json: level and colour of every light' },
-  { key: 'relit', label: 'Scene', about: 'relit.xml: the scene with this lighting' },
-  { key: 'report', label: 'Report', about: 'report.html: painting, answer and analysis' },
+  { key: 'target', label: 'Painting', description: 'painting.exr, for lightpaint solve' },
+  { key: 'picture', label: 'Picture', description: 'answer.png: the answer as a picture' },
+  {
+    key: 'lighting',
+    label: 'Lighting',
+    description: 'lighting.json: level and colour of every light',
+  },
+  { key: 'relit', label: 'Scene', description: 'relit.xml: the scene with this lighting' },
+  { key: 'report', label: 'Report', description: 'report.html: painting, answer and analysis' },
 ];
 
-const UNPAINTED = 'Nothing is painted yet, so no painting and no report were exported.';
+const UNPAINTED_TEXT = 'Nothing is painted yet, so no painting and no report were exported.';
 
 /** @param {{ui: Ui, app: App, close: () => void}} props */
 function ExportDialog({ ui, app, close }) {
-  const can = EXPORTS.filter(
+  const available = EXPORTS.filter(
     ({ key }) =>
       (key !== 'relit' || ui.state?.can_render) &&
       (key !== 'report' || ui.state?.can_report !== false),
   );
-  const [outputs, setOutputs] = useState(can.map(({ key }) => key));
-  const isBusy = ui.isWriting;
-  const { exported } = ui;
+  const [outputs, setOutputs] = useState(available.map(({ key }) => key));
+  const isBusy = ui.isExporting;
+  const { exportResult } = ui;
   const folder = ui.state?.folder ?? '';
   return html`<${Dialog} title="Export" close=${close} class="export">
-    ${can.map(
-      ({ key, label, about }) => html`<div class="export-row" key=${key}>
-      <${Check} label=${label} on=${outputs.includes(key)} change=${(/** @type {boolean} */ on) =>
-        setOutputs(on ? [...outputs, key] : outputs.filter((one) => one !== key))} />
-      <span class="faint">${about}</span></div>`,
+    ${available.map(
+      ({ key, label, description }) => html`<div class="export-row" key=${key}>
+      <${Checkbox} label=${label} checked=${outputs.includes(key)} change=${(
+        /** @type {boolean} */ on,
+      ) => setOutputs(on ? [...outputs, key] : outputs.filter((output) => output !== key))} />
+      <span class="faint">${description}</span></div>`,
     )}
     <div class="row"><span class="faint folder">to ${folder}</span>
       <${CopyButton} text=${folder} tip="Copy the folder's path" app=${app} />
       <${Button} label=${isBusy ? 'Exporting …' : 'Export'} primary disabled=${isBusy || !outputs.length}
-        act=${() => app.session.write(outputs)} /></div>
+        act=${() => app.session.exportFiles(outputs)} /></div>
     ${
       isBusy &&
       html`<div class="row"><span class="faint folder">You can close this window.</span>
-        <${ProgressBar} progress=${ui.writing ?? { done: 0, total: 0 }} label="Exporting" />
-        <span class="faint">${ui.writing && progressText(ui.writing)}</span>
-        <${Button} label="Stop" icon="close" act=${() => app.session.write([])}
+        <${ProgressBar} progress=${ui.exportProgress ?? { done: 0, total: 0 }} label="Exporting" />
+        <span class="faint">${ui.exportProgress && progressText(ui.exportProgress)}</span>
+        <${Button} label="Stop" icon="close" act=${() => app.session.exportFiles([])}
           tip="Files that are written already stay" /></div>`
     }
     ${
-      exported &&
+      exportResult &&
       html`<div class="exported" role="status">
-      <h3>${exported.is_stopped ? 'Stopped. Written already:' : 'Exported'}</h3>
-      <ul>${exported.files.map((file) => html`<li key=${file}><code>${within(file, folder)}</code></li>`)}</ul>
-      ${exported.is_unpainted && html`<p>${UNPAINTED}</p>`}
+      <h3>${exportResult.is_stopped ? 'Stopped. Written already:' : 'Exported'}</h3>
+      <ul>${exportResult.files.map((file) => html`<li key=${file}><code>${relativePath(file, folder)}</code></li>`)}</ul>
+      ${exportResult.is_unpainted && html`<p>${UNPAINTED_TEXT}</p>`}
       ${
-        exported.command &&
+        exportResult.command &&
         html`<h3>The same from the command line</h3>
-        <${CommandLine} text=${exported.command} app=${app} />`
+        <${CommandLine} text=${exportResult.command} app=${app} />`
       }
     </div>`
     }
@@ -102,16 +107,16 @@ function CommandLine({ text, app }) {
 /** A button that copies, and confirms it in its label.
  * @param {{text: string, app: App, label?: string, tip?: string}} props */
 function CopyButton({ text, app, label, tip }) {
-  const [isDone, setDone] = useState(false);
+  const [isCopied, setCopied] = useState(false);
   const copy = async () => {
     try {
       await navigator.clipboard.writeText(text);
-      setDone(true);
+      setCopied(true);
     } catch {
       // Browsers allow copying only to pages from this machine or over https.
       app.session.toast('This browser does not let the page copy. Select the text instead.');
     }
   };
-  return html`<${Button} label=${label && (isDone ? 'Copied' : label)} tip=${isDone && tip ? 'Copied' : tip}
-    icon=${isDone ? 'check' : 'copy'} act=${copy} />`;
+  return html`<${Button} label=${label && (isCopied ? 'Copied' : label)} tip=${isCopied && tip ? 'Copied' : tip}
+    icon=${isCopied ? 'check' : 'copy'} act=${copy} />`;
 }

@@ -25,9 +25,9 @@
 /** @typedef {"painting" | "solution" | "other" | "verified" | "present"} Kind */
 
 /**
- * What is drawn, and how. `gains`: factors of the lights by solo and mute; null for all. `instead`,
- * `other`: weights for "solution" and "other"; null for the answer's.
- * @typedef {object} Show
+ * What is drawn, and how. `visibleLights`: those that solo and mute leave; null for all. `solutionWeights`,
+ * `otherWeights`: weights for "solution" and "other"; null for the answer's.
+ * @typedef {object} Display
  * @property {Kind} left
  * @property {Kind} right
  * @property {"side" | "wipe" | "blink"} layout
@@ -39,9 +39,9 @@
  * @property {string} transform
  * @property {boolean} clean
  * @property {null | "missed" | "beyond" | "falsecolor" | "importance"} overlay
- * @property {boolean[] | null} gains
- * @property {RGB[] | null} instead
- * @property {RGB[] | null} other
+ * @property {boolean[] | null} visibleLights
+ * @property {RGB[] | null} solutionWeights
+ * @property {RGB[] | null} otherWeights
  */
 
 /** @typedef {"brush" | "eraser" | "weight" | "pick" | "fill" | "line" | "adjust"} Tool */
@@ -52,12 +52,12 @@
  * @typedef {object} ToolSettings
  * @property {Tool} tool
  * @property {RGB} rgb
- * @property {"light" | "colour"} as
+ * @property {"light" | "colour"} paintMode
  * @property {number} size
  * @property {number} hardness
  * @property {number} flow
  * @property {number} importance
- * @property {"spot" | "object"} about what a drag asks about
+ * @property {"spot" | "object"} adjustedArea what a drag adjusts
  */
 
 /** In pixels of the picture. @typedef {{x: number, y: number, pressure: number}} Point */
@@ -68,7 +68,7 @@
  * What is under the pointer. `object`: its name; `index`: its number, -1 for none. `shares`: each
  * light's share of the answer there. `light`: light of the picture under the pointer.
  * @typedef {{object: string | null, index: number, shares: number[], light: RGB,
- *   paint: RGB}} Pointed paint: what to paint with, as the hand does, to have that light there */
+ *   paint: RGB}} Probe paint: what to paint with, as the hand does, to have that light there */
 /** Numbers of objects, (height, width).
  * @typedef {{data: ArrayLike<number>, width: number, height: number}} Objects */
 
@@ -76,7 +76,7 @@
  * @typedef {object} Engine
  * @property {HTMLElement} element where the pictures are drawn
  * @property {(width: number, height: number) => void} resize in CSS pixels
- * @property {(show: Show) => void} show
+ * @property {(display: Display) => void} show
  * @property {(settings: ToolSettings) => void} setTool
  * @property {() => Pane[]} panes
  * @property {(view: number) => void} showView another view: what is shown, and painted
@@ -86,18 +86,18 @@
  * @property {() => void} end
  * @property {() => boolean} cancel the stroke that has begun; whether there was one
  * @property {(from: Point, to: Point) => void} line a straight stroke, whole
- * @property {(asked: {stops: number, mired: number, object: number | null}) => void} adjust
+ * @property {(adjustment: {stops: number, mired: number, object: number | null}) => void} adjust
  *   brighter and warmer by so much, in an object or, for null, in the whole picture
  * @property {(kind: Kind, x: number, y: number) => RGB} lightAt
  * @property {(kind: Kind, x: number, y: number, light?: RGB) => RGB} paintAt what to paint with, in the manner
  *   that is in the hand, to have that light there
- * @property {(x: number, y: number) => Omit<Pointed, 'light' | 'paint'> | null} pointed
+ * @property {(x: number, y: number) => Omit<Probe, 'light' | 'paint'> | null} probe
  * @property {() => Objects | null} objects which object each pixel shows, once that is known
- * @property {() => number} greatest importance that is painted; 1 at least
+ * @property {() => number} maxImportance the greatest painted importance, at least 1
  * @property {(rgb: RGB, stops: number) => number[]} codes that light is shown with, at an exposure
  * @property {(name: string, listener: (event: any) => void) => void} on "message": an answer to a
  *   stroke; "loading": {done, total, isFirst} pictures, where some of
- *   the lights have none yet; "asking": {stops, mired} while a drag asks;
+ *   the lights have none yet; "adjustment": {stops, mired} of a drag;
  *   "view": {view} in which something was undone; "lost": {count, isStale} strokes that are not
  *   sent any more, since another page has painted meanwhile, or the session is there no more; "trouble": {text}
  * @property {() => void} close

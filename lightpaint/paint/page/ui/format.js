@@ -5,7 +5,7 @@ import { luminance, toKelvin } from './paint_colour.js';
 const MINUS = '\u2212';
 
 /** @param {number} value @param {number} [digits] @returns {string} */
-export function number(value, digits = 3) {
+export function numberText(value, digits = 3) {
   if (!Number.isFinite(value)) return '–';
   const size = Math.abs(value);
   const text =
@@ -17,27 +17,27 @@ export function number(value, digits = 3) {
 
 /** Parse a typed number, which may have a true minus sign and a decimal comma.
  * @param {string} text */
-export const asTyped = (text) => text.trim().replace(MINUS, '-').replace(',', '.');
+export const cleanNumberText = (text) => text.trim().replace(MINUS, '-').replace(',', '.');
 
 /** @param {number} value @param {number} [digits] @returns {string} "+0.5", "−1.2", "0" */
-export function signed(value, digits = 1) {
-  const rounded = Number(value.toFixed(digits));
-  if (!rounded) return '0';
-  return (rounded > 0 ? '+' : MINUS) + Math.abs(rounded).toFixed(digits);
+export function signedText(value, digits = 1) {
+  const roundedValue = Number(value.toFixed(digits));
+  if (!roundedValue) return '0';
+  return (roundedValue > 0 ? '+' : MINUS) + Math.abs(roundedValue).toFixed(digits);
 }
 
 /** @param {number | null | undefined} stops @returns {string} */
 export function stopsText(stops) {
   if (stops === null || stops === undefined || !Number.isFinite(stops)) return '';
-  return Math.abs(stops) < 0.05 ? 'as now' : `${signed(stops)} st`;
+  return Math.abs(stops) < 0.05 ? 'as now' : `${signedText(stops)} st`;
 }
 
 /** Return progress and remaining time as text, in one form for all tasks.
- * @param {{done: number, total: number, left_s?: number}} progress */
-export function progressText({ done, total, left_s: left }) {
+ * @param {{done: number, total: number, remainingSeconds?: number}} progress */
+export function progressText({ done, total, remainingSeconds: remaining }) {
   if (!total) return '';
   const share = `${Math.floor((100 * Math.min(done, total)) / total)} %`;
-  return left === undefined ? share : `${share}, ${timeText(left)} left`;
+  return remaining === undefined ? share : `${share}, ${timeText(remaining)} left`;
 }
 
 /** Rounded to the precision of the estimate. @param {number} seconds */
@@ -49,7 +49,7 @@ function timeText(seconds) {
 }
 
 /** @param {number} share 0 to 1 @returns {string} */
-export function percent(share) {
+export function percentText(share) {
   const value = 100 * share;
   if (value > 0 && value < 1) return '<1 %';
   return `${Math.round(value)} %`;
@@ -63,48 +63,49 @@ const kelvinText = (kelvin) => {
 
 /** Distance from Planck's locus, in thousandths, beyond which a white looks green or pink. Lamps
  * that are sold as white are nearer. */
-const TINTED = 6;
+const MIN_TINT_DUV = 6;
 
 /** Return a white as kelvin, with its tint if it has one. @param {number} kelvin
  * @param {number} green as of `toKelvin` */
 export const whiteText = (kelvin, green) =>
-  kelvinText(kelvin) + (Math.abs(green) < TINTED ? '' : green > 0 ? ' green' : ' pink');
+  kelvinText(kelvin) + (Math.abs(green) < MIN_TINT_DUV ? '' : green > 0 ? ' green' : ' pink');
 
 /** Distance from Planck's locus, in thousandths of (u, v), up to which light has a colour
  * temperature. */
-const WHITE = 20;
+const MAX_WHITE_DUV = 20;
 
 /** Return light as text: stops from display white, and kelvin if it is a white; empty for no light.
  * @param {number[]} rgb linear, the exposure included @returns {string} */
-export const lightText = (rgb) => spoken(rgb, luminance(rgb));
+export const lightText = (rgb) => describeLight(rgb, luminance(rgb));
 
 /** Return paint as text, as in its panel: its stops are those of its largest channel.
  * @param {number[]} rgb linear, the exposure included @returns {string} */
-export const paintText = (rgb) => spoken(rgb, Math.max(...rgb));
+export const paintText = (rgb) => describeLight(rgb, Math.max(...rgb));
 
 /** @param {number[]} rgb @param {number} level */
-function spoken(rgb, level) {
+function describeLight(rgb, level) {
   if (!(level > 0)) return '';
-  const found = toKelvin(rgb);
-  const isWhite = found && Math.abs(found.green) <= WHITE;
-  return `${signed(Math.log2(level))} st${isWhite ? ` · ${whiteText(found.kelvin, found.green)}` : ''}`;
+  const white = toKelvin(rgb);
+  const isWhite = white && Math.abs(white.green) <= MAX_WHITE_DUV;
+  return `${signedText(Math.log2(level))} st${isWhite ? ` · ${whiteText(white.kelvin, white.green)}` : ''}`;
 }
 
 /** Return a name shortened in the middle, since names of many lights differ at their ends.
- * @param {string} name @param {number} most */
-export function shortened(name, most) {
-  if (name.length <= most) return name;
-  const end = Math.ceil((most - 1) / 2);
-  return `${name.slice(0, most - 1 - end)}…${name.slice(-end)}`;
+ * @param {string} name @param {number} maxLength */
+export function shortenName(name, maxLength) {
+  if (name.length <= maxLength) return name;
+  const end = Math.ceil((maxLength - 1) / 2);
+  return `${name.slice(0, maxLength - 1 - end)}…${name.slice(-end)}`;
 }
 
-/** @param {number} count @param {string} one @param {string} [many] @returns {string} */
-export const counted = (count, one, many = `${one}s`) => `${count} ${count === 1 ? one : many}`;
+/** @param {number} count @param {string} singular @param {string} [plural] @returns {string} */
+export const countText = (count, singular, plural = `${singular}s`) =>
+  `${count} ${count === 1 ? singular : plural}`;
 
 /** Return the name of a file without its folder. @param {string} file @param {string} folder */
-export function within(file, folder) {
+export function relativePath(file, folder) {
   return file.startsWith(folder) ? file.slice(folder.length).replace(/^[/\\]+/, '') : file;
 }
 
 /** Return a sentence with no-break spaces between numbers and units. @param {string} text */
-export const unbroken = (text) => text.replace(/(\d) (?=%)|(ΔE) (?=\d)/g, '$1$2\u00a0');
+export const joinUnits = (text) => text.replace(/(\d) (?=%)|(ΔE) (?=\d)/g, '$1$2\u00a0');

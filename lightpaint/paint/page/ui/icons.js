@@ -5,7 +5,7 @@
 import { html } from '../vendor/preact.js';
 
 /** @type {Record<string, string>} */
-const PATHS = {
+const ICON_PATHS = {
   brush:
     'M4 20c3 0 5-1 5-4 0-1.6-1.2-2.8-2.7-2.8S3.6 14.4 3.6 16 3 19 4 20zM9.4 13.4 18.6 4c.8-.8 2.2.6 1.4 1.4l-9.2 9.4',
   eraser:
@@ -42,6 +42,6 @@ const PATHS = {
 /** @param {{name: string}} props */
 export function Icon({ name }) {
   return html`<svg class="icon" viewBox="0 0 24 24" aria-hidden="true" focusable="false">
-    <path d=${PATHS[name]} />
+    <path d=${ICON_PATHS[name]} />
   </svg>`;
 }

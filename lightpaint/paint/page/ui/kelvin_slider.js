@@ -1,17 +1,17 @@
 /** A slider for colour temperature, in mireds, so that equal steps look equal; warm is right. */
 
 import { html } from '../vendor/preact.js';
-import { ofKelvin, toHex } from './paint_colour.js';
+import { fromKelvin, toHex } from './paint_colour.js';
 import { Slider } from './controls.js';
 
 /** @typedef {import("./engine_interface.js").RGB} RGB */
 
 /** Ends of the slider. */
-const [WARMEST, COOLEST] = [1500, 15000];
+const [MIN_KELVIN, MAX_KELVIN] = [1500, 15000];
 
-const MIRED = {
-  to: (/** @type {number} */ k) => 1e6 / k,
-  of: (/** @type {number} */ t) => Math.round(1e6 / t / 50) * 50,
+const MIRED_CURVE = {
+  toPosition: (/** @type {number} */ k) => 1e6 / k,
+  toValue: (/** @type {number} */ t) => Math.round(1e6 / t / 50) * 50,
 };
 
 /** Return the CSS gradient of the track. @param {RGB[]} colours */
@@ -19,18 +19,18 @@ export const gradient = (colours) => `linear-gradient(to right, ${colours.map(to
 
 const TRACK = gradient(
   Array.from({ length: 12 }, (_, i) => {
-    const [low, high] = [MIRED.to(COOLEST), MIRED.to(WARMEST)];
-    return ofKelvin(MIRED.of(low + (i / 11) * (high - low)));
+    const [low, high] = [MIRED_CURVE.toPosition(MAX_KELVIN), MIRED_CURVE.toPosition(MIN_KELVIN)];
+    return fromKelvin(MIRED_CURVE.toValue(low + (i / 11) * (high - low)));
   }),
 );
 
 /** @param {number} kelvin */
-export const withinKelvin = (kelvin) => Math.min(COOLEST, Math.max(WARMEST, kelvin));
+export const clampKelvin = (kelvin) => Math.min(MAX_KELVIN, Math.max(MIN_KELVIN, kelvin));
 
-/** @param {{value: number, change: (kelvin: number, done: boolean) => void, label?: string,
+/** @param {{value: number, change: (kelvin: number, isFinal: boolean) => void, label?: string,
  *   disabled?: boolean}} props */
 export function KelvinSlider({ value, change, label = 'CCT', disabled }) {
-  return html`<${Slider} label=${label} value=${withinKelvin(value)} least=${WARMEST}
-    most=${COOLEST} step=${100} unit="K" curve=${MIRED} track=${TRACK} disabled=${disabled}
+  return html`<${Slider} label=${label} value=${clampKelvin(value)} min=${MIN_KELVIN}
+    max=${MAX_KELVIN} step=${100} unit="K" curve=${MIRED_CURVE} track=${TRACK} disabled=${disabled}
     tip="Correlated colour temperature: warmer to the right" change=${change} />`;
 }

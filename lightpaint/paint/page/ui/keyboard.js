@@ -5,20 +5,21 @@ import { setFlow } from './tools.js';
 
 /** @typedef {import("./shortcuts.js").App} App */
 
-const BY_KEY = new Map(
+const SHORTCUTS_BY_KEY = new Map(
   SHORTCUTS.flatMap(({ keys }) => keys)
-    .filter((one) => one.act)
-    .map((one) => [one.keys, one]),
+    .filter((shortcut) => shortcut.act)
+    .map((shortcut) => [shortcut.keys, shortcut]),
 );
 
 /** Some keyboards have [ and ] behind AltGr, which is Ctrl and Alt on some systems.
  * @param {KeyboardEvent} event */
-const isMod = (event) => (event.ctrlKey || event.metaKey) && !event.getModifierState('AltGraph');
+const hasModifier = (event) =>
+  (event.ctrlKey || event.metaKey) && !event.getModifierState('AltGraph');
 
 /** @param {KeyboardEvent} event @returns {string} */
 function shortcutOf(event) {
   const key = event.key.toLowerCase();
-  if (isMod(event)) return `mod+${event.shiftKey ? 'shift+' : ''}${key}`;
+  if (hasModifier(event)) return `mod+${event.shiftKey ? 'shift+' : ''}${key}`;
   if (key === 'f' && event.shiftKey) return 'shift+f';
   return key === '=' ? '+' : key;
 }
@@ -36,7 +37,9 @@ export function isTyping(event) {
  * it is no shortcut of the pictures. @param {KeyboardEvent} event */
 function isAmongNumbers(event) {
   const element = /** @type {HTMLElement} */ (event.composedPath()[0]);
-  return event.key.length === 1 && !isMod(event) && Boolean(element.closest?.('[data-numbers]'));
+  return (
+    event.key.length === 1 && !hasModifier(event) && Boolean(element.closest?.('[data-numbers]'))
+  );
 }
 
 /** Keys of undo and redo, which also work in a field without uncommitted text. */
@@ -44,7 +47,7 @@ const HISTORY_KEYS = ['mod+z', 'mod+shift+z'];
 
 /** Return whether a field's text is committed. Then undo applies to the session, not to the text.
  * @param {KeyboardEvent} event in that field */
-function isTaken(event) {
+function isCommitted(event) {
   const field = /** @type {HTMLElement} */ (event.composedPath()[0]);
   return field.dataset?.typed === 'no';
 }
@@ -65,17 +68,17 @@ export function handleKey(event, app) {
   const isAlt = event.altKey && !event.getModifierState('AltGraph');
   if (event.defaultPrevented || isAlt) return;
   const name = shortcutOf(event);
-  const isIn = isTyping(event) || isAmongNumbers(event);
+  const isInField = isTyping(event) || isAmongNumbers(event);
   // Suppress saving the page and selecting all, except in text fields.
-  if (name === 'mod+s' || (name === 'mod+a' && !isIn)) event.preventDefault();
+  if (name === 'mod+s' || (name === 'mod+a' && !isInField)) event.preventDefault();
   if (app.store.value.dialog) return;
-  if (name === 'mod+s' && isIn) commit(event);
-  else if (isIn && !(HISTORY_KEYS.includes(name) && isTaken(event))) return;
-  const digit = /^[0-9]$/.test(event.key) && !event.ctrlKey && !event.metaKey;
-  const found = BY_KEY.get(name);
-  if (digit) setFlow(app.store, (Number(event.key) || 10) / 10);
-  else if (found && !(found.isOnce && event.repeat)) found.act?.(app);
-  else if (!found) return;
+  if (name === 'mod+s' && isInField) commit(event);
+  else if (isInField && !(HISTORY_KEYS.includes(name) && isCommitted(event))) return;
+  const isDigit = /^[0-9]$/.test(event.key) && !event.ctrlKey && !event.metaKey;
+  const shortcut = SHORTCUTS_BY_KEY.get(name);
+  if (isDigit) setFlow(app.store, (Number(event.key) || 10) / 10);
+  else if (shortcut && !(shortcut.isOnce && event.repeat)) shortcut.act?.(app);
+  else if (!shortcut) return;
   if (name !== 'escape') event.preventDefault();
 }
 
@@ -89,7 +92,7 @@ const CELL_KEYS = ['x', 'v', 'y', 'enter'];
  */
 function belongsToPainter(event) {
   if (event.defaultPrevented) return true;
-  if (isMod(event)) return !isTyping(event) && CELL_KEYS.includes(event.key.toLowerCase());
+  if (hasModifier(event)) return !isTyping(event) && CELL_KEYS.includes(event.key.toLowerCase());
   return !/^F\d+$/.test(event.key);
 }
 
@@ -105,16 +108,16 @@ export function listenWithin(root, app, signal) {
   root.tabIndex = -1; // after a click anywhere in it
   root.addEventListener('keydown', handle, { signal });
   // If the focused element disappears (a dialog, a disabled button), nothing has the focus.
-  let isHere = false;
+  let hasFocus = false;
   const noteFocus = (/** @type {Event} */ event) => {
-    isHere = event.composedPath().includes(root);
+    hasFocus = event.composedPath().includes(root);
   };
-  const early = { signal, capture: true };
-  window.addEventListener('pointerdown', noteFocus, early);
-  window.addEventListener('focusin', noteFocus, early);
+  const captureOptions = { signal, capture: true };
+  window.addEventListener('pointerdown', noteFocus, captureOptions);
+  window.addEventListener('focusin', noteFocus, captureOptions);
   window.addEventListener(
     'keydown',
-    (event) => isHere && event.target === document.body && handle(event),
-    early,
+    (event) => hasFocus && event.target === document.body && handle(event),
+    captureOptions,
   );
 }

@@ -8,7 +8,7 @@ import { placeOf } from './lamp_marks.js';
 /** @typedef {import("./shortcuts.js").App} App */
 
 /** Labels of what the next click does to a light. */
-const WAYS = /** @type {const} */ ({
+const CLICK_MODES = /** @type {const} */ ({
   aim: { label: 'Aim here', tip: 'Click a surface: the light points there' },
   highlight: {
     label: 'Highlight here',
@@ -20,31 +20,40 @@ const WAYS = /** @type {const} */ ({
   },
 });
 
-/** Hint on what to click next. @param {import("./ui_state.js").Pointing} pointing
+/** Hint on what to click next. @param {import("./ui_state.js").ClickAction} action
  * @param {Ui["lights"]} lights */
-export function pointingHint(pointing, lights) {
-  if (pointing.mode === 'hang')
-    return `Click the surface that the new ${pointing.type} hangs on, or its place in the plan. Esc cancels.`;
-  const { mode, edge } = pointing;
-  const name = lights[pointing.light]?.label ?? '';
+export function pointingHint(action, lights) {
+  if (action.mode === 'hang')
+    return `Click the surface that the new ${action.type} hangs on, or its place in the plan. Esc cancels.`;
+  const { mode, edge } = action;
+  const name = lights[action.light]?.label ?? '';
   if (mode === 'aim') return `Click what ${name} is to point at. Esc cancels.`;
-  if (mode === 'highlight') return `Click where the highlight of ${name} is to be seen. Esc cancels.`;
+  if (mode === 'highlight')
+    return `Click where the highlight of ${name} is to be seen. Esc cancels.`;
   return edge
     ? 'Now click where that shadow is to end. Esc cancels.'
     : `Click the edge of what casts the shadow of ${name}. Esc cancels.`;
 }
 
-/** Handle a click on a picture in a pointing mode. @param {App} app
+/** Handle a click on a picture that a click action waits for. @param {App} app
  * @param {{x: number, y: number} | null} point in pixels of the picture */
 export function pointLamp(app, point) {
-  const { pointing, view } = app.store.value;
-  if (!pointing || !point) return;
+  const { clickAction, view } = app.store.value;
+  if (!clickAction || !point) return;
   const pixel = /** @type {[number, number]} */ ([point.x, point.y]);
-  if (pointing.mode === 'hang') return void app.session.addLight({ type: pointing.type, pixel, view });
-  const { light, mode, edge } = pointing;
-  if (mode === 'shadow' && !edge) return app.store.set({ pointing: { light, mode, edge: pixel } });
-  app.store.set({ pointing: null });
-  app.session.lampMoves.ask(light, { kind: 'point', mode, pixel, ...(edge ? { edge } : {}), view });
+  if (clickAction.mode === 'hang')
+    return void app.session.addLight({ type: clickAction.type, pixel, view });
+  const { light, mode, edge } = clickAction;
+  if (mode === 'shadow' && !edge)
+    return app.store.set({ clickAction: { light, mode, edge: pixel } });
+  app.store.set({ clickAction: null });
+  app.session.lampMoves.queue(light, {
+    kind: 'point',
+    mode,
+    pixel,
+    ...(edge ? { edge } : {}),
+    view,
+  });
 }
 
 /** @param {{k: number, ui: Ui, app: App}} props */
@@ -59,7 +68,7 @@ export function LampFields({ k, ui, app }) {
   const isAdded = ui.addedLights.includes(name);
   if (place.immovable_reason)
     return html`<p class="faint lamp-fields">${label} ${place.immovable_reason}: it stays where it is.</p>`;
-  const vector = (
+  const vectorFields = (
     /** @type {"position" | "target"} */ key,
     /** @type {string} */ title,
     /** @type {number[] | null} */ value,
@@ -68,35 +77,45 @@ export function LampFields({ k, ui, app }) {
     html`<div class="lamp-vector" role="group" aria-label=${`${title} of ${label}`}>
       <span class="name">${title}</span>
       ${['x', 'y', 'z'].map(
-        (axis, c) => html`<${NumberField} key=${axis} label=${`${title} ${axis}`} hidden value=${value[c]}
+        (
+          axis,
+          c,
+        ) => html`<${NumberField} key=${axis} label=${`${title} ${axis}`} hidden value=${value[c]}
         figures=${4} step=${0.05} change=${(/** @type {number} */ x) =>
-          session.moveLamp(k, { [key]: value.map((was, i) => (i === c ? x : was)) })} />`,
+          session.moveLamp(k, {
+            [key]: value.map((coordinate, i) => (i === c ? x : coordinate)),
+          })} />`,
       )}</div>`;
-  const point = (/** @type {"aim" | "highlight" | "shadow"} */ mode) => {
-    const isOn = ui.pointing?.mode === mode && 'light' in ui.pointing && ui.pointing.light === k;
-    return html`<${Button} key=${mode} label=${WAYS[mode].label} tip=${WAYS[mode].tip} on=${isOn}
+  const pointButton = (/** @type {"aim" | "highlight" | "shadow"} */ mode) => {
+    const isOn =
+      ui.clickAction?.mode === mode && 'light' in ui.clickAction && ui.clickAction.light === k;
+    return html`<${Button} key=${mode} label=${CLICK_MODES[mode].label} tip=${CLICK_MODES[mode].tip} pressed=${isOn}
       act=${() =>
-        store.set({ lamps: true, lamp: k, pointing: isOn ? null : { light: k, mode } })} />`;
+        store.set({
+          areLampsMarked: true,
+          lamp: k,
+          clickAction: isOn ? null : { light: k, mode },
+        })} />`;
   };
   return html`<div class="lamp-fields" data-numbers>
     <h3>Place</h3>
-    ${vector('position', 'Position', place.position)}
-    ${place.position && place.direction && vector('target', 'Target', place.target)}
+    ${vectorFields('position', 'Position', place.position)}
+    ${place.position && place.direction && vectorFields('target', 'Target', place.target)}
     ${
       place.cutoff !== null &&
       html`<div class="ask-fields is-pair">
-        <${NumberField} label="Cone" unit="°" value=${place.cutoff} least=${1} most=${89} step=${1}
+        <${NumberField} label="Cone" unit="°" value=${place.cutoff} min=${1} max=${89} step=${1}
           digits=${1} change=${(/** @type {number} */ x) =>
             session.moveLamp(k, { cutoff: x, beam: Math.min(x, place.beam ?? x) })} />
-        <${NumberField} label="Beam" unit="°" value=${place.beam} least=${0.5} most=${place.cutoff}
+        <${NumberField} label="Beam" unit="°" value=${place.beam} min=${0.5} max=${place.cutoff}
           step=${1} digits=${1} change=${(/** @type {number} */ x) =>
             session.moveLamp(k, { beam: x, cutoff: place.cutoff })} />
       </div>`
     }
     <div class="lamp-ways" role="group" aria-label=${`Point ${label} by a click`}>
-      ${place.position && place.direction && point('aim')}
-      ${point('highlight')}${point('shadow')}
-      ${name in ui.poses && html`<${Button} label="Put back" tip=${`Back to where ${isAdded ? 'you hung it' : 'the scene has it'}`} act=${() => session.putBack(k)} />`}
+      ${place.position && place.direction && pointButton('aim')}
+      ${pointButton('highlight')}${pointButton('shadow')}
+      ${name in ui.poses && html`<${Button} label="Put back" tip=${`Back to where ${isAdded ? 'you hung it' : 'the scene has it'}`} act=${() => session.resetPlace(k)} />`}
       ${isAdded && html`<${Button} label="Remove" icon="trash" tip=${`Remove ${label}. Undo brings it back.`} act=${() => session.removeLight(name)} />`}
     </div></div>`;
 }

@@ -10,10 +10,10 @@ const GRAZING = 0.04;
 export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
 /** a + t b. @param {number[]} a @param {number[]} b @param {number} [t] @returns {Vector} */
-export const plus = (a, b, t = 1) => [a[0] + t * b[0], a[1] + t * b[1], a[2] + t * b[2]];
+export const add = (a, b, t = 1) => [a[0] + t * b[0], a[1] + t * b[1], a[2] + t * b[2]];
 
 /** @param {number[]} a @param {number[]} b @returns {Vector} */
-export const minus = (a, b) => plus(a, b, -1);
+export const subtract = (a, b) => add(a, b, -1);
 
 /** @param {number[]} a @param {number[]} b @returns {Vector} */
 const cross = (a, b) => [
@@ -23,7 +23,7 @@ const cross = (a, b) => [
 ];
 
 /** @param {number[]} a @returns {Vector} */
-export function unit(a) {
+export function normalize(a) {
   const length = Math.hypot(...a) || 1;
   return [a[0] / length, a[1] / length, a[2] / length];
 }
@@ -31,12 +31,12 @@ export function unit(a) {
 /** Return the coefficients of a vector in a basis of three others. @param {number[]} a
  * @param {number[]} b
  * @param {number[]} c @param {number[]} v @returns {Vector} */
-function parts(a, b, c, v) {
-  const whole = dot(a, cross(b, c));
+function coefficients(a, b, c, v) {
+  const determinant = dot(a, cross(b, c));
   return [
-    dot(v, cross(b, c)) / whole,
-    dot(a, cross(v, c)) / whole,
-    dot(a, cross(b, v)) / whole,
+    dot(v, cross(b, c)) / determinant,
+    dot(a, cross(v, c)) / determinant,
+    dot(a, cross(b, v)) / determinant,
   ];
 }
 
@@ -45,12 +45,12 @@ function parts(a, b, c, v) {
  * point behind it, the place is that of the opposite direction.
  * @param {Camera} camera @param {number[]} point @returns {{x: number, y: number, isAhead: boolean}}
  */
-export function seenAt(camera, point) {
-  const [x, y, s] = parts(
+export function project(camera, point) {
+  const [x, y, s] = coefficients(
     camera.x_axis,
     camera.y_axis,
     camera.forward,
-    minus(point, camera.origin),
+    subtract(point, camera.origin),
   );
   if (camera.is_parallel) return { x, y, isAhead: s > 0 };
   return { x: x / s, y: y / s, isAhead: s > 0 };
@@ -58,18 +58,18 @@ export function seenAt(camera, point) {
 
 /** Return the same for a direction: a point that is infinitely far away. @param {Camera} camera
  * @param {number[]} direction */
-export function seenTowards(camera, direction) {
-  const far = 1e6 * (Math.hypot(...camera.origin) + 1);
-  return seenAt(camera, plus(camera.origin, unit(direction), far));
+export function projectDirection(camera, direction) {
+  const distance = 1e6 * (Math.hypot(...camera.origin) + 1);
+  return project(camera, add(camera.origin, normalize(direction), distance));
 }
 
 /** Return the camera ray of a pixel. @param {Camera} camera @param {number} x @param {number} y
- * @returns {{origin: Vector, way: Vector}} */
+ * @returns {{origin: Vector, direction: Vector}} */
 function rayAt({ origin, x_axis: xAxis, y_axis: yAxis, forward, is_parallel: isParallel }, x, y) {
-  const shifted = plus(plus([0, 0, 0], xAxis, x), yAxis, y);
+  const offset = add(add([0, 0, 0], xAxis, x), yAxis, y);
   return isParallel
-    ? { origin: plus(origin, shifted), way: unit(forward) }
-    : { origin: plus(origin, [0, 0, 0]), way: unit(plus(shifted, forward)) };
+    ? { origin: add(origin, offset), direction: normalize(forward) }
+    : { origin: add(origin, [0, 0, 0]), direction: normalize(add(offset, forward)) };
 }
 
 /**
@@ -78,41 +78,41 @@ function rayAt({ origin, x_axis: xAxis, y_axis: yAxis, forward, is_parallel: isP
  * @param {Camera} camera @param {number[]} place of the light @param {number} up axis
  * @param {number} x @param {number} y in pixels of the picture @returns {Vector}
  */
-export function inPlane(camera, place, up, x, y) {
-  const { origin, way } = rayAt(camera, x, y);
-  const far = dot(minus(place, origin), way);
-  const distance = (place[up] - origin[up]) / way[up];
-  const isMet = Math.abs(way[up]) > GRAZING && distance > 0 && distance < 8 * Math.abs(far);
-  const made = plus(origin, way, isMet ? distance : far);
-  made[up] = place[up];
-  return made;
+export function dragInPlane(camera, place, up, x, y) {
+  const { origin, direction } = rayAt(camera, x, y);
+  const depth = dot(subtract(place, origin), direction);
+  const distance = (place[up] - origin[up]) / direction[up];
+  const isHit = Math.abs(direction[up]) > GRAZING && distance > 0 && distance < 8 * Math.abs(depth);
+  const point = add(origin, direction, isHit ? distance : depth);
+  point[up] = place[up];
+  return point;
 }
 
 /** Return the point of a line that is nearest to a pointer's ray. @param {Camera} camera
- * @param {number[]} start @param {number[]} along @param {number} x @param {number} y
+ * @param {number[]} start @param {number[]} axis @param {number} x @param {number} y
  * @returns {number} as a multiple of `along` from `start` */
-function nearestOnLine(camera, start, along, x, y) {
-  const { origin, way } = rayAt(camera, x, y);
-  const between = minus(start, origin);
-  const [a, b, c] = [dot(along, along), dot(along, way), dot(way, way)];
-  const whole = a * c - b * b;
-  if (whole < 1e-9 * a * c) return 0;
-  return (b * dot(way, between) - c * dot(along, between)) / whole;
+function nearestOnLine(camera, start, axis, x, y) {
+  const { origin, direction } = rayAt(camera, x, y);
+  const offset = subtract(start, origin);
+  const [a, b, c] = [dot(axis, axis), dot(axis, direction), dot(direction, direction)];
+  const determinant = a * c - b * b;
+  if (determinant < 1e-9 * a * c) return 0;
+  return (b * dot(direction, offset) - c * dot(axis, offset)) / determinant;
 }
 
 /** Return the place to which a pointer drags a light up and down. @param {Camera} camera
  * @param {number[]} place @param {number} up @param {number} x @param {number} y @returns {Vector} */
-export function upAndDown(camera, place, up, x, y) {
-  const along = /** @type {Vector} */ ([0, 0, 0].map((_, k) => (k === up ? 1 : 0)));
-  return plus(place, along, nearestOnLine(camera, place, along, x, y));
+export function dragVertically(camera, place, up, x, y) {
+  const axis = /** @type {Vector} */ ([0, 0, 0].map((_, k) => (k === up ? 1 : 0)));
+  return add(place, axis, nearestOnLine(camera, place, axis, x, y));
 }
 
 /** Return the place on its rail to which a pointer drags a light. @param {Camera} camera
  * @param {number[][]} rail both ends @param {number} x @param {number} y @returns {Vector} */
-export function onRail(camera, [start, end], x, y) {
-  const along = minus(end, start);
-  const share = nearestOnLine(camera, start, along, x, y);
-  return plus(start, along, Math.min(1, Math.max(0, share)));
+export function dragOnRail(camera, [start, end], x, y) {
+  const axis = subtract(end, start);
+  const share = nearestOnLine(camera, start, axis, x, y);
+  return add(start, axis, Math.min(1, Math.max(0, share)));
 }
 
 /**
@@ -121,7 +121,7 @@ export function onRail(camera, [start, end], x, y) {
  * @param {{left: number, top: number, right: number, bottom: number}} box
  * @returns {{x: number, y: number, isInside: boolean, angle: number}} angle: in radians, outwards
  */
-export function within({ x, y, isAhead }, { left, top, right, bottom }) {
+export function clampToBox({ x, y, isAhead }, { left, top, right, bottom }) {
   const [cx, cy] = [(left + right) / 2, (top + bottom) / 2];
   const isInside = isAhead && x >= left && x <= right && y >= top && y <= bottom;
   const sign = isAhead ? 1 : -1;

@@ -2,17 +2,17 @@
 
 import { html, useRef } from '../vendor/preact.js';
 import {
-  inPlane,
-  minus,
-  onRail,
-  plus,
-  seenAt,
-  seenTowards,
-  upAndDown,
-  within,
+  dragInPlane,
+  subtract,
+  dragOnRail,
+  add,
+  project,
+  projectDirection,
+  dragVertically,
+  clampToBox,
 } from './lamp_geometry.js';
 import { toHex } from './paint_colour.js';
-import { atFull, luminance } from './paint_colour.js';
+import { atFullBrightness, luminance } from './paint_colour.js';
 
 /** @typedef {import("./engine_interface.js").Pane} Pane */
 /** @typedef {import("./ui_state.js").Ui} Ui */
@@ -22,24 +22,24 @@ import { atFull, luminance } from './paint_colour.js';
 /** @typedef {{left: number, top: number, right: number, bottom: number}} Box */
 
 /** CSS pixels between the edge and a mark of a light outside the picture. */
-const MARGIN = 14;
+const MARK_MARGIN = 14;
 
 /** Length of the arrow at a trial place, relative to the room. */
-const ARROW = 0.06;
+const ARROW_ROOM_SHARE = 0.06;
 
 /** @param {{ui: Ui, app: App, panes: Pane[]}} props */
 export function LampMarks({ ui, app, panes }) {
-  const camera = ui.lamps && ui.rig ? ui.rig.cameras[ui.view] : null;
+  const camera = ui.areLampsMarked && ui.rig ? ui.rig.cameras[ui.view] : null;
   if (!camera) return null;
-  return html`<div class=${`lamps ${ui.pointing ? 'is-pointing' : ''} ${ui.placing ? 'is-placing' : ''}`}>
-    ${apart(panes).map(
+  return html`<div class=${`lamps ${ui.clickAction ? 'is-pointing' : ''} ${ui.placementProgress ? 'is-placing' : ''}`}>
+    ${distinctPanes(panes).map(
       (pane, k) => html`<${PaneMarks} key=${k} ui=${ui} app=${app} pane=${pane} camera=${camera}
       isTwin=${k > 0} />`,
     )}</div>`;
 }
 
 /** Return the panes side by side; of overlapping ones the first. @param {Pane[]} panes */
-function apart(panes) {
+function distinctPanes(panes) {
   return panes.filter(
     (pane, k) => panes.findIndex((x) => x.left === pane.left && x.top === pane.top) === k,
   );
@@ -60,47 +60,51 @@ function boxOf(pane, [height, width]) {
  * reaches the marks of the other picture */
 function PaneMarks({ ui, app, pane, camera, isTwin }) {
   const box = boxOf(pane, ui.state.size);
-  const inner = {
-    left: box.left + MARGIN,
-    top: box.top + MARGIN,
-    right: box.right - MARGIN,
-    bottom: box.bottom - MARGIN,
+  const innerBox = {
+    left: box.left + MARK_MARGIN,
+    top: box.top + MARK_MARGIN,
+    right: box.right - MARK_MARGIN,
+    bottom: box.bottom - MARK_MARGIN,
   };
-  /** @param {{x: number, y: number, isAhead: boolean}} seen in pixels of the picture */
-  const onPage = (seen) => ({
-    ...seen,
-    x: pane.left + seen.x * pane.scale,
-    y: pane.top + seen.y * pane.scale,
+  /** @param {{x: number, y: number, isAhead: boolean}} projection in pixels of the picture */
+  const toPage = (projection) => ({
+    ...projection,
+    x: pane.left + projection.x * pane.scale,
+    y: pane.top + projection.y * pane.scale,
   });
   const places = /** @type {LightPlace[]} */ (ui.rig?.lights ?? []);
   return html`
-    <${Trials} ui=${ui} camera=${camera} box=${box} onPage=${onPage} />
-    <${Ghosts} ui=${ui} camera=${camera} box=${box} onPage=${onPage} />
-    ${ui.lamp !== null && places[ui.lamp] && html`<${Beam} place=${placeOf(ui, ui.lamp)} camera=${camera} box=${box} onPage=${onPage} />`}
+    <${Trials} ui=${ui} camera=${camera} box=${box} toPage=${toPage} />
+    <${Ghosts} ui=${ui} camera=${camera} box=${box} toPage=${toPage} />
+    ${ui.lamp !== null && places[ui.lamp] && html`<${Beam} place=${placeOf(ui, ui.lamp)} camera=${camera} box=${box} toPage=${toPage} />`}
     ${places.map((_, k) => {
       const place = placeOf(ui, k);
-      const seen = markAt(camera, place);
-      if (!seen) return null;
+      const projection = markAt(camera, place);
+      if (!projection) return null;
       return html`<${Mark} key=${k} ui=${ui} app=${app} light=${k} place=${place} pane=${pane}
-        camera=${camera} at=${within(onPage(seen), inner)} isTwin=${isTwin} />`;
+        camera=${camera} position=${clampToBox(toPage(projection), innerBox)} isTwin=${isTwin} />`;
     })}
-    ${ui.lamp !== null && places[ui.lamp] && html`<${AimHandle} ui=${ui} app=${app} light=${ui.lamp} pane=${pane} camera=${camera} inner=${inner}
-      onPage=${onPage} isTwin=${isTwin} />`}`;
+    ${
+      ui.lamp !== null &&
+      places[ui.lamp] &&
+      html`<${AimHandle} ui=${ui} app=${app} light=${ui.lamp} pane=${pane} camera=${camera} innerBox=${innerBox}
+      toPage=${toPage} isTwin=${isTwin} />`
+    }`;
 }
 
 /** Return the place of a light; during a drag, the pointer's. @param {Ui} ui @param {number} k
  * @returns {LightPlace} */
-export function placeOf({ rig, dragged }, k) {
+export function placeOf({ rig, drag }, k) {
   const place = /** @type {LightPlace} */ (rig?.lights[k]);
-  return dragged?.light === k ? { ...place, ...dragged.place } : place;
+  return drag?.light === k ? { ...place, ...drag.place } : place;
 }
 
 /** Return the place of a light's mark; for an infinitely distant light, the direction that its
  * light comes from. @param {Camera} camera @param {LightPlace} place */
 function markAt(camera, { position, direction }) {
-  if (position) return seenAt(camera, position);
+  if (position) return project(camera, position);
   if (!direction) return null;
-  return seenTowards(
+  return projectDirection(
     camera,
     direction.map((x) => -x),
   );
@@ -108,9 +112,9 @@ function markAt(camera, { position, direction }) {
 
 /**
  * @param {{ui: Ui, app: App, light: number, place: LightPlace, pane: Pane, camera: Camera,
- *   at: {x: number, y: number, isInside: boolean, angle: number}, isTwin: boolean}} props
+ *   position: {x: number, y: number, isInside: boolean, angle: number}, isTwin: boolean}} props
  */
-function Mark({ ui, app, light, place, pane, camera, at, isTwin }) {
+function Mark({ ui, app, light, place, pane, camera, position, isTwin }) {
   const { label } = ui.lights[light];
   const rgb = ui.weights[light] ?? ui.lights[light].present;
   const isOn = luminance(rgb) > 0;
@@ -121,131 +125,137 @@ function Mark({ ui, app, light, place, pane, camera, at, isTwin }) {
     : `${label}: drag to move it, with Shift up and down`;
   const drag = useDrag(app, pane, (x, y, isShift, start) => {
     if (!canDrag || !place.position || !ui.rig) return null;
-    const from = /** @type {number[]} */ (start.place.position);
-    const moved = place.rail
-      ? onRail(camera, place.rail, x, y)
+    const startPosition = /** @type {number[]} */ (start.place.position);
+    const newPosition = place.rail
+      ? dragOnRail(camera, place.rail, x, y)
       : isShift
-        ? upAndDown(camera, from, ui.rig.up, x, y)
-        : inPlane(camera, from, ui.rig.up, x, y);
-    return { place: { position: moved }, request: { kind: 'move', pose: { position: moved } } };
+        ? dragVertically(camera, startPosition, ui.rig.up, x, y)
+        : dragInPlane(camera, startPosition, ui.rig.up, x, y);
+    return {
+      place: { position: newPosition },
+      request: { kind: 'move', pose: { position: newPosition } },
+    };
   });
   return html`<button type="button" class=${[
     'lamp',
-    at.isInside ? '' : 'is-outside',
+    position.isInside ? '' : 'is-outside',
     ui.lamp === light ? 'is-chosen' : '',
     place.immovable_reason ? 'is-fixed' : '',
     isOn ? '' : 'is-off',
   ].join(' ')} style=${{
-    left: `${at.x}px`,
-    top: `${at.y}px`,
-    '--lit': isOn ? toHex(atFull(rgb)) : 'transparent',
-    '--outwards': `${at.angle}rad`,
+    left: `${position.x}px`,
+    top: `${position.y}px`,
+    '--lit': isOn ? toHex(atFullBrightness(rgb)) : 'transparent',
+    '--outwards': `${position.angle}rad`,
   }} aria-label=${label} aria-pressed=${String(ui.lamp === light)} tabindex=${isTwin ? -1 : 0}
     aria-hidden=${isTwin ? 'true' : undefined} data-tip=${tip} data-lamp=${label} onClick=${choose}
     onPointerDown=${(/** @type {PointerEvent} */ event) => {
-      if (ui.pointing) return; // the click goes to the picture behind it
+      if (ui.clickAction) return; // the click goes to the picture behind it
       choose();
       drag.down(event, light, place);
     }} onPointerMove=${drag.move} onPointerUp=${drag.up} onPointerCancel=${drag.up}></button>`;
 }
 
 /**
- * @param {{ui: Ui, app: App, light: number, pane: Pane, camera: Camera, inner: Box,
- *   onPage: (seen: any) => any, isTwin: boolean}} props
+ * @param {{ui: Ui, app: App, light: number, pane: Pane, camera: Camera, innerBox: Box,
+ *   toPage: (projection: any) => any, isTwin: boolean}} props
  */
-function AimHandle({ ui, app, light, pane, camera, inner, onPage, isTwin }) {
+function AimHandle({ ui, app, light, pane, camera, innerBox, toPage, isTwin }) {
   const place = placeOf(ui, light);
   const drag = useDrag(app, pane, (x, y) => ({
     place: {},
-    at: [x, y],
+    aimPixel: [x, y],
     request: { kind: 'point', mode: 'aim', pixel: [x, y], view: ui.view },
   }));
   if (!place.position || !place.direction || !place.target || place.immovable_reason) return null;
-  const dragged = ui.dragged?.light === light ? ui.dragged.at : undefined;
-  const seen = dragged
-    ? { x: dragged[0], y: dragged[1], isAhead: true }
-    : seenAt(camera, place.target);
-  const at = within(onPage(seen), inner);
+  const aimPixel = ui.drag?.light === light ? ui.drag.aimPixel : undefined;
+  const projection = aimPixel
+    ? { x: aimPixel[0], y: aimPixel[1], isAhead: true }
+    : project(camera, place.target);
+  const position = clampToBox(toPage(projection), innerBox);
   const { label } = ui.lights[light];
-  return html`<button type="button" class=${`lamp-aim ${at.isInside ? '' : 'is-outside'}`}
-    style=${{ left: `${at.x}px`, top: `${at.y}px` }} tabindex=${isTwin ? -1 : 0}
+  return html`<button type="button" class=${`lamp-aim ${position.isInside ? '' : 'is-outside'}`}
+    style=${{ left: `${position.x}px`, top: `${position.y}px` }} tabindex=${isTwin ? -1 : 0}
     aria-hidden=${isTwin ? 'true' : undefined} aria-label=${`Aim of ${label}`}
     data-tip=${`Drag what ${label} points at`}
     onPointerDown=${(/** @type {PointerEvent} */ event) =>
-      ui.pointing ? undefined : drag.down(event, light, place)}
+      ui.clickAction ? undefined : drag.down(event, light, place)}
     onPointerMove=${drag.move} onPointerUp=${drag.up} onPointerCancel=${drag.up}></button>`;
 }
 
 /** The places that a search is trying. @param {{ui: Ui, camera: Camera, box: Box,
- *   onPage: (seen: any) => {x: number, y: number, isAhead: boolean}}} props */
-function Trials({ ui, camera, box, onPage }) {
+ *   toPage: (projection: any) => {x: number, y: number, isAhead: boolean}}} props */
+function Trials({ ui, camera, box, toPage }) {
   if (!ui.trial) return null;
   const { left, top, right, bottom } = box;
   const style = { left: `${left}px`, top: `${top}px` };
   const { positions, directions } = ui.trial;
   const marks = Object.entries(positions).flatMap(([name, position]) => {
-    const at = onPage(seenAt(camera, position));
-    const way = directions[name];
-    const to = way && onPage(seenAt(camera, plus(position, way, ARROW * sizeOf(ui))));
-    return at.isAhead ? [{ name, at, to: to?.isAhead ? to : null }] : [];
+    const start = toPage(project(camera, position));
+    const direction = directions[name];
+    const end =
+      direction && toPage(project(camera, add(position, direction, ARROW_ROOM_SHARE * sizeOf(ui))));
+    return start.isAhead ? [{ name, start, end: end?.isAhead ? end : null }] : [];
   });
   return html`<svg class="lamp-beam is-trial" style=${style} width=${right - left}
     height=${bottom - top} aria-hidden="true">${marks.map(
-      ({ name, at, to }) => html`<g key=${name}>
-        ${to && html`<line x1=${at.x - left} y1=${at.y - top} x2=${to.x - left} y2=${to.y - top} />`}
-        <circle cx=${at.x - left} cy=${at.y - top} r="8" /></g>`,
+      ({ name, start, end }) => html`<g key=${name}>
+        ${end && html`<line x1=${start.x - left} y1=${start.y - top} x2=${end.x - left} y2=${end.y - top} />`}
+        <circle cx=${start.x - left} cy=${start.y - top} r="8" /></g>`,
     )}</svg>`;
 }
 
 /** The diagonal of the room. @param {Ui} ui */
 function sizeOf({ rig }) {
-  return rig ? Math.hypot(...minus(rig.high, rig.low)) : 1;
+  return rig ? Math.hypot(...subtract(rig.high, rig.low)) : 1;
 }
 
 /** The places of lights before a search moved them. @param {{ui: Ui, camera: Camera, box: Box,
- *   onPage: (seen: any) => {x: number, y: number, isAhead: boolean}}} props */
-function Ghosts({ ui, camera, box, onPage }) {
+ *   toPage: (projection: any) => {x: number, y: number, isAhead: boolean}}} props */
+function Ghosts({ ui, camera, box, toPage }) {
   const { left, top, right, bottom } = box;
   const style = { left: `${left}px`, top: `${top}px` };
   const moves = ui.lights.flatMap(({ name }, k) => {
-    const [before, now] = [ui.ghosts[name], placeOf(ui, k)?.position];
-    if (!before || !now || !(name in ui.poses)) return [];
-    const [from, to] = [before, now].map((point) => onPage(seenAt(camera, point)));
-    return from.isAhead && to.isAhead ? [{ name, from, to }] : [];
+    const [oldPosition, newPosition] = [ui.ghosts[name], placeOf(ui, k)?.position];
+    if (!oldPosition || !newPosition || !(name in ui.poses)) return [];
+    const [start, end] = [oldPosition, newPosition].map((point) => toPage(project(camera, point)));
+    return start.isAhead && end.isAhead ? [{ name, start, end }] : [];
   });
   if (!moves.length) return null;
   return html`<svg class="lamp-beam is-ghost" style=${style} width=${right - left}
     height=${bottom - top} aria-hidden="true">${moves.map(
-      ({ name, from, to }) => html`<g key=${name}>
-        <line x1=${from.x - left} y1=${from.y - top} x2=${to.x - left} y2=${to.y - top} />
-        <circle cx=${from.x - left} cy=${from.y - top} r="7" /></g>`,
+      ({ name, start, end }) => html`<g key=${name}>
+        <line x1=${start.x - left} y1=${start.y - top} x2=${end.x - left} y2=${end.y - top} />
+        <circle cx=${start.x - left} cy=${start.y - top} r="7" /></g>`,
     )}</svg>`;
 }
 
 /** The line from a light to its target. @param {{place: LightPlace, camera: Camera, box: Box,
- *   onPage: (seen: any) => {x: number, y: number, isAhead: boolean}}} props */
-function Beam({ place, camera, box, onPage }) {
+ *   toPage: (projection: any) => {x: number, y: number, isAhead: boolean}}} props */
+function Beam({ place, camera, box, toPage }) {
   if (!place.position || !place.target) return null;
-  const [from, to] = [place.position, place.target].map((point) => onPage(seenAt(camera, point)));
-  if (!from.isAhead || !to.isAhead) return null;
+  const [start, end] = [place.position, place.target].map((point) =>
+    toPage(project(camera, point)),
+  );
+  if (!start.isAhead || !end.isAhead) return null;
   const { left, top, right, bottom } = box;
   const style = { left: `${left}px`, top: `${top}px` };
   return html`<svg class="lamp-beam" style=${style} width=${right - left} height=${bottom - top}
-    aria-hidden="true"><line x1=${from.x - left} y1=${from.y - top} x2=${to.x - left}
-      y2=${to.y - top} /></svg>`;
+    aria-hidden="true"><line x1=${start.x - left} y1=${start.y - top} x2=${end.x - left}
+      y2=${end.y - top} /></svg>`;
 }
 
 /**
  * A drag of a mark: it requests a place at every move, and keeps the last.
  * @param {App} app @param {Pane} pane
  * @param {(x: number, y: number, isShift: boolean, start: {place: LightPlace}) =>
- *   {place: Partial<LightPlace>, at?: [number, number],
- *    request: import("./lamp_moves.js").LampRequest} | null} of the pointer, in pixels of the picture
+ *   {place: Partial<LightPlace>, aimPixel?: [number, number],
+ *    request: import("./lamp_moves.js").LampRequest} | null} resolveDrag from the place of the pointer, in pixels of the picture
  */
-function useDrag(app, pane, of) {
+function useDrag(app, pane, resolveDrag) {
   const start = useRef(
     /** @type {{light: number, place: LightPlace, dx: number, dy: number, isMoved: boolean,
-     *   last: import("./lamp_moves.js").LampRequest | null} | null} */ (null),
+     *   lastRequest: import("./lamp_moves.js").LampRequest | null} | null} */ (null),
   );
   const inPicture = (/** @type {PointerEvent} */ event) => {
     const { left, top } = app.engine.element.getBoundingClientRect();
@@ -265,29 +275,34 @@ function useDrag(app, pane, of) {
     button.setPointerCapture(event.pointerId);
     const { left, top, width, height } = button.getBoundingClientRect();
     // The mark keeps its offset from the pointer.
-    const grasp = { dx: event.clientX - left - width / 2, dy: event.clientY - top - height / 2 };
-    start.current = { light, place, ...grasp, isMoved: false, last: null };
+    const offset = { dx: event.clientX - left - width / 2, dy: event.clientY - top - height / 2 };
+    start.current = { light, place, ...offset, isMoved: false, lastRequest: null };
   };
   const move = (/** @type {PointerEvent} */ event) => {
-    const its = start.current;
-    if (!its) return;
+    const drag = start.current;
+    if (!drag) return;
     event.stopPropagation();
     const [x, y] = inPicture(event);
-    const made = of(x - its.dx / pane.scale, y - its.dy / pane.scale, event.shiftKey, its);
-    if (!made) return;
-    its.isMoved = true;
-    its.last = made.request;
-    app.store.set({ dragged: { light: its.light, place: made.place, at: made.at } });
-    app.session.lampMoves.ask(its.light, made.request, false);
+    const result = resolveDrag(
+      x - drag.dx / pane.scale,
+      y - drag.dy / pane.scale,
+      event.shiftKey,
+      drag,
+    );
+    if (!result) return;
+    drag.isMoved = true;
+    drag.lastRequest = result.request;
+    app.store.set({ drag: { light: drag.light, place: result.place, aimPixel: result.aimPixel } });
+    app.session.lampMoves.queue(drag.light, result.request, false);
   };
   const up = (/** @type {PointerEvent} */ event) => {
-    const its = start.current;
-    if (!its) return;
+    const drag = start.current;
+    if (!drag) return;
     event.stopPropagation();
     start.current = null;
-    if (its.isMoved && its.last)
-      app.session.lampMoves.ask(its.light, its.last, true);
-    app.store.set({ dragged: null });
+    if (drag.isMoved && drag.lastRequest)
+      app.session.lampMoves.queue(drag.light, drag.lastRequest, true);
+    app.store.set({ drag: null });
   };
   return { down, move, up };
 }

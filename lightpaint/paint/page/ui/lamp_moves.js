@@ -11,31 +11,34 @@ export class LampMoves {
   constructor(session) {
     this.session = session;
     /** @type {{light: number, request: LampRequest, isFinal: boolean} | null} */
-    this.next = null;
+    this.nextMove = null;
     this.isSending = false;
     /** Answers to moves so far. */
-    this.answers = 0;
+    this.answerCount = 0;
   }
 
   /** @param {number} light @param {LampRequest} request @param {boolean} [isFinal] false while it is dragged */
-  ask(light, request, isFinal = true) {
-    this.next = { light, request, isFinal };
+  queue(light, request, isFinal = true) {
+    this.nextMove = { light, request, isFinal };
     if (!this.isSending) void this.send();
   }
 
   async send() {
     this.isSending = true;
-    while (this.next) {
-      const { light, request, isFinal } = this.next;
-      this.next = null;
+    while (this.nextMove) {
+      const { light, request, isFinal } = this.nextMove;
+      this.nextMove = null;
       const name = this.session.store.value.lights[light].name;
       const { kind, ...fields } = request;
       const reply =
         kind === 'move'
           ? await this.session.send('move', { poses: { [name]: request.pose }, is_final: isFinal })
-          : await this.session.send('point', /** @type {any} */ ({ light, ...fields, is_final: isFinal }));
+          : await this.session.send(
+              'point',
+              /** @type {any} */ ({ light, ...fields, is_final: isFinal }),
+            );
       if (reply?.kind === 'failed') this.session.revert();
-      this.answers += 1;
+      this.answerCount += 1;
     }
     this.isSending = false;
   }

@@ -8,30 +8,32 @@
 
 /** Largest difference between equal answers, relative to the brightest light: round-off of sums in
  * another order. */
-const SAME = 1e-6;
+const MAX_ROUND_OFF = 1e-6;
 
 /** Save painting, answer and locked lights under a new name.
  * @param {App} app */
 export function saveLook(app) {
   const { session } = app;
-  session.savingLook = session.savingLook.then(() => session.moveInProgress).then(() => keep(app));
-  return session.savingLook;
+  session.lookInProgress = session.lookInProgress
+    .then(() => session.moveInProgress)
+    .then(() => sendLook(app));
+  return session.lookInProgress;
 }
 
 /** @param {App} app */
-async function keep({ session, store }) {
-  const reply = await session.send('save_look', { name: unused(store.value.looks) });
-  if (reply?.kind === 'looks') mark(store, Math.max(...reply.looks.map(idOf)));
+async function sendLook({ session, store }) {
+  const reply = await session.send('save_look', { name: unusedName(store.value.looks) });
+  if (reply?.kind === 'looks') noteLastLook(store, Math.max(...reply.looks.map(idOf)));
 }
 
 /** Load a look, as a step that can be undone. @param {App} app @param {number} look */
 export async function loadLook({ session, store }, look) {
   const name = store.value.looks.find(({ id }) => id === look)?.name ?? null;
   // Until it arrives, the pictures show the earlier state.
-  store.set({ comingTo: name });
+  store.set({ loadingLook: name });
   const reply = await session.send('load_look', { look });
-  if (store.value.comingTo === name) store.set({ comingTo: null });
-  if (reply?.kind === 'patch' || reply?.kind === 'state') mark(store, look);
+  if (store.value.loadingLook === name) store.set({ loadingLook: null });
+  if (reply?.kind === 'patch' || reply?.kind === 'state') noteLastLook(store, look);
 }
 
 /**
@@ -39,15 +41,17 @@ export async function loadLook({ session, store }, look) {
  * changed since; else one with the answer's lights, as after undo.
  * @param {Ui} ui @returns {number | null}
  */
-export function currentLook({ looks, lastLook: last, version, history, weights }) {
+export function currentLook({ looks, lastLook, version, history, weights }) {
   // A page that has just opened or reconnected knows no version.
-  const isKnown = version >= 0 && last?.version === version;
-  if (last && isKnown && looks.some(({ id }) => id === last.look)) return last.look;
+  const isKnown = version >= 0 && lastLook?.version === version;
+  if (lastLook && isKnown && looks.some(({ id }) => id === lastLook.look)) return lastLook.look;
   // If its lights are locked, they stay equal while the painting changes.
   const isPaintedOn = (/** @type {number} */ id) =>
-    id === last?.look && stepsOf(history) !== last.steps;
-  const found = looks.filter((one) => !isPaintedOn(one.id) && isSame(one.weights, weights));
-  return (found.find(({ id }) => id === last?.look) ?? found[0])?.id ?? null;
+    id === lastLook?.look && stepsOf(history) !== lastLook.steps;
+  const candidates = looks.filter(
+    (look) => !isPaintedOn(look.id) && areWeightsEqual(look.weights, weights),
+  );
+  return (candidates.find(({ id }) => id === lastLook?.look) ?? candidates[0])?.id ?? null;
 }
 
 /**
@@ -67,7 +71,7 @@ export function comparedAnswer(ui) {
 export const isAnswerHidden = (ui) => ui.mix !== null && !comparedAnswer(ui);
 
 /** @param {UiStore} store @param {number} look */
-function mark(store, look) {
+function noteLastLook(store, look) {
   store.set(({ version, history }) => ({ lastLook: { look, version, steps: stepsOf(history) } }));
 }
 
@@ -78,17 +82,17 @@ const stepsOf = ({ undo, count }) => count ?? undo.length;
 const idOf = ({ id }) => id;
 
 /** @param {Look[]} looks */
-function unused(looks) {
-  let number = looks.length + 1;
-  while (looks.some(({ name }) => name === `Look ${number}`)) number += 1;
-  return `Look ${number}`;
+function unusedName(looks) {
+  let count = looks.length + 1;
+  while (looks.some(({ name }) => name === `Look ${count}`)) count += 1;
+  return `Look ${count}`;
 }
 
-/** @param {RGB[]} one @param {RGB[]} other */
-function isSame(one, other) {
-  const most = SAME * Math.max(...one.flat());
+/** @param {RGB[]} weights @param {RGB[]} otherWeights */
+function areWeightsEqual(weights, otherWeights) {
+  const tolerance = MAX_ROUND_OFF * Math.max(...weights.flat());
   return (
-    one.length === other.length &&
-    one.every((rgb, k) => rgb.every((x, c) => Math.abs(x - other[k][c]) <= most))
+    weights.length === otherWeights.length &&
+    weights.every((rgb, k) => rgb.every((x, c) => Math.abs(x - otherWeights[k][c]) <= tolerance))
   );
 }

@@ -3,14 +3,14 @@
  * pictures above it stay where they are.
  */
 
-import { inView } from '../engine/message_frames.js';
+import { nameInView } from '../engine/message_frames.js';
 import { html, useEffect, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
 import { Button, Select, Slider } from './controls.js';
 import { currentLook, loadLook } from './look_actions.js';
 import { MOD } from './shortcuts.js';
-import { mixName, mixedWeights, withoutMix } from './ui_state.js';
+import { mixName, mixedWeights, resetMix } from './ui_state.js';
 import { Thumbnail } from './thumbnail.js';
-import { updateShow } from './tools.js';
+import { updateDisplay } from './tools.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./ui_state.js").Look} Look */
@@ -32,7 +32,7 @@ export function LookStrip({ ui, app }) {
     ${
       looks.length > 0 &&
       html`<ul ref=${list}>${looks.map(
-        (one) => html`<${LookItem} key=${one.id} one=${one} isCurrent=${one.id === current}
+        (look) => html`<${LookItem} key=${look.id} look=${look} isCurrent=${look.id === current}
           ui=${ui} app=${app} />`,
       )}</ul>`
     }
@@ -45,102 +45,103 @@ export function LookStrip({ ui, app }) {
   </div></section>`;
 }
 
-/** @param {{one: Look, isCurrent: boolean, ui: Ui, app: App}} props */
-function LookItem({ one, isCurrent, ui, app }) {
+/** @param {{look: Look, isCurrent: boolean, ui: Ui, app: App}} props */
+function LookItem({ look, isCurrent, ui, app }) {
   const { session } = app;
   const [isNaming, setNaming] = useState(false);
-  const [isSure, setSure] = useState(false);
-  const drop = () => (isSure ? session.send('drop_look', { look: one.id }) : setSure(true));
-  const its = inView(one.thumbnail, ui.view);
-  const picture = its in ui.resources ? its : one.thumbnail;
+  const [isConfirming, setConfirming] = useState(false);
+  const drop = () =>
+    isConfirming ? session.send('drop_look', { look: look.id }) : setConfirming(true);
+  const viewPicture = nameInView(look.thumbnail, ui.view);
+  const picture = viewPicture in ui.resources ? viewPicture : look.thumbnail;
   const tip = isCurrent ? 'Painting and answer equal this look' : 'Load this look. Undo goes back.';
   return html`<li class=${`look ${isCurrent ? 'is-current' : ''}`}
-    onPointerLeave=${() => setSure(false)}>
-    <button type="button" class="look-picture" aria-label=${`Load ${one.name}`}
+    onPointerLeave=${() => setConfirming(false)}>
+    <button type="button" class="look-picture" aria-label=${`Load ${look.name}`}
       aria-current=${isCurrent ? 'true' : undefined} data-tip=${tip}
-      onClick=${() => loadLook(app, one.id)}>
+      onClick=${() => loadLook(app, look.id)}>
       <${Thumbnail} name=${picture} generation=${ui.resources[picture] ?? 0} app=${app} />
     </button>
     ${
       isNaming
-        ? html`<${LookNameField} one=${one} app=${app} done=${() => setNaming(false)} />`
-        : html`<button type="button" class="look-name" data-tip=${`Rename ${one.name}`}
-          onClick=${() => setNaming(true)}>${one.name}</button>`
+        ? html`<${LookNameField} look=${look} app=${app} done=${() => setNaming(false)} />`
+        : html`<button type="button" class="look-name" data-tip=${`Rename ${look.name}`}
+          onClick=${() => setNaming(true)}>${look.name}</button>`
     }
     <span class="look-tools">
-      <${Button} icon="copy" tip=${`Duplicate ${one.name}`}
-        act=${() => session.send('copy_look', { look: one.id })} />
-      <${Button} icon=${isSure ? 'check' : 'trash'} class=${isSure ? 'is-sure' : ''}
-        tip=${isSure ? `Delete ${one.name}: press again to confirm` : `Delete ${one.name}`} act=${drop} />
+      <${Button} icon="copy" tip=${`Duplicate ${look.name}`}
+        act=${() => session.send('copy_look', { look: look.id })} />
+      <${Button} icon=${isConfirming ? 'check' : 'trash'} class=${isConfirming ? 'is-sure' : ''}
+        tip=${isConfirming ? `Delete ${look.name}: press again to confirm` : `Delete ${look.name}`} act=${drop} />
     </span>
   </li>`;
 }
 
-/** @param {{one: Look, app: App, done: () => void}} props */
-function LookNameField({ one, app, done }) {
+/** @param {{look: Look, app: App, done: () => void}} props */
+function LookNameField({ look, app, done }) {
   const ref = useRef(/** @type {HTMLInputElement | null} */ (null));
   useEffect(() => ref.current?.select(), []);
-  const take = () => {
+  const commit = () => {
     const name = ref.current?.value.trim();
-    if (name && name !== one.name) app.session.send('rename_look', { look: one.id, name });
+    if (name && name !== look.name) app.session.send('rename_look', { look: look.id, name });
     done();
   };
   const press = (/** @type {KeyboardEvent} */ event) => {
-    if (event.key === 'Enter') take();
+    if (event.key === 'Enter') commit();
     if (event.key === 'Escape') done();
   };
-  return html`<input class="naming" ref=${ref} type="text" aria-label=${`Name of ${one.name}`}
-    defaultValue=${one.name} value=${one.name} maxlength="60" onBlur=${take} onKeyDown=${press} />`;
+  return html`<input class="naming" ref=${ref} type="text" aria-label=${`Name of ${look.name}`}
+    defaultValue=${look.name} value=${look.name} maxlength="60" onBlur=${commit} onKeyDown=${press} />`;
 }
 
 /** Return the current look, or else the newest, and the one before it.
  * @param {Ui} ui */
 function pairOf(ui) {
-  const ids = ui.looks.map((one) => one.id);
+  const ids = ui.looks.map((look) => look.id);
   const b = currentLook(ui) ?? Math.max(...ids);
-  const at = ids.indexOf(b);
-  return { a: ids[at > 0 ? at - 1 : 1], b };
+  const index = ids.indexOf(b);
+  return { a: ids[index > 0 ? index - 1 : 1], b };
 }
 
 /** Two looks side by side, and a slider to mix them. @param {{ui: Ui, app: App}} props */
 function LookCrossfade({ ui, app }) {
   const { store } = app;
-  const now = ui.mix ?? { ...pairOf(ui), share: 1 };
-  const choices = ui.looks.map((one) => ({ value: String(one.id), label: one.name }));
-  const nameOf = (/** @type {number} */ id) => ui.looks.find((one) => one.id === id)?.name ?? '';
-  const set = (/** @type {{a?: number, b?: number, share?: number}} */ changed) => {
-    const mix = { ...now, ...changed };
+  const comparison = ui.mix ?? { ...pairOf(ui), share: 1 };
+  const choices = ui.looks.map((look) => ({ value: String(look.id), label: look.name }));
+  const nameOf = (/** @type {number} */ id) => ui.looks.find((look) => look.id === id)?.name ?? '';
+  const set = (/** @type {{a?: number, b?: number, share?: number}} */ changes) => {
+    const mix = { ...comparison, ...changes };
     store.set({ mix });
-    updateShow(store, {
+    updateDisplay(store, {
       left: 'solution',
       right: 'other',
-      instead: mixedWeights(ui, { ...mix, share: 0 }),
+      solutionWeights: mixedWeights(ui, { ...mix, share: 0 }),
     });
   };
   const keep = () =>
     app.session.send('mix_looks', {
-      first: now.a,
-      second: now.b,
-      part: now.share,
-      name: mixName(ui.looks, now),
+      first: comparison.a,
+      second: comparison.b,
+      part: comparison.share,
+      name: mixName(ui.looks, comparison),
     });
   return html`<div class="mix" role="group" aria-label="Compare two looks">
     ${
       ui.mix &&
-      html`<${Select} label="First look" hidden value=${String(now.a)} choices=${choices}
-        tip=${`From ${nameOf(now.a)}`}
+      html`<${Select} label="First look" hidden value=${String(comparison.a)} choices=${choices}
+        tip=${`From ${nameOf(comparison.a)}`}
         change=${(/** @type {string} */ id) => set({ a: Number(id) })} />
-      <${Slider} label="Crossfade" value=${100 * now.share} least=${0} most=${100} unit="%"
-        tip=${`Crossfade from ${nameOf(now.a)} to ${nameOf(now.b)}`}
+      <${Slider} label="Crossfade" value=${100 * comparison.share} min=${0} max=${100} unit="%"
+        tip=${`Crossfade from ${nameOf(comparison.a)} to ${nameOf(comparison.b)}`}
         change=${(/** @type {number} */ share) => set({ share: share / 100 })} />
-      <${Select} label="Second look" hidden value=${String(now.b)} choices=${choices}
-        tip=${`To ${nameOf(now.b)}`}
+      <${Select} label="Second look" hidden value=${String(comparison.b)} choices=${choices}
+        tip=${`To ${nameOf(comparison.b)}`}
         change=${(/** @type {string} */ id) => set({ b: Number(id) })} />
       <${Button} icon="plus" label="Save as look" class="keep" act=${keep}
-        tip=${`Save ${mixName(ui.looks, now)}`} />`
+        tip=${`Save ${mixName(ui.looks, comparison)}`} />`
     }
     <${Button} icon="side" label=${ui.mix ? 'Back to the painting' : 'Compare looks'} class="compare"
       tip=${ui.mix ? 'Show painting and answer again' : 'Two looks side by side, and a crossfade between them'}
-      on=${Boolean(ui.mix)} act=${() => (ui.mix ? store.set(withoutMix) : set({}))} />
+      pressed=${Boolean(ui.mix)} act=${() => (ui.mix ? store.set(resetMix) : set({}))} />
   </div>`;
 }

@@ -2,7 +2,7 @@
 
 import { html, useEffect, useRef, useState } from '../vendor/preact.js';
 import { Button } from './controls.js';
-import { counted, progressText } from './format.js';
+import { countText, progressText } from './format.js';
 import { Icon } from './icons.js';
 import { ProgressBar } from './progress_bar.js';
 
@@ -20,38 +20,38 @@ export function Toasts({ ui, app }) {
   </div>`;
 }
 
-const SILENT =
+const SILENT_TEXT =
   'The kernel has not answered for 10 s. If it is busy, your strokes arrive when it is free. If it was restarted, run the cell again.';
 
-const LOST =
+const LOST_TEXT =
   'The connection is lost; reconnecting … Finished strokes are kept. What you paint now is sent if the same painter comes back.';
 
-/** @param {number} unheard strokes */
-function stale(unheard) {
-  const lost = unheard
-    ? ` ${counted(unheard, 'stroke')} painted here could not be sent, and ${unheard === 1 ? 'is' : 'are'} lost.`
+/** @param {number} lostStrokes */
+function staleText(lostStrokes) {
+  const lossText = lostStrokes
+    ? ` ${countText(lostStrokes, 'stroke')} painted here could not be sent, and ${lostStrokes === 1 ? 'is' : 'are'} lost.`
     : '';
-  return `This page belongs to a painter that has ended. Open the address that the terminal shows now.${lost}`;
+  return `This page belongs to a painter that has ended. Open the address that the terminal shows now.${lossText}`;
 }
 
 /** A banner over the pictures; centred if there are none. @param {{ui: Ui, app: App}} props */
 export function Banner({ ui, app }) {
-  const { closed, connection, isSilent } = ui;
-  const banner = (/** @type {string} */ text, /** @type {any} */ more = null) =>
+  const { closure, connection, isSilent } = ui;
+  const banner = (/** @type {string} */ text, /** @type {any} */ extra = null) =>
     html`<div class=${`banner ${ui.ready ? '' : 'is-alone'}`} role="alert">
-      <${Icon} name="warn" /><span>${text}</span>${more}</div>`;
-  if (isSilent) return banner(SILENT);
-  if (closed && connection !== 'stale')
-    return banner(closed.text, html`<${ReconnectButton} ui=${ui} app=${app} />`);
-  if (connection === 'lost') return banner(LOST);
-  if (connection === 'stale') return banner(stale(ui.unheard));
+      <${Icon} name="warn" /><span>${text}</span>${extra}</div>`;
+  if (isSilent) return banner(SILENT_TEXT);
+  if (closure && connection !== 'stale')
+    return banner(closure.text, html`<${ReconnectButton} ui=${ui} app=${app} />`);
+  if (connection === 'lost') return banner(LOST_TEXT);
+  if (connection === 'stale') return banner(staleText(ui.lostStrokes));
   return null;
 }
 
 /** The button that brings the session back, if that is possible.
  * @param {{ui: Ui, app: App}} props */
 function ReconnectButton({ ui, app }) {
-  const reason = ui.closed?.reason;
+  const reason = ui.closure?.reason;
   if (reason === 'taken') {
     return html`<${Button} label="Take over" primary tip="Continue here instead of in the other tab"
       act=${() => app.session.send('take_over')} />`;
@@ -67,60 +67,64 @@ function ReconnectButton({ ui, app }) {
  */
 export function RunningTasks({ ui, app }) {
   if (!ui.ready) return null;
-  return html`${worksOf(ui, app).map(({ name, progress, text, stop, stopText, stopTip }) => {
-    const far = progressText(progress);
-    const whole = [name, far].filter(Boolean).join(': ');
+  return html`${runningTasks(ui, app).map(({ name, progress, text, stop, stopText, stopTip }) => {
+    const progressLabel = progressText(progress);
+    const label = [name, progressLabel].filter(Boolean).join(': ');
     return html`<div class="working" key=${name}><${ProgressBar} progress=${progress} label=${name} />
-      <span>${ui.pointed ? far || name : text ? `${whole}. ${text}` : whole}</span>
-      ${stop && html`<${Button} icon=${stopText ? undefined : 'close'} label=${stopText}
-        tip=${stopTip ?? `Stop: ${name.toLowerCase()}`} act=${stop} />`}</div>`;
+      <span>${ui.probe ? progressLabel || name : text ? `${label}. ${text}` : label}</span>
+      ${
+        stop &&
+        html`<${Button} icon=${stopText ? undefined : 'close'} label=${stopText}
+        tip=${stopTip ?? `Stop: ${name.toLowerCase()}`} act=${stop} />`
+      }</div>`;
   })}`;
 }
 
-/** @typedef {{name: string, progress: {done: number, total: number, left_s?: number},
+/** @typedef {{name: string, progress: {done: number, total: number, remainingSeconds?: number},
  *   text?: string, stop?: () => void, stopText?: string, stopTip?: string}} Task */
 
 /** Return the tasks that no panel shows, and at most one of those that start by themselves.
  * @param {Ui} ui
  * @param {App} app @returns {Task[]} */
-function worksOf(ui, { session }) {
-  const { basis, loading, writing, verifying } = ui;
+function runningTasks(ui, { session }) {
+  const { basis, loadProgress, exportProgress, verificationProgress } = ui;
   const isOpen = ui.side && !ui.panel && ui.open.truth;
-  const endless = { done: 0, total: 0 };
+  const unknownProgress = { done: 0, total: 0 };
   /** @type {Task[]} */
-  const works = [];
-  if ((ui.isWriting || writing) && ui.dialog !== 'export')
-    works.push({
+  const tasks = [];
+  if ((ui.isExporting || exportProgress) && ui.dialog !== 'export')
+    tasks.push({
       name: 'Exporting files',
-      progress: writing ?? endless,
-      stop: () => void session.write([]),
+      progress: exportProgress ?? unknownProgress,
+      stop: () => void session.exportFiles([]),
     });
-  if (verifying && !isOpen)
-    works.push({
+  if (verificationProgress && !isOpen)
+    tasks.push({
       name: 'Verifying',
-      progress: verifying,
+      progress: verificationProgress,
       stop: () => void session.verify(false),
     });
-  if (ui.placing)
-    works.push({
+  if (ui.placementProgress)
+    tasks.push({
       name: 'Searching for places',
-      progress: ui.placing,
+      progress: ui.placementProgress,
       stopText: 'Stop, move nothing',
       stopTip: 'Stop the search: every light stays where it is',
       stop: () => void session.placeLights(false),
     });
-  if (ui.explaining && !isOpen) works.push({ name: 'Finding reasons', progress: endless });
+  if (ui.isExplaining && !isOpen)
+    tasks.push({ name: 'Finding reasons', progress: unknownProgress });
   if (basis)
-    works.push({ name: 'Rendering the lights', progress: basis, text: 'You can paint already.' });
-  else if (loading && loading.done < loading.total)
-    works.push({ name: 'Loading the images of the lights', progress: loading });
-  else if (ui.sampling)
-    works.push({ name: 'Adding samples where you painted', progress: ui.sampling });
-  return works;
+    tasks.push({ name: 'Rendering the lights', progress: basis, text: 'You can paint already.' });
+  else if (loadProgress && loadProgress.done < loadProgress.total)
+    tasks.push({ name: 'Loading the images of the lights', progress: loadProgress });
+  else if (ui.samplingProgress)
+    tasks.push({ name: 'Adding samples where you painted', progress: ui.samplingProgress });
+  return tasks;
 }
 
 /** Milliseconds that a pointer rests before a tip appears. */
-const REST_MS = 500;
+const TIP_DELAY_MS = 500;
 
 /** The tip of all elements with `data-tip`, with their keys.
  * @param {{root: () => HTMLElement | null}} props */
@@ -131,26 +135,26 @@ export function Tips({ root }) {
     const element = root();
     if (!element) return undefined;
     let timer = 0;
-    const ends = new AbortController();
+    const controller = new AbortController();
     const hide = () => {
       clearTimeout(timer);
       setTip(null);
     };
     const show = (/** @type {Event} */ event) => {
-      const inner = /** @type {HTMLElement} */ (event.composedPath()[0]);
-      const owner = /** @type {HTMLElement | null} */ (inner.closest?.('[data-tip], [data-keys]'));
+      const target = /** @type {HTMLElement} */ (event.composedPath()[0]);
+      const owner = /** @type {HTMLElement | null} */ (target.closest?.('[data-tip], [data-keys]'));
       hide();
       if (!owner || (event.type === 'focusin' && !owner.matches(':focus-visible'))) return;
-      timer = window.setTimeout(() => setTip(placed(owner, element)), REST_MS);
+      timer = window.setTimeout(() => setTip(placeTip(owner, element)), TIP_DELAY_MS);
     };
     for (const name of ['pointerover', 'focusin']) {
-      element.addEventListener(name, show, { signal: ends.signal });
+      element.addEventListener(name, show, { signal: controller.signal });
     }
     for (const name of ['pointerdown', 'focusout', 'keydown', 'pointerleave']) {
-      element.addEventListener(name, hide, { signal: ends.signal });
+      element.addEventListener(name, hide, { signal: controller.signal });
     }
     return () => {
-      ends.abort();
+      controller.abort();
       clearTimeout(timer);
     };
   }, []);
@@ -161,7 +165,7 @@ export function Tips({ root }) {
 }
 
 /** @param {HTMLElement} owner @param {HTMLElement} root */
-function placed(owner, root) {
+function placeTip(owner, root) {
   const [a, b] = [owner.getBoundingClientRect(), root.getBoundingClientRect()];
   const isAbove = a.bottom + 60 > b.bottom;
   const x = Math.min(b.width - 150, Math.max(150, (a.left + a.right) / 2 - b.left));

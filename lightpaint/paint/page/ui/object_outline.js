@@ -8,16 +8,16 @@ import { html, useLayoutEffect, useRef } from '../vendor/preact.js';
 /** @typedef {import("./ui_state.js").Ui} Ui */
 
 /** White inside the object and dark around it, so that it is visible on any picture. */
-const [WITHIN, AROUND] = [
+const [INSIDE_COLOUR, OUTSIDE_COLOUR] = [
   [255, 255, 255, 255],
   [0, 0, 0, 180],
 ];
 
 /** Index of the object that a press affects or would affect; null for none. @param {Ui} ui */
-function objectOf({ tool, about, pointed }) {
-  if (!pointed) return null;
-  if (tool === 'fill') return pointed.index;
-  return tool === 'adjust' && about === 'object' && pointed.index >= 0 ? pointed.index : null;
+function objectOf({ tool, adjustedArea, probe }) {
+  if (!probe) return null;
+  if (tool === 'fill') return probe.index;
+  return tool === 'adjust' && adjustedArea === 'object' && probe.index >= 0 ? probe.index : null;
 }
 
 /** Redrawn only when the object or its place changes.
@@ -32,7 +32,7 @@ export function ObjectOutline({ ui, engine, panes }) {
     if (ref.current && object !== null) draw(ref.current, engine.objects(), object, panes);
   }, [object, ui.view, places.join()]);
   // Fainter during a drag, so that its effect is visible.
-  return html`<canvas class=${ui.asking ? 'outline is-asking' : 'outline'} ref=${ref} hidden=${object === null}
+  return html`<canvas class=${ui.dragAdjustment ? 'outline is-asking' : 'outline'} ref=${ref} hidden=${object === null}
     aria-hidden="true"></canvas>`;
 }
 
@@ -47,16 +47,16 @@ function draw(canvas, objects, object, panes) {
   const box = objects && boxOf(objects, object);
   if (!context || !box) return;
   for (const pane of panes) {
-    const made = outlined(objects, object, box, scaled(pane, ratio), Math.round(ratio));
-    if (made) context.putImageData(made.image, made.x, made.y);
+    const outline = createOutline(objects, object, box, scalePane(pane, ratio), Math.round(ratio));
+    if (outline) context.putImageData(outline.image, outline.x, outline.y);
   }
 }
 
 /** In device pixels. @param {Pane} pane @param {number} ratio @returns {Pane} */
-function scaled(pane, ratio) {
+function scalePane(pane, ratio) {
   const lengths = ['x', 'y', 'width', 'height', 'left', 'top', 'scale'];
-  const made = lengths.map((key) => [key, /** @type {any} */ (pane)[key] * ratio]);
-  return { ...pane, ...Object.fromEntries(made) };
+  const scaledLengths = lengths.map((key) => [key, /** @type {any} */ (pane)[key] * ratio]);
+  return { ...pane, ...Object.fromEntries(scaledLengths) };
 }
 
 /** @typedef {[left: number, top: number, right: number, bottom: number]} Box */
@@ -90,46 +90,52 @@ function boxOf({ data, width, height }, object) {
 
 /** Draw the outline in a pane, some device pixels wide on both sides of the edge.
  * @param {Objects} objects @param {number} object @param {Box} box @param {Pane} pane
- * @param {number} line @returns {{image: ImageData, x: number, y: number} | null} */
-function outlined({ data, width, height }, object, box, pane, line) {
+ * @param {number} lineWidth @returns {{image: ImageData, x: number, y: number} | null} */
+function createOutline({ data, width, height }, object, box, pane, lineWidth) {
   const { left, top, scale } = pane;
-  const x0 = Math.max(Math.round(pane.x), Math.floor(left + box[0] * scale) - line);
-  const y0 = Math.max(Math.round(pane.y), Math.floor(top + box[1] * scale) - line);
-  const x1 = Math.min(Math.round(pane.x + pane.width), Math.ceil(left + box[2] * scale) + line);
-  const y1 = Math.min(Math.round(pane.y + pane.height), Math.ceil(top + box[3] * scale) + line);
+  const x0 = Math.max(Math.round(pane.x), Math.floor(left + box[0] * scale) - lineWidth);
+  const y0 = Math.max(Math.round(pane.y), Math.floor(top + box[1] * scale) - lineWidth);
+  const x1 = Math.min(
+    Math.round(pane.x + pane.width),
+    Math.ceil(left + box[2] * scale) + lineWidth,
+  );
+  const y1 = Math.min(
+    Math.round(pane.y + pane.height),
+    Math.ceil(top + box[3] * scale) + lineWidth,
+  );
   if (x1 <= x0 || y1 <= y0) return null;
-  const inside = insideOf();
+  const inside = insideMask();
   const image = new ImageData(x1 - x0, y1 - y0);
-  const across = x1 - x0 + 2 * line;
-  for (let y = 0, to = 0; y < y1 - y0; y += 1) {
-    for (let x = 0; x < x1 - x0; x += 1, to += 4) {
-      const at = (y + line) * across + x + line;
-      const own = inside[at];
+  const rowLength = x1 - x0 + 2 * lineWidth;
+  for (let y = 0, target = 0; y < y1 - y0; y += 1) {
+    for (let x = 0; x < x1 - x0; x += 1, target += 4) {
+      const index = (y + lineWidth) * rowLength + x + lineWidth;
+      const isInside = inside[index];
       const isEdge =
-        inside[at - line] !== own ||
-        inside[at + line] !== own ||
-        inside[at - line * across] !== own ||
-        inside[at + line * across] !== own;
-      if (isEdge) image.data.set(own ? WITHIN : AROUND, to);
+        inside[index - lineWidth] !== isInside ||
+        inside[index + lineWidth] !== isInside ||
+        inside[index - lineWidth * rowLength] !== isInside ||
+        inside[index + lineWidth * rowLength] !== isInside;
+      if (isEdge) image.data.set(isInside ? INSIDE_COLOUR : OUTSIDE_COLOUR, target);
     }
   }
   return { image, x: x0, y: y0 };
 
   /** Return whether a device pixel shows the object, up to a line's width outside the drawing. */
-  function insideOf() {
-    const columns = Int32Array.from({ length: x1 - x0 + 2 * line }, (_, i) =>
-      Math.floor((x0 - line + i + 0.5 - left) / scale),
+  function insideMask() {
+    const columns = Int32Array.from({ length: x1 - x0 + 2 * lineWidth }, (_, i) =>
+      Math.floor((x0 - lineWidth + i + 0.5 - left) / scale),
     );
-    const found = new Uint8Array(columns.length * (y1 - y0 + 2 * line));
-    for (let j = 0, at = 0; at < found.length; j += 1) {
-      const row = Math.floor((y0 - line + j + 0.5 - top) / scale);
+    const mask = new Uint8Array(columns.length * (y1 - y0 + 2 * lineWidth));
+    for (let j = 0, index = 0; index < mask.length; j += 1) {
+      const row = Math.floor((y0 - lineWidth + j + 0.5 - top) / scale);
       const isRow = row >= 0 && row < height;
-      for (let i = 0; i < columns.length; i += 1, at += 1) {
+      for (let i = 0; i < columns.length; i += 1, index += 1) {
         const column = columns[i];
         if (isRow && column >= 0 && column < width)
-          found[at] = Number(data[row * width + column] === object);
+          mask[index] = Number(data[row * width + column] === object);
       }
     }
-    return found;
+    return mask;
   }
 }

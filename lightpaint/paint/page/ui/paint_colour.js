@@ -4,9 +4,9 @@ export {
   decode,
   encode,
   luminance,
-  ofHex,
-  ofHsv,
-  ofKelvin,
+  fromHex,
+  fromHsv,
+  fromKelvin,
   toHex,
   toHsv,
   toKelvin,
@@ -15,7 +15,7 @@ export {
 /** @typedef {import('./engine_interface.js').RGB} RGB */
 
 /** A colour whatever its brightness: its largest channel is 1. @param {RGB} rgb @returns {RGB} */
-export function atFull(rgb) {
-  const top = Math.max(...rgb) || 1;
-  return /** @type {RGB} */ (rgb.map((x) => x / top));
+export function atFullBrightness(rgb) {
+  const maxChannel = Math.max(...rgb) || 1;
+  return /** @type {RGB} */ (rgb.map((x) => x / maxChannel));
 }

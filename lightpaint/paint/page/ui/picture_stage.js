@@ -2,17 +2,17 @@
  * The pictures with their overlays: names, brush cursor, wipe, and a hint for the first stroke.
  */
 
-import { inView } from '../engine/message_frames.js';
+import { nameInView } from '../engine/message_frames.js';
 import { html, useEffect, useLayoutEffect, useMemo, useRef, useState } from '../vendor/preact.js';
 import { toHex } from './paint_colour.js';
-import { point, pointAgain, ring } from './brush_cursor.js';
-import { counted } from './format.js';
+import { reportProbe, refreshProbe, drawRings } from './brush_cursor.js';
+import { countText } from './format.js';
 import { useStageInput } from './stage_input.js';
-import { mixName, gainOf, paintOf, shownSettings } from './ui_state.js';
+import { mixName, gainOf, paintOf, effectiveDisplay } from './ui_state.js';
 import { PointerLabel } from './pointer_label.js';
 import { ObjectOutline } from './object_outline.js';
 import { Pointer } from './pointer_input.js';
-import { firstHint, flowOf, updateShow } from './tools.js';
+import { firstHint, flowOf, updateDisplay } from './tools.js';
 import { LampMarks } from './lamp_marks.js';
 import { Legend } from './analysis_panel.js';
 import { ProgressBar } from './progress_bar.js';
@@ -35,43 +35,44 @@ const NAMES = {
 
 /** @param {Ui} ui @param {string} kind @returns {string} */
 function nameOf(ui, kind) {
-  if (kind === 'other' && ui.hovered !== null) {
-    const stops = Math.round(Math.log2(gainOf(ui, ui.hovered)));
-    return `${ui.lights[ui.hovered].label} alone${stops > 0 ? `, ${counted(stops, 'stop')} brighter` : ''}`;
+  if (kind === 'other' && ui.hoveredLight !== null) {
+    const stops = Math.round(Math.log2(gainOf(ui, ui.hoveredLight)));
+    return `${ui.lights[ui.hoveredLight].label} alone${stops > 0 ? `, ${countText(stops, 'stop')} brighter` : ''}`;
   }
   if (kind === 'other' && ui.mix) {
     const { b, share } = ui.mix;
-    const to = ui.looks.find((one) => one.id === b)?.name;
-    return share === 1 && to ? to : mixName(ui.looks, ui.mix);
+    const name = ui.looks.find((look) => look.id === b)?.name;
+    return share === 1 && name ? name : mixName(ui.looks, ui.mix);
   }
-  if (kind === 'solution' && ui.show.instead && ui.mix) {
-    return ui.looks.find((one) => one.id === ui.mix?.a)?.name ?? NAMES.solution;
+  if (kind === 'solution' && ui.display.solutionWeights && ui.mix) {
+    return ui.looks.find((look) => look.id === ui.mix?.a)?.name ?? NAMES.solution;
   }
-  const waits = kind === 'solution' || kind === 'painting' ? waitingFor(ui, kind) : null;
-  if (waits) return `${NAMES[kind]}: ${waits}`;
-  if (isPartly(ui, kind)) return `${NAMES.solution}: ${partOf(ui)}`;
-  if (kind === 'verified' && ui.verified?.isOld) return 'Render of an earlier answer';
+  const gap = kind === 'solution' || kind === 'painting' ? missingText(ui, kind) : null;
+  if (gap) return `${NAMES[kind]}: ${gap}`;
+  if (isPartial(ui, kind)) return `${NAMES.solution}: ${visibleNames(ui)}`;
+  if (kind === 'verified' && ui.verification?.isOld) return 'Render of an earlier answer';
   return NAMES[kind] ?? kind;
 }
 
 /** Return what a picture does not show yet; null if it is complete. @param {Ui} ui
  * @param {'solution' | 'painting'} kind */
-function waitingFor({ comingTo, loading }, kind) {
-  if (comingTo !== null) return `loading ${comingTo} …`;
-  const isShort = loading?.isFirst && loading.done < loading.total;
-  return kind === 'solution' && isShort ? 'some lights are still loading …' : null;
+function missingText({ loadingLook, loadProgress }, kind) {
+  if (loadingLook !== null) return `loading ${loadingLook} …`;
+  const isIncomplete = loadProgress?.isFirst && loadProgress.done < loadProgress.total;
+  return kind === 'solution' && isIncomplete ? 'some lights are still loading …' : null;
 }
 
 /** Return whether a picture shows only some of the lights. @param {Ui} ui @param {string} kind */
-function isPartly(ui, kind) {
-  return kind === 'solution' && ui.solo.length + ui.mute.length > 0 && ui.hovered === null;
+function isPartial(ui, kind) {
+  return kind === 'solution' && ui.solo.length + ui.mute.length > 0 && ui.hoveredLight === null;
 }
 
 /** Return the names of the lights shown, if not all are. @param {Ui} ui */
-function partOf({ solo, mute, lights }) {
-  const some = solo.length ? solo : mute;
-  const names = some.length > 2 ? `${some.length} lights` : some.map((k) => lights[k]?.label);
-  return `${solo.length ? 'only' : 'without'} ${[names].flat().join(' and ')}`;
+function visibleNames({ solo, mute, lights }) {
+  const indices = solo.length ? solo : mute;
+  const labels =
+    indices.length > 2 ? `${indices.length} lights` : indices.map((k) => lights[k]?.label);
+  return `${solo.length ? 'only' : 'without'} ${[labels].flat().join(' and ')}`;
 }
 
 /** @param {{ui: Ui, app: App}} props */
@@ -79,15 +80,15 @@ export function Stage({ ui, app }) {
   const { engine, store } = app;
   const frame = useRef(/** @type {HTMLElement | null} */ (null));
   const rings = useRef(/** @type {HTMLElement | null} */ (null));
-  const [, resized] = useState(0);
+  const [, rerender] = useState(0);
   const [pointer] = useState(
     () =>
       new Pointer(
         engine,
         store,
         (x, y) => {
-          ring(rings.current, engine, store.value, x, y);
-          point(engine, store, x, y);
+          drawRings(rings.current, engine, store.value, x, y);
+          reportProbe(engine, store, x, y);
         },
         (text) => app.session.toast(text),
       ),
@@ -97,49 +98,55 @@ export function Stage({ ui, app }) {
     () =>
       watch(frame.current, (width, height) => {
         engine.resize(width, height);
-        resized((count) => count + 1);
+        rerender((count) => count + 1);
       }),
     [],
   );
   // At once, so that the names are at the pictures' places.
   useMemo(
-    () => engine.show(shownSettings(ui)),
-    [ui.show, ui.tool, ui.solo, ui.mute, ui.hovered, ui.mix, ui.ready, ui.weights, ui.view],
+    () => engine.show(effectiveDisplay(ui)),
+    [ui.display, ui.tool, ui.solo, ui.mute, ui.hoveredLight, ui.mix, ui.ready, ui.weights, ui.view],
   );
-  const hasAlbedo = ui.resources[inView('albedo', ui.view)] !== undefined;
+  const hasAlbedo = ui.resources[nameInView('albedo', ui.view)] !== undefined;
   // Set before the next press of a pointer.
   useLayoutEffect(
     () =>
       engine.setTool({
         tool: ui.tool,
         rgb: paintOf(ui),
-        as: hasAlbedo ? ui.as : 'colour',
+        paintMode: hasAlbedo ? ui.paintMode : 'colour',
         size: ui.size,
         hardness: ui.hardness,
         flow: flowOf(ui),
         importance: ui.importance,
-        about: ui.about,
+        adjustedArea: ui.adjustedArea,
       }),
     [
       ui.tool,
       ui.colour,
       ui.stops,
-      ui.as,
+      ui.paintMode,
       ui.size,
       ui.hardness,
       flowOf(ui),
       ui.importance,
-      ui.about,
+      ui.adjustedArea,
       hasAlbedo,
     ],
   );
-  useEffect(() => pointAgain(engine, store), [ui.weights, ui.version, ui.show, ui.view, ui.as]);
-  useEffect(() => ring(rings.current, engine, ui), [ui.size, ui.tool, ui.hardness, ui.show]);
+  useEffect(
+    () => refreshProbe(engine, store),
+    [ui.weights, ui.version, ui.display, ui.view, ui.paintMode],
+  );
+  useEffect(
+    () => drawRings(rings.current, engine, ui),
+    [ui.size, ui.tool, ui.hardness, ui.display],
+  );
   useStageInput(frame, pointer, app);
   const panes = ui.ready ? engine.panes() : [];
-  const fit = panes.length ? panes[0].scale / ui.show.zoom : null;
+  const fit = panes.length ? panes[0].scale / ui.display.zoom : null;
   useLayoutEffect(() => store.set({ fit }), [fit?.toPrecision(6)]);
-  return html`<div class=${`stage is-${ui.tool} ${ui.asking ? 'is-asking' : ''} ${ui.pointing ? 'is-pointing' : ''}`} ref=${frame} tabindex="0" role="application"
+  return html`<div class=${`stage is-${ui.tool} ${ui.dragAdjustment ? 'is-asking' : ''} ${ui.clickAction ? 'is-pointing' : ''}`} ref=${frame} tabindex="0" role="application"
     aria-label="Pictures. Arrow keys move the brush, Enter paints, Shift Enter a line." aria-describedby="lp-status">
     ${ui.ready && html`<${ObjectOutline} ui=${ui} engine=${engine} panes=${panes} />`}
     <div class="rings" ref=${rings} hidden aria-hidden="true">
@@ -150,52 +157,52 @@ export function Stage({ ui, app }) {
     )}
     ${ui.ready && html`<${LampMarks} ui=${ui} app=${app} panes=${panes} />`}
     ${ui.ready && html`<${Legend} ui=${ui} app=${app} panes=${panes} />`}
-    ${ui.show.layout === 'wipe' && ui.ready && html`<${Wipe} ui=${ui} app=${app} />`}
+    ${ui.display.layout === 'wipe' && ui.ready && html`<${Wipe} ui=${ui} app=${app} />`}
     ${ui.hint && ui.ready && !ui.history.undo.length && html`<${Hint} panes=${panes} tool=${ui.tool} />`}
     ${ui.ready && html`<${PointerLabel} ui=${ui} engine=${engine} rings=${rings} />`}
-    ${!ui.ready && html`<${Waiting} ui=${ui} />`}
+    ${!ui.ready && html`<${WaitingScreen} ui=${ui} />`}
   </div>`;
 }
 
 /** Shown before the first picture. @param {{ui: Ui}} props */
-function Waiting({ ui }) {
-  const { basis, closed, connection } = ui;
+function WaitingScreen({ ui }) {
+  const { basis, closure, connection } = ui;
   // Nothing will come; the banner says why.
-  if (closed || connection === 'stale') return null;
-  const text = ui.waiting || (basis ? 'Rendering the first picture …' : 'Opening the scene …');
+  if (closure || connection === 'stale') return null;
+  const text = ui.waitReason || (basis ? 'Rendering the first picture …' : 'Opening the scene …');
   return html`<div class="waiting" role="status"><span>${text}</span>
-    ${!ui.waiting && html`<${ProgressBar} progress=${basis ?? { done: 0, total: 0 }} label=${text} />`}
+    ${!ui.waitReason && html`<${ProgressBar} progress=${basis ?? { done: 0, total: 0 }} label=${text} />`}
   </div>`;
 }
 
 /** @param {{ui: Ui, app: App, pane: Pane, panes: Pane[]}} props */
 function Tag({ ui, app, pane, panes }) {
-  const isRight = ui.show.layout === 'wipe' && pane === panes[0] && panes.length > 1;
+  const isRight = ui.display.layout === 'wipe' && pane === panes[0] && panes.length > 1;
   const size = /** @type {[number, number]} */ ([...ui.state.size].reverse());
   if (pane.width < 90) return null;
-  const [w] = size;
+  const [columns] = size;
   const left = Math.max(pane.x, pane.left);
-  const right = Math.min(pane.x + pane.width, pane.left + w * pane.scale);
+  const right = Math.min(pane.x + pane.width, pane.left + columns * pane.scale);
   const style = {
     top: `${Math.min(Math.max(pane.y, pane.top), pane.y + pane.height - 30) + 8}px`,
     left: `${isRight ? right - 8 : left + 8}px`,
     transform: isRight ? 'translateX(-100%)' : '',
     maxWidth: `${Math.max(74, right - left - 16)}px`,
   };
-  const isPart = isPartly(ui, pane.kind);
-  const all = () => app.store.set({ solo: [], mute: [] });
-  return html`<span class=${`tag ${isPart ? 'is-part' : ''}`} style=${style}>
+  const hasHidden = isPartial(ui, pane.kind);
+  const showAll = () => app.store.set({ solo: [], mute: [] });
+  return html`<span class=${`tag ${hasHidden ? 'is-part' : ''}`} style=${style}>
     <span>${nameOf(ui, pane.kind)}</span>
     ${
-      isPart &&
+      hasHidden &&
       html`<span onPointerDown=${(/** @type {Event} */ event) => event.stopPropagation()}>
-        <${Button} icon="close" tip="Show all lights" act=${all} /></span>`
+        <${Button} icon="close" tip="Show all lights" act=${showAll} /></span>`
     }</span>`;
 }
 
 /** @param {{panes: Pane[], tool: import("./engine_interface.js").Tool}} props */
 function Hint({ panes, tool }) {
-  const pane = panes.find((one) => one.kind === 'painting');
+  const pane = panes.find((candidate) => candidate.kind === 'painting');
   if (!pane) return null;
   const { title, text } = firstHint(tool);
   return html`<div class="hint" style=${{
@@ -211,35 +218,35 @@ function Hint({ panes, tool }) {
 function Wipe({ ui, app }) {
   const { store, engine } = app;
   const ref = useRef(/** @type {HTMLElement | null} */ (null));
-  const to = (/** @type {number} */ wipe) =>
-    updateShow(store, { wipe: Math.min(1, Math.max(0, wipe)) });
+  const setWipe = (/** @type {number} */ wipe) =>
+    updateDisplay(store, { wipe: Math.min(1, Math.max(0, wipe)) });
   const drag = (/** @type {PointerEvent} */ event) => {
     if (!event.buttons) return;
     event.stopPropagation();
     const { left, width } = engine.element.getBoundingClientRect();
-    to((event.clientX - left) / width);
+    setWipe((event.clientX - left) / width);
   };
   const grab = (/** @type {PointerEvent} */ event) => {
     event.stopPropagation();
     ref.current?.setPointerCapture(event.pointerId);
   };
   const press = (/** @type {KeyboardEvent} */ event) => {
-    const way = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
-    if (!way) return;
+    const sign = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+    if (!sign) return;
     event.preventDefault();
     event.stopPropagation();
-    to(ui.show.wipe + way * 0.02);
+    setWipe(ui.display.wipe + sign * 0.02);
   };
   return html`<div class="wipe" ref=${ref} role="slider" tabindex="0" aria-label="Wipe"
-    aria-valuemin="0" aria-valuemax="100" aria-valuenow=${Math.round(100 * ui.show.wipe)}
-    style=${{ left: `${100 * ui.show.wipe}%` }} onPointerDown=${grab} onPointerMove=${drag}
+    aria-valuemin="0" aria-valuemax="100" aria-valuenow=${Math.round(100 * ui.display.wipe)}
+    style=${{ left: `${100 * ui.display.wipe}%` }} onPointerDown=${grab} onPointerMove=${drag}
     onKeyDown=${press}><i></i></div>`;
 }
 
-/** @param {HTMLElement | null} element @param {(width: number, height: number) => void} resized */
-function watch(element, resized) {
+/** @param {HTMLElement | null} element @param {(width: number, height: number) => void} onResize */
+function watch(element, onResize) {
   if (!element) return undefined;
-  const observer = new ResizeObserver(() => resized(element.clientWidth, element.clientHeight));
+  const observer = new ResizeObserver(() => onResize(element.clientWidth, element.clientHeight));
   observer.observe(element);
   return () => observer.disconnect();
 }

@@ -4,34 +4,34 @@
  * One finger paints, two pan and zoom. Space or the middle button pan; Ctrl and the wheel zoom.
  */
 
-import { updateShow, rememberPaint, pickPaint } from './tools.js';
+import { updateDisplay, rememberPaint, pickPaint } from './tools.js';
 
 /** @typedef {import("./engine_interface.js").Engine} Engine */
 /** @typedef {import("./engine_interface.js").Point} Point */
 /** @typedef {import("./ui_state.js").UiStore} UiStore */
 
 /** Within this time and distance a second finger cancels the stroke of the first. */
-const SECOND_FINGER = { ms: 250, px: 24 };
+const SECOND_FINGER_LIMITS = { ms: 250, px: 24 };
 
 export class Pointer {
-  /** @param {Engine} engine @param {UiStore} store @param {(x: number, y: number) => void} moved
+  /** @param {Engine} engine @param {UiStore} store @param {(x: number, y: number) => void} onMove
    * @param {(text: string) => void} say */
-  constructor(engine, store, moved, say) {
+  constructor(engine, store, onMove, say) {
     this.engine = engine;
     this.store = store;
-    this.moved = moved;
+    this.onMove = onMove;
     this.say = say;
     /** @type {Map<number, {x: number, y: number}>} */
     this.fingers = new Map();
     /** @type {null | "stroke" | "pan" | "pinch"} */
-    this.doing = null;
-    this.began = 0;
-    this.way = 0;
+    this.gesture = null;
+    this.startTime = 0;
+    this.pathLength = 0;
     /** @type {Point | null} */
-    this.last = null;
-    this.isSpace = false;
+    this.lastPoint = null;
+    this.isSpaceDown = false;
     /** Whether a drag adjusts light: its label stays at the place that it started from. */
-    this.isAsking = false;
+    this.isAdjusting = false;
   }
 
   /** @param {PointerEvent} event @returns {{x: number, y: number}} in CSS pixels of the pictures */
@@ -55,14 +55,14 @@ export class Pointer {
 
   /** @param {PointerEvent} event */
   down(event) {
-    if (isElsewhere(this.store.value)) return;
+    if (isSessionElsewhere(this.store.value)) return;
     const place = this.place(event);
     this.fingers.set(event.pointerId, place);
     capture(event);
     if (event.pointerType === 'touch' && this.fingers.size === 2) return this.pinch(event);
     if (this.fingers.size > 1) return;
-    if (event.button === 1 || this.isSpace) {
-      this.doing = 'pan';
+    if (event.button === 1 || this.isSpaceDown) {
+      this.gesture = 'pan';
     } else if (event.button === 0) {
       this.pane = paneAt(this.engine, place.x, place.y);
       this.press(event);
@@ -84,61 +84,61 @@ export class Pointer {
     if (!this.canPaint()) return;
     rememberPaint(this.store);
     this.store.set({ hint: false });
-    if (event.shiftKey && this.last && tool !== 'adjust') {
-      this.engine.line(this.last, point);
-      this.last = point;
+    if (event.shiftKey && this.lastPoint && tool !== 'adjust') {
+      this.engine.line(this.lastPoint, point);
+      this.lastPoint = point;
       return;
     }
-    this.doing = 'stroke';
-    this.began = event.timeStamp;
-    this.way = 0;
+    this.gesture = 'stroke';
+    this.startTime = event.timeStamp;
+    this.pathLength = 0;
     this.engine.begin(point);
-    this.last = point;
-    this.isAsking = tool === 'adjust';
-    if (this.isAsking) this.store.set({ asking: { stops: 0, mired: 0 } });
+    this.lastPoint = point;
+    this.isAdjusting = tool === 'adjust';
+    if (this.isAdjusting) this.store.set({ dragAdjustment: { stops: 0, mired: 0 } });
   }
 
   /** @param {PointerEvent} event */
   move(event) {
     const place = this.place(event);
-    const before = this.fingers.get(event.pointerId);
-    if (this.doing === 'pinch') this.spread(event.pointerId, place);
-    if (before) this.fingers.set(event.pointerId, place);
-    this.isAsking &&= this.store.value.asking !== null; // until it is cancelled
-    if (!this.isAsking) this.moved(place.x, place.y);
-    if (this.doing === 'pan' && before) {
-      this.pan(place.x - before.x, place.y - before.y);
-    } else if (this.doing === 'stroke' && before) {
-      const all = event.getCoalescedEvents?.() ?? [];
-      const points = (all.length ? all : [event]).map((one) => this.point(one));
-      const found = /** @type {Point[]} */ (points.filter(Boolean));
-      this.way += Math.hypot(place.x - before.x, place.y - before.y);
-      if (found.length) this.last = found[found.length - 1];
-      this.engine.move(found);
+    const previous = this.fingers.get(event.pointerId);
+    if (this.gesture === 'pinch') this.spread(event.pointerId, place);
+    if (previous) this.fingers.set(event.pointerId, place);
+    this.isAdjusting &&= this.store.value.dragAdjustment !== null; // until it is cancelled
+    if (!this.isAdjusting) this.onMove(place.x, place.y);
+    if (this.gesture === 'pan' && previous) {
+      this.pan(place.x - previous.x, place.y - previous.y);
+    } else if (this.gesture === 'stroke' && previous) {
+      const events = event.getCoalescedEvents?.() ?? [];
+      const points = (events.length ? events : [event]).map((sample) => this.point(sample));
+      const validPoints = /** @type {Point[]} */ (points.filter(Boolean));
+      this.pathLength += Math.hypot(place.x - previous.x, place.y - previous.y);
+      if (validPoints.length) this.lastPoint = validPoints[validPoints.length - 1];
+      this.engine.move(validPoints);
     }
   }
 
   /** @param {PointerEvent} event */
   up(event) {
     this.fingers.delete(event.pointerId);
-    if (this.doing === 'stroke' && event.type === 'pointercancel') this.engine.cancel();
-    else if (this.doing === 'stroke') this.engine.end();
-    if (this.doing === 'stroke' || this.fingers.size === 0) {
-      this.doing = null;
+    if (this.gesture === 'stroke' && event.type === 'pointercancel') this.engine.cancel();
+    else if (this.gesture === 'stroke') this.engine.end();
+    if (this.gesture === 'stroke' || this.fingers.size === 0) {
+      this.gesture = null;
       this.pane = null;
-      this.store.set({ asking: null });
-      if (this.isAsking) this.moved(...xy(this.place(event)));
-      this.isAsking = false;
+      this.store.set({ dragAdjustment: null });
+      if (this.isAdjusting) this.onMove(...pairOf(this.place(event)));
+      this.isAdjusting = false;
     }
   }
 
   /** Do not paint on a hidden picture. */
   canPaint() {
-    const { mix, show } = this.store.value;
-    const { left, right } = show;
+    const { mix, display } = this.store.value;
+    const { left, right } = display;
     const isShown = left === 'painting' || right === 'painting';
-    const way = mix ? 'press Back to the painting' : 'compare Painting | Answer';
-    if (!isShown) this.say(`The painting is not shown: ${way} to paint.`);
+    const remedy = mix ? 'press Back to the painting' : 'compare Painting | Answer';
+    if (!isShown) this.say(`The painting is not shown: ${remedy} to paint.`);
     return isShown;
   }
 
@@ -147,7 +147,7 @@ export class Pointer {
   dab(x, y, isLine = false) {
     const pane = paneAt(this.engine, x, y);
     const { tool } = this.store.value;
-    if (!pane || isElsewhere(this.store.value)) return;
+    if (!pane || isSessionElsewhere(this.store.value)) return;
     const point = { x: (x - pane.left) / pane.scale, y: (y - pane.top) / pane.scale, pressure: 1 };
     if (tool === 'pick')
       return pickPaint(this.store, this.engine.paintAt(pane.kind, point.x, point.y));
@@ -158,56 +158,56 @@ export class Pointer {
     if (!this.canPaint()) return;
     rememberPaint(this.store);
     this.store.set({ hint: false });
-    if (isLine && this.last) this.engine.line(this.last, point);
+    if (isLine && this.lastPoint) this.engine.line(this.lastPoint, point);
     else {
       this.engine.begin(point);
       this.engine.end();
     }
-    this.last = point;
+    this.lastPoint = point;
   }
 
   /** Handle a second finger: cancel what the first began, or end it if it is a stroke already.
    * @param {PointerEvent} event */
   pinch(event) {
-    if (this.doing === 'stroke') {
-      const { ms, px } = SECOND_FINGER;
-      if (event.timeStamp - this.began < ms || this.way < px) this.engine.cancel();
+    if (this.gesture === 'stroke') {
+      const { ms, px } = SECOND_FINGER_LIMITS;
+      if (event.timeStamp - this.startTime < ms || this.pathLength < px) this.engine.cancel();
       else this.engine.end();
     }
     this.pane = null;
-    this.isAsking = false;
-    this.store.set({ asking: null });
-    this.doing = 'pinch';
+    this.isAdjusting = false;
+    this.store.set({ dragAdjustment: null });
+    this.gesture = 'pinch';
   }
 
   /** @param {number} id @param {{x: number, y: number}} place */
   spread(id, place) {
-    const own = this.fingers.get(id);
-    const other = [...this.fingers].find(([key]) => key !== id)?.[1];
-    if (!own || !other) return;
-    const far = (/** @type {{x: number, y: number}} */ a) =>
-      Math.hypot(a.x - other.x, a.y - other.y);
-    const factor = far(place) / Math.max(1, far(own));
-    updateShow(
+    const finger = this.fingers.get(id);
+    const otherFinger = [...this.fingers].find(([key]) => key !== id)?.[1];
+    if (!finger || !otherFinger) return;
+    const distance = (/** @type {{x: number, y: number}} */ a) =>
+      Math.hypot(a.x - otherFinger.x, a.y - otherFinger.y);
+    const factor = distance(place) / Math.max(1, distance(finger));
+    updateDisplay(
       this.store,
-      this.engine.zoomAt((place.x + other.x) / 2, (place.y + other.y) / 2, factor),
+      this.engine.zoomAt((place.x + otherFinger.x) / 2, (place.y + otherFinger.y) / 2, factor),
     );
-    this.pan((place.x - own.x) / 2, (place.y - own.y) / 2);
+    this.pan((place.x - finger.x) / 2, (place.y - finger.y) / 2);
   }
 
   /** @param {number} x @param {number} y in CSS pixels */
   pan(x, y) {
     const scale = this.engine.panes()[0]?.scale ?? 1;
-    const [px, py] = this.store.value.show.pan;
-    updateShow(this.store, { pan: [px - x / scale, py - y / scale] });
+    const [px, py] = this.store.value.display.pan;
+    updateDisplay(this.store, { pan: [px - x / scale, py - y / scale] });
   }
 
   /** @param {WheelEvent} event */
   wheel(event) {
     const { x, y } = this.place(/** @type {any} */ (event));
-    const { zoom } = this.store.value.show;
+    const { zoom } = this.store.value.display;
     if (event.ctrlKey || event.metaKey) {
-      updateShow(this.store, this.engine.zoomAt(x, y, 2 ** (-event.deltaY / 240)));
+      updateDisplay(this.store, this.engine.zoomAt(x, y, 2 ** (-event.deltaY / 240)));
     } else if (zoom > 1) {
       this.pan(-(event.shiftKey ? event.deltaY : event.deltaX), event.shiftKey ? 0 : -event.deltaY);
     } else {
@@ -221,11 +221,11 @@ export class Pointer {
 }
 
 /** @param {{x: number, y: number}} place @returns {[number, number]} */
-const xy = ({ x, y }) => [x, y];
+const pairOf = ({ x, y }) => [x, y];
 
 /** Return whether the session receives no strokes from here.
  * @param {import("./ui_state.js").Ui} ui */
-const isElsewhere = ({ closed, connection }) => closed !== null || connection === 'stale';
+const isSessionElsewhere = ({ closure, connection }) => closure !== null || connection === 'stale';
 
 /** @param {Engine} engine @param {number} x @param {number} y */
 export function paneAt(engine, x, y) {

@@ -15,12 +15,13 @@ export function PointerLabel({ ui, engine, rings }) {
   useLayoutEffect(() => {
     if (ref.current && rings.current) place(ref.current, rings.current, engine, ui);
   });
-  const { asking, pointed, tool } = ui;
-  if (asking) return html`<div class="near asking" ref=${ref} role="status">${asked(asking)}</div>`;
-  if (tool !== 'pick' || !pointed) return null;
-  const exposed = pointed.paint.map((x) => Math.max(0, x) * 2 ** exposureOf(ui.state));
+  const { dragAdjustment, probe, tool } = ui;
+  if (dragAdjustment)
+    return html`<div class="near asking" ref=${ref} role="status">${adjustmentText(dragAdjustment)}</div>`;
+  if (tool !== 'pick' || !probe) return null;
+  const exposedPaint = probe.paint.map((x) => Math.max(0, x) * 2 ** exposureOf(ui.state));
   return html`<div class="near picking" ref=${ref} aria-hidden="true">
-    <i style=${{ background: toHex(exposed) }}></i>${paintText(exposed) || 'no light'}</div>`;
+    <i style=${{ background: toHex(exposedPaint) }}></i>${paintText(exposedPaint) || 'no light'}</div>`;
 }
 
 /** Above the brush, where no hand covers it, or beside it without room above; always within the
@@ -37,22 +38,22 @@ function place(element, rings, engine, ui) {
   const right = Math.min(pane.x + pane.width, pane.left + columns * pane.scale) - width;
   const bottom = Math.min(pane.y + pane.height, pane.top + rows * pane.scale) - height;
   const isAbove = y - gap - height >= top;
-  const sideways = x - gap - width >= left ? x - gap - width : x + gap;
-  const across = within(isAbove ? x - width / 2 : sideways, left, right);
-  const down = within(isAbove ? y - gap - height : y - height / 2, top, bottom);
-  element.style.transform = `translate(${Math.round(across)}px, ${Math.round(down)}px)`;
+  const besideX = x - gap - width >= left ? x - gap - width : x + gap;
+  const labelX = clamp(isAbove ? x - width / 2 : besideX, left, right);
+  const labelY = clamp(isAbove ? y - gap - height : y - height / 2, top, bottom);
+  element.style.transform = `translate(${Math.round(labelX)}px, ${Math.round(labelY)}px)`;
 }
 
-/** @param {number} x @param {number} least @param {number} most */
-const within = (x, least, most) => Math.max(least, Math.min(most, x));
+/** @param {number} x @param {number} min @param {number} max */
+const clamp = (x, min, max) => Math.max(min, Math.min(max, x));
 
-/** @param {{stops: number, mired: number}} asking */
-function asked({ stops, mired }) {
-  const bright =
+/** @param {{stops: number, mired: number}} adjustment */
+function adjustmentText({ stops, mired }) {
+  const brightness =
     Math.abs(stops) >= 0.05 &&
     `${Math.abs(stops).toFixed(1)} stops ${stops > 0 ? 'brighter' : 'darker'}`;
-  const warm =
+  const warmth =
     Math.abs(mired) >= 3 &&
     `${Math.abs(Math.round(mired))} mired ${mired > 0 ? 'warmer' : 'cooler'}`;
-  return [bright, warm].filter(Boolean).join(', ') || 'no change';
+  return [brightness, warmth].filter(Boolean).join(', ') || 'no change';
 }

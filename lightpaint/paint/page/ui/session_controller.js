@@ -16,15 +16,21 @@ export class SessionController extends SessionLink {
    * @param {number} light @param {Constraints} constraints @param {boolean} [isFinal] false while a slider moves
    */
   async constrainLight(light, constraints, isFinal = true) {
-    const kept = Object.fromEntries(
+    const validConstraints = Object.fromEntries(
       Object.entries(constraints).filter(
         ([, value]) => value !== null && value !== undefined && value !== false,
       ),
     );
-    this.store.set((ui) => ({ constraints: { ...ui.constraints, [ui.lights[light].name]: kept } }));
-    this.pendingConstraints.set(light, kept);
-    const reply = await this.send('constrain_light', { light, constraints: kept, is_final: isFinal });
-    const isNewest = this.pendingConstraints.get(light) === kept;
+    this.store.set((ui) => ({
+      constraints: { ...ui.constraints, [ui.lights[light].name]: validConstraints },
+    }));
+    this.pendingConstraints.set(light, validConstraints);
+    const reply = await this.send('constrain_light', {
+      light,
+      constraints: validConstraints,
+      is_final: isFinal,
+    });
+    const isNewest = this.pendingConstraints.get(light) === validConstraints;
     if (isNewest) this.pendingConstraints.delete(light);
     if (reply?.kind === 'failed') this.revert();
     if (isNewest) this.forgetUnlocked(this.store.value.constraints);
@@ -48,11 +54,11 @@ export class SessionController extends SessionLink {
 
   async sendMoves() {
     /** @type {Map<number, object>} */
-    const sent = new Map();
-    const waiting = () => [...this.moves].find(([light, move]) => sent.get(light) !== move);
-    for (let next = waiting(); next; next = waiting()) {
+    const sentMoves = new Map();
+    const findUnsent = () => [...this.moves].find(([light, move]) => sentMoves.get(light) !== move);
+    for (let next = findUnsent(); next; next = findUnsent()) {
       const [light, move] = next;
-      sent.set(light, move);
+      sentMoves.set(light, move);
       const isScalar = this.store.value.lights[light].is_scalar;
       const reply = await this.constrainLight(
         light,
@@ -66,36 +72,36 @@ export class SessionController extends SessionLink {
   }
 
   /** Unlock a light, or the light that it is tied to, and restore its earlier constraints.
-   * @param {number} tied */
-  unlockLight(tied) {
+   * @param {number} tiedLight */
+  unlockLight(tiedLight) {
     const { lights, constraints } = this.store.value;
-    const light = lockingLight(this.store.value, tied);
-    this.moves.delete(tied);
+    const light = lockingLight(this.store.value, tiedLight);
+    this.moves.delete(tiedLight);
     this.moves.delete(light);
-    const before =
+    const earlierConstraints =
       this.unlockedConstraints.get(light) ?? withoutLevel(constraints[lights[light].name] ?? {});
     this.unlockedConstraints.delete(light);
-    return this.constrainLight(light, before);
+    return this.constrainLight(light, earlierConstraints);
   }
 
   /** Unlock all lights in one step, and restore their earlier constraints. */
   unlockAll() {
     const { lights, constraints } = this.store.value;
-    const locked = lockedLights(this.store.value);
-    const unlocked = locked.map((k) => [
+    const lockedIndices = lockedLights(this.store.value);
+    const entries = lockedIndices.map((k) => [
       lights[k].name,
       this.unlockedConstraints.get(k) ?? withoutLevel(constraints[lights[k].name]),
     ]);
-    for (const k of locked) {
+    for (const k of lockedIndices) {
       this.moves.delete(k);
       this.unlockedConstraints.delete(k);
     }
-    return this.sendChange('constrain_lights', { constraints: Object.fromEntries(unlocked) });
+    return this.sendChange('constrain_lights', { constraints: Object.fromEntries(entries) });
   }
 
-  /** @param {number} light @param {boolean} off */
-  switchLight(light, off) {
-    if (!off) return this.unlockLight(light);
+  /** @param {number} light @param {boolean} isOff */
+  switchLight(light, isOff) {
+    if (!isOff) return this.unlockLight(light);
     this.moves.delete(light);
     const { lights, constraints } = this.store.value;
     if (!this.unlockedConstraints.has(light)) {
@@ -104,18 +110,20 @@ export class SessionController extends SessionLink {
     return this.constrainLight(light, { off: true });
   }
 
-  /** Tie two lights. @param {string} one @param {string} other */
-  tie(one, other) {
+  /** Tie two lights. @param {string} name @param {string} otherName */
+  tie(name, otherName) {
     const { ties } = this.store.value;
-    const joined = ties.filter((tie) => tie.includes(one) || tie.includes(other)).flat();
-    const rest = ties.filter((tie) => !tie.includes(one) && !tie.includes(other));
-    return this.tieAll([...rest, [...new Set([...joined, one, other])]]);
+    const joinedNames = ties.filter((tie) => tie.includes(name) || tie.includes(otherName)).flat();
+    const otherTies = ties.filter((tie) => !tie.includes(name) && !tie.includes(otherName));
+    return this.tieAll([...otherTies, [...new Set([...joinedNames, name, otherName])]]);
   }
 
   /** @param {string} name */
   untie(name) {
-    const left = this.store.value.ties.map((tie) => tie.filter((one) => one !== name));
-    return this.tieAll(left.filter((tie) => tie.length > 1));
+    const remainingTies = this.store.value.ties.map((tie) =>
+      tie.filter((member) => member !== name),
+    );
+    return this.tieAll(remainingTies.filter((tie) => tie.length > 1));
   }
 
   /** @param {string[][]} ties */
@@ -139,10 +147,10 @@ export class SessionController extends SessionLink {
   /** Request a preview of a change. @param {string} label its name
    * @param {import("./ui_state.js").Change} change */
   preview(label, change) {
-    this.previews += 1;
-    const number = this.previews;
-    const unknown = { text: '', isAtCost: false, before: null, after: null };
-    this.store.set({ preview: { number, label, change, ...unknown } });
+    this.previewCount += 1;
+    const number = this.previewCount;
+    const emptyResult = { text: '', isAtCost: false, before: null, after: null };
+    this.store.set({ preview: { number, label, change, ...emptyResult } });
     return this.send('preview', { ...change.fields, number, view: this.store.value.view });
   }
 
@@ -161,38 +169,45 @@ export class SessionController extends SessionLink {
 
   /** Show or hide the marks of lights. Their places are requested the first time. */
   toggleLamps() {
-    const { lamps, rig } = this.store.value;
-    this.store.set({ lamps: !lamps, pointing: null });
-    if (!lamps && !rig) void this.send('show_rig');
+    const { areLampsMarked, rig } = this.store.value;
+    this.store.set({ areLampsMarked: !areLampsMarked, clickAction: null });
+    if (!areLampsMarked && !rig) void this.send('show_rig');
   }
 
   /** Move a light. @param {number} light @param {Record<string, any>} change of its pose
    * @param {boolean} [isFinal] false while it is dragged */
   moveLamp(light, change, isFinal = true) {
-    this.lampMoves.ask(light, { kind: 'move', pose: change }, isFinal);
+    this.lampMoves.queue(light, { kind: 'move', pose: change }, isFinal);
   }
 
   /** Start or stop the search for places of lights. @param {boolean} [run] */
   placeLights(run = true) {
-    const { rig, lights, lamps } = this.store.value;
+    const { rig, lights, areLampsMarked } = this.store.value;
     if (!run) return this.send('place', { run });
-    if (!lamps) this.toggleLamps();
+    if (!areLampsMarked) this.toggleLamps();
     /** @type {Record<string, number[]>} */
     const ghosts = {};
     rig?.lights.forEach(({ position, immovable_reason: reason }, k) => {
       if (position && !reason) ghosts[lights[k].name] = position;
     });
-    this.store.set({ placing: { task: 'place', done: 0, total: 0, unit: 'steps' }, ghosts });
+    this.store.set({
+      placementProgress: { task: 'place', done: 0, total: 0, unit: 'steps' },
+      ghosts,
+    });
     return this.send('place', { run });
   }
 
   /** Add a light, and choose it. @param {Requests["add_light"]} fields */
   async addLight(fields) {
-    this.store.set({ pointing: null });
+    this.store.set({ clickAction: null });
     const reply = await this.send('add_light', fields);
     if (reply?.kind !== 'state') return;
     const lamp = this.store.value.lights.length - 1;
-    this.store.set(({ unfolded }) => ({ lamps: true, lamp, unfolded: [...unfolded, lamp] }));
+    this.store.set(({ openLights }) => ({
+      areLampsMarked: true,
+      lamp,
+      openLights: [...openLights, lamp],
+    }));
   }
 
   /** @param {string} name of a light that was added */
@@ -200,35 +215,38 @@ export class SessionController extends SessionLink {
     return this.send('remove_light', { name });
   }
 
-  /** Search for places of new lights. @param {import("./ui_state.js").Ui["adding"]} adding */
-  findLights({ type, where, count }) {
-    const { lamps } = this.store.value;
-    if (!lamps) this.toggleLamps();
-    this.store.set({ placing: { task: 'place', done: 0, total: 0, unit: 'steps' }, ghosts: {} });
-    const surfaces = where === 'anywhere' ? [] : [where];
+  /** Search for places of new lights. @param {import("./ui_state.js").Ui["newLight"]} newLight */
+  findLights({ type, surface, count }) {
+    const { areLampsMarked } = this.store.value;
+    if (!areLampsMarked) this.toggleLamps();
+    this.store.set({
+      placementProgress: { task: 'place', done: 0, total: 0, unit: 'steps' },
+      ghosts: {},
+    });
+    const surfaces = surface === 'anywhere' ? [] : [surface];
     return this.send('place', { run: true, new_type: type, max_count: count, surfaces });
   }
 
   /** Restore a light's place from the scene. @param {number} light */
-  putBack(light) {
-    this.lampMoves.ask(light, { kind: 'move', pose: {} });
+  resetPlace(light) {
+    this.lampMoves.queue(light, { kind: 'move', pose: {} });
   }
 
   /** Request the reasons why the current view is not closer. */
   explain() {
-    this.store.set({ explaining: true });
+    this.store.set({ isExplaining: true });
     return this.send('explain', { view: this.store.value.view });
   }
 
   verify(run = true) {
     this.store.set({
-      verifying: run ? { task: 'verify', done: 0, total: 0, unit: '' } : null,
+      verificationProgress: run ? { task: 'verify', done: 0, total: 0, unit: '' } : null,
     });
     return this.send('verify', { run, view: this.store.value.view });
   }
 }
 
 /** @param {Constraints} constraints @returns {Constraints} */
-function withoutLevel({ lock, off, ...rest }) {
-  return rest;
+function withoutLevel({ lock, off, ...otherConstraints }) {
+  return otherConstraints;
 }

@@ -4,26 +4,26 @@
 
 import { html, useLayoutEffect, useRef } from '../vendor/preact.js';
 import { Button, Choice, NumberField, useId } from './controls.js';
-import { number } from './format.js';
+import { numberText } from './format.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
 
-const AUTO = 'The best choice for a painting made here';
+const AUTOMATIC_TIP = 'The best choice for a painting made here';
 
 const SPACES = [
-  { value: null, label: 'Automatic', tip: AUTO },
+  { value: null, label: 'Automatic', tip: AUTOMATIC_TIP },
   { value: 'display', label: 'Display', tip: 'Differences as the eye sees them on a display' },
   { value: 'linear', label: 'Linear', tip: 'Differences in linear light: bright areas count most' },
 ];
 const COLOURS = [
-  { value: null, label: 'Automatic', tip: AUTO },
+  { value: null, label: 'Automatic', tip: AUTOMATIC_TIP },
   { value: 'free', label: 'Free', tip: 'Any colour' },
   { value: 'gentle', label: 'Gentle', tip: 'Their own, unless the paint asks for another' },
   { value: 'white', label: 'White', tip: 'Whites from 2200 to 9000 K' },
 ];
 const HOLDS = [
-  { value: 'auto', label: 'Automatic', tip: AUTO },
+  { value: 'auto', label: 'Automatic', tip: AUTOMATIC_TIP },
   { value: 'hold', label: 'Hold', tip: 'They stay near their current look' },
   { value: 'go', label: 'Ignore', tip: 'They may change freely: only the paint counts' },
 ];
@@ -50,8 +50,8 @@ const DESCRIPTIONS = {
 };
 
 /** Initial strengths; the first is the automatic one, if something is held. */
-const HOLD = 4;
-const PREFER_CURRENT = 0.01;
+const DEFAULT_HOLD = 4;
+const DEFAULT_PREFER_CURRENT = 0.01;
 
 /** @param {{ui: Ui, app: App}} props */
 export function SettingsPanel({ ui, app }) {
@@ -62,56 +62,56 @@ export function SettingsPanel({ ui, app }) {
   const close = () => app.store.set({ panel: null });
   const hold = settings.hold ?? null;
   const mode = hold === null ? 'auto' : hold === 0 ? 'go' : 'hold';
-  const stays = settings.prefer_current || null;
+  const pull = settings.prefer_current || null;
   return html`<${Panel} labelledby=${id} close=${close}>
     <div class="panel-head">
       <h2 id=${id}>Solve settings</h2>
       <${Button} icon="close" tip="Close" keys="Escape" act=${close} />
     </div>
-    <${Row} title="Unpainted parts" says=${withSource(hold === null, describeHold(effectiveSettings.hold))}>
+    <${Row} title="Unpainted parts" description=${describeSource(hold === null, describeHold(effectiveSettings.hold))}>
       <${Choice} label="Unpainted parts" value=${mode} choices=${HOLDS}
-        change=${(/** @type {string} */ to) => set('hold')({ auto: null, hold: hold || HOLD, go: 0 }[to])} />
+        change=${(/** @type {string} */ newMode) => set('hold')({ auto: null, hold: hold || DEFAULT_HOLD, go: 0 }[newMode])} />
       ${
         mode === 'hold' &&
-        html`<${NumberField} label="Strength" value=${hold} least=${0.01} most=${100} step=${0.1}
+        html`<${NumberField} label="Strength" value=${hold} min=${0.01} max=${100} step=${0.1}
         unit="×" tip="1: they count as much as all paint together. 3 is the usual value."
         change=${set('hold')} />`
       }
     </${Row}>
-    <${Row} title="Colour space of the match" says=${withSource(!settings.space, DESCRIPTIONS.space[effectiveSettings.space])}>
+    <${Row} title="Colour space of the match" description=${describeSource(!settings.space, DESCRIPTIONS.space[effectiveSettings.space])}>
       <${Choice} label="Colour space of the match" value=${settings.space ?? null} choices=${SPACES}
         change=${set('space')} /></${Row}>
     <${Row} title="Light colours"
-      says=${withSource(!settings.colors, DESCRIPTIONS.colors[effectiveSettings.colors])}>
+      description=${describeSource(!settings.colors, DESCRIPTIONS.colors[effectiveSettings.colors])}>
       <${Choice} label="Light colours" value=${settings.colors ?? null}
         choices=${COLOURS} change=${set('colors')} /></${Row}>
-    <${Row} title="Read the paint as" says=${
+    <${Row} title="Read the paint as" description=${
       settings.literal
         ? 'Every stroke is exact: linear light, nothing held, any colour, unless set otherwise above'
         : 'Strokes show what should change; the rest of the picture counts, too'
     }>
       <${Choice} label="Read the paint as" value=${Boolean(settings.literal)} choices=${PAINT_READINGS}
         change=${set('literal')} /></${Row}>
-    <${Row} title="Lights that make little difference" says=${
-      stays ? 'They stay as they are now' : 'They may change, too'
+    <${Row} title="Lights that make little difference" description=${
+      pull ? 'They stay as they are now' : 'They may change, too'
     }>
-      <${Choice} label="Lights that make little difference" value=${stays !== null} choices=${MINOR_LIGHTS}
-        change=${(/** @type {boolean} */ stay) =>
-          set('prefer_current')(stay ? (stays ?? PREFER_CURRENT) : null)} />
+      <${Choice} label="Lights that make little difference" value=${pull !== null} choices=${MINOR_LIGHTS}
+        change=${(/** @type {boolean} */ isPulled) =>
+          set('prefer_current')(isPulled ? (pull ?? DEFAULT_PREFER_CURRENT) : null)} />
       ${
-        stays !== null &&
-        html`<${NumberField} label="Pull" value=${stays} least=${0.001} most=${10} step=${0.01}
+        pull !== null &&
+        html`<${NumberField} label="Pull" value=${pull} min=${0.001} max=${10} step=${0.01}
         digits=${3} tip="0.01: only where the paint leaves it open. 1: unless a change helps very much."
         change=${set('prefer_current')} />`
       }
     </${Row}>
-    <${Row} title="Number of lights" says=${
+    <${Row} title="Number of lights" description=${
       settings.sparse
         ? 'The most useful ones, besides locked lights; the others are off'
         : 'No limit'
     }>
-      <${NumberField} label="At most" value=${settings.sparse ?? null} least=${1} digits=${0}
-        most=${ui.lights.length || 1} empty="all" unit="lights"
+      <${NumberField} label="At most" value=${settings.sparse ?? null} min=${1} digits=${0}
+        max=${ui.lights.length || 1} placeholder="all" unit="lights"
         tip="Empty: no limit" change=${set('sparse')} /></${Row}>
   </${Panel}>`;
 }
@@ -126,10 +126,10 @@ function Panel({ labelledby, close, children }) {
     const element = ref.current;
     if (!element) return undefined;
     const root = /** @type {Document | ShadowRoot} */ (element.getRootNode());
-    const before = /** @type {HTMLElement | null} */ (root.activeElement);
+    const previousFocus = /** @type {HTMLElement | null} */ (root.activeElement);
     element.focus({ preventScroll: true });
     return () => {
-      if (element.contains(root.activeElement)) before?.focus?.();
+      if (element.contains(root.activeElement)) previousFocus?.focus?.();
     };
   }, []);
   const press = (/** @type {KeyboardEvent} */ event) => {
@@ -142,15 +142,15 @@ function Panel({ labelledby, close, children }) {
     onKeyDown=${press}>${children}</aside>`;
 }
 
-/** @param {{title: string, says: string, children?: any}} props */
-function Row({ title, says, children }) {
+/** @param {{title: string, description: string, children?: any}} props */
+function Row({ title, description, children }) {
   return html`<section class="setting"><h3>${title}</h3>
-    <div class="row">${children}</div><p class="faint">${says}</p></section>`;
+    <div class="row">${children}</div><p class="faint">${description}</p></section>`;
 }
 
 /** The current value, and whether it follows from the painting. @param {boolean} isAuto
  * @param {string | undefined} text */
-function withSource(isAuto, text = '') {
+function describeSource(isAuto, text = '') {
   return isAuto && text ? `Now: ${text}` : text.charAt(0).toUpperCase() + text.slice(1);
 }
 
@@ -158,6 +158,6 @@ function withSource(isAuto, text = '') {
 function describeHold(hold) {
   if (hold === undefined || hold === null) return '';
   if (!hold) return 'free to change';
-  const weight = hold === 1 ? 'the same weight as' : `${number(hold)} times the weight of`;
+  const weight = hold === 1 ? 'the same weight as' : `${numberText(hold)} times the weight of`;
   return `held near their current look, with ${weight} the paint`;
 }

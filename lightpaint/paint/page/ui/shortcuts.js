@@ -7,8 +7,8 @@ import {
   togglePanels,
   hardenBrush,
   LAYOUTS,
-  updateShow,
-  next,
+  updateDisplay,
+  nextValue,
   OVERLAYS,
   resizeBrush,
   swapColours,
@@ -20,7 +20,7 @@ import {
 /** @typedef {import("./ui_state.js").UiStore} UiStore */
 /** @typedef {{store: UiStore, session: SessionController, engine: Engine}} App */
 /** isOnce: ignores repeats of a held key.
- * @typedef {{keys: string, shown: string[], does: string, act?: (app: App) => void,
+ * @typedef {{keys: string, symbols: string[], description: string, act?: (app: App) => void,
  *   isOnce?: boolean}} Key */
 
 /** Name of the Ctrl key on this system. */
@@ -31,20 +31,20 @@ const zoomBy =
   (/** @type {App} */ { store, engine }) => {
     const { width, height } = engine.element.getBoundingClientRect();
     const pane = engine.panes()[0] ?? { x: 0, y: 0, width, height };
-    updateShow(store, engine.zoomAt(pane.x + pane.width / 2, pane.y + pane.height / 2, factor));
+    updateDisplay(store, engine.zoomAt(pane.x + pane.width / 2, pane.y + pane.height / 2, factor));
   };
 
 /** Show one picture pixel per page pixel. @param {App} app */
 export function showPixels({ store, engine }) {
   const scale = engine.panes()[0]?.scale;
-  if (scale) updateShow(store, { zoom: store.value.show.zoom / scale });
+  if (scale) updateDisplay(store, { zoom: store.value.display.zoom / scale });
 }
 
-/** @param {number} by */
+/** @param {number} step */
 const changeExposure =
-  (by) =>
+  (step) =>
   (/** @type {App} */ { store }) =>
-    updateShow(store, { stops: Math.min(10, Math.max(-10, store.value.show.stops + by)) });
+    updateDisplay(store, { stops: Math.min(10, Math.max(-10, store.value.display.stops + step)) });
 
 /** All shortcuts, by their effect. `keys`: the browser's names, after Shift and Mod (Ctrl or ⌘). */
 /** @type {{title: string, keys: Key[]}[]} */
@@ -53,8 +53,8 @@ export const SHORTCUTS = [
     title: 'Tools',
     keys: TOOLS.map(({ tool, keys, label }) => ({
       keys: keys.toLowerCase(),
-      shown: [keys],
-      does: label,
+      symbols: [keys],
+      description: label,
       act: ({ store }) => chooseTool(store, tool),
     })),
   },
@@ -63,80 +63,104 @@ export const SHORTCUTS = [
     keys: [
       {
         keys: 'mod+s',
-        shown: ['Ctrl', 'S'],
-        does: 'save look',
+        symbols: ['Ctrl', 'S'],
+        description: 'save look',
         act: (app) => void saveLook(app),
         isOnce: true,
       },
       {
         keys: 'p',
-        shown: ['P'],
-        does: 'show or hide panels',
+        symbols: ['P'],
+        description: 'show or hide panels',
         act: ({ store }) => togglePanels(store),
       },
       {
         keys: 'd',
-        shown: ['D'],
-        does: 'mark the lights, and move them',
+        symbols: ['D'],
+        description: 'mark the lights, and move them',
         act: ({ store, session }) => {
           if (store.value.state?.can_render) session.toggleLamps();
         },
       },
       {
         keys: '?',
-        shown: ['?'],
-        does: 'show these shortcuts',
+        symbols: ['?'],
+        description: 'show these shortcuts',
         act: ({ store }) => store.set({ dialog: 'keys' }),
       },
-      { keys: '', shown: ['Tab'], does: 'next control' },
-      { keys: '', shown: ['← ↑ ↓ →'], does: 'move the brush on the pictures; Enter paints' },
-      { keys: '', shown: ['Shift', 'Enter'], does: 'there, a line from the last stroke' },
+      { keys: '', symbols: ['Tab'], description: 'next control' },
+      {
+        keys: '',
+        symbols: ['← ↑ ↓ →'],
+        description: 'move the brush on the pictures; Enter paints',
+      },
+      { keys: '', symbols: ['Shift', 'Enter'], description: 'there, a line from the last stroke' },
     ],
   },
   {
     title: 'Brush',
     keys: [
-      { keys: '[', shown: ['['], does: 'smaller', act: ({ store }) => resizeBrush(store, -1) },
-      { keys: ']', shown: [']'], does: 'larger', act: ({ store }) => resizeBrush(store, 1) },
+      {
+        keys: '[',
+        symbols: ['['],
+        description: 'smaller',
+        act: ({ store }) => resizeBrush(store, -1),
+      },
+      {
+        keys: ']',
+        symbols: [']'],
+        description: 'larger',
+        act: ({ store }) => resizeBrush(store, 1),
+      },
       {
         keys: '{',
-        shown: ['Shift', '['],
-        does: 'softer',
+        symbols: ['Shift', '['],
+        description: 'softer',
         act: ({ store }) => hardenBrush(store, -1),
       },
       {
         keys: '}',
-        shown: ['Shift', ']'],
-        does: 'harder',
+        symbols: ['Shift', ']'],
+        description: 'harder',
         act: ({ store }) => hardenBrush(store, 1),
       },
-      { keys: 'digit', shown: ['1', '…', '9', '0'], does: 'flow 10 % to 100 %' },
-      { keys: 'x', shown: ['X'], does: 'swap colours', act: ({ store }) => swapColours(store) },
-      { keys: '', shown: ['Alt', 'click'], does: 'pick light from the picture' },
-      { keys: '', shown: ['Shift', 'click'], does: 'line from the last stroke' },
+      { keys: 'digit', symbols: ['1', '…', '9', '0'], description: 'flow 10 % to 100 %' },
+      {
+        keys: 'x',
+        symbols: ['X'],
+        description: 'swap colours',
+        act: ({ store }) => swapColours(store),
+      },
+      { keys: '', symbols: ['Alt', 'click'], description: 'pick light from the picture' },
+      { keys: '', symbols: ['Shift', 'click'], description: 'line from the last stroke' },
       {
         keys: 'escape',
-        shown: ['Esc'],
-        does: 'cancel the stroke',
+        symbols: ['Esc'],
+        description: 'cancel the stroke',
         act: ({ engine, store }) => {
-          const isClosed = engine.cancel() ? {} : { panel: null };
-          store.set({ asking: null, hovered: null, pointing: null, ...isClosed });
+          const panelChange = engine.cancel() ? {} : { panel: null };
+          store.set({
+            dragAdjustment: null,
+            hoveredLight: null,
+            clickAction: null,
+            ...panelChange,
+          });
         },
       },
       {
         keys: 'mod+z',
-        shown: ['Ctrl', 'Z'],
-        does: 'undo',
+        symbols: ['Ctrl', 'Z'],
+        description: 'undo',
         // Undo first cancels the current stroke, which is the last action.
         act: ({ engine, session, store }) => {
-          if (engine.cancel()) store.set({ asking: null });
+          if (engine.cancel()) store.set({ dragAdjustment: null });
           else void session.send('undo');
         },
       },
       {
         keys: 'mod+shift+z',
-        shown: ['Ctrl', 'Shift', 'Z'],
-        does: 'redo',
+        symbols: ['Ctrl', 'Shift', 'Z'],
+        description: 'redo',
         act: ({ session }) => void session.send('redo'),
       },
     ],
@@ -144,53 +168,64 @@ export const SHORTCUTS = [
   {
     title: 'Pictures',
     keys: [
-      { keys: '', shown: ['Space', 'drag'], does: 'pan' },
-      { keys: '', shown: ['Ctrl', 'wheel'], does: 'zoom' },
-      { keys: '+', shown: ['+'], does: 'zoom in', act: zoomBy(1.25) },
-      { keys: '-', shown: ['−'], does: 'zoom out', act: zoomBy(0.8) },
+      { keys: '', symbols: ['Space', 'drag'], description: 'pan' },
+      { keys: '', symbols: ['Ctrl', 'wheel'], description: 'zoom' },
+      { keys: '+', symbols: ['+'], description: 'zoom in', act: zoomBy(1.25) },
+      { keys: '-', symbols: ['−'], description: 'zoom out', act: zoomBy(0.8) },
       {
         keys: 'f',
-        shown: ['F'],
-        does: 'fit to window',
-        act: ({ store }) => updateShow(store, { zoom: 1, pan: [0, 0] }),
+        symbols: ['F'],
+        description: 'fit to window',
+        act: ({ store }) => updateDisplay(store, { zoom: 1, pan: [0, 0] }),
       },
-      { keys: 'shift+f', shown: ['Shift', 'F'], does: '100 %', act: showPixels },
+      { keys: 'shift+f', symbols: ['Shift', 'F'], description: '100 %', act: showPixels },
       {
         keys: 'v',
-        shown: ['V'],
-        does: 'side by side, wipe, blink',
-        act: ({ store }) => updateShow(store, { layout: next(LAYOUTS, store.value.show.layout) }),
+        symbols: ['V'],
+        description: 'side by side, wipe, blink',
+        act: ({ store }) =>
+          updateDisplay(store, { layout: nextValue(LAYOUTS, store.value.display.layout) }),
       },
       {
         keys: 'n',
-        shown: ['N'],
-        does: 'next view, if there are several',
+        symbols: ['N'],
+        description: 'next view, if there are several',
         act: showNextView,
       },
       {
         keys: 'k',
-        shown: ['K'],
-        does: 'switch the picture in blink',
+        symbols: ['K'],
+        description: 'switch the picture in blink',
         act: ({ store }) =>
-          updateShow(store, {
+          updateDisplay(store, {
             layout: 'blink',
-            blink: store.value.show.blink === 'left' ? 'right' : 'left',
+            blink: store.value.display.blink === 'left' ? 'right' : 'left',
           }),
       },
-      { keys: ',', shown: [','], does: 'lower display exposure', act: changeExposure(-0.5) },
-      { keys: '.', shown: ['.'], does: 'raise display exposure', act: changeExposure(0.5) },
+      {
+        keys: ',',
+        symbols: [','],
+        description: 'lower display exposure',
+        act: changeExposure(-0.5),
+      },
+      {
+        keys: '.',
+        symbols: ['.'],
+        description: 'raise display exposure',
+        act: changeExposure(0.5),
+      },
       {
         keys: 'c',
-        shown: ['C'],
-        does: 'denoise on or off',
-        act: ({ store }) => updateShow(store, { clean: !store.value.show.clean }),
+        symbols: ['C'],
+        description: 'denoise on or off',
+        act: ({ store }) => updateDisplay(store, { clean: !store.value.display.clean }),
       },
       {
         keys: 'o',
-        shown: ['O'],
-        does: 'next overlay',
+        symbols: ['O'],
+        description: 'next overlay',
         act: ({ store }) =>
-          updateShow(store, { overlay: next(OVERLAYS, store.value.show.overlay) }),
+          updateDisplay(store, { overlay: nextValue(OVERLAYS, store.value.display.overlay) }),
       },
     ],
   },

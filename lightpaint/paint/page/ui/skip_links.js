@@ -7,16 +7,16 @@ import { Button, reveal } from './controls.js';
 
 /** @param {{app: App}} props */
 export function SkipLinks({ app: { store } }) {
-  const within = (/** @type {MouseEvent} */ event) =>
+  const buttonOf = (/** @type {MouseEvent} */ event) =>
     /** @type {HTMLElement} */ (event.currentTarget);
-  const toLights = (/** @type {MouseEvent} */ event) => {
-    const button = within(event);
+  const skipToLights = (/** @type {MouseEvent} */ event) => {
+    const button = buttonOf(event);
     store.set(({ open }) => ({ side: true, panel: null, open: { ...open, lights: true } }));
     reveal(button, '.lights :is(.group-name, .light-name)', true);
   };
   return html`<nav class="skips" aria-label="Skip links">
     <${Button} label="Skip to the pictures" act=${(/** @type {MouseEvent} */ event) =>
-      reveal(within(event), '.stage', true)} />
-    <${Button} label="Skip to the lights" act=${toLights} />
+      reveal(buttonOf(event), '.stage', true)} />
+    <${Button} label="Skip to the lights" act=${skipToLights} />
   </nav>`;
 }

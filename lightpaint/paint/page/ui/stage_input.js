@@ -1,7 +1,7 @@
 /** Pointer, wheel and keyboard events on the pictures. */
 
 import { useEffect } from '../vendor/preact.js';
-import { pointAway } from './brush_cursor.js';
+import { clearProbe } from './brush_cursor.js';
 import { isTyping } from './keyboard.js';
 import { pointLamp } from './lamp_fields.js';
 import { paneAt } from './pointer_input.js';
@@ -18,72 +18,74 @@ export function useStageInput(frame, pointer, app) {
     const element = frame.current;
     if (!element) return undefined;
     const { store } = app;
-    const ends = new AbortController();
-    const on = (/** @type {string} */ name, /** @type {(event: any) => void} */ listener) =>
-      element.addEventListener(name, listener, { signal: ends.signal, passive: false });
+    const controller = new AbortController();
+    const listen = (/** @type {string} */ name, /** @type {(event: any) => void} */ listener) =>
+      element.addEventListener(name, listener, { signal: controller.signal, passive: false });
     // The focus outline is for keyboard users only.
-    on('pointerdown', (event) => {
+    listen('pointerdown', (event) => {
       element.dataset.by = 'pointer';
-      if (store.value.pointing && event.button === 0 && !pointer.isSpace) {
+      if (store.value.clickAction && event.button === 0 && !pointer.isSpaceDown) {
         event.preventDefault();
         return pointLamp(app, pointer.point(event));
       }
       pointer.down(event);
     });
-    on('blur', () => delete element.dataset.by);
-    on('pointermove', (event) => pointer.move(event));
-    on('pointerup', (event) => pointer.up(event));
-    on('pointercancel', (event) => pointer.up(event));
-    on('wheel', (event) => pointer.wheel(event));
-    on('contextmenu', (event) => event.preventDefault());
-    on('pointerleave', () => {
-      pointAway(store);
+    listen('blur', () => delete element.dataset.by);
+    listen('pointermove', (event) => pointer.move(event));
+    listen('pointerup', (event) => pointer.up(event));
+    listen('pointercancel', (event) => pointer.up(event));
+    listen('wheel', (event) => pointer.wheel(event));
+    listen('contextmenu', (event) => event.preventDefault());
+    listen('pointerleave', () => {
+      clearProbe(store);
       const rings = /** @type {HTMLElement | null} */ (element.querySelector('.rings'));
-      if (rings && !pointer.doing) rings.hidden = true;
+      if (rings && !pointer.gesture) rings.hidden = true;
     });
-    on('keydown', (event) => byKeys(event, pointer, app));
+    listen('keydown', (event) => handleBrushKey(event, pointer, app));
     const pan = (/** @type {boolean} */ isSpace) => {
-      pointer.isSpace = isSpace;
+      pointer.isSpaceDown = isSpace;
       element.classList.toggle('is-panning', isSpace);
     };
-    const onSpace = (/** @type {KeyboardEvent} */ event) => {
-      const inner = /** @type {HTMLElement} */ (event.composedPath()[0]);
+    const handleSpace = (/** @type {KeyboardEvent} */ event) => {
+      const source = /** @type {HTMLElement} */ (event.composedPath()[0]);
       if (event.code !== 'Space' || isTyping(event)) return;
-      const isHere = element.matches(':hover') || inner === element;
-      pan(event.type === 'keydown' && isHere);
-      if (isHere) event.preventDefault();
+      const isOnStage = element.matches(':hover') || source === element;
+      pan(event.type === 'keydown' && isOnStage);
+      if (isOnStage) event.preventDefault();
     };
     // In the capture phase, since the painter stops its key events from leaving it.
-    const early = { signal: ends.signal, capture: true };
-    window.addEventListener('keydown', onSpace, early);
-    window.addEventListener('keyup', onSpace, early);
+    const captureOptions = { signal: controller.signal, capture: true };
+    window.addEventListener('keydown', handleSpace, captureOptions);
+    window.addEventListener('keyup', handleSpace, captureOptions);
     // If the key is released in another window, this one gets no event.
-    window.addEventListener('blur', () => pan(false), { signal: ends.signal });
-    return () => ends.abort();
+    window.addEventListener('blur', () => pan(false), { signal: controller.signal });
+    return () => controller.abort();
   }, []);
 }
 
 /** Handle brush keys: arrows move it; Enter paints a dab, with Shift a line, or aims a light.
  * @param {KeyboardEvent} event @param {Pointer} pointer @param {App} app */
-function byKeys(event, pointer, app) {
+function handleBrushKey(event, pointer, app) {
   const { engine, store } = app;
-  const way = /** @type {Record<string, [number, number]>} */ ({
+  const direction = /** @type {Record<string, [number, number]>} */ ({
     ArrowLeft: [-1, 0],
     ArrowRight: [1, 0],
     ArrowUp: [0, -1],
     ArrowDown: [0, 1],
   })[event.key];
-  if ((!way && event.key !== 'Enter') || event.target !== event.currentTarget) return;
+  if ((!direction && event.key !== 'Enter') || event.target !== event.currentTarget) return;
   event.preventDefault();
   const element = /** @type {HTMLElement} */ (event.currentTarget);
   const rings = /** @type {HTMLElement} */ (element.querySelector('.rings'));
   const pane = engine.panes()[0];
   const step = event.shiftKey ? 1 : 12;
   rings.hidden = false;
-  const x = Number(rings.dataset.x ?? pane.x + pane.width / 2) + (way ? way[0] * step : 0);
-  const y = Number(rings.dataset.y ?? pane.y + pane.height / 2) + (way ? way[1] * step : 0);
-  pointer.moved(x, y);
-  if (event.key === 'Enter' && store.value.pointing) {
+  const x =
+    Number(rings.dataset.x ?? pane.x + pane.width / 2) + (direction ? direction[0] * step : 0);
+  const y =
+    Number(rings.dataset.y ?? pane.y + pane.height / 2) + (direction ? direction[1] * step : 0);
+  pointer.onMove(x, y);
+  if (event.key === 'Enter' && store.value.clickAction) {
     const target = paneAt(engine, x, y);
     pointLamp(
       app,

@@ -6,104 +6,110 @@
 /** @typedef {import('../engine/messages.js').Events} Events */
 
 import { stateOfView } from '../engine/message_frames.js';
-import { mixedWeights, withoutMix } from './ui_state.js';
+import { mixedWeights, resetMix } from './ui_state.js';
 
 /** State of requested tasks while none is running.
  * @type {Record<string, Partial<Ui>>} */
-export const TASK_ENDED = {
-  export: { isWriting: false, writing: null },
-  verify: { verifying: null },
-  explain: { explaining: false },
+export const TASK_RESETS = {
+  export: { isExporting: false, exportProgress: null },
+  verify: { verificationProgress: null },
+  explain: { isExplaining: false },
   preview: { preview: null },
-  place: { placing: null, trial: null },
+  place: { placementProgress: null, trial: null },
 };
 
 /** State while no task is known to be running. */
 export const IDLE = {
-  ...TASK_ENDED.export,
-  ...TASK_ENDED.verify,
-  ...TASK_ENDED.explain,
-  ...TASK_ENDED.preview,
-  ...TASK_ENDED.place,
-  sampling: null,
+  ...TASK_RESETS.export,
+  ...TASK_RESETS.verify,
+  ...TASK_RESETS.explain,
+  ...TASK_RESETS.preview,
+  ...TASK_RESETS.place,
+  samplingProgress: null,
 };
 
 /** @param {Events["state"]} message @returns {Partial<Ui>} */
-export function stateUpdate(message, /** @type {import('./ui_state.js').Ui} */ before) {
-  const isBack = before.connection !== 'open' || before.closed !== null;
+export function stateUpdate(message, /** @type {import('./ui_state.js').Ui} */ previous) {
+  const isReconnected = previous.connection !== 'open' || previous.closure !== null;
   const views = message.views ?? [];
-  const view = before.view < views.length ? before.view : 0;
-  const { lights, constraints, ties, settings, effective_settings, poses, added_lights, history, looks, resources, basis } =
-    message;
+  const view = previous.view < views.length ? previous.view : 0;
+  const { lights, looks = [], basis } = message;
   return {
-    ...lightNumbers(before, lights),
+    ...renumberLights(previous, lights),
     ready: true,
     state: stateOfView(message, view),
     version: -1,
     view,
     views,
     lights,
-    constraints: constraints ?? {},
-    ties: ties ?? [],
-    settings: settings ?? {},
-    effectiveSettings: effective_settings ?? {},
-    poses: poses ?? {},
-    addedLights: added_lights ?? [],
-    history,
-    looks: looks ?? [],
-    resources: resources ?? {},
+    constraints: message.constraints ?? {},
+    ties: message.ties ?? [],
+    settings: message.settings ?? {},
+    effectiveSettings: message.effective_settings ?? {},
+    poses: message.poses ?? {},
+    addedLights: message.added_lights ?? [],
+    history: message.history,
+    looks,
+    resources: message.resources ?? {},
     hint: Boolean(message.is_new),
     connection: 'open',
-    closed: null,
+    closure: null,
     // Results in the meantime were missed; tasks that still run will report again.
-    ...(isBack ? { ...IDLE, explained: [] } : {}),
+    ...(isReconnected ? { ...IDLE, reasons: [] } : {}),
     basis:
       basis && !basis.is_complete
         ? { task: 'basis', done: basis.spp, total: basis.target_spp, unit: 'samples' }
         : null,
-    ...(isApart(looks ?? [], before) ? withoutMix(before) : {}),
-    ...(message.verifications ? rendersUpdate(message.verifications, view) : {}),
+    ...(isLookMissing(looks, previous) ? resetMix(previous) : {}),
+    ...(message.verifications ? verificationsUpdate(message.verifications, view) : {}),
     // At first a scene is shown at the exposure at which it is painted.
-    ...(before.state ? {} : { show: { ...before.show, ...shownAs(message.transform) } }),
-    ...answerFields(message.answer ?? {}, { ...before, view, views, lit: [] }),
+    ...(previous.state
+      ? {}
+      : { display: { ...previous.display, ...transformDisplay(message.transform) } }),
+    ...answerFields(message.answer ?? {}, { ...previous, view, views, lightAnswers: [] }),
     ...weightsOf(message),
   };
 }
 
-/** Added or removed lights change the numbers of others. @param {Ui} before
+/** Added or removed lights change the numbers of others. @param {Ui} previous
  * @param {Ui["lights"]} lights @returns {Partial<Ui>} */
-function lightNumbers(before, lights) {
-  const { rig } = before;
-  const now = (/** @type {number} */ k) =>
-    lights.findIndex((light) => light.name === before.lights[k]?.name);
-  const some = (/** @type {number[]} */ numbers) => numbers.map(now).filter((k) => k >= 0);
-  const names = (/** @type {Ui["lights"]} */ all) => all.map(({ name }) => name).join('\n');
-  if (!before.lights.length || names(lights) === names(before.lights)) return {};
-  const lamp = before.lamp === null ? -1 : now(before.lamp);
+function renumberLights(previous, lights) {
+  const { rig } = previous;
+  const newIndex = (/** @type {number} */ k) =>
+    lights.findIndex((light) => light.name === previous.lights[k]?.name);
+  const renumber = (/** @type {number[]} */ numbers) => numbers.map(newIndex).filter((k) => k >= 0);
+  const names = (/** @type {Ui["lights"]} */ list) => list.map(({ name }) => name).join('\n');
+  if (!previous.lights.length || names(lights) === names(previous.lights)) return {};
+  const lamp = previous.lamp === null ? -1 : newIndex(previous.lamp);
   return {
-    solo: some(before.solo),
-    mute: some(before.mute),
-    unfolded: some(before.unfolded),
+    solo: renumber(previous.solo),
+    mute: renumber(previous.mute),
+    openLights: renumber(previous.openLights),
     lamp: lamp < 0 ? null : lamp,
-    hovered: null,
-    pointed: null,
-    dragged: null,
+    hoveredLight: null,
+    probe: null,
+    drag: null,
     // Their places come with the next message.
-    rig: rig && { ...rig, lights: lights.flatMap(({ name }) => rig.lights[indexOf(before, name)] ?? []) },
+    rig: rig && {
+      ...rig,
+      lights: lights.flatMap(({ name }) => rig.lights[indexOf(previous, name)] ?? []),
+    },
   };
 }
 
 /** @param {Ui} ui @param {string} name */
 const indexOf = ({ lights }, name) => lights.findIndex((light) => light.name === name);
 
-/** @param {any} told @returns {NonNullable<Ui['verified']>} */
-const render = ({ is_old: isOld = false, ...about }) => ({ ...about, isOld });
+/** @param {any} message @returns {NonNullable<Ui['verification']>} */
+const toVerification = ({ is_old: isOld = false, ...message }) => ({ ...message, isOld });
 
-/** Take renders from before the page opened. @param {any[]} verified @param {number} view
+/** Take renders from before the page opened. @param {any[]} messages @param {number} view
  * @returns {Partial<Ui>} */
-function rendersUpdate(verified, view) {
-  const verifiedOf = Object.fromEntries(verified.map((one) => [one.view, render(one)]));
-  return { verifiedOf, verified: verifiedOf[view] ?? null };
+function verificationsUpdate(messages, view) {
+  const verifications = Object.fromEntries(
+    messages.map((message) => [message.view, toVerification(message)]),
+  );
+  return { verifications, verification: verifications[view] ?? null };
 }
 
 /** Update the list of looks. @param {Events["looks"]} message @param {Ui} ui
@@ -112,58 +118,58 @@ export function looksUpdate({ looks, resources }, ui) {
   return {
     looks,
     resources: { ...ui.resources, ...resources },
-    ...(isApart(looks, ui) ? withoutMix(ui) : {}),
+    ...(isLookMissing(looks, ui) ? resetMix(ui) : {}),
   };
 }
 
 /** Return whether a compared look no longer exists.
  * @param {import('./ui_state.js').Look[]} looks @param {Ui} ui */
-function isApart(looks, ui) {
+function isLookMissing(looks, ui) {
   return ui.mix !== null && !mixedWeights({ ...ui, looks }, ui.mix);
 }
 
 /** @param {{name: string, stops: number} | undefined} transform */
-function shownAs(transform) {
+function transformDisplay(transform) {
   return transform ? { transform: transform.name, stops: transform.stops } : {};
 }
 
 /**
  * Take an exact answer. Its sentences follow later; until then those of the last answer stay.
- * @param {any} answer @param {Ui} before @returns {Partial<Ui>}
+ * @param {any} answer @param {Ui} previous @returns {Partial<Ui>}
  */
-function answerFields(answer, before) {
+function answerFields(answer, previous) {
   const { headline, lights, shares = null, closeness = null } = answer;
   /** @type {Partial<Ui>} */
-  const made = { isLive: false, isJudged: headline !== undefined };
+  const changes = { isLive: false, isJudgementCurrent: headline !== undefined };
   if (headline !== undefined)
-    Object.assign(made, { closeness }, closenessUpdate({ ...answer, closeness }, before));
+    Object.assign(changes, { closeness }, closenessUpdate({ ...answer, closeness }, previous));
   // Without paint there are no error bars and no reasons.
-  const unknown = made.deltaE === null && !closeness ? UNKNOWN : {};
+  const resetFields = changes.deltaE === null && !closeness ? UNKNOWN : {};
   if (lights) {
-    made.shares = shares;
-    made.lit = lights.map((/** @type {any} */ one, /** @type {number} */ k) => ({
-      ...before.lit[k],
-      ...unknown,
-      ...one,
-      share: shares?.[before.view]?.[k] ?? one.share,
+    changes.shares = shares;
+    changes.lightAnswers = lights.map((/** @type {any} */ light, /** @type {number} */ k) => ({
+      ...previous.lightAnswers[k],
+      ...resetFields,
+      ...light,
+      share: shares?.[previous.view]?.[k] ?? light.share,
     }));
   }
-  return made;
+  return changes;
 }
 
 /** Update how close the current view is. @param {any} answer @param {Ui} ui
  * @returns {Partial<Ui>} */
 function closenessUpdate(answer, { view, views }) {
-  const isOne = views.length < 2;
-  const its = isOne || !answer.closeness ? answer : answer.closeness[view];
-  if (!its)
-    return { headline: UNPAINTED, help: null, deltaE: null, deltaPresent: null, sentences: [] };
+  const isSingle = views.length < 2;
+  const viewCloseness = isSingle || !answer.closeness ? answer : answer.closeness[view];
+  if (!viewCloseness)
+    return { headline: UNPAINTED, advice: null, deltaE: null, deltaPresent: null, sentences: [] };
   return {
-    headline: its.headline,
-    help: its.help ?? null,
-    deltaE: its.delta_e ?? null,
-    deltaPresent: its.delta_e_present ?? null,
-    sentences: its.sentences ?? [],
+    headline: viewCloseness.headline,
+    advice: viewCloseness.help ?? null,
+    deltaE: viewCloseness.delta_e ?? null,
+    deltaPresent: viewCloseness.delta_e_present ?? null,
+    sentences: viewCloseness.sentences ?? [],
   };
 }
 
@@ -174,25 +180,28 @@ const UNKNOWN = { error: null, is_constrained: false, is_unreached: false };
 /** Return the state that changes with the current view. @param {Ui} ui @param {number} view
  * @returns {Partial<Ui>} */
 export function viewUpdate(ui, view) {
-  const verified = ui.verifiedOf[view] ?? null;
-  const isRender = ui.show.right === 'verified' && !verified;
-  const isAsLarge = String(ui.views[view].size) === String(ui.views[ui.view].size);
-  /** @type {Ui['show']} */
-  const show = {
-    ...ui.show,
-    ...(isRender ? { left: 'painting', right: 'solution' } : {}),
-    ...(isAsLarge ? {} : { zoom: 1, pan: [0, 0] }),
+  const verification = ui.verifications[view] ?? null;
+  const losesVerification = ui.display.right === 'verified' && !verification;
+  const hasSameSize = String(ui.views[view].size) === String(ui.views[ui.view].size);
+  /** @type {Ui['display']} */
+  const display = {
+    ...ui.display,
+    ...(losesVerification ? { left: 'painting', right: 'solution' } : {}),
+    ...(hasSameSize ? {} : { zoom: 1, pan: [0, 0] }),
   };
   const { closeness, shares } = ui;
   return {
     view,
     state: stateOfView(ui.state, view),
-    verified,
-    explained: [],
-    pointed: null,
-    show,
+    verification,
+    reasons: [],
+    probe: null,
+    display,
     ...(closeness ? closenessUpdate({ closeness }, { ...ui, view }) : {}),
-    lit: ui.lit.map((one, k) => ({ ...one, share: shares?.[view]?.[k] ?? one.share })),
+    lightAnswers: ui.lightAnswers.map((light, k) => ({
+      ...light,
+      share: shares?.[view]?.[k] ?? light.share,
+    })),
   };
 }
 
@@ -200,17 +209,20 @@ export function viewUpdate(ui, view) {
  * @returns {Partial<Ui>} */
 export function verificationUpdate(message, ui) {
   const { view = 0 } = message;
-  const verified = render(message);
-  const made = { verifiedOf: { ...ui.verifiedOf, [view]: verified }, verifying: null };
-  return view === ui.view ? { ...made, verified } : made;
+  const verification = toVerification(message);
+  const changes = {
+    verifications: { ...ui.verifications, [view]: verification },
+    verificationProgress: null,
+  };
+  return view === ui.view ? { ...changes, verification } : changes;
 }
 
 /** Take the reasons why the answer is not closer, unless painting has continued.
  * @param {any} message @param {Ui} ui
  * @returns {Partial<Ui>} */
 export function explanationUpdate({ view = 0, sentences, is_old: isOld = false }, ui) {
-  const isIts = view === ui.view && !isOld && !ui.isLive;
-  return { explaining: false, explained: isIts ? sentences : [] };
+  const isCurrent = view === ui.view && !isOld && !ui.isLive;
+  return { isExplaining: false, reasons: isCurrent ? sentences : [] };
 }
 
 /** Take the preview of a change, unless another preview has been requested. @param {any} message
@@ -226,7 +238,7 @@ function weightsOf(message) {
   if (!flat) return {};
   /** @type {RGB[]} */
   const weights = [];
-  for (let at = 0; at < flat.length; at += 3) weights.push([flat[at], flat[at + 1], flat[at + 2]]);
+  for (let i = 0; i < flat.length; i += 3) weights.push([flat[i], flat[i + 1], flat[i + 2]]);
   return { weights };
 }
 
@@ -234,53 +246,70 @@ function weightsOf(message) {
  * exact answer found during an undo. @param {any} message @param {Ui} ui @returns {Partial<Ui>} */
 export function answerUpdate(message, ui) {
   if (message.version < ui.version) return {};
-  const made = /** @type {Partial<Ui>} */ (weightsOf(message));
-  made.version = message.version ?? ui.version;
-  for (const key of /** @type {const} */ (['history', 'constraints', 'ties', 'settings', 'poses'])) {
-    if (message[key]) made[key] = message[key];
+  const changes = /** @type {Partial<Ui>} */ (weightsOf(message));
+  changes.version = message.version ?? ui.version;
+  for (const key of /** @type {const} */ ([
+    'history',
+    'constraints',
+    'ties',
+    'settings',
+    'poses',
+  ])) {
+    if (message[key]) changes[key] = message[key];
   }
-  if (message.effective_settings) made.effectiveSettings = message.effective_settings;
-  if (message.added_lights) made.addedLights = message.added_lights;
-  if (message.lights) Object.assign(made, answerFields(message, ui));
+  if (message.effective_settings) changes.effectiveSettings = message.effective_settings;
+  if (message.added_lights) changes.addedLights = message.added_lights;
+  if (message.lights) Object.assign(changes, answerFields(message, ui));
   else if (!message.exact) {
-    made.isLive = true;
-    made.isJudged = false;
+    changes.isLive = true;
+    changes.isJudgementCurrent = false;
     // Earlier statements no longer hold once something is painted.
-    if (ui.deltaE === null) made.headline = '';
+    if (ui.deltaE === null) changes.headline = '';
   }
-  if (made.weights) {
-    const old = Object.entries(ui.verifiedOf).map(([view, one]) => [view, { ...one, isOld: true }]);
-    made.verifiedOf = Object.fromEntries(old);
-    if (ui.verified) made.verified = { ...ui.verified, isOld: true };
+  if (changes.weights) {
+    const outdatedEntries = Object.entries(ui.verifications).map(([view, verification]) => [
+      view,
+      { ...verification, isOld: true },
+    ]);
+    changes.verifications = Object.fromEntries(outdatedEntries);
+    if (ui.verification) changes.verification = { ...ui.verification, isOld: true };
   }
   // The reasons belong to the previous answer.
-  if (made.isLive && ui.explained.length) made.explained = [];
-  return made;
+  if (changes.isLive && ui.reasons.length) changes.reasons = [];
+  return changes;
 }
 
 /** @param {Events["progress"]} message @param {Ui} ui @returns {Partial<Ui>} */
 export function progressUpdate({ task, done, total, unit }, ui) {
-  const made = { task, done, total, unit };
-  if (task === 'export') return { writing: timed(made, ui.writing), isWriting: true };
-  if (task === 'place') return ui.placing ? { placing: timed(made, ui.placing) } : {};
+  const changes = { task, done, total, unit };
+  if (task === 'export')
+    return { exportProgress: estimateTime(changes, ui.exportProgress), isExporting: true };
+  if (task === 'place')
+    return ui.placementProgress
+      ? { placementProgress: estimateTime(changes, ui.placementProgress) }
+      : {};
   // The brush interrupts it, so the remaining time is unknown.
-  if (task === 'sampling') return { sampling: done < total ? made : null };
-  if (/verif/i.test(task)) return { verifying: timed(made, ui.verifying) };
-  return { basis: total && done >= total ? null : timed(made, ui.basis) };
+  if (task === 'sampling') return { samplingProgress: done < total ? changes : null };
+  if (/verif/i.test(task))
+    return { verificationProgress: estimateTime(changes, ui.verificationProgress) };
+  return { basis: total && done >= total ? null : estimateTime(changes, ui.basis) };
 }
 
 /** Seconds of work before the remaining time is shown. */
-const KNOWN_S = 2;
+const MIN_TIMED_SECONDS = 2;
 
 /** Extrapolate from the progress since the first report.
- * @param {import('./ui_state.js').Progress} now
- * @param {import('./ui_state.js').Progress | null} before @returns {import('./ui_state.js').Progress} */
-function timed(now, before) {
+ * @param {import('./ui_state.js').Progress} progress
+ * @param {import('./ui_state.js').Progress | null} previous @returns {import('./ui_state.js').Progress} */
+function estimateTime(progress, previous) {
   const ms = performance.now();
-  const isSame = before?.since && before.total === now.total && before.done <= now.done;
-  const since = (isSame && before.since) || { ms, done: now.done };
-  const [seconds, done] = [(ms - since.ms) / 1000, now.done - since.done];
-  const left_s =
-    seconds > KNOWN_S && done > 0 ? (seconds / done) * (now.total - now.done) : undefined;
-  return { ...now, since, left_s };
+  const isSameTask =
+    previous?.since && previous.total === progress.total && previous.done <= progress.done;
+  const since = (isSameTask && previous.since) || { ms, done: progress.done };
+  const [seconds, done] = [(ms - since.ms) / 1000, progress.done - since.done];
+  const remainingSeconds =
+    seconds > MIN_TIMED_SECONDS && done > 0
+      ? (seconds / done) * (progress.total - progress.done)
+      : undefined;
+  return { ...progress, since, remainingSeconds };
 }

@@ -10,36 +10,36 @@ import { html, useEffect, useRef } from '../vendor/preact.js';
  */
 export function Thumbnail({ name, generation, app }) {
   const ref = useRef(/** @type {HTMLCanvasElement | null} */ (null));
-  const drawn = useRef(/** @type {string | null} */ (null));
+  const drawnName = useRef(/** @type {string | null} */ (null));
   useEffect(() => {
     if (generation === undefined) return undefined;
     const { session, store } = app;
-    let isGone = false;
-    let isThere = false;
+    let isUnmounted = false;
+    let isLoaded = false;
     // Clear the picture of something else.
-    if (ref.current && drawn.current !== null && drawn.current !== name) clear(ref.current);
-    drawn.current = null;
+    if (ref.current && drawnName.current !== null && drawnName.current !== name) clear(ref.current);
+    drawnName.current = null;
     const fetch = () =>
       session.host.fetch(name).then(
         (picture) => {
-          isThere = true;
-          if (isGone || !ref.current) return;
+          isLoaded = true;
+          if (isUnmounted || !ref.current) return;
           drawPicture(ref.current, picture);
-          drawn.current = name;
+          drawnName.current = name;
         },
         () => undefined, // A missing thumbnail is not reported.
       );
     void fetch();
     // A page that has just lost the session gets no picture until it has the session again.
-    let wasClosed = store.value.closed !== null;
-    const end = store.listen(() => {
-      const isClosed = store.value.closed !== null;
-      if (wasClosed && !isClosed && !isThere) void fetch();
+    let wasClosed = store.value.closure !== null;
+    const stopListening = store.listen(() => {
+      const isClosed = store.value.closure !== null;
+      if (wasClosed && !isClosed && !isLoaded) void fetch();
       wasClosed = isClosed;
     });
     return () => {
-      isGone = true;
-      end();
+      isUnmounted = true;
+      stopListening();
     };
   }, [name, generation]);
   return html`<canvas class="thumb" ref=${ref} width="1" height="1"

@@ -8,7 +8,8 @@
 export const findTie = (ui, light) => ui.ties.find((tie) => tie.includes(ui.lights[light].name));
 
 /** @param {Ui} ui @param {string} name */
-const isLocked = ({ constraints }, name) => constraints[name]?.lock !== undefined || Boolean(constraints[name]?.off);
+const isLocked = ({ constraints }, name) =>
+  constraints[name]?.lock !== undefined || Boolean(constraints[name]?.off);
 
 /** Return the lights that constraints lock or switch off. @param {Ui} ui */
 export const lockedLights = (ui) =>
@@ -18,16 +19,20 @@ export const lockedLights = (ui) =>
  * @param {Ui} ui @param {number} light @returns {number} */
 export function lockingLight(ui, light) {
   const { name } = ui.lights[light];
-  const locking = isLocked(ui, name) ? name : findTie(ui, light)?.find((one) => isLocked(ui, one));
-  return locking === undefined ? light : ui.lights.findIndex((one) => one.name === locking);
+  const lockingName = isLocked(ui, name)
+    ? name
+    : findTie(ui, light)?.find((member) => isLocked(ui, member));
+  return lockingName === undefined
+    ? light
+    : ui.lights.findIndex((member) => member.name === lockingName);
 }
 
 /** Return the constraints of a light, with the level constraint of its dimmer.
  * @param {Ui} ui @param {number} light @returns {Constraints | undefined} */
 export function constraintsOf(ui, light) {
-  const own = ui.constraints[ui.lights[light].name];
-  const locking = lockingLight(ui, light);
-  if (locking === light) return own;
-  const { lock, off } = ui.constraints[ui.lights[locking].name];
-  return { ...own, ...(lock === undefined ? {} : { lock }), ...(off ? { off } : {}) };
+  const ownConstraints = ui.constraints[ui.lights[light].name];
+  const lockingIndex = lockingLight(ui, light);
+  if (lockingIndex === light) return ownConstraints;
+  const { lock, off } = ui.constraints[ui.lights[lockingIndex].name];
+  return { ...ownConstraints, ...(lock === undefined ? {} : { lock }), ...(off ? { off } : {}) };
 }

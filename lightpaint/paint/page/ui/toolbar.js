@@ -1,11 +1,11 @@
 /** The toolbar, and the options of the current tool above the pictures. */
 
-import { inView } from '../engine/message_frames.js';
+import { nameInView } from '../engine/message_frames.js';
 import { html } from '../vendor/preact.js';
 import { toHex } from './paint_colour.js';
-import { shownAs } from './colour_panel.js';
+import { displayColour } from './colour_panel.js';
 import { Button, Choice, NumberField, Select, Slider, reveal } from './controls.js';
-import { signed } from './format.js';
+import { signedText } from './format.js';
 import {
   chooseTool,
   flowOf,
@@ -20,22 +20,22 @@ import {
 /** @typedef {import("./shortcuts.js").App} App */
 
 /** Sizes are perceived as ratios. */
-const RATIO = {
-  to: (/** @type {number} */ x) => Math.log2(x),
-  of: (/** @type {number} */ t) => Math.round(2 ** t),
+const RATIO_CURVE = {
+  toPosition: (/** @type {number} */ x) => Math.log2(x),
+  toValue: (/** @type {number} */ t) => Math.round(2 ** t),
 };
 
 /** Symmetric around 1, and snapped to 1 near it. */
-const TIMES = {
-  to: (/** @type {number} */ x) => Math.log10(x),
-  of: (/** @type {number} */ t) => Number((10 ** (Math.abs(t) < 0.02 ? 0 : t)).toPrecision(2)),
+const FACTOR_CURVE = {
+  toPosition: (/** @type {number} */ x) => Math.log10(x),
+  toValue: (/** @type {number} */ t) => Number((10 ** (Math.abs(t) < 0.02 ? 0 : t)).toPrecision(2)),
 };
 
-const ABOUT = [
+const AREAS = [
   { value: 'spot', label: 'Spot', tip: 'A soft spot where the drag begins' },
   { value: 'object', label: 'Object', tip: 'The whole object under the pointer' },
 ];
-const PAINT_AS = [
+const PAINT_MODES = [
   {
     value: 'light',
     label: 'Light',
@@ -50,24 +50,24 @@ export function ToolBar({ ui, app }) {
   const second = { ...ui, ...ui.second };
   const style = {
     '--first': toHex(ui.colour),
-    '--first-shown': shownAs(ui, app),
+    '--first-shown': displayColour(ui, app),
     '--second': toHex(second.colour),
-    '--second-shown': shownAs(second, app),
+    '--second-shown': displayColour(second, app),
   };
   return html`<nav class="tools" aria-label="Tools">
     ${TOOLS.map(
       ({ tool, icon, keys, tip }) => html`<${Button} key=${tool} icon=${icon} tip=${tip}
-      keys=${keys} on=${ui.tool === tool} act=${() => chooseTool(store, tool)}
+      keys=${keys} pressed=${ui.tool === tool} act=${() => chooseTool(store, tool)}
       disabled=${tool === 'fill' && !ui.state?.objects?.length} />`,
     )}
     <div class="spring"></div>
     ${
       ui.state?.can_render &&
       html`<${Button} icon="lamp" tip="Lights in the picture: mark and move them" keys="D"
-      on=${ui.lamps} act=${() => app.session.toggleLamps()} />`
+      pressed=${ui.areLampsMarked} act=${() => app.session.toggleLamps()} />`
     }
     <button type="button" class="two-colours" style=${style} data-tip="Swap colours" data-keys="X"
-      aria-keyshortcuts="X" aria-label=${`Swap colours: the current one is ${toHex(ui.colour)}, ${signed(ui.stops)} stops`}
+      aria-keyshortcuts="X" aria-label=${`Swap colours: the current one is ${toHex(ui.colour)}, ${signedText(ui.stops)} stops`}
       onClick=${() => swapColours(store)}><i></i><i></i></button>
   </nav>`;
 }
@@ -76,23 +76,23 @@ export function ToolBar({ ui, app }) {
 export function ToolOptions({ ui, app }) {
   const { store } = app;
   const label = TOOLS.find(({ tool }) => tool === ui.tool)?.label ?? '';
-  const strokes = ['brush', 'eraser', 'weight', 'line'].includes(ui.tool);
-  const paints = ['brush', 'fill', 'line'].includes(ui.tool);
-  const isAsking = ui.side && !ui.panel && Boolean(ui.open.ask);
-  const numbers = () =>
-    store.set({ side: true, panel: null, open: { ...ui.open, ask: !isAsking } });
+  const isStrokeTool = ['brush', 'eraser', 'weight', 'line'].includes(ui.tool);
+  const isPaintTool = ['brush', 'fill', 'line'].includes(ui.tool);
+  const isPanelOpen = ui.side && !ui.panel && Boolean(ui.open.ask);
+  const togglePanel = () =>
+    store.set({ side: true, panel: null, open: { ...ui.open, ask: !isPanelOpen } });
   return html`<div class="options" role="group" aria-label=${`${label} settings`}>
     <strong>${label}</strong>
     ${
-      paints &&
-      ui.resources[inView('albedo', ui.view)] !== undefined &&
+      isPaintTool &&
+      ui.resources[nameInView('albedo', ui.view)] !== undefined &&
       html`<${Choice} label="Paint as"
-      value=${ui.as} choices=${PAINT_AS} change=${(/** @type {any} */ as) => store.set({ as })} />`
+      value=${ui.paintMode} choices=${PAINT_MODES} change=${(/** @type {any} */ paintMode) => store.set({ paintMode })} />`
     }
     ${
       ui.tool === 'weight' &&
-      html`<${Slider} label="Weight" value=${ui.importance} least=${0.1}
-      most=${10} curve=${TIMES} step=${0.1} digits=${2} rest=${1} unit="×"
+      html`<${Slider} label="Weight" value=${ui.importance} min=${0.1}
+      max=${10} curve=${FACTOR_CURVE} step=${0.1} digits=${2} resetValue=${1} unit="×"
       tip="How many times as much the area counts: above 1 the answer matches better there"
       change=${(/** @type {number} */ importance) => store.set({ importance })} />`
     }
@@ -100,57 +100,59 @@ export function ToolOptions({ ui, app }) {
       ui.tool === 'adjust' &&
       ui.state?.objects?.length > 0 &&
       html`<${Choice} label="Area"
-      value=${ui.about} choices=${ABOUT} change=${(/** @type {any} */ about) =>
-        store.set({ about })} />`
+      value=${ui.adjustedArea} choices=${AREAS} change=${(/** @type {any} */ adjustedArea) =>
+        store.set({ adjustedArea })} />`
     }
     ${
-      (strokes || (ui.tool === 'adjust' && ui.about === 'spot')) &&
+      (isStrokeTool || (ui.tool === 'adjust' && ui.adjustedArea === 'spot')) &&
       html`<${Slider} label="Size"
-      value=${ui.size} least=${MIN_BRUSH_SIZE} curve=${RATIO} most=${MAX_BRUSH_SIZE} unit="px" keys="[ ]"
+      value=${ui.size} min=${MIN_BRUSH_SIZE} curve=${RATIO_CURVE} max=${MAX_BRUSH_SIZE} unit="px" keys="[ ]"
       tip="Size" change=${(/** @type {number} */ size) => store.set({ size })} />`
     }
     ${
-      strokes &&
-      html`<${Slider} label="Hardness" value=${100 * ui.hardness} least=${0} most=${100} unit="%"
+      isStrokeTool &&
+      html`<${Slider} label="Hardness" value=${100 * ui.hardness} min=${0} max=${100} unit="%"
         keys="Shift [ ]" tip="Hardness of the edge"
-        change=${(/** @type {number} */ hard) => store.set({ hardness: hard / 100 })} />`
+        change=${(/** @type {number} */ percent) => store.set({ hardness: percent / 100 })} />`
     }
     ${
-      (strokes || ui.tool === 'fill') &&
+      (isStrokeTool || ui.tool === 'fill') &&
       html`<${Slider} label="Flow" value=${100 * flowOf(ui)}
-      least=${1} most=${100} unit="%" keys="1 … 0" tip=${
-        strokes ? 'Flow: how much paint each dab adds' : 'Flow: 100 % covers the object completely'
+      min=${1} max=${100} unit="%" keys="1 … 0" tip=${
+        isStrokeTool
+          ? 'Flow: how much paint each dab adds'
+          : 'Flow: 100 % covers the object completely'
       }
       change=${(/** @type {number} */ flow) => setFlow(store, flow / 100)} />`
     }
     ${
       ui.tool === 'adjust' &&
-      html`<${Button} label="By numbers" on=${isAsking}
-      tip="Type stops and mired, for an object or the whole picture" act=${numbers} />`
+      html`<${Button} label="By numbers" pressed=${isPanelOpen}
+      tip="Type stops and mired, for an object or the whole picture" act=${togglePanel} />`
     }
   </div>`;
 }
 
 /** The value of this choice; names of objects are not empty. */
-const WHOLE = '';
+const WHOLE_PICTURE = '';
 
 /** The adjustment of a drag in numbers, for one object or the whole picture. Also used in a panel.
  * @param {{ui: Ui, app: App}} props */
-export function Ask({ ui, app }) {
+export function AdjustPanel({ ui, app }) {
   const { store, engine } = app;
-  const { stops, mired, object } = ui.inNumbers;
+  const { stops, mired, object } = ui.typedAdjustment;
   const objects = /** @type {string[]} */ (ui.state?.objects ?? []);
   // By its name, since another view numbers its objects differently and may not show this one.
   const isMissing = object !== null && !objects.includes(object);
   const choices = [
-    { value: WHOLE, label: 'Whole picture' },
+    { value: WHOLE_PICTURE, label: 'Whole picture' },
     ...(isMissing ? [{ value: object, label: `${object}: not in this view` }] : []),
     ...[...objects]
       .sort((a, b) => a.localeCompare(b))
       .map((name) => ({ value: name, label: name })),
   ];
-  const set = (/** @type {Partial<Ui['inNumbers']>} */ changed) =>
-    store.set((now) => ({ inNumbers: { ...now.inNumbers, ...changed } }));
+  const set = (/** @type {Partial<Ui['typedAdjustment']>} */ changes) =>
+    store.set((state) => ({ typedAdjustment: { ...state.typedAdjustment, ...changes } }));
   const adjust = (/** @type {MouseEvent} */ event) => {
     store.set({ hint: false });
     engine.adjust({ stops, mired, object: object === null ? null : objects.indexOf(object) });
@@ -158,12 +160,12 @@ export function Ask({ ui, app }) {
     if (event.detail) reveal(/** @type {HTMLElement} */ (event.currentTarget), '.stage', true);
   };
   return html`<div class="ask" data-numbers>
-    <${Select} label="Area" value=${object ?? WHOLE} choices=${choices}
-      change=${(/** @type {string} */ to) => set({ object: to === WHOLE ? null : to })} />
-    <${NumberField} label="Brighter" value=${stops} least=${-8} most=${8} step=${0.1} unit="st"
-      change=${(/** @type {number} */ to) => set({ stops: to })} />
-    <${NumberField} label="Warmer" value=${mired} least=${-300} most=${300} step=${5} digits=${0}
-      unit="mired" change=${(/** @type {number} */ to) => set({ mired: to })} />
+    <${Select} label="Area" value=${object ?? WHOLE_PICTURE} choices=${choices}
+      change=${(/** @type {string} */ area) => set({ object: area === WHOLE_PICTURE ? null : area })} />
+    <${NumberField} label="Brighter" value=${stops} min=${-8} max=${8} step=${0.1} unit="st"
+      change=${(/** @type {number} */ value) => set({ stops: value })} />
+    <${NumberField} label="Warmer" value=${mired} min=${-300} max=${300} step=${5} digits=${0}
+      unit="mired" change=${(/** @type {number} */ value) => set({ mired: value })} />
     <${Button} label="Apply" disabled=${isMissing || (!stops && !mired)} act=${adjust}
       tip="Applied as one stroke, which can be undone" />
   </div>`;

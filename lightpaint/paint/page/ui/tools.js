@@ -65,21 +65,21 @@ export function toolHint(tool) {
   return (isTouch && TOUCH_HINTS[tool]) || HINTS[tool];
 }
 
-const PAINT = {
+const PAINT_HINT = {
   title: 'Paint how it should look',
   text: 'Choose a colour and drag over this picture. The other one shows what the lights can do.',
 };
 
 /** First hint on the painting, for tools other than brushes.
  * @type {Partial<Record<Tool, {title: string, text: string}>>} */
-const FIRST = {
+const FIRST_HINTS = {
   weight: { title: 'Mark what matters most', text: 'Drag over it on this picture.' },
   pick: {
     title: 'Pick light from a picture',
     text: 'It becomes the paint. Then choose the brush.',
   },
   fill: {
-    title: PAINT.title,
+    title: PAINT_HINT.title,
     text: 'Choose a colour, then click an object in this picture. The other one shows what the lights can do.',
   },
   adjust: {
@@ -89,13 +89,13 @@ const FIRST = {
 };
 
 /** @param {Tool} tool */
-export const firstHint = (tool) => FIRST[tool] ?? PAINT;
+export const firstHint = (tool) => FIRST_HINTS[tool] ?? PAINT_HINT;
 
 export const MIN_BRUSH_SIZE = 2;
 export const MAX_BRUSH_SIZE = 1000;
 
 /** Range of the paint's slider, in stops from white. */
-export const MAX_STOPS = 8;
+export const PAINT_MAX_STOPS = 8;
 
 /** Largest number of recent colours. */
 const MAX_RECENT = 7;
@@ -116,13 +116,16 @@ export function swapColours(store) {
 
 /** Use light from a picture as paint. @param {UiStore} store @param {RGB} light */
 export function pickPaint(store, light) {
-  const shown = light.map((x) => Math.max(0, x) * 2 ** exposureOf(store.value.state));
-  const top = Math.max(...shown);
-  if (!(top > 0)) return store.set({ colour: [0, 0, 0], stops: 0 });
-  const stops = Math.min(MAX_STOPS, Math.max(-MAX_STOPS, Math.log2(top)));
+  const exposedLight = light.map((x) => Math.max(0, x) * 2 ** exposureOf(store.value.state));
+  const maxChannel = Math.max(...exposedLight);
+  if (!(maxChannel > 0)) return store.set({ colour: [0, 0, 0], stops: 0 });
+  const stops = Math.min(PAINT_MAX_STOPS, Math.max(-PAINT_MAX_STOPS, Math.log2(maxChannel)));
   // Darker light gives a darker colour instead.
-  const scale = Math.max(top, 2 ** stops);
-  store.set({ colour: /** @type {RGB} */ (shown.map((x) => x / scale)), stops: Math.log2(scale) });
+  const scale = Math.max(maxChannel, 2 ** stops);
+  store.set({
+    colour: /** @type {RGB} */ (exposedLight.map((x) => x / scale)),
+    stops: Math.log2(scale),
+  });
 }
 
 /** @typedef {{colour: RGB, stops: number}} Paint */
@@ -137,13 +140,15 @@ export function rememberPaint(store) {
 
 /** Without duplicates, and limited in number. @param {Paint[]} paints the latest first */
 export function distinctPaints(paints) {
-  const distinct = paints.filter((one, k) => !paints.slice(0, k).some((other) => isSame(one, other)));
+  const distinct = paints.filter(
+    (paint, k) => !paints.slice(0, k).some((other) => isSame(paint, other)),
+  );
   return distinct.slice(0, MAX_RECENT);
 }
 
-/** @param {Paint} one @param {Paint} other */
-const isSame = (one, other) =>
-  toHex(one.colour) === toHex(other.colour) && Math.abs(one.stops - other.stops) < 0.01;
+/** @param {Paint} paint @param {Paint} other */
+const isSame = (paint, other) =>
+  toHex(paint.colour) === toHex(other.colour) && Math.abs(paint.stops - other.stops) < 0.01;
 
 /** The flow of the current tool: the fill has its own, independent of the brush.
  * @param {import("./ui_state.js").Ui} ui */
@@ -154,21 +159,21 @@ export function setFlow(store, flow) {
   store.set(store.value.tool === 'fill' ? { fillFlow: flow } : { flow });
 }
 
-/** @param {UiStore} store @param {number} way +1 or −1 */
-export function resizeBrush(store, way) {
-  const size = store.value.size * (way > 0 ? 1.15 : 1 / 1.15);
-  store.set({ size: Math.round(Math.min(MAX_BRUSH_SIZE, Math.max(MIN_BRUSH_SIZE, size + way))) });
+/** @param {UiStore} store @param {number} sign +1 or −1 */
+export function resizeBrush(store, sign) {
+  const size = store.value.size * (sign > 0 ? 1.15 : 1 / 1.15);
+  store.set({ size: Math.round(Math.min(MAX_BRUSH_SIZE, Math.max(MIN_BRUSH_SIZE, size + sign))) });
 }
 
-/** @param {UiStore} store @param {number} way */
-export function hardenBrush(store, way) {
-  const hardness = store.value.hardness + way * 0.1;
+/** @param {UiStore} store @param {number} sign */
+export function hardenBrush(store, sign) {
+  const hardness = store.value.hardness + sign * 0.1;
   store.set({ hardness: Math.min(1, Math.max(0, Math.round(hardness * 10) / 10)) });
 }
 
-/** @param {UiStore} store @param {Partial<import("./engine_interface.js").Show>} changes */
-export function updateShow(store, changes) {
-  store.set((ui) => ({ show: { ...ui.show, ...changes } }));
+/** @param {UiStore} store @param {Partial<import("./engine_interface.js").Display>} changes */
+export function updateDisplay(store, changes) {
+  store.set((ui) => ({ display: { ...ui.display, ...changes } }));
 }
 
 /** Hide or show the panels. @param {UiStore} store */
@@ -176,9 +181,9 @@ export function togglePanels(store) {
   store.set(({ side, panel }) => ({ side: !(side || panel), panel: null }));
 }
 
-/** Return the value after another one. @template T @param {readonly T[]} values @param {T} now
+/** Return the value after another one. @template T @param {readonly T[]} values @param {T} value
  * @returns {T} */
-export const next = (values, now) => values[(values.indexOf(now) + 1) % values.length];
+export const nextValue = (values, value) => values[(values.indexOf(value) + 1) % values.length];
 
 export const LAYOUTS = /** @type {const} */ (['side', 'wipe', 'blink']);
 export const OVERLAYS = /** @type {const} */ ([

@@ -1,10 +1,10 @@
 /** The bar above the pictures: scene, undo, layout, exposure, view transform and zoom. */
 
 import { html } from '../vendor/preact.js';
-import { Button, Check, Choice, Select, Slider, TruncatedText } from './controls.js';
-import { signed } from './format.js';
+import { Button, Checkbox, Choice, Select, Slider, TruncatedText } from './controls.js';
+import { signedText } from './format.js';
 import { showPixels } from './shortcuts.js';
-import { togglePanels, updateShow } from './tools.js';
+import { togglePanels, updateDisplay } from './tools.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
@@ -18,12 +18,12 @@ const LAYOUTS = [
 /** @param {{ui: Ui, app: App}} props */
 export function TopBar({ ui, app }) {
   const { store, session } = app;
-  const { show, history } = ui;
+  const { display, history } = ui;
   const undo = history.undo.at(-1);
   const redo = history.redo.at(-1);
   const title = ui.state?.scene || 'lightpaint';
   return html`<header class="top">
-    <div class="title"><${TruncatedText} text=${title} most=${16} tag="strong" /></div>
+    <div class="title"><${TruncatedText} text=${title} maxLength=${16} tag="strong" /></div>
     <div class="group" role="group" aria-label="History">
       <${Button} icon="undo" tip=${undo ? `Undo: ${undo}` : 'Undo'} keys="Control+Z"
         disabled=${!undo} act=${() => session.send('undo')} />
@@ -31,23 +31,23 @@ export function TopBar({ ui, app }) {
         disabled=${!redo} act=${() => session.send('redo')} />
     </div>
     <div class="spring"></div>
-    <${Choice} label="Layout" icons value=${show.layout} choices=${LAYOUTS}
-      change=${(/** @type {any} */ layout) => updateShow(store, { layout })} />
-    <${Compare} ui=${ui} app=${app} />
-    <${Slider} label="Exposure" value=${show.stops} least=${-6} most=${6} step=${0.1} digits=${1}
-      unit="st" rest=${0} keys=", ." tip="Display exposure. The light does not change."
-      text=${`${signed(show.stops)} stops`}
-      change=${(/** @type {number} */ stops) => updateShow(store, { stops })} />
+    <${Choice} label="Layout" icons value=${display.layout} choices=${LAYOUTS}
+      change=${(/** @type {any} */ layout) => updateDisplay(store, { layout })} />
+    <${ComparisonChoice} ui=${ui} app=${app} />
+    <${Slider} label="Exposure" value=${display.stops} min=${-6} max=${6} step=${0.1} digits=${1}
+      unit="st" resetValue=${0} keys=", ." tip="Display exposure. The light does not change."
+      text=${`${signedText(display.stops)} stops`}
+      change=${(/** @type {number} */ stops) => updateDisplay(store, { stops })} />
     <${ViewChoice} ui=${ui} app=${app} />
     <${Zoom} ui=${ui} app=${app} />
     <div class="group" role="group" aria-label="Painter">
       <${Button} icon="settings" tip="Solve settings"
-        on=${ui.panel === 'settings'}
+        pressed=${ui.panel === 'settings'}
         act=${() => store.set({ panel: ui.panel ? null : 'settings' })} />
       <${Button} icon="export" tip="Export"
         act=${() => store.set({ dialog: 'export' })} />
       <${Button} icon="keys" tip="Keyboard shortcuts" keys="?" act=${() => store.set({ dialog: 'keys' })} />
-      <${Button} icon="panel" tip="Show or hide the panels" keys="P" on=${ui.side || ui.panel !== null}
+      <${Button} icon="panel" tip="Show or hide the panels" keys="P" pressed=${ui.side || ui.panel !== null}
         act=${() => togglePanels(store)} />
     </div>
   </header>`;
@@ -55,33 +55,33 @@ export function TopBar({ ui, app }) {
 
 /** The size of a picture pixel on the page, or *fit*.
  * @param {{ui: Ui, app: App}} props */
-function Zoom({ ui: { show, fit }, app }) {
-  const scale = (fit ?? 1) * show.zoom;
-  const isFitted = show.zoom === 1 && show.pan.every((x) => x === 0);
+function Zoom({ ui: { display, fit }, app }) {
+  const scale = (fit ?? 1) * display.zoom;
+  const isFitted = display.zoom === 1 && display.pan.every((x) => x === 0);
   return html`<div class="group" role="group" aria-label="Zoom">
     <${Button} label=${isFitted ? 'Fit' : `${Math.round(100 * scale)} %`} class="zoom" keys="F"
       tip="Fit the whole picture. Zoom with Ctrl and the wheel, or with + and −."
-      act=${() => updateShow(app.store, { zoom: 1, pan: [0, 0] })} />
-    <${Button} label="1:1" class="zoom pixels" keys="Shift+F" on=${fit !== null && Math.abs(scale - 1) < 1e-3}
+      act=${() => updateDisplay(app.store, { zoom: 1, pan: [0, 0] })} />
+    <${Button} label="1:1" class="zoom pixels" keys="Shift+F" pressed=${fit !== null && Math.abs(scale - 1) < 1e-3}
       tip="100 %: one image pixel on one pixel of the page" act=${() => showPixels(app)} />
   </div>`;
 }
 
 /** @param {{ui: Ui, app: App}} props */
 function ViewChoice({ ui, app }) {
-  const { show } = ui;
+  const { display } = ui;
   if (!ui.ready) return null;
-  const names = (ui.state?.transforms ?? []).map((/** @type {any} */ one) => one.name ?? one);
-  return html`<${Select} label="View" hidden value=${show.transform}
+  const names = (ui.state?.transforms ?? []).map((/** @type {any} */ entry) => entry.name ?? entry);
+  return html`<${Select} label="View" hidden value=${display.transform}
     tip="View transform: how the display shows linear light"
-    choices=${names.map((/** @type {string} */ name) => ({ value: name, label: spoken(name) }))}
-    change=${(/** @type {string} */ transform) => updateShow(app.store, { transform })} />
-  <${Check} label="Denoise" on=${show.clean} tip="Denoise the pictures (C). The solve does not change."
-    change=${(/** @type {boolean} */ clean) => updateShow(app.store, { clean })} />`;
+    choices=${names.map((/** @type {string} */ name) => ({ value: name, label: transformLabel(name) }))}
+    change=${(/** @type {string} */ transform) => updateDisplay(app.store, { transform })} />
+  <${Checkbox} label="Denoise" checked=${display.clean} tip="Denoise the pictures (C). The solve does not change."
+    change=${(/** @type {boolean} */ clean) => updateDisplay(app.store, { clean })} />`;
 }
 
 /** @param {string} name */
-function spoken(name) {
+function transformLabel(name) {
   const labels = /** @type {Record<string, string>} */ ({
     srgb: 'sRGB',
     linear: 'Linear',
@@ -92,15 +92,15 @@ function spoken(name) {
 }
 
 /** The choice of the two pictures to compare. @param {{ui: Ui, app: App}} props */
-function Compare({ ui, app }) {
+function ComparisonChoice({ ui, app }) {
   const { store } = app;
-  const { show } = ui;
-  const value = ui.mix ? 'looks' : `${show.left} ${show.right}`;
+  const { display } = ui;
+  const value = ui.mix ? 'looks' : `${display.left} ${display.right}`;
   const choices = [
     { value: 'painting solution', label: 'Painting | Answer' },
     { value: 'present solution', label: 'Now | Answer' },
     { value: 'current painting', label: 'Now | Painting' },
-    ...(ui.verified ? [{ value: 'solution verified', label: 'Answer | Render' }] : []),
+    ...(ui.verification ? [{ value: 'solution verified', label: 'Answer | Render' }] : []),
     ...(ui.mix ? [{ value: 'looks', label: 'Two looks' }] : []),
   ];
   return html`<${Select} label="Compare" hidden value=${value} choices=${choices}
@@ -108,6 +108,6 @@ function Compare({ ui, app }) {
       if (pair === 'looks') return;
       const [left, right] = /** @type {any} */ (pair.split(' '));
       store.set({ mix: null });
-      updateShow(store, { left, right, instead: null, other: null });
+      updateDisplay(store, { left, right, solutionWeights: null, otherWeights: null });
     }} />`;
 }

@@ -9,7 +9,7 @@ export class Store {
     this.value = value;
     /** @type {Set<() => void>} */
     this.listeners = new Set();
-    this.waiting = false;
+    this.isScheduled = false;
   }
 
   /**
@@ -18,12 +18,12 @@ export class Store {
    * @param {Partial<T> | ((value: T) => Partial<T>)} changes
    */
   set(changes) {
-    const made = typeof changes === 'function' ? changes(this.value) : changes;
-    this.value = { ...this.value, ...made };
-    if (!this.waiting) {
-      this.waiting = true;
+    const newValues = typeof changes === 'function' ? changes(this.value) : changes;
+    this.value = { ...this.value, ...newValues };
+    if (!this.isScheduled) {
+      this.isScheduled = true;
       queueMicrotask(() => {
-        this.waiting = false;
+        this.isScheduled = false;
         for (const listener of this.listeners) listener();
       });
     }

@@ -1,8 +1,8 @@
 /** Tabs for the views of a session. One lighting serves all views. */
 
-import { inView } from '../engine/message_frames.js';
+import { nameInView } from '../engine/message_frames.js';
 import { html } from '../vendor/preact.js';
-import { number } from './format.js';
+import { numberText } from './format.js';
 import { viewUpdate } from './state_updates.js';
 import { Thumbnail } from './thumbnail.js';
 
@@ -27,9 +27,11 @@ export function ViewTabs({ ui, app }) {
   if (ui.views.length < 2) return null;
   return html`<div class="views" role="group" aria-label="Views">
     ${ui.views.map(({ name }, k) => {
-      const picture = inView('look', k);
+      const picture = nameInView('look', k);
       const closeness = ui.closeness?.[k];
-      const note = closeness ? `ΔE ${number(closeness.delta_e, 2)}` : ui.closeness && 'not painted';
+      const note = closeness
+        ? `ΔE ${numberText(closeness.delta_e, 2)}`
+        : ui.closeness && 'not painted';
       return html`<button type="button" class=${`view-tab ${k === ui.view ? 'is-on' : ''}`}
         key=${name} aria-pressed=${String(k === ui.view)} data-tip=${`Show and paint ${name}`}
         data-keys="N" onClick=${() => showView(app, k)}>

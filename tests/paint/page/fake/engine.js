@@ -106,12 +106,12 @@ export class FakeEngine {
   }
 
   picture(kind) {
-    const { gains, instead, other } = this.shown;
+    const { visibleLights, solutionWeights, otherWeights } = this.shown;
     if (kind === 'painting') return this.image;
     if (kind === 'present') return this.original;
     return this.mix(
-      (kind === 'other' ? other : kind === 'solution' ? instead : null) ?? this.weights,
-      kind === 'verified' ? null : gains,
+      (kind === 'other' ? otherWeights : kind === 'solution' ? solutionWeights : null) ?? this.weights,
+      kind === 'verified' ? null : visibleLights,
     );
   }
 
@@ -168,7 +168,7 @@ export class FakeEngine {
     this.calls.push(['move', points.length]);
     const last = points.at(-1);
     if (this.tool.tool === 'adjust') {
-      return this.tell('asking', {
+      return this.tell('adjustment', {
         stops: (this.started.y - last.y) / 30,
         mired: last.x - this.started.x,
       });
@@ -180,7 +180,7 @@ export class FakeEngine {
 
   stamp({ x, y, pressure }) {
     const { w, h, surfaces } = this.room;
-    const { size, hardness, flow, rgb, tool, as } = this.tool;
+    const { size, hardness, flow, rgb, tool, paintMode } = this.tool;
     const r = size / 2;
     for (let j = Math.max(0, Math.floor(y - r)); j < Math.min(h, y + r); j += 1) {
       for (let i = Math.max(0, Math.floor(x - r)); i < Math.min(w, x + r); i += 1) {
@@ -195,7 +195,7 @@ export class FakeEngine {
               ? this.original[3 * at + c]
               : tool === 'weight'
                 ? this.image[3 * at + c]
-                : rgb[c] * (as === 'light' ? surfaces[at].albedo[c] : 1);
+                : rgb[c] * (paintMode === 'light' ? surfaces[at].albedo[c] : 1);
           this.image[3 * at + c] += amount * (to - this.image[3 * at + c]);
         }
       }
@@ -243,8 +243,8 @@ export class FakeEngine {
     this.send(true);
   }
 
-  adjust(asked) {
-    this.calls.push(['adjust', asked]);
+  adjust(adjustment) {
+    this.calls.push(['adjust', adjustment]);
     this.strokes += 1;
     this.send(true);
   }
@@ -269,7 +269,7 @@ export class FakeEngine {
     return { data: this.numbers, width, height };
   }
 
-  greatest() {
+  maxImportance() {
     return this.importance ?? 1;
   }
 
@@ -277,7 +277,7 @@ export class FakeEngine {
     return rgb.map((x) => Math.round(encode(x * 2 ** stops)));
   }
 
-  pointed(x, y) {
+  probe(x, y) {
     if (x < 0 || y < 0 || x >= this.room.w || y >= this.room.h) return null;
     const at = this.at(x, y);
     const each = this.room.planes.map((plane, k) =>

@@ -1,0 +1,103 @@
+/** What the pictures on the screen show: a state of the session, weights of the lights, the painting. */
+import { union } from '../../../viewer/drawing/cpu_picture.js';
+import { SRGB } from '../../../viewer/drawing/view_transform.js';
+import { showsPresent } from './picture_slots.js';
+
+/** @typedef {import("../../../viewer/drawing/view_transform.js").Lut} Lut */
+/** @typedef {import("./message_frames.js").Message} Message */
+/** @typedef {import("./message_frames.js").Region} Region */
+/** @typedef {import("./paint_canvas.js").PaintCanvas} PaintCanvas */
+/** @typedef {import("./picture_canvas.js").Screen} Screen */
+/** @typedef {import("./picture_slots.js").Display} Display */
+
+export class PictureState {
+  /** @param {Screen} screen */
+  constructor(screen) {
+    this.screen = screen;
+    /** The session's state of the current view. @type {Message | null} */
+    this.state = null;
+    /** @type {PaintCanvas | null} */
+    this.canvas = null;
+    /** @type {Display | null} */
+    this.display = null;
+    this.weights = new Float64Array();
+    /** Whether lights have moved since the current look. */
+    this.haveLightsMoved = false;
+    /** @type {Lut} */
+    this.lut = SRGB;
+    /** Whether the current look exists, and whether the view has it. */
+    this.knowsPresent = false;
+    this.hasPresent = false;
+    /** Whether a stroke is in progress. */
+    this.isPainting = false;
+  }
+
+  /** Weights that come with a message. @param {Message} message */
+  takeWeights(message) {
+    const { poses, added_lights: addedLights } = message;
+    if (poses && addedLights)
+      this.haveLightsMoved = Object.keys(poses).length + addedLights.length > 0;
+    else if (poses) this.haveLightsMoved ||= Object.keys(poses).length > 0;
+    const weights = message.arrays?.weights?.data;
+    if (!weights) return;
+    this.weights = Float64Array.from(weights);
+    this.showWeights();
+    // The exact answer comes when the brush rests, and should be drawn sharply.
+    this.screen.requestDraw(!message.exact);
+  }
+
+  /** @param {Lut} lut */
+  setLut(lut) {
+    this.lut = lut;
+    this.screen.view?.setLut(lut);
+  }
+
+  /** Tell the view which weights are shown. */
+  showWeights() {
+    const { view } = this.screen;
+    if (!view || !this.state) return;
+    const {
+      visibleLights = null,
+      solutionWeights = null,
+      otherWeights = null,
+    } = this.display ?? {};
+    const weights = Float64Array.from(solutionWeights?.flat() ?? this.weights);
+    if (visibleLights)
+      weights.forEach((weight, i) => (weights[i] = visibleLights[Math.floor(i / 3)] ? weight : 0));
+    if (weights.length === 3 * this.state.lights.length) view.setWeights(weights);
+    if (otherWeights) view.setWeights(Float64Array.from(otherWeights.flat()), 'other');
+    this.checkPresent(weights);
+  }
+
+  /** Unchanged lights give the current look, which arrives before the planes and is denoised.
+   * @param {Float64Array} weights */
+  checkPresent(weights) {
+    const { screen, canvas, state, display } = this;
+    const present =
+      state?.lights.flatMap((/** @type {{present: number[]}} */ light) => light.present) ?? [];
+    const isClean = display?.clean ?? true;
+    const isPresent =
+      isClean &&
+      !this.haveLightsMoved &&
+      weights.every((weight, i) => Math.abs(weight - present[i]) <= 1e-9 * present[i]);
+    screen.isPresent = isPresent && this.knowsPresent;
+    if (screen.isPresent !== this.hasPresent && canvas) this.showPresent();
+  }
+
+  /** Give the view the current look while it is shown. */
+  showPresent() {
+    const { screen, canvas, display } = this;
+    const isShown = screen.isPresent || showsPresent(display);
+    this.hasPresent = screen.isPresent;
+    screen.view?.setPicture('present', isShown && canvas ? canvas.present : null);
+  }
+
+  /** @param {Region[]} regions */
+  redraw(regions) {
+    const { canvas } = this;
+    const region = regions.reduce((a, b) => /** @type {Region} */ (union(a, b)), regions[0]);
+    if (!canvas || !region) return;
+    this.screen.view?.setCanvas(region, canvas.image, canvas.importance);
+    this.screen.requestDraw(this.isPainting);
+  }
+}
