@@ -98,8 +98,8 @@ class PainterUser:
         """Wait until all pictures are there, and what was done before."""
         self.page.wait_for_selector(".lightpaint .tag")
         condition = (
-            "const { loader } = mirror; return mirror.isReady && !loader.missing().length"
-            " && !loader.onTheWay.size"
+            "const { loader } = mirror; return mirror.isReady && !loader.missingSlots().length"
+            " && !loader.activeFetches.size"
             "&& screen.width > 0 && screen.width === engine.element.clientWidth"
         )
         wait_until(lambda: self.look(condition), "the page is not ready")
