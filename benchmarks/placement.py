@@ -8,8 +8,7 @@ panels). Missed shares are Σ (Ψ − picture)² / Σ Ψ²: of the room as it is
 was found by an independent plain render, and between two plain renders of the truth, which is the
 noise floor. A room counts as found if the render of what was found misses less than FOUND above the
 floor, and each true light has a found one within NEAR of it. Seconds are of the processor, all
-threads. `--rivals` adds `lp.suggest_lights`, and Adam through Mitsuba's differentiable path
-integrator from random starts.
+threads. `--rivals` adds Adam through Mitsuba's differentiable path integrator from random starts.
 """
 
 import argparse
@@ -99,7 +98,7 @@ def one_room(folder: Path, kind: str, seed: int, *, with_rivals: bool) -> tuple[
         flush=True,
     )
     if with_rivals:
-        show_rivals(folder, scene, basis, solution, placement, painted, seed)
+        show_rival(scene, placement, painted, seed)
     return verified - floor < FOUND and max(off) < NEAR, seconds
 
 
@@ -143,26 +142,8 @@ def distances(truth: Scene, placement: lp.Placement) -> tuple[list[float], list[
     return off, turned
 
 
-def show_rivals(
-    folder: Path,
-    scene: Scene,
-    basis: lp.Basis,
-    solution: lp.Solution,
-    placement: lp.Placement,
-    painted: Floats,
-    seed: int,
-) -> None:
-    """Print what `suggest_lights` and Adam leave of the same room."""
-    start = cpu_s()
-    suggested = lp.suggest_lights(scene, basis, solution, count=3, seed=seed)
-    seconds = cpu_s() - start
-    lights = [
-        lp.NewEmitter(x.name, "point", lp.Pose(position=x.position), emission=x.emission)
-        for x in suggested
-    ]
-    with_them = scene.with_new_emitters(lights) if lights else scene
-    left = missed(verification(with_them, solution, folder / "suggested"), painted)
-    print(f"         suggest_lights: {left:.4f} in {seconds:.1f} s", flush=True)
+def show_rival(scene: Scene, placement: lp.Placement, painted: Floats, seed: int) -> None:
+    """Print what Adam leaves of the same room."""
     kinds = {light.emitter.kind for light in placement.additions}
     if kinds <= {"point", "spot"} and kinds:
         best, seconds = adam(scene, kinds.pop(), len(placement.additions), painted, seed)

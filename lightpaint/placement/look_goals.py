@@ -1,15 +1,16 @@
 """Goals of looks on small films, with their constraints, for lights that move."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
+from typing import Any
 
 import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.lights import BasisLight
 from lightpaint.images.pixel_blocks import block_mean
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraints import Constraints, LightConstraint
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
@@ -90,12 +91,12 @@ def _with_new_lights(
     """Return `reduction` with the unknowns of new lights after its own."""
     if not new:
         return reduction
-    lights = [
-        entry
-        for entry in constraints.lights
-        if any(light.name == entry[0] or fnmatchcase(light.name, entry[0]) for light in new)
+    entries = [
+        (pattern, table if pattern in (light.name for light in new) else _absolute(table), where)
+        for pattern, table, where in constraints.lights
+        if any(fnmatchcase(light.name, pattern) or light.name == pattern for light in new)
     ]
-    more = reduce_to(Constraints(tuple(lights)), new)
+    more = reduce_to(Constraints(tuple(entries)), new)
     first = len(reduction.fixed_weights)
     knobs = [
         replace(
@@ -114,6 +115,18 @@ def _with_new_lights(
         labels=(*reduction.labels, *more.labels),
         knobs=(*reduction.knobs, *knobs),
     )
+
+
+def _absolute(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the constraints of a pattern that hold for a light that is not there yet.
+
+    A lock, or a limit that is a share, refers to its present emission, which is black.
+    """
+    constraint = LightConstraint.of(table)
+    relative = {"lock"}
+    if any(level is not None and level.is_share for level in (constraint.least, constraint.most)):
+        relative.add("limits")
+    return {key: value for key, value in table.items() if key not in relative}
 
 
 def pull_with_more(solution: Solution, count: int) -> NormalEquations | None:

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from copy import copy
 from typing import Any
 
-from lightpaint.arrays import Position
 from lightpaint.scene.properties.emission import EmitterSetting, set_emission
 from lightpaint.scene.properties.pose import Motion, moved_parameters
 from lightpaint.scene.scene_tree import ParsedScene
@@ -70,33 +69,6 @@ def with_elements(parsed: ParsedScene, elements: Mapping[str, str]) -> ParsedSce
             root = copied.state.nodes[0].props
             root[f"{name} of lightpaint"] = mi.Properties.ResolvedReference(first)
         _put_nodes(copied.state, first, fragment)
-    return copied
-
-
-def with_points(
-    parsed: ParsedScene, dark: Mapping[int, EmitterSetting], positions: Mapping[str, Position]
-) -> ParsedScene:
-    """Return a copy of a scene with the settings `dark`, and with point lights of intensity 1
-    added.
-
-    positions: by name of the new light, which must not exist yet. The nodes of the new lights come
-    last, in this order.
-    """
-    import mitsuba as mi
-
-    copied = darkened(parsed, dark)
-    copied.emitter_nodes, copied.names = [*parsed.emitter_nodes], dict(parsed.names)
-    for name, position in positions.items():
-        node = mi.parser.SceneNode()
-        node.type = mi.ObjectType.Emitter
-        node.props = mi.Properties("point")
-        node.props["position"] = mi.ScalarPoint3f(*position)
-        node.props["intensity"] = mi.ScalarColor3f(1)
-        copied.state.nodes.append(node)
-        k = len(copied.state.nodes) - 1
-        copied.state.nodes[0].props[f"{name} of lightpaint"] = mi.Properties.ResolvedReference(k)
-        copied.emitter_nodes.append(k)
-        copied.names[k] = name
     return copied
 
 

@@ -13,7 +13,6 @@ from nightly import nightly
 from renderer import LIGHTS, PLASTIC, write_room
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.render import basis_render
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import SceneError
@@ -121,20 +120,6 @@ def test_a_light_that_is_missing_is_found(
 
 def test_the_same_seed_gives_the_same_light(lacking: tuple[Scene, Basis], missing: Any):
     _, solution, found = missing()
-    [first] = suggest_lights(*lacking, solution, count=1)
-    assert first.position == found[0].position
-
-
-def test_first_hits_are_not_rendered_where_nobody_looks_at_them(
-    lacking: tuple[Scene, Basis], missing: Any, monkeypatch: pytest.MonkeyPatch
-):
-    """A sixth of the time of a suggestion was theirs."""
-
-    def refuse(*_: Any, **__: Any) -> None:
-        raise AssertionError("first hits of candidates")
-
-    _, solution, found = missing()
-    monkeypatch.setattr(basis_render, "render_first_hits", refuse)
     [first] = suggest_lights(*lacking, solution, count=1)
     assert first.position == found[0].position
 

@@ -9,11 +9,12 @@ import pytest
 from command import run, run_refused, succeed
 from renderer import LIGHTS, write_room
 
+from lightpaint.colour.photometry import point_flux
 from lightpaint.errors import SceneError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.pipeline.job.remarks import remarks_of_scene
-from lightpaint.scene.lights.emitters import Emitter, point_emitter
+from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.lights.light_choice import (
     MAX_SEPARATE,
     SIZE_TOLERANCE,
@@ -110,9 +111,22 @@ def test_the_lights_file_may_part_them(city: Scene, tmp_path: Path) -> None:
 
 
 def test_few_stay_apart() -> None:
+    bulb = Emitter(
+        name="bulb",
+        plugin="point",
+        kind=EmissionKind(Scaling.COLOUR, "intensity", "W/sr"),
+        emission=(1.0, 1.0, 1.0),
+        form="at the origin",
+        sampling_weight=1.0,
+        node=0,
+        file=0,
+        offset=-1,
+        unit_flux=point_flux(),
+        has_name=False,
+    )
+
     def lamp(k: int, **changes: object) -> Emitter:
-        made = point_emitter(f"point_{k}", k, (k, 0, 0))
-        return replace(made, **{"has_name": False, **changes})
+        return replace(bulb, **{"name": f"point_{k}", "node": k, **changes})
 
     many = [lamp(k) for k in range(MAX_SEPARATE + 1)]
     assert alike_groups(many[:-1], ()) == {}

@@ -122,14 +122,6 @@ def _check_equal_samples(start: Basis) -> None:
         )
 
 
-def render_planes_only(scene: Scene, *, spp: int, seed: int) -> Basis:
-    """Render a basis without features and objects, for callers that do not need them."""
-    check_memory(scene)
-    render_all = _render_together if method_of(scene) == ONE_PASS else _render_one_by_one
-    with render_errors(scene.path):
-        return render_all(scene, Budget(spp, None), seed, None, Keeper(None), silent)
-
-
 def with_first_hits(basis: Basis, scene: Scene, seed: int, *, loaded: Any = None) -> Basis:
     """Return `basis` with features and objects, which a basis from an earlier version may lack.
 

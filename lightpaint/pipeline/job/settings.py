@@ -15,7 +15,7 @@ from lightpaint.validation import SWITCH, Check, a, between, number, one_of, who
 #: Maximum number of rounds of rendering and solving again: a larger number is a typing error.
 MAX_REFINE = 100
 #: Maximum number of suggested lights: a larger number is a typing error.
-MAX_SUGGEST = 100
+MAX_SUGGEST = 32
 #: Least error that may be asked for: a smaller one is a typing error.
 MIN_ERROR = 1e-4
 #: Samples per pixel of the pilot, which tells where more are needed.

@@ -14,9 +14,7 @@ from lightpaint.colour.photometry import lambertian_flux, point_flux, spot_flux
 from lightpaint.errors import SceneError
 from lightpaint.scene.plane_identity import EmitterDigest, SceneHasher
 from lightpaint.scene.properties.emission import (
-    AS_AUTHORED,
     ENVIRONMENTS,
-    PLUGINS,
     EmissionKind,
     Scaling,
     emission_kind,
@@ -76,25 +74,6 @@ class Emitter:
         lights are on.
         """
         return self.plugin == "area" and self.kind is not None and self.kind.is_scalar
-
-
-def point_emitter(name: str, node: int, position: tuple[float, float, float]) -> Emitter:
-    """Return a point light of intensity 1 that is not in a file."""
-    parameter, unit = PLUGINS["point"]
-    x, y, z = position
-    return Emitter(
-        name=name,
-        plugin="point",
-        kind=EmissionKind(Scaling.COLOUR, parameter, unit),
-        emission=AS_AUTHORED,
-        form=f"at ({x:.2f}, {y:.2f}, {z:.2f})",
-        sampling_weight=1.0,
-        node=node,
-        file=0,
-        offset=-1,
-        unit_flux=point_flux(),
-        site=Site(position),
-    )
 
 
 def find_emitters(parsed: ParsedScene, loaded: Any, hasher: SceneHasher) -> tuple[Emitter, ...]:
