@@ -56,8 +56,8 @@ def _solve_by_rounds(few: pytest.MonkeyPatch, *args: Any, **how: Any) -> Solutio
 def _value(solution: Solution, w: Any) -> float:
     """The loss of weights and what pulls at them."""
     pull = solution.problem.pull
-    asked = 0.0 if pull is None else float(pull.objective(w).sum())
-    return float(solution.problem.objective(w).sum()) + asked
+    pull_value = 0.0 if pull is None else float(pull.objective(w).sum())
+    return float(solution.problem.objective(w).sum()) + pull_value
 
 
 @pytest.mark.parametrize(
@@ -92,7 +92,7 @@ def test_the_optimum_is_that_of_all_pixels(
 
 @pytest.mark.parametrize("transform", VIEWS, ids=lambda v: v.spoken)
 @pytest.mark.parametrize(
-    "asked",
+    "constraint_words",
     [
         {},
         {"lights": {"light 0": {"lock": True}, "light 1": {"limits": {"max": 0.3}}}},
@@ -103,21 +103,21 @@ def test_the_optimum_is_that_of_all_pixels(
     ids=lambda a: "+".join(a) or "free",
 )
 def test_it_ends_where_rounds_over_all_pixels_do(
-    make_basis: Any, few_samples: Any, asked: dict[str, Any], transform: ViewTransform
+    make_basis: Any, few_samples: Any, constraint_words: dict[str, Any], transform: ViewTransform
 ):
     basis, target = _random_problem(make_basis, 3)
     target = replace(target, at_least=target.image > 0.8)
-    asked = dict(asked)
-    constraints = Constraints.of(asked.pop("lights", {}), **asked)
+    constraint_words = dict(constraint_words)
+    constraints = Constraints.of(constraint_words.pop("lights", {}), **constraint_words)
     how: dict[str, Any] = {"transform": transform, "constraints": constraints, "hold": 0.3}
     expected = _solve_by_rounds(few_samples, basis, target, **how)
-    found = solve(basis, target, **how)
-    assert found.certificate.rounds < expected.certificate.rounds
-    value = _value(found, expected.weights)
-    assert _value(found, found.weights) <= value * (1 + 1e-9)
+    solution = solve(basis, target, **how)
+    assert solution.certificate.rounds < expected.certificate.rounds
+    value = _value(solution, expected.weights)
+    assert _value(solution, solution.weights) <= value * (1 + 1e-9)
     # Both are within what a round may change and be the last.
-    np.testing.assert_allclose(found.weights, expected.weights, atol=2e-4)
-    np.testing.assert_allclose(found.equations.M, expected.equations.M, rtol=2e-2)
+    np.testing.assert_allclose(solution.weights, expected.weights, atol=2e-4)
+    np.testing.assert_allclose(solution.equations.M, expected.equations.M, rtol=2e-2)
 
 
 def test_several_views_are_one(make_basis: Any, few_samples: Any):
@@ -125,12 +125,12 @@ def test_several_views_are_one(make_basis: Any, few_samples: Any):
     bases = [replace(basis, lights=parts[0][0].lights) for basis, _ in parts]
     targets = [target for _, target in parts]
     how = {"transform": VIEWS[0], "hold": 0.3}
-    expected, found = (
+    expected, solution = (
         _solve_by_rounds(few_samples, bases, targets, **how),
         solve(bases, targets, **how),
     )
-    assert found.certificate.rounds < expected.certificate.rounds
-    np.testing.assert_allclose(found.weights, expected.weights, atol=2e-5)
+    assert solution.certificate.rounds < expected.certificate.rounds
+    np.testing.assert_allclose(solution.weights, expected.weights, atol=2e-5)
 
 
 @pytest.mark.parametrize("transform", VIEWS, ids=lambda v: v.spoken)
@@ -138,12 +138,12 @@ def test_answers_have_the_same_bits_on_any_number_of_processors(
     make_basis: Any, few_samples: Any, transform: ViewTransform
 ):
     basis, target = _random_problem(make_basis, 6)
-    found = []
+    solutions = []
     for count in (1, 2, 7):
         few_samples.setattr(os, "cpu_count", lambda count=count: count)
-        found.append(solve(basis, target, transform=transform, hold=0.3).weights)
-    np.testing.assert_array_equal(found[0], found[1])
-    np.testing.assert_array_equal(found[0], found[2])
+        solutions.append(solve(basis, target, transform=transform, hold=0.3).weights)
+    np.testing.assert_array_equal(solutions[0], solutions[1])
+    np.testing.assert_array_equal(solutions[0], solutions[2])
 
 
 def _lit_problem(
@@ -156,9 +156,11 @@ def _lit_problem(
 @pytest.mark.parametrize("transform", VIEWS, ids=lambda v: v.spoken)
 def test_the_gradient_is_that_of_the_objective(make_basis: Any, few_samples: Any, transform: Any):
     basis, target = _random_problem(make_basis, 7)
-    problem, lit = _lit_problem(basis, replace(target, at_least=target.image > 0.5), transform)
+    problem, pixels_of_problem = _lit_problem(
+        basis, replace(target, at_least=target.image > 0.5), transform
+    )
     w = 0.5 + np.random.default_rng(0).random((4, 3))
-    value, gradient = lit.objective_and_gradient(w)
+    value, gradient = pixels_of_problem.objective_and_gradient(w)
     assert value == pytest.approx(problem.objective(w).sum(), rel=1e-12)
     for k, c in ((0, 0), (1, 2), (3, 1)):
         step = np.zeros_like(w)
@@ -176,30 +178,36 @@ def test_a_sample_stands_for_all_and_has_every_light(make_basis: Any, few_sample
     images[3, 10, 20:25] = 1e-3
     basis = make_basis(images=images)
     target = Target("t", rng.random((*SIZE, 3)).astype(np.float32), np.ones(SIZE, np.float32), True)
-    problem, lit = _lit_problem(basis, target, VIEWS[0])
-    part = sample_pixels(lit, np.einsum("cii->ic", problem.equations.M), 400)
+    problem, pixels_of_problem = _lit_problem(basis, target, VIEWS[0])
+    part = sample_pixels(pixels_of_problem, np.einsum("cii->ic", problem.equations.M), 400)
     assert 350 <= len(part.pixels) <= 450
     assert (part.planes.pixels(slice(None))[3] > 0).any(axis=-1).sum() == 5
     # One drawn of each 400th part: the mean of all, to some 1/400 and the scatter of weights.
-    assert part.pixels.importance.sum() == pytest.approx(lit.pixels.importance.sum(), rel=0.05)
+    assert part.pixels.importance.sum() == pytest.approx(
+        pixels_of_problem.pixels.importance.sum(), rel=0.05
+    )
 
     # Products of two pictures of random numbers: 400 of them tell their mean to some 6 %.
-    def products(of: LitPixels) -> Any:
-        D = np.broadcast_to(of.pixels.importance, (3, len(of.pixels)))
-        return of.equations(np.zeros_like(D), D).M
+    def products(pixels: LitPixels) -> Any:
+        D = np.broadcast_to(pixels.pixels.importance, (3, len(pixels.pixels)))
+        return pixels.equations(np.zeros_like(D), D).M
 
-    np.testing.assert_allclose(products(part)[:, :3, :3], products(lit)[:, :3, :3], rtol=0.25)
-    np.testing.assert_allclose(products(part)[:, 3, 3], products(lit)[:, 3, 3], rtol=1e-6)
+    np.testing.assert_allclose(
+        products(part)[:, :3, :3], products(pixels_of_problem)[:, :3, :3], rtol=0.25
+    )
+    np.testing.assert_allclose(
+        products(part)[:, 3, 3], products(pixels_of_problem)[:, 3, 3], rtol=1e-6
+    )
 
 
 def test_few_pixels_need_no_sample(make_basis: Any, few_samples: Any):
     basis, target = _random_problem(make_basis, 8)
-    counted = np.zeros(SIZE, np.float32)
-    counted[:10] = 1
-    asked: list[int] = []
-    few_samples.setattr(warm_start, "sample_pixels", lambda *args: asked.append(1))
-    solution = solve(basis, replace(target, importance=counted), transform=VIEWS[0])
-    assert not asked
+    is_counted = np.zeros(SIZE, np.float32)
+    is_counted[:10] = 1
+    calls: list[int] = []
+    few_samples.setattr(warm_start, "sample_pixels", lambda *args: calls.append(1))
+    solution = solve(basis, replace(target, importance=is_counted), transform=VIEWS[0])
+    assert not calls
     assert solution.certificate.converged
 
 
@@ -211,8 +219,10 @@ def test_pixels_that_do_not_count_are_not_looked_at(make_basis: Any, monkeypatch
     solution = solve(basis, target, transform=VIEWS[1], hold=0.0, colors="free")
     other = target.image.copy()
     other[some == 0] = 1e9
-    again = solve(basis, replace(target, image=other), transform=VIEWS[1], hold=0.0, colors="free")
-    np.testing.assert_array_equal(again.weights, solution.weights)
+    changed_solution = solve(
+        basis, replace(target, image=other), transform=VIEWS[1], hold=0.0, colors="free"
+    )
+    np.testing.assert_array_equal(changed_solution.weights, solution.weights)
     monkeypatch.setattr(lit_pixels, "MIN_SKIPPED_SHARE", 1.0)
-    whole = solve(basis, target, transform=VIEWS[1], hold=0.0, colors="free")
-    np.testing.assert_allclose(whole.weights, solution.weights, rtol=1e-6, atol=1e-9)
+    full_solution = solve(basis, target, transform=VIEWS[1], hold=0.0, colors="free")
+    np.testing.assert_allclose(full_solution.weights, solution.weights, rtol=1e-6, atol=1e-9)

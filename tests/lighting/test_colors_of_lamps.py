@@ -40,9 +40,9 @@ def _paint_over_look(basis: lp.Basis, painted: dict[tuple[float, ...], Any]) -> 
     assert basis.features is not None
     for (top, bottom, left, right), light in painted.items():
         rows = slice(round(top * height), round(bottom * height))
-        where = rows, slice(round(left * width), round(right * width))
-        image[where] = light * basis.features.albedo[where]
-        weight[where] = 1
+        region = rows, slice(round(left * width), round(right * width))
+        image[region] = light * basis.features.albedo[region]
+        weight[region] = 1
     return lp.Target(
         "painted",
         image,

@@ -22,22 +22,22 @@ WARM = np.array([1.5, 0.9, 0.4])
 @pytest.fixture
 def basis(make_basis: Any) -> Basis:
     """`sky` lights all evenly; `lantern` what is near it, and its flame is 12 times white."""
-    seen = np.zeros(SIZE, bool)
-    seen[FLAME] = True
+    emitter_mask = np.zeros(SIZE, bool)
+    emitter_mask[FLAME] = True
     rows, columns = np.mgrid[: SIZE[0], : SIZE[1]]
     near = np.exp(-np.hypot(rows - 17, columns - 15) / 3)
-    images = np.stack([np.full(SIZE, 0.03), np.where(seen, 12, 0.2 * near)])[..., None]
+    images = np.stack([np.full(SIZE, 0.03), np.where(emitter_mask, 12, 0.2 * near)])[..., None]
     emission = [[1.0] * 3, [1.0] * 3]
     images = np.repeat(images, 3, axis=-1)
-    return make_basis(images=images, names=["sky", "lantern"], seen=seen, emission=emission)
+    return make_basis(images=images, names=["sky", "lantern"], seen=emitter_mask, emission=emission)
 
 
-def _paint(basis: Basis, where: Any, color: Any, *, times: bool = False) -> lp.Target:
+def _paint(basis: Basis, region: Any, color: Any, *, times: bool = False) -> lp.Target:
     """A stroke over the current look. times: whether it multiplies what is there."""
     image = basis.current_look.copy()
-    image[where] = image[where] * color if times else color
+    image[region] = image[region] * color if times else color
     counts = np.zeros(SIZE, np.float32)
-    counts[where] = 1
+    counts[region] = 1
     how: dict[str, Any] = {"through_view": True, "over_look": True}
     return lp.Target("t", image, counts, False, transform=lp.ViewTransform(), **how)
 
@@ -69,8 +69,8 @@ def test_a_warm_stroke_over_a_lantern_leaves_it_on(basis: Basis, space: Any):
 @pytest.mark.parametrize("space", ["display", "linear"])
 def test_a_warm_stroke_over_a_lantern_leaves_it_on_in_a_dark_room(basis: Basis, space: Any):
     """The room two stops down, then the brush: darker than it was, but brighter than the room."""
-    everywhere = (slice(None), slice(None))
-    target = _paint(basis, everywhere, 0.25, times=True)
+    whole_picture = (slice(None), slice(None))
+    target = _paint(basis, whole_picture, 0.25, times=True)
     room = _lantern_levels(basis, target, space=space)
     assert room == pytest.approx((0.25, 0.25), rel=0.05)
     target.image[AROUND] = 0.06 * WARM
@@ -81,8 +81,8 @@ def test_a_warm_stroke_over_a_lantern_leaves_it_on_in_a_dark_room(basis: Basis, 
 
 
 def test_a_room_that_becomes_darker_and_warmer_dims_its_lantern(basis: Basis):
-    everywhere = (slice(None), slice(None))
-    exact, live = _lantern_levels(basis, _paint(basis, everywhere, 0.15 * WARM, times=True))
+    whole_picture = (slice(None), slice(None))
+    exact, live = _lantern_levels(basis, _paint(basis, whole_picture, 0.15 * WARM, times=True))
     assert exact < 0.3
     assert live < 0.3
 
@@ -125,11 +125,11 @@ def test_who_says_so_has_it_as_painted(basis: Basis, fit: Any):
 
 
 def test_what_is_read_once_is_not_read_again(basis: Basis):
-    [read] = lp.Problem.of(basis, _paint(basis, AROUND, 0.5 * WARM)).views.targets
-    assert read.at_least is not None
-    assert (read.at_least.any(axis=-1) == basis.emitters_seen).all()
-    [again] = lp.Problem.of(basis, read).views.targets
-    assert again.at_least is read.at_least
+    [resolved] = lp.Problem.of(basis, _paint(basis, AROUND, 0.5 * WARM)).views.targets
+    assert resolved.at_least is not None
+    assert (resolved.at_least.any(axis=-1) == basis.emitters_seen).all()
+    [resolved_again] = lp.Problem.of(basis, resolved).views.targets
+    assert resolved_again.at_least is resolved.at_least
 
 
 def test_strokes_one_after_the_other_count_as_all_at_once(basis: Basis):
@@ -146,13 +146,15 @@ def test_strokes_one_after_the_other_count_as_all_at_once(basis: Basis):
         image[region] = rng.choice([0, 0.02, 0.5, 20]) * WARM
         counts[region] = rng.choice([0, 0.3, 1, 10])
         view.update(region)
-        fresh = LiveView(basis, image, counts)
-        fresh.set_transform(lp.ViewTransform())
-        assert (view.counts == fresh.counts).all()
-        here, there = (x.film(lp.ViewTransform(), 100).pixels(0.1, None) for x in (view, fresh))
-        assert (here.importance == there.importance).all()
-        assert (here.painted == there.painted).all()
-        one, other = (x.tiles().equations(0.1) for x in (view, fresh))
+        rebuilt = LiveView(basis, image, counts)
+        rebuilt.set_transform(lp.ViewTransform())
+        assert (view.counts == rebuilt.counts).all()
+        updated_pixels, rebuilt_pixels = (
+            x.film(lp.ViewTransform(), 100).pixels(0.1, None) for x in (view, rebuilt)
+        )
+        assert (updated_pixels.importance == rebuilt_pixels.importance).all()
+        assert (updated_pixels.painted == rebuilt_pixels.painted).all()
+        one, other = (x.tiles().equations(0.1) for x in (view, rebuilt))
         np.testing.assert_allclose(one.M, other.M, rtol=1e-9)
 
 

@@ -43,8 +43,8 @@ def folder(make_basis: Any, tmp_path: Path) -> Path:
 
 
 def _solve_apart(folder: Path, name: str, **variables: str) -> bytes:
-    done = spawn(folder, "solve", "a.basis.exr", "t.exr", "-o", name, **variables)
-    assert done.returncode == 0, done.stderr
+    completed = spawn(folder, "solve", "a.basis.exr", "t.exr", "-o", name, **variables)
+    assert completed.returncode == 0, completed.stderr
     return (folder / name / "lighting.json").read_bytes()
 
 
@@ -54,25 +54,27 @@ def _emissions(text: bytes) -> Any:
 
 def test_equal_commands_have_equal_answers_and_other_kernels_nearly_so(folder: Path):
     blas, kernel = linear_algebra()
-    here = _solve_apart(folder, "here")
-    assert _solve_apart(folder, "again") == here
+    lighting_text = _solve_apart(folder, "here")
+    assert _solve_apart(folder, "again") == lighting_text
     for name in ("predicted.exr", "comparison.png"):
-        whole, other = ((folder / x / name).read_bytes() for x in ("here", "again"))
-        assert whole == other, name
-    told = json.loads(here)["solve"]["software"]
-    assert (told["blas"], told["kernel"]) == (blas, kernel)
-    assert told["numpy"] == np.__version__
+        content, other = ((folder / x / name).read_bytes() for x in ("here", "again"))
+        assert content == other, name
+    software = json.loads(lighting_text)["solve"]["software"]
+    assert (software["blas"], software["kernel"]) == (blas, kernel)
+    assert software["numpy"] == np.__version__
     if not (blas.startswith("openblas") and platform.machine() == "x86_64" and kernel != OTHER):
         pytest.skip("OpenBLAS with kernels for x86-64")
-    there = _solve_apart(folder, "there", OPENBLAS_CORETYPE=OTHER)
-    assert json.loads(there)["solve"]["software"]["kernel"] == OTHER
-    a, b = _emissions(here), _emissions(there)
+    other_text = _solve_apart(folder, "there", OPENBLAS_CORETYPE=OTHER)
+    assert json.loads(other_text)["solve"]["software"]["kernel"] == OTHER
+    a, b = _emissions(lighting_text), _emissions(other_text)
     # Not the same sums, or this test would show nothing.
     assert (a != b).any()
     np.testing.assert_allclose(a[:3], b[:3], rtol=DISTINCT)
     np.testing.assert_allclose(a[3:].sum(axis=0), b[3:].sum(axis=0), rtol=DISTINCT)
-    ours, theirs = (read_picture(folder / x / "predicted.exr").image for x in ("here", "there"))
-    np.testing.assert_allclose(ours, theirs, rtol=PICTURE)
+    own_picture, other_picture = (
+        read_picture(folder / x / "predicted.exr").image for x in ("here", "there")
+    )
+    np.testing.assert_allclose(own_picture, other_picture, rtol=PICTURE)
 
 
 def test_a_lighting_keeps_what_it_was_solved_with(make_basis: Any, tmp_path: Path):

@@ -45,7 +45,7 @@ def _bases_of_few_samples(scene: lp.Scene) -> dict[int, Basis]:
     return {1: one, 2: two, 4: render_basis(scene, spp=4, seed=2, start=two)}
 
 
-def _painting(basis: Basis, look: Any, wish: str) -> lp.Target:
+def _painting(basis: Basis, look: Any, request: str) -> lp.Target:
     """Over a look without grain (h, w, 3), painted as people do."""
     height, width = basis.size
     rows, columns = np.mgrid[:height, :width] / np.array([height, width])[:, None, None]
@@ -60,10 +60,10 @@ def _painting(basis: Basis, look: Any, wish: str) -> lp.Target:
         "a warm spot": (look * (1 + soft[..., None] * (3 * warm - 1)), soft),
         "a darker side": (look / 4, np.clip((0.4 - columns) / 0.1, 0, 1)),
         "nothing else": (look, np.ones(basis.size)),
-    }[wish]
+    }[request]
     transform = lp.ViewTransform("srgb", choose_exposure(basis.current_look))
     return lp.Target(
-        wish,
+        request,
         np.asarray(image, np.float32),
         np.asarray(counts, np.float32),
         everything=False,
@@ -86,15 +86,15 @@ def test_no_answer_is_worse_than_none(name: str):
     scene = lp.load_scene(SCENES / name / "scene.xml").reduced(FILMS[name])
     judge = render_basis(scene, spp=MANY, seed=MANY)
     wishes = ("all darker, a warm spot", "a warm spot", "a darker side", "nothing else")
-    for (spp, few), wish in product(_bases_of_few_samples(scene).items(), wishes):
-        target = _painting(few, judge.current_look, wish)
+    for (spp, few), request in product(_bases_of_few_samples(scene).items(), wishes):
+        target = _painting(few, judge.current_look, request)
         problem = lp.Problem.of(judge, target)
 
-        def missed(weights: Any, problem: lp.Problem = problem) -> float:
+        def miss_of(weights: Any, problem: lp.Problem = problem) -> float:
             return float(problem.objective(weights).sum())
 
-        asked = missed(np.zeros_like(judge.current_weights))
-        now = missed(judge.current_weights) * NOISE + 0.02 * asked
+        black_miss = miss_of(np.zeros_like(judge.current_weights))
+        current_miss = miss_of(judge.current_weights) * NOISE + 0.02 * black_miss
         solution = lp.solve(few, target)
         answers = {
             "exact": solution.weights,
@@ -102,9 +102,9 @@ def test_no_answer_is_worse_than_none(name: str):
             "live": _live_answer(few, target),
         }
         for kind, weights in answers.items():
-            assert missed(weights) <= now, (name, spp, wish, kind)
+            assert miss_of(weights) <= current_miss, (name, spp, request, kind)
             ratio = weights.max(axis=1) / few.current_weights.max(axis=1)
-            assert np.log2(ratio.max()) < MOST_STOPS, (name, spp, wish, kind)
+            assert np.log2(ratio.max()) < MOST_STOPS, (name, spp, request, kind)
 
 
 @pytest.fixture
@@ -115,8 +115,8 @@ def noisy_basis(make_basis: Any) -> Basis:
     level = np.array([0.2, 0.1])[:, None, None, None]
     halves = level * rng.exponential(1, (2, 2, *size, 3))
     images, half = halves.mean(axis=0), (halves[0] - halves[1]) / 2
-    made = make_basis(images=images, half_differences=half, emission=[[1, 1, 1], [1, 1, 1]])
-    return replace(made, origin=replace(made.origin, halves=(1, 1)))
+    noisy = make_basis(images=images, half_differences=half, emission=[[1, 1, 1], [1, 1, 1]])
+    return replace(noisy, origin=replace(noisy.origin, halves=(1, 1)))
 
 
 def _paint_over(basis: Basis, times: float) -> lp.Target:
@@ -146,13 +146,13 @@ def test_blocks_are_as_large_as_noise_asks(noisy_basis: Basis):
 def test_noise_of_what_a_display_shows_moves_no_light(noisy_basis: Basis):
     """Fitted pixel by pixel a display's curve would make up for it: 15 % here."""
     solution = lp.solve(noisy_basis, _paint_over(noisy_basis, 0.25), colors="free")
-    shown = (
+    display = (
         noisy_basis.images.mean(axis=(1, 2)).T
         @ solution.weights
         / noisy_basis.current_look.mean((0, 1))
     )
     # Of 48 x 64 pixels in blocks of nine, the residual noise's bias.
-    assert np.diag(shown) == pytest.approx(np.full(3, 0.25), rel=0.06)
+    assert np.diag(display) == pytest.approx(np.full(3, 0.25), rel=0.06)
     assert solution.problem.block_side == 3
     assert correct_noise(solution) is solution
 
@@ -176,5 +176,7 @@ def test_blocks_cost_what_their_pixels_do(make_basis: Any):
     views = lp.Problem.of(basis, lp.Target.of(loss.painted.astype(np.float32))).views
     binned = bin_pixels(views, loss, 2)
     weights = rng.random((2, 3))
-    whole = loss.objective(basis.mix(weights))
-    assert binned.loss.objective(binned.basis.mix(weights)) == pytest.approx(whole, rel=1e-6)
+    full_objective = loss.objective(basis.mix(weights))
+    assert binned.loss.objective(binned.basis.mix(weights)) == pytest.approx(
+        full_objective, rel=1e-6
+    )

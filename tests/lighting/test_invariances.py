@@ -67,22 +67,22 @@ def test_not_from_the_order_of_views(views: Any, fit: str) -> None:
     bases, targets = views
     expected = emissions(bases, targets, fit)
     tolerance = DISPLAY if fit == "display" else LINEAR
-    found = emissions(bases[::-1], targets[::-1], fit)
-    np.testing.assert_allclose(found, expected, rtol=tolerance, atol=tolerance)
+    actual = emissions(bases[::-1], targets[::-1], fit)
+    np.testing.assert_allclose(actual, expected, rtol=tolerance, atol=tolerance)
 
 
 @pytest.mark.parametrize("fit", FITS)
 def test_not_from_the_number_of_threads(views: Any, fit: str) -> None:
     bases, targets = views
-    found = []
+    results_by_count = []
     for count in (1, 4):
         limit_jobs(count)
         try:
             with threadpool_limits(count, "blas"):
-                found.append(emissions(bases, targets, fit))
+                results_by_count.append(emissions(bases, targets, fit))
         finally:
             limit_jobs(None)
-    np.testing.assert_array_equal(*found)
+    np.testing.assert_array_equal(*results_by_count)
 
 
 @pytest.mark.parametrize("fit", FITS)
@@ -97,6 +97,6 @@ def test_not_from_where_planes_lie(
     monkeypatch.setattr(file_planes, "PICKED_MAX_BYTES", 0)
     stored = lp.read_basis(path)
     assert isinstance(stored.planes, FilePlanes)
-    found = emissions(stored, target, fit)
+    actual = emissions(stored, target, fit)
     # The same sums in the same order, but for strips.
-    np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(actual, expected, rtol=1e-10, atol=1e-12)

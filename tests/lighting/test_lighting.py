@@ -46,17 +46,17 @@ def test_a_lighting_is_a_mapping_of_names(basis: lp.Basis, lighting: lp.Lighting
 
 
 def test_an_unknown_name_is_one_line_and_a_key_error(lighting: lp.Lighting):
-    with pytest.raises(KeyError) as caught:
+    with pytest.raises(KeyError) as error:
         lighting["lmap"]
-    assert isinstance(caught.value, UnknownLightError)
-    assert isinstance(caught.value, LightingError)
-    assert str(caught.value) == "no light 'lmap' in the lighting: it has key, lamp, rest"
+    assert isinstance(error.value, UnknownLightError)
+    assert isinstance(error.value, LightingError)
+    assert str(error.value) == "no light 'lmap' in the lighting: it has key, lamp, rest"
     with pytest.raises(LightingError, match="no light 'lmap'"):
         lighting.with_emission("lmap", (1, 1, 1))
 
 
 @pytest.mark.parametrize(
-    ("given", "weights"),
+    ("weights_argument", "weights"),
     [
         ({"lamp": 2}, [[0] * 3, [2] * 3, [1] * 3]),
         ({"lamp": 2, "key": [1, 0.5, 0]}, [[1, 0.5, 0], [2] * 3, [1] * 3]),
@@ -67,17 +67,19 @@ def test_an_unknown_name_is_one_line_and_a_key_error(lighting: lp.Lighting):
         ([[1, 2, 3], [4, 5, 6], [1, 1, 1]], [[1, 2, 3], [4, 5, 6], [1] * 3]),
     ],
 )
-def test_combine_takes_weights(basis: lp.Basis, given: Any, weights: Any):
+def test_combine_takes_weights(basis: lp.Basis, weights_argument: Any, weights: Any):
     expected = np.einsum("nhwc,nc->hwc", basis.images, weights)
-    made = lp.combine(basis, given)
-    np.testing.assert_allclose(made.image, expected, rtol=1e-5)
+    combined = lp.combine(basis, weights_argument)
+    np.testing.assert_allclose(combined.image, expected, rtol=1e-5)
     np.testing.assert_allclose(
-        made.half_difference, np.broadcast_to(np.sum(weights, axis=0), made.image.shape), rtol=1e-5
+        combined.half_difference,
+        np.broadcast_to(np.sum(weights, axis=0), combined.image.shape),
+        rtol=1e-5,
     )
 
 
 @pytest.mark.parametrize(
-    ("given", "words"),
+    ("invalid_weights", "words"),
     [
         ({"lmap": 2}, "no light lmap in the basis: it has key, lamp, rest"),
         ({3: 2}, "no light 3 in the basis"),
@@ -102,7 +104,9 @@ def test_combine_takes_weights(basis: lp.Basis, given: Any, weights: Any):
         (None, "a lighting of 3 lights"),
     ],
 )
-def test_what_are_no_weights_is_refused_in_one_line(basis: lp.Basis, given: Any, words: str):
-    with pytest.raises(LightingError, match=words) as caught:
-        lp.combine(basis, given)
-    assert "\n" not in str(caught.value)
+def test_what_are_no_weights_is_refused_in_one_line(
+    basis: lp.Basis, invalid_weights: Any, words: str
+):
+    with pytest.raises(LightingError, match=words) as refusal:
+        lp.combine(basis, invalid_weights)
+    assert "\n" not in str(refusal.value)

@@ -94,10 +94,10 @@ REMOVALS = [
 ]
 
 
-@pytest.mark.parametrize("where", REMOVALS, ids="/".join)
-def test_a_missing_key(good_file: tuple[Path, dict[str, Any]], where: tuple[str, ...]):
+@pytest.mark.parametrize("key_path", REMOVALS, ids="/".join)
+def test_a_missing_key(good_file: tuple[Path, dict[str, Any]], key_path: tuple[str, ...]):
     path, data = good_file
-    *outer, last = where
+    *outer, last = key_path
     inner = data
     for key in outer:
         inner = inner[key]
@@ -129,10 +129,10 @@ BAD_COLOURS = [
 
 
 @pytest.mark.parametrize("colour", BAD_COLOURS, ids=lambda c: str(c)[:20])
-@pytest.mark.parametrize("which", ["emission", "weight"])
-def test_a_colour_that_is_none(good_file: tuple[Path, dict[str, Any]], which: str, colour: Any):
+@pytest.mark.parametrize("key", ["emission", "weight"])
+def test_a_colour_that_is_none(good_file: tuple[Path, dict[str, Any]], key: str, colour: Any):
     path, data = good_file
-    data["lights"]["lamp"][which] = colour
+    data["lights"]["lamp"][key] = colour
     path.write_text(json.dumps(data))
     with pytest.raises(LightingError, match=r"lighting\.json"):
         read_lighting(path)
@@ -228,9 +228,9 @@ def test_what_a_light_consists_of_there_and_back(
 ) -> None:
     path = tmp_path_factory.mktemp("l") / "lighting.json"
     one = (1.0, 1.0, 1.0)
-    kept = LightSetting("rest", "area", "emission", "×", one, one, True, tuple(members))
-    write_lighting(path, Lighting((kept,)))
-    assert read_lighting(path).lights == (kept,)
+    kept_setting = LightSetting("rest", "area", "emission", "×", one, one, True, tuple(members))
+    write_lighting(path, Lighting((kept_setting,)))
+    assert read_lighting(path).lights == (kept_setting,)
 
 
 @pytest.mark.parametrize(
@@ -260,17 +260,17 @@ def test_photometry_goes_along_and_what_follows_is_not_read_back(tmp_path: Path)
     lamp = LightSetting(
         "lamp", "area", "radiance", "W/(m² sr)", (1, 1, 1), (1, 1, 1), unit_flux=(2, 2, 2)
     )
-    off = LightSetting("off", "directional", "irradiance", "W/m²", (0, 0, 0), (0, 0, 0))
-    lighting = Lighting((lamp, off), cd_per_unit=100)
+    dark_setting = LightSetting("off", "directional", "irradiance", "W/m²", (0, 0, 0), (0, 0, 0))
+    lighting = Lighting((lamp, dark_setting), cd_per_unit=100)
     path = tmp_path / "lighting.json"
     write_lighting(path, lighting)
     assert read_lighting(path) == lighting
     data = json.loads(path.read_text(encoding="utf-8"))
-    found = data["lights"]["lamp"]["photometry"]
-    assert found["hex"] == "#ffffff"
-    assert found["cct_k"] == pytest.approx(6504, abs=1)
-    assert found["luminous"] == pytest.approx(100)
-    assert found["flux_lm"] == pytest.approx(200)
+    photometry = data["lights"]["lamp"]["photometry"]
+    assert photometry["hex"] == "#ffffff"
+    assert photometry["cct_k"] == pytest.approx(6504, abs=1)
+    assert photometry["luminous"] == pytest.approx(100)
+    assert photometry["flux_lm"] == pytest.approx(200)
     assert data["lights"]["off"]["photometry"] == {"y": 0, "luminous": 0, "luminous_unit": "lx"}
     data["lights"]["lamp"]["photometry"] = "whatever"
     path.write_text(json.dumps(data), encoding="utf-8")

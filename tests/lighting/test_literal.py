@@ -49,10 +49,10 @@ def test_every_painting_at_its_word_is_the_papers_problem(path: Path, make_basis
     basis = _basis(target.size, make_basis)
     weights = lp.solve(basis, target, literal=True).weights
     light = np.einsum("nhwc,nc->hwc", basis.images.astype(np.float64), weights)
-    missed = target.importance[..., None] * (light - target.image)
+    loss_gradient = target.importance[..., None] * (light - target.image)
     if target.at_least is not None:  # the file cannot say more, so brighter is as good
-        missed[target.at_least & (light > target.image)] = 0
-    gradient = np.einsum("nhwc,hwc->nc", basis.images.astype(np.float64), missed)
+        loss_gradient[target.at_least & (light > target.image)] = 0
+    gradient = np.einsum("nhwc,hwc->nc", basis.images.astype(np.float64), loss_gradient)
     painted = np.abs(target.importance[..., None] * target.image)
     size = np.einsum("nhwc,hwc->nc", basis.images.astype(np.float64), painted)
     assert (weights >= 0).all()
@@ -75,9 +75,9 @@ def test_an_exr_with_its_own_mask_is_taken_at_its_word_unasked(path: Path, make_
 def test_paint_over_the_look_is_not(make_basis: object):
     target = _target(TARGETS / "gallery" / "opening.png")
     basis = _basis(target.size, make_basis)
-    meant, literal = (lp.solve(basis, target, literal=x) for x in (False, True))
-    assert meant.problem.fit.space == "display"
+    by_meaning, literal = (lp.solve(basis, target, literal=x) for x in (False, True))
+    assert by_meaning.problem.fit.space == "display"
     assert literal.problem.fit.space == "linear"
-    over = replace(target, over_look=True)
-    assert lp.solve(basis, over).problem.fit.hold
-    assert np.abs(meant.weights - literal.weights).max() > 0.01
+    over_look = replace(target, over_look=True)
+    assert lp.solve(basis, over_look).problem.fit.hold
+    assert np.abs(by_meaning.weights - literal.weights).max() > 0.01

@@ -31,11 +31,11 @@ class _Brush:
 
     def __init__(self, make_basis: Any, seed: int, size: tuple[int, int]) -> None:
         rng = np.random.default_rng(seed)
-        seen = np.zeros(size, bool)
-        seen[2:5, 3:9] = True
+        emitter_mask = np.zeros(size, bool)
+        emitter_mask[2:5, 3:9] = True
         current = np.random.default_rng(99).random((4, 3))
         planes = rng.random((4, *size, 3)) ** 2
-        self.basis: Basis = make_basis(images=planes, emission=current, seen=seen)
+        self.basis: Basis = make_basis(images=planes, emission=current, seen=emitter_mask)
         self.image = self.basis.current_look.copy()
         self.importance = np.zeros(size, np.float32)
         self.view = LiveView(self.basis, self.image, self.importance)
@@ -93,27 +93,31 @@ def test_sums_under_a_brush_are_those_of_the_whole_problem(
 ) -> None:
     brushes = _paint_views(make_basis, seed, views, count)
     targets = [brush.target for brush in brushes]
-    meant = _resolve_fit(targets, space="linear", **fit)
-    problem = Problem.of([brush.basis for brush in brushes], targets, fit=meant)
-    rest = unpainted_weight_of(problem.views, meant)
+    resolved_fit = _resolve_fit(targets, space="linear", **fit)
+    problem = Problem.of([brush.basis for brush in brushes], targets, fit=resolved_fit)
+    rest = unpainted_weight_of(problem.views, resolved_fit)
     live = reduce(add, (brush.view.tiles().equations(rest) for brush in brushes))
     # ‖Ψ‖² is another constant: here paint and rest are two residuals of a pixel, there one.
     for name in ("M", "b"):
-        found, expected = getattr(live, name), getattr(problem.equations, name)
+        live_sums, expected = getattr(live, name), getattr(problem.equations, name)
         # The current look, and 1 less what is painted, are in single precision.
-        np.testing.assert_allclose(found, expected, rtol=2e-6, atol=2e-6 * np.abs(expected).max())
+        np.testing.assert_allclose(
+            live_sums, expected, rtol=2e-6, atol=2e-6 * np.abs(expected).max()
+        )
 
 
 @given(st.integers(0, 10_000), st.integers(1, 6))
 def test_no_stroke_leaves_a_trace_in_the_sums(make_basis: Any, seed: int, count: int) -> None:
     """What is painted has the bits of a view that begins with it; the rest but for round-off."""
     [brush] = _paint_views(make_basis, seed, 1, count)
-    fresh = LiveView(brush.basis, brush.image, brush.importance)
-    paint, anew = (view.tiles().equations(0.0) for view in (brush.view, fresh))
-    both, both_anew = (view.tiles().equations(0.7) for view in (brush.view, fresh))
+    rebuilt = LiveView(brush.basis, brush.image, brush.importance)
+    paint, rebuilt_sums = (view.tiles().equations(0.0) for view in (brush.view, rebuilt))
+    paint_and_hold, both_anew = (view.tiles().equations(0.7) for view in (brush.view, rebuilt))
     for name in SUMS:
-        assert getattr(paint, name).tobytes() == getattr(anew, name).tobytes()
-        np.testing.assert_allclose(getattr(both, name), getattr(both_anew, name), rtol=1e-6)
+        assert getattr(paint, name).tobytes() == getattr(rebuilt_sums, name).tobytes()
+        np.testing.assert_allclose(
+            getattr(paint_and_hold, name), getattr(both_anew, name), rtol=1e-6
+        )
 
 
 def test_undoing_a_stroke_gives_back_the_bits(make_basis: Any) -> None:
@@ -134,15 +138,15 @@ def test_undoing_a_stroke_gives_back_the_bits(make_basis: Any) -> None:
 @pytest.mark.parametrize("views", [1, 2])
 @pytest.mark.parametrize("fit", [{"hold": 1.0}, {"unpainted": 0.1, "colors": "free"}])
 @pytest.mark.parametrize(
-    "asked", [{}, {"light 1": {"lock": True}}, {"light 0": {"limits": {"max": "40%"}}}]
+    "words", [{}, {"light 1": {"lock": True}}, {"light 0": {"limits": {"max": "40%"}}}]
 )
 def test_the_answer_under_a_brush_is_that_of_a_solve(
-    make_basis: Any, asked: dict[str, Any], fit: dict[str, Any], views: int
+    make_basis: Any, words: dict[str, Any], fit: dict[str, Any], views: int
 ) -> None:
-    constraints = Constraints.of(light=asked)
+    constraints = Constraints.of(light=words)
     brushes = _paint_views(make_basis, 5, views, 0)
-    meant = _resolve_fit([brush.target for brush in brushes], space="linear", **fit)
-    live = LiveSolver([brush.view for brush in brushes], fit=meant, constraints=constraints)
+    resolved_fit = _resolve_fit([brush.target for brush in brushes], space="linear", **fit)
+    live = LiveSolver([brush.view for brush in brushes], fit=resolved_fit, constraints=constraints)
     rng, answer = np.random.default_rng(3), brushes[0].basis.current_weights
     for _ in range(4):
         for brush in brushes:
@@ -150,19 +154,19 @@ def test_the_answer_under_a_brush_is_that_of_a_solve(
             answer = live.answer(answer)
     targets = [brush.target for brush in brushes]
     bases = [brush.basis for brush in brushes]
-    problem = Problem.of(bases, targets, constraints=constraints, fit=meant)
+    problem = Problem.of(bases, targets, constraints=constraints, fit=resolved_fit)
     # Of one convex problem, whose sums agree in single precision.
     np.testing.assert_allclose(live.answer(answer), solution_of(problem).weights, atol=2e-5)
 
 
 def test_rounds_under_a_brush_come_to_the_answer_of_a_display(make_basis: Any) -> None:
     [brush] = _paint_views(make_basis, 8, 1, 5)
-    meant = _resolve_fit([brush.target], space="display", hold=1.0)
-    live = LiveSolver([brush.view], fit=meant, constraints=Constraints())
+    resolved_fit = _resolve_fit([brush.target], space="display", hold=1.0)
+    live = LiveSolver([brush.view], fit=resolved_fit, constraints=Constraints())
     answer = brush.basis.current_weights
     for _ in range(60):
         answer = live.answer(answer)
-    problem = Problem.of(brush.basis, brush.target, fit=meant)
+    problem = Problem.of(brush.basis, brush.target, fit=resolved_fit)
     exact = problem.objective(solution_of(problem).weights).sum()
     assert problem.objective(answer).sum() <= 1.001 * exact
 
@@ -174,21 +178,21 @@ def test_planes_that_are_replaced_answer_as_if_they_had_been_there(
 ) -> None:
     """And what is not painted is held near the look of before."""
     brushes = _paint_views(make_basis, 5, views, 4)
-    meant = _resolve_fit([brush.target for brush in brushes], space=space)
-    live = LiveSolver([b.view for b in brushes], fit=meant, constraints=Constraints())
+    resolved_fit = _resolve_fit([brush.target for brush in brushes], space=space)
+    live = LiveSolver([b.view for b in brushes], fit=resolved_fit, constraints=Constraints())
     start = live.answer(brushes[0].basis.current_weights)
-    fresh = []
+    rebuilt_views = []
     for brush in brushes:
         basis, rng = brush.basis, np.random.default_rng(3)
         plane = rng.random((*basis.size, 3)).astype(np.float32) ** 2
         former = Estimate(basis.current_look, basis.current_noise)
-        moved = replace(
+        moved_basis = replace(
             basis, planes=MemoryPlanes(basis.images.copy()).replaced({1: plane}), former=former
         )
-        brush.view.replace_planes(moved, [1])
-        fresh.append(LiveView(moved, brush.image, brush.importance))
+        brush.view.replace_planes(moved_basis, [1])
+        rebuilt_views.append(LiveView(moved_basis, brush.image, brush.importance))
     live.follow_planes()
-    anew = LiveSolver(fresh, fit=meant, constraints=Constraints())
-    followed, expected = live.answer(start), anew.answer(start)
+    rebuilt_solver = LiveSolver(rebuilt_views, fit=resolved_fit, constraints=Constraints())
+    followed, expected = live.answer(start), rebuilt_solver.answer(start)
     np.testing.assert_allclose(followed, expected, rtol=1e-9, atol=1e-12)  # of float64 sums
     assert not np.allclose(followed, start)

@@ -18,25 +18,25 @@ def test_paint_and_rest_are_those_of_the_whole_picture(
 ):
     """Also where importance is beyond 1, and where an emitter is seen, of which no rest counts."""
     rng = np.random.default_rng(3)
-    seen = np.zeros(SIZE, bool)
-    seen[10:20, 30:50] = True
-    basis = make_basis(4, SIZE, seen=seen)
+    emitter_mask = np.zeros(SIZE, bool)
+    emitter_mask[10:20, 30:50] = True
+    basis = make_basis(4, SIZE, seen=emitter_mask)
     image, importance = basis.current_look.copy(), np.zeros(SIZE, np.float32)
     tiles = PaintedTiles(basis, image, importance)
     for top, left in ((0, 0), (12, 25), (30, 60), (12, 25)):
         region = slice(top, top + 12), slice(left, left + 17)
         shape = importance[region].shape
         image[region] = rng.random((*shape, 3))
-        importance[region] = most * rng.random(shape) * (over_seen | ~seen[region])
+        importance[region] = most * rng.random(shape) * (over_seen | ~emitter_mask[region])
         tiles.update(region, with_importance=True)
-        made = tiles.equations(2.5)
-        left_of_1 = np.where(seen, 0, np.maximum(1 - importance.astype(np.float64), 0))
+        equations = tiles.equations(2.5)
+        left_of_1 = np.where(emitter_mask, 0, np.maximum(1 - importance.astype(np.float64), 0))
         paint = NormalEquations.of(basis, image, importance)
         rest = NormalEquations.of(basis, basis.current_look, left_of_1).scaled(2.5)
         for name in ("M", "b", "target_norm2"):
             expected = getattr(paint, name) + getattr(rest, name)
             # The current look, and what is left of 1, are in single precision.
-            np.testing.assert_allclose(getattr(made, name), expected, rtol=1e-6)
+            np.testing.assert_allclose(getattr(equations, name), expected, rtol=1e-6)
 
 
 def test_what_was_painted_first_has_the_same_rest(make_basis: Any):

@@ -34,8 +34,8 @@ class RobustPixels(PixelLoss):
     importance: Doubles
     scale: float
 
-    def subset(self, which: Any) -> "RobustPixels":
-        return RobustPixels(self.painted[:, which], self.importance[which], self.scale)
+    def subset(self, indices: Any) -> "RobustPixels":
+        return RobustPixels(self.painted[:, indices], self.importance[indices], self.scale)
 
     def scaled(self, factors: Doubles) -> "RobustPixels":
         return replace(self, importance=self.importance * factors)
@@ -81,10 +81,10 @@ def _problem(make_basis: Any, seed: int, *, views: int = 1, slips: float = 0.1) 
         importance = rng.random(SIZE).astype(np.float32)
         targets.append(Target("t", image, importance, everything=False))
     problem = Problem.of(bases, targets, fit=Fit(space="linear", colors="free", hold=0.0))
-    its = problem.views
+    problem_views = problem.views
     loss = RobustLoss(
-        its.join([target.image for target in its.targets]),
-        its.join([target.importance for target in its.targets]),
+        problem_views.join([target.image for target in problem_views.targets]),
+        problem_views.join([target.importance for target in problem_views.targets]),
         scale=0.05,
     )
     return replace(problem, loss=loss)
@@ -102,9 +102,9 @@ def test_a_third_loss_is_brought_to_its_least(make_basis: Any, views: int) -> No
         return value, 2 * np.einsum("npc,cp->nc", rows, half).ravel()
 
     start = np.ones(9)
-    found = minimize(cost, start, jac=True, method="L-BFGS-B", bounds=[(0, None)] * 9, tol=1e-14)
+    optimum = minimize(cost, start, jac=True, method="L-BFGS-B", bounds=[(0, None)] * 9, tol=1e-14)
     # Rounds end at a change of 1e-6.
-    np.testing.assert_allclose(solution.weights.ravel(), found.x, atol=1e-4)
+    np.testing.assert_allclose(solution.weights.ravel(), optimum.x, atol=1e-4)
     assert solution.certificate.converged
     # Slips do not count as they do where squares are the loss.
     plain = solution_of(replace(problem, loss=problem.squares))
@@ -116,10 +116,10 @@ def test_a_third_loss_heeds_what_is_asked_of_lights(make_basis: Any) -> None:
     free = solution_of(problem)
     locked = Constraints.of(light={"light 1": {"lock": True}})
     [basis], [target] = problem.views.bases, problem.views.targets
-    asked = Problem.of(basis, target, constraints=locked, fit=problem.fit)
-    held = solution_of(replace(asked, loss=problem.loss))
-    np.testing.assert_allclose(held.weights[1], basis.current_weights[1])
-    assert problem.objective(held.weights).sum() > problem.objective(free.weights).sum()
+    constrained_problem = Problem.of(basis, target, constraints=locked, fit=problem.fit)
+    solution = solution_of(replace(constrained_problem, loss=problem.loss))
+    np.testing.assert_allclose(solution.weights[1], basis.current_weights[1])
+    assert problem.objective(solution.weights).sum() > problem.objective(free.weights).sum()
 
 
 def test_a_third_loss_is_analysed(make_basis: Any) -> None:
@@ -133,15 +133,15 @@ def test_a_third_loss_is_analysed(make_basis: Any) -> None:
 def test_squares_are_a_loss_as_any_other(make_basis: Any, seed: int) -> None:
     """Without the short cut for what is a linear problem, the answer is the same."""
     problem = _problem(make_basis, seed)
-    whole = problem.squares
-    direct = solution_of(replace(problem, loss=whole))
+    squares = problem.squares
+    direct = solution_of(replace(problem, loss=squares))
     np.testing.assert_allclose(
-        whole.pixels.objective(planes_of(problem.basis.mix(direct.weights))),
-        whole.objective(problem.basis.mix(direct.weights)),
+        squares.pixels.objective(planes_of(problem.basis.mix(direct.weights))),
+        squares.objective(problem.basis.mix(direct.weights)),
         rtol=1e-12,
     )
-    around = solution_of(replace(problem, loss=_Unknown(whole)))
-    np.testing.assert_allclose(around.weights, direct.weights, atol=1e-9)
+    generic = solution_of(replace(problem, loss=_Unknown(squares)))
+    np.testing.assert_allclose(generic.weights, direct.weights, atol=1e-9)
 
 
 class _Unknown(Loss):
@@ -157,14 +157,14 @@ class _Unknown(Loss):
 
 
 @pytest.mark.parametrize("name", [None, "srgb", "agx"])
-@pytest.mark.parametrize("kept", [False, True])
+@pytest.mark.parametrize("is_kept", [False, True])
 def test_squares_that_are_made_on_request(
-    make_basis: Any, monkeypatch: pytest.MonkeyPatch, name: str | None, kept: bool
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch, name: str | None, is_kept: bool
 ) -> None:
     """The arrays and sums of all pixels at once are the plain twin."""
     size, rng = (96, 128), np.random.default_rng(5)  # more than a strip
     basis = make_basis(images=rng.random((4, *size, 3), np.float32))
-    if not kept:
+    if not is_kept:
         monkeypatch.setattr(loss_module, "MAX_KEPT_PIXELS", size[0])
     target = Target.of(basis.current_look * np.float32(0.7), rng.random(size).round())
     top = np.broadcast_to((rng.random(size) < 0.2)[..., None], (*size, 3))
@@ -172,24 +172,29 @@ def test_squares_that_are_made_on_request(
     transform = None if name is None else ViewTransform(name)
     problem = Problem.of(basis, target, fit=Fit(transform=transform, unpainted=0.3, colors="free"))
     assert not problem.is_linear
-    weights, lit = rng.random((4, 3)), LitPixels.whole(basis, problem.loss)
-    x = lit.predicted(weights)
-    image, weight = lit.pixels.squares(x, from_clipping=False)
+    weights, lit_pixels = rng.random((4, 3)), LitPixels.whole(basis, problem.loss)
+    x = lit_pixels.predicted(weights)
+    image, weight = lit_pixels.pixels.squares(x, from_clipping=False)
     expected = [
-        *(part.T.reshape(*size, 3) for part in (image, weight, lit.pixels.shares(x, weight)))
+        *(part.T.reshape(*size, 3) for part in (image, weight, lit_pixels.pixels.shares(x, weight)))
     ]
-    squares = DeferredSquares(lit, weights)
+    squares = DeferredSquares(lit_pixels, weights)
     for _ in range(2):
-        for mine, part in zip(
+        for cut_array, part in zip(
             (squares.image, squares.weight, squares.share), expected, strict=True
         ):
-            np.testing.assert_array_equal(mine, part)
+            np.testing.assert_array_equal(cut_array, part)
         assert squares.image is squares.image
         squares.release()
         assert "_arrays" not in vars(squares)
-    sums, plain = lit.equations_at(weights), NormalEquations.of(basis, expected[0], expected[1])
+    sums, plain = (
+        lit_pixels.equations_at(weights),
+        NormalEquations.of(basis, expected[0], expected[1]),
+    )
     for field in ("M", "b", "target_norm2"):
         np.testing.assert_allclose(getattr(sums, field), getattr(plain, field), rtol=1e-12)
-    np.testing.assert_allclose(lit.objective(weights), lit.pixels.objective(x), rtol=1e-12)
+    np.testing.assert_allclose(
+        lit_pixels.objective(weights), lit_pixels.pixels.objective(x), rtol=1e-12
+    )
     black = problem.loss.objective(np.zeros((*size, 3)))
     np.testing.assert_allclose(problem.loss.norm2, black, rtol=1e-12)

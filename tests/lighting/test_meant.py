@@ -25,17 +25,17 @@ def _basis(make_basis: Any, n: int = 4, seed: int = 0) -> lp.Basis:
     return make_basis(images=rng.random((n, 12, 10, 3)) ** 3, emission=rng.random((n, 3)) + 0.1)
 
 
-def _paint(basis: lp.Basis, seed: int = 1, **about: Any) -> lp.Target:
+def _paint(basis: lp.Basis, seed: int = 1, **fields: Any) -> lp.Target:
     """Something else than the look, within the left half."""
     rng = np.random.default_rng(seed)
     mask = np.zeros(basis.size)
     mask[:, :5] = rng.random((basis.size[0], 5))
-    made = lp.Target.of(rng.random((*basis.size, 3)), mask)
-    return replace(made, **about)
+    masked = lp.Target.of(rng.random((*basis.size, 3)), mask)
+    return replace(masked, **fields)
 
 
 @pytest.mark.parametrize(
-    ("about", "fit"),
+    ("fields", "fit"),
     [
         ({}, ("linear", 0, "free", None)),
         ({"transform": SRGB}, ("linear", 0, "free", None)),
@@ -47,26 +47,26 @@ def _paint(basis: lp.Basis, seed: int = 1, **about: Any) -> lp.Target:
         ),
     ],
 )
-def test_what_is_left_open_follows_from_how_it_was_painted(make_basis: Any, about: Any, fit: Any):
-    target = _paint(_basis(make_basis), **about)
-    found = resolve_for_targets(Fit(), [target])
-    assert (found.space, found.hold, found.colors, found.transform) == fit
+def test_what_is_left_open_follows_from_how_it_was_painted(make_basis: Any, fields: Any, fit: Any):
+    target = _paint(_basis(make_basis), **fields)
+    resolved = resolve_for_targets(Fit(), [target])
+    assert (resolved.space, resolved.hold, resolved.colors, resolved.transform) == fit
     literal = resolve_for_targets(Fit(literal=True), [target])
     assert (literal.space, literal.hold, literal.colors) == ("linear", 0, "free")
     # What is said holds, whatever else is taken at its word.
-    said = Fit(space="display", hold=0.7, colors="white", literal=True)
-    assert resolve_for_targets(said, [target]) == replace(said, transform=SRGB)
+    expected = Fit(space="display", hold=0.7, colors="white", literal=True)
+    assert resolve_for_targets(expected, [target]) == replace(expected, transform=SRGB)
 
 
 def test_views_of_which_one_was_painted_over_the_look(make_basis: Any):
     basis = _basis(make_basis)
-    both = [_paint(basis), _paint(basis, over_look=True)]
-    assert resolve_for_targets(Fit(), both).hold == DEFAULT_HOLD
+    targets = [_paint(basis), _paint(basis, over_look=True)]
+    assert resolve_for_targets(Fit(), targets).hold == DEFAULT_HOLD
     agx = lp.ViewTransform("agx")
-    seen = [_paint(basis, through_view=True, transform=x) for x in (SRGB, agx)]
+    targets_by_view = [_paint(basis, through_view=True, transform=x) for x in (SRGB, agx)]
     with pytest.raises(TargetError, match=r"srgb at \+0 stops.*transform=\.\.\."):
-        resolve_for_targets(Fit(), seen)
-    assert resolve_for_targets(Fit(transform=agx), seen).transform == agx
+        resolve_for_targets(Fit(), targets_by_view)
+    assert resolve_for_targets(Fit(transform=agx), targets_by_view).transform == agx
 
 
 def test_what_is_not_painted_weighs_as_much_as_is_said(make_basis: Any):
@@ -92,9 +92,9 @@ def test_what_is_not_painted_weighs_as_much_as_is_said(make_basis: Any):
 def test_an_untouched_look_is_met_by_the_present_lighting(make_basis: Any):
     basis = _basis(make_basis)
     look = basis.mix(basis.current_weights)
-    for about in ({"over_look": True}, {"over_look": True, "through_view": True}):
+    for fields in ({"over_look": True}, {"over_look": True, "through_view": True}):
         target = replace(_paint(basis, transform=lp.ViewTransform("srgb", -1.0)), image=look)
-        solution = lp.solve(basis, replace(target, **about))
+        solution = lp.solve(basis, replace(target, **fields))
         np.testing.assert_allclose(solution.weights, basis.current_weights, rtol=1e-4)
 
 
@@ -114,23 +114,23 @@ def test_colors_are_pulled_as_the_formula_says(make_basis: Any, monkeypatch: pyt
 
     def cost(flat: np.ndarray) -> float:
         w = flat.reshape(-1, 3)
-        missed = target.image - np.einsum("nhwc,nc->hwc", images, w)
+        residual = target.image - np.einsum("nhwc,nc->hwc", images, w)
         hue = w - (w @ LUMINANCE)[:, None] * colors
         pull = (dimming[:, None] * power * hue**2).sum()
-        return float((D[..., None] * missed**2).sum() + COLOR_PULL * D.mean() * pull)
+        return float((D[..., None] * residual**2).sum() + COLOR_PULL * D.mean() * pull)
 
     bounds, dimming, start = [(0, None)] * current.size, np.ones(4), current.ravel()
     how = {"method": "L-BFGS-B", "options": {"ftol": 1e-15, "maxiter": 5000}}
     for _ in range(2):
-        found = minimize(cost, start, bounds=bounds, **how)
-        assert found.success
-        before, start = dimming, found.x
-        then = np.maximum(found.x.reshape(-1, 3) @ LUMINANCE, 1e-9)
-        dimming = np.clip(current @ LUMINANCE / then, 1, MAX_DIMMING)
+        optimum = minimize(cost, start, bounds=bounds, **how)
+        assert optimum.success
+        before, start = dimming, optimum.x
+        luminances = np.maximum(optimum.x.reshape(-1, 3) @ LUMINANCE, 1e-9)
+        dimming = np.clip(current @ LUMINANCE / luminances, 1, MAX_DIMMING)
     dimming = before
     assert dimming.max() > 1.5
-    assert cost(solution.weights.ravel()) <= found.fun * (1 + 1e-7)
-    np.testing.assert_allclose(solution.weights.ravel(), found.x, rtol=1e-3, atol=1e-4)
+    assert cost(solution.weights.ravel()) <= optimum.fun * (1 + 1e-7)
+    np.testing.assert_allclose(solution.weights.ravel(), optimum.x, rtol=1e-3, atol=1e-4)
     assert solution.certificate.converged
 
 
@@ -156,13 +156,13 @@ def test_colors_that_were_asked_for_are_not_pulled(make_basis: Any):
 def test_white_is_what_kelvin_does(make_basis: Any):
     basis = _basis(make_basis)
     target = _paint(basis)
-    asked = lp.Constraints.of({"*": {"kelvin": [2200, 9000]}})
-    expected = lp.solve(basis, target, constraints=asked).weights
+    constraints = lp.Constraints.of({"*": {"kelvin": [2200, 9000]}})
+    expected = lp.solve(basis, target, constraints=constraints).weights
     np.testing.assert_allclose(lp.solve(basis, target, colors="white").weights, expected, rtol=1e-9)
     # What is asked of a light goes before.
     locked = lp.Constraints.of({"light 1": {"lock": True}})
-    found = lp.solve(basis, target, colors="white", constraints=locked).weights
-    np.testing.assert_allclose(found[1], basis.current_weights[1])
+    weights = lp.solve(basis, target, colors="white", constraints=locked).weights
+    np.testing.assert_allclose(weights[1], basis.current_weights[1])
 
 
 def test_the_answer_says_how_it_was_found(make_basis: Any, tmp_path: Any):

@@ -28,15 +28,15 @@ def _target(image: Any) -> Target:
     return Target("t", image.astype(np.float32), np.ones(SIZE, np.float32), everything=False)
 
 
-@pytest.mark.parametrize("asked", ASKED)
+@pytest.mark.parametrize("words", ASKED)
 @pytest.mark.parametrize("seed", range(10))
-def test_both_methods_come_to_one_answer(make_basis: Any, seed: int, asked: Any) -> None:
+def test_both_methods_come_to_one_answer(make_basis: Any, seed: int, words: Any) -> None:
     basis = make_basis(4, SIZE, seed=seed)
     if seed % 2:
         lights = (*basis.lights[:3], replace(basis.lights[3], is_scalar=True))
         basis = replace(basis, lights=lights)
     target = _target(np.random.default_rng(seed).random((*SIZE, 3)))
-    constraints = Constraints.of(**asked)
+    constraints = Constraints.of(**words)
     polished, swept = (
         solve(basis, target, constraints=constraints, method=method)
         for method in ("polished", "gauss-seidel")

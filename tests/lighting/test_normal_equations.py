@@ -65,16 +65,18 @@ def test_a_run_of_pixels_is_not_gathered_and_comes_to_the_same():
     images, target, _ = _problem(4, (9, 8))
     run = np.zeros((9, 8), np.float32)
     run[2:7] = np.random.default_rng(2).random((5, 8)) + 0.5
-    gathered, seen = run.copy(), images.copy()
-    gathered[8, 7] = 1
-    seen[:, 8, 7] = 0
+    gathered_pixels, seen_pixels = run.copy(), images.copy()
+    gathered_pixels[8, 7] = 1
+    seen_pixels[:, 8, 7] = 0
     unpainted = target.copy()
     unpainted[8, 7] = 0
-    read = CountedPixels(images)
-    for got, want in zip(
-        inner_products(read, target, run), inner_products(seen, unpainted, gathered), strict=True
+    counted_pixels = CountedPixels(images)
+    for actual, expected_sums in zip(
+        inner_products(counted_pixels, target, run),
+        inner_products(seen_pixels, unpainted, gathered_pixels),
+        strict=True,
     ):
-        np.testing.assert_allclose(got, want, rtol=PRECISION)
+        np.testing.assert_allclose(actual, expected_sums, rtol=PRECISION)
     assert CountedPixels.gathered == 0
 
 
@@ -86,11 +88,11 @@ class CountedPixels(np.ndarray):  # type: ignore[type-arg]
     def __new__(cls, pixels: Any) -> "CountedPixels":
         return np.asarray(pixels).view(cls)
 
-    def __getitem__(self, where: Any) -> Any:
-        CountedPixels.gathered += isinstance(where, tuple) and any(
-            isinstance(k, np.ndarray) for k in where
+    def __getitem__(self, index: Any) -> Any:
+        CountedPixels.gathered += isinstance(index, tuple) and any(
+            isinstance(k, np.ndarray) for k in index
         )
-        return super().__getitem__(where)
+        return super().__getitem__(index)
 
 
 @pytest.mark.parametrize("garbage", [1e30, np.nan, np.inf])
@@ -99,26 +101,28 @@ def test_pixels_without_importance_are_not_read(garbage: float):
     expected = inner_products(images, target, importance)
     images[:, importance == 0] = garbage
     target[importance == 0] = garbage
-    for got, want in zip(inner_products(images, target, importance), expected, strict=True):
-        np.testing.assert_array_equal(got, want)
+    for actual, expected_sums in zip(
+        inner_products(images, target, importance), expected, strict=True
+    ):
+        np.testing.assert_array_equal(actual, expected_sums)
 
 
 def test_importance_counts_pixels():
     """A pixel of importance 3 weighs as three pixels of importance 1."""
     images, target, _ = _problem(3, (6, 4))
     tripled = [np.concatenate([images] * 3, axis=1), np.concatenate([target] * 3)]
-    for got, want in zip(
+    for actual, expected_sums in zip(
         inner_products(images, target, np.full((6, 4), 3.0)),
         inner_products(*tripled, np.ones((18, 4))),
         strict=True,
     ):
-        np.testing.assert_allclose(got, want, rtol=PRECISION)
+        np.testing.assert_allclose(actual, expected_sums, rtol=PRECISION)
 
 
 def test_the_order_of_pixels_is_of_no_importance():
     images, target, importance = _problem(3, (8, 8))
-    got = inner_products(images[:, ::-1, ::-1], target[::-1, ::-1], importance[::-1, ::-1])
-    for a, b in zip(got, inner_products(images, target, importance), strict=True):
+    actual = inner_products(images[:, ::-1, ::-1], target[::-1, ::-1], importance[::-1, ::-1])
+    for a, b in zip(actual, inner_products(images, target, importance), strict=True):
         np.testing.assert_allclose(a, b, rtol=PRECISION)
 
 
@@ -127,9 +131,9 @@ def test_sums_of_parts_of_the_picture_add(seed: int, split: int):
     images, target, importance = _problem(3, (12, 5), seed)
     top = inner_products(images[:, :split], target[:split], importance[:split])
     bottom = inner_products(images[:, split:], target[split:], importance[split:])
-    whole = inner_products(images, target, importance)
-    for a, b, both in zip(top, bottom, whole, strict=True):
-        np.testing.assert_allclose(a + b, both, rtol=PRECISION)
+    whole_sums = inner_products(images, target, importance)
+    for a, b, whole_sum in zip(top, bottom, whole_sums, strict=True):
+        np.testing.assert_allclose(a + b, whole_sum, rtol=PRECISION)
 
 
 @given(seed=st.integers(0, 1000), scale=st.floats(0.0, 10.0))

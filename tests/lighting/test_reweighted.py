@@ -61,9 +61,9 @@ def _hinge_objective(basis: Basis, target: Target, unpainted: float) -> Any:
 
     def value(w: Any) -> float:
         x = _pictures(basis, w)
-        missed = target.image - x
-        missed = np.where(target.at_least, np.maximum(missed, 0), missed)
-        return float((a * missed**2 + unpainted * (1 - a) * (current - x) ** 2).sum())
+        residual = target.image - x
+        residual = np.where(target.at_least, np.maximum(residual, 0), residual)
+        return float((a * residual**2 + unpainted * (1 - a) * (current - x) ** 2).sum())
 
     return value
 
@@ -85,11 +85,11 @@ def _displayed_objective(
 def _least_value(value: Any, starts: list[Any]) -> float:
     """The least that scipy's quasi-Newton method finds from these weights."""
     options = {"maxiter": 2000, "maxfun": 10**6, "ftol": 1e-16, "gtol": 1e-11}
-    found = [
+    optima = [
         minimize(value, w.ravel(), method="L-BFGS-B", bounds=[(0, None)] * w.size, options=options)
         for w in starts
     ]
-    return min(float(each.fun) for each in found)
+    return min(float(each.fun) for each in optima)
 
 
 def _projected_gradient(value: Any, w: Any) -> Any:
@@ -151,10 +151,10 @@ def test_running_out_of_rounds_keeps_what_was_won(
     """Whole steps would be for the worse here, parts of them are not; labels stay as well."""
     basis, image, importance = _random_problem(make_basis, seed)
     target, transform = _target(image, importance), ViewTransform("srgb", 2.0)
-    asked = Constraints.of({"light 0": {"limits": {"max": 0.2}}, "light 1": {"lock": True}})
-    problem = solve(basis, target, constraints=asked)
+    constraints = Constraints.of({"light 0": {"limits": {"max": 0.2}}, "light 1": {"lock": True}})
+    problem = solve(basis, target, constraints=constraints)
     monkeypatch.setattr(reweighting, "MAX_ROUNDS", 1)
-    solution = solve(basis, target, constraints=asked, transform=transform)
+    solution = solve(basis, target, constraints=constraints, transform=transform)
     assert not solution.certificate.converged
     begin = solution.problem.objective(problem.lighting.weights_for(basis)).sum()
     assert sum(solution.certificate.objective) < (1 - 1e-4) * begin
@@ -176,10 +176,10 @@ def test_saturated_paint_does_not_dim_the_lights(make_basis: Any):
     linear = solve(basis, target).lighting.weights_for(basis)
     assert (linear.sum(axis=0) < 0.85 * truth.sum(axis=0)).all()
     # Half of the last code is light that is read as white too.
-    found = solve(basis, replace(target, at_least=codes == 255)).lighting.weights_for(basis)
+    weights = solve(basis, replace(target, at_least=codes == 255)).lighting.weights_for(basis)
     # Rounding to codes: uniform errors of up to half of one, over 400 pixels, of slope 1/2.3.
     half = 0.5 / 255 * 2.3
-    np.testing.assert_allclose(found, truth, atol=3 * half / np.sqrt(3 * 400) / 0.2)
+    np.testing.assert_allclose(weights, truth, atol=3 * half / np.sqrt(3 * 400) / 0.2)
 
 
 def test_only_a_lower_end_is_black(make_basis: Any):
@@ -249,8 +249,8 @@ def test_what_is_clipped_comes_back(make_basis: Any):
     def linear(equations: Any, begin: Any) -> Any:
         return solve_reduced(equations, problem.reduction, begin).weights
 
-    found = reweighting.descend(basis, problem.loss, np.full((2, 3), 50.0), linear)
-    np.testing.assert_allclose(found.weights, truth, rtol=1e-5)
+    solution = reweighting.descend(basis, problem.loss, np.full((2, 3), 50.0), linear)
+    np.testing.assert_allclose(solution.weights, truth, rtol=1e-5)
 
 
 @pytest.mark.parametrize("transform", [None, *VIEWS], ids=str)
@@ -295,14 +295,14 @@ ASKED: list[dict[str, Any]] = [
 
 
 @pytest.mark.parametrize("transform", [None, SRGB])
-@pytest.mark.parametrize("asked", ASKED, ids=lambda a: next(iter(a)))
+@pytest.mark.parametrize("words", ASKED, ids=lambda a: next(iter(a)))
 def test_constraints_hold_and_nothing_near_is_better(
-    make_basis: Any, asked: dict[str, Any], transform: ViewTransform | None
+    make_basis: Any, words: dict[str, Any], transform: ViewTransform | None
 ):
     basis, image, importance = _random_problem(make_basis, 7)
     target = _target(image, importance, top=0.3)
-    asked = dict(asked)
-    constraints = Constraints.of(asked.pop("lights", {}), **asked)
+    words = dict(words)
+    constraints = Constraints.of(words.pop("lights", {}), **words)
     solution = solve(basis, target, constraints=constraints, transform=transform)
     assert solution.certificate.converged
     w = solution.lighting.weights_for(basis)
@@ -310,8 +310,8 @@ def test_constraints_hold_and_nothing_near_is_better(
     pull = constraints.prefer_current * np.square(basis.images, dtype=np.float64).sum((1, 2))
 
     def value(w: Any) -> float:
-        missed = float(solution.problem.loss.objective(_pictures(basis, w)).sum())
-        return missed + float((pull * np.square(w - basis.current_weights)).sum())
+        objective = float(solution.problem.loss.objective(_pictures(basis, w)).sum())
+        return objective + float((pull * np.square(w - basis.current_weights)).sum())
 
     assert value(w) <= value(plain) * (1 + 1e-9)
     if constraints.sparse:
@@ -325,8 +325,8 @@ def test_constraints_hold_and_nothing_near_is_better(
         for seed in range(5):
             other = _random_problem(make_basis, seed + 20)[1]
             free = solve(basis, _target(other, importance), constraints=constraints)
-            there = free.lighting.weights_for(basis)
-            assert value(w + 1e-3 * (there - w)) >= value(w) * (1 - 1e-9)
+            free_weights = free.lighting.weights_for(basis)
+            assert value(w + 1e-3 * (free_weights - w)) >= value(w) * (1 - 1e-9)
 
 
 @pytest.mark.parametrize("transform", [None, SRGB])
@@ -340,19 +340,19 @@ def test_views_together_are_one_picture(make_basis: Any, transform: ViewTransfor
     )
     at_least = image > 0.4
     at_least[5:] = False
-    whole = replace(_target(image, importance), at_least=at_least)
+    whole_target = replace(_target(image, importance), at_least=at_least)
     parts = [
         (first, replace(_target(image[:5], importance[:5]), at_least=at_least[:5])),
         (second, _target(image[5:], importance[5:])),
     ]
-    expected = solve(basis, whole, unpainted=0.2, transform=transform)
-    found = solve(*zip(*parts, strict=True), unpainted=0.2, transform=transform).views
+    expected = solve(basis, whole_target, unpainted=0.2, transform=transform)
+    views = solve(*zip(*parts, strict=True), unpainted=0.2, transform=transform).views
     w = expected.lighting.weights_for(basis)
     # As exactly as rounds end.
-    np.testing.assert_allclose(found[0].lighting.weights_for(first), w, atol=1e-5)
-    together = sum(sum(s.certificate.objective) for s in found)
+    np.testing.assert_allclose(views[0].lighting.weights_for(first), w, atol=1e-5)
+    together = sum(sum(s.certificate.objective) for s in views)
     assert together == pytest.approx(sum(expected.certificate.objective), rel=1e-9)
-    M = found[0].equations.M + found[1].equations.M
+    M = views[0].equations.M + views[1].equations.M
     np.testing.assert_allclose(M, expected.equations.M, rtol=1e-4)
 
 
@@ -385,30 +385,32 @@ def test_what_each_of_several_views_misses_is_split_on_one_scale(
         bases.append(replace(basis, lights=bases[0].lights if bases else basis.lights))
         targets.append(_target(image, importance + 0.01, top=None if transform else 0.6))
     joint = solve(bases, targets, transform=transform)
-    told, energies = [], []
-    for b, its in zip(bases, joint.views, strict=True):
-        found = diagnose(its)
-        free, alone = (
-            _least_of_last_problem(its, b, f)
+    diagnoses, energies = [], []
+    for b, view_solution in zip(bases, joint.views, strict=True):
+        diagnosis = diagnose(view_solution)
+        free, least_alone = (
+            _least_of_last_problem(view_solution, b, f)
             for f in (_solve_unbounded, lambda A, y: nnls(A, y)[0])
         )
-        energy = _least_of_last_problem(its, b, partial(_replace_channels, joint, iter(range(3))))
-        # Pixels in float32, sums of 72 of them.
-        close = partial(pytest.approx, abs=1e-5 * energy)
-        assert found.total == close(energy)
-        # Random pixels are what a painting has of noise.
-        assert found.unreachable + found.painting_noise == close(free)
-        assert found.forbidden == close(alone - free)
-        assert found.compromise == close(energy - alone)
-        assert found.missed == pytest.approx(
-            np.sqrt(sum(its.certificate.objective) / its.norm2.sum()), rel=1e-5
+        energy = _least_of_last_problem(
+            view_solution, b, partial(_replace_channels, joint, iter(range(3)))
         )
-        told.append(found)
+        # Pixels in float32, sums of 72 of them.
+        approx = partial(pytest.approx, abs=1e-5 * energy)
+        assert diagnosis.total == approx(energy)
+        # Random pixels are what a painting has of noise.
+        assert diagnosis.unreachable + diagnosis.painting_noise == approx(free)
+        assert diagnosis.forbidden == approx(least_alone - free)
+        assert diagnosis.compromise == approx(energy - least_alone)
+        assert diagnosis.missed == pytest.approx(
+            np.sqrt(sum(view_solution.certificate.objective) / view_solution.norm2.sum()), rel=1e-5
+        )
+        diagnoses.append(diagnosis)
         energies.append(energy)
-    assert min(max(x.forbidden, x.compromise) for x in told) > 0.01 * min(energies)
+    assert min(max(x.forbidden, x.compromise) for x in diagnoses) > 0.01 * min(energies)
     # What holds a light does so in all views, and its gain is beside what all of them miss.
-    for found in told:
-        assert found.lighting_total == pytest.approx(sum(energies), rel=1e-5)
+    for diagnosis in diagnoses:
+        assert diagnosis.lighting_total == pytest.approx(sum(energies), rel=1e-5)
 
 
 def _replace_channels(joint: Solution, channels: Any, A: Any, y: Any) -> Any:
@@ -421,18 +423,18 @@ def test_gains_are_beside_what_the_same_squares_miss(make_basis: Any, transform:
     basis, image, importance = _random_problem(make_basis, 2)
     target = _target(image, importance)
     solution = solve(basis, target, transform=transform)
-    found = diagnose(solution)
+    diagnosis = diagnose(solution)
     # As pixels have it in float32, and normal equations in float64.
-    assert solution.energy == pytest.approx(found.total, rel=1e-5)
-    assert found.lighting_total == pytest.approx(found.total, rel=1e-5)
+    assert solution.energy == pytest.approx(diagnosis.total, rel=1e-5)
+    assert diagnosis.lighting_total == pytest.approx(diagnosis.total, rel=1e-5)
 
 
 def test_nothing_changes_where_nothing_is_saturated_that_counts(make_basis: Any):
     basis, image, importance = _random_problem(make_basis, 4)
     target = _target(image, importance)
-    nowhere = replace(target, at_least=np.repeat((importance == 0)[..., None], 3, axis=-1))
-    assert nowhere.at_least.any()
-    a, b = solve(basis, target), solve(basis, nowhere)
+    unsaturated = replace(target, at_least=np.repeat((importance == 0)[..., None], 3, axis=-1))
+    assert unsaturated.at_least.any()
+    a, b = solve(basis, target), solve(basis, unsaturated)
     assert b.problem.is_linear
     assert a.lighting == b.lighting
 
@@ -449,7 +451,7 @@ def test_error_bars_hold_the_answer_without_noise(make_basis: Any, transform: Vi
     target = _target(image, top=0.8)
     quiet = make_basis(images=clean)
     truth = solve(quiet, target, transform=transform).lighting.weights_for(quiet)
-    held, off, corrected_off = [], [], []
+    coverages, errors, corrected_off = [], [], []
     for seed in range(30):
         rng = np.random.default_rng(seed)
         a, b = (
@@ -459,12 +461,12 @@ def test_error_bars_hold_the_answer_without_noise(make_basis: Any, transform: Vi
         basis = make_basis(images=(a + b) / 2, half_differences=(a - b) / 2)
         solution = solve(basis, target, transform=transform)
         low, high = error_bars(solution).interval
-        held.append((low <= truth + 1e-9) & (truth <= high + 1e-9))
-        off.append(solution.lighting.weights_for(basis) - truth)
+        coverages.append((low <= truth + 1e-9) & (truth <= high + 1e-9))
+        errors.append(solution.lighting.weights_for(basis) - truth)
         corrected = correct_noise(solution)
         corrected_off.append(corrected.lighting.weights_for(basis) - truth)
-    assert 0.8 <= np.mean(held) <= 1
-    assert np.square(corrected_off).mean() < np.square(off).mean()
+    assert 0.8 <= np.mean(coverages) <= 1
+    assert np.square(corrected_off).mean() < np.square(errors).mean()
 
 
 @pytest.mark.parametrize("transform", [None, SRGB])
@@ -483,21 +485,25 @@ def test_lights_once_chosen_stay_chosen(
     basis = make_basis(images=images, half_differences=halves, emission=rng.random((6, 3)))
     image = rng.random((*SIZE, 3)) ** 2 * rng.choice([0.5, 1, 2])
     target = _target(image, top=None if transform else 0.3)
-    asked = Constraints.of({}, sparse=2)
-    solution = solve(basis, target, constraints=asked, transform=transform)
+    constraints = Constraints.of({}, sparse=2)
+    solution = solve(basis, target, constraints=constraints, transform=transform)
     w = solution.lighting.weights_for(basis)
     mix = combine(basis, solution.lighting)
     refined = refine(solution, Estimate(mix.image, 0.5 * mix.half_difference))
-    for found in (solve_again(solution, solution.problem), correct_noise(solution), refined):
-        v = found.lighting.weights_for(basis)
+    for solution_again in (
+        solve_again(solution, solution.problem),
+        correct_noise(solution),
+        refined,
+    ):
+        v = solution_again.lighting.weights_for(basis)
         assert v.any(axis=1).tolist() == w.any(axis=1).tolist()
         # Noise of 1e-4 moves nothing further, squares that end where the loss does neither.
         np.testing.assert_allclose(v, w, atol=2e-3)
-        assert sum(found.certificate.objective) == pytest.approx(
+        assert sum(solution_again.certificate.objective) == pytest.approx(
             sum(solution.certificate.objective), rel=1e-4
         )
-        assert [count for count, _ in found.tried] == [1, 2, 3, 4]
-        assert found.certificate.curve == solution.certificate.curve
-        assert [x.constraint for x in found.lighting.lights] == [
+        assert [count for count, _ in solution_again.tried] == [1, 2, 3, 4]
+        assert solution_again.certificate.curve == solution.certificate.curve
+        assert [x.constraint for x in solution_again.lighting.lights] == [
             x.constraint for x in solution.lighting.lights
         ]

@@ -87,8 +87,8 @@ def _hold_look(basis: lp.Basis, target: lp.Target) -> tuple[Any, Any]:
     look = np.einsum("nc,nhwc->hwc", basis.current_weights, basis.images.astype(np.float64))
     free = np.where(basis.emitters_seen, 0, np.maximum(1 - D, 0))
     u = free * (min(HOLD * D.sum() / free.sum(), 1.0) if free.any() else 0.0)
-    both = np.where(D + u > 0, D + u, 1)[..., None]
-    return (D[..., None] * psi + u[..., None] * look) / both, D + u
+    total_weight = np.where(D + u > 0, D + u, 1)[..., None]
+    return (D[..., None] * psi + u[..., None] * look) / total_weight, D + u
 
 
 def _rows(basis: lp.Basis, psi: Any, D: Any, channel: int) -> tuple[Any, Any]:
@@ -165,15 +165,17 @@ def test_constrained_lightings_are_those_of_quadprog(planes: Planes, name: str) 
     target = replace(_painting(name, basis), at_least=None)  # least squares, of every painting
     free = lp.solve(basis, target, literal=True)
     dark, limited = np.argsort(-free.weights.min(axis=1))[:2]  # two that are on
-    shown = (basis.current_weights * basis.totals).sum(axis=1)
-    locked = next(k for k in np.argsort(shown) if k not in (dark, limited))  # hardly in the way
+    current_power = (basis.current_weights * basis.totals).sum(axis=1)
+    locked = next(
+        k for k in np.argsort(current_power) if k not in (dark, limited)
+    )  # hardly in the way
     most = 0.5 * free.weights[limited]
-    asked = {
+    words = {
         basis.names[locked]: {"lock": True},
         basis.names[dark]: {"off": True},
         basis.names[limited]: {"limits": {"max": most.tolist()}},
     }
-    weights = lp.solve(basis, target, literal=True, constraints=lp.Constraints.of(asked)).weights
+    weights = lp.solve(basis, target, literal=True, constraints=lp.Constraints.of(words)).weights
     assert (weights[limited] == most).any()
     n = len(basis.lights)
     for channel in range(3):

@@ -30,9 +30,9 @@ def true_planes() -> Any:
     y, x = np.mgrid[: SIZE[0], : SIZE[1]]
     direct, glow = np.zeros((2, LIGHTS, *SIZE, 3))
     for k in range(LIGHTS):
-        off = np.hypot(y - 4 * (k // 8) - 2, x - 6 * (k % 8) - 3)
-        direct[k] = (off < 1.5)[..., None]
-        glow[k] = 0.2 * np.exp(-((off / 9) ** 2))[..., None]
+        distance = np.hypot(y - 4 * (k // 8) - 2, x - 6 * (k % 8) - 3)
+        direct[k] = (distance < 1.5)[..., None]
+        glow[k] = 0.2 * np.exp(-((distance / 9) ** 2))[..., None]
     return direct, glow
 
 
@@ -40,7 +40,7 @@ def noisy_basis(rng: np.random.Generator, *, noise: float = 1.0) -> Basis:
     """A basis of these planes on a flat wall, whose glow is as of few samples."""
     direct, glow = true_planes()
     a, b = (glow * (1 - noise + noise * rng.exponential(size=(LIGHTS, *SIZE, 1))) for _ in range(2))
-    mean, half = ((its / 2).astype(np.float32) for its in (a + b, a - b))
+    mean, half = ((picture / 2).astype(np.float32) for picture in (a + b, a - b))
     y, x = np.mgrid[: SIZE[0], : SIZE[1]].astype(np.float32)
     flat = np.ones((*SIZE, 3), np.float32)
     wall = Features(flat / 2, flat * np.float32([0, 0, 1]), np.stack([x, y, 0 * x], axis=-1))
@@ -95,19 +95,26 @@ def test_the_noise_that_is_left_is_that_of_averaged_planes(rng: np.random.Genera
     """Two bases of the same planes: half their difference has the power of the half differences."""
     target, _ = painting(rng)
     pair = [on_smooth_light(solve(noisy_basis(rng), target)).basis for _ in range(2)]
-    apart = np.square((pair[0].images - pair[1].images) / np.sqrt(2), dtype=np.float64).sum()
-    told = np.mean([np.square(its.half_differences, dtype=np.float64).sum() for its in pair])
+    variance = np.square((pair[0].images - pair[1].images) / np.sqrt(2), dtype=np.float64).sum()
+    stated_variance = np.mean(
+        [
+            np.square(basis_of_pair.half_differences, dtype=np.float64).sum()
+            for basis_of_pair in pair
+        ]
+    )
     # Of 64 planes of 1536 pixels, some twelve of which are alike: 1/90 is a standard error.
-    assert apart == pytest.approx(told, rel=0.05)
-    assert told < 0.3 * np.square(noisy_basis(rng).half_differences, dtype=np.float64).sum()
+    assert variance == pytest.approx(stated_variance, rel=0.05)
+    assert (
+        stated_variance < 0.3 * np.square(noisy_basis(rng).half_differences, dtype=np.float64).sum()
+    )
 
 
 def test_a_sum_of_the_basis_itself_is_met_as_before(rng: np.random.Generator):
     """Its noise is that of the planes as they were rendered."""
     basis = noisy_basis(rng)
-    wanted = rng.uniform(0.2, 3, (LIGHTS, 3))
-    corrected = correct_noise(solve(basis, Target.of(basis.mix(wanted))))
-    np.testing.assert_allclose(corrected.weights, wanted, rtol=1e-3)
+    weights_of_mix = rng.uniform(0.2, 3, (LIGHTS, 3))
+    corrected = correct_noise(solve(basis, Target.of(basis.mix(weights_of_mix))))
+    np.testing.assert_allclose(corrected.weights, weights_of_mix, rtol=1e-3)
     assert corrected.problem.noise_removed == 0
 
 
@@ -128,17 +135,19 @@ def test_several_views_are_averaged_each_by_itself(rng: np.random.Generator):
     target, expected = painting(rng)
     basis, cleaner = noisy_basis(rng), noisy_basis(rng, noise=0.5)
     # Solves stop at 1e-6 or so of a weight.
-    once, twice = (
+    single, double = (
         correct_noise(solve([basis] * k, [target] * k), share=1.0).weights for k in (1, 2)
     )
-    np.testing.assert_allclose(twice, once, rtol=0, atol=1e-4)
-    both = solve([basis, cleaner], [target] * 2)
-    alone = [on_smooth_light(solve(x, target)).equations for x in (basis, cleaner)]
-    joint = on_smooth_light(both).equations
+    np.testing.assert_allclose(double, single, rtol=0, atol=1e-4)
+    joint_solution = solve([basis, cleaner], [target] * 2)
+    separate = [on_smooth_light(solve(x, target)).equations for x in (basis, cleaner)]
+    joint = on_smooth_light(joint_solution).equations
     for name in ("M", "b"):
-        summed = sum(getattr(x, name) for x in alone)
+        summed = sum(getattr(x, name) for x in separate)
         np.testing.assert_allclose(getattr(joint, name), summed, rtol=1e-9)
-    assert error(correct_noise(both).weights, expected) < error(both.weights, expected)
+    assert error(correct_noise(joint_solution).weights, expected) < error(
+        joint_solution.weights, expected
+    )
 
 
 def test_few_lights_and_unknown_surfaces_are_solved_as_they_were_rendered(

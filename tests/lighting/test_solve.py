@@ -28,10 +28,10 @@ SIZE = (12, 10)
 
 
 def _target(image: Any, importance: Any = None) -> Target:
-    everything = importance is None
+    is_everywhere = importance is None
     importance = np.ones(image.shape[:2]) if importance is None else importance
     return Target(
-        "painted", image.astype(np.float32), importance.astype(np.float32), everything=everything
+        "painted", image.astype(np.float32), importance.astype(np.float32), everything=is_everywhere
     )
 
 
@@ -43,9 +43,9 @@ def _random_target(seed: int = 1) -> Target:
 
 
 def _emitter_mask() -> Any:
-    seen = np.zeros(SIZE, bool)
-    seen[:3, :4] = True
-    return seen
+    emitter_mask = np.zeros(SIZE, bool)
+    emitter_mask[:3, :4] = True
+    return emitter_mask
 
 
 def _weighted_target(basis: Any, target: Target, *, unpainted: float = 0.0) -> tuple[Any, Any]:
@@ -166,13 +166,15 @@ def test_the_start_does_not_change_the_answer(make_basis: Any, start: float):
     np.testing.assert_allclose(other, plain, atol=1e-8)
 
 
-@pytest.mark.parametrize("asked", [None, Constraints.of({"light 0": {"limits": {"max": 9.0}}})])
-def test_what_reaches_nothing_keeps_the_start(make_basis: Any, asked: Constraints | None):
+@pytest.mark.parametrize(
+    "constraints", [None, Constraints.of({"light 0": {"limits": {"max": 9.0}}})]
+)
+def test_what_reaches_nothing_keeps_the_start(make_basis: Any, constraints: Constraints | None):
     images = np.random.default_rng(0).random((3, *SIZE, 3))
     images[2] = 0
     basis = make_basis(images=images)
     for begin in (None, Lighting.of_weights(basis, np.full((3, 3), 7.0))):
-        solution = solve(basis, _random_target(), start=begin, constraints=asked)
+        solution = solve(basis, _random_target(), start=begin, constraints=constraints)
         expected = basis.lights[2].emission if begin is None else (7.0, 7.0, 7.0)
         assert solution.lighting.emission["light 2"] == pytest.approx(expected)
         assert solution.certificate.unreached == ("light 2",)
@@ -288,7 +290,7 @@ def test_what_is_kept_leaves_scipy_the_rest_of_the_target(
 @pytest.mark.parametrize("unpainted", [0.0, 0.3])
 def test_keeping_a_light_is_painting_without_it(make_basis: Any, unpainted: float) -> None:
     basis = make_basis(4, SIZE, seed=5)
-    held = _fix_lights(basis, [1])
+    basis_with_fixed = _fix_lights(basis, [1])
     others = replace(
         basis,
         lights=tuple(np.delete(np.array(basis.lights, object), 1)),
@@ -297,20 +299,22 @@ def test_keeping_a_light_is_painting_without_it(make_basis: Any, unpainted: floa
     )
     target = _random_target()
     bare = replace(target, image=target.image - basis.images[1])
-    found = solve(held, target, unpainted=unpainted).lighting.emission
-    alone = solve(others, bare, unpainted=unpainted).lighting.emission
+    emission = solve(basis_with_fixed, target, unpainted=unpainted).lighting.emission
+    expected_emission = solve(others, bare, unpainted=unpainted).lighting.emission
     for name in others.names:
-        np.testing.assert_allclose(found[name], alone[name], atol=1e-6)  # float32 pixels
+        np.testing.assert_allclose(
+            emission[name], expected_emission[name], atol=1e-6
+        )  # float32 pixels
 
 
 def test_what_is_kept_stays_through_any_painting(make_basis: Any) -> None:
     basis = _fix_lights(make_basis(3, SIZE), [0, 2])
     black = solve(basis, _target(np.zeros((*SIZE, 3)))).lighting
     assert black.weights_for(basis).tolist() == [[1, 1, 1], [0, 0, 0], [1, 1, 1]]
-    alone = _fix_lights(make_basis(2, SIZE), [0, 1])
-    everything = solve(alone, _random_target())
-    assert everything.certificate.converged
-    assert (everything.lighting.weights_for(alone) == 1).all()
+    fixed_basis = _fix_lights(make_basis(2, SIZE), [0, 1])
+    solution = solve(fixed_basis, _random_target())
+    assert solution.certificate.converged
+    assert (solution.lighting.weights_for(fixed_basis) == 1).all()
     with pytest.raises(LightingError, match="fixed, so its emission must be 1 1 1"):
         black.with_emission(basis.names[0], (2, 2, 2))
 

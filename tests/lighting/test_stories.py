@@ -24,10 +24,10 @@ def basis(make_basis: Any) -> lp.Basis:
     return make_basis(images=images, emission=np.full((7, 3), 0.3))
 
 
-def _paint_over(look: np.ndarray, factor: Any, where: Any) -> lp.Target:
+def _paint_over(look: np.ndarray, factor: Any, region: Any) -> lp.Target:
     """Painted over the look, and saved in 8 bits."""
     mask = np.zeros(SIZE)
-    mask[where] = 1
+    mask[region] = 1
     view = lp.ViewTransform()
     painted = np.where(mask[..., None] > 0, look * np.asarray(factor), look)
     codes = np.round(255 * view.encode(painted)) / 255
@@ -35,10 +35,10 @@ def _paint_over(look: np.ndarray, factor: Any, where: Any) -> lp.Target:
     return replace(target, transform=view, through_view=True, over_look=True)
 
 
-def _mean_change(basis: lp.Basis, solution: lp.Solution, where: Any) -> float:
+def _mean_change(basis: lp.Basis, solution: lp.Solution, region: Any) -> float:
     """Mean ΔE from the current look."""
-    look, found = basis.mix(basis.current_weights), basis.mix(solution.weights)
-    return float(delta_e(look, found)[where].mean())
+    look, picture = basis.mix(basis.current_weights), basis.mix(solution.weights)
+    return float(delta_e(look, picture)[region].mean())
 
 
 def _hue(basis: lp.Basis, solution: lp.Solution) -> float:
@@ -51,22 +51,22 @@ def test_more_light_on_the_statue_leaves_the_room_alone(basis: lp.Basis):
     """One percent of the picture, two stops brighter: the room next door stays as it was."""
     look = basis.mix(basis.current_weights)
     target = _paint_over(look, 2.5, (slice(15, 21), slice(9, 13)))
-    elsewhere = (slice(None), slice(32, None))
-    meant, literal = lp.solve(basis, target), lp.solve(basis, target, literal=True)
-    assert _mean_change(basis, literal, elsewhere) > 5
-    assert _mean_change(basis, meant, elsewhere) < 1
+    outside = (slice(None), slice(32, None))
+    by_meaning, literal = lp.solve(basis, target), lp.solve(basis, target, literal=True)
+    assert _mean_change(basis, literal, outside) > 5
+    assert _mean_change(basis, by_meaning, outside) < 1
     # And it is brighter: by more than half of the stops that were painted.
-    there = np.log2(basis.mix(meant.weights) / look)[target.importance > 0]
-    assert there.mean() > 0.5 * np.log2(2.5)
+    stops_gained = np.log2(basis.mix(by_meaning.weights) / look)[target.importance > 0]
+    assert stops_gained.mean() > 0.5 * np.log2(2.5)
 
 
 def test_a_warm_stroke_makes_no_red_and_green_lamps(basis: lp.Basis):
     look = basis.mix(basis.current_weights)
     noise = np.random.default_rng(5).normal(0, 0.15, (*SIZE, 3))
     target = _paint_over(look, np.array([1.5, 1.2, 0.9]) * 2**noise, (slice(4, 30), slice(2, 20)))
-    meant, literal = lp.solve(basis, target), lp.solve(basis, target, literal=True)
+    by_meaning, literal = lp.solve(basis, target), lp.solve(basis, target, literal=True)
     assert _hue(basis, literal) > 0.8
-    assert _hue(basis, meant) < 0.5
+    assert _hue(basis, by_meaning) < 0.5
 
 
 def test_an_untouched_look_changes_nothing(basis: lp.Basis):
@@ -80,5 +80,5 @@ def test_what_has_its_own_mask_is_taken_at_its_word(basis: lp.Basis):
     """The paper's case: float light, nothing under it."""
     rng = np.random.default_rng(2)
     target = lp.Target.of(rng.random((*SIZE, 3)), rng.random(SIZE))
-    found, literal = lp.solve(basis, target), lp.solve(basis, target, literal=True)
-    np.testing.assert_array_equal(found.weights, literal.weights)
+    by_meaning, literal = lp.solve(basis, target), lp.solve(basis, target, literal=True)
+    np.testing.assert_array_equal(by_meaning.weights, literal.weights)

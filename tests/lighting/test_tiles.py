@@ -31,23 +31,25 @@ def _bits(equations: NormalEquations) -> tuple[bytes, bytes, bytes]:
 @st.composite
 def strokes(draw: st.DrawFn) -> list[tuple[slice, slice, int]]:
     """Rectangles, single pixels and empty ones included, and a seed for what is painted."""
-    found = []
+    strokes_drawn = []
     for _ in range(draw(st.integers(1, 5))):
         top, left = draw(st.integers(0, HEIGHT)), draw(st.integers(0, WIDTH))
         rows, columns = draw(st.integers(0, HEIGHT)), draw(st.integers(0, WIDTH))
         seed = draw(st.integers(0, 99))
-        found.append((slice(top, top + rows), slice(left, left + columns), seed))
-    return found
+        strokes_drawn.append((slice(top, top + rows), slice(left, left + columns), seed))
+    return strokes_drawn
 
 
 @pytest.mark.parametrize("side", [1, 7, 8, 64, None])
 def test_equal_to_the_sums_over_the_whole_picture(side: int | None):
     picture = _picture(0)
-    found = TiledEquations(*picture, side=side).equations
+    equations = TiledEquations(*picture, side=side).equations
     expected = inner_products(*picture)
     # Another order of summation, in float64.
-    for got, want in zip((found.M, found.b, found.target_norm2), expected, strict=True):
-        np.testing.assert_allclose(got, want, rtol=1e-12)
+    for actual, expected_sums in zip(
+        (equations.M, equations.b, equations.target_norm2), expected, strict=True
+    ):
+        np.testing.assert_allclose(actual, expected_sums, rtol=1e-12)
 
 
 @settings(max_examples=200, deadline=None)
@@ -60,22 +62,22 @@ def test_update_is_rebuild_and_undo_is_undone_bit_for_bit(
     before = _bits(tiled.equations)
     undo = []
     for rows, columns, colour in painted:
-        where = rows, columns
+        region = rows, columns
         rng = np.random.default_rng(colour)
-        undo.append((where, target[where].copy(), importance[where].copy()))
-        stroke = rng.random(target[where].shape).astype(np.float32)
-        weight = np.round(rng.random(importance[where].shape) * 2).astype(np.float32)
+        undo.append((region, target[region].copy(), importance[region].copy()))
+        stroke = rng.random(target[region].shape).astype(np.float32)
+        weight = np.round(rng.random(importance[region].shape) * 2).astype(np.float32)
         changes_target, changes_importance = colour % 3 != 0, colour % 3 != 1
         if changes_target:
-            target[where] = stroke
+            target[region] = stroke
         if changes_importance:
-            importance[where] = weight
-        tiled.update(where, with_M=changes_importance)
+            importance[region] = weight
+        tiled.update(region, with_M=changes_importance)
         rebuilt = TiledEquations(images, target, importance, side=side)
         assert _bits(tiled.equations) == _bits(rebuilt.equations)
-    for where, colours, weights in reversed(undo):
-        target[where], importance[where] = colours, weights
-        tiled.update(where)
+    for region, colours, weights in reversed(undo):
+        target[region], importance[region] = colours, weights
+        tiled.update(region)
     assert _bits(tiled.equations) == before
 
 
@@ -132,9 +134,9 @@ def test_two_halves_add_up_and_other_lights_do_not():
         NormalEquations(*inner_products(images[:, part], target[part], importance[part]))
         for part in (slice(0, 10), slice(10, None))
     ]
-    both, whole = halves[0] + halves[1], inner_products(images, target, importance)
-    np.testing.assert_allclose(both.M, whole[0], rtol=1e-12)
-    np.testing.assert_allclose(both.b, whole[1], rtol=1e-12)
-    np.testing.assert_allclose(both.target_norm2, whole[2], rtol=1e-12)
+    sums_of_halves, sums_of_all = halves[0] + halves[1], inner_products(images, target, importance)
+    np.testing.assert_allclose(sums_of_halves.M, sums_of_all[0], rtol=1e-12)
+    np.testing.assert_allclose(sums_of_halves.b, sums_of_all[1], rtol=1e-12)
+    np.testing.assert_allclose(sums_of_halves.target_norm2, sums_of_all[2], rtol=1e-12)
     with pytest.raises(SizeError, match="4 lights and one of 3"):
-        both + NormalEquations(*inner_products(images[:3], target, importance))
+        sums_of_halves + NormalEquations(*inner_products(images[:3], target, importance))

@@ -40,11 +40,11 @@ def test_what_is_painted_off_is_off(layers: Any, painting: Any, seed: int):
     weights = np.random.default_rng(seed).uniform(0.2, 2, (5, 3))
     weights[1], weights[3, 1] = 0, 0
     painted = np.einsum("nhwc,nc->hwc", images, weights).astype(painting)
-    found = _solve(images.astype(layers), painted)
-    assert (found[1] == 0).all()
-    assert found[3, 1] == 0
+    solution = _solve(images.astype(layers), painted)
+    assert (solution[1] == 0).all()
+    assert solution[3, 1] == 0
     # Rounding of half floats, which other weights are found to within.
-    np.testing.assert_allclose(found, weights, atol=2e-3)
+    np.testing.assert_allclose(solution, weights, atol=2e-3)
 
 
 @pytest.mark.parametrize("dimmed", [1e-6, 1e-9])
@@ -54,8 +54,8 @@ def test_day_for_night(dimmed: float, kind: Any):
     images = pictures(2, size=SIZE)
     images[0] *= 1e5
     painted = (dimmed * images[0]).astype(np.float32)
-    found = _solve(images.astype(np.float32), painted)
-    np.testing.assert_allclose(found[0], dimmed, rtol=1e-4)
+    solution = _solve(images.astype(np.float32), painted)
+    np.testing.assert_allclose(solution[0], dimmed, rtol=1e-4)
 
 
 def test_a_dim_light_in_a_corner_stays_on():
@@ -71,21 +71,21 @@ def test_a_dim_light_beside_a_bright_one_stays_as_it_was():
     """In half floats no pixel shows a candle in the sun; nobody has painted it off."""
     images = pictures(2, size=SIZE) + 1
     images[0] *= 2e3
-    found = remove_traces(
+    cleaned = remove_traces(
         _basis(images.astype(np.float16)),
         np.ones((2, 3)),
         images[0],
         is_constrained=np.zeros(2, bool),
     )
-    assert (found == 1).all()
+    assert (cleaned == 1).all()
 
 
 def test_what_is_asked_is_kept():
     images = pictures(3, size=SIZE)
-    asked = Constraints.of({"light 1": {"lock": [1e-9, 1e-9, 1e-9]}})
-    found = _solve(images, 2 * images[0], constraints=asked)
-    assert (found[1] == 1e-9).all()
-    assert (found[2] == 0).all()
+    constraints = Constraints.of({"light 1": {"lock": [1e-9, 1e-9, 1e-9]}})
+    solution = _solve(images, 2 * images[0], constraints=constraints)
+    assert (solution[1] == 1e-9).all()
+    assert (solution[2] == 0).all()
 
 
 def test_of_a_basis_that_knows_its_noise_nothing_is_taken():

@@ -19,10 +19,10 @@ def _problems(n: int, seed: int, count: int = 3) -> tuple[Any, Any]:
     rng = np.random.default_rng([n, seed])
     columns = rng.random((count, 3 * n + 4, n)) ** 2
     columns /= np.linalg.norm(columns, axis=1, keepdims=True)
-    wanted = columns @ (rng.random((count, n, 1)) * (rng.random((count, n, 1)) < 0.6))
-    wanted += 0.3 * rng.normal(size=wanted.shape)
-    turned = columns.transpose(0, 2, 1)
-    return turned @ columns, (turned @ wanted)[..., 0]
+    target_images = columns @ (rng.random((count, n, 1)) * (rng.random((count, n, 1)) < 0.6))
+    target_images += 0.3 * rng.normal(size=target_images.shape)
+    transposed = columns.transpose(0, 2, 1)
+    return transposed @ columns, (transposed @ target_images)[..., 0]
 
 
 def _steps(M: Any, b: Any, upper: float, x: Any) -> tuple[Any, Any, int]:
@@ -41,8 +41,8 @@ def test_what_is_certified_is_the_optimum(n: int, upper: float):
         for c in range(3):
             gradient, size = M[c] @ x[c] - b[c], np.abs(b[c]).max()
             # Sums of n products in another order.
-            again = kkt_residual(gradient, x[c], size, 0.0, upper)
-            assert again == pytest.approx(residuals[c], abs=1e-14)
+            residual = kkt_residual(gradient, x[c], size, 0.0, upper)
+            assert residual == pytest.approx(residuals[c], abs=1e-14)
             if residuals[c] <= TOLERANCE:
                 best = minimise(M[c], b[c], upper=upper, method="gauss-seidel", tolerance=1e-11)
                 # 1e-11 times the condition of M, some thousands at worst.
@@ -58,9 +58,9 @@ def test_a_problem_that_is_solved_stays_as_it_is():
     x, _, _ = _steps(M, b, np.inf, np.ones(b.shape))
     begin = np.ones(b.shape)
     begin[1] = x[1]
-    again, _, steps = _steps(M, b, np.inf, begin)
+    unchanged, _, steps = _steps(M, b, np.inf, begin)
     assert steps > 0
-    assert again[1].tobytes() == x[1].tobytes()
+    assert unchanged[1].tobytes() == x[1].tobytes()
 
 
 def test_coincident_lights_stay_as_they_differ_at_the_start():
@@ -102,22 +102,22 @@ def test_without_them_the_answer_is_the_same(n: int, monkeypatch: pytest.MonkeyP
 def test_channels_in_threads_have_the_bits_of_one_after_another():
     n = MAX_BATCHED_UNKNOWNS + 6
     equations, start = _equations(n, 5), np.ones((n, 3))
-    found = solve_free(equations, start)
+    together = solve_free(equations, start)
     for c in range(3):
-        alone = minimise(equations.M[c], equations.b[c], start=start[:, c])
-        assert alone.x.tobytes() == found.weights[:, c].tobytes()
+        separate = minimise(equations.M[c], equations.b[c], start=start[:, c])
+        assert separate.x.tobytes() == together.weights[:, c].tobytes()
 
 
 def test_a_channel_that_does_not_converge_does_not_spoil_the_others():
     equations = _equations(8, 3)
     # Nothing asks for light in the second: that is none of their business.
     equations.b[1] *= -1
-    found = solve_free(equations, np.ones((8, 3)))
-    assert found.converged
-    np.testing.assert_array_equal(found.weights[:, 1], 0)
+    optimum = solve_free(equations, np.ones((8, 3)))
+    assert optimum.converged
+    np.testing.assert_array_equal(optimum.weights[:, 1], 0)
     for c in (0, 2):
         q = scaled(equations.M[c], equations.b[c], 0.0, np.inf, ())
-        assert q.violations(found.weights[:, c] / q.scale)[2] <= TOLERANCE
+        assert q.violations(optimum.weights[:, c] / q.scale)[2] <= TOLERANCE
 
 
 def test_few_lights_and_pixels_that_are_not_finite():

@@ -20,7 +20,7 @@ def test_copies_of_a_light_share_the_change_evenly(copies: int) -> None:
     A = np.hstack([np.repeat(a, copies, axis=1), other])
     M, b = A.T @ A, A.T @ (A @ np.ones(copies + 2))
     start = np.concatenate([1 + rng.random(copies), [1, 1]])
-    for found in (
+    for nearest_optimum in (
         minimise(M, b, start=start),
         *minimise_each(
             np.stack([M, M]),
@@ -31,18 +31,18 @@ def test_copies_of_a_light_share_the_change_evenly(copies: int) -> None:
         ),
     ):
         expected = start[:copies] - (start[:copies].sum() - copies) / copies
-        np.testing.assert_allclose(found.x, [*expected, 1, 1], atol=1e-9)
-        assert found.converged
+        np.testing.assert_allclose(nearest_optimum.x, [*expected, 1, 1], atol=1e-9)
+        assert nearest_optimum.converged
 
 
 def test_what_has_no_part_in_it_stays_to_the_bit() -> None:
     """In closed form: two of three lights are one, and the third has nothing to do with them."""
     q = scaled(np.array([[1.0, 1, 0], [1, 1, 0], [0, 0, 1]]), np.ones(3), 0.0, np.inf, ())
-    moved = nearest_equal(q, np.array([0.75, 0.25, 1.0]), np.array([0.3, 0.2, 5.0]))
-    np.testing.assert_allclose(moved, [0.55, 0.45, 1.0], atol=1e-15)
-    assert moved[2] == 1.0
-    stays = np.array([0.55, 0.45, 1.0])
-    assert nearest_equal(q, stays, stays) is stays
+    nearest = nearest_equal(q, np.array([0.75, 0.25, 1.0]), np.array([0.3, 0.2, 5.0]))
+    np.testing.assert_allclose(nearest, [0.55, 0.45, 1.0], atol=1e-15)
+    assert nearest[2] == 1.0
+    unaffected = np.array([0.55, 0.45, 1.0])
+    assert nearest_equal(q, unaffected, unaffected) is unaffected
 
 
 def test_a_bound_ends_the_way_back() -> None:
@@ -50,10 +50,10 @@ def test_a_bound_ends_the_way_back() -> None:
     a = np.random.default_rng(0).random((20, 1))
     A = np.hstack([a, a])
     M, b = A.T @ A, A.T @ (A @ [1.0, 1.0])
-    found = minimise(M, b, upper=[0.9, np.inf], start=np.array([0.9, 0.3]))
-    assert found.x.sum() == pytest.approx(2, abs=1e-9)
-    assert found.x[0] <= 0.9
-    assert found.converged
+    nearest_optimum = minimise(M, b, upper=[0.9, np.inf], start=np.array([0.9, 0.3]))
+    assert nearest_optimum.x.sum() == pytest.approx(2, abs=1e-9)
+    assert nearest_optimum.x[0] <= 0.9
+    assert nearest_optimum.converged
 
 
 def _capped_problem(seed: int) -> tuple[Any, Any, list[Cap]]:
@@ -95,18 +95,18 @@ def test_moved_along_is_the_projection(seed: int) -> None:
     a, x = 0.1 + rng.random((k, m)), rng.normal(size=(k, m))
     low = np.where(rng.random((k, m)) < 0.3, -np.inf, -rng.random((k, m)))
     high = np.where(rng.random((k, m)) < 0.3, np.inf, rng.random((k, m)))
-    inside = np.clip(rng.normal(size=(k, m)), low, high)
-    x, wanted = np.clip(x, low, high), (a * inside).sum(axis=1)
-    found = clip_to_sums(a, x, low, high, wanted)
+    feasible = np.clip(rng.normal(size=(k, m)), low, high)
+    x, sums = np.clip(x, low, high), (a * feasible).sum(axis=1)
+    clipped = clip_to_sums(a, x, low, high, sums)
     # float64 sums of three.
-    np.testing.assert_allclose((a * found).sum(axis=1), wanted, atol=1e-12)
-    assert ((found >= low) & (found <= high)).all()
+    np.testing.assert_allclose((a * clipped).sum(axis=1), sums, atol=1e-12)
+    assert ((clipped >= low) & (clipped <= high)).all()
     # x − found is a multiple of a but for what bounds take, whose sign fits.
     for row in range(k):
-        free = (found[row] > low[row]) & (found[row] < high[row])
-        push = (x[row] - found[row]) / a[row]
+        free = (clipped[row] > low[row]) & (clipped[row] < high[row])
+        push = (x[row] - clipped[row]) / a[row]
         if free.any():
             t = push[free].mean()
             np.testing.assert_allclose(push[free], t, atol=1e-10)
-            assert (push[found[row] <= low[row]] <= t + 1e-10).all()
-            assert (push[found[row] >= high[row]] >= t - 1e-10).all()
+            assert (push[clipped[row] <= low[row]] <= t + 1e-10).all()
+            assert (push[clipped[row] >= high[row]] >= t - 1e-10).all()

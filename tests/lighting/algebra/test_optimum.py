@@ -37,12 +37,12 @@ def _bounds(rng: np.random.Generator, n: int) -> tuple[Any, Any]:
     return lower, lower + np.where(rng.random(n) < 0.4, room, np.inf)
 
 
-def _certify(found: Optimum, M: Any, b: Any, lower: Any, upper: Any, caps: Any = ()) -> None:
+def _certify(optimum: Optimum, M: Any, b: Any, lower: Any, upper: Any, caps: Any = ()) -> None:
     """Optimal, since what is left of the gradient is a sum of the limits that hold x.
 
     That is sufficient, the problem being convex; scipy's nnls finds the sum.
     """
-    x, n = found.x, b.size
+    x, n = optimum.x, b.size
     assert (lower <= x).all()
     assert (x <= upper).all()
     size = 1 / np.sqrt(np.where(np.diag(M) > 0, np.diag(M), 1))
@@ -78,13 +78,13 @@ def test_no_light_is_negative_as_in_scipy(kind: str):
         n = int(rng.integers(2, 30))
         A, y = _pixels(rng, n, kind)
         M, b = A.T @ A, A.T @ y
-        found = minimise(M, b, start=np.ones(n))
-        assert found.converged
-        _certify(found, M, b, np.zeros(n), np.full(n, np.inf))
+        optimum = minimise(M, b, start=np.ones(n))
+        assert optimum.converged
+        _certify(optimum, M, b, np.zeros(n), np.full(n, np.inf))
         # Both minimise the same squares: ours are no more than scipy's, up to round-off.
-        mine = np.square(A @ found.x - y).sum()
+        objective = np.square(A @ optimum.x - y).sum()
         oracle = nnls(A, y, maxiter=100 * n)[1] ** 2
-        assert mine <= oracle + 1e-10 * np.square(y).sum()
+        assert objective <= oracle + 1e-10 * np.square(y).sum()
 
 
 @pytest.mark.usefixtures("_solver_path")
@@ -96,9 +96,9 @@ def test_between_bounds_as_in_scipy(kind: str):
         A, y = _pixels(rng, n, kind)
         lower, upper = _bounds(rng, n)
         M, b = A.T @ A, A.T @ y
-        found = minimise(M, b, lower=lower, upper=upper, start=rng.random(n) * 2)
-        assert found.converged
-        _certify(found, M, b, lower, upper)
+        optimum = minimise(M, b, lower=lower, upper=upper, start=rng.random(n) * 2)
+        assert optimum.converged
+        _certify(optimum, M, b, lower, upper)
         free = lower < upper
         x = lower.copy()
         if free.any():
@@ -106,8 +106,8 @@ def test_between_bounds_as_in_scipy(kind: str):
             x[free] = lsq_linear(
                 A[:, free], rest, (lower[free], upper[free]), tol=1e-14, method="bvls"
             ).x
-        mine, oracle = (np.square(A @ v - y).sum() for v in (found.x, x))
-        assert mine <= oracle + 1e-10 * (np.square(y).sum() + np.square(A @ lower).sum())
+        objective, oracle = (np.square(A @ v - y).sum() for v in (optimum.x, x))
+        assert objective <= oracle + 1e-10 * (np.square(y).sum() + np.square(A @ lower).sum())
 
 
 def _capped_problem(seed: int) -> tuple[Any, Any, Any, Any, list[Cap], Any]:
@@ -136,9 +136,9 @@ def test_under_caps_certified_and_as_quadprog(seeds: range):
     compared = 0
     for seed in seeds:
         M, b, lower, upper, caps, start = _capped_problem(seed)
-        found = minimise(M, b, lower=lower, upper=upper, caps=caps, start=start)
-        assert found.converged
-        _certify(found, M, b, lower, upper, caps)
+        optimum = minimise(M, b, lower=lower, upper=upper, caps=caps, start=start)
+        assert optimum.converged
+        _certify(optimum, M, b, lower, upper, caps)
         if np.linalg.cond(M) > 1e8:
             continue  # quadprog needs a definite M
         rows = np.zeros((len(caps), b.size))
@@ -146,9 +146,9 @@ def test_under_caps_certified_and_as_quadprog(seeds: range):
             row[list(cap.unknowns)] = cap.coefficients
         limits = [(cap.lower, cap.upper) for cap in caps]
         other = least(M, b, lower=lower, upper=upper, rows=rows, limits=limits)
-        mine, oracle = (0.5 * x @ M @ x - b @ x for x in (found.x, other))
+        objective, oracle = (0.5 * x @ M @ x - b @ x for x in (optimum.x, other))
         # It keeps to its constraints to about 1e-12 of their size.
-        assert mine == pytest.approx(oracle, abs=1e-9 * (1 + abs(oracle)))
+        assert objective == pytest.approx(oracle, abs=1e-9 * (1 + abs(oracle)))
         compared += 1
     assert compared >= 0.28 * len(seeds)
 
@@ -156,9 +156,9 @@ def test_under_caps_certified_and_as_quadprog(seeds: range):
 @pytest.mark.parametrize("seed", range(20))
 def test_the_papers_iteration_comes_to_the_same_under_caps(seed: int):
     M, b, lower, upper, caps, start = _capped_problem(4 * seed)
-    kept = {"lower": lower, "upper": upper, "caps": caps, "start": start}
-    swept = minimise(M, b, method="gauss-seidel", tolerance=1e-10, **kept)
-    best = minimise(M, b, **kept)
+    constraints = {"lower": lower, "upper": upper, "caps": caps, "start": start}
+    swept = minimise(M, b, method="gauss-seidel", tolerance=1e-10, **constraints)
+    best = minimise(M, b, **constraints)
     assert swept.converged
     assert (swept.sweeps > 0) or (swept.kkt_residual <= 1e-10)
     np.testing.assert_allclose(swept.x, best.x, atol=1e-6)
@@ -167,10 +167,10 @@ def test_the_papers_iteration_comes_to_the_same_under_caps(seed: int):
 def test_no_sweep_raises_the_objective_under_caps():
     for seed in range(10):
         M, b, lower, upper, caps, start = _capped_problem(seed)
-        kept = {"lower": lower, "upper": upper, "caps": caps, "start": start}
+        constraints = {"lower": lower, "upper": upper, "caps": caps, "start": start}
         trace = []
         for k in range(12):
-            x = minimise(M, b, method="gauss-seidel", max_sweeps=k, **kept).x
+            x = minimise(M, b, method="gauss-seidel", max_sweeps=k, **constraints).x
             trace.append(0.5 * x @ M @ x - b @ x)
         assert np.diff(trace).max() <= 1e-13 * np.abs(trace).max()
 
@@ -181,25 +181,25 @@ def test_caps_of_four_unknowns_and_of_one():
         A, y = _pixels(rng, 6, "plain")
         M, b = A.T @ A, A.T @ (3 * y)
         caps = [Cap((0, 2, 3, 5), (0.3, 0.5, 0.1, 0.7), upper=0.4), Cap((1,), (2.0,), 0.5, 0.5)]
-        found = minimise(M, b, caps=caps)
-        assert found.converged
-        _certify(found, M, b, np.zeros(6), np.full(6, np.inf), caps)
-        np.testing.assert_allclose(found.x[1], 0.25, rtol=1e-14)
+        optimum = minimise(M, b, caps=caps)
+        assert optimum.converged
+        _certify(optimum, M, b, np.zeros(6), np.full(6, np.inf), caps)
+        np.testing.assert_allclose(optimum.x[1], 0.25, rtol=1e-14)
 
 
 def test_multipliers_are_prices():
     M, b = np.eye(3), np.array([1.0, 2.0, -1.0])
-    found = minimise(M, b, upper=[np.inf, 0.5, np.inf])
-    assert found.x[1:].tolist() == [0.5, 0]
+    optimum = minimise(M, b, upper=[np.inf, 0.5, np.inf])
+    assert optimum.x[1:].tolist() == [0.5, 0]
     # One step with a ridge of 8 ε √n.
-    np.testing.assert_allclose(found.x[0], 1, rtol=1e-14)
-    np.testing.assert_allclose(found.multipliers, [0, -1.5, 1], atol=1e-14)
+    np.testing.assert_allclose(optimum.x[0], 1, rtol=1e-14)
+    np.testing.assert_allclose(optimum.multipliers, [0, -1.5, 1], atol=1e-14)
     cap = Cap((0, 1), (1.0, 1.0), upper=2.0)
-    found = minimise(M, b, caps=[cap])
-    np.testing.assert_allclose(found.x, [0.5, 1.5, 0], atol=1e-15)
+    optimum = minimise(M, b, caps=[cap])
+    np.testing.assert_allclose(optimum.x, [0.5, 1.5, 0], atol=1e-15)
     # One more of the limit would lower the objective by that much.
-    np.testing.assert_allclose(found.cap_multipliers, [-0.5], rtol=1e-14)
-    np.testing.assert_allclose(found.multipliers, [0, 0, 1], atol=1e-15)
+    np.testing.assert_allclose(optimum.cap_multipliers, [-0.5], rtol=1e-14)
+    np.testing.assert_allclose(optimum.multipliers, [0, 0, 1], atol=1e-15)
 
 
 def test_units_and_order_are_of_no_importance():
@@ -225,7 +225,7 @@ def test_units_and_order_are_of_no_importance():
         np.testing.assert_allclose(other.x * s, plain.x, atol=1e-8)
         order = rng.permutation(n)
         place = np.argsort(order)
-        moved = [
+        moved_caps = [
             Cap(tuple(int(place[i]) for i in c.unknowns), c.coefficients, c.lower, c.upper)
             for c in caps
         ]
@@ -234,7 +234,7 @@ def test_units_and_order_are_of_no_importance():
             b[order],
             lower=lower[order],
             upper=upper[order],
-            caps=moved,
+            caps=moved_caps,
             start=start[order],
         )
         np.testing.assert_allclose(other.x, plain.x[order], atol=1e-8)
@@ -245,10 +245,10 @@ def test_of_equal_optima_one_near_the_start():
     a = rng.random((30, 1))
     A = np.hstack([a, a, rng.random((30, 1))])
     M, b = A.T @ A, A.T @ (A @ [1.0, 1, 1])
-    found = minimise(M, b, start=np.array([1.5, 0.7, 1.0]))
-    np.testing.assert_allclose(found.x, [1.4, 0.6, 1], atol=1e-9)
-    again = minimise(M, b, start=found.x)
-    np.testing.assert_array_equal(again.x, found.x)
+    optimum = minimise(M, b, start=np.array([1.5, 0.7, 1.0]))
+    np.testing.assert_allclose(optimum.x, [1.4, 0.6, 1], atol=1e-9)
+    second_optimum = minimise(M, b, start=optimum.x)
+    np.testing.assert_array_equal(second_optimum.x, optimum.x)
 
 
 def test_many_lights():
@@ -256,10 +256,10 @@ def test_many_lights():
     A = rng.random((700, 400)) ** 3
     y = A @ (rng.random(400) * (rng.random(400) < 0.6)) + 0.3 * rng.normal(size=700)
     M, b = A.T @ A, A.T @ y
-    found = minimise(M, b, start=np.ones(400))
-    assert found.converged
-    assert (found.x == 0).any()
-    _certify(found, M, b, np.zeros(400), np.full(400, np.inf))
+    optimum = minimise(M, b, start=np.ones(400))
+    assert optimum.converged
+    assert (optimum.x == 0).any()
+    _certify(optimum, M, b, np.zeros(400), np.full(400, np.inf))
 
 
 @pytest.mark.parametrize(
@@ -284,6 +284,6 @@ def test_problems_that_are_none(change: dict[str, Any], words: str):
 
 
 def test_no_unknowns():
-    found = minimise(np.zeros((0, 0)), np.zeros(0))
-    assert found.converged
-    assert found.x.shape == (0,)
+    optimum = minimise(np.zeros((0, 0)), np.zeros(0))
+    assert optimum.converged
+    assert optimum.x.shape == (0,)

@@ -33,26 +33,26 @@ def test_coincident_lights_are_a_group_whatever_their_power():
     images[:, 2] = 7 * images[:, 0]
     # Another colour is another weight, not another light.
     images[:, 4] = images[:, 0] * np.array([1, 0.5, 1e-3])[:, None]
-    (found,) = indistinguishable(_gram(images), NAMES)
-    assert found.names == ("key", "rim", "lamp")
-    assert not found.is_mix
-    assert "key, rim and lamp light the painted part alike" in found.sentence
-    assert "wider mask" in found.sentence
+    (group,) = indistinguishable(_gram(images), NAMES)
+    assert group.names == ("key", "rim", "lamp")
+    assert not group.is_mix
+    assert "key, rim and lamp light the painted part alike" in group.sentence
+    assert "wider mask" in group.sentence
 
 
 def test_a_light_that_is_a_mix_of_others():
     images = _images()
     images[:, 3] = 0.5 * images[:, 0] + 2 * images[:, 1]
-    (found,) = indistinguishable(_gram(images), NAMES)
-    assert found.names == ("key", "fill", "sky")
-    assert found.is_mix
-    assert "mixes of key, fill and sky" in found.sentence
+    (group,) = indistinguishable(_gram(images), NAMES)
+    assert group.names == ("key", "fill", "sky")
+    assert group.is_mix
+    assert "mixes of key, fill and sky" in group.sentence
 
 
 def test_fewer_pixels_than_lights():
-    found = indistinguishable(_gram(_images()[:, :, :2]), NAMES)
-    assert found
-    assert all(each.is_mix for each in found)
+    groups = indistinguishable(_gram(_images()[:, :, :2]), NAMES)
+    assert groups
+    assert all(each.is_mix for each in groups)
 
 
 def test_lights_that_reach_nothing_are_not_compared():
@@ -64,12 +64,12 @@ def test_lights_that_reach_nothing_are_not_compared():
 def test_one_channel_and_no_lights():
     images = _images()
     images[0, 1] = images[0, 0]
-    (found,) = indistinguishable(_gram(images)[0], NAMES)
-    assert found.names == ("key", "fill")
+    (group,) = indistinguishable(_gram(images)[0], NAMES)
+    assert group.names == ("key", "fill")
     # In the other channels they do differ: it is in one that they can trade.
-    (found,) = indistinguishable(_gram(images), NAMES)
-    assert found.names == ("key", "fill")
-    assert found.is_mix
+    (group,) = indistinguishable(_gram(images), NAMES)
+    assert group.names == ("key", "fill")
+    assert group.is_mix
     assert indistinguishable(np.zeros((3, 0, 0)), []) == ()
 
 
@@ -83,9 +83,9 @@ def test_two_lights_at_one_place_are_named_in_spite_of_noise():
         BasisLight(name, "area", "radiance", "W/(m² sr)", (1.0, 1.0, 1.0)) for name in "abc"
     )
     origin = Origin("s", "", "c", 0, "one pass", (8, 8), (1, 1))
-    seen = np.zeros((16, 16), dtype=bool)
-    basis = Basis(lights, images, noise[1].astype(np.float32), seen, origin)
+    emitter_mask = np.zeros((16, 16), dtype=bool)
+    basis = Basis(lights, images, noise[1].astype(np.float32), emitter_mask, origin)
     target = Target("t", basis.mix(np.ones((3, 3))), np.ones((16, 16), np.float32), False)
-    [found] = ambiguities(solve(basis, target))
-    assert found.names == ("a", "c")
-    assert not found.is_mix
+    [ambiguity] = ambiguities(solve(basis, target))
+    assert ambiguity.names == ("a", "c")
+    assert not ambiguity.is_mix

@@ -36,10 +36,10 @@ def _left_and_right(make_basis: Any, *, spill: float = 0.0, noise: float = 0.0) 
     )
 
 
-def _paint_over(look: Any, where: Any, color: Any, *, alpha: float = 1.0) -> Target:
+def _paint_over(look: Any, region: Any, color: Any, *, alpha: float = 1.0) -> Target:
     """Painted over the current look, through a display."""
     image, importance = look.copy(), np.zeros(look.shape[:2], np.float32)
-    image[where], importance[where] = color, alpha
+    image[region], importance[region] = color, alpha
     painted = Target.of(image, importance, name="painting")
     return replace(painted, over_look=True, through_view=True, transform=ViewTransform())
 
@@ -51,8 +51,8 @@ def _look(basis: Any) -> Any:
 def test_the_mean_is_over_the_paint_weighted_and_against_the_paint(make_basis: Any):
     """Whatever the solve held: in closed form."""
     basis = _left_and_right(make_basis)
-    where = (slice(None), slice(0, 24))
-    target = _paint_over(_look(basis), where, (0.5, 0.4, 0.3))
+    region = (slice(None), slice(0, 24))
+    target = _paint_over(_look(basis), region, (0.5, 0.4, 0.3))
     target.importance[:12, :24] = 0.25
     target.image[:12, :24] = 0.6
     solution = solve(basis, target, constraints=Constraints.of({"left": {"lock": True}}))
@@ -72,13 +72,13 @@ def test_a_look_at_the_exposure_and_through_the_view_of_the_painting(make_basis:
     basis = _left_and_right(make_basis, spill=0.5)
     dark = make_basis(images=basis.images, names=basis.names, emission=[[0.2 / 64] * 3] * 2)
     bright = ViewTransform("srgb", 6.0)
-    where = (slice(None), slice(0, 24))
-    found = []
-    for its, scale, view in ((basis, 1, ViewTransform()), (dark, 64, bright)):
-        target = replace(_paint_over(_look(its), where, 0.5 / scale), transform=view)
-        found.append(compare_appearance(solve(its, target, constraints=_lock_all())))
-    assert found[0].delta_e > 1
-    assert found[1].delta_e == pytest.approx(found[0].delta_e, rel=1e-3)
+    region = (slice(None), slice(0, 24))
+    appearances = []
+    for its_basis, scale, view in ((basis, 1, ViewTransform()), (dark, 64, bright)):
+        target = replace(_paint_over(_look(its_basis), region, 0.5 / scale), transform=view)
+        appearances.append(compare_appearance(solve(its_basis, target, constraints=_lock_all())))
+    assert appearances[0].delta_e > 1
+    assert appearances[1].delta_e == pytest.approx(appearances[0].delta_e, rel=1e-3)
 
 
 def test_a_painting_that_is_made_is_close(make_basis: Any):
@@ -102,21 +102,23 @@ def test_an_untouched_picture_is_close(make_basis: Any):
 
 
 @pytest.mark.parametrize(
-    ("asked", "held"),
+    ("requested", "held_share"),
     [
         ({"hold": 50.0}, ("hold",)),
         ({"hold": 0.0, "constraints": {"*": {"limits": {"max": 0.21}}}}, ("constraints",)),
         ({"hold": 0.0}, ()),
     ],
 )
-def test_a_held_picture_never_meets_the_wish(make_basis: Any, asked: Any, held: Any):
+def test_a_held_picture_never_meets_the_wish(make_basis: Any, requested: Any, held_share: Any):
     """What was asked for is swallowed: that is no success, and what swallowed it is told."""
     basis = _left_and_right(make_basis, spill=0.5)
     target = _paint_over(_look(basis), (slice(8, 16), slice(4, 12)), 0.6)
-    limits = Constraints.of(asked.get("constraints", {}))
-    appearance = compare_appearance(solve(basis, target, hold=asked["hold"], constraints=limits))
-    assert appearance.is_close == (not held)
-    assert appearance.limit_groups == held
+    limits = Constraints.of(requested.get("constraints", {}))
+    appearance = compare_appearance(
+        solve(basis, target, hold=requested["hold"], constraints=limits)
+    )
+    assert appearance.is_close == (not held_share)
+    assert appearance.limit_groups == held_share
 
 
 def test_what_holds_whatever_else_is_let_go_comes_first(make_basis: Any):
@@ -125,9 +127,9 @@ def test_what_holds_whatever_else_is_let_go_comes_first(make_basis: Any):
     target = _paint_over(_look(basis), (slice(8, 16), slice(4, 12)), 0.6)
     locked = Constraints.of({"*": {"lock": True}})
     assert compare_appearance(solve(basis, target, hold=50.0)).limit_groups == ("hold",)
-    both = compare_appearance(solve(basis, target, hold=50.0, constraints=locked)).limit_groups
-    assert both[0] == "constraints"
-    assert "hold" in both
+    groups = compare_appearance(solve(basis, target, hold=50.0, constraints=locked)).limit_groups
+    assert groups[0] == "constraints"
+    assert "hold" in groups
 
 
 def _four_quarters(make_basis: Any) -> Any:
@@ -145,9 +147,9 @@ def test_a_light_that_somebody_switched_off_goes_before_the_hold(make_basis: Any
     """Two are off by hand, and one of them is all that is missed."""
     basis = _four_quarters(make_basis)
     target = _paint_over(_look(basis), (slice(None), slice(12, 24)), 0.5)
-    off = {name: {"off": True} for name in ("annex_window", "annex_lamp")}
+    switched_off = {name: {"off": True} for name in ("annex_window", "annex_lamp")}
     appearance = compare_appearance(
-        solve(basis, target, hold=10.0, constraints=Constraints.of(off))
+        solve(basis, target, hold=10.0, constraints=Constraints.of(switched_off))
     )
     first = appearance.reasons[0]
     assert (first.kind, first.names) == ("off", ("annex_window",))
@@ -155,8 +157,8 @@ def test_a_light_that_somebody_switched_off_goes_before_the_hold(make_basis: Any
     assert "annex_window is switched off" in headline(appearance)
     # What both are needed for is told of both, and of no other light that is locked.
     wide = _paint_over(_look(basis), (slice(None), slice(12, 36)), 0.5)
-    asked = Constraints.of(off | {"left": {"lock": True}})
-    first = compare_appearance(solve(basis, wide, hold=10.0, constraints=asked)).reasons[0]
+    constraints = Constraints.of(switched_off | {"left": {"lock": True}})
+    first = compare_appearance(solve(basis, wide, hold=10.0, constraints=constraints)).reasons[0]
     assert first.names == ("annex_window", "annex_lamp")
 
 
@@ -164,21 +166,28 @@ def test_the_share_of_a_reason_is_what_the_fit_misses_no_more(make_basis: Any):
     """By a solve without it, of all pixels: the few that are looked at give the same."""
     basis = _four_quarters(make_basis)
     target = _paint_over(_look(basis), (slice(None), slice(12, 24)), 0.5)
-    off = Constraints.of({"annex_window": {"off": True}})
+    without_window = Constraints.of({"annex_window": {"off": True}})
 
-    def missed(**options: Any) -> float:
+    def missed_light(**options: Any) -> float:
         solution = solve(basis, target, **options)
         loss = solution.problem.loss.residual(basis.mix(solution.weights))
         return float((target.importance[..., None] * np.square(loss)).sum())
 
-    now, hold = missed(constraints=off, hold=3.0), missed(constraints=off, hold=0.0)
-    on = missed(hold=3.0)
+    current_miss, hold = (
+        missed_light(constraints=without_window, hold=3.0),
+        missed_light(constraints=without_window, hold=0.0),
+    )
+    miss_with_all = missed_light(hold=3.0)
     shares = {
         reason.kind: reason.share
-        for reason in compare_appearance(solve(basis, target, constraints=off, hold=3.0)).reasons
+        for reason in compare_appearance(
+            solve(basis, target, constraints=without_window, hold=3.0)
+        ).reasons
     }
-    assert shares["off"] == pytest.approx(1 - on / now, abs=1e-3)  # of where its solve stops
-    assert shares.get("hold", 0.0) == pytest.approx(1 - hold / now, abs=0.05)
+    assert shares["off"] == pytest.approx(
+        1 - miss_with_all / current_miss, abs=1e-3
+    )  # of where its solve stops
+    assert shares.get("hold", 0.0) == pytest.approx(1 - hold / current_miss, abs=0.05)
 
 
 def test_what_counts_of_the_few_pixels_is_what_counts_of_all(make_basis: Any):
@@ -212,32 +221,34 @@ def test_a_weaker_hold_is_the_strongest_that_brings_half(make_basis: Any, stops:
     assert weaker is not None
     assert 0 < weaker.hold < 10
     sample = PixelSample.of(solution)
-    holds = (weaker.hold, 1.3 * weaker.hold)  # the steps of the search are finer than that
-    brought, less = (sample.share_of(sample.solve((), sample.other_views, hold=h)) for h in holds)
-    assert brought >= 0.5 * hold.share > less
-    assert weaker.share == pytest.approx(brought)
+    tested_holds = (weaker.hold, 1.3 * weaker.hold)  # the steps of the search are finer than that
+    removed, removed_less = (
+        sample.share_of(sample.solve((), sample.other_views, hold=h)) for h in tested_holds
+    )
+    assert removed >= 0.5 * hold.share > removed_less
+    assert weaker.share == pytest.approx(removed)
     # And it harms less than none would: of the window, which nobody painted.
     look_at = PaintComparison.of_problem(solution.problem)
     before = basis.mix(solution.weights)
     none = basis.mix(solve(basis, target, hold=0.0).weights)
-    harm = unpainted_change(look_at, basis, target.importance > 0, before, none)
-    assert harm is not None
+    cost = unpainted_change(look_at, basis, target.importance > 0, before, none)
+    assert cost is not None
     assert weaker.unpainted_change is not None
-    assert weaker.unpainted_change.object == harm.object == "annex"
-    assert weaker.unpainted_change.worst < harm.worst
+    assert weaker.unpainted_change.object == cost.object == "annex"
+    assert weaker.unpainted_change.worst < cost.worst
 
 
 def test_what_becomes_of_the_rest_is_seen(make_basis: Any):
     """In closed form; and what a person did to a light is no harm of the answer."""
     basis = _four_quarters(make_basis)
-    where = (slice(None), slice(0, 12))
+    region = (slice(None), slice(0, 12))
     locked = Constraints.of({"*": {"lock": True}, "annex_window": {"lock": 0.4}})
     appearance = compare_appearance(
-        solve(basis, _paint_over(_look(basis), where, 0.2), constraints=locked)
+        solve(basis, _paint_over(_look(basis), region, 0.2), constraints=locked)
     )
     assert appearance.unpainted_change is not None
     assert appearance.unpainted_change.worst < 1e-3
-    target = _paint_over(_look(basis), where, 0.5)
+    target = _paint_over(_look(basis), region, 0.5)
     solution = solve(basis, target, hold=0.0, constraints=Constraints.of({"left": {"off": True}}))
     appearance = compare_appearance(solution)
     mixed = solution.basis.mix(solution.weights)
@@ -302,13 +313,13 @@ def test_where_no_light_gets(make_basis: Any):
 
 def test_noise_that_the_painting_does_not_share_is_told_from_a_miss(make_basis: Any):
     basis = _left_and_right(make_basis, noise=0.05)
-    where = (slice(None), slice(0, 24))
-    appearance = compare_appearance(solve(basis, _paint_over(_look(basis), where, 0.5)))
+    region = (slice(None), slice(0, 24))
+    appearance = compare_appearance(solve(basis, _paint_over(_look(basis), region, 0.5)))
     assert appearance.delta_e > 2
     assert appearance.error < 0.4 * appearance.delta_e
     # A painting over the same samples shares it: then what is missed is no noise.
     look = _look(basis)
-    target = _paint_over(look, where, 2.5 * look[where])
+    target = _paint_over(look, region, 2.5 * look[region])
     appearance = compare_appearance(solve(basis, target, hold=0.0, constraints=_lock_all()))
     assert appearance.noise < 0.1 * appearance.delta_e
 
@@ -322,18 +333,18 @@ def test_what_is_missed_lies_on_an_object(make_basis: Any):
     index = np.zeros(SIZE, np.int32)
     index[statue] = 1
     index[12:20, 14:34] = 2
-    even = Target.of(np.full((*SIZE, 3), 0.4, np.float32), name="even")
-    for names, said in (
+    even_target = Target.of(np.full((*SIZE, 3), 0.4, np.float32), name="even")
+    for names, place in (
         (("wall", "statue_body", "statue_head"), "statue"),
         (("wall", "statue", "statue"), "statue"),
         (("wall", "plinth", "statue"), ""),
         (("wall", "sphere", "sphere"), ""),
         (("room", "room", "room"), ""),
     ):
-        its = replace(basis, objects=Objects(index, names))
-        appearance = compare_appearance(solve(its, even))
+        basis_of_objects = replace(basis, objects=Objects(index, names))
+        appearance = compare_appearance(solve(basis_of_objects, even_target))
         assert appearance.place is not None
-        assert appearance.place.object == said
+        assert appearance.place.object == place
 
 
 def test_a_miss_that_is_spread_is_on_nothing(make_basis: Any):
@@ -344,8 +355,8 @@ def test_a_miss_that_is_spread_is_on_nothing(make_basis: Any):
     index[8:16, :24], index[8:16, 24:] = 1, 2
     basis = make_basis(images=images, names=["left", "right"], emission=[[0.4] * 3] * 2)
     basis = replace(basis, objects=Objects(index, ("wall", "bench", "vase")))
-    even = Target.of(np.full((*SIZE, 3), 0.4, np.float32), name="even")
-    appearance = compare_appearance(solve(basis, even))
+    even_target = Target.of(np.full((*SIZE, 3), 0.4, np.float32), name="even")
+    appearance = compare_appearance(solve(basis, even_target))
     assert appearance.place is not None
     assert appearance.place.object == ""
 
@@ -354,16 +365,16 @@ def test_a_miss_that_is_spread_is_on_nothing(make_basis: Any):
 def test_another_view_that_holds_is_named(make_basis: Any, space: Any):
     """One lamp lights all three views alike, and one is to be dark."""
     views = [_basis_of_view(make_basis, name) for name in ("stalls", "balcony", "box")]
-    paints = (0.8, 0.05, 0.8)
-    targets = [_even_target(x) for x in paints]
+    levels = (0.8, 0.05, 0.8)
+    targets = [_even_target(x) for x in levels]
     solution = solve(views, targets, space=space)
     stalls, balcony, _ = (compare_appearance(view) for view in solution.views)
     assert stalls.limit_groups == balcony.limit_groups == ("views",)
     assert stalls.limiting_views == ("balcony",)
     assert balcony.limiting_views == ("stalls", "box")
     # Views of one sensor go by their paintings.
-    same = solve([views[0]] * 3, targets, space=space)
-    assert compare_appearance(same.views[0]).limiting_views == ("0.05 painted",)
+    joint = solve([views[0]] * 3, targets, space=space)
+    assert compare_appearance(joint.views[0]).limiting_views == ("0.05 painted",)
 
 
 def test_what_holds_beside_other_views_is_told_apart(make_basis: Any):
@@ -418,6 +429,6 @@ def test_nothing_is_left_to_solve_where_all_is_held(make_basis: Any):
     """Of a basis with noise, whose errors are asked for: no direction is left that they have."""
     basis = _left_and_right(make_basis, noise=0.01)
     target = _paint_over(_look(basis), np.s_[:, :24], 0.5)
-    held = Constraints.of({"*": {"lock": 0.3}})
-    [analysis] = analyse(solve(basis, target, constraints=held))
+    locks = Constraints.of({"*": {"lock": 0.3}})
+    [analysis] = analyse(solve(basis, target, constraints=locks))
     np.testing.assert_allclose(analysis.solution.weights, 0.3)

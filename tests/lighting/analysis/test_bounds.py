@@ -83,9 +83,9 @@ def _reduced(basis: Any, target: Target) -> tuple[Any, Any]:
 def _random_ranges(rng: Any, basis: Any) -> tuple[dict[str, Any], list[str], list[LightRange]]:
     """What is asked of each light: as `Constraints.of` takes it, and by its own words."""
     n = len(basis.lights)
-    now = np.array([light.emission for light in basis.lights])
+    current = np.array([light.emission for light in basis.lights])
     wishes: dict[str, Any] = {}
-    asked = []
+    ranges = []
     for k in range(n - 3):
         one = _free_range(n, k, is_scalar=False)
         kind = rng.choice(["", "lock", "off", "rgb", "color", "dimmer", "kelvin"])
@@ -114,49 +114,49 @@ def _random_ranges(rng: Any, basis: Any) -> tuple[dict[str, Any], list[str], lis
             one.low, one.high = np.zeros(2), np.full(2, np.inf)
             wishes[f"l{k}"] = {"kelvin": [2700, 6500]}
         one.kind = kind
-        asked.append(one)
+        ranges.append(one)
     # Two tied lights, and one that can only be dimmed.
     ties = []
     if rng.random() < 0.5:
         C = (
-            _light_columns(n, n - 3, now[[n - 3]]) + _light_columns(n, n - 2, now[[n - 2]])
+            _light_columns(n, n - 3, current[[n - 3]]) + _light_columns(n, n - 2, current[[n - 2]])
         ).reshape(1, -1)
         tied = LightRange(
             (n - 3, n - 2), C, np.zeros(1), np.full(1, np.inf), np.zeros(3 * n), "tie"
         )
-        asked.append(tied)
+        ranges.append(tied)
         ties = [f"l{n - 3}", f"l{n - 2}"]
     else:
-        asked += [_free_range(n, n - 3, is_scalar=False), _free_range(n, n - 2, is_scalar=False)]
+        ranges += [_free_range(n, n - 3, is_scalar=False), _free_range(n, n - 2, is_scalar=False)]
     last = _free_range(n, n - 1, is_scalar=True)
     if rng.random() < 0.6:
         last.kind, last.high = "scalar", np.array([rng.uniform(0.05, 0.4)])
         wishes[f"l{n - 1}"] = {"limits": {"max": float(last.high[0])}}
-    return wishes, ties, [*asked, last]
+    return wishes, ties, [*ranges, last]
 
 
-def _least_objective(R: Any, q: Any, asked: list[LightRange]) -> float:
+def _least_objective(R: Any, q: Any, ranges: list[LightRange]) -> float:
     """The least objective, by scipy."""
-    C = np.concatenate([a.C for a in asked]).T
-    w0 = np.sum([a.w0 for a in asked], axis=0)
-    low, high = (np.concatenate(x) for x in zip(*((a.low, a.high) for a in asked), strict=True))
+    C = np.concatenate([a.C for a in ranges]).T
+    w0 = np.sum([a.w0 for a in ranges], axis=0)
+    low, high = (np.concatenate(x) for x in zip(*((a.low, a.high) for a in ranges), strict=True))
     rest = q - R @ w0
     if not low.size:
         return float(rest @ rest)
-    found = lsq_linear(R @ C, rest, bounds=(low, high), method="bvls", tol=1e-15, max_iter=1000)
-    return float(2 * found.cost)
+    solution = lsq_linear(R @ C, rest, bounds=(low, high), method="bvls", tol=1e-15, max_iter=1000)
+    return float(2 * solution.cost)
 
 
-def _drop_bound(bound: Bound, asked: list[LightRange], w: Any, basis: Any) -> list[LightRange]:
+def _drop_bound(bound: Bound, ranges: list[LightRange], w: Any, basis: Any) -> list[LightRange]:
     """What is asked of all lights without that one bound."""
     n = len(basis.lights)
-    mine = [basis.names.index(name) for name in bound.lights]
-    others = [a for a in asked if set(a.lights) != set(mine)]
+    indices = [basis.names.index(name) for name in bound.lights]
+    others = [a for a in ranges if set(a.lights) != set(indices)]
     if bound.kind != "zero":
-        return others + [_free_range(n, k, basis.lights[k].is_scalar) for k in mine]
-    [one] = (a for a in asked if set(a.lights) == set(mine))
-    off = _is_at_zero(one, w)
-    low, high = np.where(off, -np.inf, one.low), np.where(off, 0, one.high)
+        return others + [_free_range(n, k, basis.lights[k].is_scalar) for k in indices]
+    [one] = (a for a in ranges if set(a.lights) == set(indices))
+    is_off = _is_at_zero(one, w)
+    low, high = np.where(is_off, -np.inf, one.low), np.where(is_off, 0, one.high)
     return [*others, replace(one, low=low, high=high)]
 
 
@@ -167,14 +167,14 @@ def _is_at_zero(one: LightRange, w: Any) -> Any:
 def _solve(make_basis: Any, seed: int) -> Any:
     basis, target = _problem(make_basis, seed)
     rng = np.random.default_rng(1000 + seed)
-    wishes, ties, asked = _random_ranges(rng, basis)
+    wishes, ties, ranges = _random_ranges(rng, basis)
     constraints = Constraints.of(wishes, tie=ties)
     solution = solve(basis, target, constraints=constraints)
     assert solution.certificate.converged
-    for one in asked:
+    for one in ranges:
         if one.kind == "kelvin":
             one.C = _tangent(solution, one.lights[0])
-    return basis, target, solution, asked
+    return basis, target, solution, ranges
 
 
 def _tangent(solution: Any, light: int) -> Any:
@@ -195,24 +195,24 @@ def _white_pieces(low: float, high: float) -> list[Any]:
 def test_each_gain_is_that_of_the_problem_without_that_one_bound(
     make_basis: Any, seed: int
 ) -> None:
-    basis, target, solution, asked = _solve(make_basis, seed)
+    basis, target, solution, ranges = _solve(make_basis, seed)
     R, q = _reduced(basis, target)
     w = solution.lighting.weights_for(basis)
     bounds, left_out = bound_release.bounds_of(solution)
     assert left_out == 0
     assert [b.gain for b in bounds] == sorted((b.gain for b in bounds), reverse=True)
-    before, scale = _least_objective(R, q, asked), q @ q
+    before, scale = _least_objective(R, q, ranges), q @ q
     for bound in bounds:
-        gain = before - _least_objective(R, q, _drop_bound(bound, asked, w, basis))
+        gain = before - _least_objective(R, q, _drop_bound(bound, ranges, w, basis))
         assert abs(bound.gain - gain) <= SAME * scale
     # None is overlooked: whatever is asked of a light and costs something has its bound.
-    told = {bound.lights for bound in bounds if bound.kind != "zero"}
-    for one in asked:
+    bounded_lights = {bound.lights for bound in bounds if bound.kind != "zero"}
+    for one in ranges:
         names = tuple(basis.names[k] for k in one.lights)
-        if one.kind and names not in told:
-            freed = [a for a in asked if a is not one]
-            freed += [_free_range(6, k, basis.lights[k].is_scalar) for k in one.lights]
-            assert before - _least_objective(R, q, freed) <= WORTH * scale
+        if one.kind and names not in bounded_lights:
+            freed_ranges = [a for a in ranges if a is not one]
+            freed_ranges += [_free_range(6, k, basis.lights[k].is_scalar) for k in one.lights]
+            assert before - _least_objective(R, q, freed_ranges) <= WORTH * scale
         labels = {light.name: light.constraint for light in solution.lighting.lights}
     for bound in bounds:
         if bound.kind != "zero":
@@ -220,12 +220,12 @@ def test_each_gain_is_that_of_the_problem_without_that_one_bound(
 
 
 def _raise_bound(
-    bound: Bound, asked: list[LightRange], w: Any, basis: Any, j: int, h: float
+    bound: Bound, ranges: list[LightRange], w: Any, basis: Any, j: int, h: float
 ) -> list[LightRange]:
     """What is asked of all lights with the j-th number that holds raised by h."""
-    mine = [basis.names.index(name) for name in bound.lights]
-    others = [a for a in asked if set(a.lights) != set(mine)]
-    [one] = (a for a in asked if set(a.lights) == set(mine))
+    indices = [basis.names.index(name) for name in bound.lights]
+    others = [a for a in ranges if set(a.lights) != set(indices)]
+    [one] = (a for a in ranges if set(a.lights) == set(indices))
     w0, low, high = one.w0.copy(), one.low.copy(), one.high.copy()
     if bound.kind == "zero":
         low[j] += h
@@ -234,27 +234,27 @@ def _raise_bound(
         if at_low and one.low[j] > 0:
             low[j] += h
         elif one.low[j] == 0 and at_low:
-            return asked  # zero holds, which is another bound
+            return ranges  # zero holds, which is another bound
         else:
             high[j] += h
     elif bound.kind == "tie":
-        k = mine[j]
+        k = indices[j]
         w0[3 * k : 3 * k + 3] += h * np.array(basis.lights[k].emission)
     else:
-        w0[3 * mine[0] + j] += h
+        w0[3 * indices[0] + j] += h
     return [*others, replace(one, w0=w0, low=low, high=high)]
 
 
-def _bound_indices(bound: Bound, asked: list[LightRange], basis: Any, j: int) -> Any:
+def _bound_indices(bound: Bound, ranges: list[LightRange], basis: Any, j: int) -> Any:
     """Which numbers multiplier j is of: of a mix that is off, the primary that matters most."""
-    mine = {basis.names.index(name) for name in bound.lights}
-    [one] = (a for a in asked if set(a.lights) == mine)
+    indices = {basis.names.index(name) for name in bound.lights}
+    [one] = (a for a in ranges if set(a.lights) == indices)
     return range(len(one.low)) if bound.kind == "zero" and one.kind == "kelvin" else [j]
 
 
 @pytest.mark.parametrize("seed", seeds(40, 120))
 def test_each_multiplier_is_how_fast_the_objective_changes(make_basis: Any, seed: int) -> None:
-    basis, target, solution, asked = _solve(make_basis, seed)
+    basis, target, solution, ranges = _solve(make_basis, seed)
     R, q = _reduced(basis, target)
     w = solution.lighting.weights_for(basis)
     bounds, _ = bound_release.bounds_of(solution)
@@ -266,9 +266,9 @@ def test_each_multiplier_is_how_fast_the_objective_changes(make_basis: Any, seed
             if bound.kind == "zero" and multiplier == 0:
                 continue  # a channel that is on
             slopes = []
-            for i in _bound_indices(bound, asked, basis, j):
+            for i in _bound_indices(bound, ranges, basis, j):
                 up, down = (
-                    _least_objective(R, q, _raise_bound(bound, asked, w, basis, i, h))
+                    _least_objective(R, q, _raise_bound(bound, ranges, w, basis, i, h))
                     for h in STEPS
                 )
                 slopes.append((up - down) / (2 * STEP))
@@ -294,8 +294,8 @@ def test_multipliers_of_the_tests_are_not_small(make_basis: Any) -> None:
             size = max(np.abs(bound.multiplier)) / allowed
             sizes.setdefault(bound.kind, []).append(size)
     assert set(sizes) == {"zero", "lock", "off", "tie", "limits", "colour"}
-    for kind, found in sizes.items():
-        assert np.median(found) > 100, kind
+    for kind, measured in sizes.items():
+        assert np.median(measured) > 100, kind
 
 
 @pytest.mark.parametrize("seed", seeds(20, 40))
@@ -306,8 +306,8 @@ def test_a_limit_of_luminance(make_basis: Any, seed: int, is_least: bool) -> Non
     level = float(plain[1] @ LUMINANCE) * (1.5 if is_least else 0.5) + 0.05 * is_least
 
     def objective(limit: float) -> tuple[float, Any]:
-        asked = {"l1": {"limits": {"min" if is_least else "max": limit}}}
-        solution = solve(basis, target, constraints=Constraints.of(asked))
+        limits = {"l1": {"limits": {"min" if is_least else "max": limit}}}
+        solution = solve(basis, target, constraints=Constraints.of(limits))
         return sum(solution.certificate.objective), solution
 
     before, solution = objective(level)
@@ -334,66 +334,66 @@ def test_lights_that_sparse_leaves_out(make_basis: Any, seed: int) -> None:
     constraints = Constraints.of({"l0": {"kelvin": [2700, 6500]}}, sparse=2)
     solution = solve(basis, target, constraints=constraints)
     w = solution.lighting.weights_for(basis)
-    asked = [_free_range(6, k, basis.lights[k].is_scalar) for k in range(6)]
-    asked[0] = LightRange(
+    ranges = [_free_range(6, k, basis.lights[k].is_scalar) for k in range(6)]
+    ranges[0] = LightRange(
         (0,), _tangent(solution, 0), np.zeros(2), np.full(2, np.inf), np.zeros(18)
     )
-    on = [k for k in range(6) if w[k].any()]
-    before = _least_objective(R, q, [asked[k] for k in on])
+    lit_lights = [k for k in range(6) if w[k].any()]
+    before = _least_objective(R, q, [ranges[k] for k in lit_lights])
 
     def gained(k: int) -> float:
         if k:
-            return before - _least_objective(R, q, [asked[j] for j in (*on, k)])
-        pieces = [replace(asked[0], C=C) for C in _white_pieces(2700, 6500)]
+            return before - _least_objective(R, q, [ranges[j] for j in (*lit_lights, k)])
+        pieces = [replace(ranges[0], C=C) for C in _white_pieces(2700, 6500)]
         return before - min(
-            _least_objective(R, q, [*(asked[j] for j in on), one]) for one in pieces
+            _least_objective(R, q, [*(ranges[j] for j in lit_lights), one]) for one in pieces
         )
 
     bounds = [b for b in bound_release.bounds_of(solution)[0] if b.kind == "left out"]
     # Each as what else is asked of it allows: l0 is still white.
-    gains = {k: gained(k) for k in set(range(6)) - set(on)}
-    told = {basis.names.index(b.lights[0]): b for b in bounds}
+    gains = {k: gained(k) for k in set(range(6)) - set(lit_lights)}
+    bound_by_light = {basis.names.index(b.lights[0]): b for b in bounds}
     for k, gain in gains.items():
         if gain > WORTH * (q @ q):
             # Of whites that no neighbour betters there may be several, nearly as good.
             near = SAME if k else 1e-6
-            assert told[k].gain == pytest.approx(gain, abs=near * (q @ q))
-            assert told[k].held_by == "left out"
-            assert max(told[k].multiplier) <= 0
-            assert told[k].is_switched_off
+            assert bound_by_light[k].gain == pytest.approx(gain, abs=near * (q @ q))
+            assert bound_by_light[k].held_by == "left out"
+            assert max(bound_by_light[k].multiplier) <= 0
+            assert bound_by_light[k].is_switched_off
 
 
 @pytest.mark.parametrize("seed", range(30))
 def test_with_a_pull_the_gain_is_of_the_miss_alone(make_basis: Any, seed: int) -> None:
     basis, target = _problem(make_basis, seed)
-    off = Constraints.of({"l1": {"off": True}}, prefer_current=0.02)
-    solution = solve(basis, target, constraints=off)
-    without = solve(basis, target, constraints=Constraints.of(prefer_current=0.02))
-    gain = sum(solution.certificate.objective) - sum(without.certificate.objective)
-    found = [b for b in bound_release.bounds_of(solution)[0] if b.kind == "off"]
+    off_constraints = Constraints.of({"l1": {"off": True}}, prefer_current=0.02)
+    solution = solve(basis, target, constraints=off_constraints)
+    unbounded = solve(basis, target, constraints=Constraints.of(prefer_current=0.02))
+    gain = sum(solution.certificate.objective) - sum(unbounded.certificate.objective)
+    off_bounds = [b for b in bound_release.bounds_of(solution)[0] if b.kind == "off"]
     norm2 = float(solution.equations.target_norm2.sum())
-    for bound in found:
+    for bound in off_bounds:
         assert bound.gain == pytest.approx(gain, abs=SAME * norm2)
-    assert found
-    assert found[0].held_by == "off"
+    assert off_bounds
+    assert off_bounds[0].held_by == "off"
 
 
 def test_a_kept_light_stands_in_the_way_under_constraints_too(make_basis: Any) -> None:
     basis, target = _problem(make_basis, 3)
-    kept = replace(basis.lights[0], emission=(1.0,) * 3, is_fixed=True)
-    held_back = replace(basis, lights=(kept, *basis.lights[1:]))
-    wish = {"l1": {"color": "3200K"}}
-    solution = solve(held_back, target, constraints=Constraints.of(wish))
+    kept_light = replace(basis.lights[0], emission=(1.0,) * 3, is_fixed=True)
+    basis_with_kept = replace(basis, lights=(kept_light, *basis.lights[1:]))
+    colour_constraint = {"l1": {"color": "3200K"}}
+    solution = solve(basis_with_kept, target, constraints=Constraints.of(colour_constraint))
     [bound] = (b for b in bound_release.bounds_of(solution)[0] if b.kind == "kept")
-    free = solve(basis, target, constraints=Constraints.of(wish))
+    free = solve(basis, target, constraints=Constraints.of(colour_constraint))
     gain = sum(solution.certificate.objective) - sum(free.certificate.objective)
     assert bound.gain == pytest.approx(gain, rel=1e-8)
 
 
 def test_the_scene_with_twelve_lights_has_all_of_its_bounds(make_basis: Any) -> None:
     basis, target = _problem(make_basis, 1, 12)
-    wish = {"l?": {"color": "3200K"}, "l11": {"limits": {"max": 0.01}}, "l10": {"off": True}}
-    solution = solve(basis, target, constraints=Constraints.of(wish))
+    constraints = {"l?": {"color": "3200K"}, "l11": {"limits": {"max": 0.01}}, "l10": {"off": True}}
+    solution = solve(basis, target, constraints=Constraints.of(constraints))
     bounds, left_out = bound_release.bounds_of(solution)
     assert left_out == 0
     active = [light.name for light in solution.lighting.lights if light.is_active]
@@ -404,15 +404,15 @@ def test_of_many_bounds_those_that_seem_to_matter_most_are_looked_into(
     make_basis: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     basis, target = _problem(make_basis, 2)
-    wish = {"l*": {"off": True}, "l5": {"lock": 0.5}}
-    solution = solve(basis, target, constraints=Constraints.of(wish))
+    constraints = {"l*": {"off": True}, "l5": {"lock": 0.5}}
+    solution = solve(basis, target, constraints=Constraints.of(constraints))
     every, none = bound_release.bounds_of(solution)
     assert none == 0
     monkeypatch.setattr(bound_release, "MAX_RELEASED", 2)
-    found = diagnose(solution)
-    assert len(found.bounds) == 2
-    assert found.bounds_left_out == len(every) - 2
-    assert set(found.bounds) <= set(every)
+    diagnosis = diagnose(solution)
+    assert len(diagnosis.bounds) == 2
+    assert diagnosis.bounds_left_out == len(every) - 2
+    assert set(diagnosis.bounds) <= set(every)
 
 
 @pytest.mark.parametrize("seed", seeds(20, 40))
@@ -430,11 +430,11 @@ def test_the_estimate_is_a_lower_limit(make_basis: Any, seed: int) -> None:
 
 def test_bounds_stand_in_the_answer_file(make_basis: Any, tmp_path: Any) -> None:
     _basis, _target, solution, _ = _solve(make_basis, 7)
-    found = diagnose(solution)
-    assert found.bounds
+    diagnosis = diagnose(solution)
+    assert diagnosis.bounds
     path = tmp_path / "lighting.json"
-    write_lighting(path, solution.with_certificate_fields(bounds=found.bounds).lighting)
-    assert read_lighting(path).certificate.bounds == found.bounds  # type: ignore[union-attr]
+    write_lighting(path, solution.with_certificate_fields(bounds=diagnosis.bounds).lighting)
+    assert read_lighting(path).certificate.bounds == diagnosis.bounds  # type: ignore[union-attr]
     data = json.loads(path.read_text(encoding="utf-8"))
     assert set(data["solve"]["bounds"][0]) == {
         "lights", "kind", "held_by", "gain", "multiplier", "per", "tint",

@@ -33,18 +33,18 @@ def _target(size: tuple[int, int] = SIZE) -> Target:
 
 
 def _choices(solution: Any) -> Any:
-    [found] = color_choices(solution, [compare_appearance(solution).delta_e])
-    return found
+    [choices] = color_choices(solution, [compare_appearance(solution).delta_e])
+    return choices
 
 
 @pytest.mark.parametrize("colors", get_args(Colors))
 def test_choices_are_what_solving_with_them_gives(make_basis: Any, colors: Colors):
     """In linear light exactly: the equations are the same, and all paint is looked at."""
     basis, target = _basis(make_basis), _target()
-    found = _choices(solve(basis, target, colors=colors))
-    assert [choice.colors for choice in found] == list(get_args(Colors))
-    assert [choice.colors for choice in found if choice.is_chosen] == [colors]
-    for choice in found:
+    choices = _choices(solve(basis, target, colors=colors))
+    assert [choice.colors for choice in choices] == list(get_args(Colors))
+    assert [choice.colors for choice in choices if choice.is_chosen] == [colors]
+    for choice in choices:
         other = solve(basis, target, colors=choice.colors)
         np.testing.assert_allclose(choice.weights, other.weights, rtol=1e-9, atol=1e-12)
         assert choice.delta_e == pytest.approx(compare_appearance(other).delta_e, rel=1e-4)
@@ -56,8 +56,8 @@ def test_on_a_display_a_sample_of_the_pixels_says_nearly_the_same(make_basis: An
     size = (100, 110)
     basis, target = _basis(make_basis, size=size), _target(size)
     assert size[0] * size[1] > 2 * MIN_SAMPLE
-    found = _choices(solve(basis, target, colors=colors, space="display"))
-    for choice in found:
+    choices = _choices(solve(basis, target, colors=colors, space="display"))
+    for choice in choices:
         other = compare_appearance(solve(basis, target, colors=choice.colors, space="display"))
         assert choice.delta_e == pytest.approx(other.delta_e, abs=0.1)
 
@@ -85,8 +85,8 @@ def test_where_colour_is_no_choice_nothing_is_told(make_basis: Any):
 
 def test_all_else_that_is_asked_stays(make_basis: Any):
     basis, target = _basis(make_basis), _target()
-    asked = Constraints.of({"right": {"lock": True}}, sparse=1)
-    free, *_ = _choices(solve(basis, target, constraints=asked, colors="white"))
+    constraints = Constraints.of({"right": {"lock": True}}, sparse=1)
+    free, *_ = _choices(solve(basis, target, constraints=constraints, colors="white"))
     np.testing.assert_allclose(free.weights[1], 0.3, rtol=1e-6)
     # Of a choice of few lights, those that were chosen.
     few = Constraints.of(sparse=1)
@@ -98,8 +98,8 @@ def test_all_else_that_is_asked_stays(make_basis: Any):
 def test_a_light_that_cannot_be_white_leaves_that_out(make_basis: Any):
     basis, target = _basis(make_basis), _target()
     limits = {"left": {"limits": {"min": [0.1, 0.1, 0.1], "max": [0.2, 0.9, 0.3]}}}
-    found = _choices(solve(basis, target, constraints=Constraints.of(limits)))
-    assert "free" in [choice.colors for choice in found]
+    choices = _choices(solve(basis, target, constraints=Constraints.of(limits)))
+    assert "free" in [choice.colors for choice in choices]
 
 
 def test_several_views_have_one_lighting_and_a_look_each(make_basis: Any):
@@ -107,7 +107,10 @@ def test_several_views_have_one_lighting_and_a_look_each(make_basis: Any):
     plain = Target.of(np.full((*SIZE, 3), 0.3, np.float32), name="plain")
     solution = solve([basis, basis], [target, plain])
     each = [compare_appearance(view).delta_e for view in solution.views]
-    found = color_choices(solution, each)
-    assert [[x.delta_e for x in its if x.is_chosen] for its in found] == [[each[0]], [each[1]]]
-    for one, other in zip(*found, strict=True):
+    choices = color_choices(solution, each)
+    assert [[x.delta_e for x in view_choices if x.is_chosen] for view_choices in choices] == [
+        [each[0]],
+        [each[1]],
+    ]
+    for one, other in zip(*choices, strict=True):
         assert one.weights is other.weights

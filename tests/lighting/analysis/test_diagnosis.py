@@ -37,23 +37,23 @@ def _diagnosis(basis: Any, target: Target) -> Any:
 
 def test_a_mix_of_the_lights_misses_nothing(make_basis: Any):
     images = _halves()
-    found = _diagnosis(make_basis(images=images), _target(0.3 * images[0] + 0.7 * images[1]))
-    assert found.total == pytest.approx(0, abs=1e-9)
-    assert found.bounds == ()
+    diagnosis = _diagnosis(make_basis(images=images), _target(0.3 * images[0] + 0.7 * images[1]))
+    assert diagnosis.total == pytest.approx(0, abs=1e-9)
+    assert diagnosis.bounds == ()
 
 
 def test_darkness_that_only_negative_light_would_make_is_forbidden(make_basis: Any):
     images = _halves()
     images[1] = 1  # the second light shines everywhere
-    found = _diagnosis(make_basis(images=images), _target(images[1] - 0.5 * images[0]))
+    diagnosis = _diagnosis(make_basis(images=images), _target(images[1] - 0.5 * images[0]))
     # The second light alone: 1 on the right and 0.5 on the left is met best by their mean.
     pixels = 3 * images[0, ..., 0].sum()
-    assert found.total == pytest.approx(2 * pixels * 0.25**2, rel=1e-5)
-    assert found.forbidden == pytest.approx(found.total, rel=1e-5)
-    [bound] = found.bounds
+    assert diagnosis.total == pytest.approx(2 * pixels * 0.25**2, rel=1e-5)
+    assert diagnosis.forbidden == pytest.approx(diagnosis.total, rel=1e-5)
+    [bound] = diagnosis.bounds
     assert (bound.lights, bound.kind, bound.held_by) == (("light 0",), "zero", "zero")
     # Without that bound the painting is met.
-    assert bound.gain == pytest.approx(found.total, rel=1e-4)
+    assert bound.gain == pytest.approx(diagnosis.total, rel=1e-4)
     # d/dw of the objective at w = 0 of that light: 2 Σ 1 · 0.25 over its pixels, per channel.
     assert bound.multiplier == pytest.approx([2 * 0.25 * images[0, ..., 0].sum()] * 3, rel=1e-5)
 
@@ -62,10 +62,10 @@ def test_what_is_orthogonal_to_all_lights_is_out_of_reach(make_basis: Any):
     images = _halves()
     stripes = np.zeros((*SIZE, 3))
     stripes[::2, :9, 2], stripes[1::2, :9, 2] = 0.5, -0.5  # blue, and on average nothing
-    found = _diagnosis(make_basis(images=images), _target(images[0] + stripes))
-    assert found.unreachable == pytest.approx(0.25 * 12 * 9, rel=1e-5)
-    assert found.forbidden == pytest.approx(0, abs=1e-4)
-    np.testing.assert_allclose(found.unreachable_map, stripes, atol=1e-5)
+    diagnosis = _diagnosis(make_basis(images=images), _target(images[0] + stripes))
+    assert diagnosis.unreachable == pytest.approx(0.25 * 12 * 9, rel=1e-5)
+    assert diagnosis.forbidden == pytest.approx(0, abs=1e-4)
+    np.testing.assert_allclose(diagnosis.unreachable_map, stripes, atol=1e-5)
 
 
 def test_the_place_is_where_light_is_missing(make_basis: Any):
@@ -89,25 +89,25 @@ def test_what_does_not_count_is_told_apart(make_basis: Any):
     importance[:, 9:] = 0.25
     image = images[0] + images[1]
     image[:6, 9:] = 0.1
-    found = _diagnosis(make_basis(images=images), _target(image, importance))
+    diagnosis = _diagnosis(make_basis(images=images), _target(image, importance))
     # Half of the right is painted 0.1, half of it 2; the light does the mean of both.
-    missed = 3 * 12 * 9 * 0.95**2
-    assert found.total == pytest.approx(0.25 * missed, rel=1e-5)
-    assert found.ignored == pytest.approx(0.75 * missed, rel=1e-5)
+    missed_energy = 3 * 12 * 9 * 0.95**2
+    assert diagnosis.total == pytest.approx(0.25 * missed_energy, rel=1e-5)
+    assert diagnosis.ignored == pytest.approx(0.75 * missed_energy, rel=1e-5)
 
 
 def test_a_light_that_is_kept_stands_in_the_way(make_basis: Any):
     from dataclasses import replace
 
     basis = make_basis(images=_halves(), emission=[[1, 1, 1], [0.5, 0.5, 0.5]])
-    kept = replace(basis.lights[0], is_fixed=True)
-    basis = replace(basis, lights=(kept, basis.lights[1]))
-    found = _diagnosis(basis, _target(0.5 * _halves()[0] + 0.2 * _halves()[1]))
-    [bound] = found.bounds
+    kept_light = replace(basis.lights[0], is_fixed=True)
+    basis = replace(basis, lights=(kept_light, basis.lights[1]))
+    diagnosis = _diagnosis(basis, _target(0.5 * _halves()[0] + 0.2 * _halves()[1]))
+    [bound] = diagnosis.bounds
     assert (bound.kind, bound.held_by) == ("kept", "kept")
-    assert bound.gain == pytest.approx(found.total, rel=1e-5)
+    assert bound.gain == pytest.approx(diagnosis.total, rel=1e-5)
     # Held as it is, no weights of the others help.
-    assert found.unreachable == pytest.approx(found.total, rel=1e-5)
+    assert diagnosis.unreachable == pytest.approx(diagnosis.total, rel=1e-5)
 
 
 @given(st.integers(0, 10_000), st.integers(1, 6), st.booleans())
@@ -123,20 +123,28 @@ def test_the_parts_add_up(make_basis: Any, seed: int, n: int, is_scalar: bool):
     importance[0, 0] = 1
     target = _target(rng.random((*SIZE, 3)) * rng.random(3), importance)
     solution = solve(basis, target)
-    found = diagnose(solution)
-    parts = (found.unreachable, found.forbidden, found.noise, found.painting_noise, found.ignored)
+    diagnosis = diagnose(solution)
+    parts = (
+        diagnosis.unreachable,
+        diagnosis.forbidden,
+        diagnosis.noise,
+        diagnosis.painting_noise,
+        diagnosis.ignored,
+    )
     assert min(parts) >= 0
-    assert sum(parts[:4]) == pytest.approx(found.total, rel=1e-12)
+    assert sum(parts[:4]) == pytest.approx(diagnosis.total, rel=1e-12)
     # As the solve counts it, and as the pixels do, in float64 over float32.
-    assert found.total == pytest.approx(sum(solution.certificate.objective), rel=1e-5)
+    assert diagnosis.total == pytest.approx(sum(solution.certificate.objective), rel=1e-5)
     D = importance[..., None]
-    separate = (D * (found.unreachable_map**2 + found.forbidden_map**2)).sum()
-    assert separate == pytest.approx(found.total, rel=1e-5)
-    missed = target.image - combine(basis, solution.lighting).image
-    np.testing.assert_allclose(found.unreachable_map + found.forbidden_map, missed, atol=1e-6)
+    separate = (D * (diagnosis.unreachable_map**2 + diagnosis.forbidden_map**2)).sum()
+    assert separate == pytest.approx(diagnosis.total, rel=1e-5)
+    residual = target.image - combine(basis, solution.lighting).image
+    np.testing.assert_allclose(
+        diagnosis.unreachable_map + diagnosis.forbidden_map, residual, atol=1e-6
+    )
     # No bound alone can stand for more than all of them together.
-    for bound in found.bounds:
-        assert bound.gain <= found.forbidden + 1e-6 * found.total
+    for bound in diagnosis.bounds:
+        assert bound.gain <= diagnosis.forbidden + 1e-6 * diagnosis.total
 
 
 def test_texture_is_no_grain_of_the_painting(make_basis: Any):
@@ -152,10 +160,10 @@ def test_texture_is_no_grain_of_the_painting(make_basis: Any):
     y = np.linspace(-1, 1, size[0])[:, None, None]
     image = (albedo * 0.5 * 2.0 ** np.where(np.abs(y) < 0.4, 1.0, -0.5)).astype(np.float32)
     target = replace(Target.of(image), transform=ViewTransform(), through_view=True)
-    found = diagnose(solve(basis, target))
+    diagnosis = diagnose(solve(basis, target))
     # Some of it is: albedo from pixel to pixel is finer than any surface's. It was all of it.
-    assert found.share(found.unreachable) > 0.5
-    assert found.share(found.painting_noise) < 0.4
+    assert diagnosis.share(diagnosis.unreachable) > 0.5
+    assert diagnosis.share(diagnosis.painting_noise) < 0.4
 
 
 def test_the_look_that_is_kept_has_the_noise_of_the_prediction(make_basis: Any):
@@ -167,10 +175,10 @@ def test_the_look_that_is_kept_has_the_noise_of_the_prediction(make_basis: Any):
     brighter = np.broadcast_to(1.5 * basis.current_weights[0], (*SIZE, 3))
     target = replace(_target(brighter, left), over_look=True)
     solution = solve(basis, target, unpainted=1.0, space="linear")
-    found = diagnose(solution)
-    moved = solution.weights[0] - basis.current_weights[0]
-    assert moved.min() > 0
+    diagnosis = diagnose(solution)
+    change = solution.weights[0] - basis.current_weights[0]
+    assert change.min() > 0
     # The residual on the right is (now − w) Φ, whose half difference is (now − w) h, not w h.
-    expected = np.square(moved * noise[0, :, 9:]).sum()
-    assert found.noise == pytest.approx(expected, rel=1e-5)  # float32
-    assert found.share(found.unreachable) > 0.5
+    expected = np.square(change * noise[0, :, 9:]).sum()
+    assert diagnosis.noise == pytest.approx(expected, rel=1e-5)  # float32
+    assert diagnosis.share(diagnosis.unreachable) > 0.5

@@ -20,14 +20,14 @@ EVERYWHERE = np.ones(SIZE, bool)
 def _noise(kind: str) -> Any:
     """(h, w, 3), of variance 1 in the right half and 4 in the left one."""
     rng = np.random.default_rng(3)
-    made = {
+    noises = {
         "normal": lambda: rng.normal(size=(*SIZE, 3)),
         "skewed": lambda: (rng.gamma(0.5, 1, (*SIZE, 3)) - 0.5) / np.sqrt(0.5),
         # As Mitsuba's default filter leaves it: σ of half a pixel.
         "filtered": lambda: gaussian_filter(rng.normal(size=(*SIZE, 3)), (0.5, 0.5, 0), truncate=4),
         "grey": lambda: np.repeat(rng.normal(size=(*SIZE, 1)), 3, axis=2),
     }[kind]()
-    return made / made.std() * np.where(X < 60, 2, 1)[..., None]
+    return noises / noises.std() * np.where(X < 60, 2, 1)[..., None]
 
 
 def grain(residual: Any, counted: Any) -> Any:
@@ -53,9 +53,9 @@ def _brush_coverage(kind: str) -> Any:
 
 @pytest.mark.parametrize("kind", ["normal", "skewed", "filtered", "grey"])
 def test_noise_is_measured(kind: str) -> None:
-    found = grain(_noise(kind), EVERYWHERE)
+    measured = grain(_noise(kind), EVERYWHERE)
     # 5400 pixels each, whose squares scatter by as much as they are, and more if skewed.
-    for half, variance in ((found[:, :40], 4), (found[:, 80:], 1)):
+    for half, variance in ((measured[:, :40], 4), (measured[:, 80:], 1)):
         assert half.mean() == pytest.approx(variance, rel=0.15)
 
 
@@ -80,21 +80,21 @@ def test_only_what_counts_is_looked_at() -> None:
 @pytest.mark.parametrize("size", [(1, 1), (2, 40), (4, 5), (7, 7), (5, 300)])
 def test_small_pictures(size: tuple[int, int]) -> None:
     residual = np.random.default_rng(0).normal(size=(*size, 3))
-    found = grain(residual, np.ones(size, bool))
-    assert found.shape == residual.shape
-    assert np.isfinite(found).all()
+    measured = grain(residual, np.ones(size, bool))
+    assert measured.shape == residual.shape
+    assert np.isfinite(measured).all()
 
 
-@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize("is_known", [True, False])
 def test_a_render_as_painting_lacks_nothing_that_lights_could_give(
-    make_basis: Any, known: bool
+    make_basis: Any, is_known: bool
 ) -> None:
     """Half as noisy as its basis is in one light, and a stroke that no light makes."""
     rng = np.random.default_rng(1)
     clean = np.stack([np.repeat((1 + a)[..., None], 3, 2) for a in (X / 120, Y / 90, X * Y / 1e4)])
     noise = 0.02 * rng.normal(size=(3, *SIZE, 3))
     halves = 0.02 * rng.normal(size=noise.shape)
-    basis = make_basis(images=clean + noise, half_differences=halves if known else None)
+    basis = make_basis(images=clean + noise, half_differences=halves if is_known else None)
     image = clean.sum(axis=0) + 0.1 * _noise("normal")
     stroke = 0.4 * _brush_coverage("soft brush")[..., None]
 
@@ -104,10 +104,12 @@ def test_a_render_as_painting_lacks_nothing_that_lights_could_give(
 
     plain, painted = diagnosis(image), diagnosis(image + stroke)
     assert plain.share(plain.unreachable) < 0.03
-    assert plain.share(plain.painting_noise) > (0.9 if known else 0.95)
+    assert plain.share(plain.painting_noise) > (0.9 if is_known else 0.95)
     assert "is out of reach of any mix" not in " ".join(error_sentences(plain)).split(",")[0]
-    whose = "of the painting, as renders have" if known else "of the painting or of the lights'"
-    assert whose in error_sentences(plain)[0]
+    explanation = (
+        "of the painting, as renders have" if is_known else "of the painting or of the lights'"
+    )
+    assert explanation in error_sentences(plain)[0]
     # The stroke is there as before, and is no noise.
     assert painted.painting_noise == pytest.approx(plain.painting_noise, rel=0.05)
     assert painted.unreachable > 0.5 * np.square(stroke).sum()

@@ -23,7 +23,9 @@ def studio(make_basis: Any) -> tuple[Any, Target]:
     rng = np.random.default_rng(3)
     x = np.linspace(0, 1, SIZE[1])[None, :, None]
     texture = rng.lognormal(0, 0.5, (*SIZE, 1))
-    images = np.stack([texture * np.exp(-np.square((x - at) / 0.3)) for at in (0.2, 0.5, 0.8)])
+    images = np.stack(
+        [texture * np.exp(-np.square((x - centre) / 0.3)) for centre in (0.2, 0.5, 0.8)]
+    )
     images = images.repeat(3, axis=-1)
     grain = rng.normal(0, 0.15, (2, *images.shape)) * images
     names = ["left", "middle", "right"]
@@ -43,17 +45,17 @@ def studio(make_basis: Any) -> tuple[Any, Target]:
 def _error(solution: Solution, target: Target) -> float:
     """Return Σ D ‖V(ψ) − V(x)‖² over the paint, in all its pixels."""
     encode, mixed = ViewTransform().encode, solution.basis.mix(solution.weights)
-    missed = encode(target.image.astype(np.float64)) - encode(mixed.astype(np.float64))
-    return float((target.importance[..., None] * np.square(missed)).sum())
+    residual = encode(target.image.astype(np.float64)) - encode(mixed.astype(np.float64))
+    return float((target.importance[..., None] * np.square(residual)).sum())
 
 
 def test_a_weaker_hold_removes_the_share_that_is_said(studio: Any):
     basis, target = studio
-    now = correct_noise(solve(basis, target, hold=30.0))
-    reason = next(x for x in compare_appearance(now).reasons if x.kind == "hold")
+    before = correct_noise(solve(basis, target, hold=30.0))
+    reason = next(x for x in compare_appearance(before).reasons if x.kind == "hold")
     assert reason.loosening is not None
-    then = correct_noise(solve(basis, target, hold=reason.loosening.hold))
-    gained = 1 - _error(then, target) / _error(now, target)
+    after = correct_noise(solve(basis, target, hold=reason.loosening.hold))
+    gained = 1 - _error(after, target) / _error(before, target)
     assert gained > 0.1
     assert reason.loosening.share == pytest.approx(gained, abs=1e-9)
 
@@ -62,15 +64,15 @@ def test_a_weaker_hold_removes_the_share_that_is_said(studio: Any):
 def test_the_first_reason_removes_the_share_that_is_said(studio: Any, kind: str):
     basis, target = studio
     limits = Constraints.of({"left": {"limits": {"max": 0.12}}})
-    held, free = {
+    options, free = {
         "limits": ({"constraints": limits, "colors": "free"}, {"colors": "free"}),
         "colors": ({"colors": "white"}, {"colors": "free"}),
     }[kind]
-    now = correct_noise(solve(basis, target, hold=0.01, **held))
-    reason = compare_appearance(now).reasons[0]
+    before = correct_noise(solve(basis, target, hold=0.01, **options))
+    reason = compare_appearance(before).reasons[0]
     assert reason.kind == kind
     gained = 1 - _error(correct_noise(solve(basis, target, hold=0.01, **free)), target) / _error(
-        now, target
+        before, target
     )
     assert gained > 0.1
     assert reason.share == pytest.approx(gained, abs=1e-9)

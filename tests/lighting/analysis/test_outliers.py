@@ -37,8 +37,11 @@ HIGHLIGHTS = {"highlight": 2 / 3, "two fifths": 0.41, "a tenth": 0.1}
 
 def _hits(clean: Any, chance: float, rng: np.random.Generator) -> Any:
     """Half of the samples of something that each meets with `chance` only, (h, w, 3)."""
-    met = rng.poisson(chance * SPP, clean.shape[:2])
-    return clean * (rng.gamma(3 * met + 1e-12) / 3 * (met > 0) / (chance * SPP))[..., None]
+    hit_counts = rng.poisson(chance * SPP, clean.shape[:2])
+    return (
+        clean
+        * (rng.gamma(3 * hit_counts + 1e-12) / 3 * (hit_counts > 0) / (chance * SPP))[..., None]
+    )
 
 
 def _lights() -> Any:
@@ -85,25 +88,26 @@ def _basis(make_basis: Any, kind: str, seed: int) -> Any:
 
 
 @pytest.mark.parametrize(
-    ("kind", "untold"), [("plain", (0, 0)), ("fireflies", (0.95, 1)), ("highlight", (0.2, 1))]
+    ("kind", "excluded_range"),
+    [("plain", (0, 0)), ("fireflies", (0.95, 1)), ("highlight", (0.2, 1))],
 )
 def test_intervals_hold_what_few_pixels_show(
-    make_basis: Any, kind: str, untold: tuple[float, float]
+    make_basis: Any, kind: str, excluded_range: tuple[float, float]
 ):
     clean = _halves(kind, np.random.default_rng(0))[0]
     target = _painting(kind, clean)
     truth = solve(make_basis(images=clean), target).weights
-    held, said = [], []
+    coverages, excluded_shares = [], []
     for seed in range(SEEDS):
-        found = error_bars(solve(_basis(make_basis, kind, seed), target))
-        low, high = found.interval
-        held.append((low <= truth + 1e-9) & (truth <= high + 1e-9))
-        said.append(found.untold)
+        bars = error_bars(solve(_basis(make_basis, kind, seed), target))
+        low, high = bars.interval
+        coverages.append((low <= truth + 1e-9) & (truth <= high + 1e-9))
+        excluded_shares.append(bars.untold)
     # Of 95 % of 40 seeds: a standard error is 0.034.
-    assert np.mean(held, axis=(0, 2)).min() > 0.9
-    assert untold[0] <= np.mean(said, axis=0)[2] <= untold[1]
+    assert np.mean(coverages, axis=(0, 2)).min() > 0.9
+    assert excluded_range[0] <= np.mean(excluded_shares, axis=0)[2] <= excluded_range[1]
     # A highlight in its midst may leave another light open as well, now and then.
-    assert np.mean(said, axis=0)[:2].max() <= (0.25 if kind == "highlight" else 0)
+    assert np.mean(excluded_shares, axis=0)[:2].max() <= (0.25 if kind == "highlight" else 0)
 
 
 @pytest.mark.parametrize("kind", ["two fifths", "a tenth"])
@@ -112,50 +116,50 @@ def test_intervals_hold_what_one_pixel_has_a_share_of(make_basis: Any, kind: str
     clean = _halves(kind, np.random.default_rng(0))[0]
     target = _painting(kind, clean)
     truth = solve(make_basis(images=clean), target).weights
-    held = []
+    coverages = []
     for seed in range(4 * SEEDS):
         solution = solve(_basis(make_basis, kind, seed), target)
         low, high = error_bars(correct_noise(solution)).interval
-        held.append((low <= truth + 1e-9) & (truth <= high + 1e-9))
+        coverages.append((low <= truth + 1e-9) & (truth <= high + 1e-9))
     # Of 95 % of 160 seeds, whose channels are alike: three standard errors are 0.052.
-    assert np.mean(held, axis=(0, 2)).min() >= 0.95 - 0.052
+    assert np.mean(coverages, axis=(0, 2)).min() >= 0.95 - 0.052
 
 
 def test_a_light_that_cannot_be_told_is_so_in_words(make_basis: Any):
     target = _painting("fireflies", _halves("fireflies", np.random.default_rng(0))[0])
     basis = _basis(make_basis, "fireflies", 1)
-    found = error_bars(solve(basis, target))
-    solution = with_error_bars(solve(basis, target), found)
+    bars = error_bars(solve(basis, target))
+    solution = with_error_bars(solve(basis, target), bars)
     assert [light.untold for light in solution.lighting.lights] == [False, False, True]
-    errors = spoken_errors(found, 3)
+    errors = spoken_errors(bars, 3)
     assert errors[2] == "undetermined"
     assert all(error.endswith(" %") for error in errors[:2])
     assert untold_lights(solution.lighting).startswith(f"Light c is {UNTOLD_HERE}: ")
-    assert untold_lights(solution.lighting) in uncertainty_sentence(basis, solution, found)
-    for shown in (
-        lights_table(basis, solution, found),
+    assert untold_lights(solution.lighting) in uncertainty_sentence(basis, solution, bars)
+    for text in (
+        lights_table(basis, solution, bars),
         html_of(solution),
         html_of(solution.lighting),
     ):
-        assert shown is not None
-        assert shown.count(UNTOLD_HERE) == 1
+        assert text is not None
+        assert text.count(UNTOLD_HERE) == 1
 
 
 def test_peaks_by_hand():
     """A pixel with most of what could push, in which both halves agree by chance."""
-    could, push = np.full((1, 101), 1.0), np.full((1, 101), 0.1)
-    could[0, 50], push[0, 50] = 10, 0
+    possible, push = np.full((1, 101), 1.0), np.full((1, 101), 0.1)
+    possible[0, 50], push[0, 50] = 10, 0
     # As if the pixels came in blocks: what was a peak of the first is none of all.
     peaks = Peaks.empty(1)
-    for its in np.array_split(np.arange(101), 4):
-        peaks.add(could[:, its], push[:, its])
+    for part in np.array_split(np.arange(101), 4):
+        peaks.add(possible[:, part], push[:, part])
     # Half of 200: it says nothing, the others 0.01 each, and it may be twice as noisy.
     assert peaks.total[0] == pytest.approx(200)
     assert peaks.hidden()[0] == pytest.approx(4 * 0.01 * 100)
     # It says 0.04 of itself, and alone it may be 42 times that: more than two paths have.
     push[0, 50] = 2
     peaks = Peaks.empty(1)
-    peaks.add(could, push)
+    peaks.add(possible, push)
     assert 0.04 * T_RATIOS[0] ** 2 > TWO_PATHS
     assert peaks.hidden()[0] == pytest.approx(TWO_PATHS * 100 - 4)
     # Of many alike none decides.
@@ -168,8 +172,8 @@ def test_ratios_are_those_of_student() -> None:
     freedom = np.concatenate([np.arange(1, 6), np.geomspace(5, 1e7, 50)])
     exact = student.ppf(0.975, freedom) / norm.ppf(0.975)
     np.testing.assert_allclose(t_ratios(freedom), exact, rtol=4e-3)
-    between = np.linspace(1, 5, 33)
-    near = student.ppf(0.975, between) / norm.ppf(0.975)
-    assert (t_ratios(between) > 0.99 * near).all()
-    assert (t_ratios(between) < 1.05 * near).all()
+    ratios = np.linspace(1, 5, 33)
+    near = student.ppf(0.975, ratios) / norm.ppf(0.975)
+    assert (t_ratios(ratios) > 0.99 * near).all()
+    assert (t_ratios(ratios) < 1.05 * near).all()
     np.testing.assert_array_equal(t_ratios(np.array([0.3, np.nan])), [T_RATIOS[0], 1])

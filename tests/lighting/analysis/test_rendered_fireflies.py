@@ -33,8 +33,8 @@ def bases(tmp_path_factory: pytest.TempPathFactory) -> list[Basis]:
     scene = lp.load_scene(write_room(tmp_path_factory.mktemp("room"), lights=lights))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(guide_training, "TRAINING_SAMPLES", (2**12,))
-        made = [render_basis(scene, spp=SPP, seed=seed) for seed in range(SEEDS)]
-        return [*made, render_basis(scene, spp=LONG_SPP, seed=SEEDS)]
+        short_bases = [render_basis(scene, spp=SPP, seed=seed) for seed in range(SEEDS)]
+        return [*short_bases, render_basis(scene, spp=LONG_SPP, seed=SEEDS)]
 
 
 def bars_of_seeds(bases: list[Basis]) -> list[Any]:
@@ -50,7 +50,7 @@ def bars_of_seeds(bases: list[Basis]) -> list[Any]:
 def coverage_share(bars: list[Any], light: int) -> float:
     """The share of seeds and channels whose intervals hold the true weight of a light."""
     true = TRUE_WEIGHTS[light]
-    ends = [(low[light], high[light]) for low, high in (its.interval for its in bars)]
+    ends = [(low[light], high[light]) for low, high in (bar.interval for bar in bars)]
     return float(np.mean([(low <= true) & (true <= high) for low, high in ends]))
 
 
@@ -59,9 +59,9 @@ def test_intervals_hold_the_weight_of_a_bulb_in_glass(
 ) -> None:
     bars = bars_of_seeds(bases)
     assert coverage_share(bars, 2) >= 0.9
-    assert np.mean([its.untold[2] for its in bars]) >= 0.9
+    assert np.mean([bar.untold[2] for bar in bars]) >= 0.9
     # All are far too dim, and by half differences alone nobody would know.
-    solved = np.array([its.weights[2] for its in bars])
+    solved = np.array([bar.weights[2] for bar in bars])
     assert (solved < 0.5 * TRUE_WEIGHTS[2]).mean() > 0.9
     none = np.zeros(TRUE_WEIGHTS.shape)
     monkeypatch.setattr(uncertainty, "noise_doubts", lambda *_: none)

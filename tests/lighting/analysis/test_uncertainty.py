@@ -73,22 +73,22 @@ def test_intervals_hold_the_answer_without_noise(
     target = _painting(clean)
     quiet = _tie_channels(make_basis(images=clean), *dimmed)
     truth = solve(quiet, target).lighting.weights_for(quiet)
-    held, missed, told = [], [], []
+    coverages, misses, stated_errors = [], [], []
     for seed in range(SEEDS):
         images, halves = _noisy_halves(clean, sigma, np.random.default_rng(seed))
         basis = _tie_channels(make_basis(images=images, half_differences=halves), *dimmed)
-        found = error_bars(solve(basis, target))
-        low, high = found.interval
-        held.append((low <= truth + 1e-9) & (truth <= high + 1e-9))
-        missed.append(np.square(found.weights - truth).mean())
-        told.append(np.square(found.standard_error).mean())
+        bars = error_bars(solve(basis, target))
+        low, high = bars.interval
+        coverages.append((low <= truth + 1e-9) & (truth <= high + 1e-9))
+        misses.append(np.square(bars.weights - truth).mean())
+        stated_errors.append(np.square(bars.standard_error).mean())
     # Where more than half of what a light does alone is noise, it may be anything: they are wide.
-    assert 0.85 <= np.mean(held) <= 0.99
+    assert 0.85 <= np.mean(coverages) <= 0.99
     # So is each light by itself, unless half of M is noise and more than that is guessed.
     if sigma < 0.5:
-        assert np.mean(held, axis=0).min() > 0.8
+        assert np.mean(coverages, axis=0).min() > 0.8
     # The errors are as large as they say.
-    ratio = np.sqrt(np.mean(told) / np.mean(missed))
+    ratio = np.sqrt(np.mean(stated_errors) / np.mean(misses))
     assert 0.6 < ratio < 1.4
 
 
@@ -100,22 +100,22 @@ def test_one_light_by_hand(make_basis: Any):
     basis = make_basis(images=image, half_differences=half)
     painted = rng.random((*SIZE, 3))
     solution = solve(basis, _target(painted))
-    found = error_bars(solution)
-    M, w = np.square(image[0]).sum((0, 1)), found.weights[0]
+    bars = error_bars(solution)
+    M, w = np.square(image[0]).sum((0, 1)), bars.weights[0]
     residual = painted - w * image[0]
     gradient = half[0] * residual - image[0] * w * half[0]
     np.testing.assert_allclose(
-        found.scatter[0], np.sqrt(np.square(gradient).sum((0, 1))) / M, rtol=1e-4
+        bars.scatter[0], np.sqrt(np.square(gradient).sum((0, 1))) / M, rtol=1e-4
     )
     power = np.square(half[0]).sum((0, 1))
-    np.testing.assert_allclose(found.bias[0], w * power / (M - power), rtol=1e-4)
+    np.testing.assert_allclose(bars.bias[0], w * power / (M - power), rtol=1e-4)
     np.testing.assert_allclose(
-        found.objective_noise, (np.square(w) * np.square(half[0])).sum((0, 1)), rtol=1e-4
+        bars.objective_noise, (np.square(w) * np.square(half[0])).sum((0, 1)), rtol=1e-4
     )
     # Without all of the noise the answer moves by just that bias.
     corrected = correct_noise(solution, share=1.0)
     np.testing.assert_allclose(
-        corrected.lighting.weights_for(basis)[0], w + found.bias[0], rtol=1e-4
+        corrected.lighting.weights_for(basis)[0], w + bars.bias[0], rtol=1e-4
     )
     np.testing.assert_allclose(error_bars(corrected).bias, 0, atol=1e-5)
 
@@ -125,28 +125,28 @@ def test_intervals_are_those_of_student_where_few_pixels_have_noise(make_basis: 
     image, target = np.ones((1, *SIZE, 3)), _target(np.full((*SIZE, 3), 0.5))
     image[0, :, 12:] = 2
     clean = solve(make_basis(images=image), target).weights
-    held, held_before = [], []
+    coverages, normal_coverages = [], []
     for seed in range(200):
         noise = np.zeros((2, *image.shape))
         noise[..., 5:8, 3, :] = np.random.default_rng(seed).normal(0, 0.1, (2, 1, 3, 3))
         half = (noise[0] - noise[1]) / 2
         basis = make_basis(images=image + noise.mean(axis=0), half_differences=half)
-        found = error_bars(solve(basis, target))
-        low, high = found.interval
-        held.append((low <= clean) & (clean <= high))
-        held_before.append(np.abs(found.weights - clean) <= NORMAL_95 * found.standard_error)
+        bars = error_bars(solve(basis, target))
+        low, high = bars.interval
+        coverages.append((low <= clean) & (clean <= high))
+        normal_coverages.append(np.abs(bars.weights - clean) <= NORMAL_95 * bars.standard_error)
     # The channels of 200 seeds are 600 cases, of whose share 0.009 is a standard error.
-    assert np.mean(held_before) == pytest.approx(2 * student.cdf(1.96, 3) - 1, abs=4 * 0.015)
-    assert 0.95 - 3 * 0.009 <= np.mean(held) <= 0.985
+    assert np.mean(normal_coverages) == pytest.approx(2 * student.cdf(1.96, 3) - 1, abs=4 * 0.015)
+    assert 0.95 - 3 * 0.009 <= np.mean(coverages) <= 0.985
 
 
 def test_without_noise_nothing_is_uncertain(make_basis: Any):
     basis = make_basis(4, SIZE)
     solution = solve(basis, _painting(_pools()))
-    found = error_bars(solution)
-    assert found.scatter.max() == 0
-    np.testing.assert_allclose(found.bias, 0, atol=1e-5)
-    errors = [x.standard_error for x in with_error_bars(solution, found).lighting.lights]
+    bars = error_bars(solution)
+    assert bars.scatter.max() == 0
+    np.testing.assert_allclose(bars.bias, 0, atol=1e-5)
+    errors = [x.standard_error for x in with_error_bars(solution, bars).lighting.lights]
     assert None not in errors
 
 
@@ -167,15 +167,15 @@ def test_kept_and_unreached_lights_have_no_error(make_basis: Any):
     lights = (replace(basis.lights[0], is_fixed=True), *basis.lights[1:])
     basis = replace(basis, lights=lights)
     solution = solve(basis, _target(clean[0] + 0.5 * clean[1]))
-    found = error_bars(solution)
-    assert not found.standard_error[0].any()
-    assert found.standard_error[1].all()
+    bars = error_bars(solution)
+    assert not bars.standard_error[0].any()
+    assert bars.standard_error[1].all()
     # Of what reaches nothing nothing is known: that is not the same as no error.
-    assert np.isnan(found.standard_error[2]).all()
-    assert np.isnan(found.interval)[:, 2].all()
-    assert not np.isnan(found.interval)[:, :2].any()
-    told = with_error_bars(solution, found).lighting
-    assert [x.standard_error is None for x in told.lights] == [True, False, True]
+    assert np.isnan(bars.standard_error[2]).all()
+    assert np.isnan(bars.interval)[:, 2].all()
+    assert not np.isnan(bars.interval)[:, :2].any()
+    lighting = with_error_bars(solution, bars).lighting
+    assert [x.standard_error is None for x in lighting.lights] == [True, False, True]
 
 
 @pytest.mark.parametrize("mixed_sigma", [0.05, 0.3, 3.0])
@@ -186,7 +186,7 @@ def test_a_refinement_comes_closer(make_basis: Any, mixed_sigma: float):
     quiet = make_basis(images=clean)
     best = solve(quiet, target)
     excess: dict[str, list[float]] = {"plain": [], "corrected": [], "refined": []}
-    held, shares = [], []
+    coverages, shares = [], []
     truth = best.lighting.weights_for(quiet)
     for seed in range(20):
         rng = np.random.default_rng(seed)
@@ -200,18 +200,18 @@ def test_a_refinement_comes_closer(make_basis: Any, mixed_sigma: float):
         refined = refine(plain, mixed)
         assert refined.problem.refinement is not None
         shares.append(refined.problem.refinement.share)
-        found = {"plain": plain, "corrected": correct_noise(plain), "refined": refined}
-        for name, solution in found.items():
+        solutions = {"plain": plain, "corrected": correct_noise(plain), "refined": refined}
+        for name, solution in solutions.items():
             w = solution.lighting.weights_for(basis)
             value = best.equations.objective(w) - best.equations.objective(truth)
             excess[name].append(float(value.sum()))
         low, high = error_bars(refined).interval
-        held.append((low <= truth + 1e-9) & (truth <= high + 1e-9))
+        coverages.append((low <= truth + 1e-9) & (truth <= high + 1e-9))
     mean = {name: np.mean(values) for name, values in excess.items()}
     assert mean["corrected"] < 0.9 * mean["plain"]
     assert mean["refined"] < {0.05: 0.6, 0.3: 0.75, 3.0: 1.1}[mixed_sigma] * mean["plain"]
     assert np.mean(shares) == pytest.approx({0.05: 1, 0.3: 0.9, 3.0: 0.25}[mixed_sigma], abs=0.15)
-    assert 0.8 <= np.mean(held) <= 1
+    assert 0.8 <= np.mean(coverages) <= 1
 
 
 def test_the_render_of_the_mix_has_the_size_of_the_basis(make_basis: Any):
@@ -239,10 +239,10 @@ def test_a_noiseless_refinement_stays_where_it_is(make_basis: Any):
     basis = make_basis(4, SIZE)
     solution = solve(basis, _painting(_pools()))
     image = basis.mix(solution.lighting.weights_for(basis))
-    again = refine(solution, Estimate(image, 0 * image))
+    second = refine(solution, Estimate(image, 0 * image))
     weights = partial(Basis.mix, basis)
     np.testing.assert_allclose(
-        weights(again.lighting.weights_for(basis)), image, rtol=1e-4, atol=1e-5
+        weights(second.lighting.weights_for(basis)), image, rtol=1e-4, atol=1e-5
     )
 
 
@@ -267,9 +267,9 @@ ASKED: dict[str, tuple[dict[str, Any], str]] = {
 def test_error_bars_under_constraints(make_basis: Any, name: str) -> None:
     """Of each light of which something is asked, against the spread over seeds."""
     clean = _pools()
-    asked, lights = ASKED[name]
-    others = {key: value for key, value in asked.items() if key != "lights"}
-    constraints = Constraints.of(asked.get("lights", {}), **others)
+    words, lights = ASKED[name]
+    others = {key: value for key, value in words.items() if key != "lights"}
+    constraints = Constraints.of(words.get("lights", {}), **others)
     target = _painting(clean)
     solved, errors, ends = [], [], []
     for seed in range(SEEDS):
@@ -279,20 +279,20 @@ def test_error_bars_under_constraints(make_basis: Any, name: str) -> None:
         )
         solution = solve(basis, target, constraints=constraints)
         solved.append(solution.lighting.weights_for(basis))
-        found = error_bars(solution)
-        errors.append(found.scatter)
-        ends.append([end == solved[-1] for end in found.interval])
-    spread, told = np.std(solved, axis=0, ddof=1), np.sqrt(np.mean(np.square(errors), axis=0))
-    held = spread < 1e-9
+        bars = error_bars(solution)
+        errors.append(bars.scatter)
+        ends.append([end == solved[-1] for end in bars.interval])
+    spread, stated = np.std(solved, axis=0, ddof=1), np.sqrt(np.mean(np.square(errors), axis=0))
+    is_held = spread < 1e-9
     # What does not move is at a bound, or locked.
-    assert np.any(ends, axis=(0, 1))[held].all()
-    assert name != "lock" or not told[0].any()
-    its = ["abcde".index(light) for light in lights]
+    assert np.any(ends, axis=(0, 1))[is_held].all()
+    assert name != "lock" or not stated[0].any()
+    indices = ["abcde".index(light) for light in lights]
     # Lights that go off in some seeds have an error of which a half is cut off.
-    always_on = (np.array(solved) > 0).all(axis=0) & ~held
-    always_on[[k for k in range(5) if k not in its]] = False
+    always_on = (np.array(solved) > 0).all(axis=0) & ~is_held
+    always_on[[k for k in range(5) if k not in indices]] = False
     assert always_on.any() != (name == "lock")
-    ratio = told[always_on] / spread[always_on]
+    ratio = stated[always_on] / spread[always_on]
     # A standard deviation from forty seeds is off by a ninth: three of these.
     np.testing.assert_allclose(ratio, 1, atol=0.34)
 
@@ -318,26 +318,26 @@ def test_what_one_unknown_moves_in_several_channels_errs_together(make_basis: An
 
     One path carries all three channels, so that the noise of one is that of the others, too.
     """
-    asked, directions = SPANNING[name]
+    words, directions = SPANNING[name]
     rng = np.random.default_rng(4)
     images = 1 + rng.random((2, *SIZE, 3))
     halves = 0.1 * rng.normal(size=(2, *SIZE, 1)) * images
     basis = make_basis(images=images, half_differences=halves, names="ab", emission=np.ones((2, 3)))
     painted = 1.4 + rng.random((*SIZE, 3))
-    others = {key: value for key, value in asked.items() if key != "lights"}
-    constraints = Constraints.of(asked.get("lights", {}), **others)
+    others = {key: value for key, value in words.items() if key != "lights"}
+    constraints = Constraints.of(words.get("lights", {}), **others)
     solution = solve(basis, _target(painted), constraints=constraints)
     w = solution.lighting.weights_for(basis)
     assert w[0].all()
-    missed = painted - np.einsum("nhwc,nc->hwc", images, w)
+    residual = painted - np.einsum("nhwc,nc->hwc", images, w)
     noise = np.einsum("nhwc,nc->hwc", halves, w)
     # (pixels, lights, channels), and M as (lights, channels, lights, channels).
-    push = np.moveaxis(halves * missed - images * noise, 0, 2).reshape(-1, 2, 3)
+    push = np.moveaxis(halves * residual - images * noise, 0, 2).reshape(-1, 2, 3)
     M = np.einsum("ihwc,jhwc,cd->icjd", images, images, np.eye(3))
-    to = np.array(directions)
-    stiffness = np.einsum("kic,icjd,ljd->kl", to, M, to)
-    steps = np.linalg.solve(stiffness, np.einsum("kic,pic->kp", to, push))
-    expected = np.sqrt(np.square(np.einsum("kic,kp->icp", to, steps)).sum(axis=-1))
+    direction_array = np.array(directions)
+    stiffness = np.einsum("kic,icjd,ljd->kl", direction_array, M, direction_array)
+    steps = np.linalg.solve(stiffness, np.einsum("kic,pic->kp", direction_array, push))
+    expected = np.sqrt(np.square(np.einsum("kic,kp->icp", direction_array, steps)).sum(axis=-1))
     np.testing.assert_allclose(error_bars(solution).scatter, expected, rtol=1e-4, atol=1e-9)
 
 
@@ -356,7 +356,7 @@ MOVING: dict[str, tuple[dict[str, Any], Any]] = {
 @pytest.mark.parametrize("name", MOVING)
 def test_what_to_believe_is_decided_among_what_may_move(make_basis: Any, name: str, sigma: float):
     """By hand: the excess that is expected of shares of the correction and of a render's step."""
-    asked, directions = MOVING[name]
+    words, directions = MOVING[name]
     rng = np.random.default_rng(5)
     # Few pixels count, so that neither scatter nor bias is all.
     importance = np.zeros(SIZE, np.float32)
@@ -368,21 +368,26 @@ def test_what_to_believe_is_decided_among_what_may_move(make_basis: Any, name: s
     basis = make_basis(images=images, half_differences=halves, names="ab", emission=np.ones((2, 3)))
     if name == "scalar":
         basis = _tie_channels(basis, 0, 1)
-    others = {key: value for key, value in asked.items() if key != "lights"}
-    constraints = Constraints.of(asked.get("lights", {}), **others)
-    there = {"lock": 3, "scalar": 3, "color": 0.2, "tie": 1, "limit": 0}[name]
-    painted = np.einsum("nhwc,n->hwc", images, [1, there]) + 0.2 * rng.random((*SIZE, 3))
+    others = {key: value for key, value in words.items() if key != "lights"}
+    constraints = Constraints.of(words.get("lights", {}), **others)
+    freedom = {"lock": 3, "scalar": 3, "color": 0.2, "tie": 1, "limit": 0}[name]
+    painted = np.einsum("nhwc,n->hwc", images, [1, freedom]) + 0.2 * rng.random((*SIZE, 3))
     target = Target("t", painted.astype(np.float32), importance, everything=False)
     solution = solve(basis, target, constraints=constraints)
     w = solution.lighting.weights_for(basis)
-    to, counted = np.array(directions), importance > 0
-    assert all(w[its != 0].all() for its in to)
+    direction_array, is_counted = np.array(directions), importance > 0
+    assert all(w[direction != 0].all() for direction in direction_array)
 
-    f, h = images[:, counted], halves[:, counted]
-    missed, noise = painted[counted] - np.einsum("npc,nc->pc", f, w), np.einsum("npc,nc->pc", h, w)
-    M, N = (np.einsum("kic,ipc,jpc,ljc->kl", to, x, x, to) for x in (f, h))
-    push = np.einsum("kic,ipc->kp", to, h * missed - f * noise)
-    lacking = np.einsum("kic,ipc,pc->k", to, h, noise)
+    f, h = images[:, is_counted], halves[:, is_counted]
+    residual, noise = (
+        painted[is_counted] - np.einsum("npc,nc->pc", f, w),
+        np.einsum("npc,nc->pc", h, w),
+    )
+    M, N = (
+        np.einsum("kic,ipc,jpc,ljc->kl", direction_array, x, x, direction_array) for x in (f, h)
+    )
+    push = np.einsum("kic,ipc->kp", direction_array, h * residual - f * noise)
+    lacking = np.einsum("kic,ipc,pc->k", direction_array, h, noise)
     bias = np.linalg.solve(M - N, lacking)
     assert np.linalg.eigvals(np.linalg.solve(M, N)).max() < 0.5
 
@@ -393,18 +398,22 @@ def test_what_to_believe_is_decided_among_what_may_move(make_basis: Any, name: s
         )
 
     shares = np.linspace(0, 1, 9)
-    chosen = correct_noise(solution).problem.noise_removed
-    assert chosen == shares[np.argmin([excess(s) for s in shares])]
+    removed = correct_noise(solution).problem.noise_removed
+    assert removed == shares[np.argmin([excess(s) for s in shares])]
 
     render = 0.3 * rng.normal(size=(*SIZE, 1)) * painted
     mixed = Estimate(*(x.astype(np.float32) for x in (basis.mix(w), render)))
-    known, rendered = (
+    known_part, rendered = (
         np.einsum("kp,kp->", x, np.linalg.solve(M, x))
-        for x in (np.einsum("kic,ipc,pc->kp", to, f, y) for y in (noise, render[counted]))
+        for x in (
+            np.einsum("kic,ipc,pc->kp", direction_array, f, y) for y in (noise, render[is_counted])
+        )
     )
-    ours = lacking @ np.linalg.solve(M, lacking) + known
+    own_objective = lacking @ np.linalg.solve(M, lacking) + known_part
     refined = refine(solution, mixed)
-    assert refined.problem.refinement.share == pytest.approx(ours / (ours + rendered), rel=1e-4)
+    assert refined.problem.refinement.share == pytest.approx(
+        own_objective / (own_objective + rendered), rel=1e-4
+    )
 
 
 @pytest.mark.parametrize("u", [0.0, 0.5, 3.0, 10.0, 29.9, 30.1, 1e3])
@@ -427,15 +436,15 @@ def test_a_light_that_is_off_by_more_than_noise_may_be_on_by_little(make_basis: 
     painted = -0.1 * rng.random((*SIZE, 3)) * np.array([1, 0.2, 0.02])
     basis = make_basis(images=image, half_differences=half)
     solution = solve(basis, _target(painted))
-    found = error_bars(solution)
+    bars = error_bars(solution)
     M, b = (np.einsum("hwc,hwc->c", image[0], x) for x in (image[0], painted))
     u, s = -b / M, np.sqrt(np.square(half[0] * painted).sum((0, 1))) / M
     assert (u > 3 * s).all()
     expected = truncnorm.isf(0.05, u / s, np.inf, loc=-u, scale=s)
-    low, high = found.interval
+    low, high = bars.interval
     np.testing.assert_array_equal(low, 0)
     np.testing.assert_allclose(high[0], expected, rtol=1e-3)
-    [light] = with_error_bars(solution, found).lighting.lights
+    [light] = with_error_bars(solution, bars).lighting.lights
     assert light.interval == tuple((0, end) for end in high[0])
 
 
@@ -450,33 +459,33 @@ AT_BOUNDS: dict[str, tuple[dict[str, Any], int]] = {
 }
 
 
-@pytest.mark.parametrize("inside", [0.4, 1.2])
+@pytest.mark.parametrize("margin", [0.4, 1.2])
 @pytest.mark.parametrize("name", AT_BOUNDS)
-def test_intervals_at_bounds_hold_what_is_just_inside(make_basis: Any, name: str, inside: float):
+def test_intervals_at_bounds_hold_what_is_just_inside(make_basis: Any, name: str, margin: float):
     """Normal noise of little power, so that coverage is known: 95 % at least, by the binomial.
 
     inside: how far the true weight is from its bound, in standard deviations.
     """
-    asked, side = AT_BOUNDS[name]
+    words, side = AT_BOUNDS[name]
     rng, seeds = np.random.default_rng(3), 60
     # What a standard deviation is here, of one channel and of three that go together.
     one = 0.005 / (np.sqrt(3) if "dimmer" in name else 1)
-    truth = (0.0 if name == "zero" else 0.5) + side * inside * one
+    truth = (0.0 if name == "zero" else 0.5) + side * margin * one
     clean = 0.5 + rng.random((2, *SIZE, 3))
     painted = np.einsum("nhwc,n->hwc", clean, [1, truth]) + _unreachable_picture(clean, rng)
-    constraints = Constraints.of({"lamp": asked})
-    held, spread = [], []
+    constraints = Constraints.of({"lamp": words})
+    coverages, spread = [], []
     for _ in range(seeds):
         a, b = (clean + 0.02 * rng.normal(size=clean.shape) for _ in range(2))
         basis = make_basis(images=(a + b) / 2, half_differences=(a - b) / 2, names=["key", "lamp"])
-        found = error_bars(solve(basis, _target(painted), constraints=constraints))
-        low, high = (end[1] for end in found.interval)
+        bars = error_bars(solve(basis, _target(painted), constraints=constraints))
+        low, high = (end[1] for end in bars.interval)
         assert (low < high).all()
-        held.append((low <= truth) & (truth <= high))
-        spread.append(found.weights[1])
+        coverages.append((low <= truth) & (truth <= high))
+        spread.append(bars.weights[1])
     assert np.mean(np.std(spread, axis=0)) == pytest.approx(one, rel=0.5)
     count = seeds if "dimmer" in name else 3 * seeds
-    assert np.mean(held) >= 0.95 - 3 * np.sqrt(0.95 * 0.05 / count)
+    assert np.mean(coverages) >= 0.95 - 3 * np.sqrt(0.95 * 0.05 / count)
 
 
 def _unreachable_picture(clean: Any, rng: np.random.Generator) -> Any:
@@ -496,9 +505,12 @@ def test_a_limit_that_is_met_leaves_one_side(make_basis: Any):
     halves = 0.1 * rng.normal(size=clean.shape)
     basis = make_basis(images=clean, half_differences=halves, names=["key", "lamp"])
     target = _target(np.einsum("nhwc,n->hwc", clean, [1, 2]))
-    for asked, at in (({"limits": {"max": [1, 1, 1]}}, 1), ({"limits": {"min": [3, 3, 3]}}, 0)):
-        constraints = Constraints.of({"lamp": asked})
-        found = error_bars(solve(basis, target, constraints=constraints))
-        ends = [end[1] for end in found.interval]
-        np.testing.assert_array_equal(ends[at], found.weights[1])
+    for words, bound_side in (
+        ({"limits": {"max": [1, 1, 1]}}, 1),
+        ({"limits": {"min": [3, 3, 3]}}, 0),
+    ):
+        constraints = Constraints.of({"lamp": words})
+        bars = error_bars(solve(basis, target, constraints=constraints))
+        ends = [end[1] for end in bars.interval]
+        np.testing.assert_array_equal(ends[bound_side], bars.weights[1])
         assert (ends[0] < ends[1]).all()

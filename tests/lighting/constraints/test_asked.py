@@ -46,10 +46,10 @@ def test_a_solve_from_python_is_that_of_paint_with_light(room: Path, tmp_path: P
     # To be asked twice is to be asked once.
     assert look.solution.problem.constraints == solution.problem.constraints
     # What is given goes before the file; what it does not contradict stays.
-    given = lp.Constraints.of({"bulb": {"off": True}})
-    off = lp.solve(basis, _target(basis), constraints=given).lighting
-    assert off.emission["bulb"] == (0, 0, 0)
-    assert [x.constraint for x in off.lights] == ["3200 K", "off"]
+    constraints = lp.Constraints.of({"bulb": {"off": True}})
+    lighting = lp.solve(basis, _target(basis), constraints=constraints).lighting
+    assert lighting.emission["bulb"] == (0, 0, 0)
+    assert [x.constraint for x in lighting.lights] == ["3200 K", "off"]
     # A basis read from a file knows only what it was rendered of.
     lp.write_basis(tmp_path / "b.exr", basis)
     assert not lp.read_basis(tmp_path / "b.exr").requests.keys
@@ -62,29 +62,33 @@ def test_the_file_of_now_counts_and_not_that_of_the_cached_basis(room: Path, tmp
     lp.paint_with_light(first, target, tmp_path / "one", spp=8)
     (tmp_path / "room.lights.toml").write_text("[light.panel]\noff = true\n", encoding="utf-8")
     scene = lp.load_scene(room)
-    heard = []
+    labels = []
     cached = lp.paint_with_light(
-        scene, target, tmp_path / "two", spp=8, progress=lambda *told: heard.append(told[0])
+        scene,
+        target,
+        tmp_path / "two",
+        spp=8,
+        progress=lambda *progress_values: labels.append(progress_values[0]),
     )
-    assert "basis" not in " ".join(heard)
-    given = lp.paint_with_light(scene, target, tmp_path / "three", basis=earlier)
-    gone_on = lp.solve(lp.render_basis(scene, spp=8, start=earlier), target)
-    for lighting in (cached.lighting, given.lighting, gone_on.lighting):
+    assert "basis" not in " ".join(labels)
+    lighting_of_scene = lp.paint_with_light(scene, target, tmp_path / "three", basis=earlier)
+    topped_up = lp.solve(lp.render_basis(scene, spp=8, start=earlier), target)
+    for lighting in (cached.lighting, lighting_of_scene.lighting, topped_up.lighting):
         assert [x.constraint for x in lighting.lights] == ["off", ""]
     # Without a scene the basis in memory is what knows; without the file nobody does.
-    alone = lp.paint_with_light(None, target, tmp_path / "four", basis=earlier)
-    assert [x.constraint for x in alone.lighting.lights] == ["3200 K", "lock 40%"]
+    lighting_of_basis = lp.paint_with_light(None, target, tmp_path / "four", basis=earlier)
+    assert [x.constraint for x in lighting_of_basis.lighting.lights] == ["3200 K", "lock 40%"]
     free = lp.load_scene(room, use_lights_file=False)
     assert not lp.render_basis(free, spp=8).requests.keys
 
 
 def test_mistakes_are_refused_in_one_line(room: Path, make_basis: Any):
-    beside = room.with_name("room.lights.toml")
-    beside.write_text("[lamp.bulb]\noff = true\n", encoding="utf-8")
+    lights_file = room.with_name("room.lights.toml")
+    lights_file.write_text("[lamp.bulb]\noff = true\n", encoding="utf-8")
     with pytest.raises(SceneError, match="unknown key 'lamp'"):
         lp.load_scene(room)
     basis = make_basis(2, names=("panel", "bulb"))
-    for keys, wrong in [
+    for keys, message in [
         ({"light": {"bulb": {"lock": "much"}}}, r"hall\.toml: light\.bulb\.lock is 'much'"),
         ({"light": {"blub": {"off": True}}}, r"hall\.toml: light\.blub: no light 'blub'; did you"),
         ({"tie": 3}, r"hall\.toml: tie is 3"),
@@ -93,21 +97,23 @@ def test_mistakes_are_refused_in_one_line(room: Path, make_basis: Any):
         ({"prefer": {"past": 1}}, r"hall\.toml: prefer.*known are current"),
         ({"prefer": 1, "prefer_current": 1}, r"hall\.toml: both prefer_current and prefer"),
     ]:
-        with pytest.raises(ConstraintError, match=wrong) as caught:
+        with pytest.raises(ConstraintError, match=message) as refusal:
             lp.solve(basis.with_requests(SceneRequests(keys, "hall.toml")), _target(basis))
-        assert "\n" not in str(caught.value)
+        assert "\n" not in str(refusal.value)
 
 
 def test_the_same_tie_twice_is_one_tie(make_basis: Any, tmp_path: Path):
     path = tmp_path / "a.lights.toml"
     path.write_text('tie = [["a", "b"]]\nprefer_current = 0.1\n[light."*"]\noff = false\n', "utf-8")
     file = read_constraints(path)
-    given = lp.Constraints.of({"c": {"lock": True}}, tie=[{"lights": ["b", "a"], "color": "3200K"}])
-    both = file.and_then(given)
-    assert file.and_then(both) == both
-    assert both.ties == given.ties
+    constraints = lp.Constraints.of(
+        {"c": {"lock": True}}, tie=[{"lights": ["b", "a"], "color": "3200K"}]
+    )
+    combined = file.and_then(constraints)
+    assert file.and_then(combined) == combined
+    assert combined.ties == constraints.ties
     basis = make_basis(3, names=("a", "b", "c"))
-    a, b, c = lp.solve(basis, _target(basis), constraints=both).lighting.lights
+    a, b, c = lp.solve(basis, _target(basis), constraints=combined).lighting.lights
     assert np.array(a.emission) / sum(a.emission) == pytest.approx(
         np.array(b.emission) / sum(b.emission)
     )
@@ -115,20 +121,23 @@ def test_the_same_tie_twice_is_one_tie(make_basis: Any, tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    "said", ["prefer_current = 0.01", "prefer = { current = 0.01 }", "prefer = 0.01"]
+    "message", ["prefer_current = 0.01", "prefer = { current = 0.01 }", "prefer = 0.01"]
 )
 def test_the_pull_has_the_name_it_has_in_python_and_the_one_of_older_files(
-    tmp_path: Path, said: str
+    tmp_path: Path, message: str
 ):
     path = tmp_path / "a.lights.toml"
-    path.write_text(said, encoding="utf-8")
+    path.write_text(message, encoding="utf-8")
     assert read_constraints(path) == lp.Constraints.of(prefer_current=0.01)
     assert read_lights_file(path).requests.keys
 
 
 def test_all_views_heed_it(make_basis: Any):
-    asked = SceneRequests({"light": {"light 0": {"off": True}}}, "hall.toml")
-    bases = [make_basis(2, seed=1).with_requests(asked), make_basis(2, seed=1).with_requests(asked)]
+    requests = SceneRequests({"light": {"light 0": {"off": True}}}, "hall.toml")
+    bases = [
+        make_basis(2, seed=1).with_requests(requests),
+        make_basis(2, seed=1).with_requests(requests),
+    ]
     problem = Problem.of(bases, [_target(basis) for basis in bases])
     assert list(problem.reduction.labels) == ["off", ""]
     with pytest.raises(lp.LightpaintError, match="the basis is a str: give what"):

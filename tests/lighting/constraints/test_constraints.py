@@ -42,8 +42,8 @@ def _problem(make_basis: Any, seed: int, n: int = 4, *, scalar: tuple[int, ...] 
     return replace(basis, lights=tuple(lights)), Target("t", image, importance, everything=False)
 
 
-def _solve(basis: Any, target: Target, **asked: Any) -> tuple[Any, float, Any]:
-    solution = solve(basis, target, constraints=Constraints.of(**asked))
+def _solve(basis: Any, target: Target, **constraint_options: Any) -> tuple[Any, float, Any]:
+    solution = solve(basis, target, constraints=Constraints.of(**constraint_options))
     assert solution.certificate.converged
     w = solution.lighting.weights_for(basis)
     A, y = stack_rows(basis, target)
@@ -56,8 +56,8 @@ def _current_weights(basis: Any) -> Any:
 
 def _least_squares(A: Any, y: Any, C: Any, w0: Any, low: Any = 0.0, high: Any = np.inf) -> float:
     """The least ‖A (C x + w₀) − y‖² between bounds, by scipy."""
-    found = lsq_linear(A @ C, y - A @ w0.ravel(), bounds=(low, high), method="bvls", tol=1e-14)
-    return float(2 * found.cost)
+    optimum = lsq_linear(A @ C, y - A @ w0.ravel(), bounds=(low, high), method="bvls", tol=1e-14)
+    return float(2 * optimum.cost)
 
 
 def _least_squares_capped(A: Any, y: Any, C: Any, row: Any, least_of: float, most: float) -> float:
@@ -76,8 +76,8 @@ def _columns(n: int, light: int, colours: Any) -> Any:
     return C
 
 
-def _check_close(mine: float, oracle: float, y: Any, *, tolerance: float = SAME) -> None:
-    assert abs(mine - oracle) <= tolerance * (y @ y)
+def _check_close(objective: float, oracle: float, y: Any, *, tolerance: float = SAME) -> None:
+    assert abs(objective - oracle) <= tolerance * (y @ y)
 
 
 @pytest.mark.parametrize("seed", PROBLEMS)
@@ -86,15 +86,15 @@ def test_fixed_colours_and_leds(make_basis: Any, seed: int) -> None:
     A, y = stack_rows(basis, target)
     free = _solve(basis, target, sparse=None, prefer_current=0, light={})[1]
     leds = [hex_to_rgb(text) for text in ("#ff2000", "#20ff00", "#3000ff", "#ffb070")]
-    for asked, colours in (
+    for words, colours in (
         ({"color": "3200K"}, [kelvin_to_rgb(3200)]),
         ({"color": "#ffaa66"}, [hex_to_rgb("#ffaa66")]),
         ({"color": [0.2, 0, 1]}, [[0.2, 0, 1]]),
         ({"primaries": ["#ff2000", "#20ff00", "#3000ff", "#ffb070"]}, leds),
     ):
-        w, mine, solution = _solve(basis, target, light={"l1": asked})
-        _check_close(mine, _least_squares(A, y, _columns(4, 1, colours), np.zeros(12)), y)
-        assert mine >= free - SAME * (y @ y)
+        w, objective, solution = _solve(basis, target, light={"l1": words})
+        _check_close(objective, _least_squares(A, y, _columns(4, 1, colours), np.zeros(12)), y)
+        assert objective >= free - SAME * (y @ y)
         x, distance = nnls(np.transpose(colours).astype(float), w[1])
         assert distance < 1e-9 * max(1, w[1].max())
         assert (x >= 0).all()
@@ -109,25 +109,27 @@ def test_limits_of_emission(make_basis: Any, seed: int) -> None:
     low = np.zeros((4, 3))
     high[:, :] = [0.3, 0.4, 0.2]
     high[2], low[2] = [0.6, 0.6, 2], [0.1, 0.2, 0.3]
-    asked = {
+    words = {
         "l*": {"limits": {"max": [0.3, 0.4, 0.2]}},
         "l2": {"limits": {"min": [0.1, 0.2, 0.3], "max": [0.6, 0.6, 2]}},
     }
-    w, mine, _ = _solve(basis, target, light=asked)
+    w, objective, _ = _solve(basis, target, light=words)
     assert (w <= high).all()
     assert (w >= low).all()
-    _check_close(mine, _least_squares(A, y, np.eye(12), np.zeros(12), low.ravel(), high.ravel()), y)
+    _check_close(
+        objective, _least_squares(A, y, np.eye(12), np.zeros(12), low.ravel(), high.ravel()), y
+    )
 
 
 @pytest.mark.parametrize("seed", PROBLEMS)
 def test_a_range_of_white_is_as_good_as_the_best_of_its_pieces(make_basis: Any, seed: int) -> None:
     basis, target = _problem(make_basis, seed)
     A, y = stack_rows(basis, target)
-    asked = {"kelvin": [2700, 6500], "duv": 0.002}
-    w, mine, solution = _solve(basis, target, light={"l1": asked})
+    words = {"kelvin": [2700, 6500], "duv": 0.002}
+    w, objective, solution = _solve(basis, target, light={"l1": words})
     pieces = pairwise(white_range(2700, 6500, 0.002).colors)
     best = min(_least_squares(A, y, _columns(4, 1, piece), np.zeros(12)) for piece in pieces)
-    _check_close(mine, best, y)
+    _check_close(objective, best, y)
     assert solution.lighting.lights[1].constraint
     if w[1].any():
         kelvin, duv = cct_and_duv(w[1])  # type: ignore[misc]
@@ -147,55 +149,55 @@ def test_limits_of_luminance(make_basis: Any, seed: int) -> None:
         ({"min": 0.5, "max": 0.9}, 0.5, 0.9),
     ):
         for extra, mixes in (({}, [np.eye(3)]), ({"kelvin": [2700, 6500]}, whites)):
-            w, mine, _ = _solve(basis, target, light={"l1": {"limits": limits, **extra}})
+            w, objective, _ = _solve(basis, target, light={"l1": {"limits": limits, **extra}})
             # Round-off of a sum of three.
             assert lowest - 1e-12 <= w[1] @ LUMINANCE <= most + 1e-12
             each = [_columns(4, 1, colours) for colours in mixes]
             best = [_least_squares_capped(A, y, C, LUMINANCE @ C[3:6], lowest, most) for C in each]
             # Of whites that no neighbour and no other white alone betters there may be several.
             tolerance = 2e-4 if extra else SAME
-            assert mine >= min(best) - SAME * (y @ y)
-            _check_close(mine, min(best), y, tolerance=tolerance)
+            assert objective >= min(best) - SAME * (y @ y)
+            _check_close(objective, min(best), y, tolerance=tolerance)
 
 
 @pytest.mark.parametrize("seed", PROBLEMS)
 def test_ties_locks_and_off(make_basis: Any, seed: int) -> None:
     basis, target = _problem(make_basis, seed)
     A, y = stack_rows(basis, target)
-    now = _current_weights(basis)
+    current = _current_weights(basis)
     # One dimmer: the columns of both, as they shine now, are one.
-    w, mine, _ = _solve(basis, target, tie=["l0", "l2"])
+    w, objective, _ = _solve(basis, target, tie=["l0", "l2"])
     C = np.zeros((12, 7))
     C[[3, 4, 5, 9, 10, 11], range(6)] = 1
-    C[0:3, 6], C[6:9, 6] = now[0], now[2]
-    _check_close(mine, _least_squares(A, y, C, np.zeros(12)), y)
-    np.testing.assert_allclose(w[0] / now[0], w[2, 0] / now[2, 0], rtol=1e-12)
+    C[0:3, 6], C[6:9, 6] = current[0], current[2]
+    _check_close(objective, _least_squares(A, y, C, np.zeros(12)), y)
+    np.testing.assert_allclose(w[0] / current[0], w[2, 0] / current[2, 0], rtol=1e-12)
     # What is locked moves to the right-hand side.
-    held = np.zeros((4, 3))
-    held[3], held[0] = now[3], [0.5, 0.25, 0.125]
+    locked_weights = np.zeros((4, 3))
+    locked_weights[3], locked_weights[0] = current[3], [0.5, 0.25, 0.125]
     C = np.eye(12)[:, 3:9]
-    asked = {"l3": {"lock": True}, "l0": {"lock": [0.5, 0.25, 0.125]}}
-    w, mine, _ = _solve(basis, target, light=asked)
-    np.testing.assert_array_equal(w[[0, 3]], held[[0, 3]])
-    _check_close(mine, _least_squares(A, y, C, held), y)
+    words = {"l3": {"lock": True}, "l0": {"lock": [0.5, 0.25, 0.125]}}
+    w, objective, _ = _solve(basis, target, light=words)
+    np.testing.assert_array_equal(w[[0, 3]], locked_weights[[0, 3]])
+    _check_close(objective, _least_squares(A, y, C, locked_weights), y)
     # What is off might as well not be there.
-    w, mine, _ = _solve(basis, target, light={"l0": {"off": True}, "l3": {"off": True}})
+    w, objective, _ = _solve(basis, target, light={"l0": {"off": True}, "l3": {"off": True}})
     assert not w[[0, 3]].any()
-    _check_close(mine, _least_squares(A, y, C, np.zeros(12)), y)
+    _check_close(objective, _least_squares(A, y, C, np.zeros(12)), y)
 
 
 @pytest.mark.parametrize("seed", PROBLEMS)
 def test_the_pull_to_the_present(make_basis: Any, seed: int) -> None:
     basis, target = _problem(make_basis, seed, scalar=(2,))
     A, y = stack_rows(basis, target)
-    now, strength = _current_weights(basis), 0.05
+    current, strength = _current_weights(basis), 0.05
     power = np.square(basis.images, dtype=np.float64).sum(axis=(1, 2))
     root = np.sqrt(strength * power).ravel()
-    rows, aims = np.vstack([A, np.diag(root)]), np.concatenate([y, root * now.ravel()])
+    rows, aims = np.vstack([A, np.diag(root)]), np.concatenate([y, root * current.ravel()])
     w, _, _ = _solve(basis, target, prefer_current=strength)
-    mine = float(((rows @ w.ravel() - aims) ** 2).sum())
+    objective = float(((rows @ w.ravel() - aims) ** 2).sum())
     C = _columns(4, 2, np.ones((1, 3)))
-    _check_close(mine, _least_squares(rows, aims, C, np.zeros(12)), aims)
+    _check_close(objective, _least_squares(rows, aims, C, np.zeros(12)), aims)
 
 
 def _random_feasible(rng: Any, basis: Any, answer: Any) -> Any:
@@ -205,12 +207,12 @@ def _random_feasible(rng: Any, basis: Any, answer: Any) -> Any:
     """
     whites = white_range(2700, 5000)
     [place] = np.floor(whites.places(answer[[2]]) - 1e-9).clip(0)
-    now, w = _current_weights(basis), rng.exponential(1, (7, 3))
-    w[0] = now[0]
+    current, w = _current_weights(basis), rng.exponential(1, (7, 3))
+    w[0] = current[0]
     w[1] = rng.exponential() * kelvin_to_rgb(3200)
     w[1] *= min(1, 0.3 / (w[1] @ LUMINANCE))
     w[2] = rng.exponential() * whites.at(place + rng.random(1))
-    w[3:5] = rng.exponential() * now[3:5]
+    w[3:5] = rng.exponential() * current[3:5]
     w[5] = np.minimum(w[5], 0.5 * w[5] / (w[5] @ LUMINANCE))
     w[6] = rng.uniform(0, 0.8)
     return w
@@ -282,10 +284,10 @@ def test_active_is_what_holds_a_light_back(make_basis: Any) -> None:
     plain = solve(basis, target).lighting.weights_for(basis)
     tight = {"l0": {"lock": plain[0].tolist()}, "l1": {"limits": {"max": (plain[1] / 2).tolist()}}}
     # Locked where it would be anyway: nothing holds it, until another light is moved.
-    alone = _solve(basis, target, light={"l0": tight["l0"]})[2]
-    assert [light.is_active for light in alone.lighting.lights] == [False] * 4
-    both = _solve(basis, target, light=tight)[2]
-    assert [light.is_active for light in both.lighting.lights] == [True, True, False, False]
+    single = _solve(basis, target, light={"l0": tight["l0"]})[2]
+    assert [light.is_active for light in single.lighting.lights] == [False] * 4
+    combined = _solve(basis, target, light=tight)[2]
+    assert [light.is_active for light in combined.lighting.lights] == [True, True, False, False]
 
 
 def test_a_light_that_reaches_nothing_stays_as_near_as_it_may(make_basis: Any) -> None:
@@ -309,11 +311,13 @@ def test_a_light_that_reaches_nothing_stays_as_near_as_it_may(make_basis: Any) -
 
 def test_scalar_and_kept_lights(make_basis: Any) -> None:
     basis, target = _problem(make_basis, 2, 5, scalar=(1, 2))
-    kept = replace(basis.lights[4], name="rest", emission=(1.0,) * 3, is_fixed=True, members=("x",))
-    basis = replace(basis, lights=(*basis.lights[:4], kept))
+    kept_light = replace(
+        basis.lights[4], name="rest", emission=(1.0,) * 3, is_fixed=True, members=("x",)
+    )
+    basis = replace(basis, lights=(*basis.lights[:4], kept_light))
     A, y = stack_rows(basis, target)
-    asked = {"l1": {"limits": {"max": "20%"}}, "rest": {"lock": True}, "x": {"lock": True}}
-    w, mine, _ = _solve(basis, target, light=asked, tie=["l2", "l3"])
+    words = {"l1": {"limits": {"max": "20%"}}, "rest": {"lock": True}, "x": {"lock": True}}
+    w, objective, _ = _solve(basis, target, light=words, tie=["l2", "l3"])
     assert (w[4] == 1).all()
     assert w[1, 0] == w[1, 1] == w[1, 2] <= 0.2
     C = np.zeros((15, 5))
@@ -322,7 +326,7 @@ def test_scalar_and_kept_lights(make_basis: Any) -> None:
     C[6:9, 4], C[9:12, 4] = 1, basis.lights[3].emission
     w0 = np.zeros(15)
     w0[12:] = 1
-    _check_close(mine, _least_squares(A, y, C, w0, 0, [np.inf] * 3 + [0.2, np.inf]), y)
+    _check_close(objective, _least_squares(A, y, C, w0, 0, [np.inf] * 3 + [0.2, np.inf]), y)
     w, _, _ = _solve(basis, target, light={"l1": {"lock": "30%"}, "l2": {"lock": 0.7}})
     np.testing.assert_allclose(w[1:3], [[0.3] * 3, [0.7] * 3])
 
@@ -351,27 +355,27 @@ def test_what_stands_later_and_names_go_before(make_basis: Any) -> None:
     w = solve(basis, target, constraints=below).lighting.weights_for(basis)
     assert not w[[0, 2, 3]].any()
     assert w[1].all()
-    both = below.and_then(Constraints.of({"l*": {"lock": True}}, sparse=2))
-    assert both.sparse == 2
-    w = solve(basis, target, constraints=replace(both, sparse=None)).lighting.weights_for(basis)
+    merged = below.and_then(Constraints.of({"l*": {"lock": True}}, sparse=2))
+    assert merged.sparse == 2
+    w = solve(basis, target, constraints=replace(merged, sparse=None)).lighting.weights_for(basis)
     np.testing.assert_array_equal(w, _current_weights(basis))
-    again = below.and_then(Constraints.of({"l2": {"off": False}}))
-    assert solve(basis, target, constraints=again).lighting.weights_for(basis)[2].any()
+    merged_again = below.and_then(Constraints.of({"l2": {"off": False}}))
+    assert solve(basis, target, constraints=merged_again).lighting.weights_for(basis)[2].any()
 
 
 def test_the_answer_file_says_what_held_a_light(make_basis: Any, tmp_path: Any) -> None:
     basis, target = _problem(make_basis, 4)
     _, _, solution = _solve(basis, target, light={"l1": {"limits": {"max": 0.01}}})
     write_lighting(tmp_path / "lighting.json", solution.lighting)
-    again = read_lighting(tmp_path / "lighting.json")
-    assert again == solution.lighting
-    assert [x.constraint for x in again.lights] == ["", "limits 0 to 0.01", "", ""]
-    assert again.lights[1].is_active
-    assert not again.with_emission("l1", (1, 1, 1)).lights[1].constraint
+    reread = read_lighting(tmp_path / "lighting.json")
+    assert reread == solution.lighting
+    assert [x.constraint for x in reread.lights] == ["", "limits 0 to 0.01", "", ""]
+    assert reread.lights[1].is_active
+    assert not reread.with_emission("l1", (1, 1, 1)).lights[1].constraint
 
 
 @pytest.mark.parametrize(
-    ("asked", "words"),
+    ("constraint_words", "words"),
     [
         ({"lock": True, "off": True}, "both 'lock' and 'off'"),
         ({"lock": 1, "limits": {"max": 2}}, "both 'lock' and 'limits'"),
@@ -405,15 +409,15 @@ def test_the_answer_file_says_what_held_a_light(make_basis: Any, tmp_path: Any) 
         (3, "is 3: expected keys"),
     ],
 )
-def test_wishes_that_mean_nothing_are_refused_at_birth(asked: Any, words: str) -> None:
-    with pytest.raises(ConstraintError, match=words) as caught:
-        Constraints.of({"key": asked}, where="hall.lights.toml")
-    assert str(caught.value).startswith("hall.lights.toml: light.key")
-    assert "\n" not in str(caught.value)
+def test_wishes_that_mean_nothing_are_refused_at_birth(constraint_words: Any, words: str) -> None:
+    with pytest.raises(ConstraintError, match=words) as refusal:
+        Constraints.of({"key": constraint_words}, where="hall.lights.toml")
+    assert str(refusal.value).startswith("hall.lights.toml: light.key")
+    assert "\n" not in str(refusal.value)
 
 
 @pytest.mark.parametrize(
-    ("asked", "words"),
+    ("constraint_words", "words"),
     [
         ({"light": ["key"]}, "light is .*: expected tables"),
         ({"tie": "key"}, "tie is 'key': expected lists of names"),
@@ -427,13 +431,13 @@ def test_wishes_that_mean_nothing_are_refused_at_birth(asked: Any, words: str) -
         ({"sparse": True}, "sparse is True"),
     ],
 )
-def test_wishes_for_all_lights_that_mean_nothing(asked: Any, words: str) -> None:
+def test_wishes_for_all_lights_that_mean_nothing(constraint_words: Any, words: str) -> None:
     with pytest.raises(ConstraintError, match=words):
-        Constraints.of(**asked)
+        Constraints.of(**constraint_words)
 
 
 @pytest.mark.parametrize(
-    ("asked", "words"),
+    ("constraint_words", "words"),
     [
         ({"light": {"lamb_1": {"off": True}}}, "no light 'lamb_1'; did you mean 'lamp_1'"),
         ({"light": {"w*": {"off": True}}}, r"no light 'w\*'; there are"),
@@ -483,7 +487,9 @@ def test_wishes_for_all_lights_that_mean_nothing(asked: Any, words: str) -> None
         ),
     ],
 )
-def test_wishes_that_do_not_fit_the_lights(make_basis: Any, asked: Any, words: str) -> None:
+def test_wishes_that_do_not_fit_the_lights(
+    make_basis: Any, constraint_words: Any, words: str
+) -> None:
     names = ["lamp_1", "lamp_2", "dark", "sky", "group", "rest"]
     basis = make_basis(6, SIZE, names=names, emission=[[1, 2, 3]] * 6)
     changes: list[dict[str, Any]] = [{} for _ in names]
@@ -493,50 +499,50 @@ def test_wishes_that_do_not_fit_the_lights(make_basis: Any, asked: Any, words: s
     changes[5] = {"emission": (1.0, 1.0, 1.0), "is_fixed": True, "members": ("x", "y")}
     lights = tuple(replace(x, **change) for x, change in zip(basis.lights, changes, strict=True))
     _, target = _problem(make_basis, 0)
-    with pytest.raises(ConstraintError, match=words) as caught:
-        solve(replace(basis, lights=lights), target, constraints=Constraints.of(**asked))
-    assert "\n" not in str(caught.value)
+    with pytest.raises(ConstraintError, match=words) as refusal:
+        solve(replace(basis, lights=lights), target, constraints=Constraints.of(**constraint_words))
+    assert "\n" not in str(refusal.value)
 
 
 def test_ties_of_lights_with_colours_and_limits(make_basis: Any) -> None:
     basis, target = _problem(make_basis, 8)
-    now = _current_weights(basis) @ LUMINANCE
+    current = _current_weights(basis) @ LUMINANCE
     w, _, _ = _solve(
         basis,
         target,
         tie=[{"lights": ["l0", "l1"], "color": "3200K"}, ["l2", "l3"]],
         light={"l2": {"color": "#ffaa66"}, "l3": {"limits": {"max": "5%"}}},
     )
-    np.testing.assert_allclose(w[0] / now[0], w[1] / now[1])
+    np.testing.assert_allclose(w[0] / current[0], w[1] / current[1])
     np.testing.assert_allclose(w[0] / (w[0] @ LUMINANCE), kelvin_to_rgb(3200))
     # The limit of one member is that of the dimmer.
-    np.testing.assert_allclose(w[2] @ LUMINANCE, 0.05 * now[2])
+    np.testing.assert_allclose(w[2] @ LUMINANCE, 0.05 * current[2])
 
 
 def test_who_holds_a_light_holds_its_dimmer(make_basis: Any) -> None:
     """As if each of the lights on it had been held, at the same share of the present."""
     basis, target = _problem(make_basis, 8)
-    now, tie = _current_weights(basis), [["l0", "l1"]]
-    level = 0.3 * float(now[0] @ LUMINANCE)
+    current, tie = _current_weights(basis), [["l0", "l1"]]
+    level = 0.3 * float(current[0] @ LUMINANCE)
     warm = (level * kelvin_to_rgb(3200)).tolist()
     for lock, first, share in (
-        ("30%", 0.3 * now[0], 0.3),
-        (level, 0.3 * now[0], 0.3),
+        ("30%", 0.3 * current[0], 0.3),
+        (level, 0.3 * current[0], 0.3),
         (warm, np.array(warm), 0.3),  # its colour is its own
-        (True, now[0], 1.0),
-        ([0, 0, 0], 0 * now[0], 0.0),
-        (None, 0 * now[0], 0.0),
+        (True, current[0], 1.0),
+        ([0, 0, 0], 0 * current[0], 0.0),
+        (None, 0 * current[0], 0.0),
     ):
-        asked = {"off": True} if lock is None else {"lock": lock}
-        w, _, _ = _solve(basis, target, tie=tie, light={"l0": asked})
-        each = {"l0": {"lock": first.tolist()}, "l1": {"lock": (share * now[1]).tolist()}}
+        words = {"off": True} if lock is None else {"lock": lock}
+        w, _, _ = _solve(basis, target, tie=tie, light={"l0": words})
+        each = {"l0": {"lock": first.tolist()}, "l1": {"lock": (share * current[1]).tolist()}}
         expected, _, _ = _solve(basis, target, light=each)
         np.testing.assert_allclose(w[0], first, rtol=1e-12)
         np.testing.assert_allclose(w, expected, rtol=1e-9, atol=1e-9 * expected.max())
     # Both at the same share are one wish.
-    both = {"l0": {"lock": "30%"}, "l1": {"lock": "30%"}}
-    w, _, _ = _solve(basis, target, tie=tie, light=both)
-    np.testing.assert_allclose(w[:2], 0.3 * now[:2], rtol=1e-12)
+    same_locks = {"l0": {"lock": "30%"}, "l1": {"lock": "30%"}}
+    w, _, _ = _solve(basis, target, tie=tie, light=same_locks)
+    np.testing.assert_allclose(w[:2], 0.3 * current[:2], rtol=1e-12)
 
 
 def test_no_constraints_are_the_plain_problem(make_basis: Any) -> None:
@@ -558,23 +564,23 @@ def test_the_best_few_lights(make_basis: Any, seed: int) -> None:
     A, y = stack_rows(basis, target)
     w0 = np.zeros((6, 3))
     w0[5] = _current_weights(basis)[5]
-    w, mine, solution = _solve(basis, target, sparse=2, light={"l5": {"lock": True}})
-    on = np.flatnonzero(w[:5].any(axis=1))
-    assert len(on) <= 2
+    w, objective, solution = _solve(basis, target, sparse=2, light={"l5": {"lock": True}})
+    lit_lights = np.flatnonzero(w[:5].any(axis=1))
+    assert len(lit_lights) <= 2
 
-    def of(lights: Any) -> float:
+    def objective_of(lights: Any) -> float:
         C = np.eye(18)[:, [3 * k + c for k in lights for c in range(3)]]
         return _least_squares(A, y, C, w0)
 
     # The best of these that are on, and, where exchanging found it, of all.
-    _check_close(mine, of(on), y)
-    values = [of(lights) for lights in combinations(range(5), 2)]
-    assert mine <= np.quantile(values, 0.2) + SAME * (y @ y)
-    counts, missed = zip(*solution.certificate.curve, strict=True)
+    _check_close(objective, objective_of(lit_lights), y)
+    values = [objective_of(lights) for lights in combinations(range(5), 2)]
+    assert objective <= np.quantile(values, 0.2) + SAME * (y @ y)
+    counts, misses = zip(*solution.certificate.curve, strict=True)
     assert counts == (1, 2, 3, 4)
     # The roots of float64 sums.
-    assert (np.diff(missed) < 1e-12).all()
-    assert missed[1] == pytest.approx(np.sqrt(mine / (y @ y)))
+    assert (np.diff(misses) < 1e-12).all()
+    assert misses[1] == pytest.approx(np.sqrt(objective / (y @ y)))
     left = [light.name for light in solution.lighting.lights if "left out" in light.constraint]
     assert len(left) == 3
 
@@ -602,14 +608,14 @@ def test_limits_may_leave_one_emission(make_basis: Any, kind: str):
         basis = make_basis(2, SIZE, names="ab", emission=[level, [1, 1, 1]])
         target = Target("t", basis.images[0], np.ones(SIZE, np.float32), everything=False)
         # Of the first, level / color of one channel and another differ.
-        asked: dict[str, Any] = {
+        words: dict[str, Any] = {
             "color": {"color": color.tolist(), "limits": [level.tolist(), level.tolist()]},
             "share": {"color": color.tolist(), "limits": ["100%", bright * (1 - 2e-13)]},
             "luminance of mixed": {"limits": ["100%", bright * (1 - 2e-13)]},
             "luminance of free": {"limits": [level.tolist(), bright * (1 - 2e-13)]},
         }[kind]
-        asked["limits"] = dict(zip(("min", "max"), asked["limits"], strict=True))
-        solution = solve(basis, target, constraints=Constraints.of({"a": asked}))
+        words["limits"] = dict(zip(("min", "max"), words["limits"], strict=True))
+        solution = solve(basis, target, constraints=Constraints.of({"a": words}))
         w = solution.lighting.weights_for(basis)[0]
         # What is taken for round-off, 1e-12, of a channel with a tenth of the luminance.
         if kind == "luminance of mixed":

@@ -25,18 +25,18 @@ SEEN = 1e-3
 
 
 def _duvs(weights: Any) -> list[float]:
-    found = [cct_and_duv(w) for w in weights if luminance(w) > 0]
-    assert None not in found
-    return [x[1] for x in found if x is not None]
+    chromaticities = [cct_and_duv(w) for w in weights if luminance(w) > 0]
+    assert None not in chromaticities
+    return [x[1] for x in chromaticities if x is not None]
 
 
-def _target(make_basis: Any, seed: int, n: int = 5, **about: Any) -> tuple[lp.Basis, lp.Target]:
+def _target(make_basis: Any, seed: int, n: int = 5, **fields: Any) -> tuple[lp.Basis, lp.Target]:
     rng = np.random.default_rng(seed)
     basis = make_basis(n, SIZE, seed=seed)
     # Some of it made by coloured lights, which no whites reach.
     image = basis.mix(rng.exponential(1, (n, 3))).astype(np.float32)
     mask = (rng.random(SIZE) < 0.7).astype(np.float32)
-    return basis, lp.Target("t", image, mask, everything=False, **about)
+    return basis, lp.Target("t", image, mask, everything=False, **fields)
 
 
 RANGES: list[dict[str, Any]] = [
@@ -47,16 +47,16 @@ RANGES: list[dict[str, Any]] = [
 
 
 @pytest.mark.parametrize("space", ["linear", "display"])
-@pytest.mark.parametrize("asked", RANGES)
+@pytest.mark.parametrize("words", RANGES)
 @pytest.mark.parametrize("seed", range(4))
-def test_lights_lie_on_the_locus(make_basis: Any, seed: int, asked: Any, space: Any) -> None:
+def test_lights_lie_on_the_locus(make_basis: Any, seed: int, words: Any, space: Any) -> None:
     basis, target = _target(make_basis, seed)
     solution = lp.solve(
-        basis, target, constraints=lp.Constraints.of({"*": asked}), space=space, hold=1.0
+        basis, target, constraints=lp.Constraints.of({"*": words}), space=space, hold=1.0
     )
     assert solution.certificate.converged
     for duv in _duvs(solution.weights):
-        assert abs(duv - asked.get("duv", 0)) < SEEN
+        assert abs(duv - words.get("duv", 0)) < SEEN
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -65,26 +65,29 @@ def test_the_answer_stays_and_no_neighbours_better_it(make_basis: Any, seed: int
     solution = lp.solve(basis, target, colors="white", literal=True)
     problem = solution.problem
     reduction, equations = problem.reduction, problem.equations
-    again, found = next_whites(equations, reduction, solution.weights)
-    assert [k.window for k in again.knobs] == [k.window for k in reduction.knobs]
+    next_windows, next_weights = next_whites(equations, reduction, solution.weights)
+    assert [k.window for k in next_windows.knobs] == [k.window for k in reduction.knobs]
     least = equations.objective(solution.weights).sum()
     round_off = 1e-9 * equations.target_norm2.sum()
-    assert equations.objective(found.weights).sum() == pytest.approx(least, abs=round_off)
+    assert equations.objective(next_weights.weights).sum() == pytest.approx(least, abs=round_off)
     for k, knob in enumerate(reduction.knobs):
         assert knob.whites is not None
         # With all others solved anew: the pieces that meet where the light is.
         [place] = knob.whites.places(solution.weights[[k]])
         for first in {int(place - 1e-6), min(int(place + 1e-6), knob.whites.last - 1)}:
-            moved = reduction.with_windows({k: (first, first + 1)})
-            beside = solve_reduced(equations, moved, solution.weights)
-            assert equations.objective(beside.weights).sum() >= least - round_off
+            neighbour_windows = reduction.with_windows({k: (first, first + 1)})
+            neighbour = solve_reduced(equations, neighbour_windows, solution.weights)
+            assert equations.objective(neighbour.weights).sum() >= least - round_off
         # With all others as they are: any white, as bright as is best.
         for rgb in knob.whites.colors:
-            beside, own = solution.weights.copy(), np.zeros((4, 3))
-            beside[k], own[k] = 0, rgb
-            down, power = (equations.gradient(beside) * own).sum(), equations.M[:, k, k] @ rgb**2
-            beside[k] = max(-down / power, 0) * rgb
-            assert equations.objective(beside).sum() >= least - round_off
+            neighbour, own_errors = solution.weights.copy(), np.zeros((4, 3))
+            neighbour[k], own_errors[k] = 0, rgb
+            down, power = (
+                (equations.gradient(neighbour) * own_errors).sum(),
+                equations.M[:, k, k] @ rgb**2,
+            )
+            neighbour[k] = max(-down / power, 0) * rgb
+            assert equations.objective(neighbour).sum() >= least - round_off
 
 
 def test_a_light_with_less_than_no_picture_is_solved_as_one_without(make_basis: Any) -> None:
@@ -97,8 +100,8 @@ def test_a_light_with_less_than_no_picture_is_solved_as_one_without(make_basis: 
     _, expected = next_whites(NormalEquations(M, b, norm2), problem.reduction, start)
     below = M.copy()
     below[:, 0, 0] = -1e-15 * M.max()
-    _, found = next_whites(NormalEquations(below, b, norm2), problem.reduction, start)
-    np.testing.assert_allclose(found.weights[1:], expected.weights[1:], rtol=1e-6)
+    _, next_weights = next_whites(NormalEquations(below, b, norm2), problem.reduction, start)
+    np.testing.assert_allclose(next_weights.weights[1:], expected.weights[1:], rtol=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -125,8 +128,8 @@ def test_a_light_beyond_its_whites_says_to_which_side(make_basis: Any) -> None:
         weights = np.array([kelvin_to_rgb(4000, duv), kelvin_to_rgb(3000), kelvin_to_rgb(5000)])
         image = basis.mix(weights).astype(np.float32)
         target = lp.Target("t", image, np.ones(SIZE, np.float32), everything=False)
-        asked = lp.Constraints.of({"light 0": {"kelvin": [2700, 6500]}})
-        bounds = lp.diagnose(lp.solve(basis, target, constraints=asked)).bounds
+        constraints = lp.Constraints.of({"light 0": {"kelvin": [2700, 6500]}})
+        bounds = lp.diagnose(lp.solve(basis, target, constraints=constraints)).bounds
         assert {bound.tint for bound in bounds if bound.kind == "colour"} <= {tint}
         assert bool(tint) == any(bound.tint for bound in bounds)
 
@@ -168,9 +171,9 @@ def _narrow_target(basis: lp.Basis) -> lp.Target:
 
 def _assert_nearest(answer: Any, current: Any) -> None:
     """Whether each light has the white at its own temperature."""
-    for w, now in zip(answer, current, strict=True):
+    for w, current_emission in zip(answer, current, strict=True):
         kelvin, duv = cct_and_duv(w)  # type: ignore[misc]
         assert abs(duv) < SEEN
-        if (found := cct_and_duv(now)) is not None:
-            mired = np.clip(1e6 / found[0], 1e6 / 9000, 1e6 / 2200)
+        if (chromaticity := cct_and_duv(current_emission)) is not None:
+            mired = np.clip(1e6 / chromaticity[0], 1e6 / 9000, 1e6 / 2200)
             assert 1e6 / kelvin == pytest.approx(mired, abs=2)  # a chord of 8

@@ -81,12 +81,12 @@ def test_without_gamuts_lamps_would_be_green(
 ) -> None:
     """Else the test above could not fail."""
     monkeypatch.setattr(problem, "gamuts_for", lambda *_: None)
-    found = []
+    solutions = []
     for seed in range(8):
         basis = _room(make_basis, seed)
         target = _target(*_painting(basis, WARM))
-        found.append(_is_white(lp.solve(basis, target, space="linear").weights))
-    assert np.count_nonzero(found) <= 2
+        solutions.append(_is_white(lp.solve(basis, target, space="linear").weights))
+    assert np.count_nonzero(solutions) <= 2
 
 
 @pytest.mark.parametrize("space", ["display", "linear"])
@@ -94,9 +94,11 @@ def test_who_paints_green_gets_green(make_basis: Any, space: Any) -> None:
     basis = _room(make_basis, 1)
     image, weight = _painting(basis, GREEN)
     solution = lp.solve(basis, _target(image, weight), space=space, hold=0.1)
-    where = white_range(2200, 9000).greener(solution.weights)
-    lit = (basis.images[(slice(None), *PAINTED)].mean(axis=(1, 2)) * solution.weights).sum(axis=1)
-    assert where[np.argmax(lit)] > 0.02
+    is_greener = white_range(2200, 9000).greener(solution.weights)
+    lit_colour = (basis.images[(slice(None), *PAINTED)].mean(axis=(1, 2)) * solution.weights).sum(
+        axis=1
+    )
+    assert is_greener[np.argmax(lit_colour)] > 0.02
 
 
 def test_a_red_lamp_keeps_nobody_from_painting_green(make_basis: Any) -> None:
@@ -118,13 +120,13 @@ def test_nor_under_the_brush(make_basis: Any, seed: int, space: Any) -> None:
     view = LiveView(basis, image, weight)
     fit = resolve_for_targets(lp.Fit(space=space), [_target(*_painting(basis, WARM))])
     live = LiveSolver([view], fit=fit, constraints=lp.Constraints())
-    painted, whole = _painting(basis, WARM)
+    painted, whole_region = _painting(basis, WARM)
     answer = basis.current_weights
     for region in (PAINTED, BLACK):
         for row in range(region[0].start, region[0].stop):
-            its = slice(row, row + 1), region[1]
-            image[its], weight[its] = painted[its], whole[its]
-            view.update(its)
+            quarter = slice(row, row + 1), region[1]
+            image[quarter], weight[quarter] = painted[quarter], whole_region[quarter]
+            view.update(quarter)
             answer = live.answer(answer)
             assert _is_white(answer)
 

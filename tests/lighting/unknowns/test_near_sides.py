@@ -25,7 +25,7 @@ def _problem(make_basis: Any, seed: int, n: int = 5) -> tuple[NormalEquations, R
     """A painting of colours that whites do not reach, under a basis of lamps that keep to some."""
     rng = np.random.default_rng(seed)
     basis = make_basis(n, SIZE, seed=seed, emission=rng.uniform(0.5, 1, (n, 3)).tolist())
-    wanted = basis.mix(rng.exponential(1, (n, 3)) * (1, 1, 0.3)).astype(np.float32)
+    target_image = basis.mix(rng.exponential(1, (n, 3)) * (1, 1, 0.3)).astype(np.float32)
     weight = rng.random(SIZE).astype(np.float32)
     current = basis.current_weights
     gamuts = Gamuts(
@@ -35,7 +35,7 @@ def _problem(make_basis: Any, seed: int, n: int = 5) -> tuple[NormalEquations, R
         current,
     )
     reduction = reduce_lights(lp.Constraints(), basis.lights, lp.Fit(colors="gentle"), gamuts)
-    equations = NormalEquations.of(basis, wanted, weight)
+    equations = NormalEquations.of(basis, target_image, weight)
     return equations, reduction, current
 
 
@@ -46,34 +46,36 @@ def test_sides_lead_to_the_optimum_over_whole_gamuts(
     """That of mixes of all corners, which is certified."""
     monkeypatch.setattr(gamut_bounds, "MAX_TURNS", 60)
     equations, reduction, current = _problem(make_basis, seed)
-    whole, best = next_whites(equations, reduction, current)
+    over_gamuts, best = next_whites(equations, reduction, current)
     assert best.converged
-    assert whole.confined_knobs  # else there is nothing to keep within anything
-    kept, weights = solve_near_sides(equations, reduction, current, method="polished")
+    assert over_gamuts.confined_knobs  # else there is nothing to keep within anything
+    near_sides, weights = solve_near_sides(equations, reduction, current, method="polished")
     assert not (reduction.gamuts or Gamuts).lights_outside(weights, np.arange(len(current)))  # type: ignore[arg-type]
     value, least = (equations.objective(w).sum() for w in (weights, best.weights))
     round_off = 1e-9 * equations.target_norm2.sum()
     assert value == pytest.approx(least, abs=round_off)
     # And from there it stays.
-    again, same = solve_near_sides(equations, kept, weights, method="polished")
-    assert [knob.side for knob in again.knobs] == [knob.side for knob in kept.knobs]
-    np.testing.assert_allclose(same, weights, rtol=1e-9, atol=1e-9)
+    second_sides, second_weights = solve_near_sides(
+        equations, near_sides, weights, method="polished"
+    )
+    assert [knob.side for knob in second_sides.knobs] == [knob.side for knob in near_sides.knobs]
+    np.testing.assert_allclose(second_weights, weights, rtol=1e-9, atol=1e-9)
 
 
 def test_gamuts_of_another_painting_are_heeded(make_basis: Any) -> None:
     equations, reduction, current = _problem(make_basis, 1)
     gamuts = reduction.gamuts
     assert gamuts is not None
-    kept, before = solve_near_sides(equations, reduction, current, method="polished")
-    k = kept.confined_knobs[0]
+    near_sides, before = solve_near_sides(equations, reduction, current, method="polished")
+    k = near_sides.confined_knobs[0]
     gamuts.refresh()
-    same, _ = solve_near_sides(equations, kept, before, method="polished")
-    assert same.knobs[k].gamut is kept.knobs[k].gamut  # nothing else was painted
+    second_sides, _ = solve_near_sides(equations, near_sides, before, method="polished")
+    assert second_sides.knobs[k].gamut is near_sides.knobs[k].gamut  # nothing else was painted
     # Now whites alone, without its own colour and the margin.
     narrow = reach_of(white_range(3000, 6500).colors)
     gamuts.refresh()
-    gamuts._gamuts[kept.knobs[k].lights[0]] = ColorHull(narrow, np.ones(3))
-    after, weights = solve_near_sides(equations, kept, before, method="polished")
+    gamuts._gamuts[near_sides.knobs[k].lights[0]] = ColorHull(narrow, np.ones(3))
+    after, weights = solve_near_sides(equations, near_sides, before, method="polished")
     light = after.knobs[k].lights[0]
     assert gamuts[light].has(weights[light])
     assert not gamuts[light].has(before[light])
@@ -83,7 +85,9 @@ def test_gamuts_of_another_painting_are_heeded(make_basis: Any) -> None:
 def test_mixes_of_three_colours_are_found_again(make_basis: Any, seed: int) -> None:
     """The x of an emission that three colours make are those that it was made with."""
     equations, reduction, current = _problem(make_basis, seed)
-    kept, weights = solve_near_sides(equations, reduction, current, method="polished")
-    found = solve_reduced(equations, kept, weights)
-    x = nearest_unknowns(kept, kept.weights(found.x), np.ones(len(current), bool))
-    np.testing.assert_allclose(kept.weights(x), kept.weights(found.x), rtol=1e-9, atol=1e-12)
+    near_sides, weights = solve_near_sides(equations, reduction, current, method="polished")
+    optimum = solve_reduced(equations, near_sides, weights)
+    x = nearest_unknowns(near_sides, near_sides.weights(optimum.x), np.ones(len(current), bool))
+    np.testing.assert_allclose(
+        near_sides.weights(x), near_sides.weights(optimum.x), rtol=1e-9, atol=1e-12
+    )

@@ -162,9 +162,9 @@ def test_the_order_of_lights_is_of_no_importance():
 def test_channels_are_solved_apart():
     columns, values = _problem(5, "uniform", 4)
     plain = _solve(columns, values)
-    turned = _solve(columns[[2, 0, 1]], values[[2, 0, 1]])
-    np.testing.assert_array_equal(turned.weights, plain.weights[:, [2, 0, 1]])
-    assert turned.sweeps == tuple(plain.sweeps[c] for c in (2, 0, 1))
+    permuted = _solve(columns[[2, 0, 1]], values[[2, 0, 1]])
+    np.testing.assert_array_equal(permuted.weights, plain.weights[:, [2, 0, 1]])
+    assert permuted.sweeps == tuple(plain.sweeps[c] for c in (2, 0, 1))
 
 
 def test_running_out_of_sweeps_is_a_result():
@@ -218,16 +218,16 @@ def test_a_light_of_one_colour_keeps_the_others_and_counts_as_reached():
 
 
 def test_kkt_residual_by_hand():
-    on, off = np.array([0.0, 0.0]), np.array([3.0, 0.0])
+    on_gradient, off_gradient = np.array([0.0, 0.0]), np.array([3.0, 0.0])
     bounds = (2.0, 0.0, np.inf)
-    assert kkt_residual(on, off, *bounds) == 0
+    assert kkt_residual(on_gradient, off_gradient, *bounds) == 0
     # A light that is off may have a positive gradient, and one that is on may not.
-    assert kkt_residual(np.array([0.0, 5.0]), off, *bounds) == 0
-    assert kkt_residual(np.array([1.0, 0.0]), off, *bounds) == 0.5
-    assert kkt_residual(np.array([0.0, -1.0]), off, *bounds) == 0.5
+    assert kkt_residual(np.array([0.0, 5.0]), off_gradient, *bounds) == 0
+    assert kkt_residual(np.array([1.0, 0.0]), off_gradient, *bounds) == 0.5
+    assert kkt_residual(np.array([0.0, -1.0]), off_gradient, *bounds) == 0.5
     # One at its upper bound may have a negative one; no step goes further than the bounds.
-    assert kkt_residual(np.array([-7.0, 0.0]), off, 2.0, 0.0, 3.0) == 0
-    assert kkt_residual(np.array([-7.0, 0.0]), off, 2.0, 0.0, 4.0) == 0.5
+    assert kkt_residual(np.array([-7.0, 0.0]), off_gradient, 2.0, 0.0, 3.0) == 0
+    assert kkt_residual(np.array([-7.0, 0.0]), off_gradient, 2.0, 0.0, 4.0) == 0.5
 
 
 @pytest.mark.parametrize("seed", seeds(20, 60))
@@ -240,7 +240,7 @@ def test_lights_with_one_weight_agree_with_scipy_on_the_joint_problem(seed: int)
     is_scalar[0] = True
     M, b = A @ A.transpose(0, 2, 1), np.einsum("cnp,cp->cn", A, target)
     equations = NormalEquations(M, b, np.square(target).sum(axis=1))
-    found = solve_free(equations, np.ones((n, 3)), is_scalar=is_scalar)
+    optimum = solve_free(equations, np.ones((n, 3)), is_scalar=is_scalar)
     # One column per weight over the pixels of all three channels, one after another.
     columns, owners = [], []
     for i in range(n):
@@ -250,7 +250,7 @@ def test_lights_with_one_weight_agree_with_scipy_on_the_joint_problem(seed: int)
             columns.append(column.ravel())
             owners.append((i, channels))
     expected, _ = nnls(np.stack(columns, axis=1), target.ravel())
-    assert found.converged
+    assert optimum.converged
     for (i, channels), value in zip(owners, expected, strict=True):
         # Precision: both stop at about 1e-10 of weights of the order of 1.
-        np.testing.assert_allclose(found.weights[i, channels], value, atol=1e-8)
+        np.testing.assert_allclose(optimum.weights[i, channels], value, atol=1e-8)
