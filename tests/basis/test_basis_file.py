@@ -32,7 +32,7 @@ SIZE = (6, 5)
 @pytest.fixture
 def basis(make_basis: Any) -> Basis:
     rng = np.random.default_rng(3)
-    made = make_basis(
+    source = make_basis(
         3,
         SIZE,
         names=["key", "Fülllicht 灯 №2", "back/rim.left"],
@@ -41,7 +41,7 @@ def basis(make_basis: Any) -> Basis:
         half_differences=rng.normal(size=(3, *SIZE, 3)),
         seen=rng.random(SIZE) < 0.3,
     )
-    return as_stored(made)
+    return as_stored(source)
 
 
 @pytest.fixture
@@ -50,22 +50,22 @@ def path(tmp_path: Path, basis: Basis) -> Path:
     return tmp_path / "a.basis.exr"
 
 
-def _assert_equal(got: Basis, want: Basis) -> None:
-    assert got.lights == want.lights
-    assert got.origin == want.origin
-    assert got.images.tobytes() == want.images.tobytes()
-    assert got.half_differences.tobytes() == want.half_differences.tobytes()
-    assert got.images.dtype == got.half_differences.dtype == np.float32
-    assert got.emitters_seen.dtype == bool
-    np.testing.assert_array_equal(got.emitters_seen, want.emitters_seen)
+def _assert_equal(actual: Basis, expected: Basis) -> None:
+    assert actual.lights == expected.lights
+    assert actual.origin == expected.origin
+    assert actual.images.tobytes() == expected.images.tobytes()
+    assert actual.half_differences.tobytes() == expected.half_differences.tobytes()
+    assert actual.images.dtype == actual.half_differences.dtype == np.float32
+    assert actual.emitters_seen.dtype == bool
+    np.testing.assert_array_equal(actual.emitters_seen, expected.emitters_seen)
 
 
 def test_there_and_back_is_exact(path: Path, basis: Basis):
-    back = read_basis(path)
-    _assert_equal(back, basis)
-    assert back.names == ("key", "Fülllicht 灯 №2", "back/rim.left")
-    assert back.size == SIZE
-    np.testing.assert_array_equal(back.current_weights, [x.emission for x in basis.lights])
+    reread = read_basis(path)
+    _assert_equal(reread, basis)
+    assert reread.names == ("key", "Fülllicht 灯 №2", "back/rim.left")
+    assert reread.size == SIZE
+    np.testing.assert_array_equal(reread.current_weights, [x.emission for x in basis.lights])
 
 
 def _add_objects(basis: Basis) -> Basis:
@@ -79,31 +79,31 @@ def test_objects_there_and_back(tmp_path: Path, basis: Basis):
     basis = _add_objects(basis)
     assert basis.objects is not None
     write_basis(tmp_path / "a.basis.exr", basis)
-    back = read_basis(tmp_path / "a.basis.exr")
-    _assert_equal(back, basis)
-    assert back.objects is not None
-    assert back.objects.names == basis.objects.names
-    np.testing.assert_array_equal(back.objects.index, basis.objects.index)
-    assert back.objects.index.dtype == np.int32
-    assert back.objects.mask("column").sum() == (basis.objects.index > 1).sum()
-    assert not back.objects.mask("vase").any()
+    reread = read_basis(tmp_path / "a.basis.exr")
+    _assert_equal(reread, basis)
+    assert reread.objects is not None
+    assert reread.objects.names == basis.objects.names
+    np.testing.assert_array_equal(reread.objects.index, basis.objects.index)
+    assert reread.objects.index.dtype == np.int32
+    assert reread.objects.mask("column").sum() == (basis.objects.index > 1).sum()
+    assert not reread.objects.mask("vase").any()
 
 
-@pytest.mark.parametrize("what", ["index", "names"])
-def test_objects_that_are_not_as_they_were_are_left_out(tmp_path: Path, basis: Basis, what: str):
+@pytest.mark.parametrize("damage", ["index", "names"])
+def test_objects_that_are_not_as_they_were_are_left_out(tmp_path: Path, basis: Basis, damage: str):
     path = tmp_path / "a.basis.exr"
     write_basis(path, _add_objects(basis))
     parts = read_parts(path)
     k = next(k for k, part in enumerate(parts) if OBJECTS_KEY in part.attributes)
-    if what == "index":
+    if damage == "index":
         parts[k].channels["index"][0, 0] += 1
     else:
-        its = {**parts[k].attributes, NAMES_KEY: '["other"]'}
-        parts[k] = replace(parts[k], attributes=its)
+        attributes = {**parts[k].attributes, NAMES_KEY: '["other"]'}
+        parts[k] = replace(parts[k], attributes=attributes)
     write_parts(path, parts)
-    back = read_basis(path)
-    _assert_equal(back, basis)
-    assert back.objects is None
+    reread = read_basis(path)
+    _assert_equal(reread, basis)
+    assert reread.objects is None
 
 
 @pytest.mark.parametrize(
@@ -135,9 +135,9 @@ def test_other_programs_see_one_rgb_part_per_light(path: Path, basis: Basis):
 
 
 def test_parts_in_another_order(path: Path, basis: Basis):
-    *lights, seen = read_parts(path)
+    *lights, emitter_part = read_parts(path)
     # The marks of the file may be on any part.
-    write_parts(path, [seen, *reversed(lights)])
+    write_parts(path, [emitter_part, *reversed(lights)])
     _assert_equal(read_basis(path), basis)
     # Where there are no checksums, as in files from before there were any, the parts' is all.
     parts = [
@@ -145,9 +145,9 @@ def test_parts_in_another_order(path: Path, basis: Basis):
         for p in read_parts(path)
     ]
     write_parts(path, parts)
-    back = read_basis(path)
-    assert back.names == basis.names[::-1]
-    np.testing.assert_array_equal(back.images, basis.images[::-1])
+    reread = read_basis(path)
+    assert reread.names == basis.names[::-1]
+    np.testing.assert_array_equal(reread.images, basis.images[::-1])
 
 
 def _drop_attribute(attributes: Mapping[str, str], key: str) -> dict[str, str]:
@@ -232,8 +232,8 @@ def test_lost_parts(path: Path, keep: slice):
     parts = read_parts(path)
     marks = {k: parts[0].attributes[k] for k in (FORMAT_KEY, ORIGIN_KEY)}
     mark = ExrPart("marks", {"Z": np.zeros(SIZE, np.float32)}, marks)
-    kept = [replace(p, attributes={**p.attributes, **marks}) for p in parts[keep]]
-    write_parts(path, [*kept, mark])
+    remaining_parts = [replace(p, attributes={**p.attributes, **marks}) for p in parts[keep]]
+    write_parts(path, [*remaining_parts, mark])
     with pytest.raises(BasisError, match="has lost parts of its basis"):
         read_basis(path)
 
@@ -284,9 +284,9 @@ def test_names_of_basis_files():
 
 
 def test_flux_goes_along_where_it_is_known(tmp_path: Path, make_basis: Any):
-    made = make_basis(2)
-    known = replace(made.lights[0], unit_flux=(1.5, 1.5, 1.5))
-    basis = replace(made, lights=(known, made.lights[1]))
+    source = make_basis(2)
+    light_with_flux = replace(source.lights[0], unit_flux=(1.5, 1.5, 1.5))
+    basis = replace(source, lights=(light_with_flux, source.lights[1]))
     write_basis(tmp_path / "f.basis.exr", basis)
     assert read_basis(tmp_path / "f.basis.exr").lights == basis.lights
 
@@ -294,14 +294,14 @@ def test_flux_goes_along_where_it_is_known(tmp_path: Path, make_basis: Any):
 def test_what_is_asked_often_is_computed_once(make_basis: Any) -> None:
     basis = make_basis(4, (150, 120), seen=np.random.default_rng(1).random((150, 120)) < 0.2)
     images = basis.images.astype(np.float64)
-    counted = images * ~basis.emitters_seen[..., None]
+    visible = images * ~basis.emitters_seen[..., None]
     # Sums of 18,000 products in float64, in another order.
-    np.testing.assert_allclose(basis.power, np.square(counted).sum(axis=(1, 2)), rtol=1e-12)
+    np.testing.assert_allclose(basis.power, np.square(visible).sum(axis=(1, 2)), rtol=1e-12)
     np.testing.assert_allclose(basis.totals, images.sum(axis=(1, 2)), rtol=1e-12)
     np.testing.assert_array_equal(basis.current_weights, [x.emission for x in basis.lights])
-    for kept in ("names", "current_weights", "is_fixed", "power", "totals"):
-        assert getattr(basis, kept) is getattr(basis, kept)
-        assert kept == "names" or not getattr(basis, kept).flags.writeable
+    for attribute in ("names", "current_weights", "is_fixed", "power", "totals"):
+        assert getattr(basis, attribute) is getattr(basis, attribute)
+        assert attribute == "names" or not getattr(basis, attribute).flags.writeable
     # Another basis has its own.
     assert replace(basis, planes=basis.images * 2).power[0, 0] == 4 * basis.power[0, 0]
 

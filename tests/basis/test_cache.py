@@ -73,14 +73,14 @@ def test_more_samples_are_added(scene: Scene) -> None:
 @pytest.mark.parametrize("use_cache", [True, False])
 def test_what_was_just_rendered_is_as_from_its_file(scene: Scene, use_cache: bool) -> None:
     """The same command gives the same files to the bit, whether it renders or not."""
-    fresh = obtain_basis(scene, spp=16, use_cache=use_cache)
+    fresh_basis = obtain_basis(scene, spp=16, use_cache=use_cache)
     rendered = render_basis(scene, spp=16)
-    assert (fresh.images != rendered.images).any()  # rounded
+    assert (fresh_basis.images != rendered.images).any()  # rounded
     if not use_cache:
         obtain_basis(scene, spp=16)
-    again = _cached_bases()[0]
+    cached = _cached_bases()[0]
     for name in ("images", "half_differences"):
-        assert getattr(again, name).tobytes() == getattr(fresh, name).tobytes()
+        assert getattr(cached, name).tobytes() == getattr(fresh_basis, name).tobytes()
 
 
 def test_what_is_large_is_read_from_its_file_as_soon_as_it_is_kept(
@@ -98,22 +98,22 @@ def test_what_is_large_is_read_from_its_file_as_soon_as_it_is_kept(
 
 def _obtain_basis(scene: Scene, **settings: object) -> tuple[Basis, list[str]]:
     """The basis that a job with these settings obtains, and what it says."""
-    said: list[str] = []
+    messages: list[str] = []
 
     class Hears:
         def __call__(self, *_: object) -> None: ...
 
         def say(self, text: str) -> None:
-            said.append(text)
+            messages.append(text)
 
-    return obtain(scene, Settings(**settings), Hears()), said  # type: ignore[arg-type]
+    return obtain(scene, Settings(**settings), Hears()), messages  # type: ignore[arg-type]
 
 
 def test_what_is_kept_beyond_what_is_asked_for_is_said(scene: Scene) -> None:
     obtain_basis(scene, spp=32)
-    basis, said = _obtain_basis(scene, spp=16)
+    basis, messages = _obtain_basis(scene, spp=16)
     assert basis.origin.spp == 32
-    assert said == [
+    assert messages == [
         "basis of 32 samples per pixel kept from an earlier run: more than the 16 requested, so "
         "the answer may differ a little from one with exactly these (exact_spp=True)"
     ]
@@ -123,21 +123,21 @@ def test_what_is_kept_beyond_what_is_asked_for_is_said(scene: Scene) -> None:
 
 
 def test_exactly_what_is_asked_for_whatever_is_kept(scene: Scene) -> None:
-    fresh = obtain_basis(scene, spp=16, use_cache=False)
+    fresh_basis = obtain_basis(scene, spp=16, use_cache=False)
     obtain_basis(scene, spp=32)
     before = [entry.path.read_bytes() for entry in cache.entries()]
-    exact, said = _obtain_basis(scene, spp=16, exact_spp=True)
-    assert said == []
-    same_basis(exact, fresh)
+    exact, messages = _obtain_basis(scene, spp=16, exact_spp=True)
+    assert messages == []
+    same_basis(exact, fresh_basis)
     # The one with more samples is not thrown away.
     assert [entry.path.read_bytes() for entry in cache.entries()] == before
     cache.delete_entries(cache.entries())
     obtain_basis(scene, spp=8)
-    same_basis(obtain_basis(scene, spp=16, exact_spp=True), fresh)
+    same_basis(obtain_basis(scene, spp=16, exact_spp=True), fresh_basis)
     [entry] = cache.entries()
-    assert entry.origin == fresh.origin
+    assert entry.origin == fresh_basis.origin
     log: list[int] = []
-    same_basis(obtain_basis(scene, spp=16, exact_spp=True, progress=passes(log)), fresh)
+    same_basis(obtain_basis(scene, spp=16, exact_spp=True, progress=passes(log)), fresh_basis)
     assert log == []
 
 
@@ -150,15 +150,15 @@ def test_the_first_samples_of_what_is_asked_for_are_gone_on_with(
         tmp_path, integrator=f'<integrator type="{integrator}"/>', lights=LIGHTS["bulb"]
     )
     scene = load_scene(path)
-    whole: list[int] = []
-    fresh = obtain_basis(scene, spp=64, use_cache=False, progress=passes(whole))
+    pass_counts: list[int] = []
+    fresh_basis = obtain_basis(scene, spp=64, use_cache=False, progress=passes(pass_counts))
     for after in (2, 3):
-        done = 0
+        pass_count = 0
 
-        def press_ctrl_c(_label: str, now: int, _total: int) -> None:
-            nonlocal done
-            done += now > 0
-            if done == after:  # noqa: B023 (called in this round)
+        def press_ctrl_c(_label: str, count: int, _total: int) -> None:
+            nonlocal pass_count
+            pass_count += count > 0
+            if pass_count == after:  # noqa: B023 (called in this round)
                 os.kill(os.getpid(), signal.SIGINT)
 
         with pytest.raises(Interrupted):
@@ -168,10 +168,10 @@ def test_the_first_samples_of_what_is_asked_for_are_gone_on_with(
         assert is_on_the_way(scene, exact, 64)
         assert not is_on_the_way(scene, unfinished, 64)
         log: list[int] = []
-        gone_on = obtain_basis(scene, spp=64, exact_spp=True, progress=passes(log))
-        assert_equal_bits(gone_on, fresh)
+        continuation = obtain_basis(scene, spp=64, exact_spp=True, progress=passes(log))
+        assert_equal_bits(continuation, fresh_basis)
         assert not sums_files()
-        assert 0 < sum(now > 0 for now in log) < max(whole)
+        assert 0 < sum(count > 0 for count in log) < max(pass_counts)
         cache.delete_entries(cache.entries())
     # One that fewer samples ended has other passes.
     assert not is_on_the_way(scene, obtain_basis(scene, spp=6, use_cache=False), 64)
@@ -199,12 +199,12 @@ obtain_basis(lp.load_scene({str(scene.path)!r}), spp={spp}, progress=kill)
 
 
 def test_a_render_that_was_killed_goes_on_to_the_bits_of_one(scene: Scene) -> None:
-    whole = obtain_basis(scene, spp=64, use_cache=False)
+    single_render = obtain_basis(scene, spp=64, use_cache=False)
     _render_and_kill(scene, 64, 3)
-    [kept] = _cached_bases()
-    assert 0 < kept.origin.spp < 64
+    [cached] = _cached_bases()
+    assert 0 < cached.origin.spp < 64
     log: list[int] = []
-    assert_equal_bits(obtain_basis(scene, spp=64, progress=passes(log)), whole)
+    assert_equal_bits(obtain_basis(scene, spp=64, progress=passes(log)), single_render)
     assert log
     assert not sums_files()
 
@@ -213,7 +213,7 @@ def test_a_render_that_was_killed_goes_on_to_the_bits_of_one(scene: Scene) -> No
 def test_without_its_sums_what_is_unfinished_counts_and_is_not_exact(
     scene: Scene, damage: str
 ) -> None:
-    whole = obtain_basis(scene, spp=32, use_cache=False)
+    single_render = obtain_basis(scene, spp=32, use_cache=False)
     obtain_basis(scene, spp=8, is_final=False)
     [file] = sums_files()
     if damage == "cut":
@@ -224,10 +224,10 @@ def test_without_its_sums_what_is_unfinished_counts_and_is_not_exact(
         np.savez(file, sums_a=np.zeros(3, np.float32), sums_b=np.zeros(3, np.float32))
     [entry] = cache.entries()
     before = entry.path.read_bytes()
-    same_basis(obtain_basis(scene, spp=32), whole, of_file=True)
+    same_basis(obtain_basis(scene, spp=32), single_render, of_file=True)
     entry.path.write_bytes(before)
     # All of it is rendered again where the same samples are asked for.
-    assert_equal_bits(obtain_basis(scene, spp=32, exact_spp=True), whole)
+    assert_equal_bits(obtain_basis(scene, spp=32, exact_spp=True), single_render)
 
 
 def test_sums_go_with_their_basis(scene: Scene) -> None:
@@ -257,10 +257,10 @@ def test_a_basis_of_blocks_says_when_it_takes_more(tmp_path: Path) -> None:
         "basis of 18 samples per pixel, not 4: a block needs a sample in each pixel for each half"
     ]
     # No fewer can be had.
-    again = (
+    message = (
         "basis of 18 samples per pixel kept from an earlier run (use_cache=False renders it again)"
     )
-    assert _obtain_basis(small, spp=4)[1] == [again]
+    assert _obtain_basis(small, spp=4)[1] == [message]
     assert _obtain_basis(small, spp=36)[1] == []
     assert "more than the 4 requested" in _obtain_basis(small, spp=4)[1][0]
 
@@ -284,8 +284,10 @@ def test_no_cache_leaves_none(scene: Scene) -> None:
 def test_a_damaged_one_is_made_anew(scene: Scene, damage: str) -> None:
     obtain_basis(scene, spp=2)
     [entry] = cache.entries()
-    whole = entry.path.read_bytes()
-    entry.path.write_bytes({"cut": whole[: len(whole) // 2], "junk": b"junk", "empty": b""}[damage])
+    content = entry.path.read_bytes()
+    entry.path.write_bytes(
+        {"cut": content[: len(content) // 2], "junk": b"junk", "empty": b""}[damage]
+    )
     log: list[int] = []
     obtain_basis(scene, spp=2, progress=passes(log))
     assert log
@@ -333,8 +335,10 @@ def test_bases_are_dropped_by_scene_or_file(
         basis = make_basis(2)
         origin = replace(basis.origin, scene=scene, scene_identity=identity)
         assert cache.keep(replace(basis, origin=origin))
-    whole = next(empty_cache.glob(f"*{SUFFIX}")).read_bytes()
-    (empty_cache / f"{DAMAGED}{SUFFIX}").write_bytes(whole[: whole.index(b"lightpaint-basis") + 20])
+    content = next(empty_cache.glob(f"*{SUFFIX}")).read_bytes()
+    (empty_cache / f"{DAMAGED}{SUFFIX}").write_bytes(
+        content[: content.index(b"lightpaint-basis") + 20]
+    )
 
     def scenes(pattern: str) -> list[str]:
         return sorted(x.origin.scene if x.origin else "?" for x in cache.entries_named(pattern))
@@ -345,12 +349,12 @@ def test_bases_are_dropped_by_scene_or_file(
     assert scenes("hal") == scenes("") == []
     [file] = {entry.path.name for entry in cache.entries_named("room")}
     assert scenes(file) == scenes(file.removesuffix(SUFFIX)) == ["room.xml"]
-    here = {"LIGHTPAINT_CACHE": str(empty_cache)}
+    environment = {"LIGHTPAINT_CACHE": str(empty_cache)}
     size = sum(entry.size for entry in cache.entries_named("hall"))
-    done = run(tmp_path, "cache", "drop", "hall", "h*", **here)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.count("hall.xml") == 2
-    assert f"2 deleted from {empty_cache}: {size / 1e6:.1f} MB are free" in done.stdout
+    completed = run(tmp_path, "cache", "drop", "hall", "h*", **environment)
+    assert completed.returncode == 0, completed.stderr
+    assert completed.stdout.count("hall.xml") == 2
+    assert f"2 deleted from {empty_cache}: {size / 1e6:.1f} MB are free" in completed.stdout
     assert scenes("*") == ["?", "room.xml"]
     for line, says in (
         (["drop", "hall"], "no basis of 'hall' is kept in"),
@@ -359,14 +363,14 @@ def test_bases_are_dropped_by_scene_or_file(
         (["clear", "room"], "cache clear takes no name: did you mean cache drop room"),
         (["list", "room"], "cache list takes no name"),
     ):
-        done = run(tmp_path, "cache", *line, **here)
-        assert done.returncode == 2
-        assert says in done.stderr
-        assert len(done.stderr.splitlines()) == 1
-    assert "it has room.xml" in run(tmp_path, "cache", "drop", "gone", **here).stderr
+        completed = run(tmp_path, "cache", *line, **environment)
+        assert completed.returncode == 2
+        assert says in completed.stderr
+        assert len(completed.stderr.splitlines()) == 1
+    assert "it has room.xml" in run(tmp_path, "cache", "drop", "gone", **environment).stderr
     assert scenes("*") == ["?", "room.xml"]
-    assert "of at most 8590 MB" in run(tmp_path, "cache", **here).stdout
-    assert run(tmp_path, "cache", "clear", **here).stdout.startswith("2 deleted")
+    assert "of at most 8590 MB" in run(tmp_path, "cache", **environment).stdout
+    assert run(tmp_path, "cache", "clear", **environment).stdout.startswith("2 deleted")
     assert cache.entries() == []
 
 
@@ -391,9 +395,9 @@ def test_a_folder_with_other_files_is_no_cache(
     before = sorted(work.rglob("*"))
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(work))
     for line in (["clear"], ["list"], ["drop", "*"]):
-        done = run(tmp_path, "cache", *line, LIGHTPAINT_CACHE=str(work))
-        assert done.returncode == 2
-        [line_] = done.stderr.splitlines()
+        completed = run(tmp_path, "cache", *line, LIGHTPAINT_CACHE=str(work))
+        assert completed.returncode == 2
+        [line_] = completed.stderr.splitlines()
         assert f"LIGHTPAINT_CACHE names {work}, which has other files in it" in line_
         assert "evening.basis.exr" in line_
     assert not cache.keep(make_basis(2))
@@ -405,9 +409,9 @@ def test_a_folder_with_other_files_is_no_cache(
 def test_only_our_own_files_are_deleted(empty_cache: Path, make_basis: Any) -> None:
     """Also of a folder that is ours: by name, and by what is inside."""
     bases_of(make_basis, "hall.xml")
-    [kept] = empty_cache.glob("*.basis.exr")
+    [basis_path] = empty_cache.glob("*.basis.exr")
     others = {
-        empty_cache / "evening.basis.exr": kept.read_bytes(),
+        empty_cache / "evening.basis.exr": basis_path.read_bytes(),
         empty_cache / f"{'ab' * 16}.basis.exr": b"not by this program",
         empty_cache / f"{'ab' * 16}.clean.npz": b"not by this program",
         empty_cache / ".evening.basis.exr.abcdefgh" / "evening.basis.exr": b"being written",
@@ -422,8 +426,8 @@ def test_only_our_own_files_are_deleted(empty_cache: Path, make_basis: Any) -> N
     os.utime(leftover, (0, 0))
     bases_of(make_basis, "again.xml")  # which prunes
     assert not leftover.exists()
-    done = run(empty_cache, "cache", "clear", LIGHTPAINT_CACHE=str(empty_cache))
-    assert done.stdout.startswith("1 deleted"), done.stderr
+    completed = run(empty_cache, "cache", "clear", LIGHTPAINT_CACHE=str(empty_cache))
+    assert completed.stdout.startswith("1 deleted"), completed.stderr
     assert {path: path.read_bytes() for path in others} == others
     assert {path.name for path in empty_cache.glob("[!.]*") if path not in others} == {TAG}
 
@@ -450,16 +454,16 @@ def test_what_somebody_else_has_put_there_is_not_believed(
     empty_cache: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     basis = make_basis(2)
-    asked = (basis.origin.scene_identity, "sensor", 0, basis.size)
+    request = (basis.origin.scene_identity, "sensor", 0, basis.size)
     assert cache.keep(basis)
-    assert cache.find(*asked) is not None
+    assert cache.find(*request) is not None
     [path] = empty_cache.glob("*.basis.exr")
-    its = path.stat().st_uid
-    monkeypatch.setattr(cache_folder, "is_trusted_owner", lambda status: status.st_uid != its)
-    assert cache.find(*asked) is None
+    owner = path.stat().st_uid
+    monkeypatch.setattr(cache_folder, "is_trusted_owner", lambda status: status.st_uid != owner)
+    assert cache.find(*request) is None
     assert cache.entries() == []
-    assert cache.cached_spp(*asked) == 0
-    assert cache.find_most_sampled(*asked[:2], samples=1, largest=2**30) is None
+    assert cache.cached_spp(*request) == 0
+    assert cache.find_most_sampled(*request[:2], samples=1, largest=2**30) is None
 
 
 def test_who_is_believed() -> None:
@@ -477,12 +481,12 @@ def test_a_clock_that_jumps_costs_no_basis(
     empty_cache: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch, jump_s: float
 ) -> None:
     bases_of(make_basis, "hall.xml", "room.xml")
-    there = time.time() + jump_s
-    monkeypatch.setattr("lightpaint.basis.cache.cache.time", SimpleNamespace(time=lambda: there))
+    clock_s = time.time() + jump_s
+    monkeypatch.setattr("lightpaint.basis.cache.cache.time", SimpleNamespace(time=lambda: clock_s))
     bases_of(make_basis, "hall.xml")
     assert len(cache.entries()) == 2
     for entry in cache.entries():
-        os.utime(entry.path, (there, there))
+        os.utime(entry.path, (clock_s, clock_s))
     assert len(cache.entries()) == 2
-    its = make_basis(2).origin
-    assert cache.find(f"{0:032x}", its.sensor, its.seed, make_basis(2).size) is not None
+    origin = make_basis(2).origin
+    assert cache.find(f"{0:032x}", origin.sensor, origin.seed, make_basis(2).size) is not None

@@ -27,9 +27,9 @@ SIZE = (6, 5)
 
 @pytest.fixture
 def basis(make_basis: Any) -> Basis:
-    made = make_basis(3, SIZE, names=["key", "fill", "rim"], seen=np.eye(*SIZE, dtype=bool))
-    halves = np.random.default_rng(1).normal(size=made.images.shape).astype(np.float32)
-    return as_stored(replace(made, noise=halves, guide_table=np.ones((2, 4, 3), np.float32)))
+    source = make_basis(3, SIZE, names=["key", "fill", "rim"], seen=np.eye(*SIZE, dtype=bool))
+    halves = np.random.default_rng(1).normal(size=source.images.shape).astype(np.float32)
+    return as_stored(replace(source, noise=halves, guide_table=np.ones((2, 4, 3), np.float32)))
 
 
 @pytest.fixture
@@ -44,8 +44,8 @@ def _cases(content: bytes, name: str) -> Iterator[Case]:
     head = content.rfind(b"lightpaint") + 600
     rng = random.Random(2)
     for _ in range(300):
-        at, bit = rng.randrange(min(head, len(content))), rng.randrange(8)
-        yield Case(name, f"bit {bit} of byte {at}", flip_bit(content, at, bit))
+        position, bit = rng.randrange(min(head, len(content))), rng.randrange(8)
+        yield Case(name, f"bit {bit} of byte {position}", flip_bit(content, position, bit))
 
 
 def test_damage_of_bytes(path: Path, tmp_path: Path) -> None:
@@ -55,7 +55,7 @@ def test_damage_of_bytes(path: Path, tmp_path: Path) -> None:
     # With checksums nothing but what was written is ever read.
     assert wrong_outcomes(results, ("same", "refused")) == []
     assert len(results) > 1000
-    assert sum(said == "same" for _, said in results) > 10
+    assert sum(outcome == "same" for _, outcome in results) > 10
 
 
 def test_damage_of_light_groups(tmp_path: Path) -> None:
@@ -136,18 +136,18 @@ def _edit(name: str) -> Callable[[list[ExrPart]], list[ExrPart]]:
 )
 def test_what_another_program_changed(path: Path, name: str, words: str) -> None:
     write_parts(path, _edit(name)(read_parts(path)))
-    with pytest.raises((BasisError, ImageError), match=words) as caught:
+    with pytest.raises((BasisError, ImageError), match=words) as refusal:
         read_basis(path)
-    assert str(path) in str(caught.value)
+    assert str(path) in str(refusal.value)
 
 
 def test_parts_in_another_order_are_the_same_basis(path: Path, basis: Basis) -> None:
     # The table has a data window of its own, which reading and writing again keeps.
     parts = read_parts(path)
     write_parts(path, [replace(p, display=SIZE) for p in parts[::-1]])
-    back = read_basis(path)
-    assert back.lights == basis.lights
-    assert back.images.tobytes() == basis.images.tobytes()
+    reread = read_basis(path)
+    assert reread.lights == basis.lights
+    assert reread.images.tobytes() == basis.images.tobytes()
     assert read_origin(path) == (basis.origin, SIZE, ("",) * 3)
 
 
@@ -155,9 +155,9 @@ def test_a_table_that_is_not_as_it_was_is_left_out(path: Path, basis: Basis) -> 
     parts = read_parts(path)
     table = {k: c * 2 for k, c in parts[-1].channels.items()}
     write_parts(path, [*parts[:-1], replace(parts[-1], channels=table)])
-    back = read_basis(path)
-    assert back.guide_table is None
-    assert back.images.tobytes() == basis.images.tobytes()
+    reread = read_basis(path)
+    assert reread.guide_table is None
+    assert reread.images.tobytes() == basis.images.tobytes()
 
 
 @pytest.mark.parametrize(
@@ -193,10 +193,10 @@ def test_hostile_headers(path: Path, key: str, changes: dict[str, Any]) -> None:
     if key != CHECKSUMS_KEY:
         del attributes[CHECKSUMS_KEY]  # which would notice anyway
     write_parts(path, [replace(parts[0], attributes=attributes), *parts[1:]])
-    with pytest.raises(BasisError) as caught:
+    with pytest.raises(BasisError) as refusal:
         read_basis(path)
-    assert str(path) in str(caught.value)
-    assert len(str(caught.value)) < 1000
+    assert str(path) in str(refusal.value)
+    assert len(str(refusal.value)) < 1000
 
 
 def test_a_basis_in_the_place_of_another_is_not_taken(
@@ -205,12 +205,12 @@ def test_a_basis_in_the_place_of_another_is_not_taken(
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path))
     origin = basis.origin
     assert cache.keep(basis)
-    asked = (origin.scene_identity, origin.sensor, origin.seed, SIZE)
-    assert cache.find(*asked) is not None
-    (kept,) = tmp_path.glob("*.basis.exr")
-    other = cache._path("another", *asked[1:])
-    kept.rename(other)
-    assert cache.find("another", *asked[1:]) is None
+    request = (origin.scene_identity, origin.sensor, origin.seed, SIZE)
+    assert cache.find(*request) is not None
+    (basis_file,) = tmp_path.glob("*.basis.exr")
+    other = cache._path("another", *request[1:])
+    basis_file.rename(other)
+    assert cache.find("another", *request[1:]) is None
     other.unlink()
     (tmp_path / f"{'0a' * 16}.basis.exr").symlink_to("nowhere")
     assert cache.entries() == []

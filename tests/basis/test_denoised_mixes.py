@@ -47,12 +47,12 @@ def test_the_share_is_that_of_the_least_error(offset: float, rng: np.random.Gene
     truth = np.full((160, 160, 3), 10, np.float32)
     a, b = (truth + rng.normal(size=truth.shape).astype(np.float32) for _ in range(2))
     blended = blend_by_noise((a + b) / 2, (a - b) / 2, truth + np.float32(offset))
-    variance, lost = 0.5, offset**2
-    expected = variance * lost / (variance + lost)
+    variance, squared_bias = 0.5, offset**2
+    expected = variance * squared_bias / (variance + squared_bias)
     # The windows' own noise costs a little; both rivals alone are worse where they differ.
     error = np.square(blended - truth, dtype=np.float64).mean()
     assert expected * 0.9 < error < expected * 1.15
-    assert error < min(variance, lost)
+    assert error < min(variance, squared_bias)
 
 
 #: Pixels that one of two samples found bright, in two of the four windows around (12, 12).
@@ -60,7 +60,7 @@ SINGLE_SAMPLES = ((6, 6), (17, 18))
 
 
 @pytest.mark.parametrize(
-    ("bright", "single", "stays"),
+    ("bright", "single", "is_kept"),
     [
         pytest.param([(12, 12)], SINGLE_SAMPLES, False, id="a stray pixel"),
         pytest.param([(12, 12), (12, 13)], SINGLE_SAMPLES, False, id="two of them"),
@@ -71,7 +71,7 @@ SINGLE_SAMPLES = ((6, 6), (17, 18))
     ],
 )
 def test_what_is_bright_by_chance_is_denoised(
-    bright: list[tuple[int, int]], single: list[tuple[int, int]], stays: bool
+    bright: list[tuple[int, int]], single: list[tuple[int, int]], is_kept: bool
 ):
     """Both samples of a bright pixel agree, so it shows no noise, but single ones nearby do."""
     a = np.ones((24, 24, 3), np.float32)
@@ -80,7 +80,7 @@ def test_what_is_bright_by_chance_is_denoised(
     for pixel in single:
         a[pixel], b[pixel] = 19, 1
     blended = blend_by_noise((a + b) / 2, (a - b) / 2, clean)
-    np.testing.assert_array_equal(blended[12, 12], 10 if stays else 1)
+    np.testing.assert_array_equal(blended[12, 12], 10 if is_kept else 1)
 
 
 def split_basis(direct: np.ndarray, indirect: np.ndarray, rng: np.random.Generator) -> Basis:
@@ -90,8 +90,8 @@ def split_basis(direct: np.ndarray, indirect: np.ndarray, rng: np.random.Generat
     mean, half = ((a + b) / 2)[None], ((a - b) / 2)[None]
     parts = IndirectLight(as_planes(mean), as_planes(half))
     origin = Origin("made", "", "", 0, "", (4, 4), (1, 1))
-    seen = np.zeros(SIZE, bool)
-    return Basis((light,), direct[None] + mean, half, seen, origin, indirect=parts)
+    emitter_mask = np.zeros(SIZE, bool)
+    return Basis((light,), direct[None] + mean, half, emitter_mask, origin, indirect=parts)
 
 
 @pytest.mark.skipif(not oidn_is_installed(), reason="Open Image Denoise")
@@ -101,10 +101,10 @@ def test_edges_of_direct_light_survive(rng: np.random.Generator):
     pools = ((x // 2 + y // 2) % 2 * np.float32(0.2))[..., None] * np.ones(3, np.float32)
     smooth = np.full((*SIZE, 3), 0.3, np.float32)
     basis, truth = split_basis(pools, smooth, rng), pools + smooth
-    whole = denoised(basis.planes.plane(0), None)
+    denoised_total = denoised(basis.planes.plane(0), None)
     error = {
         "split": np.square(denoise_plane(basis, 0) - truth).mean(),
-        "whole": np.square(whole - truth).mean(),
+        "whole": np.square(denoised_total - truth).mean(),
         "raw": np.square(basis.planes.plane(0) - truth).mean(),
     }
     assert error["split"] < 0.3 * error["whole"]
@@ -150,18 +150,18 @@ def test_without_a_denoiser_light_is_averaged_along_surfaces(
 def two_lights(rng: np.random.Generator) -> tuple[Basis, list[np.ndarray]]:
     """A basis of two lights whose pools are where the other's are not, and its true planes."""
     pools, glow = pools_and_glow()
-    both = [split_basis(its, glow, rng) for its in (pools, 0.3 - pools)]
+    bases = [split_basis(part, glow, rng) for part in (pools, 0.3 - pools)]
 
     def stacked(name: str, parts: Any) -> Any:
-        return as_planes(np.concatenate([getattr(its, name).array() for its in parts]))
+        return as_planes(np.concatenate([getattr(part, name).array() for part in parts]))
 
-    lights = [replace(both[0].lights[0], name=name) for name in ("spot", "other")]
-    indirect = [stacked(name, [its.indirect for its in both]) for name in ("planes", "noise")]
+    lights = [replace(bases[0].lights[0], name=name) for name in ("spot", "other")]
+    indirect = [stacked(name, [part.indirect for part in bases]) for name in ("planes", "noise")]
     basis = replace(
-        both[0],
+        bases[0],
         lights=lights,
-        planes=stacked("planes", both),
-        noise=stacked("noise", both),
+        planes=stacked("planes", bases),
+        noise=stacked("noise", bases),
         indirect=IndirectLight(*indirect),
     )
     return basis, [pools + glow, 0.3 - pools + glow]
@@ -216,14 +216,14 @@ def test_a_file_keeps_it(tmp_path: Path, rng: np.random.Generator):
     assert before is not None
     images, noise = before.planes.array().copy(), before.noise.array().copy()
     write_basis(tmp_path / "a.basis.exr", basis)
-    again, stored = read_basis(tmp_path / "a.basis.exr").indirect, as_stored(basis).indirect
-    assert again is not None
+    reread, stored = read_basis(tmp_path / "a.basis.exr").indirect, as_stored(basis).indirect
+    assert reread is not None
     assert stored is not None
-    np.testing.assert_array_equal(again.planes.array(), stored.planes.array())
-    np.testing.assert_array_equal(again.noise.array(), stored.noise.array())
+    np.testing.assert_array_equal(reread.planes.array(), stored.planes.array())
+    np.testing.assert_array_equal(reread.noise.array(), stored.noise.array())
     power = np.square(noise, dtype=np.float64).sum()
-    for read, its in ((again.planes, images), (again.noise, noise)):
-        assert np.square(read.array() - its, dtype=np.float64).sum() < power / 100
+    for read, expected in ((reread.planes, images), (reread.noise, noise)):
+        assert np.square(read.array() - expected, dtype=np.float64).sum() < power / 100
 
 
 def test_other_pixels_are_no_picture_to_denoise(rng: np.random.Generator):

@@ -46,19 +46,19 @@ def test_their_sum_is_a_clean_picture_of_any_lighting(make_basis: Any):
 
 
 def test_made_once_for_the_same_pixels(make_basis: Any, monkeypatch: pytest.MonkeyPatch):
-    basis, made = make_basis(2, (24, 32)), []
+    basis, calls = make_basis(2, (24, 32)), []
     real = denoised_planes.denoise_plane
 
-    def counted(*given: Any, **how: Any) -> Any:
-        made.append(given)
-        return real(*given, **how)
+    def count_calls(*arguments: Any, **options: Any) -> Any:
+        calls.append(arguments)
+        return real(*arguments, **options)
 
-    monkeypatch.setattr(denoised_planes, "denoise_plane", counted)
-    first, again = obtain_denoised_planes(basis), obtain_denoised_planes(replace(basis))
-    assert len(made) == 2
+    monkeypatch.setattr(denoised_planes, "denoise_plane", count_calls)
+    first, second = obtain_denoised_planes(basis), obtain_denoised_planes(replace(basis))
+    assert len(calls) == 2
     assert first is not None
-    assert again is not None
-    np.testing.assert_array_equal(first.halves, again.halves)
+    assert second is not None
+    np.testing.assert_array_equal(first.halves, second.halves)
     # Other pixels, features or current emissions have others.
     other = replace(basis, planes=basis.images * np.float32(1.5))
     assert read_denoised_planes(other) is None
@@ -87,25 +87,25 @@ def test_means_over_blocks_are_denoised_and_kept_until_whole_planes_are(make_bas
     np.testing.assert_allclose(
         small.plane(1), expected, rtol=2**-11, atol=expected.max() * 2.0**-24
     )
-    again = read_denoised_planes(basis, factor=2)
-    assert again is not None
-    np.testing.assert_array_equal(again.halves, small.halves)
+    reread = read_denoised_planes(basis, factor=2)
+    assert reread is not None
+    np.testing.assert_array_equal(reread.halves, small.halves)
     assert read_denoised_planes(basis) is None
     assert read_denoised_planes(basis, factor=3) is None
-    whole = obtain_denoised_planes(basis)
-    assert whole is not None
-    assert whole.is_whole
+    full_planes = obtain_denoised_planes(basis)
+    assert full_planes is not None
+    assert full_planes.is_whole
     # Now these serve for either.
-    kept = obtain_denoised_planes(basis, factor=2)
-    assert kept is not None
-    np.testing.assert_array_equal(kept.halves, whole.halves)
+    block_planes = obtain_denoised_planes(basis, factor=2)
+    assert block_planes is not None
+    np.testing.assert_array_equal(block_planes.halves, full_planes.halves)
 
 
 def test_the_look_before_lights_were_moved_is_not_kept_as_the_present_one(make_basis: Any):
     basis = make_basis(2, (24, 32))
     before = 9 * basis.current_look
-    moved = replace(basis, former=Estimate(before, np.zeros_like(before)))
-    planes = obtain_denoised_planes(moved, factor=2)
+    moved_basis = replace(basis, former=Estimate(before, np.zeros_like(before)))
+    planes = obtain_denoised_planes(moved_basis, factor=2)
     assert planes is not None
     np.testing.assert_array_equal(planes.current, denoise_current_look(basis))
 
@@ -132,13 +132,17 @@ def test_the_same_light_by_the_scales_of_brighter_planes(make_basis: Any):
     planes = obtain_denoised_planes(basis)
     assert planes is not None
     brighter = replace(basis, planes=basis.images * np.float32(2**12))
-    its = planes.scaled_as(brighter)
-    np.testing.assert_array_equal(its.scales, [scale_of(plane) for plane in brighter.images])
-    assert (its.scales != planes.scales).any()
+    scaled_planes = planes.scaled_as(brighter)
+    np.testing.assert_array_equal(
+        scaled_planes.scales, [scale_of(plane) for plane in brighter.images]
+    )
+    assert (scaled_planes.scales != planes.scales).any()
     for k in range(2):
         # What is 12 stops below has as many bits less among the half floats' 24.
         light = planes.plane(k)
-        np.testing.assert_allclose(its.plane(k), light, rtol=2**-11, atol=light.max() * 2**-11)
+        np.testing.assert_allclose(
+            scaled_planes.plane(k), light, rtol=2**-11, atol=light.max() * 2**-11
+        )
 
 
 def test_rough_planes_add_up_and_are_nearer_to_light_without_grain(make_basis: Any):
@@ -155,7 +159,7 @@ def test_rough_planes_add_up_and_are_nearer_to_light_without_grain(make_basis: A
     assert planes.dtype == np.float32
     total = np.einsum("nhwc,nc->hwc", planes, basis.current_weights)
     np.testing.assert_allclose(total, current, rtol=1e-5)  # single precision
-    grain, left = (np.sqrt(np.mean((its - light) ** 2)) for its in (basis.images, planes))
+    grain, left = (np.sqrt(np.mean((image - light) ** 2)) for image in (basis.images, planes))
     assert left < grain / 5  # of 64 pixels each is a mean, and of the total nothing is left
 
 
@@ -171,8 +175,8 @@ def test_clean_blocks_bring_rough_planes_nearer_to_the_light(make_basis: Any):
     blocks = DenoisedPlanes(small, np.ones(2), current)
     for k in range(2):
         rough, better = (RoughPlanes(basis, current, x).plane(k) for x in (None, blocks))
-        off, left = (np.sqrt(np.mean((x - light[k]) ** 2)) for x in (rough, better))
-        assert left < off / 2
+        rough_error, left = (np.sqrt(np.mean((x - light[k]) ** 2)) for x in (rough, better))
+        assert left < rough_error / 2
         # Away from the shadow's edge, over which a gain is interpolated.
         for part in (np.s_[:, :20], np.s_[:, 28:]):
             blocks_of = [block_mean(x, 2)[part] for x in (better, light[k])]

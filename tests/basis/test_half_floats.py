@@ -45,8 +45,8 @@ def relative_noise(image: np.ndarray, encoding: PlaneEncoding) -> float:
 
 
 def encodings_of(image: np.ndarray, half: np.ndarray) -> tuple[PlaneEncoding, PlaneEncoding]:
-    its, of_noise = encode_pair(image, half)
-    return its.encoding, of_noise.encoding
+    encoding, of_noise = encode_pair(image, half)
+    return encoding.encoding, of_noise.encoding
 
 
 def test_rounding_has_the_bits_of_numpy() -> None:
@@ -63,21 +63,21 @@ def test_rounding_has_the_bits_of_numpy() -> None:
         numbers = bits.view(np.float32)
         with np.errstate(over="ignore", invalid="ignore"):
             expected = numbers.astype(np.float16)
-        found, is_number = round_to_halves(numbers), ~np.isnan(numbers)
+        halves, is_number = round_to_halves(numbers), ~np.isnan(numbers)
         np.testing.assert_array_equal(
-            found[is_number].view(np.uint16), expected[is_number].view(np.uint16)
+            halves[is_number].view(np.uint16), expected[is_number].view(np.uint16)
         )
-        assert np.isnan(found[~is_number]).all()
+        assert np.isnan(halves[~is_number]).all()
 
 
 def test_noisy_planes_are_halves_and_clean_ones_are_not() -> None:
     for noise, kind in ((0.1, HALF), (0.01, HALF), (1e-3, FLOAT), (0.0, FLOAT)):
         image, half = plane(noise)
-        its, of_noise = encodings_of(image, half)
-        assert (its.kind, its.scale, of_noise.scale) == (kind, 1, 1)
+        encoding, of_noise = encodings_of(image, half)
+        assert (encoding.kind, encoding.scale, of_noise.scale) == (kind, 1, 1)
         assert of_noise.kind == HALF
         # Round to nearest, of 11 binary digits.
-        assert relative_noise(image, its) <= (2**-11 if kind == HALF else 0)
+        assert relative_noise(image, encoding) <= (2**-11 if kind == HALF else 0)
 
 
 def test_rounding_is_hidden_in_the_noise_of_every_tile() -> None:
@@ -85,31 +85,33 @@ def test_rounding_is_hidden_in_the_noise_of_every_tile() -> None:
     half[TILE : 2 * TILE, :TILE] *= 1e-3
     assert encodings_of(image, half)[0].kind == FLOAT
     image[TILE : 2 * TILE, :TILE] = 0.5  # nothing is rounded there
-    its, _ = encodings_of(image, half)
-    assert its.kind == HALF
-    missed = np.square(its.decoded(its.encoded(image)) - image, dtype=np.float64)
+    encoding, _ = encodings_of(image, half)
+    assert encoding.kind == HALF
+    squared_error = np.square(encoding.decoded(encoding.encoded(image)) - image, dtype=np.float64)
     noise = np.square(half, dtype=np.float64)
     for top in range(0, SIZE[0], TILE):
         for left in range(0, SIZE[1], TILE):
             tile = np.s_[top : top + TILE, left : left + TILE]
-            assert (missed[tile].sum((0, 1)) <= HIDDEN_SHARE**2 * noise[tile].sum((0, 1))).all()
+            assert (
+                squared_error[tile].sum((0, 1)) <= HIDDEN_SHARE**2 * noise[tile].sum((0, 1))
+            ).all()
 
 
 @pytest.mark.parametrize("light", [1e-30, 1e-7, 1e5, 1e30])
 def test_what_half_floats_do_not_reach_is_scaled(light: float) -> None:
     image, half = plane(0.1, light=light)
-    its, of_noise = encodings_of(image, half)
-    assert its.kind == of_noise.kind == HALF
-    assert its.scale != 1
-    assert np.log2(its.scale) % 1 == 0
-    assert relative_noise(image, its) <= 2**-11
+    encoding, of_noise = encodings_of(image, half)
+    assert encoding.kind == of_noise.kind == HALF
+    assert encoding.scale != 1
+    assert np.log2(encoding.scale) % 1 == 0
+    assert relative_noise(image, encoding) <= 2**-11
 
 
 def test_a_range_beyond_half_floats_is_float() -> None:
     image, half = plane(0.1)
-    for its in (image, half):
-        its[:TILE] *= np.float32(1e-12)  # a shadow that counts beside lamps in view
-    assert [its.kind for its in encodings_of(image, half)] == [FLOAT, FLOAT]
+    for array in (image, half):
+        array[:TILE] *= np.float32(1e-12)  # a shadow that counts beside lamps in view
+    assert [encoding.kind for encoding in encodings_of(image, half)] == [FLOAT, FLOAT]
     assert encodings_of(np.zeros_like(image), np.zeros_like(half)) == (PlaneEncoding(HALF),) * 2
 
 
@@ -119,8 +121,8 @@ def basis(make_basis: Any) -> lp.Basis:
     planes = [plane(0.1), plane(0.05, seed=2), plane(0.0, seed=3), plane(0.1, light=1e-9)]
     planes.append((np.zeros((*SIZE, 3), np.float32),) * 2)
     images, halves = (np.stack(x) for x in zip(*planes, strict=True))
-    made: lp.Basis = make_basis(images=images, half_differences=halves)
-    return made
+    source: lp.Basis = make_basis(images=images, half_differences=halves)
+    return source
 
 
 @pytest.mark.parametrize("limit", [0, 2**27])
@@ -132,15 +134,15 @@ def test_what_is_stored_comes_back(
     images, halves = basis.images.copy(), basis.half_differences.copy()
     path = tmp_path / "a.basis.exr"
     write_basis(path, basis)
-    back = read_basis(path)
+    reread = read_basis(path)
     stored = as_stored(basis)
-    for mine, its, before in (
-        (back.images, stored.images, images),
-        (back.half_differences, stored.half_differences, halves),
+    for actual, expected, before in (
+        (reread.images, stored.images, images),
+        (reread.half_differences, stored.half_differences, halves),
     ):
-        assert mine.dtype == np.float32
-        assert mine.tobytes() == its.tobytes()
-        for one, other in zip(mine, before, strict=True):
+        assert actual.dtype == np.float32
+        assert actual.tobytes() == expected.tobytes()
+        for one, other in zip(actual, before, strict=True):
             # Next to zero, where noise makes light negative, steps are even: 2^-24.
             np.testing.assert_allclose(one, other, rtol=2**-11, atol=6e-7 * other.max(initial=0))
     parts = read_parts(path)
@@ -156,31 +158,31 @@ def test_memory_holds_many_planes_in_two_bytes_a_number(
     planes = [plane(0.1, seed=k) for k in range(3)]
     images, halves = (np.stack(x) for x in zip(*planes, strict=True))
     indirect = IndirectLight(MemoryPlanes(0.4 * images), MemoryPlanes(0.4 * halves))
-    made = replace(make_basis(images=images, half_differences=halves), indirect=indirect)
-    target = lp.Target.of(made.mix(np.full((3, 3), 0.7)))
-    write_basis(tmp_path / "a.basis.exr", made)
+    source = replace(make_basis(images=images, half_differences=halves), indirect=indirect)
+    target = lp.Target.of(source.mix(np.full((3, 3), 0.7)))
+    write_basis(tmp_path / "a.basis.exr", source)
     monkeypatch.setattr(basis_file, "SINGLES_MAX_BYTES", 0)
-    rendered, kept = as_stored(made), read_basis(tmp_path / "a.basis.exr")
+    rendered, reread = as_stored(source), read_basis(tmp_path / "a.basis.exr")
     monkeypatch.setattr(basis_file, "SINGLES_MAX_BYTES", 2**27)
-    singles = as_stored(made)
-    for its in (rendered, kept):
-        assert its.indirect is not None
+    singles = as_stored(source)
+    for basis in (rendered, reread):
+        assert basis.indirect is not None
         assert singles.indirect is not None
-        for mine, other in (
-            (its.planes, singles.planes),
-            (its.noise, singles.noise),
-            (its.indirect.planes, singles.indirect.planes),
-            (its.indirect.noise, singles.indirect.noise),
+        for actual, other in (
+            (basis.planes, singles.planes),
+            (basis.noise, singles.noise),
+            (basis.indirect.planes, singles.indirect.planes),
+            (basis.indirect.noise, singles.indirect.noise),
         ):
-            if isinstance(mine, EncodedPlanes):
-                assert 2 * mine.nbytes == images.nbytes
+            if isinstance(actual, EncodedPlanes):
+                assert 2 * actual.nbytes == images.nbytes
             else:
-                assert isinstance(mine, FilePlanes)
-                assert its is kept
-                assert mine in (its.indirect.planes, its.indirect.noise)
-            assert mine.array().tobytes() == other.array().tobytes()
+                assert isinstance(actual, FilePlanes)
+                assert basis is reread
+                assert actual in (basis.indirect.planes, basis.indirect.noise)
+            assert actual.array().tobytes() == other.array().tobytes()
         expected = lp.solve(singles, target)
-        np.testing.assert_allclose(lp.solve(its, target).weights, expected.weights, rtol=1e-12)
+        np.testing.assert_allclose(lp.solve(basis, target).weights, expected.weights, rtol=1e-12)
 
 
 @pytest.mark.parametrize("limit", [0, 2**27])
@@ -193,9 +195,11 @@ def test_what_is_kept_is_rounded_once(
     rounded = []
     encode = half_floats.encode_pair
     monkeypatch.setattr(
-        file_parts, "encode_pair", lambda *its: rounded.append(len(its)) or encode(*its)
+        file_parts,
+        "encode_pair",
+        lambda *arguments: rounded.append(len(arguments)) or encode(*arguments),
     )
-    stored = as_stored(basis, lambda its: write_basis(tmp_path / "b.exr", its))
+    stored = as_stored(basis, lambda complete: write_basis(tmp_path / "b.exr", complete))
     assert len(rounded) == len(basis.lights)
     assert (tmp_path / "a.exr").read_bytes() == (tmp_path / "b.exr").read_bytes()
     assert stored.images.tobytes() == read_basis(tmp_path / "b.exr").images.tobytes()
@@ -219,27 +223,27 @@ def test_a_file_is_half_as_long(tmp_path: Path, make_basis: Any) -> None:
     assert (tmp_path / "a.basis.exr").stat().st_size < 1.02 * pixels
 
 
-@pytest.mark.parametrize("how", [{"literal": True}, {"transform": lp.ViewTransform("agx")}, {}])
+@pytest.mark.parametrize("options", [{"literal": True}, {"transform": lp.ViewTransform("agx")}, {}])
 def test_weights_are_the_same_to_far_below_their_error(
-    tmp_path: Path, make_basis: Any, how: dict[str, Any]
+    tmp_path: Path, make_basis: Any, options: dict[str, Any]
 ) -> None:
     rng = np.random.default_rng(8)
-    made = [plane(0.02 * (1 + k), seed=k) for k in range(4)]
+    planes = [plane(0.02 * (1 + k), seed=k) for k in range(4)]
     ramps = rng.uniform(0, 1, (4, SIZE[0], 1, 1)) ** 3
-    images, halves = (np.stack(x) * ramps for x in zip(*made, strict=True))
+    images, halves = (np.stack(x) * ramps for x in zip(*planes, strict=True))
     basis = make_basis(images=images, half_differences=halves)
     painting = lp.Target.of(basis.mix(np.full((4, 3), 0.3)) + np.float32(0.02) * images[1])
-    expected = lp.solve(basis, painting, **how)
+    expected = lp.solve(basis, painting, **options)
     bars = lp.error_bars(expected)
     assert bars is not None
     write_basis(tmp_path / "a.basis.exr", basis)
-    back = read_basis(tmp_path / "a.basis.exr")
-    assert (back.images != basis.images).mean() > 0.5
-    found = lp.solve(back, painting, **how)
-    gap = np.abs(found.weights - expected.weights)
+    reread = read_basis(tmp_path / "a.basis.exr")
+    assert (reread.images != basis.images).mean() > 0.5
+    solution = lp.solve(reread, painting, **options)
+    gap = np.abs(solution.weights - expected.weights)
     # HIDDEN of the noise of an image at most, and here its rounding is less: 2^-11 / 0.02.
     assert (gap <= 0.05 * bars.standard_error).all()
-    again = lp.error_bars(found)
+    again = lp.error_bars(solution)
     assert again is not None
     np.testing.assert_allclose(again.standard_error, bars.standard_error, rtol=0.01)
 
@@ -249,19 +253,19 @@ def test_a_file_of_the_format_before_is_read() -> None:
     path = DATA / "format_1.basis.exr"
     assert read_parts(path)[0].attributes[FORMAT_KEY] == "lightpaint-basis 1"
     k = np.arange(2 * 4 * 5 * 3, dtype=np.float32).reshape(2, 4, 5, 3)
-    back = read_basis(path)
-    np.testing.assert_array_equal(back.images, np.float32(1) / (3 + k))
-    np.testing.assert_array_equal(np.abs(back.half_differences), np.float32(1) / (700 + k))
-    assert back.names == ("key", "Fülllicht")
-    assert back.lights[0].unit_flux == (1.5, 1.5, 1.5)
-    assert back.lights[1].members == ("a", "b")
-    assert back.origin.halves == (32, 32)
-    assert back.guide_table is not None
-    assert back.features is not None
-    assert back.features.position is None
-    assert back.surface_filter is None
-    assert back.objects is not None
-    assert back.objects.names == ("vase", "")
+    reread = read_basis(path)
+    np.testing.assert_array_equal(reread.images, np.float32(1) / (3 + k))
+    np.testing.assert_array_equal(np.abs(reread.half_differences), np.float32(1) / (700 + k))
+    assert reread.names == ("key", "Fülllicht")
+    assert reread.lights[0].unit_flux == (1.5, 1.5, 1.5)
+    assert reread.lights[1].members == ("a", "b")
+    assert reread.origin.halves == (32, 32)
+    assert reread.guide_table is not None
+    assert reread.features is not None
+    assert reread.features.position is None
+    assert reread.surface_filter is None
+    assert reread.objects is not None
+    assert reread.objects.names == ("vase", "")
 
 
 @pytest.mark.parametrize(
@@ -300,9 +304,9 @@ class MadePlanes(RowPlanes):
 def test_writing_holds_one_light_at_a_time(tmp_path: Path, make_basis: Any) -> None:
     planes: Any = MadePlanes()
     basis = make_basis(images=np.ones((planes.count, 1, 1, 3)))
-    its = {name: getattr(basis, name) for name in ("lights", "origin")}
+    fields = {name: getattr(basis, name) for name in ("lights", "origin")}
     large = lp.Basis(
-        **its, planes=planes, noise=planes, emitters_seen=np.zeros(planes.size, dtype=bool)
+        **fields, planes=planes, noise=planes, emitters_seen=np.zeros(planes.size, dtype=bool)
     )
     tracemalloc.start()
     write_basis(tmp_path / "a.basis.exr", large)
@@ -310,6 +314,6 @@ def test_writing_holds_one_light_at_a_time(tmp_path: Path, make_basis: Any) -> N
     tracemalloc.stop()
     # Two planes, what is stored of them, and what is computed on the way; all are 120 of them.
     assert peak < 10 * MadePlanes.bytes
-    back = read_basis(tmp_path / "a.basis.exr")
-    np.testing.assert_allclose(back.planes.plane(7), planes.plane(7), rtol=2**-11)
-    assert as_planes(back.planes).count == planes.count
+    reread = read_basis(tmp_path / "a.basis.exr")
+    np.testing.assert_allclose(reread.planes.plane(7), planes.plane(7), rtol=2**-11)
+    assert as_planes(reread.planes).count == planes.count

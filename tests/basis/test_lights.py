@@ -17,8 +17,8 @@ from lightpaint.lighting.problem_sums import Sums, summed_problem
 from lightpaint.scene.lights.lights_file import SceneRequests
 
 
-def lamp(name: str, emission: float = 0.5, **about: bool) -> BasisLight:
-    return BasisLight(name, "point", "intensity", "W/sr", (emission,) * 3, **about)
+def lamp(name: str, emission: float = 0.5, **options: bool) -> BasisLight:
+    return BasisLight(name, "point", "intensity", "W/sr", (emission,) * 3, **options)
 
 
 def test_it_is_a_sequence_in_one_order() -> None:
@@ -46,13 +46,13 @@ def test_names_do_not_repeat() -> None:
 
 
 def test_a_lighting_and_a_solve_need_no_pixel() -> None:
-    asked = SceneRequests({"light": {"b": {"lock": [0.25] * 3}}}, "hall.toml")
-    lights = Lights((lamp("a"), lamp("b")), asked)
+    requests = SceneRequests({"light": {"b": {"lock": [0.25] * 3}}}, "hall.toml")
+    lights = Lights((lamp("a"), lamp("b")), requests)
     M = np.tile(np.diag([2.0, 3.0]), (3, 1, 1))
     sums = Sums(NormalEquations(M, np.tile([4.0, 9.0], (3, 1)), np.full(3, 50.0)), np.ones((2, 3)))
     problem = summed_problem(lights, "it", sums, constraints=Constraints(), fit=Fit(literal=True))
-    found = solve_linear(problem, problem.start)
-    np.testing.assert_allclose(found.weights, [[2.0] * 3, [0.25] * 3])
-    assert found.lighting.weights_for(lights).tolist() == found.weights.tolist()
-    assert Lighting.of_weights(lights, found.weights).emission == found.lighting.emission
+    optimum = solve_linear(problem, problem.start)
+    np.testing.assert_allclose(optimum.weights, [[2.0] * 3, [0.25] * 3])
+    assert optimum.lighting.weights_for(lights).tolist() == optimum.weights.tolist()
+    assert Lighting.of_weights(lights, optimum.weights).emission == optimum.lighting.emission
     assert len(reduce_lights(Constraints(), lights, resolve_fit(Fit())).knobs) == 2

@@ -37,31 +37,33 @@ def images() -> np.ndarray:
 
 
 def test_nobody_outside_the_room_indexes_planes() -> None:
-    found = [
+    violations = [
         f"{path.relative_to(PACKAGE)}:{node.lineno}"
         for path in PACKAGE.rglob("*.py")
         if path.relative_to(PACKAGE).parts[0] != "basis"
         for node in ast.walk(ast.parse(path.read_text("utf-8")))
         if isinstance(node, ast.Attribute) and node.attr in ("images", "half_differences")
     ]
-    assert found == []
+    assert violations == []
 
 
 def check_alike(planes: Planes, images: np.ndarray, tolerance: float = 0.0) -> None:
     """Everything that planes can be asked is what the array says."""
     rng, (n, height, width, _) = np.random.default_rng(4), images.shape
-    close = {"rtol": tolerance, "atol": tolerance}
+    tolerances = {"rtol": tolerance, "atol": tolerance}
     assert (planes.count, planes.size) == (n, (height, width))
-    np.testing.assert_allclose(planes.array(), images, **close)
-    for mine, its in zip(planes, images, strict=True):
-        np.testing.assert_allclose(mine, its, **close)
-    np.testing.assert_allclose(planes.plane(n - 1), images[-1], **close)
-    np.testing.assert_allclose(planes.rows(1, 3), images[:, 1:3], **close)
+    np.testing.assert_allclose(planes.array(), images, **tolerances)
+    for plane, image in zip(planes, images, strict=True):
+        np.testing.assert_allclose(plane, image, **tolerances)
+    np.testing.assert_allclose(planes.plane(n - 1), images[-1], **tolerances)
+    np.testing.assert_allclose(planes.rows(1, 3), images[:, 1:3], **tolerances)
     flat = images.reshape(n, -1, 3)
     some = np.unique(np.minimum([1, width, 3 * width + 2, 10**6], height * width - 1))
-    for where in (some, slice(2, 2 * width + 1), slice(height * width - 2, height * width + 9)):
-        np.testing.assert_allclose(planes.pixels(where), flat[:, where], **close)
-        np.testing.assert_allclose(planes.picked(where).array(), flat[:, None, where], **close)
+    for pixels in (some, slice(2, 2 * width + 1), slice(height * width - 2, height * width + 9)):
+        np.testing.assert_allclose(planes.pixels(pixels), flat[:, pixels], **tolerances)
+        np.testing.assert_allclose(
+            planes.picked(pixels).array(), flat[:, None, pixels], **tolerances
+        )
     w = rng.random((n, 3))
     expected = np.einsum("nhwc,nc->hwc", images, w)
     np.testing.assert_allclose(planes.mix(w), expected, rtol=1e-5 + tolerance)  # float32 sums
@@ -78,8 +80,8 @@ def check_alike(planes: Planes, images: np.ndarray, tolerance: float = 0.0) -> N
     np.testing.assert_allclose(norm2, np.einsum("hw,hwc->c", weight, psi**2))
     other = planes.replaced({1: np.ones((height, width, 3), np.float32)})
     assert (other.plane(1) == 1).all()
-    np.testing.assert_allclose(other.plane(0), images[0], **close)
-    np.testing.assert_allclose(planes.plane(1), images[1], **close)
+    np.testing.assert_allclose(other.plane(0), images[0], **tolerances)
+    np.testing.assert_allclose(planes.plane(1), images[1], **tolerances)
 
 
 def test_planes_in_memory(images: np.ndarray) -> None:
@@ -136,17 +138,17 @@ def test_planes_of_a_file_are_those_in_memory(
     check_alike(in_memory.noise, basis.half_differences)
     monkeypatch.setattr(basis_file, "IN_MEMORY_MAX_BYTES", 0)
     monkeypatch.setattr(file_planes, "STRIP_CACHE_BYTES", room)
-    found = lp.read_basis(path)
-    assert isinstance(found.planes, FilePlanes)
+    reread = lp.read_basis(path)
+    assert isinstance(reread.planes, FilePlanes)
     assert RowFile(path).parts[0].is_packed == (smooth or size != PLAIN)
-    check_alike(found.planes, basis.images)
-    check_alike(found.noise, basis.half_differences)
+    check_alike(reread.planes, basis.images)
+    check_alike(reread.noise, basis.half_differences)
     some = np.sort(np.random.default_rng(6).permutation(size[0] * size[1])[:500])
     monkeypatch.setattr(file_planes, "PICKED_MAX_BYTES", 0)
-    picked = found.planes.picked(some)
+    picked = reread.planes.picked(some)
     assert isinstance(picked, file_planes.PickedPlanes)
     check_alike(picked, basis.images.reshape(N, 1, -1, 3)[:, :, some])
-    other = found.planes.replaced({0: np.zeros((*size, 3), np.float32)})
+    other = reread.planes.replaced({0: np.zeros((*size, 3), np.float32)})
     assert not other.rows(3, 5)[0].any()
     assert other.rows(3, 5)[1].any()
 
@@ -170,9 +172,9 @@ class CountedPlanes(file_planes.RowPlanes):
         return self._images[i].copy()
 
     def rows(self, top: int, bottom: int) -> np.ndarray:
-        made = self._images[:, top:bottom].copy()
-        self.largest = max(self.largest, made.nbytes)
-        return made
+        band = self._images[:, top:bottom].copy()
+        self.largest = max(self.largest, band.nbytes)
+        return band
 
 
 @pytest.mark.parametrize("side", [1, 2, 3])
@@ -187,12 +189,12 @@ def test_means_over_blocks_are_the_same_wherever_planes_lie(
     rows, columns = -(-65 // side), -(-89 // side)
     expected = np.zeros((N, rows, columns, 3))
     for row, column in np.ndindex(rows, columns):
-        its = np.s_[row * side : min(65, (row + 1) * side), column * side : (column + 1) * side]
+        block = np.s_[row * side : min(65, (row + 1) * side), column * side : (column + 1) * side]
         w = np.zeros((67, 90))
         w[:65, :89] = weight
-        w = w[its]
+        w = w[block]
         if w.sum() > 0:
-            expected[:, row, column] = np.einsum("yx,nyxc->nc", w, images[:, *its]) / w.sum()
+            expected[:, row, column] = np.einsum("yx,nyxc->nc", w, images[:, *block]) / w.sum()
     in_memory = block_means(MemoryPlanes(images), weight, side)
     assert isinstance(in_memory, MemoryPlanes)
     np.testing.assert_allclose(in_memory.array(), expected, rtol=1e-6)
@@ -213,10 +215,10 @@ def test_no_more_rows_are_averaged_at_a_time_than_a_chunk_has(
     images = np.ones((N, 128, 40, 3), np.float32)
     for limit in (0, 2**27):
         monkeypatch.setattr(file_planes, "PICKED_MAX_BYTES", limit)
-        whole = CountedPlanes(images)
-        made = block_means(whole, np.ones((128, 40)), 2)
-        assert (made.array() == 1).all()
-        assert whole.largest == images[:, :16].nbytes
+        planes = CountedPlanes(images)
+        means = block_means(planes, np.ones((128, 40)), 2)
+        assert (means.array() == 1).all()
+        assert planes.largest == images[:, :16].nbytes
 
 
 def test_a_fit_of_blocks_reads_strips_of_noisy_planes(
@@ -228,20 +230,20 @@ def test_a_fit_of_blocks_reads_strips_of_noisy_planes(
     basis = make_basis(images=images, half_differences=rng.normal(0, 0.1, images.shape))
     target = lp.Target.of(basis.current_look * np.float32(0.7))
     fit = Fit(transform=lp.ViewTransform("srgb"))
-    counted = CountedPlanes(images), CountedPlanes(basis.half_differences)
+    counted_planes = CountedPlanes(images), CountedPlanes(basis.half_differences)
     monkeypatch.setattr(file_planes, "PICKED_MAX_BYTES", 0)
     monkeypatch.setattr(file_planes, "STRIP_CACHE_BYTES", 1)
-    found = []
-    for its in (basis, replace(basis, planes=counted[0], noise=counted[1])):
-        problem = Problem.of(its, target, fit=fit)
-        for planes in counted:
+    fits = []
+    for source in (basis, replace(basis, planes=counted_planes[0], noise=counted_planes[1])):
+        problem = Problem.of(source, target, fit=fit)
+        for planes in counted_planes:
             planes.largest = 0
         blocks = bin_pixels(problem.views, problem.loss, 2)
         assert blocks is not None
-        found.append((blocks.equations.M, blocks.equations.b, blocks.prior.M, blocks.prior.b))
-    for mine, expected in zip(*found, strict=True):
-        np.testing.assert_allclose(mine, expected, rtol=1e-12)
-    assert 0 < max(planes.largest for planes in counted) <= images[:, :16].nbytes
+        fits.append((blocks.equations.M, blocks.equations.b, blocks.prior.M, blocks.prior.b))
+    for actual, expected in zip(*fits, strict=True):
+        np.testing.assert_allclose(actual, expected, rtol=1e-12)
+    assert 0 < max(planes.largest for planes in counted_planes) <= images[:, :16].nbytes
 
 
 def test_strips_of_rows_vanish_with_their_planes(images: np.ndarray) -> None:
@@ -262,27 +264,27 @@ def test_sums_of_squares_made_block_by_block(
 ) -> None:
     monkeypatch.setattr("lightpaint.basis.planes.BLOCK_PIXELS", 4)
     rng = np.random.default_rng(8)
-    w, counted = rng.random((N, 3)), np.array([0, 1, 2, 5, 9, 10, 30])
+    w, indices = rng.random((N, 3)), np.array([0, 1, 2, 5, 9, 10, 30])
     light = np.einsum("nhwc,nc->hwc", images, w)
     weight = np.zeros((*SIZE, 3))
-    weight.reshape(-1, 3)[counted] = 1 + np.square(light.reshape(-1, 3)[counted])
+    weight.reshape(-1, 3)[indices] = 1 + np.square(light.reshape(-1, 3)[indices])
 
-    def squares(where: Any, lit: Any) -> tuple[Any, Any]:
-        x = np.einsum("npc,nc->pc", lit, w)
+    def squares(pixels: Any, radiance: Any) -> tuple[Any, Any]:
+        x = np.einsum("npc,nc->pc", radiance, w)
         return 1 + np.square(x), 2 * x
 
     for planes in (MemoryPlanes(images), CountedPlanes(images)):
-        sums = planes.sums_of(counted, squares), planes.sums(weight, 2 * light)
-        for mine, expected in zip(*sums, strict=True):
-            np.testing.assert_allclose(mine, expected, rtol=1e-12)
+        sums = planes.sums_of(indices, squares), planes.sums(weight, 2 * light)
+        for actual, expected in zip(*sums, strict=True):
+            np.testing.assert_allclose(actual, expected, rtol=1e-12)
 
 
 def test_spooled_planes_are_made_once_and_those_in_memory_stay(images: np.ndarray) -> None:
     planes = CountedPlanes(images)
-    made = spooled(planes)
-    assert isinstance(made, SpooledPlanes)
+    on_disk = spooled(planes)
+    assert isinstance(on_disk, SpooledPlanes)
     planes.rows = None  # type: ignore[method-assign, assignment]
-    check_alike(made, images)
+    check_alike(on_disk, images)
     in_memory = MemoryPlanes(images)
     assert spooled(in_memory) is in_memory
 
@@ -311,16 +313,16 @@ def test_several_pictures_in_one_row(monkeypatch: pytest.MonkeyPatch, images: np
     np.testing.assert_array_equal(on_request.array(), expected)
     np.testing.assert_array_equal(on_request.plane(1), expected[1])
     n = on_request.size[1]
-    for where in (slice(30, 40), slice(36, n), slice(0, 0), slice(1, n, 3), np.array([0, 34, 35])):
-        np.testing.assert_array_equal(on_request.pixels(where), expected[:, 0, where])
+    for pixels in (slice(30, 40), slice(36, n), slice(0, 0), slice(1, n, 3), np.array([0, 34, 35])):
+        np.testing.assert_array_equal(on_request.pixels(pixels), expected[:, 0, pixels])
     w = np.random.default_rng(9).random((N, 3))
     np.testing.assert_allclose(on_request.mix(w), in_memory.mix(w), rtol=1e-6)
-    for mine, its in zip(
+    for actual, expected_sum in zip(
         on_request.sums(expected[0, ..., 0], expected[1]),
         in_memory.sums(expected[0, ..., 0], expected[1]),
         strict=True,
     ):
-        np.testing.assert_array_equal(mine, its)
+        np.testing.assert_array_equal(actual, expected_sum)
 
 
 def test_a_chunk_of_a_packed_file_is_unpacked_once_for_a_walk(
@@ -333,11 +335,11 @@ def test_a_chunk_of_a_packed_file_is_unpacked_once_for_a_walk(
     unpacked = []
     plain = exr_rows._unpacked
 
-    def counted(compressed: bytes, size: int) -> bytes:
+    def count_chunks(compressed: bytes, size: int) -> bytes:
         unpacked.append(size)
         return plain(compressed, size)
 
-    monkeypatch.setattr(exr_rows, "_unpacked", counted)
+    monkeypatch.setattr(exr_rows, "_unpacked", count_chunks)
     # Strips of seven rows, of which a chunk has sixteen.
     strips = 7 * file_planes.STRIP_CACHE_COUNT * 12 * N * PLAIN[1]
     monkeypatch.setattr(file_planes, "STRIP_CACHE_BYTES", strips)
@@ -345,21 +347,21 @@ def test_a_chunk_of_a_packed_file_is_unpacked_once_for_a_walk(
     assert len(unpacked) == N * -(-PLAIN[0] // 16)
 
 
-@pytest.mark.parametrize("how", [{}, {"transform": lp.ViewTransform("srgb")}])
+@pytest.mark.parametrize("options", [{}, {"transform": lp.ViewTransform("srgb")}])
 def test_a_basis_in_a_file_is_solved_as_one_in_memory(
-    tmp_path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch, how: dict[str, Any]
+    tmp_path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch, options: dict[str, Any]
 ) -> None:
     path = tmp_path / "it.basis.exr"
     basis = write_planes(path, make_basis)
     image = basis.mix(np.full((N, 3), 0.7)) + np.float32(0.1)
     target = lp.Target.of(image, (np.arange(67) > 20)[:, None] * np.ones((67, 90), np.float32))
-    expected = lp.solve(basis, target, **how)
+    expected = lp.solve(basis, target, **options)
     monkeypatch.setattr(basis_file, "IN_MEMORY_MAX_BYTES", 0)
     monkeypatch.setattr(file_planes, "PICKED_MAX_BYTES", 0)
-    found = lp.solve(lp.read_basis(path), target, **how)
+    solution = lp.solve(lp.read_basis(path), target, **options)
     # The same sums in the same order.
-    np.testing.assert_allclose(found.weights, expected.weights, rtol=1e-12)
-    [one], [other] = lp.analyse(found), lp.analyse(expected)
+    np.testing.assert_allclose(solution.weights, expected.weights, rtol=1e-12)
+    [one], [other] = lp.analyse(solution), lp.analyse(expected)
     assert one.uncertainty is not None
     assert other.uncertainty is not None
     np.testing.assert_allclose(

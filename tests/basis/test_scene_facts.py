@@ -51,15 +51,15 @@ def folder(tmp_path: Path) -> Path:
     return place
 
 
-def key_of_facts(folder: Path, **more: Any) -> str:
-    return facts_key({"path": str(folder / "hall.xml"), **more})
+def key_of_facts(folder: Path, **fields: Any) -> str:
+    return facts_key({"path": str(folder / "hall.xml"), **fields})
 
 
 def keep_basis(scene: Scene, make_basis: Any) -> Basis:
     """A made-up basis of it, in the cache."""
-    made = make_basis(len(scene.lights), scene.size)
-    origin = replace(made.origin, scene_identity=scene.identity, sensor=scene.sensor_names[0])
-    basis: Basis = replace(made, lights=basis_lights(scene), origin=origin)
+    source = make_basis(len(scene.lights), scene.size)
+    origin = replace(source.origin, scene_identity=scene.identity, sensor=scene.sensor_names[0])
+    basis: Basis = replace(source, lights=basis_lights(scene), origin=origin)
     assert cache.keep(basis)
     return basis
 
@@ -69,8 +69,8 @@ def test_another_version_of_any_module_that_reads_scenes_is_another_key() -> Non
     modules = {path for room in ("scene", "basis") for path in (package / room).rglob("*.py")}
     files = {
         Path(path)
-        for at in scene_facts._code_folders()
-        for path, *_ in scene_facts._files_in_folder(at)
+        for folder in scene_facts._code_folders()
+        for path, *_ in scene_facts._files_in_folder(folder)
     }
     assert files == modules
 
@@ -82,8 +82,8 @@ def test_it_is_what_the_scene_would_have_told(folder: Path, make_basis: Any) -> 
     key, later_s = key_of_facts(folder), time.time() + LATER_S
     assert recall_facts(key) is None
     assert remember_facts(key, scene, basis, remarks=["one"], began_s=later_s)
-    found = recall_facts(key)
-    assert found == SceneFacts(
+    facts = recall_facts(key)
+    assert facts == SceneFacts(
         scene.identity,
         "sensor_0",
         (3, 4),
@@ -101,11 +101,11 @@ def test_it_is_what_the_scene_would_have_told(folder: Path, make_basis: Any) -> 
 
 def rewrite_same_bytes(path: Path) -> None:
     """Write it anew as it was, at the time at which it was."""
-    its = path.stat()
+    status = path.stat()
     data = bytearray(path.read_bytes())
     data[-20] ^= 1
     path.write_bytes(data)
-    os.utime(path, ns=(its.st_atime_ns, its.st_mtime_ns))
+    os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
 
 
 def create_file(path: Path) -> None:
@@ -142,8 +142,13 @@ def test_nor_where_it_is_asked_for_otherwise(
     scene = load_scene(folder / "hall.xml")
     key, later_s = key_of_facts(folder), time.time() + LATER_S
     assert remember_facts(key, scene, keep_basis(scene, make_basis), remarks=(), began_s=later_s)
-    for more in ({"sensor": 1}, {"parameters": {"a": "1"}}, {"resolution": "1/2"}, {"lights": []}):
-        assert recall_facts(key_of_facts(folder, **more)) is None
+    for options in (
+        {"sensor": 1},
+        {"parameters": {"a": "1"}},
+        {"resolution": "1/2"},
+        {"lights": []},
+    ):
+        assert recall_facts(key_of_facts(folder, **options)) is None
     monkeypatch.setattr(scene_facts, "_code_version", lambda: "another version")
     assert recall_facts(key_of_facts(folder)) is None
     monkeypatch.undo()
@@ -168,8 +173,8 @@ def test_what_is_in_doubt_is_not_kept(folder: Path, make_basis: Any) -> None:
     # The parser reads a file that is no part of the scene later, or looks into another folder.
     (folder / "blue.spd").write_text("400 1\n700 2\n")
     spectrum = '<spectrum name="reflectance" filename="blue.spd"/>'
-    for more in (f'<bsdf type="diffuse" id="b">{spectrum}</bsdf>', '<path value="textures"/>'):
-        (folder / "hall.xml").write_text(SCENE.format(more=more))
+    for addition in (f'<bsdf type="diffuse" id="b">{spectrum}</bsdf>', '<path value="textures"/>'):
+        (folder / "hall.xml").write_text(SCENE.format(more=addition))
         scene = load_scene(folder / "hall.xml")
         assert not remember_facts(
             key, scene, keep_basis(scene, make_basis), remarks=(), began_s=time.time() + LATER_S
@@ -192,12 +197,12 @@ def test_what_lies_beside_no_basis_goes_when_it_was_not_used(tmp_path: Path) -> 
     place = tmp_path / "cache"
     place.mkdir()
     (place / cache_folder.TAG).write_text(cache_folder.TAG_TEXT)
-    alone = place / f"{'0a' * 16}.clean.npz"
-    mine = place / "notes.clean.npz"
-    for path in (alone, mine):
+    orphan = place / f"{'0a' * 16}.clean.npz"
+    user_file = place / "notes.clean.npz"
+    for path in (orphan, user_file):
         np.savez(path, made_of=np.array("0"))
-    size = alone.stat().st_size
+    size = orphan.stat().st_size
     assert cache_folder.delete_orphans(3600) == 0
     assert cache_folder.delete_orphans() == size
-    assert not alone.exists()
-    assert mine.exists()
+    assert not orphan.exists()
+    assert user_file.exists()

@@ -69,9 +69,9 @@ def test_what_is_asked_for_is_done_on_the_whole_film():
 def test_it_takes_no_longer_than_the_basis(
     factor: int, width: int, height: int, rest: tuple[int, int], spp: int, most: int | None
 ):
-    whole = filmed(width * factor + rest[0] % factor, height * factor + rest[1] % factor)
-    small = whole.reduced(f"1/{factor}")
-    budget = verification_budget(whole, small.size, spp, most_spp=most)
+    full_film = filmed(width * factor + rest[0] % factor, height * factor + rest[1] % factor)
+    small = full_film.reduced(f"1/{factor}")
+    budget = verification_budget(full_film, small.size, spp, most_spp=most)
     least = 2 * budget.scene.film.block_pixels
     assert samples(budget) <= spp * width * height or budget.spp == least
     assert budget.share == pytest.approx(samples(budget) / (spp * width * height))

@@ -44,26 +44,26 @@ def halves(mean: np.ndarray, rng: np.random.Generator) -> Estimate:
 def judged(make_basis: BasisFactory, is_painted: bool) -> tuple[np.ndarray, np.ndarray]:
     """Return z of the whole, (seeds,), and what fitting adds to the prediction, relative."""
     images = truth()
-    meant = np.einsum("ic,ihwc->hwc", WEIGHTS, images)
+    target_image = np.einsum("ic,ihwc->hwc", WEIGHTS, images)
     if is_painted:  # as no lights can make it
-        meant = meant * 2 ** np.sin(np.arange(SIZE[1]) / 3)[:, None]
-    target = Target.of(meant)
+        target_image = target_image * 2 ** np.sin(np.arange(SIZE[1]) / 3)[:, None]
+    target = Target.of(target_image)
     z, weights, errors = [], [], []
     for seed in range(SEEDS):
         rng = np.random.default_rng(seed)
         noisy = halves(images, rng)
         basis = make_basis(images=noisy.image, half_differences=noisy.half_difference)
         solution = correct_noise(solve(basis, target))
-        lit = np.einsum("ic,ihwc->hwc", solution.weights, images)
-        found = compare(combine(basis, solution.lighting), halves(lit, rng))
-        z.append(found.z_mean[1])
+        picture = np.einsum("ic,ihwc->hwc", solution.weights, images)
+        verification = compare(combine(basis, solution.lighting), halves(picture, rng))
+        z.append(verification.z_mean[1])
         weights.append(solution.weights)
         errors.append((noisy.image - images).sum(axis=(1, 2)))
     # With weights that know nothing of this noise the prediction has no bias: the paired
     # difference is what fitting adds.
-    off = np.array(weights) - np.mean(weights, axis=0)
+    deviation = np.array(weights) - np.mean(weights, axis=0)
     light = np.einsum("ic,ihwc->", np.mean(weights, axis=0), images)
-    return np.array(z), np.einsum("sic,sic->s", off, np.array(errors)) / light
+    return np.array(z), np.einsum("sic,sic->s", deviation, np.array(errors)) / light
 
 
 @pytest.mark.parametrize("is_painted", [False, True])
@@ -94,6 +94,6 @@ def test_a_prediction_that_is_off_is_no_standard_normal(make_basis: BasisFactory
         noisy = halves(images, rng)
         basis = make_basis(images=noisy.image, half_differences=noisy.half_difference)
         solution = solve(basis, Target.of(np.einsum("ic,ihwc->hwc", WEIGHTS, images)))
-        lit = np.einsum("ic,ihwc->hwc", solution.weights, 1.05 * images)
-        z.append(compare(combine(basis, solution.lighting), halves(lit, rng)).z_mean[1])
+        picture = np.einsum("ic,ihwc->hwc", solution.weights, 1.05 * images)
+        z.append(compare(combine(basis, solution.lighting), halves(picture, rng)).z_mean[1])
     assert np.mean(z) < -4 / np.sqrt(len(z))

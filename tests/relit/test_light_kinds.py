@@ -134,19 +134,19 @@ def test_predicted_is_the_relit_render(assets: Path, kind: str) -> None:
     basis = render_basis(scene, spp=256)
     lighting = Lighting.current(basis)
     for emission in ((0.5, 1.5, 2.0), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)):
-        asked = (emission[0],) * 3 if scaling is Scaling.FACTORS else emission
-        changed = lighting.with_emission("it", asked).with_emission("bulb", (0.3, 0.2, 0.1))
+        rgb = (emission[0],) * 3 if scaling is Scaling.FACTORS else emission
+        changed = lighting.with_emission("it", rgb).with_emission("bulb", (0.3, 0.2, 0.1))
         relit = relight(scene, changed, assets / "out" / "relit.xml")
-        found = verify(combine(basis, changed), relit, spp=256)
-        assert found.agrees, (emission, found.difference)
+        verification = verify(combine(basis, changed), relit, spp=256)
+        assert verification.agrees, (emission, verification.difference)
 
 
 def test_known_multiples_come_back(assets: Path, kind: str) -> None:
     xml, scaling = KINDS[kind]
     scene = load_scene(write_room(assets, lights=xml + LIGHTS["bulb"]))
     basis = render_basis(scene, spp=32)
-    asked = (1.7,) * 3 if scaling is Scaling.FACTORS else (0.5, 0.0, 2.0)
-    lighting = Lighting.current(basis).with_emission("it", asked)
+    multiples = (1.7,) * 3 if scaling is Scaling.FACTORS else (0.5, 0.0, 2.0)
+    lighting = Lighting.current(basis).with_emission("it", multiples)
     target = Target("t", combine(basis, lighting).image, np.ones(basis.size, np.float32), False)
     solution = solve(basis, target)
     # The target is float32.
@@ -185,9 +185,9 @@ def test_what_mitsuba_cannot_render_is_named(tmp_path: Path, words: str) -> None
     light, integrator = CANNOT[words]
     integrator = f'<integrator type="{integrator}"/>'
     path = write_room(tmp_path, lights=light + LIGHTS["bulb"], integrator=integrator)
-    with pytest.raises(SceneError, match=f"light 'it' .*{words}") as caught:
+    with pytest.raises(SceneError, match=f"light 'it' .*{words}") as refusal:
         load_scene(path)
-    assert "\n" not in str(caught.value)
+    assert "\n" not in str(refusal.value)
 
 
 def test_a_shared_texture_is_left_alone(assets: Path) -> None:
@@ -224,13 +224,13 @@ def test_what_is_hit_by_chance_is_not_sampled_though_all_else_is_off(assets: Pat
     scene = load_scene(write_room(assets, lights=KINDS["painted mesh"][0] + LIGHTS["bulb"]))
     emission = {"it": (1.0, 1.0, 1.0), "bulb": (0.0, 0.0, 0.0)}
     settings = settings_for(scene.lights, scene.emitters, emission, scene="room")
-    its = {x.name: settings[x.node].sampling_weight for x in scene.emitters}
-    assert its == {"it": 0, "bulb": 1}
+    sampling_weights = {x.name: settings[x.node].sampling_weight for x in scene.emitters}
+    assert sampling_weights == {"it": 0, "bulb": 1}
     basis = render_basis(scene, spp=256)
-    alone = Lighting.current(basis).with_emission("bulb", (0.0, 0.0, 0.0))
-    relit = relight(scene, alone, assets / "out" / "relit.xml")
+    lighting = Lighting.current(basis).with_emission("bulb", (0.0, 0.0, 0.0))
+    relit = relight(scene, lighting, assets / "out" / "relit.xml")
     assert {x.name: x.sampling_weight for x in relit.emitters} == {"it": 0, "bulb": 1}
-    assert verify(combine(basis, alone), relit, spp=256).agrees
+    assert verify(combine(basis, lighting), relit, spp=256).agrees
     # And where it is all there is, Mitsuba has to sample it.
     only = load_scene(write_room(assets, lights=KINDS["painted mesh"][0]))
     relit = relight(only, Lighting.current(render_basis(only, spp=2)), assets / "2" / "relit.xml")

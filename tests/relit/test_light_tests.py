@@ -31,53 +31,53 @@ def pictures() -> np.ndarray:
     return np.stack([p[..., None] * c for p, c in zip(pools, colors, strict=True)])
 
 
-def render(lit: np.ndarray, paths: float, rng: np.random.Generator) -> list[Estimate]:
+def render(images: np.ndarray, paths: float, rng: np.random.Generator) -> list[Estimate]:
     """Return a render of each light, whose paths are few, so that noise is skew as in renders."""
-    noise = rng.gamma(paths, 1 / paths, (len(lit), 2, *SIZE, 1))
+    noise = rng.gamma(paths, 1 / paths, (len(images), 2, *SIZE, 1))
     return [
-        Estimate.of_halves(*(x * n).astype(np.float32)) for x, n in zip(lit, noise, strict=True)
+        Estimate.of_halves(*(x * n).astype(np.float32)) for x, n in zip(images, noise, strict=True)
     ]
 
 
-def total(lit: list[Estimate]) -> Estimate:
+def total(estimates: list[Estimate]) -> Estimate:
     """Return the sum of some renders."""
-    images, halves = zip(*((x.image, x.half_difference) for x in lit), strict=True)
+    images, halves = zip(*((x.image, x.half_difference) for x in estimates), strict=True)
     return Estimate(np.sum(images, axis=0), np.sum(halves, axis=0))
 
 
-def shares(lit: list[Estimate]) -> LightShares:
+def shares(images: list[Estimate]) -> LightShares:
     """Return the lights of a prediction."""
-    return LightShares.of_pictures([f"light {k}" for k in range(len(lit))], lit)
+    return LightShares.of_pictures([f"light {k}" for k in range(len(images))], images)
 
 
 @cache
-def found(kind: str, wrong: float) -> tuple[np.ndarray, np.ndarray]:
+def found(kind: str, error_share: float) -> tuple[np.ndarray, np.ndarray]:
     """Return z, (seeds, n), and power, (seeds, n), where the first light's render is off."""
     z, power = [], []
-    lit = pictures()
-    true = lit * np.array([1 + wrong, 1, 1])[:, None, None, None]
+    images = pictures()
+    true = images * np.array([1 + error_share, 1, 1])[:, None, None, None]
     for seed in range(SEEDS):
         rng = np.random.default_rng(seed)
-        parts = render(lit, 8 * PATHS[kind], rng)
+        parts = render(images, 8 * PATHS[kind], rng)
         predicted, lights = total(parts), shares(parts)
         verified = total(render(true, PATHS[kind], rng))
         tests = light_tests(predicted, verified, lights.blocks, lights.noise)
         z.append(tests.z)
-        said = detection_power(predicted, verified, lights, tests, error=ERROR)
-        power.append([said[name] for name in lights.names])
+        stated_power = detection_power(predicted, verified, lights, tests, error=ERROR)
+        power.append([stated_power[name] for name in lights.names])
     return np.array(z), np.array(power)
 
 
 @pytest.mark.parametrize("kind", list(PATHS))
 def test_z_of_each_light_strays_no_further_than_a_normal_number_where_all_is_true(kind: str):
     z, _ = found(kind, 0.0)
-    for its in z.T:
+    for z_of_light in z.T:
         # Four standard errors of a mean, of a standard deviation, and of shares of so many seeds.
-        assert abs(its.mean()) < 4 / np.sqrt(SEEDS)
-        assert 0.7 < its.std() < 1 + 4 / np.sqrt(2 * SEEDS)
+        assert abs(z_of_light.mean()) < 4 / np.sqrt(SEEDS)
+        assert 0.7 < z_of_light.std() < 1 + 4 / np.sqrt(2 * SEEDS)
         for limit in (1.64, 1.96, 2.58):
             tail = 2 * NormalDist().cdf(-limit)
-            assert np.mean(np.abs(its) > limit) < tail + 4 * np.sqrt(tail / SEEDS)
+            assert np.mean(np.abs(z_of_light) > limit) < tail + 4 * np.sqrt(tail / SEEDS)
 
 
 def test_z_is_no_standard_normal_where_a_light_is_off():
@@ -89,49 +89,52 @@ def test_z_is_no_standard_normal_where_a_light_is_off():
 
 @pytest.mark.parametrize(("kind", "error"), [("smooth", 0.01), ("smooth", ERROR), ("skew", 0.15)])
 def test_errors_in_a_light_are_found_as_often_as_the_sensitivity_says(kind: str, error: float):
-    lit, misses, said = pictures(), [], []
-    true = lit * np.array([1 - error, 1, 1])[:, None, None, None]
+    images, misses, stated_powers = pictures(), [], []
+    true = images * np.array([1 - error, 1, 1])[:, None, None, None]
     for seed in range(150):
         rng = np.random.default_rng(seed)
-        parts = render(lit, 8 * PATHS[kind], rng)
+        parts = render(images, 8 * PATHS[kind], rng)
         predicted, lights = total(parts), shares(parts)
         verified = total(render(true, PATHS[kind], rng))
         tests = light_tests(predicted, verified, lights.blocks, lights.noise)
         misses.append(tests.z[0])
-        said.append(tests.mean(error)[0])
+        stated_powers.append(tests.mean(error)[0])
     # The mean of z is what is said: its scatter of 1, and some for what the error itself changes.
-    room = 4 / np.sqrt(len(said)) + 0.05 * np.mean(said)
-    assert np.mean(misses) == pytest.approx(np.mean(said), abs=room)
+    room = 4 / np.sqrt(len(stated_powers)) + 0.05 * np.mean(stated_powers)
+    assert np.mean(misses) == pytest.approx(np.mean(stated_powers), abs=room)
 
 
 def test_looks_and_lights_alarm_no_more_often_than_is_stated():
     """Renders of growing length, looked at six times, each time by all tests."""
-    once, looks, runs = 2.5, 6, 250
-    limit, alarms, careless = limit_of_tests(looks, once=once), 0, 0
-    lit = pictures()
-    tail = limit_of_tests(1, once=once)
+    single_limit, looks, runs = 2.5, 6, 250
+    limit, alarms, careless = limit_of_tests(looks, once=single_limit), 0, 0
+    images = pictures()
+    tail = limit_of_tests(1, once=single_limit)
     for seed in range(runs):
         rng = np.random.default_rng(seed)
-        parts = render(lit, 30.0, rng)
+        parts = render(images, 30.0, rng)
         predicted, lights = total(parts), shares(parts)
         halves = np.zeros((2, *SIZE, 3))
         beyond, wrongly = False, False
         for look in range(looks):
-            more = max(1, 2 ** (look - 1))
-            again = total(render(lit, 3.0 * more, rng))
-            halves += more * np.stack(
-                [again.image + again.half_difference, again.image - again.half_difference]
+            growth = max(1, 2 ** (look - 1))
+            second_render = total(render(images, 3.0 * growth, rng))
+            halves += growth * np.stack(
+                [
+                    second_render.image + second_render.half_difference,
+                    second_render.image - second_render.half_difference,
+                ]
             )
             verified = Estimate.of_halves(*(halves / 2**look).astype(np.float32))
             tests = light_tests(predicted, verified, lights.blocks, lights.noise)
             z = dict(zip(lights.names, tests.z.tolist(), strict=True))
-            both = differences(predicted, verified)
-            beyond |= largest_difference(*both, z, limit=limit) > limit
-            wrongly |= max(*map(abs, both[0]), both[1], *map(abs, z.values())) > tail
+            z_values = differences(predicted, verified)
+            beyond |= largest_difference(*z_values, z, limit=limit) > limit
+            wrongly |= max(*map(abs, z_values[0]), z_values[1], *map(abs, z.values())) > tail
         alarms, careless = alarms + beyond, careless + wrongly
     # Three channels and the lights as one alarm either way, the pattern one way. A channel's noise
     # is of the same paths as another's, so it is less.
-    stated = 9 * NormalDist().cdf(-once)
+    stated = 9 * NormalDist().cdf(-single_limit)
     assert alarms / runs <= stated + 4 * np.sqrt(stated / runs)
     assert careless > 2 * alarms
 

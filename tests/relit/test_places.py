@@ -40,12 +40,12 @@ def answer_of(scene: Scene) -> lp.Lighting:
 
 
 def test_a_file_has_the_places_of_its_answer(room: Scene, tmp_path: Path) -> None:
-    moved = room.moved({"beam": TURNED}).with_new_emitters([NEW])
-    lighting = answer_of(moved)
+    moved_room = room.moved({"beam": TURNED}).with_new_emitters([NEW])
+    lighting = answer_of(moved_room)
     write_lighting(tmp_path / "a.json", lighting)
-    again = read_lighting(tmp_path / "a.json")
-    assert again.places == lighting.places
-    assert again.up == lighting.up == (0, 1, 0)
+    reread = read_lighting(tmp_path / "a.json")
+    assert reread.places == lighting.places
+    assert reread.up == lighting.up == (0, 1, 0)
     data = json.loads((tmp_path / "a.json").read_text())["places"]
     assert data["beam"]["moved_from"]["position"] == [0.8, 1.8, 1.5]
     assert data["key"]["new"] == "spot"
@@ -58,10 +58,10 @@ def test_whoever_applies_an_answer_hangs_its_lights_there(
     room: Scene, tmp_path: Path, of: str
 ) -> None:
     """From the scene as it is in its file, or from one in which they hang there already."""
-    moved = room.moved({"beam": TURNED}).with_new_emitters([NEW])
-    lighting = answer_of(moved)
-    relit = lp.relight(room if of == "file" else moved, lighting, tmp_path / "r" / "relit.xml")
-    sites = {x.name: x.site for x in moved.emitters}
+    moved_room = room.moved({"beam": TURNED}).with_new_emitters([NEW])
+    lighting = answer_of(moved_room)
+    relit = lp.relight(room if of == "file" else moved_room, lighting, tmp_path / "r" / "relit.xml")
+    sites = {x.name: x.site for x in moved_room.emitters}
     assert {x.name for x in relit.emitters} == {*sites}
     assert all(x.site.is_near(sites[x.name]) for x in relit.emitters)
     assert not relit.light("beam").members[0].site.is_near(room.light("beam").members[0].site)
@@ -106,10 +106,10 @@ def test_other_programs_hang_the_lights_too(room: Scene, tmp_path: Path) -> None
 
 
 def test_no_lamp_travels_between_two_looks(room: Scene) -> None:
-    here, there = answer_of(room), answer_of(room.moved({"beam": TURNED}))
+    answer, other_answer = answer_of(room), answer_of(room.moved({"beam": TURNED}))
     with pytest.raises(LightingError, match="beam at different places"):
-        interpolate([here, there], 0.5, space="log")
-    assert interpolate([there, there], 0.5, space="log").places == there.places
+        interpolate([answer, other_answer], 0.5, space="log")
+    assert interpolate([other_answer, other_answer], 0.5, space="log").places == other_answer.places
 
 
 def test_a_list_of_fixtures_says_where_each_hangs(room: Scene) -> None:
@@ -160,6 +160,6 @@ def test_damaged_places_are_one_line(room: Scene, tmp_path: Path, places: object
     write_lighting(tmp_path / "a.json", answer_of(room))
     data = json.loads((tmp_path / "a.json").read_text())
     (tmp_path / "a.json").write_text(json.dumps({**data, "places": places}))
-    with pytest.raises(LightingError, match=r"a\.json") as caught:
+    with pytest.raises(LightingError, match=r"a\.json") as refusal:
         read_lighting(tmp_path / "a.json")
-    assert "\n" not in str(caught.value)
+    assert "\n" not in str(refusal.value)

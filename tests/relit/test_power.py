@@ -41,25 +41,25 @@ def power(predicted: Estimate, verified: Estimate, light: Estimate) -> float:
 )
 def test_as_many_errors_are_found_as_it_says(strength: float, spread: float):
     light, rest = lamp(strength, spread), np.full((*SIZE, 3), 0.5)
-    found, said = [], []
+    detections, stated_powers = [], []
     for seed in SEEDS:
         rng = np.random.default_rng(seed)
         predicted = estimate(rest + light, 0.2, rng)
         verified = estimate(rest + (1 - ERROR) * light, 0.2, rng)
         judged = judge(predicted, verified, estimate(light, 0.1, rng))
-        found.append(not judged.agrees)
-        said.append((judged.power or {})["lamp"])
-    expected = np.mean(said)
+        detections.append(not judged.agrees)
+        stated_powers.append((judged.power or {})["lamp"])
+    expected = np.mean(stated_powers)
     # Four standard errors of a share of so many, and what two tests at once have in common.
     error = 4 * np.sqrt(max(expected * (1 - expected), 0.01) / len(SEEDS))
-    assert np.mean(found) == pytest.approx(expected, abs=error + 0.05)
+    assert np.mean(detections) == pytest.approx(expected, abs=error + 0.05)
 
 
 def test_a_light_that_is_only_noise_is_not_seen():
     rng = np.random.default_rng(0)
     room = estimate(np.full((*SIZE, 3), 0.5), 0.1, rng)
-    again = estimate(np.full((*SIZE, 3), 0.5), 0.1, rng)
-    assert power(room, again, estimate(np.zeros((*SIZE, 3)), 1.0, rng)) < 1e-3
+    second = estimate(np.full((*SIZE, 3), 0.5), 0.1, rng)
+    assert power(room, second, estimate(np.zeros((*SIZE, 3)), 1.0, rng)) < 1e-3
 
 
 def test_without_noise_all_is_seen():

@@ -107,21 +107,21 @@ def test_values_given_to_the_scene_change_no_text_and_hold_when_it_is_rendered(
     relit = relight(scene, lighting, tmp_path / "out" / "relit.xml")
     assert relit.parameters == {"width": "12"}  # nothing asks for the level any more
     assert relit.size == scene.size == (20, 12)
-    written = tmp_path / "out" / "relit.xml"
+    relit_file = tmp_path / "out" / "relit.xml"
     for name in ("width", "level"):
-        assert written.read_text(encoding="utf-8").count(f'<default name="{name}"') == 1
-    assert all("default" not in line for line in changed_lines(path, written))
+        assert relit_file.read_text(encoding="utf-8").count(f'<default name="{name}"') == 1
+    assert all("default" not in line for line in changed_lines(path, relit_file))
     changed = [x for x in scene_patch(scene, lighting).splitlines() if x[:1] in "+-"]
     assert not any("default" in line for line in changed)
     assert any("intensity" in line for line in changed)
-    assert load_scene(written).size == (20, 24)  # the scene's own
+    assert load_scene(relit_file).size == (20, 24)  # the scene's own
 
 
 def test_a_result_remembers_what_was_given_to_its_scene(tmp_path: Path) -> None:
     write_room(tmp_path, lights=LIGHTS["bulb"])
-    given = ("-D", "width=12", "--spp", "8", "-q")
+    options = ("-D", "width=12", "--spp", "8", "-q")
     write_rgb(tmp_path / "p.exr", np.full((20, 12, 3), 0.1, np.float32))
-    succeed(tmp_path, "solve", "room.xml", "p.exr", "-o", "out", *given)
+    succeed(tmp_path, "solve", "room.xml", "p.exr", "-o", "out", *options)
     succeed(tmp_path, "verify", "out", "--spp", "8", "-q")
 
 
@@ -140,9 +140,9 @@ def test_off_is_black_and_never_sampled_and_the_emitter_stays(
     assert relit.light("bulb").members[0].sampling_weight == 0
     assert relit.light("beam").members[0].sampling_weight == 1
     # And on again from there.
-    again = relight(relit, lighting_of(relit, {"bulb": (1, 2, 3)}), tmp_path / "two" / "relit.xml")
-    assert again.light("bulb").emission == (1, 2, 3)
-    assert again.light("bulb").members[0].sampling_weight == 1
+    second = relight(relit, lighting_of(relit, {"bulb": (1, 2, 3)}), tmp_path / "two" / "relit.xml")
+    assert second.light("bulb").emission == (1, 2, 3)
+    assert second.light("bulb").members[0].sampling_weight == 1
 
 
 def test_all_lights_off_still_loads(tmp_path: Path, small_room: Scene) -> None:
@@ -213,8 +213,8 @@ def test_other_encodings_come_back_as_they_were(tmp_path: Path, encoding: str) -
     relit = relight(scene, lighting, tmp_path / "out" / "relit.xml")
     for light in relit.lights:
         np.testing.assert_allclose(light.emission, lighting.emission[light.name], rtol=1e-6)
-    written = (tmp_path / "out" / "relit.xml").read_bytes().decode(encoding)
-    assert "Bühne für Örtchen" in written
+    content = (tmp_path / "out" / "relit.xml").read_bytes().decode(encoding)
+    assert "Bühne für Örtchen" in content
 
 
 def test_one_include_with_two_answers_is_refused(tmp_path: Path) -> None:
@@ -224,8 +224,8 @@ def test_one_include_with_two_answers_is_refused(tmp_path: Path) -> None:
     path = write_room(tmp_path, lights='<include filename="lamp.xml"/>' * 2)
     scene = load_scene(path)
     a, b = (light.name for light in scene.lights)
-    same = lighting_of(scene, {a: (1, 2, 3), b: (1, 2, 3)})
-    relight(scene, same, tmp_path / "out" / "relit.xml")
+    lighting = lighting_of(scene, {a: (1, 2, 3), b: (1, 2, 3)})
+    relight(scene, lighting, tmp_path / "out" / "relit.xml")
     with pytest.raises(SceneError, match="more than once"):
         relight(scene, lighting_of(scene, {a: (1, 2, 3), b: (3, 2, 1)}), tmp_path / "x" / "r.xml")
     assert not (tmp_path / "x").exists()

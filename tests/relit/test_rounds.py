@@ -45,24 +45,24 @@ def test_error_bars_hold_the_answer_of_many_samples(
     many = lp.render_basis(scene, spp=4096, seed=999)
     best = solve(many, target)
     truth = best.lighting.weights_for(many)
-    held: dict[str, list[float]] = {}
+    coverages: dict[str, list[float]] = {}
     objective: dict[str, list[float]] = {}
     for seed in range(seeds):
         basis = lp.render_basis(scene, spp=16, seed=seed)
         plain = solve(basis, target)
-        found = {"plain": plain, "corrected": correct_noise(plain)}
+        solutions = {"plain": plain, "corrected": correct_noise(plain)}
         if seed < refined:
-            found["refined"] = refine_by_rendering([(scene, basis)], plain, rounds=1, seed=seed)
-        for name, solution in found.items():
+            solutions["refined"] = refine_by_rendering([(scene, basis)], plain, rounds=1, seed=seed)
+        for name, solution in solutions.items():
             low, high = error_bars(solution).interval
-            inside = (low <= truth + 1e-12) & (truth <= high + 1e-12)
-            held.setdefault(name, []).append(float(inside.mean()))
+            is_covered = (low <= truth + 1e-12) & (truth <= high + 1e-12)
+            coverages.setdefault(name, []).append(float(is_covered.mean()))
             w = solution.lighting.weights_for(basis)
             objective.setdefault(name, []).append(float(best.equations.objective(w).sum()))
     for name in ("plain", "corrected"):
-        assert len(held[name]) == seeds
-        assert 0.85 <= np.mean(held[name]) <= (0.99 if seeds >= MANY[0] else 1), name
-    assert np.mean(held["refined"]) >= 0.85
+        assert len(coverages[name]) == seeds
+        assert 0.85 <= np.mean(coverages[name]) <= (0.99 if seeds >= MANY[0] else 1), name
+    assert np.mean(coverages["refined"]) >= 0.85
     least = sum(best.certificate.objective)
     # Of the same seeds.
     excess = {name: np.mean(values[:refined]) - least for name, values in objective.items()}
@@ -87,9 +87,9 @@ def test_a_refined_look_is_verified_and_tells_its_errors(
     assert look.solution.problem.refinement is not None
     assert look.verification is not None
     assert look.verification.agrees
-    written = lp.read_lighting(tmp_path / "lighting.json")
-    assert written == look.lighting
-    assert all(light.standard_error is not None for light in written.lights)
+    stored = lp.read_lighting(tmp_path / "lighting.json")
+    assert stored == look.lighting
+    assert all(light.standard_error is not None for light in stored.lights)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "How sure" in page
     assert "The difference" in page

@@ -45,17 +45,17 @@ def test_one_look_has_the_limit_and_more_looks_no_more_false_alarms():
     assert limit_of_tests(1) == pytest.approx(LIMIT, rel=1e-9)  # float64 in the tail
     # Sums of white noise, looked at after some and all: how often one is beyond. At 5 standard
     # errors nothing would ever be, so it is tried where one look alarms in 1 of 20.
-    once, runs = NormalDist().inv_cdf(0.975), 20_000
-    looks = limit_of_tests(len(LOOKS), once=once)
+    single_limit, runs = NormalDist().inv_cdf(0.975), 20_000
+    looks = limit_of_tests(len(LOOKS), once=single_limit)
     rng = np.random.default_rng(0)
     walk = rng.normal(size=(runs, ALL_PARTS)).cumsum(axis=1)
-    at = np.array(LOOKS)
-    z = walk[:, at - 1] / np.sqrt(at)
+    look_counts = np.array(LOOKS)
+    z = walk[:, look_counts - 1] / np.sqrt(look_counts)
     alarms = (np.abs(z) > looks).any(axis=1).mean()
     error = 4 * np.sqrt(0.05 * 0.95 / runs)
     assert alarms <= 0.05 + error
     # Without the farther limit it would alarm much more often.
-    assert (np.abs(z) > once).any(axis=1).mean() > 0.1
+    assert (np.abs(z) > single_limit).any(axis=1).mean() > 0.1
 
 
 def _estimate(picture: np.ndarray, sigma: float, rng: np.random.Generator) -> Estimate:
@@ -70,8 +70,8 @@ def _lit(strengths: dict[str, float]) -> tuple[Estimate, LightShares]:
         picture = clean.copy()
         picture[:, 8 * k : 8 * k + 8] = strength
         pictures.append(Estimate(picture, clean))
-    whole = np.sum([x.image for x in pictures], axis=0)
-    return Estimate(whole, clean), LightShares.of_pictures(list(strengths), pictures)
+    total = np.sum([x.image for x in pictures], axis=0)
+    return Estimate(total, clean), LightShares.of_pictures(list(strengths), pictures)
 
 
 def test_it_ends_when_errors_show_in_most_of_the_light_and_in_each_large_light():
@@ -97,9 +97,9 @@ def test_it_ends_at_once_where_they_disagree():
     rng = np.random.default_rng(2)
     sigma = 0.05 * np.sqrt(SIZE[0] * 8) / (3 * LIMIT)
     assert not can_tell(predicted, _estimate(predicted.image, sigma, rng), lights, 1 / 32)
-    wrong = predicted.image.copy()
-    wrong[:, :8] *= 1.3
-    assert can_tell(predicted, _estimate(wrong, sigma, rng), lights, 1 / 32)
+    wrong_image = predicted.image.copy()
+    wrong_image[:, :8] *= 1.3
+    assert can_tell(predicted, _estimate(wrong_image, sigma, rng), lights, 1 / 32)
 
 
 @pytest.mark.parametrize("spp", [2, 6, 9])
@@ -108,10 +108,10 @@ def test_it_never_takes_more_samples_than_its_budget(tmp_path: Path, spp: int):
     basis = render_basis(scene, spp=4, seed=0)
     lighting = Lighting.of_weights(basis, basis.current_weights)
     relit = relight(scene, lighting, tmp_path / "relit.xml")
-    found = verify_in_stages(combine(basis, lighting), relit, basis, lighting, spp=spp)
-    assert found.spp is not None
+    verification = verify_in_stages(combine(basis, lighting), relit, basis, lighting, spp=spp)
+    assert verification.spp is not None
     # Two halves of equally many, so one more than an odd number.
-    assert found.spp <= spp + spp % 2
+    assert verification.spp <= spp + spp % 2
 
 
 def test_it_stops_early_and_still_finds_what_is_wrong(tmp_path: Path):
@@ -125,7 +125,7 @@ def test_it_stops_early_and_still_finds_what_is_wrong(tmp_path: Path):
     assert right.spp is not None
     assert right.spp < 1024
     assert right.limit == pytest.approx(limit_of_tests(len(stages_of(1024))))
-    wrong = Estimate(predicted.image * np.float32(1.2), predicted.half_difference)
-    found = verify_in_stages(wrong, relit, basis, lighting, spp=1024)
-    assert not found.agrees
-    assert found.spp == stages_of(1024)[0]
+    wrong_estimate = Estimate(predicted.image * np.float32(1.2), predicted.half_difference)
+    verification = verify_in_stages(wrong_estimate, relit, basis, lighting, spp=1024)
+    assert not verification.agrees
+    assert verification.spp == stages_of(1024)[0]

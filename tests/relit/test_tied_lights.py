@@ -72,13 +72,13 @@ def test_predicted_is_the_relit_render_at_the_same_seed(scene: Scene, tmp_path: 
 
 def test_known_weights_come_back_and_the_rest_stays(scene: Scene) -> None:
     basis = render_basis(scene, spp=32)
-    wanted = some_lighting(scene)
-    target = Target("t", combine(basis, wanted).image, np.ones(basis.size, np.float32), False)
+    lighting = some_lighting(scene)
+    target = Target("t", combine(basis, lighting).image, np.ones(basis.size, np.float32), False)
     solution = solve(basis, target)
     for light in solution.lighting.lights:
         assert light.is_fixed == scene.light(light.name).is_fixed
         # The target is float32.
-        np.testing.assert_allclose(light.emission, wanted.emission[light.name], rtol=1e-4)
+        np.testing.assert_allclose(light.emission, lighting.emission[light.name], rtol=1e-4)
     assert solution.lighting.emission["rest"] == (1, 1, 1)
 
 

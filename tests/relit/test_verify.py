@@ -69,25 +69,25 @@ def test_noise_alone_agrees(noise: Noise):
 
 
 def test_pattern_of_noise_is_zero_on_average_however_skew():
-    found = np.array([compare(*_pair(seed, _fireflies)).z_pattern for seed in SEEDS])
-    assert abs(found.mean()) <= 4 * found.std() / np.sqrt(len(SEEDS))
+    z_values = np.array([compare(*_pair(seed, _fireflies)).z_pattern for seed in SEEDS])
+    assert abs(z_values.mean()) <= 4 * z_values.std() / np.sqrt(len(SEEDS))
     # The standard error it is measured in is an upper bound.
-    assert found.std() < 1.2
+    assert z_values.std() < 1.2
 
 
 def test_z_is_one_for_noise_alone():
-    found = [compare(*_pair(seed, _gaussian)) for seed in SEEDS]
+    verifications = [compare(*_pair(seed, _gaussian)) for seed in SEEDS]
     # 30 blocks, 3 channels: a mean of that many z² is 1 ± √(2/90), and 64 degrees of freedom
     # add 2/62; four standard errors of the mean over all seeds.
-    z2 = np.mean([v.z_rms**2 for v in found])
+    z2 = np.mean([v.z_rms**2 for v in verifications])
     assert z2 == pytest.approx(1 + 2 / 62, abs=4 * np.sqrt(2 / 90 / len(SEEDS)))
-    z_mean = np.array([v.z_mean for v in found])
+    z_mean = np.array([v.z_mean for v in verifications])
     assert np.square(z_mean).mean() == pytest.approx(1, abs=4 * np.sqrt(2 / z_mean.size))
-    z = np.concatenate([v.z.ravel() for v in found])
+    z = np.concatenate([v.z.ravel() for v in verifications])
     # The noise is pooled over at most 25 pixels and both pictures, so that z is Student's t
     # with up to 50 degrees of freedom, 9 + 9 at corners: of variance 1.04 to 1.13.
     assert 1.0 < np.square(z).mean() < 1.13
-    assert np.mean([v.rmse / v.noise_rmse for v in found]) == pytest.approx(1, abs=0.01)
+    assert np.mean([v.rmse / v.noise_rmse for v in verifications]) == pytest.approx(1, abs=0.01)
 
 
 @pytest.mark.parametrize("noise", [_gaussian, _same_in_all_channels])
@@ -97,9 +97,9 @@ def test_a_bias_of_three_standard_errors_of_a_block_is_seen(noise: Noise):
     blocks = np.indices((SIZE[0] // 8, SIZE[1] // 8)).sum(axis=0) % 2 * 2 - 1
     bias = np.kron(blocks, np.ones((8, 8)))[..., None] * 3 * SIGMA / 8
     for seed in SEEDS:
-        found = compare(*_pair(seed, noise, bias=bias))
-        assert not found.agrees
-        assert found.z_pattern > LIMIT
+        verification = compare(*_pair(seed, noise, bias=bias))
+        assert not verification.agrees
+        assert verification.z_pattern > LIMIT
 
 
 def test_one_percent_of_the_whole_picture_is_seen_where_no_block_shows_it():
@@ -109,22 +109,28 @@ def test_one_percent_of_the_whole_picture_is_seen_where_no_block_shows_it():
         return rng.normal(scale=0.1, size=shape)
 
     for seed in range(20):
-        found = compare(*_pair(seed, noise, bias=0.01 * _truth(size), size=size))
-        assert found.z_pattern <= LIMIT
+        verification = compare(*_pair(seed, noise, bias=0.01 * _truth(size), size=size))
+        assert verification.z_pattern <= LIMIT
         # The verified picture is the brighter one: the difference is negative.
-        assert min(found.z_mean) < -LIMIT
-        assert not found.agrees
+        assert min(verification.z_mean) < -LIMIT
+        assert not verification.agrees
 
 
 @pytest.mark.parametrize("size", [SIZE, (8, 8), (5, 7), (1, 1), (17, 9)])
 def test_without_noise_equal_pictures_agree(size: tuple[int, int]):
     image = _truth(size).astype(np.float32)
     silent = Estimate(image, np.zeros_like(image))
-    found = compare(silent, silent)
-    assert found.agrees
-    assert found.z_rms == found.rmse == found.delta_e_mean == found.delta_e_95 == 0
-    assert found.z_mean == (0, 0, 0)
-    np.testing.assert_array_equal(found.z, 0)
+    verification = compare(silent, silent)
+    assert verification.agrees
+    assert (
+        verification.z_rms
+        == verification.rmse
+        == verification.delta_e_mean
+        == verification.delta_e_95
+        == 0
+    )
+    assert verification.z_mean == (0, 0, 0)
+    np.testing.assert_array_equal(verification.z, 0)
     # Round-off of float32 is no difference, and one percent is.
     assert compare(silent, replace(silent, image=image * np.float32(1 + 1e-6))).agrees
     assert not compare(silent, replace(silent, image=image * np.float32(1.01))).agrees
@@ -144,10 +150,10 @@ def test_every_pixel_is_looked_at(place: tuple[int, int]):
 def test_black_agrees_with_black_and_with_nothing_else():
     black = np.zeros((*SIZE, 3), np.float32)
     dark = Estimate(black, black)
-    found = compare(dark, dark)
-    assert found.agrees
-    assert np.isfinite(found.z).all()
-    assert found.z_rms == found.rmse == found.delta_e_mean == 0
+    verification = compare(dark, dark)
+    assert verification.agrees
+    assert np.isfinite(verification.z).all()
+    assert verification.z_rms == verification.rmse == verification.delta_e_mean == 0
     assert not compare(dark, Estimate(black + np.float32(1e-3), black)).agrees
     # A picture of which most is black, the rest noisy.
     predicted, verified = _pair(0, _gaussian)
@@ -160,15 +166,15 @@ def test_closed_forms():
     shape = (*SIZE, 3)
     predicted = Estimate(np.full(shape, 0.7, np.float32), np.full(shape, 0.03, np.float32))
     verified = Estimate(np.full(shape, 0.675, np.float32), np.full(shape, -0.04, np.float32))
-    found = compare(predicted, verified)
+    verification = compare(predicted, verified)
     # 3, 4, 5: a difference of 0.025 with a standard deviation of 0.05. Precision: float32 of
     # a difference, and the 1e-5 of round-off that counts as noise.
-    assert found.rmse == pytest.approx(0.025, rel=1e-5)
-    assert found.noise_rmse == pytest.approx(0.05, rel=1e-5)
-    np.testing.assert_allclose(found.z, 0.5, rtol=1e-5)
-    assert found.z_rms == pytest.approx(0.5 * 8, rel=1e-5)
-    assert found.z_mean == pytest.approx([0.5 * np.sqrt(SIZE[0] * SIZE[1])] * 3, rel=1e-5)
-    assert found.verified is verified
+    assert verification.rmse == pytest.approx(0.025, rel=1e-5)
+    assert verification.noise_rmse == pytest.approx(0.05, rel=1e-5)
+    np.testing.assert_allclose(verification.z, 0.5, rtol=1e-5)
+    assert verification.z_rms == pytest.approx(0.5 * 8, rel=1e-5)
+    assert verification.z_mean == pytest.approx([0.5 * np.sqrt(SIZE[0] * SIZE[1])] * 3, rel=1e-5)
+    assert verification.verified is verified
     far = Estimate(verified.image - 1, verified.half_difference)
     assert not compare(predicted, far).agrees
 
@@ -182,20 +188,20 @@ def test_the_unit_of_radiance_is_of_no_importance(scale: float):
         factor = np.float32(scale)
         return Estimate(e.image * factor, e.half_difference * factor)
 
-    found = compare(scaled(predicted), scaled(verified))
+    verification = compare(scaled(predicted), scaled(verified))
     # Powers of two scale exactly; float64 sums.
-    assert found.z_rms == pytest.approx(plain.z_rms, rel=1e-9)
-    assert found.z_mean == pytest.approx(plain.z_mean, rel=1e-9)
-    assert found.rmse == pytest.approx(plain.rmse * scale, rel=1e-9)
+    assert verification.z_rms == pytest.approx(plain.z_rms, rel=1e-9)
+    assert verification.z_mean == pytest.approx(plain.z_mean, rel=1e-9)
+    assert verification.rmse == pytest.approx(plain.rmse * scale, rel=1e-9)
 
 
 def test_both_ways_the_same():
     predicted, verified = _pair(1, _gaussian, bias=0.05)
-    there, back = compare(predicted, verified), compare(verified, predicted)
+    forward, backward = compare(predicted, verified), compare(verified, predicted)
     # Sums of the same numbers in another order.
-    assert there.z_rms == pytest.approx(back.z_rms, rel=1e-12)
-    assert there.z_mean == pytest.approx([-z for z in back.z_mean], rel=1e-12)
-    assert there.agrees == back.agrees
+    assert forward.z_rms == pytest.approx(backward.z_rms, rel=1e-12)
+    assert forward.z_mean == pytest.approx([-z for z in backward.z_mean], rel=1e-12)
+    assert forward.agrees == backward.agrees
 
 
 @pytest.mark.parametrize(("brightness", "exposure"), [(1.0, 1.0), (2.0**-10, 2.0**8.5)])
@@ -205,11 +211,11 @@ def test_colour_difference_is_taken_as_it_is_shown(brightness: float, exposure: 
     other = image * np.array([0.9, 1, 1], np.float32)
     other[:2] = image[:2]
     zero = np.zeros_like(image)
-    found = compare(Estimate(other, zero), Estimate(image, zero))
+    verification = compare(Estimate(other, zero), Estimate(image, zero))
     differences = delta_e(other * exposure, image * exposure)
     # The very same float64 numbers, averaged.
-    assert found.delta_e_mean == pytest.approx(differences.mean(), rel=1e-12)
-    assert found.delta_e_95 == pytest.approx(differences.max(), rel=1e-12)
+    assert verification.delta_e_mean == pytest.approx(differences.mean(), rel=1e-12)
+    assert verification.delta_e_95 == pytest.approx(differences.max(), rel=1e-12)
     assert differences.max() > 1
 
 

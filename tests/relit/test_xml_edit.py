@@ -70,7 +70,7 @@ def test_lenient_xml_is_relit(tmp_path: Path, lights: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("before", "behind"),
+    ("before", "suffix"),
     [
         ('\n  <?xml version="1.0"?>\n', ""),
         ('<!-- x --><?xml version="1.0" encoding="utf-8"?>', ""),
@@ -80,9 +80,9 @@ def test_lenient_xml_is_relit(tmp_path: Path, lights: str) -> None:
         ("\ufeff", "<!-- -- -->"),
     ],
 )
-def test_around_the_root(tmp_path: Path, before: str, behind: str) -> None:
-    path = rewrite(write_room(tmp_path), lambda text: before + text + behind)
-    if "</anything>" in behind:
+def test_around_the_root(tmp_path: Path, before: str, suffix: str) -> None:
+    path = rewrite(write_room(tmp_path), lambda text: before + text + suffix)
+    if "</anything>" in suffix:
         with pytest.raises(SceneError, match="Mitsuba refuses"):
             load_scene(path)
         path = rewrite(path, lambda text: text.replace("</anything>", ""))
@@ -179,13 +179,13 @@ def test_names_are_converted_as_mitsuba_does() -> None:
 def test_parameter_in_a_name_is_refused(tmp_path: Path) -> None:
     lights = BULB.replace('name="intensity"', 'name="$nm"')
     scene = load_scene(write_room(tmp_path, lights=lights), parameters={"nm": "intensity"})
-    with pytest.raises(SceneError, match=r"line \d+: <rgb name='\$nm'>.*'bulb'") as caught:
+    with pytest.raises(SceneError, match=r"line \d+: <rgb name='\$nm'>.*'bulb'") as refusal:
         relit_text(scene, tmp_path)
     line = next(
         k for k, x in enumerate(scene.path.read_text("utf-8").splitlines(), 1) if "$nm" in x
     )
-    assert f"room.xml, line {line}:" in str(caught.value)
-    assert "\n" not in str(caught.value)
+    assert f"room.xml, line {line}:" in str(refusal.value)
+    assert "\n" not in str(refusal.value)
     assert not (tmp_path / "out").exists()
 
 
@@ -226,10 +226,10 @@ def test_dollar_in_a_value_is_refused() -> None:
 def test_broken_tags_are_one_line_with_the_file(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "broken.xml"
     path.write_text(text, encoding="utf-8")
-    with pytest.raises(SceneError) as caught:
+    with pytest.raises(SceneError) as refusal:
         XmlFile(path)
-    assert str(caught.value).startswith(f"cannot edit {path}: {message}")
-    assert "\n" not in str(caught.value)
+    assert str(refusal.value).startswith(f"cannot edit {path}: {message}")
+    assert "\n" not in str(refusal.value)
 
 
 def test_no_light_at_an_offset(tmp_path: Path) -> None:
@@ -252,10 +252,10 @@ def test_inserted_lines_end_as_the_others(tmp_path: Path, newline: str) -> None:
     )
     scene = load_scene(path)
     relight(scene, lighting_of(scene, COLOUR), tmp_path / "out" / "relit.xml")
-    written = (tmp_path / "out" / "relit.xml").read_bytes()
-    assert written.count(b"\n") > path.read_bytes().count(b"\n")
-    assert written.count(b"\n") == written.count(newline.encode())
-    assert written.count(b"\r") == (written.count(b"\n") if newline == "\r\n" else 0)
+    content = (tmp_path / "out" / "relit.xml").read_bytes()
+    assert content.count(b"\n") > path.read_bytes().count(b"\n")
+    assert content.count(b"\n") == content.count(newline.encode())
+    assert content.count(b"\r") == (content.count(b"\n") if newline == "\r\n" else 0)
 
 
 def test_insertion_before_a_replacement_at_the_same_place(tmp_path: Path) -> None:
@@ -302,10 +302,10 @@ def trees(draw: st.DrawFn, depth: int = 3) -> str:
         f"{draw(space)}{key}{draw(st.sampled_from(['=', ' = ']))}{draw(quoted())}"
         for key in draw(st.lists(NAMES, max_size=3, unique=True))
     )
-    inside = draw(st.lists(trees(depth - 1), max_size=3)) if depth else []
-    if not inside and draw(st.booleans()):
+    children = draw(st.lists(trees(depth - 1), max_size=3)) if depth else []
+    if not children and draw(st.booleans()):
         return f"<{name}{attributes}/>"
-    body = "".join(draw(BETWEEN) + child for child in inside) + draw(BETWEEN)
+    body = "".join(draw(BETWEEN) + child for child in children) + draw(BETWEEN)
     return f"<{name}{attributes}>{body}</{name}{draw(st.sampled_from(['', ' ']))}>"
 
 
@@ -326,11 +326,11 @@ def test_scanner_finds_the_tree_that_another_parser_finds(tree: str, before: str
         assert_same(element, ElementTree.fromstring(text[offset : element.end]))
 
 
-def assert_same(found: Element, expected: ElementTree.Element) -> None:
-    assert found.tag == expected.tag
-    assert dict(found.attributes) == expected.attrib
-    assert len(found.children) == len(expected)
-    for child, other in zip(found.children, expected, strict=True):
+def assert_same(actual: Element, expected: ElementTree.Element) -> None:
+    assert actual.tag == expected.tag
+    assert dict(actual.attributes) == expected.attrib
+    assert len(actual.children) == len(expected)
+    for child, other in zip(actual.children, expected, strict=True):
         assert_same(child, other)
 
 

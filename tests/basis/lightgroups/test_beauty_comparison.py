@@ -32,21 +32,21 @@ def _adds_up(beauty: RenderLayer, lights: list[RenderLayer]) -> bool:
 
 
 @pytest.mark.parametrize("kind", [np.float16, np.float32])
-@pytest.mark.parametrize("off", [0, 2e-6, 2e-5, 1e-3])
-@pytest.mark.parametrize("where", ["everywhere", "in one pixel"])
-def test_sums_are_found_as_the_definition_says(kind: Any, off: float, where: str):
+@pytest.mark.parametrize("relative_error", [0, 2e-6, 2e-5, 1e-3])
+@pytest.mark.parametrize("location", ["everywhere", "in one pixel"])
+def test_sums_are_found_as_the_definition_says(kind: Any, relative_error: float, location: str):
     images = pictures(5, size=(37, 29))
-    whole = images.sum(axis=0)
-    error = off * whole if where == "everywhere" else np.zeros_like(whole)
-    if where == "in one pixel":
+    total = images.sum(axis=0)
+    error = relative_error * total if location == "everywhere" else np.zeros_like(total)
+    if location == "in one pixel":
         # One that a coarse look does not see.
-        error[3, 5] = off * whole.sum() / 3
-    layers = _layers([*images, whole + error], kind)
+        error[3, 5] = relative_error * total.sum() / 3
+    layers = _layers([*images, total + error], kind)
     lights, picture = layers[:-1], layers[-1]
     expected = _adds_up(picture, lights)
     # In float16 some of it is rounding, unless it is all in one place.
-    rounds_away = kind == np.float16 and where == "everywhere" and off < 1e-4
-    assert expected is (off < 1e-5 or rounds_away)
+    rounds_away = kind == np.float16 and location == "everywhere" and relative_error < 1e-4
+    assert expected is (relative_error < 1e-5 or rounds_away)
     assert LayerSum.of(lights).is_of(picture) is expected
     assert (find_beauty_of_lights([lights[0], picture], lights) is picture) is expected
     assert (find_beauty(layers) is picture) is expected
@@ -64,9 +64,9 @@ def test_black_is_no_sum():
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_pixels_without_a_number_have_no_say(bad: float):
     images = pictures(4, size=(20, 20))
-    whole = images.sum(axis=0)
+    total = images.sum(axis=0)
     images[1, 3, 3] = bad
-    layers = _layers([*images, whole])
+    layers = _layers([*images, total])
     assert find_beauty(layers) is layers[-1]
     assert find_beauty_of_lights(layers[-1:], layers[:-1]) is layers[-1]
 
@@ -74,10 +74,10 @@ def test_pixels_without_a_number_have_no_say(bad: float):
 def test_one_more_layer():
     layers = _layers(pictures(4))
     added = LayerSum.of(layers[:3])
-    more, whole = added.and_also(layers[3]), LayerSum.of(layers)
-    np.testing.assert_allclose(more.total, whole.total, rtol=1e-14)
-    np.testing.assert_allclose(more.bound, whole.bound, rtol=1e-14)
-    assert whole.lacks(layers[0]) == pytest.approx(
+    extra_sum, total = added.and_also(layers[3]), LayerSum.of(layers)
+    np.testing.assert_allclose(extra_sum.total, total.total, rtol=1e-14)
+    np.testing.assert_allclose(extra_sum.bound, total.bound, rtol=1e-14)
+    assert total.lacks(layers[0]) == pytest.approx(
         np.abs(sum(x.image.astype(np.float64) for x in layers[1:])).sum(), rel=1e-12
     )
 

@@ -21,37 +21,41 @@ Writer = Callable[..., Path]
 def surfaces(*, seed: int = 5) -> tuple[Any, Any, Any]:
     """Albedo, normals of any length, and positions, (h, w, 3) float32."""
     rng = np.random.default_rng(seed)
-    made = rng.random((*SIZE, 3)), rng.normal(size=(*SIZE, 3)), rng.normal(size=(*SIZE, 3))
-    return tuple(x.astype(np.float32) for x in made)
+    surface_planes = (
+        rng.random((*SIZE, 3)),
+        rng.normal(size=(*SIZE, 3)),
+        rng.normal(size=(*SIZE, 3)),
+    )
+    return tuple(x.astype(np.float32) for x in surface_planes)
 
 
 def cycles(view: str, images: Any, *, seed: int = 5) -> dict[str, Any]:
     """Channels of a view layer with denoising data and the pass of positions."""
     albedo, normal, position = surfaces(seed=seed)
-    made = channels(f"{view}.Combined", images.sum(axis=0))
+    file_channels = channels(f"{view}.Combined", images.sum(axis=0))
     for name, image in zip("ab", images, strict=True):
-        made |= channels(f"{view}.Combined_{name}", image)
-    made |= channels(f"{view}.Denoising Albedo", albedo)
-    made |= channels(f"{view}.Denoising Normal", normal, names="XYZ")
-    made |= channels(f"{view}.Position", position, names="XYZ")
-    return made | {f"{view}.Denoising Depth.Z": position[..., 0]}
+        file_channels |= channels(f"{view}.Combined_{name}", image)
+    file_channels |= channels(f"{view}.Denoising Albedo", albedo)
+    file_channels |= channels(f"{view}.Denoising Normal", normal, names="XYZ")
+    file_channels |= channels(f"{view}.Position", position, names="XYZ")
+    return file_channels | {f"{view}.Denoising Depth.Z": position[..., 0]}
 
 
-def write_one_part(path: Path, held: dict[str, Any]) -> Path:
-    return write(path, ("", held))
+def write_one_part(path: Path, file_channels: dict[str, Any]) -> Path:
+    return write(path, ("", file_channels))
 
 
-def write_part_each(path: Path, held: dict[str, Any]) -> Path:
+def write_part_each(path: Path, file_channels: dict[str, Any]) -> Path:
     layers: dict[str, dict[str, Any]] = {}
-    for name, plane in held.items():
+    for name, plane in file_channels.items():
         layers.setdefault(name.rpartition(".")[0], {})[name] = plane
     return write(path, *layers.items())
 
 
-@pytest.mark.parametrize("written", [write_one_part, write_part_each])
-def test_denoising_data_of_cycles(tmp_path: Path, written: Writer):
+@pytest.mark.parametrize("writer", [write_one_part, write_part_each])
+def test_denoising_data_of_cycles(tmp_path: Path, writer: Writer):
     images = pictures(2)
-    groups = read_light_groups(written(tmp_path / "a.exr", cycles("ViewLayer", images)))
+    groups = read_light_groups(writer(tmp_path / "a.exr", cycles("ViewLayer", images)))
     albedo, normal, position = surfaces()
     features = groups.basis.features
     assert groups.basis.names == ("a", "b")
@@ -65,8 +69,8 @@ def test_denoising_data_of_cycles(tmp_path: Path, written: Writer):
 
 
 def test_of_several_view_layers_the_surfaces_of_the_one_that_is_read(tmp_path: Path):
-    held = cycles("Far", pictures(2), seed=1) | cycles("Near", pictures(2), seed=2)
-    groups = read_light_groups(write(tmp_path / "a.exr", ("", held)))
+    file_channels = cycles("Far", pictures(2), seed=1) | cycles("Near", pictures(2), seed=2)
+    groups = read_light_groups(write(tmp_path / "a.exr", ("", file_channels)))
     features = groups.basis.features
     assert groups.basis.origin.sensor == "Far"
     assert features is not None
@@ -75,8 +79,8 @@ def test_of_several_view_layers_the_surfaces_of_the_one_that_is_read(tmp_path: P
 
 def test_without_normals_there_are_no_features(tmp_path: Path):
     images = pictures(2)
-    held = {k: v for k, v in cycles("ViewLayer", images).items() if "Normal" not in k}
-    basis = read_light_groups(write(tmp_path / "a.exr", ("", held))).basis
+    file_channels = {k: v for k, v in cycles("ViewLayer", images).items() if "Normal" not in k}
+    basis = read_light_groups(write(tmp_path / "a.exr", ("", file_channels))).basis
     assert basis.names == ("a", "b")
     assert basis.features is None
 
@@ -110,15 +114,15 @@ def split(n: int = 2) -> tuple[Any, Any]:
     return pictures(n), pictures(n, seed=1)
 
 
-@pytest.mark.parametrize("given", [("direct", "indirect"), ("indirect",), ("direct",)])
-@pytest.mark.parametrize("named", ["{part}_{name}", "RGBA_{name}_{part}"])
-def test_parts_of_each_light(tmp_path: Path, given: tuple[str, ...], named: str):
+@pytest.mark.parametrize("passes_present", [("direct", "indirect"), ("indirect",), ("direct",)])
+@pytest.mark.parametrize("label", ["{part}_{name}", "RGBA_{name}_{part}"])
+def test_parts_of_each_light(tmp_path: Path, passes_present: tuple[str, ...], label: str):
     direct, indirect = split()
     layers = {"RGBA": (direct + indirect).sum(axis=0)}
     for k, name in enumerate(("key", "back light")):
         layers[f"RGBA_{name}"] = direct[k] + indirect[k]
-        its = {"direct": direct[k], "indirect": indirect[k]}
-        layers |= {named.format(part=part, name=name): its[part] for part in given}
+        light_parts = {"direct": direct[k], "indirect": indirect[k]}
+        layers |= {label.format(part=part, name=name): light_parts[part] for part in passes_present}
     groups = read_light_groups(interleaved(tmp_path / "a.exr", layers))
     parts = groups.basis.indirect
     assert groups.basis.names == ("back light", "key")  # in the order of the file's channels
@@ -133,20 +137,20 @@ def test_parts_of_each_light(tmp_path: Path, given: tuple[str, ...], named: str)
 def test_what_has_no_parts_counts_as_indirect(tmp_path: Path):
     """All of it is denoised then, as it was before there were parts; and so is the rest."""
     direct, indirect = split()
-    both = direct + indirect
+    total = direct + indirect
     layers = {
-        "RGBA": both.sum(axis=0) + 1,
-        "RGBA_a": both[0],
-        "RGBA_b": both[1],
+        "RGBA": total.sum(axis=0) + 1,
+        "RGBA_a": total[0],
+        "RGBA_b": total[1],
         "indirect_b": indirect[1],
     }
     groups = read_light_groups(interleaved(tmp_path / "a.exr", layers))
     parts = groups.basis.indirect
     assert groups.basis.names == ("a", "b", "rest")
     assert parts is not None
-    expected = [both[0], indirect[1], groups.basis.images[2]]
-    for plane, its in zip(parts.planes, expected, strict=True):
-        np.testing.assert_array_equal(plane, its)
+    expected = [total[0], indirect[1], groups.basis.images[2]]
+    for plane, image in zip(parts.planes, expected, strict=True):
+        np.testing.assert_array_equal(plane, image)
 
 
 def test_a_light_may_be_named_like_a_part(tmp_path: Path):
@@ -160,9 +164,9 @@ def test_a_light_may_be_named_like_a_part(tmp_path: Path):
 
 def test_passes_alone_are_no_light_groups(tmp_path: Path):
     albedo, normal, _ = surfaces()
-    held = channels("albedo", albedo) | channels("N", normal, names="XYZ")
+    file_channels = channels("albedo", albedo) | channels("N", normal, names="XYZ")
     with pytest.raises(BasisError):
-        read_light_groups(write(tmp_path / "a.exr", ("", held)))
+        read_light_groups(write(tmp_path / "a.exr", ("", file_channels)))
     with pytest.raises(BasisError, match="has no RGB layers"):
         read_light_groups(write(tmp_path / "b.exr", ("", channels("N", normal, names="XYZ"))))
 
@@ -179,15 +183,15 @@ def test_normals_of_another_size_are_passed_by(tmp_path: Path):
 
 
 def test_a_saved_basis_keeps_them(tmp_path: Path):
-    held = cycles("ViewLayer", pictures(2))
-    made = read_light_groups(write(tmp_path / "a.exr", ("", held))).basis
-    write_basis(tmp_path / "b.basis.exr", made)
-    again = read_basis(tmp_path / "b.basis.exr")
-    assert again.features is not None
-    assert made.features is not None
+    file_channels = cycles("ViewLayer", pictures(2))
+    basis = read_light_groups(write(tmp_path / "a.exr", ("", file_channels))).basis
+    write_basis(tmp_path / "b.basis.exr", basis)
+    reread = read_basis(tmp_path / "b.basis.exr")
+    assert reread.features is not None
+    assert basis.features is not None
     # Albedo and normals become half floats.
-    np.testing.assert_allclose(again.features.albedo, made.features.albedo, rtol=2**-11)
-    np.testing.assert_array_equal(again.features.position, made.features.position)
+    np.testing.assert_allclose(reread.features.albedo, basis.features.albedo, rtol=2**-11)
+    np.testing.assert_array_equal(reread.features.position, basis.features.position)
 
 
 def test_grain_is_taken_out_of_light_of_unknown_noise():
@@ -208,10 +212,10 @@ def test_edges_stay_in_light_of_unknown_noise(step: tuple[int, int]):
     blurred = (np.roll(edge, 1, (0, 1)) + edge + np.roll(edge, -1, (0, 1))) / 3
     if step == (1, 1):
         blurred = (np.roll(edge, 1, 0) + edge + np.roll(edge, -1, 0)) / 3
-    inside = np.s_[14:-14, 14:-14]  # Beyond the border a picture goes on at its other end.
-    lost = np.square(blurred - edge)[inside].mean()
-    assert lost > 0.01
-    assert np.square(blend_by_grain(edge, blurred) - edge)[inside].mean() < 1e-6
+    interior = np.s_[14:-14, 14:-14]  # Beyond the border a picture goes on at its other end.
+    blur_error = np.square(blurred - edge)[interior].mean()
+    assert blur_error > 0.01
+    assert np.square(blend_by_grain(edge, blurred) - edge)[interior].mean() < 1e-6
 
 
 @pytest.mark.skipif(not oidn_is_installed(), reason="Open Image Denoise")
@@ -226,9 +230,11 @@ def test_parts_and_surfaces_keep_what_a_denoiser_blurs(tmp_path: Path):
     indirect = albedo * rng.exponential(size=(96, 128, 1)).astype(np.float32)
     normal = np.broadcast_to(np.float32([0, 0, 1]), albedo.shape)
     layers = {"RGBA": direct + indirect, "RGBA_key": direct + indirect, "indirect_key": indirect}
-    held = {k: v for name, image in layers.items() for k, v in channels(name, image).items()}
-    held |= channels("albedo", albedo) | channels("N", normal, names="XYZ")
-    basis = read_light_groups(write(tmp_path / "a.exr", ("", held))).basis
+    file_channels = {
+        k: v for name, image in layers.items() for k, v in channels(name, image).items()
+    }
+    file_channels |= channels("albedo", albedo) | channels("N", normal, names="XYZ")
+    basis = read_light_groups(write(tmp_path / "a.exr", ("", file_channels))).basis
     error = np.square(denoise_plane(basis, 0) - truth).mean()
-    alone = np.square(denoised(basis.planes.plane(0)) - truth).mean()
-    assert error < 0.2 * alone
+    plain_error = np.square(denoised(basis.planes.plane(0)) - truth).mean()
+    assert error < 0.2 * plain_error

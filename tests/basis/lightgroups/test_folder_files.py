@@ -17,20 +17,20 @@ from lightpaint.images.formats.exr import write_rgb
 LIGHTS = ["fill", "key", "rim"]
 
 
-def _write_plain(path: Path, image: Any, **more: Any) -> Path:
-    return write(path, ("rgb", channels("", image) | more))
+def _write_plain(path: Path, image: Any, **extra_channels: Any) -> Path:
+    return write(path, ("rgb", channels("", image) | extra_channels))
 
 
 @pytest.fixture(params=["beauty", "final", None])
 def folder(tmp_path: Path, request: pytest.FixtureRequest) -> Path:
     """Three lights; and their sum under a name that is known, under one that is not, or not."""
-    made = tmp_path / "lights"
-    made.mkdir()
+    lights_folder = tmp_path / "lights"
+    lights_folder.mkdir()
     for name, image in zip(LIGHTS, pictures(), strict=True):
-        _write_plain(made / f"{name}.exr", image)
+        _write_plain(lights_folder / f"{name}.exr", image)
     if request.param:
-        _write_plain(made / f"{request.param}.exr", pictures().sum(axis=0))
-    return made
+        _write_plain(lights_folder / f"{request.param}.exr", pictures().sum(axis=0))
+    return lights_folder
 
 
 def _remarks(groups: Any) -> str:
@@ -86,10 +86,10 @@ def test_where_nothing_tells_that_is_told(folder: Path):
     _write_plain(folder / "noon.exr", pictures(4)[3])
     groups = read_light_groups(folder)
     assert groups.basis.names == ("fill", "key", "noon", "rim")
-    told = _remarks(groups)
+    remarks = _remarks(groups)
     assert (
         "unknown whether the groups add up to all of it, and whether each of them is a light"
-        in told
+        in remarks
     )
 
 
@@ -132,11 +132,11 @@ def test_of_a_group_without_a_pixel_nobody_is_told_to_paint_it(tmp_path: Path):
     layers = {"Combined": a + b, "Combined_key": a, "Combined_old": 0 * a}
     interleaved(tmp_path / "a.exr", layers)
     _write_plain(tmp_path / "p.exr", 0.5 * a + b)
-    done = run(tmp_path, "solve", "a.exr", "p.exr")
-    assert done.returncode == 0
-    assert "the picture shows nothing of old: left unchanged" in done.stderr
-    assert "of the light of the beauty is in no group" in done.stderr
-    assert "paint where it shines" not in done.stderr
+    completed = run(tmp_path, "solve", "a.exr", "p.exr")
+    assert completed.returncode == 0
+    assert "the picture shows nothing of old: left unchanged" in completed.stderr
+    assert "of the light of the beauty is in no group" in completed.stderr
+    assert "paint where it shines" not in completed.stderr
     rows = (tmp_path / "p" / "lights.csv").read_text().splitlines()
     assert [row.split(",")[6] for row in rows if row.startswith("old")] == ["unknown"]
 
@@ -144,10 +144,10 @@ def test_of_a_group_without_a_pixel_nobody_is_told_to_paint_it(tmp_path: Path):
 def test_a_solve_into_the_folder_of_its_lights_twice(folder: Path):
     """The painting lies there, and so does the first answer when it is asked again."""
     _write_plain(folder / "evening.exr", 2 * pictures()[1] + 0.5 * pictures()[2])
-    how = ("solve", "--lights", "lights", "lights/evening.exr", "-o", "lights")
+    arguments = ("solve", "--lights", "lights", "lights/evening.exr", "-o", "lights")
     printed = []
     for _ in range(2):
-        printed.append(succeed(folder.parent, *how))
+        printed.append(succeed(folder.parent, *arguments))
         table = (folder / "lights.csv").read_text().splitlines()[1:]
         assert [row.split(",")[0] for row in table] == LIGHTS
         assert [row.split(",")[6] for row in table] == ["off", "+1.000", "-1.000"]

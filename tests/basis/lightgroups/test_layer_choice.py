@@ -71,28 +71,30 @@ CASES: list[tuple[str, list[str], dict[str, str], str | None]] = [
 def test_each_renderer_by_its_names(
     renderer: str, names: list[str], lights: dict[str, str], beauty: str | None
 ):
-    found = _choose(*names)
-    assert found.renderer == renderer
-    assert found.lights == lights
-    assert list(found.lights) == list(lights)  # in the order of the file
-    assert found.beauty == beauty
+    choice = _choose(*names)
+    assert choice.renderer == renderer
+    assert choice.lights == lights
+    assert list(choice.lights) == list(lights)  # in the order of the file
+    assert choice.beauty == beauty
 
 
 def test_layers_that_may_belong_to_the_sum_are_told_apart():
-    found = _choose("", "LightSelect_key", "Environment", "Self Illumination", "Rest", "Reflection")
-    assert found.lights == {"key": "LightSelect_key"}
-    assert sorted(found.optional) == ["Environment", "Rest", "Self Illumination"]
+    choice = _choose(
+        "", "LightSelect_key", "Environment", "Self Illumination", "Rest", "Reflection"
+    )
+    assert choice.lights == {"key": "LightSelect_key"}
+    assert sorted(choice.optional) == ["Environment", "Rest", "Self Illumination"]
 
 
 def test_of_several_view_layers_the_first():
     names = ["far.Combined", "far.Combined_a", "near.Combined", "near.Combined_a"]
-    found = _choose(*names)
-    assert (found.lights, found.beauty, found.view) == (
+    choice = _choose(*names)
+    assert (choice.lights, choice.beauty, choice.view) == (
         {"a": "far.Combined_a"},
         "far.Combined",
         "far",
     )
-    [remark] = found.remarks
+    [remark] = choice.remarks
     assert "pattern='near.Combined_{name}' takes near" in remark
     other = _choose(*names, pattern="near.Combined_{name}")
     assert (other.lights, other.beauty) == ({"a": "near.Combined_a"}, "near.Combined")
@@ -102,16 +104,16 @@ def test_of_several_eyes_one_must_be_named():
     names = [f"View.Combined{n}.{eye}" for n in ("", "_a", "_b") for eye in ("left", "right")]
     with pytest.raises(BasisError, match=r"the views left and right.*_\{name\}\.left'"):
         _choose(*names)
-    found = _choose(*names, pattern="View.Combined_{name}.left")
-    assert list(found.lights) == ["a", "b"]
-    assert found.beauty == "View.Combined.left"
+    choice = _choose(*names, pattern="View.Combined_{name}.left")
+    assert list(choice.lights) == ["a", "b"]
+    assert choice.beauty == "View.Combined.left"
     # Names with dots are no eyes.
     assert list(_choose("C", "C_lamp.1", "C_lamp.2", "C_key").lights) == ["lamp.1", "lamp.2", "key"]
 
 
 def test_only_where_a_renderer_calls_the_sum_so_a_group_may_be_all_of_them():
-    found = _choose("Beauty", "Beauty_all", "Beauty_key")
-    assert (list(found.lights), found.whole, found.beauty) == (
+    choice = _choose("Beauty", "Beauty_all", "Beauty_key")
+    assert (list(choice.lights), choice.whole, choice.beauty) == (
         ["key"],
         {"all": "Beauty_all"},
         "Beauty",
@@ -129,8 +131,8 @@ def test_only_where_a_renderer_calls_the_sum_so_a_group_may_be_all_of_them():
     ],
 )
 def test_elsewhere_a_light_may_be_called_all(layer: str, beauty: str):
-    found = _choose(beauty, layer.format("all"), layer.format("key"))
-    assert (list(found.lights), found.whole, found.beauty) == (["all", "key"], {}, beauty)
+    choice = _choose(beauty, layer.format("all"), layer.format("key"))
+    assert (list(choice.lights), choice.whole, choice.beauty) == (["all", "key"], {}, beauty)
 
 
 @pytest.mark.parametrize(
@@ -154,17 +156,19 @@ def test_what_stands_before_a_marker_is_left_out_unless_it_tells_lights_apart(
 
 
 def test_a_pattern_finds_what_no_convention_does():
-    found = _choose("beauty", "L[1].key!", "L[1].fill!", "depth", pattern="L[1].{name}!")
-    assert found.lights == {"key": "L[1].key!", "fill": "L[1].fill!"}
-    assert found.beauty == "beauty"
+    choice = _choose("beauty", "L[1].key!", "L[1].fill!", "depth", pattern="L[1].{name}!")
+    assert choice.lights == {"key": "L[1].key!", "fill": "L[1].fill!"}
+    assert choice.beauty == "beauty"
     # Parts and files have names too.
-    found = choose_layers({"x": ("key.light",), "y": ("z",)}, pattern="{name}.light", file_name="a")
-    assert found.lights == {"key": "x"}
+    choice = choose_layers(
+        {"x": ("key.light",), "y": ("z",)}, pattern="{name}.light", file_name="a"
+    )
+    assert choice.lights == {"key": "x"}
     # So wide a pattern must not take the picture for a light.
     assert _choose("rgba", "key", "fill", pattern="{name}").beauty == "rgba"
     # A plain R, G, B is the picture before a light that is called like one.
-    found = _choose("", "L_main", "L_key", pattern="L_{name}")
-    assert (list(found.lights), found.beauty) == (["main", "key"], "")
+    choice = _choose("", "L_main", "L_key", pattern="L_{name}")
+    assert (list(choice.lights), choice.beauty) == (["main", "key"], "")
 
 
 @pytest.mark.parametrize(
@@ -214,5 +218,5 @@ def test_short_names_stay_apart(stems: list[str]):
 
 
 def test_files_of_any_name_are_lights_but_for_the_beauty():
-    found = choose_files(["key", "Beauty", "fill"])
-    assert (found.lights, found.beauty) == ({"key": "key", "fill": "fill"}, "Beauty")
+    choice = choose_files(["key", "Beauty", "fill"])
+    assert (choice.lights, choice.beauty) == ({"key": "key", "fill": "fill"}, "Beauty")

@@ -27,10 +27,10 @@ FLOAT32 = 1e-6
 
 
 def _layers(
-    images: Any, *, named: str = "ViewLayer.Combined_{}", beauty: str = "ViewLayer.Combined"
+    images: Any, *, name_pattern: str = "ViewLayer.Combined_{}", beauty: str = "ViewLayer.Combined"
 ):
     return {beauty: images.sum(axis=0)} | {
-        named.format(name): image for name, image in zip("abc", images, strict=False)
+        name_pattern.format(name): image for name, image in zip("abc", images, strict=False)
     }
 
 
@@ -42,10 +42,10 @@ def _solve(groups: LightGroups, image: Any) -> Any:
     return solve(groups.basis, _target(image)).lighting.weights_for(groups.basis)
 
 
-@pytest.mark.parametrize("written", [interleaved, multi_part])
-def test_groups_that_add_up(tmp_path: Path, written: Writer):
+@pytest.mark.parametrize("writer", [interleaved, multi_part])
+def test_groups_that_add_up(tmp_path: Path, writer: Writer):
     images = pictures()
-    groups = read_light_groups(written(tmp_path / "a.exr", _layers(images)))
+    groups = read_light_groups(writer(tmp_path / "a.exr", _layers(images)))
     basis = groups.basis
     assert basis.names == ("a", "b", "c")
     np.testing.assert_array_equal(basis.images, images)
@@ -59,21 +59,21 @@ def test_groups_that_add_up(tmp_path: Path, written: Writer):
     assert not any("WARNING" in remark for remark in groups.remarks)
 
 
-@pytest.mark.parametrize("written", [interleaved, multi_part])
+@pytest.mark.parametrize("writer", [interleaved, multi_part])
 @pytest.mark.parametrize("lacks", [False, True])
 def test_a_rebalanced_beauty_gives_back_its_multipliers(
-    tmp_path: Path, written: Writer, lacks: bool
+    tmp_path: Path, writer: Writer, lacks: bool
 ):
     images = pictures(4)
     layers = _layers(images[:3]) | {"ViewLayer.Combined": images[: 4 if lacks else 3].sum(axis=0)}
-    groups = read_light_groups(written(tmp_path / "a.exr", layers))
-    wanted = np.array([[2, 1, 0.5], [0, 0.25, 3], [1, 1, 1]], np.float64)
-    mixed = np.einsum("nhwc,nc->hwc", images[:3], wanted) + images[3] * lacks
-    found = _solve(groups, mixed)
+    groups = read_light_groups(writer(tmp_path / "a.exr", layers))
+    multipliers = np.array([[2, 1, 0.5], [0, 0.25, 3], [1, 1, 1]], np.float64)
+    mixed = np.einsum("nhwc,nc->hwc", images[:3], multipliers) + images[3] * lacks
+    actual = _solve(groups, mixed)
     # The painting and the rest are rounded to float32, the solve is in float64.
-    np.testing.assert_allclose(found[:3], wanted, atol=10 * FLOAT32)
+    np.testing.assert_allclose(actual[:3], multipliers, atol=10 * FLOAT32)
     assert groups.basis.names[3:] == (("rest",) if lacks else ())
-    assert (found[3:] == 1).all()
+    assert (actual[3:] == 1).all()
 
 
 def test_what_is_missing_stays_and_is_told(tmp_path: Path):
@@ -128,7 +128,7 @@ def test_without_a_beauty_nothing_is_made_up(tmp_path: Path):
 
 def test_a_beauty_of_unknown_name_is_known_by_its_sum(tmp_path: Path):
     images = pictures()
-    layers = _layers(images, named="RGBA_{}", beauty="final_v3") | {"N": pictures(seed=5)[0]}
+    layers = _layers(images, name_pattern="RGBA_{}", beauty="final_v3") | {"N": pictures(seed=5)[0]}
     groups = read_light_groups(interleaved(tmp_path / "a.exr", layers))
     assert groups.beauty is not None
     assert groups.beauty.name == "final_v3"
@@ -139,8 +139,8 @@ def test_layers_beside_count_where_they_make_the_sum(tmp_path: Path):
     layers = {"LightSelect_key": images[0], "Environment": images[1], "Rest": images[2]}
     path = interleaved(tmp_path / "a.exr", {"": images[:2].sum(axis=0)} | layers)
     assert read_light_groups(path).basis.names == ("key", "Environment")
-    whole = interleaved(tmp_path / "b.exr", {"": images[:3].sum(axis=0)} | layers)
-    assert sorted(read_light_groups(whole).basis.names) == ["Environment", "Rest", "key"]
+    whole_file = interleaved(tmp_path / "b.exr", {"": images[:3].sum(axis=0)} | layers)
+    assert sorted(read_light_groups(whole_file).basis.names) == ["Environment", "Rest", "key"]
 
 
 def test_a_light_called_rest_keeps_its_name(tmp_path: Path):
@@ -165,8 +165,8 @@ def test_whether_beauty_all_is_a_light_the_sum_tells(tmp_path: Path, share: floa
     """Redshift's is the sum. share: of the light of the picture that is in no group."""
     a, b = pictures(2)
     lights = {"Beauty_a": a, "Beauty_b": b}
-    whole = (a + b) / (1 - share)
-    layers = {"Beauty": whole, **lights, "Beauty_all": whole}
+    beauty = (a + b) / (1 - share)
+    layers = {"Beauty": beauty, **lights, "Beauty_all": beauty}
     groups = read_light_groups(interleaved(tmp_path / "a.exr", layers))
     assert [light.name for light in groups.basis.lights if not light.is_fixed] == ["a", "b"]
     assert any("Beauty_all: taken for the sum" in x for x in groups.remarks)
@@ -186,12 +186,12 @@ def test_a_group_without_a_pixel_is_told_and_what_the_beauty_lacks(tmp_path: Pat
     images = np.ones((3, *SIZE, 3), np.float32)
     layers = _layers(images) | {"ViewLayer.Combined_a": 0 * images[0]}
     groups = read_light_groups(interleaved(tmp_path / "a.exr", layers))
-    [told] = [x for x in groups.remarks if "holds nothing of a:" in x]
-    assert "33 % of the light of the beauty is in no group" in told
+    [remark] = [x for x in groups.remarks if "holds nothing of a:" in x]
+    assert "33 % of the light of the beauty is in no group" in remark
     layers["ViewLayer.Combined"] = 2 * images[0]
     groups = read_light_groups(interleaved(tmp_path / "a.exr", layers))
-    [told] = [x for x in groups.remarks if "holds nothing of a:" in x]
-    assert "is the light off" in told
+    [remark] = [x for x in groups.remarks if "holds nothing of a:" in x]
+    assert "is the light off" in remark
 
 
 @pytest.mark.parametrize("names", [("r", "g", "b"), ("red", "green", "blue")])
@@ -203,7 +203,7 @@ def test_channels_in_other_words(tmp_path: Path, names: tuple[str, ...]):
 
 def test_parts_with_plain_channels_have_their_names(tmp_path: Path):
     images = pictures()
-    layers = _layers(images, named="LightSelect_{}", beauty="beauty")
+    layers = _layers(images, name_pattern="LightSelect_{}", beauty="beauty")
     groups = read_light_groups(multi_part(tmp_path / "a.exr", layers, is_plain=True))
     assert groups.basis.names == ("a", "b", "c")
     assert groups.beauty is not None
@@ -354,7 +354,7 @@ def test_a_sequence_of_frames_is_refused(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("made", "says"),
+    ("layers", "says"),
     [
         (lambda p: p.mkdir(), "holds no .exr file"),
         (lambda p: write(p, ("z", {"Z": np.ones(SIZE, np.float32)})), "has no RGB layers"),
@@ -362,9 +362,9 @@ def test_a_sequence_of_frames_is_refused(tmp_path: Path):
         (lambda p: interleaved(p, {"": pictures()[0]}), "no layers named like"),
     ],
 )
-def test_what_has_no_light_groups_is_refused(tmp_path: Path, made: Any, says: str):
+def test_what_has_no_light_groups_is_refused(tmp_path: Path, layers: Any, says: str):
     path = tmp_path / "x.exr"
-    made(path)
+    layers(path)
     with pytest.raises(BasisError, match=says):
         read_light_groups(path)
 
@@ -382,10 +382,10 @@ def test_the_basis_can_be_saved_and_is_no_light_group_file_then(tmp_path: Path):
     path = interleaved(tmp_path / "a.exr", _layers(pictures()))
     groups = read_light_groups(path)
     write_basis(tmp_path / "a.basis.exr", groups.basis)
-    back = read_basis(tmp_path / "a.basis.exr")
-    np.testing.assert_array_equal(back.images, groups.basis.images)
-    assert replace(back, planes=groups.basis.images).lights == groups.basis.lights
-    assert not back.knows_noise
+    reread = read_basis(tmp_path / "a.basis.exr")
+    np.testing.assert_array_equal(reread.images, groups.basis.images)
+    assert replace(reread, planes=groups.basis.images).lights == groups.basis.lights
+    assert not reread.knows_noise
     assert is_light_groups(path)
     assert not is_light_groups(tmp_path / "a.basis.exr")
     assert not is_light_groups(tmp_path / "none.exr")
@@ -412,21 +412,21 @@ def test_a_file_of_cycles(tmp_path: Path):
     # Of groups that the renderer adds in float32.
     assert groups.missing + groups.exceeding < 1e-6
     assert groups.beauty is not None
-    whole = basis.mix(basis.current_weights)
-    np.testing.assert_allclose(whole, groups.beauty.image, rtol=1e-5, atol=1e-6)
-    wanted = np.random.default_rng(0).uniform(0, 3, (6, 3))
-    wanted[2] = 0
-    np.testing.assert_allclose(_solve(groups, basis.mix(wanted)), wanted, atol=1e-4)
+    total = basis.mix(basis.current_weights)
+    np.testing.assert_allclose(total, groups.beauty.image, rtol=1e-5, atol=1e-6)
+    multipliers = np.random.default_rng(0).uniform(0, 3, (6, 3))
+    multipliers[2] = 0
+    np.testing.assert_allclose(_solve(groups, basis.mix(multipliers)), multipliers, atol=1e-4)
 
 
-@pytest.mark.parametrize("at", [0, 2])
-def test_a_light_that_takes_light_away_is_named_first(tmp_path: Path, at: int):
+@pytest.mark.parametrize("position", [0, 2])
+def test_a_light_that_takes_light_away_is_named_first(tmp_path: Path, position: int):
     """Before anything is said of their sum, which is of no use then."""
     images = pictures()
-    images[at] *= -1
-    with pytest.raises(BasisError, match=rf"the light group '{'abc'[at]}' takes light away"):
+    images[position] *= -1
+    with pytest.raises(BasisError, match=rf"the light group '{'abc'[position]}' takes light away"):
         read_light_groups(interleaved(tmp_path / "a.exr", _layers(images)))
     # Negative lobes of a filter at edges are no such thing.
-    images[at] = np.abs(images[at])
-    images[at, ::3] *= -0.1
+    images[position] = np.abs(images[position])
+    images[position, ::3] *= -0.1
     read_light_groups(interleaved(tmp_path / "b.exr", _layers(images)))

@@ -54,26 +54,26 @@ def band_memory(
     read: list[int] = []
     plain = FileSums.read
 
-    def counted(sums: FileSums, half: int, rows: range) -> Any:
-        made = plain(sums, half, rows)
-        read.append(made.nbytes)
-        return made
+    def count_memory(sums: FileSums, half: int, rows: range) -> Any:
+        band = plain(sums, half, rows)
+        read.append(band.nbytes)
+        return band
 
-    monkeypatch.setattr(FileSums, "read", counted)
+    monkeypatch.setattr(FileSums, "read", count_memory)
     return read
 
 
 def test_bands_have_the_bits_of_the_whole_film(
     small_room: Scene, whole_basis: Basis, band_memory: list[int]
 ) -> None:
-    found = render_basis(small_room, spp=20, seed=3)
-    assert isinstance(found.planes, SumPlanes)
-    assert_equal_bits(found, whole_basis)
-    assert found.indirect is not None
-    for mine in (found.planes, found.noise, found.indirect.planes, found.indirect.noise):
-        its = mine.array()
-        assert mine.plane(1).tobytes() == its[1].tobytes()
-        assert mine.rows(3, 9).tobytes() == its[:, 3:9].tobytes()
+    basis = render_basis(small_room, spp=20, seed=3)
+    assert isinstance(basis.planes, SumPlanes)
+    assert_equal_bits(basis, whole_basis)
+    assert basis.indirect is not None
+    for planes in (basis.planes, basis.noise, basis.indirect.planes, basis.indirect.noise):
+        array = planes.array()
+        assert planes.plane(1).tobytes() == array[1].tobytes()
+        assert planes.rows(3, 9).tobytes() == array[:, 3:9].tobytes()
     assert max(band_memory) <= banded_film.BAND_BYTES
     assert len(band_memory) > 8
 
@@ -106,24 +106,24 @@ def test_an_interrupted_band_goes_on_to_the_same_bits(
     part = cache.find(small_room.identity, sensor, 3, small_room.size)
     assert part is not None
     assert 0 < part.origin.spp < 20
-    found = obtain_basis(small_room, spp=20, seed=3)
-    assert isinstance(found.planes, EncodedPlanes)
-    assert_equal_bits(found, basis_file.as_stored(whole_basis))
+    basis = obtain_basis(small_room, spp=20, seed=3)
+    assert isinstance(basis.planes, EncodedPlanes)
+    assert_equal_bits(basis, basis_file.as_stored(whole_basis))
 
 
 def test_sums_are_read_once_to_write_all_planes(
     small_room: Scene, band_memory: list[int], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    found = render_basis(small_room, spp=4, seed=3)
+    basis = render_basis(small_room, spp=4, seed=3)
     read: list[int] = []
     plain = FileSums.halves
 
-    def counted(sums: FileSums, planes: slice, rows: slice) -> Any:
+    def count_reads(sums: FileSums, planes: slice, rows: slice) -> Any:
         read.extend(range(*planes.indices(2 * len(small_room.lights))))
         return plain(sums, planes, rows)
 
-    monkeypatch.setattr(FileSums, "halves", counted)
-    basis_file.write_basis(tmp_path / "a.basis.exr", found)
+    monkeypatch.setattr(FileSums, "halves", count_reads)
+    basis_file.write_basis(tmp_path / "a.basis.exr", basis)
     assert sorted(read) == [*range(2 * len(small_room.lights))]
 
 
@@ -137,13 +137,13 @@ def test_indirect_planes_of_many_lights_stay_in_their_file(
     monkeypatch.setattr(basis_file, "SINGLES_MAX_BYTES", 0)
     path = tmp_path / "a.basis.exr"
     basis_file.write_basis(path, whole_basis)
-    rendered, kept = (obtain_basis(small_room, spp=20, seed=3) for _ in range(2))
-    for found in (rendered, kept, basis_reader.read_basis(path)):
-        assert isinstance(found.planes, EncodedPlanes)
-        assert found.indirect is not None
-        assert isinstance(found.indirect.planes, FilePlanes)
-        assert isinstance(found.indirect.noise, FilePlanes)
-        assert_equal_bits(found, expected)
+    rendered, cached = (obtain_basis(small_room, spp=20, seed=3) for _ in range(2))
+    for basis in (rendered, cached, basis_reader.read_basis(path)):
+        assert isinstance(basis.planes, EncodedPlanes)
+        assert basis.indirect is not None
+        assert isinstance(basis.indirect.planes, FilePlanes)
+        assert isinstance(basis.indirect.noise, FilePlanes)
+        assert_equal_bits(basis, expected)
 
 
 def test_indirect_planes_of_another_file_are_not_taken(
@@ -159,9 +159,9 @@ def test_indirect_planes_of_another_file_are_not_taken(
 def test_memory_is_that_of_half_floats_and_some_bands(
     small_room: Scene, band_memory: list[int]
 ) -> None:
-    whole, banded = (memory_needed(small_room, in_bands=x) for x in (False, True))
+    whole_film, banded = (memory_needed(small_room, in_bands=x) for x in (False, True))
     height, width = small_room.size
-    assert whole - banded > 9 * len(small_room.lights) * height * width * 12
+    assert whole_film - banded > 9 * len(small_room.lights) * height * width * 12
 
 
 def test_a_full_disk_is_one_clear_line(

@@ -27,12 +27,12 @@ SPOTS = "".join(
 BEHIND = '<emitter type="point" id="behind"><point name="position" x="0" y="1" z="-3"/></emitter>'
 
 
-def probabilities(received: np.ndarray, asked: np.ndarray, lights: list[int]) -> np.ndarray:
+def probabilities(received: np.ndarray, samples: np.ndarray, lights: list[int]) -> np.ndarray:
     use_variant()
     from lightpaint.basis.render.tracer.emitter_guide import _probabilities
 
     sampled = np.ones(len(lights), dtype=bool)
-    return _probabilities(received, asked, np.asarray(lights), sampled)
+    return _probabilities(received, samples, np.asarray(lights), sampled)
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 7), st.integers(1, 5))
@@ -41,12 +41,14 @@ def test_probabilities_are_probabilities(seed: int, emitters: int, cells: int) -
     from lightpaint.basis.render.tracer.emitter_guide import EVEN_SHARE
 
     rng = np.random.default_rng(seed)
-    asked = rng.integers(0, 5, (cells, emitters)).astype(float)
-    received = rng.lognormal(0, 10, (cells, emitters)) * (asked > rng.integers(0, 4))
-    found = probabilities(received, asked, rng.integers(0, emitters, emitters).tolist())
+    samples = rng.integers(0, 5, (cells, emitters)).astype(float)
+    received = rng.lognormal(0, 10, (cells, emitters)) * (samples > rng.integers(0, 4))
+    probability_table = probabilities(
+        received, samples, rng.integers(0, emitters, emitters).tolist()
+    )
     # Precision of float64.
-    np.testing.assert_allclose(found.sum(axis=1), 1, rtol=1e-12)
-    assert found.min() >= EVEN_SHARE / emitters * (1 - 1e-12)
+    np.testing.assert_allclose(probability_table.sum(axis=1), 1, rtol=1e-12)
+    assert probability_table.min() >= EVEN_SHARE / emitters * (1 - 1e-12)
 
 
 def test_an_untrained_guide_chooses_evenly() -> None:
@@ -59,12 +61,12 @@ def test_a_light_is_asked_where_it_matters_however_faint_it_is() -> None:
     use_variant()
     from lightpaint.basis.render.tracer.emitter_guide import EVEN_SHARE
 
-    asked = np.full((2, 2), 1e6)
-    found = probabilities(np.array([[1e6, 0], [0, 1.0]]), asked, [0, 1])
+    samples = np.full((2, 2), 1e6)
+    probability_table = probabilities(np.array([[1e6, 0], [0, 1.0]]), samples, [0, 1])
     # Each reaches one cell alone and gets that cell, but for the even share.
     sure = 1 - EVEN_SHARE / 2
     # 1e-6: what one sample of trust in the mean does beside a million.
-    np.testing.assert_allclose(found, [[sure, 1 - sure], [1 - sure, sure]], atol=2e-6)
+    np.testing.assert_allclose(probability_table, [[sure, 1 - sure], [1 - sure, sure]], atol=2e-6)
 
 
 @pytest.mark.parametrize("samples", [(2**10,), (2**16, 2**18)])
@@ -105,13 +107,13 @@ def test_the_table_goes_through_the_file(tmp_path: Path) -> None:
     scene = load_scene(write_room(tmp_path, lights=SPOTS + BEHIND))
     basis = render_basis(scene, spp=8)
     assert basis.guide_table is not None
-    received, asked = basis.guide_table
-    assert asked.sum() > 0
-    assert (received[asked == 0] == 0).all()
+    received, samples = basis.guide_table
+    assert samples.sum() > 0
+    assert (received[samples == 0] == 0).all()
     write_basis(tmp_path / "b.exr", basis)
-    again = read_basis(tmp_path / "b.exr").guide_table
-    assert again is not None
-    np.testing.assert_array_equal(again, basis.guide_table)
+    reread = read_basis(tmp_path / "b.exr").guide_table
+    assert reread is not None
+    np.testing.assert_array_equal(reread, basis.guide_table)
 
 
 @pytest.mark.parametrize("damage", ["nan", "negative", "shape", "none"])
@@ -125,9 +127,9 @@ def test_a_damaged_memory_is_forgotten(tmp_path: Path, damage: str) -> None:
     if damage in ("nan", "negative"):
         guide_table[0, 0, 0] = np.nan if damage == "nan" else -1
     spoilt = {"shape": guide_table[:, :1], "none": None}.get(damage, guide_table)
-    gone_on = render_basis(scene, spp=64, start=replace(basis, guide_table=spoilt))
-    assert np.isfinite(gone_on.images).all()
-    assert gone_on.images.max() > 0
+    continuation = render_basis(scene, spp=64, start=replace(basis, guide_table=spoilt))
+    assert np.isfinite(continuation.images).all()
+    assert continuation.images.max() > 0
 
 
 def test_a_kept_emitter_that_is_never_sampled_is_as_dark_as_in_mitsuba(tmp_path: Path) -> None:
@@ -139,9 +141,9 @@ def test_a_kept_emitter_that_is_never_sampled_is_as_dark_as_in_mitsuba(tmp_path:
     scene = load_scene(path, lights=["sky"])
     basis = render_basis(scene, spp=512)
     rendered = mitsuba_render(scene, {"sky": (0.0, 0.0, 0.0)}, seed=1, spp=512)
-    kept = basis.image("rest")
+    rest_image = basis.image("rest")
     noise = 2 * np.square(basis.half_differences[basis.names.index("rest")]).sum(dtype=np.float64)
     # Noise: five standard errors of the difference of the sums. The panel is there by chance
     # hits alone, the bulb not at all.
-    assert abs((kept - rendered).sum(dtype=np.float64)) <= 5 * np.sqrt(noise)
+    assert abs((rest_image - rendered).sum(dtype=np.float64)) <= 5 * np.sqrt(noise)
     assert rendered.sum() > 0

@@ -31,10 +31,10 @@ def small_passes(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_what_is_left_to_do_goes_on_with_whole_passes() -> None:
-    whole = plan_passes(24 * 20, 160)
-    for done in range(0, 80, 16):
-        rest = plan_passes(24 * 20, 160, done=(done, done))
-        assert rest == whole[2 * done // 16 :]
+    all_passes = plan_passes(24 * 20, 160)
+    for spp_before in range(0, 80, 16):
+        rest = plan_passes(24 * 20, 160, done=(spp_before, spp_before))
+        assert rest == all_passes[2 * spp_before // 16 :]
     assert plan_passes(24 * 20, 160, done=(32, 16))[0] == (1, 16)
     assert sum(size for half, size in plan_passes(24 * 20, 160, done=(32, 16)) if half) == 64
     assert plan_passes(24 * 20, 160, done=(80, 80)) == []
@@ -46,17 +46,17 @@ def test_in_two_goes_as_in_one(tmp_path: Path, small_room: Scene, through_a_file
     if through_a_file:
         write_basis(tmp_path / "b.exr", first)
         first = read_basis(tmp_path / "b.exr")
-    gone_on = render_basis(small_room, spp=40, seed=3, start=first)
-    whole = render_basis(small_room, spp=40, seed=3)
-    same_basis(gone_on, whole, of_file=through_a_file)
+    continuation = render_basis(small_room, spp=40, seed=3, start=first)
+    single_render = render_basis(small_room, spp=40, seed=3)
+    same_basis(continuation, single_render, of_file=through_a_file)
 
 
 @pytest.mark.parametrize("after", [1, 2, 4])
 def test_an_interrupt_keeps_what_is_done(small_room: Scene, after: int) -> None:
-    kept: list[Basis] = []
+    saved_bases: list[Basis] = []
 
     def keep(basis: Basis) -> bool:
-        kept.append(basis)
+        saved_bases.append(basis)
         return True
 
     def press_ctrl_c(_label: str, done: int, _total: int) -> None:
@@ -66,9 +66,9 @@ def test_an_interrupt_keeps_what_is_done(small_room: Scene, after: int) -> None:
     done = 8 * after
     with pytest.raises(Interrupted, match=f"{done} of 40"):
         render_basis(small_room, spp=40, keep=keep, progress=press_ctrl_c)
-    assert kept[-1].origin.spp == done
-    gone_on = render_basis(small_room, spp=40, start=kept[-1])
-    assert_equal_bits(gone_on, render_basis(small_room, spp=40))
+    assert saved_bases[-1].origin.spp == done
+    continuation = render_basis(small_room, spp=40, start=saved_bases[-1])
+    assert_equal_bits(continuation, render_basis(small_room, spp=40))
 
 
 def test_an_interrupt_between_the_halves_of_a_step_waits_for_the_second(
@@ -77,7 +77,7 @@ def test_an_interrupt_between_the_halves_of_a_step_waits_for_the_second(
     use_variant()
     from lightpaint.basis.render.tracer.one_pass import Tracer
 
-    kept: list[Basis] = []
+    saved_bases: list[Basis] = []
     add, calls = Tracer.add, 0
 
     def press_ctrl_c(*step: Any) -> None:
@@ -90,26 +90,26 @@ def test_an_interrupt_between_the_halves_of_a_step_waits_for_the_second(
     with monkeypatch.context() as patch:
         patch.setattr(Tracer, "add", press_ctrl_c)
         with pytest.raises(Interrupted, match="16 of 40"):
-            render_basis(small_room, spp=40, keep=lambda basis: not kept.append(basis))
+            render_basis(small_room, spp=40, keep=lambda basis: not saved_bases.append(basis))
     as_asked = render_basis(small_room, spp=16)
-    assert_equal_bits(replace(kept[-1], origin=as_asked.origin), as_asked)
-    gone_on = render_basis(small_room, spp=40, start=kept[-1])
-    assert_equal_bits(gone_on, render_basis(small_room, spp=40))
+    assert_equal_bits(replace(saved_bases[-1], origin=as_asked.origin), as_asked)
+    continuation = render_basis(small_room, spp=40, start=saved_bases[-1])
+    assert_equal_bits(continuation, render_basis(small_room, spp=40))
 
 
 @pytest.mark.parametrize("integrator", ["path", "volpathmis"])
 def test_what_goes_on_has_the_bits_of_one_render(tmp_path: Path, integrator: str) -> None:
     scene = load_scene(write_room(tmp_path, integrator=f'<integrator type="{integrator}"/>'))
-    whole = render_basis(scene, spp=40)
+    single_render = render_basis(scene, spp=40)
     # Separate renders draw other numbers where their passes end elsewhere.
     rungs = (2, 8, 24) if integrator == "path" else (16, 32)
     basis = None
     for spp in rungs:
         basis = render_basis(scene, spp=spp, start=basis, is_final=False)
         assert basis.origin.spp == spp
-    gone_on = render_basis(scene, spp=40, start=basis)
-    assert_equal_bits(gone_on, whole)
-    assert gone_on.sums is None
+    continuation = render_basis(scene, spp=40, start=basis)
+    assert_equal_bits(continuation, single_render)
+    assert continuation.sums is None
 
 
 def test_enough_is_enough(small_room: Scene) -> None:

@@ -26,28 +26,28 @@ def test_direct_light_is_that_of_one_bounce(tmp_path: Path):
     path = write_room(tmp_path)
     name = load_scene(path).lights[0].name
     scenes = [load_scene(path, integrator=x) for x in ("path", "path:max_depth=2")]
-    whole, direct = (render_basis(scene.only([name]), spp=SPP) for scene in scenes)
-    assert whole.indirect is not None
+    all_bounces, direct = (render_basis(scene.only([name]), spp=SPP) for scene in scenes)
+    assert all_bounces.indirect is not None
     assert direct.indirect is None
-    left = whole.images - whole.indirect.planes.array()
+    left = all_bounces.images - all_bounces.indirect.planes.array()
     np.testing.assert_allclose(left, direct.images, rtol=1e-5, atol=1e-5 * direct.images.max())
-    noise = whole.half_differences - whole.indirect.noise.array()
+    noise = all_bounces.half_differences - all_bounces.indirect.noise.array()
     scale = np.abs(direct.half_differences).max()
     np.testing.assert_allclose(noise, direct.half_differences, rtol=1e-4, atol=1e-5 * scale)
-    assert whole.indirect.planes.array().sum() > 0.02 * whole.images.sum()
+    assert all_bounces.indirect.planes.array().sum() > 0.02 * all_bounces.images.sum()
 
 
 def test_sums_of_both_do_not_depend_on_keeping_them_apart(
     small_room: Scene, monkeypatch: pytest.MonkeyPatch
 ):
-    apart = render_basis(small_room, spp=SPP)
+    split_basis = render_basis(small_room, spp=SPP)
     monkeypatch.setattr(integrators, "SPLIT_MAX_BYTES", 0)
     together = render_basis(small_room, spp=SPP)
-    assert apart.indirect is not None
+    assert split_basis.indirect is not None
     assert together.indirect is None
     # The same values, added in another order in float32.
     scale = together.images.max()
-    np.testing.assert_allclose(apart.images, together.images, rtol=1e-5, atol=1e-6 * scale)
+    np.testing.assert_allclose(split_basis.images, together.images, rtol=1e-5, atol=1e-6 * scale)
 
 
 def test_parts_in_any_order_make_the_same(small_room: Scene, monkeypatch: pytest.MonkeyPatch):
@@ -63,22 +63,28 @@ def test_parts_in_any_order_make_the_same(small_room: Scene, monkeypatch: pytest
     for part in order:
         sums.add(part, *renderer.render(part))
     renderer.close()
-    made, whole = sums.basis(guide_table).indirect, render_basis(small_room, spp=SPP).indirect
-    assert made is not None
-    assert whole is not None
-    np.testing.assert_array_equal(made.planes.array(), whole.planes.array())
-    np.testing.assert_array_equal(made.noise.array(), whole.noise.array())
+    indirect, single_render = (
+        sums.basis(guide_table).indirect,
+        render_basis(small_room, spp=SPP).indirect,
+    )
+    assert indirect is not None
+    assert single_render is not None
+    np.testing.assert_array_equal(indirect.planes.array(), single_render.planes.array())
+    np.testing.assert_array_equal(indirect.noise.array(), single_render.noise.array())
 
 
 def test_what_goes_on_knows_it_as_well(small_room: Scene):
-    first, whole = (render_basis(small_room, spp=spp) for spp in (SPP // 2, SPP))
-    more = render_basis(small_room, spp=SPP, start=first)
-    assert more.indirect is not None
-    assert whole.indirect is not None
-    scale = whole.indirect.planes.array().max()
+    first, single_render = (render_basis(small_room, spp=spp) for spp in (SPP // 2, SPP))
+    continuation = render_basis(small_room, spp=SPP, start=first)
+    assert continuation.indirect is not None
+    assert single_render.indirect is not None
+    scale = single_render.indirect.planes.array().max()
     # Sums are made of means and half differences again, in float32.
     np.testing.assert_allclose(
-        more.indirect.planes.array(), whole.indirect.planes.array(), rtol=1e-5, atol=1e-6 * scale
+        continuation.indirect.planes.array(),
+        single_render.indirect.planes.array(),
+        rtol=1e-5,
+        atol=1e-6 * scale,
     )
 
 
@@ -88,10 +94,15 @@ def test_what_went_on_from_a_basis_without_it_does_not(
     with monkeypatch.context() as before:
         before.setattr(integrators, "SPLIT_MAX_BYTES", 0)
         first = render_basis(small_room, spp=SPP // 2)
-    more, whole = render_basis(small_room, spp=SPP, start=first), render_basis(small_room, spp=SPP)
-    assert more.indirect is None
-    scale = whole.images.max()
-    np.testing.assert_allclose(more.images, whole.images, rtol=1e-5, atol=1e-6 * scale)
+    continuation, single_render = (
+        render_basis(small_room, spp=SPP, start=first),
+        render_basis(small_room, spp=SPP),
+    )
+    assert continuation.indirect is None
+    scale = single_render.images.max()
+    np.testing.assert_allclose(
+        continuation.images, single_render.images, rtol=1e-5, atol=1e-6 * scale
+    )
 
 
 def test_planes_of_several_bases_bring_it_along(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -102,10 +113,10 @@ def test_planes_of_several_bases_bring_it_along(tmp_path: Path, monkeypatch: pyt
     scene = load_scene(write_room(tmp_path))
     names = [light.name for light in scene.lights]
     before = obtain_basis(scene.only(names[:2]), spp=SPP)
-    made = obtain_basis(scene.only(names[:3]), spp=SPP)
-    assert made.origin.is_composed
+    basis = obtain_basis(scene.only(names[:3]), spp=SPP)
+    assert basis.origin.is_composed
     assert before.indirect is not None
-    assert made.indirect is not None
-    kept = made.indirect.planes.array()[:2]
-    np.testing.assert_array_equal(kept, before.indirect.planes.array())
-    assert (made.indirect.planes.plane(2) <= made.planes.plane(2) + 1e-6).all()
+    assert basis.indirect is not None
+    indirect_planes = basis.indirect.planes.array()[:2]
+    np.testing.assert_array_equal(indirect_planes, before.indirect.planes.array())
+    assert (basis.indirect.planes.plane(2) <= basis.planes.plane(2) + 1e-6).all()

@@ -51,12 +51,12 @@ def rendered_lights(monkeypatch: pytest.MonkeyPatch) -> Rendered:
     """List what is rendered from now on."""
     log: Rendered = []
 
-    def render(scene: Scene, **how: Any) -> Basis:
-        done: list[int] = []
-        how["progress"] = lambda _label, now, _total, *_: done.append(now)
-        basis = render_basis(scene, **how)
-        if done:
-            log.append((basis.names, basis.origin.spp, how.get("start") is None))
+    def render(scene: Scene, **options: Any) -> Basis:
+        progress_counts: list[int] = []
+        options["progress"] = lambda _label, count, _total, *_: progress_counts.append(count)
+        basis = render_basis(scene, **options)
+        if progress_counts:
+            log.append((basis.names, basis.origin.spp, options.get("start") is None))
         return basis
 
     # What `obtain_basis` takes for its own must stay the same object.
@@ -65,9 +65,9 @@ def rendered_lights(monkeypatch: pytest.MonkeyPatch) -> Rendered:
     return log
 
 
-def room(folder: Path, *edits: tuple[str, str], **how: Any) -> Scene:
+def room(folder: Path, *edits: tuple[str, str], **options: Any) -> Scene:
     """The test room after some edits of its XML."""
-    path = write_room(folder, **how)
+    path = write_room(folder, **options)
     text = path.read_text(encoding="utf-8")
     for old, new in edits:
         assert old in text
@@ -132,12 +132,12 @@ def test_two_moved_lamps_are_one_pass_and_planes_come_from_several_files(
 ) -> None:
     turn = ('origin="0.8 1.8 1.5"', 'origin="0.6 1.8 1.5"')
     first = obtain_basis(room(tmp_path), spp=16)
-    both = obtain_basis(room(tmp_path, MOVED, turn), spp=16)
+    basis = obtain_basis(room(tmp_path, MOVED, turn), spp=16)
     assert rendered_lights[1:] == [(("bulb", "beam"), 16, True)]
     # The bulb from the one and the beam from the other.
     last = obtain_basis(room(tmp_path, MOVED), spp=16)
     assert len(rendered_lights) == 2
-    assert reused_lights(last, both) == {*NAMES} - {"beam"}
+    assert reused_lights(last, basis) == {*NAMES} - {"beam"}
     assert reused_lights(last, first) == {*NAMES} - {"bulb"}
 
 
@@ -159,11 +159,11 @@ def test_edits_of_colour_and_name_render_nothing(tmp_path: Path, rendered_lights
 def test_lamps_that_come_and_go(tmp_path: Path, rendered_lights: Rendered) -> None:
     lights = LIGHTS["panel"] + LIGHTS["bulb"]
     first = obtain_basis(room(tmp_path, lights=lights), spp=32)
-    more = obtain_basis(scene := room(tmp_path, lights=lights + LIGHTS["sky"]), spp=32)
+    basis = obtain_basis(scene := room(tmp_path, lights=lights + LIGHTS["sky"]), spp=32)
     assert rendered_lights[1:] == [(("sky",), 32, True)]
-    assert reused_lights(more, first) == {"panel", "bulb"}
-    assert_agrees(more, render_basis(scene, spp=32, seed=5))
-    assert more.emitters_seen.sum() > first.emitters_seen.sum()  # where there is sky
+    assert reused_lights(basis, first) == {"panel", "bulb"}
+    assert_agrees(basis, render_basis(scene, spp=32, seed=5))
+    assert basis.emitters_seen.sum() > first.emitters_seen.sum()  # where there is sky
     fewer = obtain_basis(scene := room(tmp_path, lights=lights[: len(LIGHTS["panel"])]), spp=32)
     assert len(rendered_lights) == 2
     assert reused_lights(fewer, first) == {"panel"}
@@ -193,7 +193,7 @@ def test_unequal_numbers_of_samples(tmp_path: Path, rendered_lights: Rendered) -
     scene = room(tmp_path, MOVED)
     basis = obtain_basis(scene, spp=16)
     assert reused_lights(basis, first) == {*NAMES} - {"bulb"}
-    assert [its[:2] for its in basis.origin.each_light] == [
+    assert [entry[:2] for entry in basis.origin.each_light] == [
         (8, 8) if name == "bulb" else (32, 32) for name in NAMES
     ]
     assert basis.origin.spp == 16
@@ -204,10 +204,10 @@ def test_unequal_numbers_of_samples(tmp_path: Path, rendered_lights: Rendered) -
     # The one that lags behind goes on by itself; nobody else's call does as if all were equal.
     with pytest.raises(BasisError, match="unequal numbers of samples"):
         render_basis(scene, spp=64, start=basis)
-    more = obtain_basis(scene, spp=64)
+    grown_basis = obtain_basis(scene, spp=64)
     assert rendered_lights[1:] == [(("bulb",), 16, True), (("bulb",), 64, False)]
-    assert (more.origin.halves, more.origin.each_light) == ((32, 32), ())
-    assert_agrees(more, render_basis(scene, spp=64, seed=5))
+    assert (grown_basis.origin.halves, grown_basis.origin.each_light) == ((32, 32), ())
+    assert_agrees(grown_basis, render_basis(scene, spp=64, seed=5))
 
 
 def test_a_time_is_spent_on_what_lacks(tmp_path: Path, rendered_lights: Rendered) -> None:
@@ -224,15 +224,20 @@ def test_what_is_left_of_a_time_is_for_all_lights(
     """As soon as the one that was moved has as many samples as the others."""
     obtain_basis(room(tmp_path), spp=4)
     scene = room(tmp_path, MOVED)
-    asked: list[dict[str, Any]] = []
+    requests: list[dict[str, Any]] = []
 
-    def render(scene: Scene, *, time_s: float, until_spp: int | None = None, **how: Any) -> Basis:
-        asked.append({"names": len(scene.lights), "time_s": time_s, "until_spp": until_spp})
-        return render_basis(scene, **how | {"spp": until_spp or 8})
+    def render(
+        scene: Scene, *, time_s: float, until_spp: int | None = None, **options: Any
+    ) -> Basis:
+        requests.append({"names": len(scene.lights), "time_s": time_s, "until_spp": until_spp})
+        return render_basis(scene, **options | {"spp": until_spp or 8})
 
     basis = obtain_basis(scene, time_s=1000.0, render=render)
-    assert [(its["names"], its["until_spp"]) for its in asked] == [(1, 4), (len(NAMES), None)]
-    assert 0 < asked[1]["time_s"] < asked[0]["time_s"] <= 1000
+    assert [(request["names"], request["until_spp"]) for request in requests] == [
+        (1, 4),
+        (len(NAMES), None),
+    ]
+    assert 0 < requests[1]["time_s"] < requests[0]["time_s"] <= 1000
     assert (basis.origin.halves, basis.origin.each_light) == ((4, 4), ())
 
 
@@ -241,10 +246,10 @@ def test_exactly_what_is_asked_for_is_rendered_as_a_whole(
 ) -> None:
     obtain_basis(room(tmp_path), spp=16)
     scene = room(tmp_path, MOVED)
-    fresh = obtain_basis(scene, spp=16, use_cache=False)
+    fresh_basis = obtain_basis(scene, spp=16, use_cache=False)
     obtain_basis(scene, spp=16)  # which is composed, and kept
     del rendered_lights[:]
-    same_basis(obtain_basis(scene, spp=16, exact_spp=True), fresh)
+    same_basis(obtain_basis(scene, spp=16, exact_spp=True), fresh_basis)
     assert rendered_lights == [(NAMES, 16, True)]
     assert not obtain_basis(scene, spp=16).origin.is_composed
 
@@ -260,7 +265,7 @@ def test_nothing_of_another_view_size_or_seed_is_taken(
     scene = scene.reduced("1/2") if "half" in other else scene
     scene = load_scene(scene.path, sensor="other") if "sensor" in other else scene
     obtain_basis(scene, spp=4, seed=other.get("seed", 0))
-    assert [its[0] for its in rendered_lights] == [NAMES] * 2
+    assert [record[0] for record in rendered_lights] == [NAMES] * 2
 
 
 def test_a_reduced_film_has_planes_of_its_own(tmp_path: Path, rendered_lights: Rendered) -> None:
@@ -273,14 +278,14 @@ def test_a_reduced_film_has_planes_of_its_own(tmp_path: Path, rendered_lights: R
 
 
 def test_groups_and_what_is_kept(tmp_path: Path, rendered_lights: Rendered) -> None:
-    how: dict[str, Any] = {"lights": ["pair", "panel"], "groups": {"pair": ["bulb", "beam"]}}
-    first = obtain_basis(load_scene(room(tmp_path).path, **how), spp=32)
+    options: dict[str, Any] = {"lights": ["pair", "panel"], "groups": {"pair": ["bulb", "beam"]}}
+    first = obtain_basis(load_scene(room(tmp_path).path, **options), spp=32)
     assert first.names == ("panel", "pair", "rest")
-    scene = load_scene(room(tmp_path, MOVED).path, **how)
+    scene = load_scene(room(tmp_path, MOVED).path, **options)
     second = obtain_basis(scene, spp=32)
     assert rendered_lights[1:] == [(("pair",), 32, True)]
     assert_agrees(second, render_basis(scene, spp=32, seed=5))
-    scene = load_scene(room(tmp_path, ('x="0.3" y="-1"', 'x="0.5" y="-1"')).path, **how)
+    scene = load_scene(room(tmp_path, ('x="0.3" y="-1"', 'x="0.5" y="-1"')).path, **options)
     third = obtain_basis(scene, spp=32)
     assert rendered_lights[2:] == [(("rest",), 32, True)]
     assert reused_lights(third, first) == {"panel", "pair"}
@@ -288,10 +293,10 @@ def test_groups_and_what_is_kept(tmp_path: Path, rendered_lights: Rendered) -> N
 
 
 def test_separate_renders(tmp_path: Path, rendered_lights: Rendered) -> None:
-    how: dict[str, Any] = {"integrator": '<integrator type="volpathmis"/>'}
-    first = obtain_basis(room(tmp_path, **how), spp=16)
+    options: dict[str, Any] = {"integrator": '<integrator type="volpathmis"/>'}
+    first = obtain_basis(room(tmp_path, **options), spp=16)
     passes: list[str] = []
-    scene = room(tmp_path, MOVED, **how)
+    scene = room(tmp_path, MOVED, **options)
 
     def count(label: str, done: int, *_: object) -> None:
         passes.extend([label] * (done > 0))
@@ -333,19 +338,19 @@ def test_what_is_larger_than_memory(
     cache.delete_entries([entry for entry in cache.entries() if entry.origin == expected.origin])
     monkeypatch.setattr(basis_file, "IN_MEMORY_MAX_BYTES", 0)
     large = obtain_basis(room(tmp_path, MOVED), spp=16)
-    assert [its[0] for its in rendered_lights] == [NAMES, ("bulb",), ("bulb",)]
+    assert [record[0] for record in rendered_lights] == [NAMES, ("bulb",), ("bulb",)]
     assert isinstance(large.planes, FilePlanes)
     assert reused_lights(large, first) == {*NAMES} - {"bulb"}
     assert large.lights == expected.lights
     # Where it cannot be kept it stays in several files.
     cache.delete_entries([entry for entry in cache.entries() if entry.origin == large.origin])
     monkeypatch.setattr(cache, "keep", lambda basis: False)
-    apart = obtain_basis(room(tmp_path, MOVED), spp=16)
-    assert reused_lights(apart, large) >= {*NAMES} - {"bulb"}
+    separate = obtain_basis(room(tmp_path, MOVED), spp=16)
+    assert reused_lights(separate, large) >= {*NAMES} - {"bulb"}
     weights = np.linspace(0, 1, 15).reshape(5, 3)
-    np.testing.assert_allclose(apart.mix(weights), large.mix(weights), atol=2e-3)
+    np.testing.assert_allclose(separate.mix(weights), large.mix(weights), atol=2e-3)
     some = slice(100, 333)
-    np.testing.assert_array_equal(apart.planes.pixels(some)[2:], large.planes.pixels(some)[2:])
+    np.testing.assert_array_equal(separate.planes.pixels(some)[2:], large.planes.pixels(some)[2:])
 
 
 @pytest.mark.parametrize("damage", ["cut", "gone"])
@@ -356,18 +361,18 @@ def test_a_damaged_file_costs_its_planes(
     [entry] = cache.entries()
     listed = cache.entries
     if damage == "cut":
-        whole = entry.path.read_bytes()
-        entry.path.write_bytes(whole[: len(whole) * 3 // 4])
+        content = entry.path.read_bytes()
+        entry.path.write_bytes(content[: len(content) * 3 // 4])
     else:  # between being listed and being read
 
         def and_gone() -> list[cache.Entry]:
-            found = listed()
+            entries = listed()
             entry.path.unlink(missing_ok=True)
-            return found
+            return entries
 
         monkeypatch.setattr(cache, "entries", and_gone)
     basis = obtain_basis(scene := room(tmp_path, MOVED), spp=16)
-    assert [its[0] for its in rendered_lights] == [NAMES] * 2
+    assert [record[0] for record in rendered_lights] == [NAMES] * 2
     assert basis.origin.scene_identity == scene.identity
     assert not basis.origin.is_composed
 
@@ -381,7 +386,7 @@ def test_planes_without_an_identity_are_none_of_anybodys(
     cache.delete_entries(cache.entries())
     assert cache.keep(replace(first, lights=lights))
     obtain_basis(room(tmp_path, MOVED), spp=16)
-    assert [its[0] for its in rendered_lights] == [NAMES] * 2
+    assert [record[0] for record in rendered_lights] == [NAMES] * 2
     same_basis(obtain_basis(room(tmp_path), spp=16), first)
     assert len(rendered_lights) == 2
 
@@ -470,7 +475,7 @@ def test_workers_render_the_moved_lamp_alone(tmp_path: Path) -> None:
     assert_agrees(second, render_basis(scene, spp=16, seed=5))
 
 
-@pytest.mark.parametrize("done", [0, 2, 5])
-def test_a_time_ends_where_no_more_samples_are_wanted(done: int) -> None:
+@pytest.mark.parametrize("sample_count", [0, 2, 5])
+def test_a_time_ends_where_no_more_samples_are_wanted(sample_count: int) -> None:
     budget = Budget(4, time_s=1e6, until_spp=9)
-    assert sum(steps(100, budget, done, silent)) == 5 - done
+    assert sum(steps(100, budget, sample_count, silent)) == 5 - sample_count

@@ -83,7 +83,7 @@ def test_each_plane_is_that_light_alone_within_noise(
     basis = small_room_basis(spp=256)
     separate = _render_one_by_one(small_room, Budget(256), 0, None, Keeper(None), silent)
     images, differences = separate.images, separate.half_differences
-    seen = separate.emitters_seen
+    emitter_mask = separate.emitters_seen
     for k, name in enumerate(basis.names):
         gap = float((basis.images[k] - images[k]).sum(dtype=np.float64))
         noise = np.square(basis.half_differences[k], dtype=np.float64)
@@ -91,9 +91,9 @@ def test_each_plane_is_that_light_alone_within_noise(
         # Noise: four and a half standard errors of the whole image's sum, five lights.
         assert abs(gap) <= 4.5 * np.sqrt(noise.sum()), name
     # The two look for seen emitters in different ways; only edges may differ, by chance.
-    assert (basis.emitters_seen != seen).mean() < 0.02
-    assert seen.any()
-    assert not seen.all()
+    assert (basis.emitters_seen != emitter_mask).mean() < 0.02
+    assert emitter_mask.any()
+    assert not emitter_mask.all()
 
 
 #: What may be between the camera and a lamp, and whether this is seen through it.
@@ -120,15 +120,17 @@ def test_lamps_are_seen_through_clear_surfaces_alone(tmp_path: Path, name: str, 
     sheet = f"""<shape type="rectangle"><transform name="to_world"><scale value="3"/>
         <translate y="1" z="2.5"/></transform>{bsdf}</shape>"""
     integrator = f'<integrator type="{method}mis"/>' if method == "volpath" else PATH
-    seen = []
-    for k, its in enumerate(("", sheet)):
-        room = write_room(tmp_path, lights=LAMP + its, integrator=integrator, name=f"{k}.xml")
-        seen.append(render_basis(load_scene(room), spp=16).emitters_seen)
-    assert 10 < seen[0].sum() < 60
+    emitter_masks = []
+    for k, shape_text in enumerate(("", sheet)):
+        room = write_room(
+            tmp_path, lights=LAMP + shape_text, integrator=integrator, name=f"{k}.xml"
+        )
+        emitter_masks.append(render_basis(load_scene(room), spp=16).emitters_seen)
+    assert 10 < emitter_masks[0].sum() < 60
     if is_clear:
-        assert (seen[1] != seen[0]).mean() < 0.03
+        assert (emitter_masks[1] != emitter_masks[0]).mean() < 0.03
     else:
-        assert not seen[1].any()
+        assert not emitter_masks[1].any()
 
 
 def test_a_lamp_in_a_mirror_is_not_seen(tmp_path: Path):
@@ -208,9 +210,11 @@ def test_the_present_look_comes_back_from_present_weights(small_room: Scene) -> 
 
 
 def test_a_light_switched_off_in_the_scene_still_has_its_image(tmp_path: Path) -> None:
-    off = LIGHTS["bulb"].replace("0.5 0.6 0.7", "0 0 0")
-    off = off.replace("</emitter>", '<float name="sampling_weight" value="0"/></emitter>')
-    scene = load_scene(write_room(tmp_path, lights=LIGHTS["sky"] + off))
+    dark_lamp = LIGHTS["bulb"].replace("0.5 0.6 0.7", "0 0 0")
+    dark_lamp = dark_lamp.replace(
+        "</emitter>", '<float name="sampling_weight" value="0"/></emitter>'
+    )
+    scene = load_scene(write_room(tmp_path, lights=LIGHTS["sky"] + dark_lamp))
     basis = render_basis(scene, spp=16)
     assert basis.images[basis.names.index("bulb")].max() > 0
 
@@ -234,20 +238,21 @@ def test_second_sensor_and_crop_window(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("integrator", "why"),
+    ("integrator", "reason"),
     [
         ('<integrator type="volpathmis"/>', "volpathmis"),
         ('<integrator type="ptracer"/>', "ptracer"),
     ],
 )
 def test_what_one_pass_cannot_serve_is_rendered_separately(
-    tmp_path: Path, integrator: str, why: str
+    tmp_path: Path, integrator: str, reason: str
 ) -> None:
     scene = load_scene(write_room(tmp_path, integrator=integrator))
-    assert why in str(why_not_one_pass(scene))
+    assert reason in str(why_not_one_pass(scene))
     [remark] = remarks_of_scene(scene)
     assert remark == (
-        f"the integrator is {why}: each of the 5 lights is rendered by itself, 5 times the work; "
+        f"the integrator is {reason}: "
+        "each of the 5 lights is rendered by itself, 5 times the work; "
         "the integrator path, where it shows the same, renders all in one pass"
     )
     basis = render_basis(scene, spp=4)
@@ -281,11 +286,11 @@ SEVERAL = "".join(PASSED.values()) + LIGHTS["panel"] + LIGHTS["bulb"] + LIGHTS["
 
 def _integrator(plugin: str, **options: int | bool) -> str:
     names = {bool: "boolean", int: "integer"}
-    inside = "".join(
+    properties_text = "".join(
         f'<{names[type(value)]} name="{name}" value="{str(value).lower()}"/>'
         for name, value in options.items()
     )
-    return f'<integrator type="{plugin}">{inside}</integrator>'
+    return f'<integrator type="{plugin}">{properties_text}</integrator>'
 
 
 def _same_as_mitsuba_at_random_weights(scene: Scene) -> None:
@@ -334,9 +339,9 @@ def test_each_plane_behind_what_is_passed_is_that_light_alone_within_noise(tmp_p
         # Noise: four and a half standard errors of the whole image's sum, four lights.
         assert abs(gap) <= 4.5 * np.sqrt(noise.sum()), name
     # What is gathered and then lost is much: else the test would say nothing.
-    kept = one_pass(scene, seed=1, spp=64)
+    plain_basis = one_pass(scene, seed=1, spp=64)
     scene = load_scene(write_room(tmp_path, lights=SEVERAL + LIGHTS["sky"]))
-    assert kept.sum() < 0.9 * one_pass(scene, seed=1, spp=64)[: len(kept)].sum()
+    assert plain_basis.sum() < 0.9 * one_pass(scene, seed=1, spp=64)[: len(plain_basis)].sum()
 
 
 @pytest.mark.parametrize(
@@ -409,8 +414,8 @@ def test_planes_of_the_scenes_that_come_along_add_up_to_their_render(name: str, 
     # Noise: four and a half standard errors, of the sums over nine blocks of the picture.
     for rows in np.array_split(np.arange(gap.shape[0]), 3):
         for columns in np.array_split(np.arange(gap.shape[1]), 3):
-            where = np.ix_(rows, columns)
-            assert abs(gap[where].sum()) <= 4.5 * np.sqrt(noise[where].sum()), (rows, columns)
+            pixels = np.ix_(rows, columns)
+            assert abs(gap[pixels].sum()) <= 4.5 * np.sqrt(noise[pixels].sum()), (rows, columns)
 
 
 @pytest.mark.parametrize("emitter_samples", [(1, 1), (2, 1), (8, 8)])
@@ -437,7 +442,7 @@ def test_any_number_of_emitter_samples_has_the_same_mean(
 
 
 @pytest.mark.parametrize(
-    ("integrator", "lights", "why"),
+    ("integrator", "lights", "reason"),
     [
         (_integrator("volpath"), SEVERAL, "fog, smoke or liquids"),
         (_integrator("volpath"), PASSED["pane"] + LIGHTS["bulb"], "behind masks, thin glass"),
@@ -446,12 +451,12 @@ def test_any_number_of_emitter_samples_has_the_same_mean(
     ],
 )
 def test_what_integrators_do_otherwise_than_path_is_left_to_them(
-    tmp_path: Path, integrator: str, lights: str, why: str
+    tmp_path: Path, integrator: str, lights: str, reason: str
 ) -> None:
     scene = load_scene(write_room(tmp_path, lights=lights, integrator=integrator))
-    assert why in str(why_not_one_pass(scene))
+    assert reason in str(why_not_one_pass(scene))
     # One light costs no more than it does.
-    is_said = any(why in remark for remark in remarks_of_scene(scene))
+    is_said = any(reason in remark for remark in remarks_of_scene(scene))
     assert is_said == (len(scene.lights) > 1)
 
 
@@ -482,10 +487,10 @@ def test_a_wrapped_path_is_one_pass(tmp_path: Path, wrapper: str) -> None:
     rendered = mitsuba_render(scene, {x.name: WHITE for x in scene.lights}, seed=11, spp=16)
     assert rendered.max() > 0
     assert np.abs(planes.sum(axis=0) - rendered).max() <= SAME_SAMPLES * rendered.max()
-    inside = load_scene(
+    inner_scene = load_scene(
         write_room(tmp_path, integrator=wrapper.format("<integrator type='volpathmis'/>"))
     )
-    assert "volpathmis" in str(why_not_one_pass(inside))
+    assert "volpathmis" in str(why_not_one_pass(inner_scene))
 
 
 def test_wrapped_integrators_hide_what_the_inner_one_hides(tmp_path: Path) -> None:
@@ -528,16 +533,18 @@ def test_hidden_emitters_are_hidden_from_the_camera_alone(
     hidden = '<integrator type="path"><boolean name="hide_emitters" value="true"/></integrator>'
     veil = """<shape type="rectangle" id="veil"><transform name="to_world"><scale value="0.4"/>
         <translate z="1.5" y="1"/></transform><emitter type="area"/></shape>"""
-    here = "".join(LIGHTS[name] for name in lights) + veil
-    scene = load_scene(write_room(tmp_path, lights=here, integrator=hidden))
+    lights_text = "".join(LIGHTS[name] for name in lights) + veil
+    scene = load_scene(write_room(tmp_path, lights=lights_text, integrator=hidden))
     assert why_not_one_pass(scene) is None
     white = {light.name: WHITE for light in scene.lights}
     planes = one_pass(scene, seed=3, spp=16)
     rendered = mitsuba_render(scene, white, seed=3, spp=16)
     assert np.abs(planes.sum(axis=0) - rendered).max() <= SAME_SAMPLES * rendered.max()
     assert not render_basis(scene, spp=4).emitters_seen.any()
-    shown = mitsuba_render(load_scene(write_room(tmp_path, lights=here)), white, seed=3, spp=16)
-    assert shown.sum() > 1.1 * rendered.sum()
+    image = mitsuba_render(
+        load_scene(write_room(tmp_path, lights=lights_text)), white, seed=3, spp=16
+    )
+    assert image.sum() > 1.1 * rendered.sum()
 
 
 def test_better_numbers_are_unbiased_at_any_length_and_less_noisy(tmp_path: Path) -> None:
@@ -641,7 +648,7 @@ def test_all_samples_are_traced_by_one_kernel(small_room: Scene) -> None:
         history = dr.kernel_history((dr.KernelType.JIT,))
     tracer.close()
     # A path tracer is hundreds of times as long as what fills or copies an array.
-    long = [its["hash"] for its in history if len(its["ir"].getvalue()) > 2**16]
+    long = [kernel["hash"] for kernel in history if len(kernel["ir"].getvalue()) > 2**16]
     assert len(long) == 3 + 4 * 2
     assert len(set(long)) == 1
 

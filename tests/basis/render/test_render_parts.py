@@ -82,7 +82,7 @@ def test_every_sample_of_every_pixel_is_in_one_part(
 def test_parts_in_any_order_make_the_basis_of_one_go(
     small_room: Scene, guide_table: np.ndarray, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = render_basis(small_room, spp=SPP)
+    single_render = render_basis(small_room, spp=SPP)
     monkeypatch.setattr(parts_module, "PART_SAMPLES", 2**12)
     # Kernels of three samples of a pixel, or of all rows.
     monkeypatch.setattr("lightpaint.scene.scene_render.SAMPLES_PER_PASS", 4 * 3 * 24 * 3)
@@ -92,17 +92,17 @@ def test_parts_in_any_order_make_the_basis_of_one_go(
     random.Random(3).shuffle(shuffled)
     for order in (plan, shuffled):
         basis = render_in_order(small_room, guide_table, order, plan)
-        assert is_same(basis, whole)
-        assert basis.origin == whole.origin
-        np.testing.assert_array_equal(basis.guide_table, whole.guide_table)
+        assert is_same(basis, single_render)
+        assert basis.origin == single_render.origin
+        np.testing.assert_array_equal(basis.guide_table, single_render.guide_table)
 
 
 @pytest.mark.usefixtures("_all_threads")
 @pytest.mark.parametrize("threads", [1, 2])
 def test_threads_decide_no_bit(small_room: Scene, threads: int) -> None:
-    whole = render_basis(small_room, spp=SPP)
+    single_render = render_basis(small_room, spp=SPP)
     limit_threads(threads)
-    assert is_same(render_basis(small_room, spp=SPP), whole)
+    assert is_same(render_basis(small_room, spp=SPP), single_render)
 
 
 def test_any_budget_that_comes_to_the_same_samples_makes_the_same(
@@ -118,9 +118,9 @@ def test_any_budget_that_comes_to_the_same_samples_makes_the_same(
     assert basis.origin.spp > 6
     monkeypatch.undo()
     monkeypatch.setattr(guide_training, "TRAINING_SAMPLES", (2**12, 2**13))
-    whole = render_basis(small_room, spp=basis.origin.spp)
-    assert is_same(basis, whole)
-    assert basis.origin == whole.origin
+    single_render = render_basis(small_room, spp=basis.origin.spp)
+    assert is_same(basis, single_render)
+    assert basis.origin == single_render.origin
 
 
 def test_what_is_there_counts(small_room: Scene) -> None:
@@ -129,11 +129,11 @@ def test_what_is_there_counts(small_room: Scene) -> None:
     in_parts = render_in_order(small_room, half.guide_table, plan, plan, start=half)
     on = render_basis(small_room, spp=32, start=half)
     assert is_same(in_parts, on)
-    whole = render_basis(small_room, spp=32)
-    assert in_parts.origin == on.origin == whole.origin
+    single_render = render_basis(small_room, spp=32)
+    assert in_parts.origin == on.origin == single_render.origin
     # The sums behind a basis are known up to round-off of float32.
-    scale = whole.images.max(axis=(1, 2, 3), keepdims=True)
-    assert (np.abs(on.images - whole.images) / scale).max() < 1e-5
+    scale = single_render.images.max(axis=(1, 2, 3), keepdims=True)
+    assert (np.abs(on.images - single_render.images) / scale).max() < 1e-5
 
 
 def test_the_training_depends_on_the_seed_alone(small_room: Scene, guide_table: np.ndarray) -> None:
@@ -162,6 +162,6 @@ def test_lights_that_are_rendered_one_by_one(tmp_path: Path) -> None:
     plan = plan_parts(scene, 8)
     assert len(plan) == 4
     parts = render_in_order(scene, None, plan[::-1], plan)
-    whole = render_basis(scene, spp=8)
-    assert is_same(parts, whole)
-    assert parts.origin == whole.origin
+    single_render = render_basis(scene, spp=8)
+    assert is_same(parts, single_render)
+    assert parts.origin == single_render.origin

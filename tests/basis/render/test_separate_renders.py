@@ -41,7 +41,7 @@ def scene(tmp_path: Path) -> Scene:
     return load_scene(write_room(tmp_path, lights=THREE, integrator=SEPARATELY))
 
 
-def interrupt_after(passes: int, scene: Scene, kept: list[Basis], **budget: object) -> str:
+def interrupt_after(passes: int, scene: Scene, saved_bases: list[Basis], **budget: object) -> str:
     """Render, press Ctrl-C after so many passes, and return what is said then."""
     count = 0
 
@@ -52,7 +52,7 @@ def interrupt_after(passes: int, scene: Scene, kept: list[Basis], **budget: obje
             os.kill(os.getpid(), signal.SIGINT)
 
     def keep(basis: Basis) -> bool:
-        kept.append(basis)
+        saved_bases.append(basis)
         return True
 
     with pytest.raises(Interrupted) as interrupt:
@@ -80,21 +80,24 @@ def test_interrupted_and_gone_on_is_as_if_never_interrupted(
     scene: Scene, tmp_path: Path, after: int, through_a_file: bool
 ) -> None:
     """Four passes for each of three lights."""
-    kept: list[Basis] = []
-    said = interrupt_after(after, scene, kept, spp=16)
-    assert "of 16 samples per pixel, on average over the lights, are kept" in said
-    part = kept[-1]
+    saved_bases: list[Basis] = []
+    message = interrupt_after(after, scene, saved_bases, spp=16)
+    assert "of 16 samples per pixel, on average over the lights, are kept" in message
+    part = saved_bases[-1]
     assert part.origin.method == SEPARATE
-    done = [a + b for a, b, _, _ in part.origin.each_light]
-    assert sum(done) == 4 * after
+    pass_counts = [a + b for a, b, _, _ in part.origin.each_light]
+    assert sum(pass_counts) == 4 * after
     # What the last light has in both halves; mostly it has none.
     assert part.origin.spp == (8 if after == 11 else 0)
     if through_a_file:
         write_basis(tmp_path / "part.exr", part)
         part = read_basis(tmp_path / "part.exr")
-        assert part.origin == kept[-1].origin
-    gone_on, whole = render_basis(scene, spp=16, start=part), render_basis(scene, spp=16)
-    same_basis(gone_on, whole, of_file=through_a_file)
+        assert part.origin == saved_bases[-1].origin
+    continuation, single_render = (
+        render_basis(scene, spp=16, start=part),
+        render_basis(scene, spp=16),
+    )
+    same_basis(continuation, single_render, of_file=through_a_file)
 
 
 def test_more_samples_add_only_what_is_missing(scene: Scene) -> None:
@@ -104,22 +107,22 @@ def test_more_samples_add_only_what_is_missing(scene: Scene) -> None:
         rendered.append(done)
 
     first = render_basis(scene, spp=8)
-    more = render_basis(scene, spp=24, start=first, progress=count)
+    continuation = render_basis(scene, spp=24, start=first, progress=count)
     assert sum(done > 0 for done in rendered) == 3 * 4
-    same_basis(more, render_basis(scene, spp=24))
+    same_basis(continuation, render_basis(scene, spp=24))
 
 
 def test_nothing_is_mixed(scene: Scene, tmp_path: Path) -> None:
-    kept: list[Basis] = []
-    interrupt_after(4, scene, kept, spp=16)
+    saved_bases: list[Basis] = []
+    interrupt_after(4, scene, saved_bases, spp=16)
     with pytest.raises(BasisError, match="another scene"):
-        render_basis(scene, spp=16, seed=1, start=kept[-1])
+        render_basis(scene, spp=16, seed=1, start=saved_bases[-1])
     with pytest.raises(BasisError, match="another scene"):
-        render_basis(scene.reduced("1/2"), spp=16, start=kept[-1])
+        render_basis(scene.reduced("1/2"), spp=16, start=saved_bases[-1])
     changed = scene.path.read_text(encoding="utf-8").replace("0.7 0.5 0.4", "0.7 0.5 0.5")
     scene.path.write_text(changed, encoding="utf-8")
     with pytest.raises(BasisError, match="another scene"):
-        render_basis(load_scene(scene.path), spp=16, start=kept[-1])
+        render_basis(load_scene(scene.path), spp=16, start=saved_bases[-1])
 
 
 def test_a_part_of_separate_renders_does_not_replace_a_whole_basis(
@@ -161,21 +164,21 @@ def test_a_time_is_kept_and_adds_samples(
     assert reports[0][0] == 0
     assert first.origin.halves[0] == first.origin.halves[1] > 4
     assert first.origin.each_light == ()
-    more = obtain_basis(scene, time_s=0.1)
-    assert more.origin.spp > first.origin.spp
+    continuation = obtain_basis(scene, time_s=0.1)
+    assert continuation.origin.spp > first.origin.spp
     if integrator is SEPARATELY:  # whose passes are as short for a number of samples
-        same_basis(more, render_basis(scene, spp=more.origin.spp), of_file=True)
+        same_basis(continuation, render_basis(scene, spp=continuation.origin.spp), of_file=True)
 
 
 def test_a_time_goes_on_from_unequal_lights(scene: Scene) -> None:
-    kept: list[Basis] = []
-    interrupt_after(4, scene, kept, spp=16)
-    part = kept[-1]
+    saved_bases: list[Basis] = []
+    interrupt_after(4, scene, saved_bases, spp=16)
+    part = saved_bases[-1]
     assert len(set(part.origin.each_light)) > 1
-    whole = render_basis(scene, time_s=0.01, start=part)
-    assert whole.origin.each_light == ()
-    assert whole.origin.spp > 16
-    same_basis(whole, render_basis(scene, spp=whole.origin.spp))
+    continuation = render_basis(scene, time_s=0.01, start=part)
+    assert continuation.origin.each_light == ()
+    assert continuation.origin.spp > 16
+    same_basis(continuation, render_basis(scene, spp=continuation.origin.spp))
 
 
 def test_a_budget_is_a_number_or_a_time(scene: Scene) -> None:

@@ -30,8 +30,8 @@ def test_every_elementary_interval_holds_one_point(
     [points] = pairs(dimension, first=first, terms=1 << log_terms)
     for rows in range(log_terms + 1):
         cells = np.floor(points * [1 << rows, 1 << (log_terms - rows)]).astype(int)
-        taken = cells[:, 0] * (1 << (log_terms - rows)) + cells[:, 1]
-        assert sorted(taken) == list(range(1 << log_terms))
+        cell_numbers = cells[:, 0] * (1 << (log_terms - rows)) + cells[:, 1]
+        assert sorted(cell_numbers) == list(range(1 << log_terms))
 
 
 def test_each_number_alone_is_uniform() -> None:
@@ -54,9 +54,9 @@ def test_dimensions_pixels_and_streams_are_unrelated() -> None:
         "pixel": np.roll(a, 1, axis=0),
         "stream": pairs(4, pixels=2000, terms=16, stream=1),
     }
-    for what, b in others.items():
+    for label, b in others.items():
         for i in range(2):
             for j in range(2):
                 correlation = np.corrcoef(a[..., i].ravel(), b[..., j].ravel())[0, 1]
                 # Noise: five standard errors of 2 000 unrelated sets.
-                assert abs(correlation) < 5 / np.sqrt(2000), (what, i, j)
+                assert abs(correlation) < 5 / np.sqrt(2000), (label, i, j)

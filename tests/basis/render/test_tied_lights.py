@@ -40,35 +40,35 @@ def test_a_tied_plane_is_the_sum_of_its_members_and_the_rest_that_of_the_others(
     tmp_path: Path,
 ) -> None:
     path = write_room(tmp_path, lights=ROOM)
-    alone = load_scene(path)
+    plain_scene = load_scene(path)
     tied = load_scene(path, groups=TIED, lights=["pair", "mix"])
     assert [light.name for light in tied.lights] == ["mix", "pair", "rest"]
-    single = planes_by_name(alone, seed=3)
-    current = {e.name: single[e.name] * np.float32(e.emission) for e in alone.emitters}
-    wanted = {
+    single = planes_by_name(plain_scene, seed=3)
+    current = {e.name: single[e.name] * np.float32(e.emission) for e in plain_scene.emitters}
+    expected = {
         "pair": single["bulb"] + single["twin"],  # of one colour, so per unit of it
         "mix": current["panel"] + current["sun"],  # as authored
         "rest": current["beam"] + current["sky"],
     }
-    found = planes_by_name(tied, seed=3)
-    for name, plane in wanted.items():
+    tied_planes = planes_by_name(tied, seed=3)
+    for name, plane in expected.items():
         assert plane.max() > 0
-        assert np.abs(found[name] - plane).max() <= SAME_SAMPLES * plane.max(), name
+        assert np.abs(tied_planes[name] - plane).max() <= SAME_SAMPLES * plane.max(), name
 
 
 @pytest.mark.parametrize("integrator", [None, SLOW])
 def test_what_cannot_be_scaled_is_rendered_as_it_is(tmp_path: Path, integrator: str | None) -> None:
-    how = {} if integrator is None else {"integrator": integrator}
-    path = write_room(tmp_path, lights=SCREEN + LIGHTS["bulb"] + LIGHTS["sky"], **how)
+    options = {} if integrator is None else {"integrator": integrator}
+    path = write_room(tmp_path, lights=SCREEN + LIGHTS["bulb"] + LIGHTS["sky"], **options)
     scene = load_scene(path, lights=["bulb"])
     assert [e.name for e in scene.emitters if e.obstacle] == ["screen"]
     basis = render_basis(scene, spp=64)
     assert (basis.origin.method == SEPARATE) == (integrator is not None)
     # The parts of the picture, each alone, add up to the picture of all.
-    whole = mitsuba_render(scene, {"bulb": WHITE}, seed=5, spp=256)
+    reference = mitsuba_render(scene, {"bulb": WHITE}, seed=5, spp=256)
     bulb = mitsuba_render(scene, {"bulb": WHITE, "rest": BLACK}, seed=5, spp=256)
     rest = mitsuba_render(scene, {"bulb": BLACK}, seed=5, spp=256)
-    for name, image in (("bulb", bulb), ("rest", rest), ("both", whole)):
+    for name, image in (("bulb", bulb), ("rest", rest), ("both", reference)):
         plane = basis.images.sum(axis=0) if name == "both" else basis.image(name)
         # Means over the picture; 64 samples of 480 pixels leave a few per cent of noise.
         np.testing.assert_allclose(plane.mean(), image.mean(), rtol=0.08, err_msg=name)
@@ -77,8 +77,10 @@ def test_what_cannot_be_scaled_is_rendered_as_it_is(tmp_path: Path, integrator: 
 def test_rest_of_separate_renders_is_the_present_render_of_the_others(tmp_path: Path) -> None:
     path = write_room(tmp_path, lights=ROOM, integrator=SLOW)
     basis = render_basis(load_scene(path, groups=TIED, lights=["mix"]), spp=64)
-    whole = mitsuba_render(load_scene(path), seed=1, spp=256)
-    np.testing.assert_allclose(basis.images.sum(axis=0).mean(), whole.mean(), rtol=0.05)  # noise
+    reference = mitsuba_render(load_scene(path), seed=1, spp=256)
+    np.testing.assert_allclose(
+        basis.images.sum(axis=0).mean(), reference.mean(), rtol=0.05
+    )  # noise
 
 
 def test_another_choice_is_another_basis(tmp_path: Path) -> None:
@@ -96,8 +98,8 @@ def test_another_choice_is_another_basis(tmp_path: Path) -> None:
     assert scenes[0].identity == scenes[0].content == scenes[1].content
     # To choose all is to choose nothing, and order is no choice.
     assert load_scene(path, lights=["*"]).identity == scenes[0].identity
-    again = load_scene(path, groups={"pair": ["twin", "bulb"]})
-    assert again.identity == scenes[1].identity
+    reordered = load_scene(path, groups={"pair": ["twin", "bulb"]})
+    assert reordered.identity == scenes[1].identity
 
     bases: list[Basis] = [obtain_basis(scene, spp=2) for scene in scenes]
     for scene, basis in zip(scenes, bases, strict=True):

@@ -41,9 +41,9 @@ def short_training(monkeypatch: pytest.MonkeyPatch) -> None:
 def counts() -> Any:
     """None in the upper rows, and 1 to 24 below."""
     rng = np.random.default_rng(0)
-    made = rng.integers(1, 25, (20, 24))
-    made[:6] = 0
-    return made
+    sample_counts = rng.integers(1, 25, (20, 24))
+    sample_counts[:6] = 0
+    return sample_counts
 
 
 def weighted_sums(basis: Basis, samples: Any) -> Any:
@@ -86,20 +86,20 @@ def test_a_scene_that_stays_loaded_changes_no_bit(
 ):
     """Two views in turn: the scene of each is loaded anew only after the other's."""
     scenes = [small_room, load_scene(write_room(tmp_path, lights=LIGHTS["panel"] + LIGHTS["bulb"]))]
-    kept = [render_basis(scene, spp=4) for scene in scenes]
-    alone, rounds = list(kept), [0, 0, 1, 0]
+    bases = [render_basis(scene, spp=4) for scene in scenes]
+    separate, rounds = list(bases), [0, 0, 1, 0]
     for k in rounds:
-        alone[k] = pixel_top_up.top_up(scenes[k], alone[k], counts)
+        separate[k] = pixel_top_up.top_up(scenes[k], separate[k], counts)
     loads: list[Scene] = []
     load = Scene.load
     monkeypatch.setattr(
-        Scene, "load", lambda self, *a, **how: loads.append(self) or load(self, *a, **how)
+        Scene, "load", lambda self, *a, **options: loads.append(self) or load(self, *a, **options)
     )
     with pixel_top_up.kept_loaded() as tracers:
         for k in rounds:
-            kept[k] = pixel_top_up.top_up(scenes[k], kept[k], counts, tracers=tracers)
-    assert [scenes.index(its) for its in loads] == [0, 1, 0]
-    for a, b in zip(kept, alone, strict=True):
+            bases[k] = pixel_top_up.top_up(scenes[k], bases[k], counts, tracers=tracers)
+    assert [scenes.index(loaded_scene) for loaded_scene in loads] == [0, 1, 0]
+    for a, b in zip(bases, separate, strict=True):
         same_basis(a, b)
 
 
@@ -107,24 +107,24 @@ def test_views_of_a_scene_are_loaded_once(counts: Any, tmp_path: Path, monkeypat
     """Each goes on from its own sensor, with the bits that it has alone."""
     path = write_room(tmp_path, lights=LIGHTS["panel"] + LIGHTS["bulb"], sensors=SECOND_SENSOR)
     scenes = [load_scene(path, sensor=k) for k in range(2)]
-    kept = [render_basis(scene, spp=4) for scene in scenes]
-    alone = [pixel_top_up.top_up(*its, counts) for its in zip(scenes, kept, strict=True)]
+    bases = [render_basis(scene, spp=4) for scene in scenes]
+    separate = [pixel_top_up.top_up(*view, counts) for view in zip(scenes, bases, strict=True)]
     loads: list[Scene] = []
     load = Scene.load
 
-    def counting(self: Scene, *a: Any, **how: Any) -> Any:
+    def counting(self: Scene, *a: Any, **options: Any) -> Any:
         loads.append(self)
-        return load(self, *a, **how)
+        return load(self, *a, **options)
 
     monkeypatch.setattr(Scene, "load", counting)
     with pixel_top_up.kept_loaded(scenes) as tracers:
         for _ in range(2):
-            made = [
-                pixel_top_up.top_up(scene, its, counts, tracers=tracers)
-                for scene, its in zip(scenes, kept, strict=True)
+            results = [
+                pixel_top_up.top_up(scene, basis, counts, tracers=tracers)
+                for scene, basis in zip(scenes, bases, strict=True)
             ]
     assert loads == scenes[:1]
-    for a, b in zip(made, alone, strict=True):
+    for a, b in zip(results, separate, strict=True):
         same_basis(a, b)
 
 
@@ -145,20 +145,22 @@ def test_batches_change_no_bit(
     small_room: Scene, counts: Any, monkeypatch: pytest.MonkeyPatch, most: int
 ):
     basis = render_basis(small_room, spp=4)
-    whole = pixel_top_up.top_up(small_room, basis, counts)
+    single_batch = pixel_top_up.top_up(small_room, basis, counts)
     monkeypatch.setattr(pixel_top_up, "PART_MAX_BYTES", 12 * 20 * most)
-    again = pixel_top_up.top_up(small_room, basis, counts * (counts > 18) if most == 1 else counts)
-    its = counts > 18 if most == 1 else counts >= 0
-    np.testing.assert_array_equal(again.images[:, its], whole.images[:, its])
-    np.testing.assert_array_equal(again.half_differences[:, its], whole.half_differences[:, its])
+    second = pixel_top_up.top_up(small_room, basis, counts * (counts > 18) if most == 1 else counts)
+    mask = counts > 18 if most == 1 else counts >= 0
+    np.testing.assert_array_equal(second.images[:, mask], single_batch.images[:, mask])
+    np.testing.assert_array_equal(
+        second.half_differences[:, mask], single_batch.half_differences[:, mask]
+    )
 
 
 def test_batches_have_every_pixel_once(counts: Any):
     batches = list(pixel_top_up.pixel_batches(counts, 10))
-    its = np.concatenate(batches)
-    np.testing.assert_array_equal(np.sort(its), np.flatnonzero(counts))
-    taken = [int(counts.ravel()[pixels].sum()) for pixels in batches]
-    assert all(a <= lightpaint.scene.scene_render.SAMPLES_PER_PASS // 4 for a in taken)
+    all_pixels = np.concatenate(batches)
+    np.testing.assert_array_equal(np.sort(all_pixels), np.flatnonzero(counts))
+    batch_samples = [int(counts.ravel()[pixels].sum()) for pixels in batches]
+    assert all(a <= lightpaint.scene.scene_render.SAMPLES_PER_PASS // 4 for a in batch_samples)
 
 
 def test_noise_falls_with_the_samples(small_room: Scene):
@@ -166,32 +168,36 @@ def test_noise_falls_with_the_samples(small_room: Scene):
     counts = np.zeros((20, 24), int)
     counts[::2] = 30
     long = render_basis(small_room, spp=512, seed=90)
-    missed, told = np.zeros((2, 2))
+    squared_errors, stated_variances = np.zeros((2, 2))
     for seed in range(1, 6):
         basis = pixel_top_up.top_up(small_room, render_basis(small_room, spp=4, seed=seed), counts)
         for k in range(2):
-            missed[k] += np.square(basis.images[:, k::2] - long.images[:, k::2]).sum()
-            told[k] += np.square(basis.half_differences[:, k::2]).sum()
+            squared_errors[k] += np.square(basis.images[:, k::2] - long.images[:, k::2]).sum()
+            stated_variances[k] += np.square(basis.half_differences[:, k::2]).sum()
     # Evenly spread samples do better than independent ones, of which 16 times as many are.
-    assert missed[0] < missed[1] / 8
-    assert 0.7 < (told[0] / told[1]) / (missed[0] / missed[1]) < 1.4
+    assert squared_errors[0] < squared_errors[1] / 8
+    assert (
+        0.7
+        < (stated_variances[0] / stated_variances[1]) / (squared_errors[0] / squared_errors[1])
+        < 1.4
+    )
 
 
 def test_an_interrupt_keeps_what_is_done(small_room: Scene, counts: Any):
-    basis, kept = render_basis(small_room, spp=4), []
+    basis, saved_bases = render_basis(small_room, spp=4), []
 
     def press_ctrl_c(_label: str, done: int, _total: int) -> None:
         if done == 2:
             os.kill(os.getpid(), signal.SIGINT)
 
     def keep(basis: Basis) -> bool:
-        kept.append(basis)
+        saved_bases.append(basis)
         return True
 
     with pytest.raises(Interrupted, match="run the same command to continue"):
         pixel_top_up.top_up(small_room, basis, counts, keep=keep, progress=press_ctrl_c)
-    assert 0 < kept[-1].extra.sum() < counts.sum()
-    rest = pixel_top_up.top_up(small_room, kept[-1], counts - kept[-1].extra)
+    assert 0 < saved_bases[-1].extra.sum() < counts.sum()
+    rest = pixel_top_up.top_up(small_room, saved_bases[-1], counts - saved_bases[-1].extra)
     same_basis(rest, pixel_top_up.top_up(small_room, basis, counts))
 
 
@@ -206,10 +212,10 @@ def test_what_is_kept_is_not_taken_for_uniform_samples(
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path))
     basis = obtain_basis(small_room, spp=8)
     topped = top_up_basis(small_room, basis, counts)
-    found = obtain_basis(small_room, spp=8)
-    assert found.origin == topped.origin
-    np.testing.assert_array_equal(found.extra, counts)
-    assert not is_on_the_way(small_room, found, 16)
+    uniform_basis = obtain_basis(small_room, spp=8)
+    assert uniform_basis.origin == topped.origin
+    np.testing.assert_array_equal(uniform_basis.extra, counts)
+    assert not is_on_the_way(small_room, uniform_basis, 16)
     exact = obtain_basis(small_room, spp=8, exact_spp=True)
     assert exact.extra is None
     np.testing.assert_array_equal(exact.images, basis.images)

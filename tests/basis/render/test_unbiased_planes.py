@@ -54,10 +54,10 @@ ROUGH = '<bsdf type="roughconductor"><float name="alpha" value="0.15"/></bsdf>'
 
 
 def integrator(plugin: str = "path", **booleans: bool) -> str:
-    inside = "".join(
+    flags = "".join(
         f'<boolean name="{name}" value="{str(value).lower()}"/>' for name, value in booleans.items()
     )
-    return f'<integrator type="{plugin}"><integer name="max_depth" value="4"/>{inside}</integrator>'
+    return f'<integrator type="{plugin}"><integer name="max_depth" value="4"/>{flags}</integrator>'
 
 
 ROOMS: dict[str, dict[str, str]] = {
@@ -84,12 +84,12 @@ def short_training(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(guide_training, "TRAINING_SAMPLES", (2**13,))
 
 
-def room(folder: Path, **how: str) -> Scene:
+def room(folder: Path, **options: str) -> Scene:
     """A test room, with the pictures that its lights refer to beside it."""
     rng = np.random.default_rng(0)
     for name in ("dome", "slide"):
         write_rgb(folder / f"{name}.exr", rng.random((8, 16, 3)).astype(np.float32) ** 3)
-    return load_scene(write_room(folder, **{"integrator": integrator(), **how}))
+    return load_scene(write_room(folder, **{"integrator": integrator(), **options}))
 
 
 def light_alone(scene: Scene, name: str) -> Estimate:
@@ -115,10 +115,10 @@ def deviations(image: np.ndarray, half_difference: np.ndarray, truth: Estimate) 
     noises = (half_difference, truth.half_difference)
     squares = [np.square(x.sum(axis=-1, dtype=np.float64))[..., None] for x in noises]
     variance, fourth = block_sums(sum(squares)), block_sums(sum(x**2 for x in squares))
-    lit = variance > 1e-12 * block_sums(truth.image) ** 2
-    gap = (block_sums(image) - block_sums(truth.image))[lit]
-    freedom = 3 * variance[lit] ** 2 / fourth[lit]
-    tail = stats.t.sf(np.abs(gap) / np.sqrt(variance[lit]), freedom)
+    lit_blocks = variance > 1e-12 * block_sums(truth.image) ** 2
+    gap = (block_sums(image) - block_sums(truth.image))[lit_blocks]
+    freedom = 3 * variance[lit_blocks] ** 2 / fourth[lit_blocks]
+    tail = stats.t.sf(np.abs(gap) / np.sqrt(variance[lit_blocks]), freedom)
     return np.asarray(np.sign(gap) * stats.norm.isf(tail))
 
 
@@ -210,5 +210,5 @@ def test_many_lights_have_the_mean_of_their_render(tmp_path: Path, lights: int) 
         weights = np.repeat(weights[:, None], 3, axis=1)
         mixes = (planes.mix(weights) for planes in (basis.planes, basis.noise))
         z.append(deviations(*mixes, truth))
-    for its in z:
-        check_means(its)
+    for z_of_light in z:
+        check_means(z_of_light)

@@ -16,15 +16,15 @@ HEIGHT = 2.0
 
 
 def material(name, kind, **inputs):
-    made = bpy.data.materials.new(name)
-    made.use_nodes = True
-    tree = made.node_tree
+    surface = bpy.data.materials.new(name)
+    surface.use_nodes = True
+    tree = surface.node_tree
     tree.nodes.clear()
     shader, output = tree.nodes.new(kind), tree.nodes.new("ShaderNodeOutputMaterial")
     for key, value in inputs.items():
         shader.inputs[key].default_value = value
     tree.links.new(shader.outputs[0], output.inputs[0])
-    return made
+    return surface
 
 
 def added(name, data):
@@ -33,13 +33,13 @@ def added(name, data):
     return thing
 
 
-def lamp(name, kind, **how):
+def lamp(name, kind, **properties):
     data = bpy.data.lights.new(name, kind)
     thing = added(name, data)
     thing.location = (0, 0, HEIGHT)
     # Whatever an artist may have left.
     data.energy, data.color = 123, (0.1, 0.9, 0.4)
-    for key, value in {"exposure": 2.0, "use_temperature": True, **how}.items():
+    for key, value in {"exposure": 2.0, "use_temperature": True, **properties}.items():
         if hasattr(data, key):
             setattr(data, key, value)
     return thing
@@ -77,13 +77,13 @@ def main():
     scene.render.image_settings.file_format = "OPEN_EXR"
     scene.render.image_settings.color_depth = "32"
     floor_and_camera()
-    shown = [
+    lamps = [
         lamp("bulb", "POINT", shadow_soft_size=0),
         lamp("spot", "SPOT", shadow_soft_size=0, spot_size=1.0, spot_blend=0),
         lamp("sun", "SUN", angle=0),
         lamp("desk", "AREA", shape="RECTANGLE", size=0.01, size_y=0.02),
     ]
-    shown[-1].scale = (2, 1, 1)
+    lamps[-1].scale = (2, 1, 1)
     bpy.ops.mesh.primitive_plane_add(
         size=0.02, location=(0, 0, HEIGHT), rotation=(3.14159265, 0, 0)
     )
@@ -93,13 +93,13 @@ def main():
     world = bpy.data.worlds.new("sky")
     scene.world, world.use_nodes = world, True
     runpy.run_path(str(FOLDER / "set_scene.py"))
-    found = {}
-    for one in (*shown, panel, None):
-        for other in (*shown, panel):
+    radiances = {}
+    for one in (*lamps, panel, None):
+        for other in (*lamps, panel):
             other.hide_render = other is not one
         scene.world = world if one is None else None
-        found["sky" if one is None else one.name] = radiance()
-    print("SEEN " + json.dumps(found))
+        radiances["sky" if one is None else one.name] = radiance()
+    print("SEEN " + json.dumps(radiances))
 
 
 main()

@@ -118,11 +118,11 @@ def again():
     render("thrice", seed=7)
 
 
-def near(found, wanted):
-    assert len(found) == len(wanted), (list(found), wanted)
-    assert all(abs(f - w) < 1e-5 * max(1, abs(w)) for f, w in zip(found, wanted, strict=True)), (
-        list(found),
-        wanted,
+def near(actual, expected):
+    assert len(actual) == len(expected), (list(actual), expected)
+    assert all(abs(f - w) < 1e-5 * max(1, abs(w)) for f, w in zip(actual, expected, strict=True)), (
+        list(actual),
+        expected,
     )
 
 
@@ -139,7 +139,7 @@ def kinds():
     bpy.context.scene.collection.objects.link(twin)
     group(twin, "b")
     free = light("free", "POINT", 7, (1, 1, 1), (1, 0, 1))
-    off = light("off", "AREA", 5, (0.5, 1, 1), (1, 0, 1), "linked")
+    dark_light = light("off", "AREA", 5, (0.5, 1, 1), (1, 0, 1), "linked")
 
     # Principled, its emission textured; one of its two users is in another group.
     textured = bpy.data.materials.new("textured")
@@ -169,8 +169,8 @@ def kinds():
         near(emitted(shared.data), [20, 5, 0])
         near(emitted(twin.data), [1, 10, 30])
         near(emitted(free.data), [7, 7, 7])
-        assert off.data.energy == 0
-        near(list(off.data.color), [0.5, 1, 1])
+        assert dark_light.data.energy == 0
+        near(list(dark_light.data.color), [0.5, 1, 1])
         for thing, factor in ((one, [2, 0.5, 0]), (two, [0.1, 1, 3])):
             nodes = thing.material_slots[0].material.node_tree.nodes
             [multiply] = [n for n in nodes if n.type == "VECT_MATH"]

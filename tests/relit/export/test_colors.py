@@ -17,17 +17,17 @@ AMOUNT = st.floats(0.01, 10)
 THREE = st.tuples(AMOUNT, AMOUNT, AMOUNT)
 
 
-def light(emission: Any, interval: Any, **about: Any) -> Lighting:
+def light(emission: Any, interval: Any, **fields: Any) -> Lighting:
     rgb = tuple(map(float, emission))
-    its = LightSetting(
-        "window", "area", "radiance", "W/(m² sr)", rgb, rgb, interval=interval, **about
+    setting = LightSetting(
+        "window", "area", "radiance", "W/(m² sr)", rgb, rgb, interval=interval, **fields
     )
-    return Lighting((its,))
+    return Lighting((setting,))
 
 
 def own(lighting: Lighting, current: Any = OWN) -> tuple[Any, tuple[str, ...]]:
-    made, names = with_own_colors(lighting, {"window": current})
-    return np.array(made["window"].emission), names
+    own_lighting, names = with_own_colors(lighting, {"window": current})
+    return np.array(own_lighting["window"].emission), names
 
 
 def test_a_blue_window_that_nothing_tells_keeps_its_own_colour() -> None:
@@ -58,11 +58,11 @@ def test_what_the_painting_tells_stays() -> None:
 def test_what_it_gets_lies_between_the_ends_in_its_own_colour(
     emission: Any, current: Any, below: Any, above: Any
 ) -> None:
-    found = np.array(emission)
-    low, high = np.maximum(found - below, 0), found + above
+    rgb_values = np.array(emission)
+    low, high = np.maximum(rgb_values - below, 0), rgb_values + above
     rgb, names = own(light(emission, tuple(zip(low, high, strict=True))), current=current)
     assume(names)
-    assert max(high - low) > UNBOUNDED * found.max()
+    assert max(high - low) > UNBOUNDED * rgb_values.max()
     assert (rgb >= low * (1 - 1e-9)).all()
     assert (rgb <= high * (1 + 1e-9)).all()
     np.testing.assert_allclose(rgb * current[0], np.array(current) * rgb[0], rtol=1e-9)

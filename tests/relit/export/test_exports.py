@@ -58,11 +58,11 @@ def _groups(
     path = interleaved(folder / "groups.exr", layers, **options)
     if alpha:
         part = OpenEXR.File(str(path), separate_channels=True).parts[0]
-        held = {name: c.pixels for name, c in part.channels.items()}
+        layer_pixels = {name: c.pixels for name, c in part.channels.items()}
         a = np.linspace(0, 1, beauty[..., 0].size, dtype=np.float32).reshape(beauty.shape[:2])
-        held["ViewLayer.Combined.A"] = a.astype(options.get("kind", np.float32))
+        layer_pixels["ViewLayer.Combined.A"] = a.astype(options.get("kind", np.float32))
         header = {"chromaticities": x} if (x := part.header.get("chromaticities")) else {}
-        write(path, ("", held), **header)
+        write(path, ("", layer_pixels), **header)
     return read_light_groups(path)
 
 
@@ -131,14 +131,14 @@ def test_the_blender_script_holds_the_multipliers(tmp_path: Path):
     groups = _groups(tmp_path, lacks=1)
     script = blender_script(groups, replace(_lighting(groups), target='x"""; raise\\'))
     tree = ast.parse(script)
-    held = {
+    constants = {
         node.targets[0].id: ast.literal_eval(node.value)  # type: ignore[attr-defined]
         for node in tree.body
         if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)
     }
-    assert list(held["MULTIPLIERS"]) == NASTY  # what is kept is not in it
-    np.testing.assert_allclose(list(held["MULTIPLIERS"].values()), WEIGHTS, rtol=1e-8)
-    assert held["RENDER"] == groups.basis.origin.scene_identity
+    assert list(constants["MULTIPLIERS"]) == NASTY  # what is kept is not in it
+    np.testing.assert_allclose(list(constants["MULTIPLIERS"].values()), WEIGHTS, rtol=1e-8)
+    assert constants["RENDER"] == groups.basis.origin.scene_identity
     assert "raise" in (ast.get_docstring(tree) or "")
 
 
@@ -155,14 +155,14 @@ def evaluated(text: str, run: Any = None) -> str:
     run: the commands in brackets go there; nobody else runs them.
     """
 
-    def one(found: Any) -> str:
-        said = found[0]
-        if said[0] == "[":
-            return str(run(said[1:-1])) if run else ""
-        return said[1] if said[0] == "\\" else ""
+    def one(match: Any) -> str:
+        value = match[0]
+        if value[0] == "[":
+            return str(run(value[1:-1])) if run else ""
+        return value[1] if value[0] == "\\" else ""
 
     text = re.sub(r"\[.*?\]|\$\w+|\$\{.*?\}|\\.", one, text, flags=re.DOTALL)
-    text = re.sub(r"#+|%\d*d", lambda found: "1", text)
+    text = re.sub(r"#+|%\d*d", lambda match: "1", text)
     return text.replace("%V", "main").replace("%v", "m")
 
 
@@ -213,8 +213,8 @@ class Nuke:
         return key
 
     def _add_layer(self, body: str) -> None:
-        layer, *held = self.tcl.splitlist(body)
-        assert held == [f"{layer}.{c}" for c in ("red", "green", "blue", "alpha")]
+        layer, *channel_names = self.tcl.splitlist(body)
+        assert channel_names == [f"{layer}.{c}" for c in ("red", "green", "blue", "alpha")]
         self.layers.add(layer)
 
     def _node(self, kind: str, body: str) -> None:
@@ -244,8 +244,8 @@ class Nuke:
 
     def _shuffle(self, knobs: Any, read: Any) -> Any:
         assert knobs["in"] in self.layers
-        held = read[knobs["in"]]
-        return np.stack([held.get(c, 0 * held["R"]) for c in "RGBA"], axis=-1)
+        planes = read[knobs["in"]]
+        return np.stack([planes.get(c, 0 * planes["R"]) for c in "RGBA"], axis=-1)
 
     def _multiply(self, knobs: Any, a: Any) -> Any:
         assert knobs["channels"] == "rgb"
@@ -295,9 +295,9 @@ def test_nuke_evaluates_nothing_of_a_path(tmp_path: Path, name: str, is_file: bo
         assert evaluated(knob, ran.append) == knob
     assert ran == []
     assert [node["file"] for node in nodes if "file" in node] == [""]
-    [told] = spoken_unreadable(groups, tmp_path)
-    assert "relit.nk leaves it out" in told
-    assert told.isprintable()
+    [message] = spoken_unreadable(groups, tmp_path)
+    assert "relit.nk leaves it out" in message
+    assert message.isprintable()
 
 
 def test_a_path_that_nuke_takes_as_it_is_is_named(tmp_path: Path):
@@ -380,11 +380,13 @@ def test_the_nuke_script_reads_a_folder(tmp_path: Path):
     ],
 )
 def test_what_nuke_calls_a_layer(tmp_path: Path, layer: str, is_part: bool, called: str):
-    written = {layer: pictures()[0], "other": pictures()[1]}
+    pictures_by_layer = {layer: pictures()[0], "other": pictures()[1]}
     make = multi_part if is_part else interleaved
     options = {"is_plain": True} if is_part else {}
     pattern = "{name}"
-    groups = read_light_groups(make(tmp_path / "a.exr", written, **options), pattern=pattern)
+    groups = read_light_groups(
+        make(tmp_path / "a.exr", pictures_by_layer, **options), pattern=pattern
+    )
     layers = [*groups.layers, *([groups.beauty] if groups.beauty else [])]
     assert called in {nuke_layer(x) for x in layers}
 
@@ -392,17 +394,17 @@ def test_what_nuke_calls_a_layer(tmp_path: Path, layer: str, is_part: bool, call
 def test_a_solve_from_a_file_writes_it_all(tmp_path: Path):
     """The whole way: groups, a painting, and the multipliers in lighting.json."""
     groups = _groups(tmp_path, lacks=0.5)
-    wanted = _lighting(groups)
-    painting = _sum(groups, wanted).astype(np.float32)
+    expected = _lighting(groups)
+    painting = _sum(groups, expected).astype(np.float32)
     write(tmp_path / "painting.exr", ("rgb", channels("", painting)))
     look = lp.paint_with_light(
         None, tmp_path / "painting.exr", tmp_path / "out", basis=groups.basis
     )
     write_exports(tmp_path / "out", groups, look.lighting)
-    held = json.loads((tmp_path / "out" / "lighting.json").read_text())["lights"]
-    found = [held[name]["weight"] for name in NASTY]
-    np.testing.assert_allclose(found, WEIGHTS, atol=FLOAT32)
-    assert "standard_error" not in held[NASTY[0]]
+    settings = json.loads((tmp_path / "out" / "lighting.json").read_text())["lights"]
+    weights = [settings[name]["weight"] for name in NASTY]
+    np.testing.assert_allclose(weights, WEIGHTS, atol=FLOAT32)
+    assert "standard_error" not in settings[NASTY[0]]
     assert look.uncertainty is None
     page = (tmp_path / "out" / "report.html").read_text()
     assert "says nothing of its samples and noise" in page
@@ -425,8 +427,8 @@ def test_no_renderer_is_imported(tmp_path: Path):
         "print([m for m in ('mitsuba', 'drjit') if m in sys.modules])\n"
     )
     run = [sys.executable, "-c", code, str(tmp_path)]
-    done = subprocess.run(run, capture_output=True, text=True, check=True)
-    assert done.stdout == "[]\n"
+    completed = subprocess.run(run, capture_output=True, text=True, check=True)
+    assert completed.stdout == "[]\n"
 
 
 # ------------------------------------------------------------------------------- in Blender
@@ -445,8 +447,8 @@ def test_lights_set_in_blender_render_the_answer(tmp_path: Path, blender: list[s
     painting = groups.basis.mix(weights)
     write(tmp_path / "p.exr", ("rgb", channels("", painting)))
     look = lp.paint_with_light(None, tmp_path / "p.exr", tmp_path / "o", basis=groups.basis)
-    found = look.lighting.weights_for(groups.basis)
-    np.testing.assert_allclose(found, weights, atol=FLOAT32)
+    answer_weights = look.lighting.weights_for(groups.basis)
+    np.testing.assert_allclose(answer_weights, weights, atol=FLOAT32)
 
     write_exports(tmp_path, groups, look.lighting)
     in_blender(blender, scene, "again", tmp_path)
@@ -460,27 +462,27 @@ def test_lights_set_in_blender_render_the_answer(tmp_path: Path, blender: list[s
     # Run again, saved and loaded between, it multiplies nothing again.
     np.testing.assert_array_equal(once.image, thrice.image)
     noise = np.sqrt(np.square(once.image - other_seed.image).mean() / 2)
-    off = np.sqrt(np.square(once.image - relit).mean())
+    rms_error = np.sqrt(np.square(once.image - relit).mean())
     # Two renders differ by √2 of the noise of one, and fireflies make noise vary from seed to seed.
-    assert off < 1.6 * np.sqrt(2) * noise
+    assert rms_error < 1.6 * np.sqrt(2) * noise
     # A light that went wrong would be far beyond: so far is the scene as it was.
     assert groups.beauty is not None
     assert np.sqrt(np.square(once.image - groups.beauty.image).mean()) > 5 * noise
     assert relit.mean(axis=(0, 1)) == pytest.approx(once.image.mean(axis=(0, 1)), rel=0.01)
-    again = read_light_groups(tmp_path / "once.exr")
+    reread = read_light_groups(tmp_path / "once.exr")
     # Each group by itself, and what is in none, comes out as it was solved.
     for name in groups.basis.names:
         mean = groups.basis.image(name).mean(axis=(0, 1)) * look.lighting.emission[name]
-        assert again.basis.image(name).mean(axis=(0, 1)) == pytest.approx(mean, rel=0.02, abs=1e-4)
+        assert reread.basis.image(name).mean(axis=(0, 1)) == pytest.approx(mean, rel=0.02, abs=1e-4)
 
 
 def test_every_kind_of_light_is_multiplied_once(tmp_path: Path, blender: list[str]):
     groups = _groups(tmp_path, names=["a", "b", "gone", "linked", "world"])
     write_exports(tmp_path, groups, _lighting(groups))
-    told = in_blender(blender, Path(__file__).parent / "blender_scene.py", "kinds", tmp_path)
-    assert "all as expected" in told
-    assert "no light is in the group gone" in told
-    assert "inside the node group hidden, set it by hand" in told
+    output = in_blender(blender, Path(__file__).parent / "blender_scene.py", "kinds", tmp_path)
+    assert "all as expected" in output
+    assert "no light is in the group gone" in output
+    assert "inside the node group hidden, set it by hand" in output
 
 
 #: What a name may hold to be taken for a formula, or to end its cell or its line.

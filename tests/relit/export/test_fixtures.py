@@ -23,9 +23,9 @@ from lightpaint.relit.export.fixtures import (
 AMOUNT = st.floats(0, 100)
 
 
-def light(name: str, emission: Any, unit: str = "W/sr", **how: Any) -> LightSetting:
+def light(name: str, emission: Any, unit: str = "W/sr", **fields: Any) -> LightSetting:
     rgb = tuple(map(float, emission))
-    return LightSetting(name, "point", "intensity", unit, rgb, rgb, **how)  # type: ignore[arg-type]
+    return LightSetting(name, "point", "intensity", unit, rgb, rgb, **fields)  # type: ignore[arg-type]
 
 
 @given(st.tuples(AMOUNT, AMOUNT, AMOUNT), st.floats(0.001, 100))
@@ -53,8 +53,8 @@ def test_the_brightest_of_a_unit_is_at_full_and_what_is_kept_is_sent_nothing() -
         light("rest", (1, 1, 1), is_fixed=True),
     )
     lighting = Lighting(lights, cd_per_unit=100.0)
-    key, fill, panel, off, rest = fixtures_of(lighting)
-    assert [x.dmx.dimmer for x in (key, fill, panel, off) if x.dmx] == [255, 128, 255, 0]
+    key, fill, panel, dark, rest = fixtures_of(lighting)
+    assert [x.dmx.dimmer for x in (key, fill, panel, dark) if x.dmx] == [255, 128, 255, 0]
     assert rest.dmx is None
     assert key.kelvin is not None
     assert abs(key.kelvin - 3000) < 1  # of Planck's locus at 3000 K
@@ -68,9 +68,9 @@ def test_the_brightest_of_a_unit_is_at_full_and_what_is_kept_is_sent_nothing() -
     assert rows[0]["emitters"] == "a b"
     assert (rows[1]["lumen"], rows[4]["dmx_red"], rows[3]["kelvin"]) == ("", "", "")
     assert float(rows[0]["luminance"]) == float(f"{luminance(warm):.9g}")
-    told = json.loads(fixtures_json(lighting))
-    assert told["fixtures"][1]["dmx"]["dimmer"] == 128
-    assert told["cd_per_unit"] == 100
+    document = json.loads(fixtures_json(lighting))
+    assert document["fixtures"][1]["dmx"]["dimmer"] == 128
+    assert document["cd_per_unit"] == 100
 
 
 def test_no_name_is_a_formula() -> None:

@@ -28,7 +28,7 @@ def script(places: Any, up: Any = (0.0, 1.0, 0.0)) -> str:
 
 def lamps(scale: float = 1.0) -> dict[str, tuple[str, list[list[float]]]]:
     """Type and matrix of the lamps in the file: they shine down, and are scaled and rolled."""
-    made = {}
+    lamp_settings = {}
     for name, kind, point in (
         ("spot", "SPOT", OLD.position),
         ("bulb", "POINT", PLACES[1].position),
@@ -38,15 +38,15 @@ def lamps(scale: float = 1.0) -> dict[str, tuple[str, list[list[float]]]]:
         matrix[:2, :2] = [[0.8, -0.6], [0.6, 0.8]]
         matrix[:3, :3] *= 2
         matrix[:3, 3] = scale * z_up(point)
-        made[name] = (kind, matrix.tolist())
-    return made
+        lamp_settings[name] = (kind, matrix.tolist())
+    return lamp_settings
 
 
-def fake_with(patch: Any, given: Any) -> Any:
+def fake_with(patch: Any, arguments: Any) -> Any:
     """A fake Blender with these lamps."""
     modules = fake_blender()
     objects = modules[0].data.objects
-    for name, (kind, matrix) in given.items():
+    for name, (kind, matrix) in arguments.items():
         data = modules[0].data.lights.new(name, kind)
         data.spot_size, data.spot_blend = CONE
         objects.new(name, data).matrix_world = FakeMatrix(matrix)
@@ -55,18 +55,18 @@ def fake_with(patch: Any, given: Any) -> Any:
 
 def hung_in(modules: Any) -> dict[str, Any]:
     """The same as blender_hung.py prints."""
-    found = {}
+    transforms = {}
     for item in modules[0].data.objects.values():
         data = item.data
         cone = [data.spot_size, data.spot_blend] if data.type == "SPOT" else None
         size = [data.size, data.size_y] if data.type == "AREA" else None
         matrix = list(item.matrix_world)
-        found[item.name] = {"type": data.type, "matrix": matrix, "cone": cone, "size": size}
-    return found
+        transforms[item.name] = {"type": data.type, "matrix": matrix, "cone": cone, "size": size}
+    return transforms
 
 
-def assert_hangs(found: Any, position: Any, direction: Any) -> None:
-    matrix = np.array(found["matrix"])
+def assert_hangs(lamp: Any, position: Any, direction: Any) -> None:
+    matrix = np.array(lamp["matrix"])
     np.testing.assert_allclose(matrix[:3, 3], z_up(position), atol=FLOAT32)
     if direction is not None:
         way = -matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
@@ -74,16 +74,16 @@ def assert_hangs(found: Any, position: Any, direction: Any) -> None:
     assert np.linalg.det(matrix[:3, :3]) > 0
 
 
-def assert_cone(found: Any, cutoff: float, beam: float) -> None:
+def assert_cone(lamp: Any, cutoff: float, beam: float) -> None:
     """Blender's spot is dark from half its size on, and full where the cosine is so much nearer."""
-    size, blend = found["cone"]
+    size, blend = lamp["cone"]
     assert size == pytest.approx(2 * math.radians(cutoff), abs=FLOAT32)
     edge = math.cos(size / 2)
     inner = math.degrees(math.acos(edge + blend * (1 - edge)))
     assert inner == pytest.approx(beam, abs=math.degrees(FLOAT32) * 10)
 
 
-def assert_all_hung(before: Any, first: Any, second: Any, again: Any) -> None:
+def assert_all_hung(before: Any, first: Any, second: Any, third: Any) -> None:
     """Fail unless the lamps of a file hang where the script puts them.
 
     before, first, second, again: lamps before the script, after it, after a second run of it, and
@@ -102,14 +102,14 @@ def assert_all_hung(before: Any, first: Any, second: Any, again: Any) -> None:
     assert first["window light"]["size"] == [2.0, 0.5]
     height = np.array(first["window light"]["matrix"])[:3, 1]
     assert height @ z_up(WAY) == pytest.approx(0, abs=FLOAT32)
-    for name, found in first.items():
-        np.testing.assert_allclose(second[name]["matrix"], found["matrix"], atol=FLOAT32)
+    for name, lamp in first.items():
+        np.testing.assert_allclose(second[name]["matrix"], lamp["matrix"], atol=FLOAT32)
     assert set(first) == set(second)
     # Another answer in which nothing moved: all is as it was.
-    assert set(again) == set(before)
-    for name, found in before.items():
-        np.testing.assert_allclose(again[name]["matrix"], found["matrix"], atol=FLOAT32)
-    assert again["spot"]["cone"] == pytest.approx(before["spot"]["cone"], abs=FLOAT32)
+    assert set(third) == set(before)
+    for name, lamp in before.items():
+        np.testing.assert_allclose(third[name]["matrix"], lamp["matrix"], atol=FLOAT32)
+    assert third["spot"]["cone"] == pytest.approx(before["spot"]["cone"], abs=FLOAT32)
 
 
 def test_lamps_in_blender_hang_as_in_the_answer(tmp_path: Path, blender: list[str]) -> None:
@@ -118,20 +118,20 @@ def test_lamps_in_blender_hang_as_in_the_answer(tmp_path: Path, blender: list[st
     rig = np.eye(4)
     rig[:3, :3] = [[0, -2, 0], [2, 0, 0], [0, 0, 2]]
     rig[:3, 3] = 5, 6, 7
-    given = {"rig": rig.tolist(), "lamps": lamps(), "cone": CONE}
-    (tmp_path / "lamps.json").write_text(json.dumps(given), encoding="utf-8")
-    told = in_blender(blender, Path(__file__).parent / "blender_hung.py", tmp_path)
-    seen = json.loads(next(x for x in told.splitlines() if x.startswith("SEEN"))[5:])
-    assert_all_hung(*seen)
+    inputs = {"rig": rig.tolist(), "lamps": lamps(), "cone": CONE}
+    (tmp_path / "lamps.json").write_text(json.dumps(inputs), encoding="utf-8")
+    output = in_blender(blender, Path(__file__).parent / "blender_hung.py", tmp_path)
+    snapshots = json.loads(next(x for x in output.splitlines() if x.startswith("SEEN"))[5:])
+    assert_all_hung(*snapshots)
 
 
 def test_lamps_hang_as_in_the_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     modules = fake_with(monkeypatch, lamps())
-    seen = [hung_in(modules)]
+    snapshots = [hung_in(modules)]
     for text in (script(PLACES), script(PLACES), script(STAYED)):
         run_in(modules, text, monkeypatch)
-        seen.append(hung_in(modules))
-    assert_all_hung(*seen)
+        snapshots.append(hung_in(modules))
+    assert_all_hung(*snapshots)
 
 
 def test_new_lamps_have_the_watts_of_their_light(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -153,9 +153,9 @@ def test_lamps_that_hang_elsewhere_than_in_the_scene_stay(
     run_in(modules, script(PLACES), monkeypatch)
     after = hung_in(modules)
     assert after == before
-    told = capsys.readouterr().out
+    output = capsys.readouterr().out
     for name in ("spot", "sun", "key", "fill", "window light"):
-        assert f"{name!r} is no lamp, or not where the scene has it" in told
+        assert f"{name!r} is no lamp, or not where the scene has it" in output
 
 
 def test_lamps_tell_the_axes_where_no_camera_does(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -169,6 +169,6 @@ def test_half_a_turn_is_a_turn(monkeypatch: pytest.MonkeyPatch) -> None:
     upwards = EmitterPlace("spot", OLD.position, (0.0, 1.0, 0.0), 30.0, 20.0, moved_from=OLD)
     modules = fake_with(monkeypatch, lamps())
     run_in(modules, script([upwards]), monkeypatch)
-    found = hung_in(modules)["spot"]
-    assert_hangs(found, OLD.position, (0.0, 1.0, 0.0))
-    assert found["cone"] == list(CONE)
+    spot = hung_in(modules)["spot"]
+    assert_hangs(spot, OLD.position, (0.0, 1.0, 0.0))
+    assert spot["cone"] == list(CONE)

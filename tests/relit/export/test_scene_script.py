@@ -24,12 +24,12 @@ def test_a_floor_in_blender_is_lit_as_in_the_scene(tmp_path: Path, blender: list
     emitters = [(name, kind, tuple(rgb)) for name, kind in kinds.items()]
     text = scene_script("evening", "hall.xml", [*emitters, ("dome", "", (2.0, 2.0, 2.0))])
     (tmp_path / "set_scene.py").write_text(text, encoding="utf-8")
-    told = in_blender(blender, Path(__file__).parent / "blender_lit.py", tmp_path)
-    assert "lightpaint: 'gone' is left as it is" in told
-    assert "lightpaint: 'dome' is left as it is" in told
-    seen = json.loads(next(x for x in told.splitlines() if x.startswith("SEEN"))[5:])
+    output = in_blender(blender, Path(__file__).parent / "blender_lit.py", tmp_path)
+    assert "lightpaint: 'gone' is left as it is" in output
+    assert "lightpaint: 'dome' is left as it is" in output
+    values = json.loads(next(x for x in output.splitlines() if x.startswith("SEEN"))[5:])
     # Irradiance of a white floor: I/d², L·A/d² of what is small, all of a sky π L; over π of it.
     falls = {"bulb": 1 / 4, "spot": 1 / 4, "sun": 1.0, "sky": math.pi}
     falls |= {"panel": 0.02**2 / 4, "desk": 0.02 * 0.02 / 4}
     for name, share in falls.items():
-        np.testing.assert_allclose(seen[name], rgb * share / math.pi, rtol=NOISE)
+        np.testing.assert_allclose(values[name], rgb * share / math.pi, rtol=NOISE)

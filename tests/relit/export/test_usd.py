@@ -70,34 +70,34 @@ EMITTERS = [
 def test_lights_shine_as_they_were_solved(tmp_path: Path) -> None:
     made_stage(tmp_path / "hall.usda")
     (tmp_path / "out").mkdir()
-    made = usd_overrides(EMITTERS, tmp_path / "hall.usda", tmp_path / "out")
-    assert made.left == ()
-    (tmp_path / "out" / "lights.usda").write_text(made.text, encoding="utf-8")
+    overrides = usd_overrides(EMITTERS, tmp_path / "hall.usda", tmp_path / "out")
+    assert overrides.left == ()
+    (tmp_path / "out" / "lights.usda").write_text(overrides.text, encoding="utf-8")
     relit = Usd.Stage.Open(str(tmp_path / "out" / "lights.usda"))
 
-    def at(path: str) -> Any:
+    def prim_at(path: str) -> Any:
         return relit.GetPrimAtPath(f"/hall/{path}")
 
     for path in ("lamps/panel", "_3_ring"):
-        np.testing.assert_allclose(shine(at(path)), RGB, rtol=FLOAT32)
-        assert not UsdLux.LightAPI(at(path)).GetNormalizeAttr().Get()
+        np.testing.assert_allclose(shine(prim_at(path)), RGB, rtol=FLOAT32)
+        assert not UsdLux.LightAPI(prim_at(path)).GetNormalizeAttr().Get()
     # Normalized, radiance is over the surface, and intensity is radiance times what is seen of it.
-    r = UsdLux.SphereLight(at("lamps/bulb")).GetRadiusAttr().Get()
-    radiance = shine(at("lamps/bulb")) / (4 * math.pi * r**2)
+    r = UsdLux.SphereLight(prim_at("lamps/bulb")).GetRadiusAttr().Get()
+    radiance = shine(prim_at("lamps/bulb")) / (4 * math.pi * r**2)
     np.testing.assert_allclose(radiance * math.pi * r**2, RGB, rtol=FLOAT32)
-    area = math.pi * UsdLux.DiskLight(at("lamps/spot")).GetRadiusAttr().Get() ** 2
-    np.testing.assert_allclose(shine(at("lamps/spot")) / area * area, RGB, rtol=FLOAT32)
+    area = math.pi * UsdLux.DiskLight(prim_at("lamps/spot")).GetRadiusAttr().Get() ** 2
+    np.testing.assert_allclose(shine(prim_at("lamps/spot")) / area * area, RGB, rtol=FLOAT32)
     # A normalized sun is irradiance, whatever its angle.
-    np.testing.assert_allclose(shine(at("lamps/sun")), RGB, rtol=FLOAT32)
+    np.testing.assert_allclose(shine(prim_at("lamps/sun")), RGB, rtol=FLOAT32)
     for name in ("bulb", "spot", "sun"):
-        assert UsdLux.LightAPI(at(f"lamps/{name}")).GetNormalizeAttr().Get()
-    assert not shine(at("lamps/tube")).any()
+        assert UsdLux.LightAPI(prim_at(f"lamps/{name}")).GetNormalizeAttr().Get()
+    assert not shine(prim_at("lamps/tube")).any()
 
 
 def test_nothing_else_of_the_stage_changes(tmp_path: Path) -> None:
     before = made_stage(tmp_path / "hall.usda")
-    made = usd_overrides(EMITTERS[:1], tmp_path / "hall.usda", tmp_path, about="for once")
-    (tmp_path / "lights.usda").write_text(made.text, encoding="utf-8")
+    overrides = usd_overrides(EMITTERS[:1], tmp_path / "hall.usda", tmp_path, about="for once")
+    (tmp_path / "lights.usda").write_text(overrides.text, encoding="utf-8")
     after = Usd.Stage.Open(str(tmp_path / "lights.usda"))
     assert UsdGeom.GetStageUpAxis(after) == "Z"
     assert UsdGeom.GetStageMetersPerUnit(after) == 0.01
@@ -119,23 +119,23 @@ def test_what_is_no_one_light_is_told(tmp_path: Path) -> None:
     stage = made_stage(tmp_path / "hall.usda")
     UsdLux.RectLight.Define(stage, "/hall/other/panel")
     stage.Save()
-    wrong = [
+    ambiguous = [
         ("panel", "radiance", RGB),  # there are two
         ("sky", "", RGB),  # a multiple of what somebody chose
         ("gone", "radiance", RGB),
         ("wall", "radiance", RGB),  # no light
     ]
-    made = usd_overrides([*wrong, EMITTERS[1]], tmp_path / "hall.usda", tmp_path)
-    assert made.left == ("panel", "sky", "gone", "wall")
-    assert "sun" in made.text
+    overrides = usd_overrides([*ambiguous, EMITTERS[1]], tmp_path / "hall.usda", tmp_path)
+    assert overrides.left == ("panel", "sky", "gone", "wall")
+    assert "sun" in overrides.text
 
 
 def test_without_a_stage_lights_are_in_one_place(tmp_path: Path) -> None:
-    made = usd_overrides([("key light", "intensity", RGB), EMITTERS[0]], None, tmp_path)
-    (tmp_path / "lights.usda").write_text(made.text, encoding="utf-8")
+    overrides = usd_overrides([("key light", "intensity", RGB), EMITTERS[0]], None, tmp_path)
+    (tmp_path / "lights.usda").write_text(overrides.text, encoding="utf-8")
     layer = Usd.Stage.Open(str(tmp_path / "lights.usda"))
-    found = layer.GetPrimAtPath("/lights/key_light")
-    np.testing.assert_allclose(shine(found) / 4, RGB, rtol=FLOAT32)
+    prim = layer.GetPrimAtPath("/lights/key_light")
+    np.testing.assert_allclose(shine(prim) / 4, RGB, rtol=FLOAT32)
     assert layer.GetPrimAtPath("/lights/panel")
 
 
@@ -143,10 +143,10 @@ def test_a_layer_over_a_stage_elsewhere_warns_of_nothing(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     made_stage(tmp_path / "hall.usda")
-    made = usd_overrides(EMITTERS, tmp_path / "hall.usda", tmp_path / "looks" / "evening")
+    overrides = usd_overrides(EMITTERS, tmp_path / "hall.usda", tmp_path / "looks" / "evening")
     assert capfd.readouterr() == ("", "")
     (tmp_path / "looks" / "evening").mkdir(parents=True)
-    (tmp_path / "looks" / "evening" / "lights.usda").write_text(made.text, encoding="utf-8")
-    opened = Usd.Stage.Open(str(tmp_path / "looks" / "evening" / "lights.usda"))
-    assert opened.GetPrimAtPath("/hall/wall").IsA(UsdGeom.Mesh)
+    (tmp_path / "looks" / "evening" / "lights.usda").write_text(overrides.text, encoding="utf-8")
+    stage = Usd.Stage.Open(str(tmp_path / "looks" / "evening" / "lights.usda"))
+    assert stage.GetPrimAtPath("/hall/wall").IsA(UsdGeom.Mesh)
     assert capfd.readouterr() == ("", "")

@@ -30,7 +30,7 @@ EMITTERS = [
 
 def stage_at(path: Path, *, scale: float = 1.0, up: str = "Z") -> Any:
     """A stage with the scene's lights below a parent that is moved, turned and scaled."""
-    turned = z_up if up == "Z" else np.array
+    rotation = z_up if up == "Z" else np.array
     stage = Usd.Stage.CreateNew(str(path))
     UsdGeom.SetStageUpAxis(stage, up)
     hall = UsdGeom.Xform.Define(stage, "/hall")
@@ -48,7 +48,7 @@ def stage_at(path: Path, *, scale: float = 1.0, up: str = "Z") -> Any:
         light = kind.Define(stage, f"/hall/rig/{name}")
         world = np.eye(4)
         # In its parent it has the size of one unit of the world.
-        world[3, :3] = scale * turned(point)
+        world[3, :3] = scale * rotation(point)
         local = Gf.Matrix4d(world.tolist()) * to_rig
         UsdGeom.Xformable(light).AddTranslateOp().Set(local.ExtractTranslation())
         UsdGeom.Xformable(light).AddRotateXOp().Set(-30.0)
@@ -56,8 +56,8 @@ def stage_at(path: Path, *, scale: float = 1.0, up: str = "Z") -> Any:
     return stage
 
 
-def relit(made: Overrides, folder: Path) -> Any:
-    (folder / "lights.usda").write_text(made.text, encoding="utf-8")
+def relit(overrides: Overrides, folder: Path) -> Any:
+    (folder / "lights.usda").write_text(overrides.text, encoding="utf-8")
     return Usd.Stage.Open(str(folder / "lights.usda"))
 
 
@@ -78,33 +78,33 @@ def assert_hangs(world: np.ndarray, position: Any, direction: Any) -> None:
 
 @pytest.mark.parametrize("up", ["Y", "Z"])
 def test_lights_hang_in_the_axes_of_the_stage(tmp_path: Path, up: str) -> None:
-    turned = z_up if up == "Z" else np.array
+    rotation = z_up if up == "Z" else np.array
     before = stage_at(tmp_path / "hall.usda", up=up)
-    made = usd_overrides(EMITTERS, tmp_path / "hall.usda", tmp_path, places=PLACES)
-    assert (made.left, made.unplaced) == ((), ())
-    after = relit(made, tmp_path)
+    overrides = usd_overrides(EMITTERS, tmp_path / "hall.usda", tmp_path, places=PLACES)
+    assert (overrides.left, overrides.unplaced) == ((), ())
+    after = relit(overrides, tmp_path)
     assert UsdGeom.GetStageUpAxis(after) == up
     spot = world_of(after, "/hall/rig/spot")
-    assert_hangs(spot, turned(PLACES[0].position), turned(WAY))
+    assert_hangs(spot, rotation(PLACES[0].position), rotation(WAY))
     # Its size, which is that of its parent, stays.
     np.testing.assert_allclose(np.linalg.norm(spot[:3, :3], axis=1), 2, atol=FLOAT64)
     # A sun turns, and what stays in the scene stays in the stage.
     old_sun = world_of(before, "/hall/rig/sun")
-    assert_hangs(world_of(after, "/hall/rig/sun"), old_sun[3, :3], turned(WAY))
+    assert_hangs(world_of(after, "/hall/rig/sun"), old_sun[3, :3], rotation(WAY))
     bulb = "/hall/rig/bulb"
     np.testing.assert_array_equal(world_of(after, bulb), world_of(before, bulb))
     for place in PLACES[3:]:
         path = f"/hall/lights/{place.name.replace(' ', '_')}"
-        way = None if place.direction is None else turned(place.direction)
-        assert_hangs(world_of(after, path), turned(place.position), way)
+        way = None if place.direction is None else rotation(place.direction)
+        assert_hangs(world_of(after, path), rotation(place.position), way)
     assert after.GetPrimAtPath("/hall/lights").GetTypeName() == "Scope"
     assert after.GetPrimAtPath("/hall").GetTypeName() == "Xform"
 
 
 def test_cones_and_sizes_are_those_of_the_answer(tmp_path: Path) -> None:
     stage_at(tmp_path / "hall.usda")
-    made = usd_overrides(EMITTERS, tmp_path / "hall.usda", tmp_path, places=PLACES)
-    after = relit(made, tmp_path)
+    overrides = usd_overrides(EMITTERS, tmp_path / "hall.usda", tmp_path, places=PLACES)
+    after = relit(overrides, tmp_path)
     for path, cutoff, beam in (("rig/spot", 40, 10), ("lights/key", 25, 5)):
         shaping = UsdLux.ShapingAPI(after.GetPrimAtPath(f"/hall/{path}"))
         angle = shaping.GetShapingConeAngleAttr().Get()
@@ -143,10 +143,10 @@ def test_a_panel_lies_as_in_the_xml(tmp_path: Path) -> None:
 
 def test_a_stage_of_other_units_keeps_its_places(tmp_path: Path) -> None:
     before = stage_at(tmp_path / "hall.usda", scale=100.0)
-    made = usd_overrides(EMITTERS, tmp_path / "hall.usda", tmp_path, places=PLACES)
-    assert made.unplaced == ("spot", "sun")
-    assert made.left == ("key", "fill", "window light")
-    after = relit(made, tmp_path)
+    overrides = usd_overrides(EMITTERS, tmp_path / "hall.usda", tmp_path, places=PLACES)
+    assert overrides.unplaced == ("spot", "sun")
+    assert overrides.left == ("key", "fill", "window light")
+    after = relit(overrides, tmp_path)
     spot = "/hall/rig/spot"
     np.testing.assert_array_equal(world_of(after, spot), world_of(before, spot))
 
@@ -154,10 +154,10 @@ def test_a_stage_of_other_units_keeps_its_places(tmp_path: Path) -> None:
 def test_lights_of_the_stage_tell_the_axes_where_no_camera_does(tmp_path: Path) -> None:
     """A camera that looks straight down has -z upwards in a scene whose y is up."""
     stage_at(tmp_path / "hall.usda")
-    made = usd_overrides(
+    overrides = usd_overrides(
         EMITTERS, tmp_path / "hall.usda", tmp_path, places=PLACES, up=(0.0, 0.0, -1.0)
     )
-    after = relit(made, tmp_path)
+    after = relit(overrides, tmp_path)
     assert_hangs(world_of(after, "/hall/lights/key"), z_up(PLACES[3].position), z_up(WAY))
 
 
@@ -165,12 +165,12 @@ def test_lights_of_the_stage_tell_the_axes_where_no_camera_does(tmp_path: Path) 
 def test_without_a_stage_places_are_those_of_the_scene(
     tmp_path: Path, up: tuple[float, float, float], axis: str
 ) -> None:
-    made = usd_overrides(EMITTERS, None, tmp_path, places=PLACES, up=up)
-    assert (made.left, made.unplaced) == ((), ())
-    after = relit(made, tmp_path)
+    overrides = usd_overrides(EMITTERS, None, tmp_path, places=PLACES, up=up)
+    assert (overrides.left, overrides.unplaced) == ((), ())
+    after = relit(overrides, tmp_path)
     assert UsdGeom.GetStageUpAxis(after) == axis
     assert not after.GetPrimAtPath("/lights/bulb").GetAttribute("xformOpOrder").HasAuthoredValue()
-    assert "over" in made.text
+    assert "over" in overrides.text
     for name, index in (("key", 3), ("fill", 4)):
         place = PLACES[index]
         assert_hangs(world_of(after, f"/lights/{name}"), place.position, place.direction)
@@ -183,8 +183,8 @@ def test_a_new_light_takes_no_name_of_the_stage(tmp_path: Path) -> None:
     stage = stage_at(tmp_path / "hall.usda")
     UsdGeom.Mesh.Define(stage, "/hall/lights/key")
     stage.Save()
-    made = usd_overrides(EMITTERS, tmp_path / "hall.usda", tmp_path, places=PLACES)
-    after = relit(made, tmp_path)
+    overrides = usd_overrides(EMITTERS, tmp_path / "hall.usda", tmp_path, places=PLACES)
+    after = relit(overrides, tmp_path)
     assert after.GetPrimAtPath("/hall/lights/key").IsA(UsdGeom.Mesh)
     assert after.GetPrimAtPath("/hall/lights/key_").GetDisplayName() == "key"
     assert after.GetPrimAtPath("/hall/lights/key_").IsA(UsdLux.SphereLight)
