@@ -73,9 +73,11 @@ def gram(repeats: int) -> None:
                 for _ in range(int(blocks)):
                     plain @ plain.T
 
-        ours = timed(lambda p=(images, target, importance): inner_products(*p), repeats)
+        ours_s = timed(lambda p=(images, target, importance): inner_products(*p), repeats)
         base = timed(product, repeats)
-        print(f"{n:8d}{1e3 * min(ours):10.1f}{1e3 * min(base):10.1f}{min(base) / min(ours):8.2f}")
+        print(
+            f"{n:8d}{1e3 * min(ours_s):10.1f}{1e3 * min(base):10.1f}{min(base) / min(ours_s):8.2f}"
+        )
 
 
 def solves(repeats: int) -> None:
@@ -104,15 +106,15 @@ def solves(repeats: int) -> None:
         three = partial(
             solve_reduced, NormalEquations(all_M, b, np.ones(3)), anything, np.ones((n, 3))
         )
-        again = partial(
+        second = partial(
             solve_reduced, NormalEquations(all_M, other, np.ones(3)), anything, three().weights
         )
-        found = one()
+        optimum = one()
         print(
             f"{n:8d}{pair(timed(one, repeats)):>18s}"
             f"{pair(timed(by_scipy, min(repeats, 3))):>18s}"
-            f"{np.count_nonzero(found.x == 0):6d}{found.kkt_residual:10.0e}"
-            f"{pair(timed(three, repeats)):>18s}{pair(timed(again, repeats)):>18s}"
+            f"{np.count_nonzero(optimum.x == 0):6d}{optimum.kkt_residual:10.0e}"
+            f"{pair(timed(three, repeats)):>18s}{pair(timed(second, repeats)):>18s}"
         )
 
 
@@ -123,8 +125,8 @@ def constrained(repeats: int) -> None:
     for n in (12, 64):
         basis, target = scene(n)
         cells = []
-        for asked in ASKED.values():
-            problem = Problem.of(basis, target, constraints=Constraints.of(**asked))
+        for constraints in ASKED.values():
+            problem = Problem.of(basis, target, constraints=Constraints.of(**constraints))
             equations, start = problem.with_pull(problem.equations), problem.start
             solve = partial(solve_reduced, equations, problem.reduction, start)
             cells.append(f"{pair(timed(solve, 4 * repeats)):>18s}")
@@ -156,11 +158,11 @@ def strokes(count: int) -> None:
                 else:
                     importance[region] = rng.random()
                 view.update(region, with_importance=kind == "importance")
-                between = time.perf_counter()
+                middle = time.perf_counter()
                 weights = live.answer(weights)
-                updates.append(between - start)
-                solves.append(time.perf_counter() - between)
-            together = [sum(both) for both in zip(updates, solves, strict=True)]
+                updates.append(middle - start)
+                solves.append(time.perf_counter() - middle)
+            together = [sum(parts) for parts in zip(updates, solves, strict=True)]
             times = "".join(f"{pair(each):>16s}" for each in (updates, solves, together))
             print(f"{n:8d}{kind:>12s}{times}")
 
@@ -172,13 +174,13 @@ def looks() -> None:
         images, target, importance = picture(n)
         M, b, norm2 = inner_products(images, target, importance)
         rng, anything = np.random.default_rng(2), reduce_to(Constraints(), lights(n))
-        weights, done = np.ones((n, 3)), 0
+        weights, count = np.ones((n, 3)), 0
         start = time.perf_counter()
         while time.perf_counter() - start < 2:
             other = b * rng.uniform(0.5, 1.5, b.shape)
             weights = solve_reduced(NormalEquations(M, other, norm2), anything, weights).weights
-            done += 1
-        print(f"{n:8d}{done / (time.perf_counter() - start):10.0f}")
+            count += 1
+        print(f"{n:8d}{count / (time.perf_counter() - start):10.0f}")
 
 
 def lights(n: int) -> tuple[BasisLight, ...]:
@@ -194,9 +196,11 @@ def scene(n: int) -> tuple[Basis, Target]:
     """A basis of random pictures, without noise, and something painted over all of it."""
     images, image, importance = picture(n)
     origin = Origin("random", "0f" * 8, "sensor", 0, "made up", (1, 1), (1, 1))
-    seen = np.zeros((HEIGHT, WIDTH), bool)
+    emitter_mask = np.zeros((HEIGHT, WIDTH), bool)
     # Its noise is asked for by nothing here.
-    basis = Basis(lights(n), images, np.broadcast_to(np.float32(0), images.shape), seen, origin)
+    basis = Basis(
+        lights(n), images, np.broadcast_to(np.float32(0), images.shape), emitter_mask, origin
+    )
     return basis, Target("random", image, importance, everything=False)
 
 

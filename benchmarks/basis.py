@@ -65,7 +65,7 @@ def measure(scene: Scene, spp: int, repeats: int, only: int) -> None:
     names = [light.name for light in scene.lights]
     height, width = scene.size
     # An odd step, for kinds of lights take turns in the hall.
-    alone = names[:: max(1, len(names) // only) | 1]
+    sample = names[:: max(1, len(names) // only) | 1]
     print(f"\n{scene.path.name}: {len(names)} lights, {width}x{height}, {spp} spp")
     one: list[Run] = []
     beauty: list[Run] = []
@@ -78,9 +78,9 @@ def measure(scene: Scene, spp: int, repeats: int, only: int) -> None:
             one.clear()
             beauty.clear()
             continue
-        own.append(separate(scene, alone, names, spp, seed=repeat))
+        own.append(separate(scene, sample, names, spp, seed=repeat))
         print(f"  n renders {own[-1].seconds:.2f} s", flush=True)
-    report(names, alone, one=one, beauty=beauty, own=own)
+    report(names, sample, one=one, beauty=beauty, own=own)
 
 
 def one_pass(scene: Scene, spp: int, *, seed: int) -> Run:
@@ -103,13 +103,13 @@ def beauty_render(scene: Scene, names: list[str], spp: int, *, seed: int) -> Run
     return _render(scene, dict.fromkeys(names, WHITE), spp, seed)
 
 
-def separate(scene: Scene, alone: list[str], names: list[str], spp: int, *, seed: int) -> Run:
-    """An ordinary render for each light in `alone`; time for all."""
+def separate(scene: Scene, sample: list[str], names: list[str], spp: int, *, seed: int) -> Run:
+    """An ordinary render for each light in `sample`; time for all."""
     runs = []
-    for k, name in enumerate(alone):
+    for k, name in enumerate(sample):
         emission = {other: WHITE if other == name else BLACK for other in names}
         runs.append(_render(scene, emission, spp, seed * 1000 + k))
-    seconds = sum(run.seconds for run in runs) / len(alone) * len(names)
+    seconds = sum(run.seconds for run in runs) / len(sample) * len(names)
     return Run(seconds, np.concatenate([run.variances for run in runs]))
 
 
@@ -128,7 +128,7 @@ def _render(
 
 
 def report(
-    names: list[str], alone: list[str], *, one: list[Run], beauty: list[Run], own: list[Run]
+    names: list[str], sample: list[str], *, one: list[Run], beauty: list[Run], own: list[Run]
 ) -> None:
     """Print times as medians, ratios as medians of the ratios run by run."""
     print(f"\n{'method':12s} {'median s':>9s} {'of a beauty render':>19s}")
@@ -138,11 +138,11 @@ def report(
     speed = statistics.median(a.seconds / b.seconds for a, b in zip(own, one, strict=True))
     print(f"\none pass is {speed:.1f}x faster than {len(names)} renders at equal spp\n")
     print(f"{'light':16s} {'variance vs its own render':>27s} {'at equal time':>14s}")
-    ours = np.mean([run.variances for run in one], axis=0)
-    theirs = np.mean([run.variances for run in own], axis=0)
+    own_variance = np.mean([run.variances for run in one], axis=0)
+    other_variance = np.mean([run.variances for run in own], axis=0)
     gains = []
-    for k, name in enumerate(alone):
-        ratio = ours[names.index(name)] / theirs[k]
+    for k, name in enumerate(sample):
+        ratio = own_variance[names.index(name)] / other_variance[k]
         if ratio == 0:
             print(f"{name:16s} {'too faint to tell':>27s}")
             continue

@@ -65,14 +65,14 @@ def cluster(workers: int, folder: Path) -> Iterator[str]:
     """The address of a scheduler with so many workers of one thread each."""
     file = folder / f"scheduler-{workers}.json"
     dask = [sys.executable, "-m", "dask"]
-    known = ["--no-dashboard", "--scheduler-file", str(file)]
+    options = ["--no-dashboard", "--scheduler-file", str(file)]
     quiet: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     quiet["env"] = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
     many = ["--nworkers", str(workers), "--nthreads", "1", "--local-directory", str(folder)]
     with contextlib.ExitStack() as stack:
         for command in (
-            [*dask, "scheduler", "--host", "127.0.0.1", "--port", "0", *known],
-            [*dask, "worker", *many, *known],
+            [*dask, "scheduler", "--host", "127.0.0.1", "--port", "0", *options],
+            [*dask, "worker", *many, *options],
         ):
             process = stack.enter_context(subprocess.Popen(command, **quiet))
             stack.callback(process.terminate)
@@ -91,9 +91,9 @@ def took(work: Callable[[], object], address: str | None = None) -> Took:
     before, here_s, begun = _workers_s(address), time.process_time(), time.perf_counter()
     work()
     clock_s = time.perf_counter() - begun
-    spent = [time.process_time() - here_s]
-    spent += [now - before.get(worker, 0.0) for worker, now in _workers_s(address).items()]
-    return Took(clock_s, max(spent), sum(spent))
+    cpu_s = [time.process_time() - here_s]
+    cpu_s += [total_s - before.get(worker, 0.0) for worker, total_s in _workers_s(address).items()]
+    return Took(clock_s, max(cpu_s), sum(cpu_s))
 
 
 def _workers_s(address: str | None) -> dict[str, float]:
@@ -103,8 +103,8 @@ def _workers_s(address: str | None) -> dict[str, float]:
     from distributed import Client
 
     with Client(address, set_as_default=False) as client:
-        spent: dict[str, float] = client.run(time.process_time)
-        return spent
+        cpu_s: dict[str, float] = client.run(time.process_time)
+        return cpu_s
 
 
 def _peak_mb(address: str) -> float:
@@ -126,8 +126,8 @@ def items(folder: Path, count: int) -> None:
     job = '{"folder": "", "settings": {"force": false}}'
     some = [Task(f"nothing {k}", "answer", job) for k in range(count)]
     with cluster(2, folder) as address, Cluster(address, silent) as engine:
-        spent = took(lambda: list(engine.run(some)))
-    print(f"{count} errands that are nothing: {1000 * spent.all_s / count:.1f} ms each, here")
+        duration = took(lambda: list(engine.run(some)))
+    print(f"{count} errands that are nothing: {1000 * duration.all_s / count:.1f} ms each, here")
 
 
 def write_looks(folder: Path, *, looks: int, lights: int, size: tuple[int, int]) -> None:
@@ -136,39 +136,39 @@ def write_looks(folder: Path, *, looks: int, lights: int, size: tuple[int, int])
     shape = (lights, size[1], size[0], 3)
     images = rng.random(shape, dtype=np.float32)
     noise = rng.normal(0, 0.02, shape).astype(np.float32)
-    named = tuple(
+    basis_lights = tuple(
         BasisLight(f"lamp {k}", "area", "radiance", "W/(m² sr)", (1.0, 1.0, 1.0), "1 m²")
         for k in range(lights)
     )
     origin = Origin("scene.xml", "0f" * 8, "camera", 0, "synthetic", (32, 32), (1, 1))
-    seen = np.zeros((size[1], size[0]), bool)
-    write_basis(folder / "b.basis.exr", Basis(named, images, noise, seen, origin))
+    emitter_mask = np.zeros((size[1], size[0]), bool)
+    write_basis(folder / "b.basis.exr", Basis(basis_lights, images, noise, emitter_mask, origin))
     for k, weights in enumerate(rng.random((looks, lights)).astype(np.float32)):
         write_rgb(folder / f"p{k:04}.exr", np.tensordot(weights, images, 1))
 
 
-def looks(folder: Path, count: int, want: str, **how: Any) -> None:
+def looks(folder: Path, count: int, steps: str, **options: Any) -> None:
     """Do all looks, of which none is done."""
-    text = f'[[look]]\nbasis = "b.basis.exr"\npaintings = ["p*.exr"]\nwant = [{want}]\n'
+    text = f'[[look]]\nbasis = "b.basis.exr"\npaintings = ["p*.exr"]\nwant = [{steps}]\n'
     (folder / "looks.toml").write_text(text, encoding="utf-8")
     with tempfile.TemporaryDirectory(dir=folder) as place:
-        address = how.get("cluster")
+        address = options.get("cluster")
         begun = time.perf_counter()
         planned = plan(folder / "looks.toml", Path(place) / "out")
         checked_s = time.perf_counter() - begun
 
         if address:  # workers begin with the first
-            assert not run_batch(planned.select("p000[01]"), RunOptions(**how)).failed
+            assert not run_batch(planned.select("p000[01]"), RunOptions(**options)).failed
             planned, count = plan(folder / "looks.toml", Path(place) / "out"), count - 2
 
         def work() -> None:
-            assert not run_batch(planned, RunOptions(**how)).failed
+            assert not run_batch(planned, RunOptions(**options)).failed
 
-        spent = took(work, address)
-        name = "a cluster of two" if address else f"{how.get('workers', 1)} processes"
+        duration = took(work, address)
+        name = "a cluster of two" if address else f"{options.get('workers', 1)} processes"
         print(
-            f"{count} looks, want {want}, {name}: checked in {checked_s:.1f} s, done in {spent} s, "
-            f"{count / spent.clock_s:.1f} looks a second",
+            f"{count} looks, want {steps}, {name}: checked in {checked_s:.1f} s, "
+            f"done in {duration} s, {count / duration.clock_s:.1f} looks a second",
             flush=True,
         )
 
@@ -182,41 +182,43 @@ def basis(engine: Engine, spp: int, cache: Path) -> Basis:
     return PartwiseRender(engine, film)(scene, spp=spp, time_s=None, seed=0, progress=silent)
 
 
-def _kept(made: list[Basis], by: Callable[[], Basis]) -> None:
-    made.append(by())
+def _kept(results: list[Basis], by: Callable[[], Basis]) -> None:
+    results.append(by())
 
 
-def _tell(name: str, spent: Took) -> None:
-    print(f"    {name:<14} {spent} s, {spent.all_s:.1f} s of the processor in all", flush=True)
+def _tell(name: str, duration: Took) -> None:
+    print(
+        f"    {name:<14} {duration} s, {duration.all_s:.1f} s of the processor in all", flush=True
+    )
 
 
 def bases(folder: Path, spp: int) -> None:
     """The table of who renders it."""
     limit_threads(1)
-    held = WorkerCache()
-    basis(InProcess(held, silent), WARM, folder / "warm")
-    made: list[Basis] = []
-    by = partial(basis, InProcess(held, silent), spp, folder / "alone")
-    lock_folder = took(partial(_kept, made, by))
-    (height, width), n = made[0].size, len(made[0].lights)
+    cache = WorkerCache()
+    basis(InProcess(cache, silent), WARM, folder / "warm")
+    results: list[Basis] = []
+    by = partial(basis, InProcess(cache, silent), spp, folder / "alone")
+    lock_folder = took(partial(_kept, results, by))
+    (height, width), n = results[0].size, len(results[0].lights)
     print(f"basis of the gallery, {n} lights, {width}x{height}, {spp} samples per pixel:")
-    found = [("this process", lock_folder)]
-    _tell(*found[-1])
+    durations = [("this process", lock_folder)]
+    _tell(*durations[-1])
     for workers in (1, 2):
         with cluster(workers, folder) as address, Cluster(address, silent) as engine:
             basis(engine, WARM, folder / f"warm-{workers}")
             by = partial(basis, engine, spp, folder / f"by-{workers}")
-            found.append((f"{workers} workers", took(partial(_kept, made, by), address)))
+            durations.append((f"{workers} workers", took(partial(_kept, results, by), address)))
             peak_mb = _peak_mb(address)
-            _tell(*found[-1])
-    one, two = found[1][1], found[2][1]
+            _tell(*durations[-1])
+    one, two = durations[1][1], durations[2][1]
     over = one.busiest_s / lock_folder.busiest_s - 1, one.clock_s / lock_folder.clock_s - 1
     print(f"    two workers take {two.busiest_s / one.busiest_s:.2f} of one, by the processor, ")
     print(f"    {two.clock_s / one.clock_s:.2f} on the clock; one takes {100 * over[0]:.1f} % more")
     print(f"    than this process, {100 * over[1]:.1f} % on the clock")
     print(f"    a worker has {peak_mb:.0f} MB at its peak")
-    same = all(np.array_equal(made[0].images, other.images) for other in made[1:])
-    print(f"    the same to the last bit: {'yes' if same else 'no'}")
+    is_same = all(np.array_equal(results[0].images, other.images) for other in results[1:])
+    print(f"    the same to the last bit: {'yes' if is_same else 'no'}")
 
 
 def _main() -> None:
@@ -227,20 +229,20 @@ def _main() -> None:
     parser.add_argument("--lights", type=int, default=12)
     parser.add_argument("--size", default="640x360")
     parser.add_argument("--spp", type=int, default=64)
-    given = parser.parse_args()
-    width, height = map(int, given.size.split("x"))
+    options = parser.parse_args()
+    width, height = map(int, options.size.split("x"))
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        if given.looks:
-            write_looks(folder, looks=given.looks, lights=given.lights, size=(width, height))
-            for want in ('"solve", "predict"', '"solve", "predict", "report"'):
+        if options.looks:
+            write_looks(folder, looks=options.looks, lights=options.lights, size=(width, height))
+            for steps in ('"solve", "predict"', '"solve", "predict", "report"'):
                 for workers in (1, 2):
-                    looks(folder, given.looks, want, workers=workers)
+                    looks(folder, options.looks, steps, workers=workers)
                 with cluster(2, folder) as address:
-                    looks(folder, given.looks, want, cluster=address)
-        if given.spp:
+                    looks(folder, options.looks, steps, cluster=address)
+        if options.spp:
             items(folder, 500)
-            bases(folder, given.spp)
+            bases(folder, options.spp)
 
 
 if __name__ == "__main__":

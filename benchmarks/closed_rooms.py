@@ -68,17 +68,17 @@ class ClosedRoom:
 
     def points(self, count: int) -> list[str]:
         """Return the elements of random point lights."""
-        made, places = [], []
+        lamps, places = [], []
         for k in range(count):
             place = self.free_place(*places)
             places.append(place)
             colour = 3 * self._rng.uniform(0.6, 1, 3)
-            made.append(point(f"true_{k}", place, colour))
-        return made
+            lamps.append(point(f"true_{k}", place, colour))
+        return lamps
 
     def spots(self, count: int) -> list[str]:
         """Return the elements of random spots that point at the floor or the furniture."""
-        made, places = [], []
+        lamps, places = [], []
         for k in range(count):
             place = self.free_place(*places)
             places.append(place)
@@ -86,20 +86,20 @@ class ClosedRoom:
             cutoff = self._rng.uniform(18, 40)
             beam = cutoff * self._rng.uniform(0.4, 0.8)
             colour = 14 * self._rng.uniform(0.6, 1, 3)
-            made.append(spot(f"true_{k}", place, target, cutoff, beam, colour))
-        return made
+            lamps.append(spot(f"true_{k}", place, target, cutoff, beam, colour))
+        return lamps
 
     def panels(self, count: int, side: float = 0.6) -> list[str]:
         """Return the elements of square panels under the ceiling or at a wall, facing inwards."""
-        made, places = [], []
+        lamps, places = [], []
         for k in range(count):
             place = self.free_place(*places)
             place[1] = self.high[1] - 0.3
             places.append(place)
             target = place + self._rng.uniform([-0.5, -1, -0.5], [0.5, -0.8, 0.5])
             colour = 10 * self._rng.uniform(0.6, 1, 3)
-            made.append(panel(f"true_{k}", place, target, side, colour))
-        return made
+            lamps.append(panel(f"true_{k}", place, target, side, colour))
+        return lamps
 
     def write(
         self, path: Path, lights: list[str], *, size: tuple[int, int] = (160, 90), views: int = 1
@@ -119,14 +119,14 @@ class ClosedRoom:
                 target=_listed([0.6, 1.0, 2.5]),
             ),
         ]
-        known = point("known", np.array([0.0, self.high[1] - 0.25, 1.0]), np.full(3, 0.6))
+        known_lamp = point("known", np.array([0.0, self.high[1] - 0.25, 1.0]), np.full(3, 0.6))
         width, height = size
         text = _ROOM.format(
             width=width,
             height=height,
             sensors="\n".join(sensors[:views]),
             shapes="\n".join(self._shapes),
-            lights="\n".join([known, *lights]),
+            lights="\n".join([known_lamp, *lights]),
         )
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
@@ -238,5 +238,5 @@ def _lookat(place: Doubles, target: Doubles, before: str = "") -> str:
     )
 
 
-def _listed(values: Doubles | list[float], between: str = ", ") -> str:
-    return between.join(f"{float(v):.5f}" for v in values)
+def _listed(values: Doubles | list[float], separator: str = ", ") -> str:
+    return separator.join(f"{float(v):.5f}" for v in values)

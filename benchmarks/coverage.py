@@ -104,19 +104,19 @@ def measure(kind: str, folder: Path, *, seeds: int, spp: int) -> None:
     *bases, truth = rendered_bases(scene, seeds, spp, factor)
     target = make_target(kind, truth)
     best = lp.correct_noise(lp.solve(truth, target, literal=True, resize=True)).weights
-    held: list[list[np.ndarray]] = [[], []]
+    intervals: list[list[np.ndarray]] = [[], []]
     untold: list[list[np.ndarray]] = [[], []]
     for basis in bases:
         solution = lp.solve(basis, target, literal=True, resize=True)
         for k, answer in enumerate((solution, lp.correct_noise(solution))):
-            found = lp.error_bars(answer)
-            assert found is not None
-            low, high = found.interval
-            held[k].append((low <= best + 1e-9) & (best <= high + 1e-9))
-            untold[k].append(found.untold)
+            bars = lp.error_bars(answer)
+            assert bars is not None
+            low, high = bars.interval
+            intervals[k].append((low <= best + 1e-9) & (best <= high + 1e-9))
+            untold[k].append(bars.untold)
     cpu_s = time.process_time() - began_s
     for k, name in enumerate((kind, f"{kind}, corrected")):
-        hits, is_on, unknown = np.array(held[k]), best > 0, np.array(untold[k])
+        hits, is_on, unknown = np.array(intervals[k]), best > 0, np.array(untold[k])
         numbers = (
             hits[:, is_on].mean(),
             hits[:, ~is_on].mean() if not is_on.all() else np.nan,
@@ -158,25 +158,25 @@ def rendered_bases(scene: Scene, seeds: int, spp: int, factor: int) -> Iterator[
     tracer, rows, half_spp = Tracer(scene, 0), range(scene.size[0]), spp // 2
     table = train(tracer, lambda: None)
     total: list[np.ndarray] = []
-    seen = np.zeros(scene.size, bool)
+    emitter_mask = np.zeros(scene.size, bool)
     for seed in range(seeds):
         sums = []
         for half in range(2):
             planes = tracer.planes(rows)
             tracer.add(planes, half, rows, seed * half_spp, half_spp)
             sums.append(planes.sums())
-            seen |= planes.seen() > 0
+            emitter_mask |= planes.seen() > 0
         total = total or [np.zeros(x.shape) for x in sums]
-        for all_of_them, its in zip(total, sums, strict=True):
-            all_of_them += its
-        yield basis_of_sums(scene, 0, sums, seen, half_spp, table, start=None)
+        for all_of_them, part in zip(total, sums, strict=True):
+            all_of_them += part
+        yield basis_of_sums(scene, 0, sums, emitter_mask, half_spp, table, start=None)
     for half in range(2):
         planes = tracer.planes(rows)
         tracer.add(planes, half, rows, seeds * half_spp, (factor - 1) * seeds * half_spp)
         total[half] += planes.sums()
     tracer.close()
     sums = [x.astype(np.float32) for x in total]
-    yield basis_of_sums(scene, 0, sums, seen, factor * seeds * half_spp, table, start=None)
+    yield basis_of_sums(scene, 0, sums, emitter_mask, factor * seeds * half_spp, table, start=None)
 
 
 if __name__ == "__main__":

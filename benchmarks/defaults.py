@@ -139,18 +139,18 @@ def seconds_of(arguments: Sequence[str], checkout: Path, home: Path) -> float:
     """Run Python with `arguments` in a version; return the processor's seconds."""
     home.mkdir(exist_ok=True)
     (home / "cache").mkdir(exist_ok=True)
-    known = {"HOME": str(home), "LIGHTPAINT_CACHE": str(home / "cache")}
-    done = subprocess.run(
+    environment = {"HOME": str(home), "LIGHTPAINT_CACHE": str(home / "cache")}
+    completed = subprocess.run(
         [sys.executable, "-c", TIMED, *arguments],
-        env={**os.environ, "PYTHONPATH": str(checkout), **known},
+        env={**os.environ, "PYTHONPATH": str(checkout), **environment},
         capture_output=True,
         cwd=home,
         text=True,
         check=False,
     )
-    if done.returncode:
-        raise SystemExit(done.stderr)
-    return float(done.stdout)
+    if completed.returncode:
+        raise SystemExit(completed.stderr)
+    return float(completed.stdout)
 
 
 def command(*arguments: str) -> list[str]:
@@ -163,33 +163,35 @@ def verified(folder: Path) -> tuple[int, float]:
     report = json.loads((folder / "report.json").read_text())
     power = report["verification"]["power"]["lights"]
     lights = report["lights"]
-    seen = sum(lights[name]["share"] for name, chance in power.items() if chance >= LIKELY)
-    return report["verification"]["spp"], seen
+    detected_share = sum(
+        lights[name]["share"] for name, chance in power.items() if chance >= LIKELY
+    )
+    return report["verification"]["spp"], detected_share
 
 
 def demo(checkouts: dict[str, Path], place: Path) -> None:
     """Measure the demo with nothing kept."""
-    found = {
-        which: seconds_of(command("demo", "-q"), at, place / which)
-        for which, at in checkouts.items()
+    durations = {
+        version: seconds_of(command("demo", "-q"), checkout, place / version)
+        for version, checkout in checkouts.items()
     }
-    print_row("demo, cold", found)
+    print_row("demo, cold", durations)
 
 
 def second(checkouts: dict[str, Path], place: Path) -> None:
     """Measure the paintings of a kept scene."""
     total = dict.fromkeys(checkouts, 0.0)
     for name, files in PAINTINGS.items():
-        found, notes = {}, []
-        for which, at in checkouts.items():
-            files_at = [str(at / "targets/gallery" / x) if "." in x else x for x in files]
-            scene = str(place / which / "lightpaint-demo/gallery/scene.xml")
+        durations, notes = {}, []
+        for version, checkout in checkouts.items():
+            files_at = [str(checkout / "targets/gallery" / x) if "." in x else x for x in files]
+            scene = str(place / version / "lightpaint-demo/gallery/scene.xml")
             arguments = command("solve", scene, *files_at, "-o", name, "-q")
-            found[which] = seconds_of(arguments, at, place / which)
-            total[which] += found[which]
-            spp, share = verified(place / which / name)
+            durations[version] = seconds_of(arguments, checkout, place / version)
+            total[version] += durations[version]
+            spp, share = verified(place / version / name)
             notes.append(f"{spp} samples check {100 * share:.0f} %")
-        print_row(f"second painting, {name}", found, " / ".join(notes))
+        print_row(f"second painting, {name}", durations, " / ".join(notes))
     print_row("second painting, all six", total)
 
 
@@ -202,17 +204,19 @@ def first(checkouts: dict[str, Path], place: Path, long_spp: int) -> None:
     truth = lp.render_basis(
         lp.load_scene(scene).reduced("1/2"), spp=long_spp // 4, seed=LONG_SEED
     ).current_look
-    found, notes = {}, []
-    for which, at in checkouts.items():
+    durations, notes = {}, []
+    for version, checkout in checkouts.items():
         for spp in (2, 4, 8, 16, 32, 64):
-            out = place / f"{which}-{spp}.npy"
-            home = place / f"first-{which}-{spp}"
-            found[which] = seconds_of(["-c", FIRST, scene, str(spp), str(out)], at, home)
-            off = delta_e_mean(np.load(out), truth)
-            if off <= CLOSE:
+            output = place / f"{version}-{spp}.npy"
+            home = place / f"first-{version}-{spp}"
+            durations[version] = seconds_of(
+                ["-c", FIRST, scene, str(spp), str(output)], checkout, home
+            )
+            error = delta_e_mean(np.load(output), truth)
+            if error <= CLOSE:
                 break
-        notes.append(f"{spp} samples, ΔE {off:.1f}")
-    print_row("first picture, cold", found, " / ".join(notes))
+        notes.append(f"{spp} samples, ΔE {error:.1f}")
+    print_row("first picture, cold", durations, " / ".join(notes))
 
 
 def weights(checkouts: dict[str, Path], place: Path, long_spp: int, seeds: int) -> None:
@@ -221,25 +225,38 @@ def weights(checkouts: dict[str, Path], place: Path, long_spp: int, seeds: int) 
         name: [str(ROOT / "targets/gallery" / x) for x in files if "." in x]
         for name, files in PAINTINGS.items()
     }
-    found = {}
-    for which, at in checkouts.items():
-        out = place / f"{which}.npz"
-        how = str(at), json.dumps(paintings), str(seeds), str(long_spp), str(LONG_SEED), str(out)
-        seconds_of(["-c", WEIGHTS, *how], at, place / which)
-        with np.load(out) as kept:
-            found[which] = dict(kept)
+    results = {}
+    for version, checkout in checkouts.items():
+        output = place / f"{version}.npz"
+        arguments = (
+            str(checkout),
+            json.dumps(paintings),
+            str(seeds),
+            str(long_spp),
+            str(LONG_SEED),
+            str(output),
+        )
+        seconds_of(["-c", WEIGHTS, *arguments], checkout, place / version)
+        with np.load(output) as archive:
+            results[version] = dict(archive)
     for name in paintings:
         errors, notes = {}, []
-        for which, its in found.items():
-            truth, share = luminance(its[f"truth of {name}"]), its[f"shares of {name}"]
-            off = np.abs(luminance(its[f"weights of {name}"]) - truth) / np.maximum(truth, 1e-9)
-            each = 100 * off @ share / share.sum()
-            errors[which] = float(each.mean())
-            pairs = zip(its[f"pictures of {name}"], its[f"long pictures of {name}"], strict=True)
+        for version, arrays in results.items():
+            truth, share = luminance(arrays[f"truth of {name}"]), arrays[f"shares of {name}"]
+            error = np.abs(luminance(arrays[f"weights of {name}"]) - truth) / np.maximum(
+                truth, 1e-9
+            )
+            each = 100 * error @ share / share.sum()
+            errors[version] = float(each.mean())
+            pairs = zip(
+                arrays[f"pictures of {name}"], arrays[f"long pictures of {name}"], strict=True
+            )
             off_e = np.mean([delta_e_mean(picture, long) for picture, long in pairs])
             notes.append(f"± {each.std() / np.sqrt(seeds):.2f}, picture ΔE {off_e:.2f}")
         print_row(f"error of weights in %, {name}", errors, " / ".join(notes))
-    print("samples: " + ", ".join(f"{its['spp']} {which}" for which, its in found.items()))
+    print(
+        "samples: " + ", ".join(f"{arrays['spp']} {version}" for version, arrays in results.items())
+    )
 
 
 def luminance(weights: Any) -> Any:
@@ -261,9 +278,9 @@ def delta_e_mean(picture: Any, truth: Any) -> float:
     return float(delta_e(picture * scale, truth * scale).mean())
 
 
-def print_row(title: str, found: dict[str, float], note: str = "") -> None:
+def print_row(title: str, figures: dict[str, float], note: str = "") -> None:
     """Print figures of both versions, and their ratio."""
-    before, now = found["before"], found["now"]
+    before, now = figures["before"], figures["now"]
     print(f"{title:38s}{before:8.2f}{now:8.2f}{now / before:7.2f}   {note}", flush=True)
 
 

@@ -51,19 +51,21 @@ def main() -> None:
         for _ in range(options.repeats):
             sampled.append(timed(basis, target, view, sample=warm_start.MIN_SAMPLE))
             all_pixels.append(timed(basis, target, view, sample=10**12))
-        (a, found), (b, expected) = (
+        (a, solution), (b, expected) = (
             min(each, key=lambda x: x[0]) for each in (sampled, all_pixels)
         )
         size = np.sqrt(basis.power)
-        apart = np.abs(size * (found.weights - expected.weights)).max()
-        loss = loss_with_pull(found) / loss_with_pull(expected) - 1
-        asked = ("--view", view.name, "--exposure", str(view.stops))
-        used, clock = command(options.basis, options.painting, *asked, repeats=options.repeats)
-        rounds = [x.certificate.rounds for x in (found, expected)]
+        difference = np.abs(size * (solution.weights - expected.weights)).max()
+        loss = loss_with_pull(solution) / loss_with_pull(expected) - 1
+        view_options = ("--view", view.name, "--exposure", str(view.stops))
+        used, clock = command(
+            options.basis, options.painting, *view_options, repeats=options.repeats
+        )
+        rounds = [x.certificate.rounds for x in (solution, expected)]
         print(
             f"{name:8s} {a:8.2f} {rounds[0]:7d} {b:8.2f} {rounds[1]:7d} {b / a:6.1f}x "
-            f"{apart / (size * expected.weights).max():8.0e} {loss:+8.0e} {used:6.2f} {clock:6.2f} "
-            f"{used / literal[0]:5.2f}x",
+            f"{difference / (size * expected.weights).max():8.0e} {loss:+8.0e} "
+            f"{used:6.2f} {clock:6.2f} {used / literal[0]:5.2f}x",
             flush=True,
         )
 
@@ -79,12 +81,12 @@ def timed(basis: lp.Basis, target: lp.Target, view: Any, *, sample: int) -> tupl
         warm_start.MIN_SAMPLE = usual
 
 
-def command(basis: str, painting: str, *asked: str, repeats: int) -> tuple[float, float]:
+def command(basis: str, painting: str, *options: str, repeats: int) -> tuple[float, float]:
     """Seconds of the processor and on the clock of the whole command, the least of its runs."""
     took = []
     for _ in range(repeats):
         with tempfile.TemporaryDirectory() as folder:
-            words = ["solve", basis, painting, *asked, "-o", str(Path(folder) / "out")]
+            words = ["solve", basis, painting, *options, "-o", str(Path(folder) / "out")]
             before, start = os.times(), time.perf_counter()
             run = [sys.executable, "-m", "lightpaint", *words]
             subprocess.run(run, check=True, capture_output=True)

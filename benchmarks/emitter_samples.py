@@ -73,10 +73,10 @@ def measure(scene: Scene, pairs: list[tuple[int, ...]], spp: int, repeats: int) 
     for pair in pairs:
         ratios = np.mean(variances[pair], axis=0) / np.mean(variances[first], axis=0)
         variance = float(np.exp(np.mean(np.log(ratios[ratios > 0]))))
-        its, reference = statistics.median(seconds[pair]), statistics.median(seconds[first])
+        median_s, reference = statistics.median(seconds[pair]), statistics.median(seconds[first])
         print(
-            f"{pair[0]:5d}, {pair[1]} {statistics.median(training[pair]):9.2f} {its:10.4f} "
-            f"{variance:9.3f} {variance * its / reference:11.3f}"
+            f"{pair[0]:5d}, {pair[1]} {statistics.median(training[pair]):9.2f} {median_s:10.4f} "
+            f"{variance:9.3f} {variance * median_s / reference:11.3f}"
         )
 
 

@@ -92,8 +92,8 @@ class Case:
         """Mean ΔE of a picture against what was meant, as the display shows both."""
         transform = self.target.transform
         assert transform is not None
-        shown = (transform.decode(transform.encode(x)) for x in (image, self.meant))
-        return float(delta_e(*(x * 2**transform.stops for x in shown)).mean())
+        displayed = (transform.decode(transform.encode(x)) for x in (image, self.meant))
+        return float(delta_e(*(x * 2**transform.stops for x in displayed)).mean())
 
     def over(self, few: lp.Basis) -> "Case":
         """The same strokes over the look of a basis of few samples, without its grain."""
@@ -153,24 +153,25 @@ def main() -> None:
             if own != nothing:
                 row(f"nothing, {setting}", own, nothing, own)
             start_s = time.perf_counter()
-            found = {
-                style: [x.judged(answer(basis, x, SETTINGS[setting])) for x in its]
-                for style, its in cases.items()
+            errors = {
+                style: [x.judged(answer(basis, x, SETTINGS[setting])) for x in cases_of_style]
+                for style, cases_of_style in cases.items()
             }
             taken_s = time.perf_counter() - start_s
-            row(setting, found, nothing, own, taken_s / (options.cases * len(cases)))
+            row(setting, errors, nothing, own, taken_s / (options.cases * len(cases)))
         for spp in options.few:
             few = obtain_basis(scene, spp=spp, seed=1, use_cache=False)
-            found = {
-                style: [x.judged(basis.mix(weights(few, x.over(few), {}))) for x in its]
-                for style, its in cases.items()
+            errors = {
+                style: [x.judged(basis.mix(weights(few, x.over(few), {}))) for x in cases_of_style]
+                for style, cases_of_style in cases.items()
             }
-            row(f"default, {spp} spp", found, nothing, nothing)
+            row(f"default, {spp} spp", errors, nothing, nothing)
         groups = as_light_groups(basis)
-        found = {
-            style: [x.judged(answer(groups, x, {})) for x in its] for style, its in cases.items()
+        errors = {
+            style: [x.judged(answer(groups, x, {})) for x in cases_of_style]
+            for style, cases_of_style in cases.items()
         }
-        row("default, light groups", found, nothing, nothing)
+        row("default, light groups", errors, nothing, nothing)
         numbers = range(options.first, options.first + options.cases)
         lamps = [over_lamp(basis, np.random.default_rng([99, k])) for k in numbers]
         lamps = {"lamps": [x for x in lamps if x is not None]}
@@ -180,21 +181,23 @@ def main() -> None:
             row("doing nothing", none, none, none)
             for setting in options.settings:
                 own = judged_alike(lamps, basis.mix(unpainted(basis, SETTINGS[setting])))
-                its = [x.judged(answer(basis, x, SETTINGS[setting])) for x in lamps["lamps"]]
-                row(setting, {"lamps": its}, none, own)
+                lamp_errors = [
+                    x.judged(answer(basis, x, SETTINGS[setting])) for x in lamps["lamps"]
+                ]
+                row(setting, {"lamps": lamp_errors}, none, own)
 
 
 def loosened(name: str, options: argparse.Namespace) -> None:
     """Print the mean ΔE of the advised hold, and of what other shares would have advised."""
     scene = lp.load_scene(SCENES / name / "scene.xml").reduced(SIZES[name])
     basis = obtain_basis(scene, spp=SPP)
-    found = []
+    differences = []
     for style in options.styles:
         for k in range(options.first, options.first + options.cases):
             case = painted(basis, style, np.random.default_rng([STYLES.index(style), k]))
             solution = lp.solve(basis, case.target)
-            seen = lp.compare_appearance(solution)
-            if not any(reason.kind == "hold" for reason in seen.causes):
+            appearance = lp.compare_appearance(solution)
+            if not any(reason.kind == "hold" for reason in appearance.causes):
                 continue
             holds = [solution.problem.fit.hold]
             for share in SHARES:
@@ -203,32 +206,41 @@ def loosened(name: str, options: argparse.Namespace) -> None:
                 weaker = [x.loosening.hold for x in reasons if x.loosening is not None]
                 holds.append(weaker[0] if weaker else holds[0])
             answers = [answer(basis, case, {"hold": hold}) for hold in [*holds, 0.0]]
-            found.append([case.judged(x) for x in (case.current, *answers)])
+            differences.append([case.judged(x) for x in (case.current, *answers)])
     names = ("doing nothing", "held", *(f"{100 * share:.0f} %" for share in SHARES), "let go")
-    told = zip(names, np.mean(found, axis=0), strict=True)
-    print(f"{name}, {len(found)} cases: " + ", ".join(f"{n} {x:.2f}" for n, x in told), flush=True)
+    mean_differences = zip(names, np.mean(differences, axis=0), strict=True)
+    print(
+        f"{name}, {len(differences)} cases: "
+        + ", ".join(f"{n} {x:.2f}" for n, x in mean_differences),
+        flush=True,
+    )
 
 
 def head(styles: Collection[str]) -> None:
     """Print the heads of the columns of `row`."""
-    shown = "".join(f"{style:>14s}" for style in styles)
-    print(f"{'':22s}{shown}{'mean':>8s}   harm: now unpainted{'s':>6s}")
+    columns = "".join(f"{style:>14s}" for style in styles)
+    print(f"{'':22s}{columns}{'mean':>8s}   harm: now unpainted{'s':>6s}")
 
 
-def row(name: str, errors: Errors, now: Errors, own: Errors, taken_s: float = 0) -> None:
+def row(name: str, errors: Errors, present: Errors, own: Errors, taken_s: float = 0) -> None:
     """Print a line: errors by style, their mean, and how much worse than either lighting with
     nothing painted a case is at most.
     """
     columns = "".join(f"{np.mean(x):8.2f} {max(x):5.1f}" for x in errors.values())
     mean = np.mean([np.mean(x) for x in errors.values()])
-    harm = (max(np.max(np.subtract(errors[x], its[x])) for x in errors) for its in (now, own))
-    told = "".join(f"{x:10.2f}" for x in harm)
-    print(f"{name:22s}{columns}{mean:8.2f}  {told}{taken_s:6.2f}", flush=True)
+    harm = (
+        max(np.max(np.subtract(errors[x], baseline[x])) for x in errors)
+        for baseline in (present, own)
+    )
+    harm_text = "".join(f"{x:10.2f}" for x in harm)
+    print(f"{name:22s}{columns}{mean:8.2f}  {harm_text}{taken_s:6.2f}", flush=True)
 
 
 def judged_alike(cases: Mapping[str, Sequence[Case]], image: np.ndarray) -> Errors:
     """Judge one picture (h, w, 3) in all cases."""
-    return {style: [x.judged(image) for x in its] for style, its in cases.items()}
+    return {
+        style: [x.judged(image) for x in cases_of_style] for style, cases_of_style in cases.items()
+    }
 
 
 def unpainted(basis: lp.Basis, settings: dict[str, Any]) -> np.ndarray:
@@ -278,7 +290,7 @@ def painted(
     is_clean: whether it is painted over the denoised look.
     """
     current = basis.mix(basis.current_weights)
-    meant, ratio = next(
+    intended, ratio = next(
         (image, ratio)
         for image, ratio in intentions(basis, current, rng)
         if (np.abs(ratio).max(axis=-1) > 0.5).mean() > 0.005
@@ -286,9 +298,9 @@ def painted(
     soft = basis.size[1] / 80
     ratio = np.dstack([gaussian_filter(plane, soft) for plane in np.moveaxis(ratio, -1, 0)])
     strong = np.abs(ratio).max(axis=-1)
-    off = rng.normal(0, 0.15, 3) * (strong > 0.2)[..., None]
+    scatter = rng.normal(0, 0.15, 3) * (strong > 0.2)[..., None]
     look = denoised(current, basis.features, quality="high") if is_clean else current
-    image = look * 2 ** (ratio * rng.uniform(0.75, 1.35) + off)
+    image = look * 2 ** (ratio * rng.uniform(0.75, 1.35) + scatter)
     mask = np.ones(basis.size)
     if style != "full":
         mask = gaussian_filter(region(strong, style).astype(float), soft)
@@ -305,31 +317,33 @@ def painted(
         through_view=True,
         over_look=True,
     )
-    return Case(meant, current, target)
+    return Case(intended, current, target)
 
 
 def over_lamp(basis: lp.Basis, rng: np.random.Generator) -> Case | None:
     """A stroke over a lamp in view and what is around it; None where no lamp is in view."""
-    current, seen = basis.current_look, basis.emitters_seen
+    current, emitter_mask = basis.current_look, basis.emitters_seen
     whose = np.argmax(luminance(current_pictures(basis)), axis=0)
-    lamps = [k for k in np.unique(whose[seen]) if not basis.is_fixed[k]]
+    lamps = [k for k in np.unique(whose[emitter_mask]) if not basis.is_fixed[k]]
     if not lamps:
         return None
     k = int(rng.choice(lamps))
-    rows, columns = np.nonzero(seen & (whose == k))
-    at = int(rng.integers(rows.size))
+    rows, columns = np.nonzero(emitter_mask & (whose == k))
+    pixel = int(rng.integers(rows.size))
     y, x = np.mgrid[: basis.size[0], : basis.size[1]]
-    away = np.hypot(y - rows[at], x - columns[at]) / basis.size[0]
+    away = np.hypot(y - rows[pixel], x - columns[pixel]) / basis.size[0]
     mask = gaussian_filter((away < rng.uniform(0.06, 0.2)).astype(float), basis.size[1] / 80)
     mask[mask < 0.02] = 0
     weights = basis.current_weights.copy()
     weights[k] *= 2 ** (rng.uniform(1, 2.5) * (1 if rng.random() < 0.75 else -1))
     tint = kelvin_to_rgb(rng.uniform(2400, 5000)) / kelvin_to_rgb(6500)
     weights[k] *= tint / luminance(tint)
-    meant = basis.mix(weights)
-    unseen = ~seen[..., None]
-    beside = (meant * mask[..., None] * unseen).sum((0, 1)) / (mask[..., None] * unseen).sum((0, 1))
-    image = np.where(seen[..., None], beside, meant) * rng.uniform(0.75, 1.35)
+    intended = basis.mix(weights)
+    unseen = ~emitter_mask[..., None]
+    neighbours = (intended * mask[..., None] * unseen).sum((0, 1)) / (mask[..., None] * unseen).sum(
+        (0, 1)
+    )
+    image = np.where(emitter_mask[..., None], neighbours, intended) * rng.uniform(0.75, 1.35)
     transform = lp.ViewTransform("srgb", meter_exposure(current, basis))
     codes = np.round(255 * transform.encode(image)) / 255
     target = lp.Target(
@@ -342,7 +356,7 @@ def over_lamp(basis: lp.Basis, rng: np.random.Generator) -> Case | None:
         through_view=True,
         over_look=True,
     )
-    return Case(meant, current, target)
+    return Case(intended, current, target)
 
 
 def intentions(

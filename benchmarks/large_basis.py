@@ -147,14 +147,14 @@ finally:
     told = [(kind, rows[kind], spent_s[kind]) for kind in rows]
     print("measured", repr((used.ru_maxrss, cpu_s, told)), file=sys.stderr)
 """
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    if done.returncode:
-        raise SystemExit(done.stderr)
-    peak, cpu_s, told = ast.literal_eval(done.stderr.rsplit("measured", 1)[1].strip())
+    completed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    if completed.returncode:
+        raise SystemExit(completed.stderr)
+    peak, cpu_s, lines = ast.literal_eval(completed.stderr.rsplit("measured", 1)[1].strip())
     # Linux counts in units of 1024 bytes, macOS in bytes.
     unit = 1 if sys.platform == "darwin" else 1024
     yield f"{peak * unit / GB:.2f} GB at most, {cpu_s:.0f} s of the processor"
-    for kind, planes, spent_s in told:
+    for kind, planes, spent_s in lines:
         walks = planes / lights
         yield f"{walks:.1f} walks over all {kind}, {spent_s / walks:.1f} s of reading each"
 
@@ -167,13 +167,13 @@ def main() -> None:
     parser.add_argument("--noise", type=float, default=0.02, help="beside the light of a pixel")
     parser.add_argument("--folder", type=Path, help="for the files; one that is deleted by default")
     parser.add_argument("--write", action="store_true", help=argparse.SUPPRESS)
-    options, more = parser.parse_known_args()
+    options, solve_options = parser.parse_known_args()
     if options.write:
         write_files(options.folder, options.lights, made_size(options), options.noise)
         return
     with tempfile.TemporaryDirectory() as temporary:
         folder = options.folder or Path(temporary)
-        run(folder, options, more)
+        run(folder, options, solve_options)
 
 
 def made_size(options: argparse.Namespace) -> tuple[int, int]:
@@ -182,33 +182,40 @@ def made_size(options: argparse.Namespace) -> tuple[int, int]:
     return height, width
 
 
-def run(folder: Path, options: argparse.Namespace, more: list[str]) -> None:
+def run(folder: Path, options: argparse.Namespace, solve_options: list[str]) -> None:
     """Write, and solve with more options of `lightpaint solve`."""
     own = [str(Path(__file__).resolve()), "--write", "--folder", str(folder)]
     own += ["--size", options.size, "--lights", str(options.lights), "--noise", str(options.noise)]
     print(f"{options.lights} lights, {options.size}, noise {options.noise}", flush=True)
     basis = folder / "made.basis.exr"
     if not basis.exists():
-        for told in measured(own, options.lights):
+        for line in measured(own, options.lights):
             size = basis.stat().st_size / GB
-            print(f"    written: {told}, a file of {size:.2f} GB", flush=True)
+            print(f"    written: {line}, a file of {size:.2f} GB", flush=True)
     lightpaint = str(Path(sys.executable).parent / "lightpaint")
     results = ["-o", str(folder / "results"), "--force"]
-    solve = [lightpaint, "solve", str(basis), str(folder / "painting.png"), *results, *more]
-    for told in measured(solve, options.lights):
-        print(f"    solved, predicted and reported: {told}", flush=True)
+    solve = [
+        lightpaint,
+        "solve",
+        str(basis),
+        str(folder / "painting.png"),
+        *results,
+        *solve_options,
+    ]
+    for line in measured(solve, options.lights):
+        print(f"    solved, predicted and reported: {line}", flush=True)
     print(f"    results: {', '.join(sorted(x.name for x in (folder / 'results').iterdir()))}")
     height, width = made_size(options)
     scene = str(write_hall(folder, options.lights, width=width, height=height))
     lighting = str(folder / "results" / "lighting.json")
-    for what, command in {
+    for label, command in {
         "exported": ["export", lighting, "--to", FORMATS, "--scene", scene, "-o", "exports"],
         "drawn as lights.png": ["lights", scene, "-o", "lights.png"],
         "relit, 4 samples per pixel": ["relight", scene, lighting, "--spp", "4", "-o", "relit"],
     }.items():
         command[-1] = str(folder / command[-1])
-        for told in measured([lightpaint, *command, "--force"], options.lights):
-            print(f"    {what}: {told}", flush=True)
+        for line in measured([lightpaint, *command, "--force"], options.lights):
+            print(f"    {label}: {line}", flush=True)
 
 
 if __name__ == "__main__":

@@ -33,11 +33,11 @@ def main() -> None:
     ratios = []
     for k in range(options.rounds):
         with tempfile.TemporaryDirectory() as folder:
-            first, moved, again = one_round(Path(folder), options.light)
-        ratios.append((moved / first, again / first))
+            first, move_s, second_s = one_round(Path(folder), options.light)
+        ratios.append((move_s / first, second_s / first))
         shares = "   ".join(f"{ratio:13.2f}" for ratio in ratios[-1])
-        print(f"{k + 1:5d}   {first:7.1f}   {moved:7.1f}   {again:7.1f}   {shares}", flush=True)
-    medians = [statistics.median(its) for its in zip(*ratios, strict=True)]
+        print(f"{k + 1:5d}   {first:7.1f}   {move_s:7.1f}   {second_s:7.1f}   {shares}", flush=True)
+    medians = [statistics.median(column) for column in zip(*ratios, strict=True)]
     print("median" + " " * 33 + "   ".join(f"{ratio:13.2f}" for ratio in medians))
 
 
@@ -53,8 +53,8 @@ def one_round(folder: Path, light: str) -> tuple[float, float, float]:
 def moved(text: str, light: str) -> str:
     """Return the scene with that spot 10 cm along x."""
 
-    def further(found: re.Match[str]) -> str:
-        return f"{found[1]}{float(found[2]) + 0.1}"
+    def further(match: re.Match[str]) -> str:
+        return f"{match[1]}{float(match[2]) + 0.1}"
 
     pattern = rf'(id="{light}">\s*<transform name="to_world">\s*<lookat origin=")([-\d.]+)'
     edited, count = re.subn(pattern, further, text)

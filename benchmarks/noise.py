@@ -71,8 +71,8 @@ def main() -> None:
     parser.add_argument("--measure", nargs=3, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.measure:
-        scene, long, out = options.measure
-        measure(scene_named(scene), Path(long), options.spp, options.repeats, Path(out))
+        scene, long, output = options.measure
+        measure(scene_named(scene), Path(long), options.spp, options.repeats, Path(output))
         return
     heads = f"{'one pass':>10s}{'pictures':>10s}{'of denoised':>13s}{'weights':>9s}{'CPU s':>8s}"
     print(" " * 32 + heads, flush=True)
@@ -98,39 +98,47 @@ def compare(name: str, options: argparse.Namespace, keep: Path) -> None:
     long = keep / f"{name}_{long_spp}.npz"
     truth, variance = long_render(scene, long_spp, long)
     checkouts = {"now": REPOSITORY} | ({"before": options.before} if options.before else {})
-    found = {which: measured(name, options, at, long) for which, at in checkouts.items()}
+    results = {
+        version: measured(name, options, checkout, long) for version, checkout in checkouts.items()
+    }
     spp, repeats, lights = options.spp, options.repeats, len(scene.lights)
-    which = np.unique(np.linspace(0, lights - 1, min(ALONE, lights)).astype(int))
-    alone = [render_alone(scene, k, spp, seed) for seed in range(repeats) for k in which]
-    alone_s = sum(seconds for _, seconds in alone) / len(alone) * lights
-    plain = errors([image for image, _ in alone], np.tile(which, repeats), truth, variance)
-    now = found["now"]
+    indices = np.unique(np.linspace(0, lights - 1, min(ALONE, lights)).astype(int))
+    single_renders = [render_alone(scene, k, spp, seed) for seed in range(repeats) for k in indices]
+    alone_s = sum(seconds for _, seconds in single_renders) / len(single_renders) * lights
+    plain = errors(
+        [image for image, _ in single_renders], np.tile(indices, repeats), truth, variance
+    )
+    results_now = results["now"]
     # As many samples as that many renders can take in the same time, one at least.
-    few = max(1, round(spp * float(now["pictures_s"]) / alone_s))
+    few = max(1, round(spp * float(results_now["pictures_s"]) / alone_s))
     few_samples = render_basis(scene, spp=2, seed=0)
     features = few_samples.features
     exact = replace(few_samples, planes=truth, noise=np.zeros_like(truth), indirect=None)
     expected = luminance(solve(exact, painting(exact, truth)).weights)
     light = expected * luminance(truth.mean(axis=(1, 2)))
-    rough = [render_alone(scene, k, few, seed) for seed in range(repeats) for k in which]
+    rough = [render_alone(scene, k, few, seed) for seed in range(repeats) for k in indices]
     begin_s = time.process_time()
     clean = [denoised(image, features) for image, _ in rough]
     clean_s = (time.process_time() - begin_s + sum(s for _, s in rough)) / len(rough) * lights
-    smooth = errors(clean, np.tile(which, repeats), truth, variance)
-    for label, its in found.items():
-        noisy = errors(its["planes"], np.tile(np.arange(lights), repeats), truth, variance)
-        shown = errors(its["pictures"], np.tile(np.arange(lights), repeats), truth, variance)
-        pass_s, pictures_s = float(its["pass_s"]), float(its["pictures_s"])
-        off = np.abs(luminance(its["weights"]) / np.maximum(expected, 1e-12) - 1).mean(axis=0)
+    smooth = errors(clean, np.tile(indices, repeats), truth, variance)
+    for label, arrays in results.items():
+        noisy = errors(arrays["planes"], np.tile(np.arange(lights), repeats), truth, variance)
+        picture_errors = errors(
+            arrays["pictures"], np.tile(np.arange(lights), repeats), truth, variance
+        )
+        pass_s, pictures_s = float(arrays["pass_s"]), float(arrays["pictures_s"])
+        weight_errors = np.abs(luminance(arrays["weights"]) / np.maximum(expected, 1e-12) - 1).mean(
+            axis=0
+        )
         figures = (
-            ratio(plain * alone_s, noisy[which] * pass_s),
-            ratio(plain * alone_s, shown[which] * pictures_s),
-            ratio(smooth * clean_s, shown[which] * pictures_s),
+            ratio(plain * alone_s, noisy[indices] * pass_s),
+            ratio(plain * alone_s, picture_errors[indices] * pictures_s),
+            ratio(smooth * clean_s, picture_errors[indices] * pictures_s),
         )
         title = f"{name}, {lights} lights, {spp} spp, {label}"
         print(
             f"{title:32s}{figures[0]:9.1f}x{figures[1]:9.1f}x{figures[2]:12.1f}x"
-            f"{100 * off @ light / light.sum():7.1f} %{pictures_s:8.1f}"
+            f"{100 * weight_errors @ light / light.sum():7.1f} %{pictures_s:8.1f}"
         )
         sys.stdout.flush()
 
@@ -141,8 +149,8 @@ def long_render(scene: Scene, spp: int, path: Path) -> tuple[npt.NDArray[np.floa
         basis = render_basis(scene, spp=spp, seed=LONG_SEED)
         variance = np.square(basis.half_differences, dtype=np.float64).mean(axis=(1, 2, 3))
         np.savez(path, planes=basis.images, variance=variance)
-    with np.load(path) as kept:
-        return kept["planes"], kept["variance"]
+    with np.load(path) as archive:
+        return archive["planes"], archive["variance"]
 
 
 def painting(basis: Basis, truth: npt.NDArray[np.float32]) -> Target:
@@ -165,25 +173,25 @@ def measured(
 
     long: file of the long render.
     """
-    out = long.parent / "measured.npz"
+    output = long.parent / "measured.npz"
     command = [sys.executable, str(Path(__file__).absolute()), "--measure", name, str(long)]
-    command += [str(out), "--spp", str(options.spp), "--repeats", str(options.repeats)]
+    command += [str(output), "--spp", str(options.spp), "--repeats", str(options.repeats)]
     path = os.pathsep.join([str(checkout), str(Path(__file__).parent)])
     subprocess.run(command, check=True, env={**os.environ, "PYTHONPATH": path})
-    with np.load(out) as found:
-        made = dict(found)
-    out.unlink()
-    return made
+    with np.load(output) as archive:
+        arrays = dict(archive)
+    output.unlink()
+    return arrays
 
 
-def measure(scene: Scene, long: Path, spp: int, repeats: int, out: Path) -> None:
+def measure(scene: Scene, long: Path, spp: int, repeats: int, output: Path) -> None:
     """Write planes, pictures and weights of several seeds, and seconds for one of each.
 
     long: file of the long render, of which the painting is made.
     """
     compiled = render_basis(scene, spp=2, seed=0)
-    with np.load(long) as kept:
-        target = painting(compiled, kept["planes"])
+    with np.load(long) as archive:
+        target = painting(compiled, archive["planes"])
     planes, pictures, weights, pass_s, clean_s = [], [], [], 0.0, 0.0
     for seed in range(FIRST_SEED, FIRST_SEED + repeats):
         basis, seconds = render_timed(scene, spp, seed)
@@ -198,8 +206,8 @@ def measure(scene: Scene, long: Path, spp: int, repeats: int, out: Path) -> None
         del basis
         gc.collect()
     seconds = {"pass_s": pass_s / repeats, "pictures_s": (pass_s + clean_s) / repeats}
-    made = {"planes": planes, "pictures": pictures, "weights": weights}
-    np.savez(out, **{name: np.stack(its) for name, its in made.items()}, **seconds)
+    results = {"planes": planes, "pictures": pictures, "weights": weights}
+    np.savez(output, **{name: np.stack(arrays) for name, arrays in results.items()}, **seconds)
 
 
 def render_timed(scene: Scene, spp: int, seed: int) -> tuple[Basis, float]:
@@ -244,14 +252,14 @@ def errors(
     total = np.zeros(len(truth))
     for image, k in zip(images, lights, strict=True):
         total[k] += np.square(image - truth[k], dtype=np.float64).mean() - variance[k]
-    there, count = np.unique(lights, return_counts=True)
-    return total[there] / count / np.square(truth[there].mean(axis=(1, 2, 3), dtype=np.float64))
+    indices, count = np.unique(lights, return_counts=True)
+    return total[indices] / count / np.square(truth[indices].mean(axis=(1, 2, 3), dtype=np.float64))
 
 
-def ratio(theirs: Errors, ours: Errors) -> float:
+def ratio(other: Errors, own: Errors) -> float:
     """Return the geometric mean over lights of how many times lower our error is."""
-    told = (theirs > 0) & (ours > 0)
-    return float(np.exp(np.mean(np.log(theirs[told] / ours[told]))))
+    is_measured = (other > 0) & (own > 0)
+    return float(np.exp(np.mean(np.log(other[is_measured] / own[is_measured]))))
 
 
 if __name__ == "__main__":

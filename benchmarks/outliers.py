@@ -52,28 +52,33 @@ def row(kind: str, corrected: bool, seeds: int) -> None:
     image = painting(kind, clean).astype(np.float32)
     target = lp.Target("painted", image, np.ones(SIZE, np.float32), everything=True)
     truth = lp.solve(basis_of(clean, np.zeros_like(clean)), target, literal=True).weights
-    held, untold, widths = [], [], []
+    coverages, untold, widths = [], [], []
     for seed in range(seeds):
         _, a, b = lights(kind, np.random.default_rng(1000 + seed))
         solution = lp.solve(basis_of((a + b) / 2, (a - b) / 2), target, literal=True)
-        found = lp.error_bars(lp.correct_noise(solution) if corrected else solution)
-        assert found is not None
-        low, high = found.interval
-        held.append((low <= truth + 1e-9) & (truth <= high + 1e-9))
-        untold.append(found.untold[-1])
+        bars = lp.error_bars(lp.correct_noise(solution) if corrected else solution)
+        assert bars is not None
+        low, high = bars.interval
+        coverages.append((low <= truth + 1e-9) & (truth <= high + 1e-9))
+        untold.append(bars.untold[-1])
         widths.append((high - low)[-1, 0] / truth[-1, 0])
-    last, others = np.mean(held, axis=0)[-1].mean(), np.mean(held, axis=0)[:-1].mean()
+    last, others = np.mean(coverages, axis=0)[-1].mean(), np.mean(coverages, axis=0)[:-1].mean()
     name = f"{kind}{', corrected' if corrected else ''}"
-    told = f"{last:7.3f}{others:8.3f}{np.mean(untold):8.2f}{np.median(widths):8.2f}"
-    print(f"{name:24s}{told}", flush=True)
+    text = f"{last:7.3f}{others:8.3f}{np.mean(untold):8.2f}{np.median(widths):8.2f}"
+    print(f"{name:24s}{text}", flush=True)
 
 
 def basis_of(images: np.ndarray, halves: np.ndarray) -> Basis:
     """Images and half differences, (n, h, w, 3) each, as a basis."""
-    its = tuple(BasisLight(f"l{k}", "area", "radiance", "", (1, 1, 1)) for k in range(len(images)))
+    lights_of_basis = tuple(
+        BasisLight(f"l{k}", "area", "radiance", "", (1, 1, 1)) for k in range(len(images))
+    )
     origin = Origin("synthetic", "", "", 0, "", (SPP, SPP), (1, 1))
     return Basis(
-        its, *(x.astype(np.float32) for x in (images, halves)), np.zeros(SIZE, bool), origin
+        lights_of_basis,
+        *(x.astype(np.float32) for x in (images, halves)),
+        np.zeros(SIZE, bool),
+        origin,
     )
 
 
@@ -93,8 +98,8 @@ def lights(kind: str, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray,
     if kind in BRIGHT:
         count, energy = BRIGHT[kind]
         bright = np.zeros((SIZE[0] * SIZE[1], 3))
-        its = np.random.default_rng(7).integers(0, len(bright), count)
-        bright[its] = np.sqrt(energy * np.square(clean[4, ..., 0]).sum())
+        indices = np.random.default_rng(7).integers(0, len(bright), count)
+        bright[indices] = np.sqrt(energy * np.square(clean[4, ..., 0]).sum())
         bright = bright.reshape(*SIZE, 3)
         clean[4] += bright
         for half in (a, b):
@@ -110,9 +115,9 @@ def ordinary(clean: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 def hits(clean: np.ndarray, chance: float, rng: np.random.Generator) -> np.ndarray:
     """As paths find it that a sample meets with `chance`, and that are not all as bright."""
-    met = rng.poisson(chance * SPP, SIZE)
-    found = rng.gamma(3.0 * met + 1e-12) / 3 * (met > 0)
-    return clean * (found / (chance * SPP))[..., None]
+    hit_counts = rng.poisson(chance * SPP, SIZE)
+    samples = rng.gamma(3.0 * hit_counts + 1e-12) / 3 * (hit_counts > 0)
+    return clean * (samples / (chance * SPP))[..., None]
 
 
 def painting(kind: str, clean: np.ndarray) -> np.ndarray:

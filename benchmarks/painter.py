@@ -127,24 +127,24 @@ def main() -> None:
     heads = ("", "asked", "view", "median", "95 %", "99 %", "answers")
     print("{:16s} {:16s} {:4s} {:>7s} {:>6s} {:>6s} {:>8s}".format(*heads))
     for n, width, height in cases:
-        asked: dict[str, Any] = {}
+        constraints: dict[str, Any] = {}
         for name in ("defaults", "lock, two limits", "linear"):
             if name == "lock, two limits":
-                asked = {"light 0": {"lock": True}}
-                asked |= {f"light {k}": {"limits": {"min": 0.2, "max": 0.7}} for k in (1, 2)}
+                constraints = {"light 0": {"lock": True}}
+                constraints |= {f"light {k}": {"limits": {"min": 0.2, "max": 0.7}} for k in (1, 2)}
             space = "linear" if name == "linear" else ""
-            with Opened((n, width, height), asked, space=space, view=options.view) as opened:
-                view, times = opened.painted(options.strokes)
+            with Opened((n, width, height), constraints, space=space, view=options.view) as session:
+                view, times = session.painted(options.strokes)
             p50, p95, p99 = np.percentile(times, [50, 95, 99])
             case = f"{n} at {width}x{height}"
             print(
                 f"{case:16s} {name:16s} {view:4s} {p50:7.0f} {p95:6.0f} {p99:6.0f} {len(times):8d}",
                 flush=True,
             )
-            asked = {}
+            constraints = {}
     if options.minutes:
-        with Opened(cases[0], {}, view=options.view) as opened:
-            opened.print_growth(options.minutes)
+        with Opened(cases[0], {}, view=options.view) as session:
+            session.print_growth(options.minutes)
 
 
 def made_up(n: int, height: int, width: int) -> lp.Basis:
@@ -161,33 +161,37 @@ def made_up(n: int, height: int, width: int) -> lp.Basis:
         BasisLight(f"light {k}", "point", "intensity", "W/sr", (0.5, 0.5, 0.5)) for k in range(n)
     )
     origin = Origin("made up", "", "camera", 0, "separate", (0, 0), (0, 0))
-    seen = np.zeros((height, width), bool)
-    return lp.Basis(lights, images, np.zeros_like(images), seen, origin)
+    emitter_mask = np.zeros((height, width), bool)
+    return lp.Basis(lights, images, np.zeros_like(images), emitter_mask, origin)
 
 
 def print_session(case: tuple[int, ...]) -> None:
     """Python's part of a stroke of 64 x 64 pixels, by what is asked."""
     n, width, height = case
     basis = made_up(n, height, width)
-    held = {"light 0": {"lock": True}, "light 1": {"limits": {"min": 0.2, "max": 0.7}}}
+    lock_and_limit = {"light 0": {"lock": True}, "light 1": {"limits": {"min": 0.2, "max": 0.7}}}
     print(f"Python's part of a stroke, {n} lights at {width}x{height}, 64 x 64 pixels, ms")
     print(f"{'':30s} {'colour':>6s} {'importance':>11s}")
-    for name, fit, asked, paint in (
+    for name, fit, constraints, paint in (
         ("literal", {"literal": True}, {}, BRIGHTER),
         ("linear, held, gentle", {"space": "linear"}, {}, BRIGHTER),
-        ("linear, a lock, a limit", {"space": "linear"}, held, BRIGHTER),
+        ("linear, a lock, a limit", {"space": "linear"}, lock_and_limit, BRIGHTER),
         ("linear, beyond lamps' colours", {"space": "linear"}, {}, GREENER),
         ("display, as by default", {}, {}, BRIGHTER),
-        ("display, a lock, a limit", {}, held, BRIGHTER),
+        ("display, a lock, a limit", {}, lock_and_limit, BRIGHTER),
         ("display, beyond lamps' colours", {}, {}, GREENER),
         ("white", {"colors": "white"}, {}, BRIGHTER),
     ):
-        colour, importance = (stroke_ms(basis, fit, asked, paint, x) for x in (False, True))
+        colour, importance = (stroke_ms(basis, fit, constraints, paint, x) for x in (False, True))
         print(f"{name:30s} {colour:6.1f} {importance:11.1f}", flush=True)
 
 
 def stroke_ms(
-    basis: lp.Basis, fit: dict[str, Any], asked: Any, paint: Sequence[float], with_importance: bool
+    basis: lp.Basis,
+    fit: dict[str, Any],
+    constraints: Any,
+    paint: Sequence[float],
+    with_importance: bool,
 ) -> float:
     """Return the median of what `Live` takes for one more piece of a stroke, which multiplies the
     light by `paint`, (3,).
@@ -195,9 +199,9 @@ def stroke_ms(
     height = basis.size[0]
     image, importance = basis.current_look.copy(), np.zeros(basis.size, np.float32)
     importance[: height // 2] = 0.5
-    meant = resolve_fit(Settings(**fit), over_look=True, through_view=True)
+    resolved = resolve_fit(Settings(**fit), over_look=True, through_view=True)
     view = LiveView(basis, image, importance)
-    live = LiveSolver([view], fit=meant, constraints=lp.Constraints.of(asked))
+    live = LiveSolver([view], fit=resolved, constraints=lp.Constraints.of(constraints))
     weights, times = live.answer(basis.current_weights), []
     for k in range(40):
         region = slice(8 + 3 * k, 72 + 3 * k), slice(8 + 5 * k, 72 + 5 * k)
@@ -211,7 +215,7 @@ def stroke_ms(
     return float(np.median(times))
 
 
-def serve(case: str, asked: str, space: str) -> None:
+def serve(case: str, constraints: str, space: str) -> None:
     """A painter of a made-up basis, until it is ended; says where it is."""
     n, width, height = map(int, case.split("x"))
     with tempfile.TemporaryDirectory() as folder:
@@ -221,7 +225,7 @@ def serve(case: str, asked: str, space: str) -> None:
             basis=made_up(n, height, width),
             # Those that were kept would be there at once, as rough ones are.
             settings=Settings(space=space or None, use_cache=False),  # type: ignore[arg-type]
-            constraints=lp.Constraints.of(json.loads(asked)),
+            constraints=lp.Constraints.of(json.loads(constraints)),
         )
         studio = Studio([subject], partial(Store.open, Path(folder) / "made_up.lightpaint"))
         server = Server(studio, port=0)
@@ -243,9 +247,15 @@ class Opened:
     """A painter that is served by a process of its own, and a page of it."""
 
     def __init__(
-        self, case: tuple[int, ...], asked: Any, *, space: str = "", view: str | None = None
+        self, case: tuple[int, ...], constraints: Any, *, space: str = "", view: str | None = None
     ) -> None:
-        words = [sys.executable, __file__, "--serve", "x".join(map(str, case)), json.dumps(asked)]
+        words = [
+            sys.executable,
+            __file__,
+            "--serve",
+            "x".join(map(str, case)),
+            json.dumps(constraints),
+        ]
         self.server = subprocess.Popen([*words, space], stdout=subprocess.PIPE, text=True)
         assert self.server.stdout is not None
         self.url, self.view = self.server.stdout.readline().strip(), view
@@ -315,8 +325,8 @@ class Opened:
                 time.sleep(1)
                 session.send("HeapProfiler.collectGarbage")
                 heap = session.send("Runtime.getHeapUsage")["usedSize"] / 1e6
-                held = Path(f"/proc/{self.server.pid}/statm").read_text().split()[1]
-                rss = int(held) * resource.getpagesize() / 1e6
+                pages = Path(f"/proc/{self.server.pid}/statm").read_text().split()[1]
+                rss = int(pages) * resource.getpagesize() / 1e6
                 samples.append((number, heap, rss))
                 print(f"{number:5d} strokes: page {heap:7.1f}, server {rss:7.1f}", flush=True)
         each = np.array(samples[len(samples) // 3 :])
@@ -384,7 +394,7 @@ def print_moves(path: str, moves: int = 30) -> None:
         with tempfile.TemporaryDirectory() as folder:
             settings = Settings(spp=2, use_cache=False, space=space)
             subject = Subject("moves", Path(folder), scene=scene, settings=settings)
-            studio = Studio([subject], lambda its: Store.open(None, its))
+            studio = Studio([subject], lambda subject_: Store.open(None, subject_))
             studio.start()
             while studio.store is None or studio._threads._threads[0].is_alive():
                 time.sleep(0.2)
@@ -427,15 +437,19 @@ def print_starts(scene: str, times: int) -> None:
         path = shutil.which("chromium")
         browser = playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
         # As installed packages have it, and a source tree may not.
-        around = {**os.environ, "LIGHTPAINT_CACHE": folder, "PYTHONPYCACHEPREFIX": f"{folder}/py"}
-        around.pop("PYTHONDONTWRITEBYTECODE", None)
+        environment = {
+            **os.environ,
+            "LIGHTPAINT_CACHE": folder,
+            "PYTHONPYCACHEPREFIX": f"{folder}/py",
+        }
+        environment.pop("PYTHONDONTWRITEBYTECODE", None)
         print(f"{scene}: s from the start of its process, and s of the processor that it took")
         heads = ("", "address", *STAGES, "stroke", "processor")
         print(f"{heads[0]:12s}" + "".join(f"{head:>10s}" for head in heads[1:]))
-        print_times("nothing kept", [started(browser, scene, folder, around, is_first=True)])
+        print_times("nothing kept", [started(browser, scene, folder, environment, is_first=True)])
         every = []
         for _ in range(times):
-            every.append(started(browser, scene, folder, around))
+            every.append(started(browser, scene, folder, environment))
             print_times("kept", every[-1:])
         print_times("median", every)
         browser.close()
@@ -447,7 +461,7 @@ def print_times(name: str, every: list[list[float]]) -> None:
 
 
 def started(
-    browser: Any, scene: str, folder: str, around: dict[str, str], *, is_first: bool = False
+    browser: Any, scene: str, folder: str, environment: dict[str, str], *, is_first: bool = False
 ) -> list[float]:
     """Seconds to each stage. is_first: wait at the end until all that can be kept is."""
     place = tempfile.mkdtemp(dir=folder)
@@ -456,15 +470,15 @@ def started(
     begin = time.perf_counter()
     painter = subprocess.Popen(
         [*words, "--no-browser", "--port", "0"],
-        env=around,
+        env=environment,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         text=True,
     )
     assert painter.stdout is not None
-    said = painter.stdout.readline()
+    line = painter.stdout.readline()
     times = [time.perf_counter() - begin]
-    page.goto(said.partition(" at ")[2].split()[0])
+    page.goto(line.partition(" at ")[2].split()[0])
     for is_there in STAGES.values():
         page.wait_for_function(is_there, timeout=600_000)
         times.append(time.perf_counter() - begin)

@@ -62,11 +62,11 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             seed = options.first + k
             lines.append(one_room(Path(folder), kind, seed, with_rivals=options.rivals))
-    found = sum(is_found for is_found, _ in lines)
+    found_count = sum(is_found for is_found, _ in lines)
     if lines:
-        seconds = [its for _, its in lines]
+        seconds = [duration for _, duration in lines]
         print(
-            f"{found} of {len(lines)} found; median {statistics.median(seconds):.0f} s, "
+            f"{found_count} of {len(lines)} found; median {statistics.median(seconds):.0f} s, "
             f"most {max(seconds):.0f} s"
         )
 
@@ -89,17 +89,17 @@ def one_room(folder: Path, kind: str, seed: int, *, with_rivals: bool) -> tuple[
     placement = lp.place(scene, basis, solution, new=new, seed=seed)
     seconds = cpu_s() - start
     verified = missed(verification(placement.scene, solution, folder), painted)
-    off, turned = distances(truth, placement)
-    known = sum(solution.certificate.objective) / float(solution.norm2.sum())
+    position_errors, angle_errors = distances(truth, placement)
+    known_loss = sum(solution.certificate.objective) / float(solution.norm2.sum())
     print(
-        f"{seed:4d}   {count} {kind:8s} {known:6.3f} {floor:6.4f} {verified:6.4f}"
+        f"{seed:4d}   {count} {kind:8s} {known_loss:6.3f} {floor:6.4f} {verified:6.4f}"
         f" {verified - floor:7.4f} {seconds:6.1f} {seconds / render_s:9.1f}"
-        f"  {listed(off, '.2f'):9s} {listed(turned, '.0f')}",
+        f"  {listed(position_errors, '.2f'):9s} {listed(angle_errors, '.0f')}",
         flush=True,
     )
     if with_rivals:
         show_rival(scene, placement, painted, seed)
-    return verified - floor < FOUND and max(off) < NEAR, seconds
+    return verified - floor < FOUND and max(position_errors) < NEAR, seconds
 
 
 def verification(scene: Scene, solution: lp.Solution, folder: Path) -> Floats:
@@ -126,20 +126,20 @@ def missed(picture: Floats, painted: Floats) -> float:
 
 def distances(truth: Scene, placement: lp.Placement) -> tuple[list[float], list[float]]:
     """Return how far each true light is from its nearest found one, and degrees between them."""
-    off, turned = [], []
+    position_errors, angle_errors = [], []
     for emitter in truth.emitters:
         if not emitter.name.startswith("true") or emitter.site.position is None:
             continue
-        found = [
+        candidates = [
             (math.dist(x.site.position or (0, 0, 0), emitter.site.position), x.site)
             for x in placement.additions
         ]
-        away, site = min(found, key=lambda its: its[0], default=(math.inf, emitter.site))
-        off.append(away)
+        away, site = min(candidates, key=lambda pair: pair[0], default=(math.inf, emitter.site))
+        position_errors.append(away)
         if emitter.site.direction is not None and site.direction is not None:
             cosine = float(np.dot(emitter.site.direction, site.direction))
-            turned.append(math.degrees(math.acos(min(1, max(-1, cosine)))))
-    return off, turned
+            angle_errors.append(math.degrees(math.acos(min(1, max(-1, cosine)))))
+    return position_errors, angle_errors
 
 
 def show_rival(scene: Scene, placement: lp.Placement, painted: Floats, seed: int) -> None:
@@ -195,8 +195,8 @@ def show_behind() -> None:
     lights = [point("true_0", true, np.full(3, 4.0))]
     with tempfile.TemporaryDirectory() as folder:
         paths = [
-            room.write(Path(folder) / name, its, size=SIZE, views=2)
-            for name, its in (("room.xml", []), ("true.xml", lights))
+            room.write(Path(folder) / name, emitters, size=SIZE, views=2)
+            for name, emitters in (("room.xml", []), ("true.xml", lights))
         ]
         scenes, truths = (
             [lp.load_scene(path, sensor=k) for k in ("camera", "other")] for path in paths
@@ -208,11 +208,11 @@ def show_behind() -> None:
             new = [lp.NewLights("point", count=1)]
             placement = lp.place(scenes[:count], bases[:count], solution, new=new)
             for light in placement.additions:
-                off = math.dist(light.site.position or (0, 0, 0), true)
+                position_error = math.dist(light.site.position or (0, 0, 0), true)
                 error = light.place_error or 0.0
                 print(
-                    f"behind the camera, {count} views: {off:.3f} off, error bar {error:.3f}; "
-                    f"{light}",
+                    f"behind the camera, {count} views: {position_error:.3f} off, "
+                    f"error bar {error:.3f}; {light}",
                     flush=True,
                 )
 
@@ -236,14 +236,14 @@ def show_gallery() -> None:
         start = cpu_s()
         placement = lp.place(scene, basis, solution, freedoms, new=new)
         seconds = cpu_s() - start
-        again = lp.render_basis(placement.scene, spp=BASIS_SPP, seed=5)
-        lighting = lp.solve(again, target, space="linear", hold=0, resize=True).lighting
+        relit_basis = lp.render_basis(placement.scene, spp=BASIS_SPP, seed=5)
+        lighting = lp.solve(relit_basis, target, space="linear", hold=0, resize=True).lighting
         with tempfile.TemporaryDirectory() as folder:
             relit = lp.relight(placement.scene, lighting, Path(folder) / "relit.xml")
             picture = rendered(relit, seed=6, spp=BASIS_SPP)
         picture = block_mean(picture, picture.shape[0] // painted.shape[0])
         print(
-            f"  {len(placement.additions)} new: {plain_share(again, painted):.3f}, rendered "
+            f"  {len(placement.additions)} new: {plain_share(relit_basis, painted):.3f}, rendered "
             f"{math.sqrt(missed(picture, painted)):.3f}, in {seconds:.0f} s",
             flush=True,
         )

@@ -38,7 +38,7 @@ def main() -> None:
     resolution, _, spp = options.reference.rpartition("x")
 
     reference, truth = weights(scene.reduced(resolution), target, int(spp), seed=1000)
-    now = truth.astype(np.float32)
+    image = truth.astype(np.float32)
     shares = energy_shares(reference, solve(reference, target).lighting)
     print("resolution   spp  seconds  mean  worst  picture")
     for resolution in RESOLUTIONS:
@@ -47,11 +47,11 @@ def main() -> None:
             if spp * small.size[0] * small.size[1] > MOST:
                 continue
             start_s = time.perf_counter()
-            _, found = weights(small, target, spp, seed=1)
+            _, estimate = weights(small, target, spp, seed=1)
             taken_s = time.perf_counter() - start_s
-            error = np.abs(luminance(found - truth)) / np.maximum(luminance(truth), 1e-12)
-            off = reference.mix(found - truth)
-            picture = np.sqrt(np.square(off).mean() / np.square(reference.mix(now)).mean())
+            error = np.abs(luminance(estimate - truth)) / np.maximum(luminance(truth), 1e-12)
+            residual = reference.mix(estimate - truth)
+            picture = np.sqrt(np.square(residual).mean() / np.square(reference.mix(image)).mean())
             print(
                 f"{resolution:10s} {spp:5d} {taken_s:8.1f} {100 * (error @ shares):4.0f} % "
                 f"{100 * error[shares > 0.02].max():4.0f} % {100 * picture:6.1f} %",

@@ -75,23 +75,33 @@ def main() -> None:
             paths.append(write_hall(Path(folder) / name, options.lights, width=w, height=h))
         for name, checkout in (checkouts | {"now": REPOSITORY}).items():
             films = ["bands", "whole"] if options.whole and checkout == REPOSITORY else ["bands"]
-            for how, film in itertools.product(("cache", "none"), films):
-                told = rendered(paths, checkout, options, how, film)
-                kind = f"{name:6s} cache: {how:5s}" + (f" {film}" if options.whole else "")
-                print(f"    {kind} {told}", flush=True)
+            for cache_mode, film in itertools.product(("cache", "none"), films):
+                figures = rendered(paths, checkout, options, cache_mode, film)
+                kind = f"{name:6s} cache: {cache_mode:5s}" + (f" {film}" if options.whole else "")
+                print(f"    {kind} {figures}", flush=True)
 
 
 def rendered(
-    paths: list[Path], checkout: Path, options: argparse.Namespace, how: str, film: str
+    paths: list[Path], checkout: Path, options: argparse.Namespace, cache_mode: str, film: str
 ) -> str:
     """Return what a render in a process of its own took."""
     with tempfile.TemporaryDirectory() as cache:
-        its = os.environ | {"PYTHONPATH": str(checkout), "LIGHTPAINT_CACHE": cache}
-        command = [sys.executable, "-c", RENDER, *map(str, paths), str(options.spp), how, film]
-        done = subprocess.run(command, env=its, cwd=checkout, capture_output=True, text=True)
-    if done.returncode:
-        raise SystemExit(done.stderr)
-    *numbers, kind = done.stdout.split()
+        environment = os.environ | {"PYTHONPATH": str(checkout), "LIGHTPAINT_CACHE": cache}
+        command = [
+            sys.executable,
+            "-c",
+            RENDER,
+            *map(str, paths),
+            str(options.spp),
+            cache_mode,
+            film,
+        ]
+        completed = subprocess.run(
+            command, env=environment, cwd=checkout, capture_output=True, text=True
+        )
+    if completed.returncode:
+        raise SystemExit(completed.stderr)
+    *numbers, kind = completed.stdout.split()
     before, peak, after, spent_s = map(float, numbers)
     each = [(x - before) / options.lights / 1e6 for x in (peak, after)]
     return (

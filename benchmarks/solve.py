@@ -59,15 +59,15 @@ def main() -> None:
     for number, target in enumerate(targets):
         judge = Judge(reference, target)
         solve_s, weights = timed_solve(basis, target)
-        mine = judge(weights)
+        own_loss = judge(weights)
         ours_s = solve_s + (basis_s if number == 0 else 0)
-        adam_s, reached = adam(scene, basis, target, judge, goal=mine, limit_s=options.limit)
-        bound = "" if reached <= mine else ">"
+        adam_s, adam_loss = adam(scene, basis, target, judge, goal=own_loss, limit_s=options.limit)
+        bound = "" if adam_loss <= own_loss else ">"
         look = "first" if number == 0 else "next"
         time_s, ratio = f"{bound}{adam_s:.2f}", f"{bound}{adam_s / ours_s:.0f}x"
         print(
-            f"{target.name:10s} {look:7s} {ours_s:12.4f} {mine:10.5f} "
-            f"{time_s:>9s} {reached:10.5f} {ratio:>9s}",
+            f"{target.name:10s} {look:7s} {ours_s:12.4f} {own_loss:10.5f} "
+            f"{time_s:>9s} {adam_loss:10.5f} {ratio:>9s}",
             flush=True,
         )
 
@@ -102,8 +102,8 @@ def adam(
         descend(scene, basis, target, judge, goal=goal, limit_s=limit_s, step_size=size)
         for size in STEP_SIZES
     ]
-    reached = [r for r in results if r[1] <= goal]
-    return min(reached) if reached else (limit_s, min(objective for _, objective in results))
+    successes = [r for r in results if r[1] <= goal]
+    return min(successes) if successes else (limit_s, min(objective for _, objective in results))
 
 
 def descend(
@@ -131,8 +131,8 @@ def descend(
     for name in keys:
         optimizer[name] = mi.Color3f(1)
 
-    spent, best, step = 0.0, (limit_s, np.inf), 0
-    while spent < limit_s:
+    spent_s, best, step = 0.0, (limit_s, np.inf), 0
+    while spent_s < limit_s:
         start = time.perf_counter()
         for name, key in keys.items():
             optimizer[name] = dr.maximum(optimizer[name], 0)
@@ -153,10 +153,10 @@ def descend(
         )
         step += 1
         if step > 1:  # the first step compiled
-            spent += time.perf_counter() - start
+            spent_s += time.perf_counter() - start
         objective = judge(weights.astype(np.float64))
         if objective < best[1]:
-            best = (spent, objective)
+            best = (spent_s, objective)
         if objective <= goal:
             break
     return best
@@ -169,12 +169,12 @@ def key_of(parameters: Any, loaded: Any, name: str) -> str:
     emitter = next(e for e in loaded.emitters() if e.id() == name)
     shape = emitter.get_shape()
     prefix = f"{shape.id()}.emitter" if shape is not None else name
-    found: list[str] = [
+    keys: list[str] = [
         f"{prefix}.{key}"
         for key in mi.traverse(emitter).keys()  # noqa: SIM118 (not a dict)
         if key.endswith(("radiance.value", "intensity.value", "irradiance.value"))
     ]
-    return found[0]
+    return keys[0]
 
 
 if __name__ == "__main__":

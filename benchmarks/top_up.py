@@ -67,12 +67,12 @@ class Runs:
         errors, count = np.array(self.errors), len(self.errors)
         worst = np.sqrt(np.square(errors).mean(axis=0)).max()
         scatter = errors.std(axis=0, ddof=1) / np.sqrt(count)
-        moved = scatter > 0  # not so for a light that is off each time
-        bias = np.abs(errors.mean(axis=0)[moved] / scatter[moved]).max()
-        held = (np.abs(errors) <= np.array(self.told)).mean()
+        is_varying = scatter > 0  # not so for a light that is off each time
+        bias = np.abs(errors.mean(axis=0)[is_varying] / scatter[is_varying]).max()
+        coverage = (np.abs(errors) <= np.array(self.told)).mean()
         return (
             f"{np.mean(self.spp):8.0f}{np.mean(self.seconds):8.1f}{100 * np.mean(self.mean):9.2f} %"
-            f"{100 * worst:8.1f} %{bias:8.1f}{held:8.2f}"
+            f"{100 * worst:8.1f} %{bias:8.1f}{coverage:8.2f}"
         )
 
     @property
@@ -116,10 +116,10 @@ def compare(
     best = without_noise(_job(scene, target, options, 0, folder), _solution(truth, target))
     rest = error_bars(best)
     assert rest is not None
-    known = 100 * float(picture_errors(truth, rest).max())
+    largest_error = 100 * float(picture_errors(truth, rest).max())
     light = (truth.totals * best.weights) @ LUMINANCE
     scale = np.maximum(light, LEAST_SHARE * light.sum())
-    where, everywhere = Runs(), Runs()
+    uneven, everywhere = Runs(), Runs()
     for seed in range(1, options.seeds + 1):
         job = _job(scene, target, options, seed, folder)
 
@@ -128,33 +128,33 @@ def compare(
             return add_needed_samples(job, [pilot], listener(silent))[0]
 
         def spread(seed: int = seed) -> Basis:
-            return render_basis(scene, spp=round(where.spp[-1]), seed=seed)
+            return render_basis(scene, spp=round(uneven.spp[-1]), seed=seed)
 
-        for runs, make in ((where, top_up), (everywhere, spread)):
+        for runs, make in ((uneven, top_up), (everywhere, spread)):
             begin_s = time.process_time()
             basis = make()
             solution = without_noise(job, _solution(basis, target))
             bars = error_bars(solution)
             runs.seconds.append(time.process_time() - begin_s)
             assert bars is not None
-            missed = ((solution.weights - best.weights) * truth.totals) @ LUMINANCE
-            runs.mean.append(float(np.abs(missed).sum() / light.sum()))
-            runs.errors.append(missed / scale)
+            missed_light = ((solution.weights - best.weights) * truth.totals) @ LUMINANCE
+            runs.mean.append(float(np.abs(missed_light).sum() / light.sum()))
+            runs.errors.append(missed_light / scale)
             runs.told.append(picture_errors(basis, bars))
             runs.spp.append(basis.origin.mean_spp)
-    asked = f"asked for {100 * options.error:g} %"
-    print(f"{name}, {asked}; the long render knows each light to ± {known:.1f} %")
-    print(f"{'  where they are needed':34s}{where.row()}")
+    goal = f"asked for {100 * options.error:g} %"
+    print(f"{name}, {goal}; the long render knows each light to ± {largest_error:.1f} %")
+    print(f"{'  where they are needed':34s}{uneven.row()}")
     print(f"{'  in all pixels':34s}{everywhere.row()}")
-    print(f"  gain {everywhere.cost / where.cost:.1f}x", flush=True)
+    print(f"  gain {everywhere.cost / uneven.cost:.1f}x", flush=True)
 
 
 def painting(name: str) -> Target:
     """Read a shipped painting at the size of the film."""
     folder = REPOSITORY / "targets" / "gallery"
     mask = folder / f"{name}.mask.exr"
-    its = read_target(folder / f"{name}.exr", mask=mask if mask.is_file() else None)
-    return its.reduced(REDUCTION)
+    picture = read_target(folder / f"{name}.exr", mask=mask if mask.is_file() else None)
+    return picture.reduced(REDUCTION)
 
 
 def _job(scene: Scene, target: Target, options: argparse.Namespace, seed: int, to: Path) -> Job:

@@ -13,8 +13,8 @@ def axe_source() -> str:
     """The source of axe-core: LIGHTPAINT_AXE, or where npm has it."""
     places = [Path("node_modules")]
     if npm := shutil.which("npm"):
-        found = subprocess.run([npm, "root", "-g"], capture_output=True, text=True, check=False)
-        places.append(Path(found.stdout.strip()))
+        completed = subprocess.run([npm, "root", "-g"], capture_output=True, text=True, check=False)
+        places.append(Path(completed.stdout.strip()))
     candidates = [Path(os.environ.get("LIGHTPAINT_AXE", "/nowhere"))]
     candidates += [place / "axe-core" / "axe.min.js" for place in places]
     for path in candidates:
@@ -23,17 +23,17 @@ def axe_source() -> str:
     pytest.skip("axe-core")
 
 
-def violations(page: Any, where: str = "html") -> list[Any]:
+def violations(page: Any, selector: str = "html") -> list[Any]:
     """Return what axe-core, which `page` has loaded, finds wrong below a selector.
 
     Of each rule that is broken its id, and the tags that break it. Only these leave the page: a
     list of all that is right takes seconds.
     """
-    found: list[Any] = page.evaluate(
+    page_violations: list[Any] = page.evaluate(
         """async (where) => {
           const { violations } = await axe.run(where);
           return violations.map(({ id, nodes }) => [id, nodes.map(({ html }) => html)]);
         }""",
-        where,
+        selector,
     )
-    return found
+    return page_violations

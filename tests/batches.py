@@ -101,11 +101,11 @@ def run_whole_batch(manifest: str, folder: str, workers: int = 1) -> None:
 
 def process_context() -> Any:
     """Processes that begin with all modules loaded, and none of this one's threads."""
-    made = multiprocessing.get_context("forkserver")
-    made.set_forkserver_preload(
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(
         ["lightpaint.batch.plan.planner", "lightpaint.batch.run", "batches"]
     )
-    return made
+    return context
 
 
 def kill_batch(manifest: Path, folder: Path, after_s: float, workers: int = 1) -> int:
@@ -126,20 +126,25 @@ def _main() -> int:
     )
     parser.add_argument("--kills", type=int, default=40)
     parser.add_argument("--seed", type=int, default=0)
-    given, wrong = parser.parse_args(), 0
-    chance = random.Random(given.seed)
-    with tempfile.TemporaryDirectory() as here:
-        manifest, end, kills, batches = write_batch(Path(here)), Path(here) / "end", 0, 0
+    options, wrong_count = parser.parse_args(), 0
+    chance = random.Random(options.seed)
+    with tempfile.TemporaryDirectory() as folder_name:
+        manifest, end, kills, batches = (
+            write_batch(Path(folder_name)),
+            Path(folder_name) / "end",
+            0,
+            0,
+        )
         begun_s = time.monotonic()
         run_whole_batch(str(manifest), str(end))
         run_s, expected = time.monotonic() - begun_s, contents(end)
-        while kills < given.kills:
-            folder, batches = Path(here) / f"{batches}", batches + 1
+        while kills < options.kills:
+            folder, batches = Path(folder_name) / f"{batches}", batches + 1
             while kill_batch(manifest, folder, chance.uniform(0, run_s)):
                 kills += 1
-            wrong += contents(folder) != expected
-    print(f"{kills} kills over {batches} batches; {wrong} ended otherwise than undisturbed")
-    return int(wrong > 0)
+            wrong_count += contents(folder) != expected
+    print(f"{kills} kills over {batches} batches; {wrong_count} ended otherwise than undisturbed")
+    return int(wrong_count > 0)
 
 
 if __name__ == "__main__":

@@ -30,16 +30,16 @@ def run(folder: Path, *arguments: object, **variables: str) -> CompletedProcess[
     One of its own (`spawn`) would load Mitsuba and compile its kernels anew, for seconds. It is
     for what a process is to itself: its variant of Mitsuba, what it imports, signals, its streams.
     """
-    given = [str(argument) for argument in arguments]
-    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
-        with _surroundings(folder, variables), _printing_to(out, err):
+    words = [str(argument) for argument in arguments]
+    with tempfile.TemporaryFile() as stdout, tempfile.TemporaryFile() as stderr:
+        with _surroundings(folder, variables), _printing_to(stdout, stderr):
             try:
-                code = main(given)
+                code = main(words)
             except SystemExit as end:  # argparse's
                 code = int(end.code or 0)
-        out.seek(0)
-        err.seek(0)
-        return CompletedProcess(given, code, out.read().decode(), err.read().decode())
+        stdout.seek(0)
+        stderr.seek(0)
+        return CompletedProcess(words, code, stdout.read().decode(), stderr.read().decode())
 
 
 def spawn(folder: Path, *arguments: object, **variables: str) -> CompletedProcess[str]:
@@ -57,20 +57,20 @@ def spawn(folder: Path, *arguments: object, **variables: str) -> CompletedProces
 
 def succeed(folder: Path, *arguments: object, by: Runner = run, **variables: str) -> str:
     """What a command that must succeed prints to stdout."""
-    done = by(folder, *arguments, **variables)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    completed = by(folder, *arguments, **variables)
+    assert completed.returncode == 0, completed.stderr
+    return completed.stdout
 
 
 def run_refused(folder: Path, *arguments: object, by: Runner = run) -> str:
     """The one line a user gets for a mistake; nothing may be left in `folder`."""
     before = sorted(p for p in folder.rglob("*"))
-    done = by(folder, *arguments)
-    assert done.returncode == 2, done.stdout + done.stderr
-    lines = done.stderr.strip().splitlines()
-    assert len(lines) == 1, done.stderr
-    assert done.stdout == ""
-    assert "Traceback" not in done.stderr
+    completed = by(folder, *arguments)
+    assert completed.returncode == 2, completed.stdout + completed.stderr
+    lines = completed.stderr.strip().splitlines()
+    assert len(lines) == 1, completed.stderr
+    assert completed.stdout == ""
+    assert "Traceback" not in completed.stderr
     assert sorted(p for p in folder.rglob("*")) == before
     return lines[0]
 

@@ -81,9 +81,9 @@ def browser() -> Iterator[Any]:
         path = next(filter(None, map(shutil.which, names)), started.chromium.executable_path)
         if not Path(path).exists():
             pytest.skip("a browser (chromium)")
-        opened = started.chromium.launch(executable_path=path, args=CHROMIUM)
-        yield opened
-        opened.close()
+        chromium = started.chromium.launch(executable_path=path, args=CHROMIUM)
+        yield chromium
+        chromium.close()
 
 
 @pytest.fixture(scope="session")

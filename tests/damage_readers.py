@@ -62,8 +62,8 @@ class Reader:
         if self.kind == "groups":
             from lightpaint.basis.lightgroups.light_groups import read_light_groups
 
-            found = read_light_groups(path)
-            return found.basis.names, found.basis.images.tobytes()
+            light_groups = read_light_groups(path)
+            return light_groups.basis.names, light_groups.basis.images.tobytes()
         from lightpaint.scene.scene_reader import load_scene
 
         scene = load_scene(path)
@@ -151,8 +151,8 @@ def contents_of_json(data: Any) -> Any:
         solve = [*(solve[k] for k in (*needed, "unreached")), solve.get("curve", [])]
         bounds = ("lights", "kind", "held_by", "gain", "multiplier", "per")
         solve.append([[b[k] for k in bounds] for b in data["solve"].get("bounds", [])])
-    about = [data.get(k, "") for k in ("target", "scene_identity")]
-    return data["format"], about, data.get("cd_per_unit"), lights, solve
+    fields = [data.get(k, "") for k in ("target", "scene_identity")]
+    return data["format"], fields, data.get("cd_per_unit"), lights, solve
 
 
 def _second_opinion(path: Path, picture: Any) -> str:
@@ -167,32 +167,36 @@ def _second_opinion(path: Path, picture: Any) -> str:
     from lightpaint.images.picture import file_kind
 
     try:
-        theirs = _read_elsewhere(path, file_kind(path))
+        reference = _read_elsewhere(path, file_kind(path))
     except Exception:
         return "alone"
-    if theirs.ndim == 2:
-        theirs = theirs[..., None]
-    if theirs.size == 0:
+    if reference.ndim == 2:
+        reference = reference[..., None]
+    if reference.size == 0:
         return "alone"
-    theirs = theirs[..., :3] if theirs.shape[-1] >= 3 else theirs[..., :1].repeat(3, axis=-1)
+    reference = (
+        reference[..., :3] if reference.shape[-1] >= 3 else reference[..., :1].repeat(3, axis=-1)
+    )
     if picture.kind == "exr":
-        ours = np.where(picture.finite[..., None], picture.image, 0)
+        pixels = np.where(picture.finite[..., None], picture.image, 0)
     else:
-        ours = read_bitmap(path, picture.kind).values
-    if ours.shape != theirs.shape:
-        return f"disputed: {ours.shape} and {theirs.shape}"
+        pixels = read_bitmap(path, picture.kind).values
+    if pixels.shape != reference.shape:
+        return f"disputed: {pixels.shape} and {reference.shape}"
     if picture.codes is None:
-        finite = np.isfinite(theirs).all(axis=-1, keepdims=True)
-        theirs = np.where(finite, theirs, 0)
-        ours = np.where(finite, ours, 0)
+        finite = np.isfinite(reference).all(axis=-1, keepdims=True)
+        reference = np.where(finite, reference, 0)
+        pixels = np.where(finite, pixels, 0)
     if picture.alpha is not None and picture.kind == "psd":
         # What is partly transparent is left out, since readers differ there.
-        theirs, ours = (np.where(picture.alpha[..., None] > 0, v, 0) for v in (theirs, ours))
+        reference, pixels = (
+            np.where(picture.alpha[..., None] > 0, v, 0) for v in (reference, pixels)
+        )
     # Two builds of JPEG's library round apart.
-    close = 3 if picture.lossy else 1e-6 * np.abs(theirs).max()
+    tolerance = 3 if picture.lossy else 1e-6 * np.abs(reference).max()
     with np.errstate(all="ignore"):
-        miss = np.abs(ours.astype(float) - theirs.astype(float)).max()
-    return "agreed" if miss <= close else f"disputed by {miss:g}"
+        miss = np.abs(pixels.astype(float) - reference.astype(float)).max()
+    return "agreed" if miss <= tolerance else f"disputed by {miss:g}"
 
 
 def _read_elsewhere(path: Path, kind: str) -> Any:

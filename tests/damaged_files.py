@@ -49,9 +49,9 @@ class Case:
     content: bytes | None = None
 
 
-def flip_bit(content: bytes, at: int, bit: int) -> bytes:
+def flip_bit(content: bytes, position: int, bit: int) -> bytes:
     """`content` with one bit turned."""
-    return content[:at] + bytes([content[at] ^ 1 << bit]) + content[at + 1 :]
+    return content[:position] + bytes([content[position] ^ 1 << bit]) + content[position + 1 :]
 
 
 def damage(file: str, content: bytes, seed: int, flips: int, lies: int) -> Iterator[Case]:
@@ -62,37 +62,44 @@ def damage(file: str, content: bytes, seed: int, flips: int, lies: int) -> Itera
         yield Case(file, f"cut at {end}", content[:end])
     for k in range(flips):
         # Every other one in the head, where the structure is.
-        at = rng.randrange(min(400, len(content)) if k % 2 else len(content))
-        yield Case(file, f"flip at {at}", flip_bit(content, at, rng.randrange(8)))
+        position = rng.randrange(min(400, len(content)) if k % 2 else len(content))
+        yield Case(file, f"flip at {position}", flip_bit(content, position, rng.randrange(8)))
     for _ in range(lies):
-        at = rng.randrange(min(600, len(content)))
+        position = rng.randrange(min(600, len(content)))
         lie = struct.pack(rng.choice("<>") + rng.choice("HI"), 0)
         number = rng.choice(LIES) & (256 ** len(lie) - 1)
         order = rng.choice(("little", "big"))
-        bent = content[:at] + number.to_bytes(len(lie), order) + content[at + len(lie) :]
+        bent = (
+            content[:position] + number.to_bytes(len(lie), order) + content[position + len(lie) :]
+        )
         if bent != content:
-            yield Case(file, f"lie at {at}", bent)
+            yield Case(file, f"lie at {position}", bent)
 
 
 def outcomes(
-    kind: str, whole: Mapping[str, bytes], cases: Sequence[Case], folder: Path
+    kind: str, originals: Mapping[str, bytes], cases: Sequence[Case], folder: Path
 ) -> list[tuple[Case, str]]:
     """What becomes of each case, read as `kind` (see `Reader`). whole: undamaged files by name."""
     results: list[tuple[Case, str]] = []
     while len(results) < len(cases):
         remaining = cases[len(results) :]
-        (folder / "cases.pickle").write_bytes(pickle.dumps((kind, whole, remaining)))
-        said, end = _worker(folder)
-        results += zip(remaining, said, strict=False)
-        if len(said) < len(remaining):
-            results.append((remaining[len(said)], end))
-    print(kind, dict(Counter(said if said in FINE else "anything else" for _, said in results)))
+        (folder / "cases.pickle").write_bytes(pickle.dumps((kind, originals, remaining)))
+        outcome, end = _worker(folder)
+        results += zip(remaining, outcome, strict=False)
+        if len(outcome) < len(remaining):
+            results.append((remaining[len(outcome)], end))
+    print(
+        kind,
+        dict(Counter(outcome if outcome in FINE else "anything else" for _, outcome in results)),
+    )
     return results
 
 
 def wrong_outcomes(results: Iterable[tuple[Case, str]], right: Sequence[str] = FINE) -> list[str]:
     """What ended in any other way."""
-    return [f"{case.file}, {case.done}: {said}" for case, said in results if said not in right]
+    return [
+        f"{case.file}, {case.done}: {outcome}" for case, outcome in results if outcome not in right
+    ]
 
 
 def read_despite_cut(results: Iterable[tuple[Case, str]]) -> list[tuple[Case, str]]:
@@ -113,8 +120,8 @@ def is_named_once(text: str, path: Path) -> bool:
     to may be named beside the scene: each once.
     """
     folder = str(path.parent)
-    named = re.findall(rf"{re.escape(folder)}(?:/[^\s/\"':,;]+)*", text)
-    return len(named) == len(set(named)) > 0 and (len(named) == 1 or folder not in named)
+    paths = re.findall(rf"{re.escape(folder)}(?:/[^\s/\"':,;]+)*", text)
+    return len(paths) == len(set(paths)) > 0 and (len(paths) == 1 or folder not in paths)
 
 
 def attempt(read: Callable[[Path], Any], path: Path, error: type[Exception]) -> Any:
@@ -130,33 +137,37 @@ def attempt(read: Callable[[Path], Any], path: Path, error: type[Exception]) -> 
 def _worker(folder: Path) -> tuple[list[str], str]:
     root = Path(__file__).parents[1]
     path = os.pathsep.join([str(root), str(root / "tests"), os.environ.get("PYTHONPATH", "")])
-    with (folder / "said").open("w+") as said:
-        done = subprocess.run(
+    with (folder / "said").open("w+") as log:
+        completed = subprocess.run(
             [sys.executable, __file__, str(folder)],
             stdin=subprocess.DEVNULL,
-            stdout=said,
+            stdout=log,
             stderr=subprocess.DEVNULL,
             env={**os.environ, "PYTHONPATH": path},
             timeout=600,
             check=False,
         )
-        said.seek(0)
-        end = "hung" if done.returncode == -signal.SIGALRM else f"ended with {done.returncode}"
-        return said.read().splitlines(), end
+        log.seek(0)
+        end = (
+            "hung"
+            if completed.returncode == -signal.SIGALRM
+            else f"ended with {completed.returncode}"
+        )
+        return log.read().splitlines(), end
 
 
 def _read_all(folder: Path) -> None:
-    kind, whole, cases = pickle.loads((folder / "cases.pickle").read_bytes())
-    out = os.fdopen(os.dup(1), "w")
+    kind, originals, cases = pickle.loads((folder / "cases.pickle").read_bytes())
+    output = os.fdopen(os.dup(1), "w")
     from lightpaint.colour.primaries import colour_science
 
     reader = Reader(kind)
-    known = {}
+    known_values = {}
     # Everything that is used is loaded before the limit: threads reserve what they never take.
     colour_science()
-    for file, content in whole.items():
+    for file, content in originals.items():
         (folder / file).write_bytes(content)
-        known[file] = reader.read(folder / file)
+        known_values[file] = reader.read(folder / file)
     gc.freeze()  # scenes collect garbage, for which libraries need not be looked through
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     for case in cases:
@@ -164,12 +175,12 @@ def _read_all(folder: Path) -> None:
         if case.content is not None:
             path.write_bytes(case.content)
         signal.alarm(10 * SECONDS)
-        out.write(_describe_outcome(reader, path, known.get(case.file)) + "\n")
-        out.flush()
+        output.write(_describe_outcome(reader, path, known_values.get(case.file)) + "\n")
+        output.flush()
     gc.unfreeze()
 
 
-def _describe_outcome(reader: Reader, path: Path, known: Any) -> str:
+def _describe_outcome(reader: Reader, path: Path, known_value: Any) -> str:
     began = time.process_time()  # however busy the machine is
     try:
         read = reader.read(path)
@@ -178,13 +189,13 @@ def _describe_outcome(reader: Reader, path: Path, known: Any) -> str:
         is_clear = (
             is_legible(error, path, 600) if reader.kind == "picture" else is_legible(error, path)
         )
-        said = "refused" if is_clear else f"unclear: {str(error)!r}"
+        outcome = "refused" if is_clear else f"unclear: {str(error)!r}"
     except BaseException as error:
         return f"{type(error).__name__}: {str(error)[:200]!r}"
     else:
-        said = "same" if read == known else reader.opinion(path, read)
+        outcome = "same" if read == known_value else reader.opinion(path, read)
     took = time.process_time() - began
-    return said if took < SECONDS else f"took {took:.1f} s"
+    return outcome if took < SECONDS else f"took {took:.1f} s"
 
 
 if __name__ == "__main__":

@@ -47,15 +47,15 @@ class FakeObjects(dict[str, Any]):
 
 def fake_blender() -> tuple[ModuleType, ModuleType]:
     """Return the modules bpy and mathutils."""
-    made, vectors = ModuleType("bpy"), ModuleType("mathutils")
+    bpy, vectors = ModuleType("bpy"), ModuleType("mathutils")
     lights = SimpleNamespace(new=lambda name, kind: SimpleNamespace(type=kind, users=1))
-    made.data = SimpleNamespace(objects=FakeObjects(), worlds={}, lights=lights)  # type: ignore[attr-defined]
+    bpy.data = SimpleNamespace(objects=FakeObjects(), worlds={}, lights=lights)  # type: ignore[attr-defined]
     nothing = SimpleNamespace(link=lambda item: None)
     scene = SimpleNamespace(collection=SimpleNamespace(objects=nothing))
     layer = SimpleNamespace(update=lambda: None)
-    made.context = SimpleNamespace(scene=scene, view_layer=layer)  # type: ignore[attr-defined]
+    bpy.context = SimpleNamespace(scene=scene, view_layer=layer)  # type: ignore[attr-defined]
     vectors.Matrix = FakeMatrix  # type: ignore[attr-defined]
-    return made, vectors
+    return bpy, vectors
 
 
 def run_in(modules: tuple[ModuleType, ModuleType], text: str, patch: Any) -> None:

@@ -20,8 +20,8 @@ from lightpaint.paint.protocol import (
 
 def fake_answer(**fields: Any) -> AnswerUpdate:
     weights = np.ones((2, 3))
-    made = {"version": 0, "stroke": 0, "exact": False, "mode": "linear", "weights": weights}
-    return AnswerUpdate(**{**made, **fields})
+    defaults = {"version": 0, "stroke": 0, "exact": False, "mode": "linear", "weights": weights}
+    return AnswerUpdate(**{**defaults, **fields})
 
 
 def fake_progress(task: str, done: int) -> ProgressReport:
@@ -34,7 +34,7 @@ def fake_pending() -> SessionPending:
 
 
 def fake_state(resources: dict[str, int], **fields: Any) -> SessionState:
-    made = {
+    defaults = {
         "version": VERSION,
         "scene": "room",
         "folder": "/shows/room",
@@ -57,4 +57,4 @@ def fake_state(resources: dict[str, int], **fields: Any) -> SessionState:
         "answer": Findings(),
         "weights": np.ones((0, 3)),
     }
-    return SessionState(**{**made, **fields})
+    return SessionState(**{**defaults, **fields})

@@ -36,10 +36,10 @@ class FakeSession:
             "objects": np.array([[-1, 0, 1]], np.int16),
         }
 
-    def handle(self, said: AnyRequest, arrays: dict[str, npt.NDArray[Any]]) -> list[Message]:
+    def handle(self, request: AnyRequest, arrays: dict[str, npt.NDArray[Any]]) -> list[Message]:
         self.threads.add(threading.get_ident())
-        self.heard.append(said)
-        match said:
+        self.heard.append(request)
+        match request:
             case Paint(label="refuse"):
                 raise PaintError("this cannot be painted")
             case Paint(label="break"):
@@ -49,7 +49,7 @@ class FakeSession:
             case Paint():
                 self.before_paint()
                 weights = np.full((2, 3), float(arrays["image"].sum()))
-                return [fake_answer(stroke=said.stroke, weights=weights)]
+                return [fake_answer(stroke=request.stroke, weights=weights)]
         return [Acknowledgement(), Notice(text="said")]
 
     def state(self) -> SessionState:

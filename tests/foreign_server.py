@@ -65,18 +65,18 @@ class ForeignServer:
         self.collected: list[dict[str, str]] = []
         self.tried: dict[str, str] = {}
         self.has_tried = threading.Event()
-        its = self
+        server = self
 
         class Handler(BaseHTTPRequestHandler):
             def do_GET(self) -> None:
-                its.collected.append({"path": self.path, **dict(self.headers.items())})
+                server.collected.append({"path": self.path, **dict(self.headers.items())})
                 self._send(b"" if self.path == "/favicon.ico" else PAGE.encode())
 
             def do_POST(self) -> None:
-                its.collected.append({"path": self.path, **dict(self.headers.items())})
-                its.tried = json.loads(self.rfile.read(int(self.headers["content-length"])))
+                server.collected.append({"path": self.path, **dict(self.headers.items())})
+                server.tried = json.loads(self.rfile.read(int(self.headers["content-length"])))
                 self._send(b"")
-                its.has_tried.set()
+                server.has_tried.set()
 
             def _send(self, content: bytes) -> None:
                 self.send_response(200)
@@ -98,31 +98,31 @@ class ForeignServer:
 
     def replay(self, painter: str) -> list[str]:
         """Send the painter what was collected, under its own name; return what it gave away."""
-        where = urlsplit(painter)
-        assert where.hostname is not None
-        given = []
+        address = urlsplit(painter)
+        assert address.hostname is not None
+        statuses = []
         for headers in self.collected:
             own = {name: value for name, value in headers.items() if name.lower() in ATTACHED}
-            own |= {"Host": where.netloc, "Origin": f"http://{where.netloc}"}
+            own |= {"Host": address.netloc, "Origin": f"http://{address.netloc}"}
             for path in ("/data/present", "/key"):
-                with closing(http.client.HTTPConnection(where.hostname, where.port)) as asking:
+                with closing(http.client.HTTPConnection(address.hostname, address.port)) as asking:
                     asking.request("GET", path, headers=own)
                     answer = asking.getresponse()
                     if answer.status not in (403, 410):
-                        given.append(f"{path}: {answer.status} {answer.read()[:40]!r}")
+                        statuses.append(f"{path}: {answer.status} {answer.read()[:40]!r}")
             cookie = {name: value for name, value in own.items() if name.lower() == "cookie"}
             try:
                 connect(
-                    f"ws://{where.netloc}/live",
-                    origin=Origin(f"http://{where.netloc}"),
+                    f"ws://{address.netloc}/live",
+                    origin=Origin(f"http://{address.netloc}"),
                     additional_headers=cookie,
                     subprotocols=[Subprotocol("lightpaint")],
                     proxy=None,
                 ).close()
-                given.append("a socket")
+                statuses.append("a socket")
             except InvalidHandshake:
                 pass
-        return given
+        return statuses
 
 
 #: Headers by which a browser could say who somebody is.

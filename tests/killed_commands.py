@@ -117,35 +117,35 @@ class Stage:
             until(self)
             if number:
                 process.send_signal(number)
-            said = process.communicate()[1]
+            stderr = process.communicate()[1]
         kind = self.what_is_there()
         finish(self.look)
         if kind in ("earlier", "new") and self.what_is_there() != kind:
             kind = f"{kind}, and another when finished"
         left = [path.name for path in self.hidden]
-        return Outcome(f"{kind}, with {left}" if left else kind, process.returncode, said)
+        return Outcome(f"{kind}, with {left}" if left else kind, process.returncode, stderr)
 
     def what_is_there(self) -> str:
         """`earlier`, `new`, or what is wrong."""
-        there = contents(self.look)
-        if there == self.earlier:
+        contents_now = contents(self.look)
+        if contents_now == self.earlier:
             return "earlier"
-        record = json.loads(there.get("result.json", b'{"files": {}}'))
+        record = json.loads(contents_now.get("result.json", b'{"files": {}}'))
         files = set(record["files"]) | {"notes.txt", "result.json"}
-        if set(there) != files:
-            return f"not whole: {sorted(set(there) ^ files)}"
-        sums = {name: f"{zlib.crc32(there[name]):08x}" for name in record["files"]}
-        mixed = [name for name, known in record["files"].items() if sums[name] != known]
+        if set(contents_now) != files:
+            return f"not whole: {sorted(set(contents_now) ^ files)}"
+        sums = {name: f"{zlib.crc32(contents_now[name]):08x}" for name in record["files"]}
+        mixed = [name for name, known_sum in record["files"].items() if sums[name] != known_sum]
         return f"mixed: {mixed}" if mixed else "new"
 
     @property
     def hidden(self) -> list[Path]:
         """Folders in which a new result is on its way, or was."""
-        there: list[Path] = []
+        hidden_files: list[Path] = []
         for place in (self.folder, self.look):
             with suppress(FileNotFoundError):
-                there += [place / name for name in os.listdir(place) if MARK in name]
-        return there
+                hidden_files += [place / name for name in os.listdir(place) if MARK in name]
+        return hidden_files
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -201,9 +201,9 @@ def _main() -> int:
     )
     parser.add_argument("--kills", type=int, default=40)
     parser.add_argument("--seed", type=int, default=0)
-    given = parser.parse_args()
-    chance = random.Random(given.seed)
-    found: Counter[tuple[str, str, str, str, int]] = Counter()
+    options = parser.parse_args()
+    chance = random.Random(options.seed)
+    mixtures: Counter[tuple[str, str, str, str, int]] = Counter()
     with tempfile.TemporaryDirectory() as folder:
         stages = {}
         for name in COMMANDS:
@@ -212,17 +212,17 @@ def _main() -> int:
             stages[name] = Stage(place, name)
             print(f"{name}: {stages[name].run_s:.1f} s", flush=True)
         turns = {name: moments(stage, chance) for name, stage in stages.items()}
-        for k in range(given.kills):
+        for k in range(options.kills):
             name = list(COMMANDS)[k % len(COMMANDS)]
             number = chance.choice([signal.SIGKILL, signal.SIGKILL, signal.SIGTERM])
             when, until = next(turns[name])
             outcome = stages[name].killed(until, number)
             if "Traceback" in outcome.said:
                 print(outcome.said)
-            found[name, when, number.name, outcome.kind, outcome.code] += 1
-    for row, count in sorted(found.items()):
+            mixtures[name, when, number.name, outcome.kind, outcome.code] += 1
+    for row, count in sorted(mixtures.items()):
         print(count, *row, sep="\t")
-    return int(any(row[3] not in ("earlier", "new") for row in found))
+    return int(any(row[3] not in ("earlier", "new") for row in mixtures))
 
 
 if __name__ == "__main__":

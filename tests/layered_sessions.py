@@ -23,7 +23,7 @@ SIZES = ((12, 70), (9, 8))
 
 def bases_of(views: int = 2) -> list[lp.Basis]:
     """Two soft lights, seen from several places."""
-    made = []
+    bases = []
     for k, size in enumerate(SIZES[:views]):
         rng = np.random.default_rng(k)
         images = rng.uniform(0.1, 1, (2, *size, 3)).astype(np.float32)
@@ -31,8 +31,8 @@ def bases_of(views: int = 2) -> list[lp.Basis]:
             BasisLight(name, "point", "intensity", "W/sr", (0.5, 0.5, 0.5)) for name in "ab"
         )
         origin = Origin("made", "made", f"view {k}", 0, "separate", (0, 0), (0, 0))
-        made.append(lp.Basis(lights, images, np.zeros_like(images), np.zeros(size, bool), origin))
-    return made
+        bases.append(lp.Basis(lights, images, np.zeros_like(images), np.zeros(size, bool), origin))
+    return bases
 
 
 def identity_of(views: int = 2) -> Identity:
@@ -80,50 +80,50 @@ class RandomEditor:
         choices = ["add", "add", "paint"]
         choices += ["change", "drop", "delete", "order", "copy", "group", "drag"] if ids else []
         choices += ["undo"] if with_undo and position else []
-        what = choices[self.rng.integers(len(choices))]
+        action = choices[self.rng.integers(len(choices))]
         number = int(self.rng.choice(ids)) if ids else 0
-        if what == "add":
+        if action == "add":
             self.add(("paint", "adjust", "weigh")[self.rng.integers(3)])
-        elif what == "paint":
+        elif action == "paint":
             self.paint(self.session.views.layers[number])
-        elif what == "drop":
+        elif action == "drop":
             self.paint(self.session.views.layers[number], is_final=False)
             self.session.handle(protocol.DropStroke(self.strokes), {})
-        elif what == "undo":
+        elif action == "undo":
             self.session.handle(protocol.Undo(), {})
         else:
-            self.rearrange(what, number)
+            self.rearrange(action, number)
         del self.states[position + 1 :]
-        if what == "undo":
+        if action == "undo":
             del self.states[self.session.store.position + 1 :]
             # What is undone is done again: then it is known what comes next.
             self.session.handle(protocol.Redo(), {})
         if self.session.store.position > len(self.states) - 1:
             self.states.append(self.state())
 
-    def rearrange(self, what: str, number: int) -> None:
+    def rearrange(self, action: str, number: int) -> None:
         """Change layers, their order or both."""
         layers = self.session.views.layers
         layer, new = layers[number], self.session.views.next_layer
-        if what in ("change", "drag"):
+        if action in ("change", "drag"):
             values = {
                 "is_visible": bool(self.rng.random() < 0.7),
                 "strength": float(self.rng.uniform(0, 2)),
                 "importance": float(self.rng.choice([0.5, 1.0, 3.0])),
             }
             changed = Layer(**{**vars(layer), **values})
-            if what == "drag":
+            if action == "drag":
                 half = Layer(**{**vars(layer), "strength": 0.5})
                 self.change(layers=(half,), is_final=False)
             self.change(layers=(changed,))
-        elif what == "delete":
+        elif action == "delete":
             self.change(order=tuple(k for k in layers.ids if k != number))
-        elif what == "order":
+        elif action == "order":
             self.change(order=tuple(int(k) for k in self.rng.permutation(layers.ids)))
-        elif what == "copy" and layer.kind != "group":
+        elif action == "copy" and layer.kind != "group":
             copy = Layer(**{**vars(layer), "id": new, "name": "copy"})
             self.change(layers=(copy,), copies={str(new): number})
-        elif what == "group" and layer.kind != "group":
+        elif action == "group" and layer.kind != "group":
             inner = Layer(**{**vars(layer), "group": new})
             self.change(layers=(Layer(new, "group", "both"), inner))
 

@@ -24,7 +24,7 @@ def stack_rows(basis: Any, target: Target) -> tuple[Any, Any]:
 
 
 def solve_free(
-    equations: NormalEquations, start: Any, *, is_scalar: Sequence[bool] = (), **how: Any
+    equations: NormalEquations, start: Any, *, is_scalar: Sequence[bool] = (), **options: Any
 ) -> ReducedOptimum:
     """The optimum of lights of which nothing is asked; some may have one weight for all channels.
 
@@ -33,4 +33,4 @@ def solve_free(
     n = len(start)
     scalar = is_scalar or [False] * n
     knobs = tuple(Knob.of_any_colour(k, is_scalar=scalar[k]) for k in range(n))
-    return solve_reduced(equations, Reduction(np.zeros((n, 3)), ("",) * n, knobs), start, **how)
+    return solve_reduced(equations, Reduction(np.zeros((n, 3)), ("",) * n, knobs), start, **options)

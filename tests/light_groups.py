@@ -24,18 +24,20 @@ def channels(layer: str, image: Any, *, names: Sequence[str] = "RGB", kind: Any 
 def write(path: Path, *parts: tuple[str, Mapping[str, Any]], **header: Any) -> Path:
     """An EXR with these parts, (name, channels) each."""
     head = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.ZIP_COMPRESSION, **header}
-    made = [OpenEXR.Part(dict(head), dict(held), name) for name, held in parts]
-    OpenEXR.File(made).write(str(path))
+    parts_of_file = [
+        OpenEXR.Part(dict(head), dict(file_channels), name) for name, file_channels in parts
+    ]
+    OpenEXR.File(parts_of_file).write(str(path))
     return path
 
 
 def interleaved(path: Path, layers: Mapping[str, Any], **options: Any) -> Path:
     """One part with all layers."""
     header = options.pop("header", {})
-    held = {
+    file_channels = {
         k: v for name, image in layers.items() for k, v in channels(name, image, **options).items()
     }
-    return write(path, ("", held), **header)
+    return write(path, ("", file_channels), **header)
 
 
 def multi_part(path: Path, layers: Mapping[str, Any], *, is_plain: bool = False) -> Path:

@@ -59,12 +59,12 @@ class RunningServer:
 
     def connection(self) -> socket.socket:
         """One whose end here takes next to nothing unless it is read."""
-        made = socket.socket()
-        made.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-        made.connect(("127.0.0.1", self.server.port))
-        made.settimeout(PATIENCE_S)
-        self.connections.append(made)
-        return made
+        client = socket.socket()
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        client.connect(("127.0.0.1", self.server.port))
+        client.settimeout(PATIENCE_S)
+        self.connections.append(client)
+        return client
 
     def end(self) -> None:
         """Stop, and fail if that is an error or never comes."""
@@ -80,13 +80,13 @@ class Page:
 
     def __init__(self, serving: RunningServer) -> None:
         self.connection = serving.connection()
-        here = serving.here
+        address = serving.here
         self.protocol = ClientProtocol(
-            parse_uri(f"ws://{here}/live"), subprotocols=[Subprotocol(PROTOCOL)]
+            parse_uri(f"ws://{address}/live"), subprotocols=[Subprotocol(PROTOCOL)]
         )
         request = self.protocol.connect()
         offer = {"Sec-WebSocket-Protocol": ", ".join(offered(serving.key))}
-        request.headers = Headers({**dict(request.headers), **offer, "Origin": f"http://{here}"})
+        request.headers = Headers({**dict(request.headers), **offer, "Origin": f"http://{address}"})
         self.protocol.send_request(request)
         self._sent()
         self.hears()
@@ -119,11 +119,11 @@ class Page:
         self.connection.sendall(b"".join(self.protocol.data_to_send()))
 
 
-def wait_until(is_so: Callable[[], object], what: str) -> None:
+def wait_until(is_so: Callable[[], object], description: str) -> None:
     """Wait for it, as long as anything takes on a busy machine."""
     end = time.monotonic() + PATIENCE_S
     while not is_so():
-        assert time.monotonic() < end, what
+        assert time.monotonic() < end, description
         time.sleep(0.01)
 
 

@@ -29,7 +29,9 @@ class MovingStudio:
             "room", folder, scene=self.scene, settings=Settings(spp=16, use_cache=False)
         )
         self.messages: list[Message] = []
-        self.studio = Studio([subject], lambda its: Store.open(folder / "session.db", its))
+        self.studio = Studio(
+            [subject], lambda identity: Store.open(folder / "session.db", identity)
+        )
         self.studio.on_message = self.messages.append
         self.studio.start()
         self.wait(lambda: any(m.kind == "state" for m in self.messages))
@@ -37,8 +39,8 @@ class MovingStudio:
     def wait(self, is_it: Callable[[], Any], seconds: float = 60) -> Any:
         until = time.monotonic() + seconds
         while time.monotonic() < until:
-            if found := is_it():
-                return found
+            if result := is_it():
+                return result
             time.sleep(0.02)
         raise AssertionError([m.fields.get("text", m.kind) for m in self.messages])
 
@@ -87,10 +89,10 @@ def opened_rig(moving: MovingStudio) -> Any:
 def pixel_of(moving: MovingStudio, point: Any) -> tuple[float, float]:
     """Where the camera of the scene itself sees a point."""
 
-    def seen(loaded: Any) -> Any:
+    def pixel_in_scene(loaded: Any) -> Any:
         return pixels_of(moving.scene, loaded, np.array([point]))[0]
 
-    x, y = moving.scene.while_loaded(seen)
+    x, y = moving.scene.while_loaded(pixel_in_scene)
     height, width = moving.scene.size
     return x * width, y * height
 

@@ -36,8 +36,8 @@ class Painter:
     def ui(self, key: str) -> Any:
         return self.page.evaluate("(key) => window.painter.store.value[key]", key)
 
-    def button(self, name: str, **about: Any) -> Any:
-        return self.page.get_by_role("button", name=name, **about).first
+    def button(self, name: str, **options: Any) -> Any:
+        return self.page.get_by_role("button", name=name, **options).first
 
     def slide(self, label: str, presses: str, times: int = 1) -> None:
         slider = self.page.get_by_role("slider", name=label, exact=True).first

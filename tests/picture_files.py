@@ -95,8 +95,8 @@ def psd(pixels: Any, *, mode: int = 3, merged: bool | None = None, packed: bool 
     depth = pixels.dtype.itemsize * 8
     resource = b""
     if merged is not None:
-        said = struct.pack(">IB", 1, merged) + bytes(9)
-        resource = b"8BIM" + struct.pack(">HHI", 1057, 0, len(said)) + said
+        header = struct.pack(">IB", 1, merged) + bytes(9)
+        resource = b"8BIM" + struct.pack(">HHI", 1057, 0, len(header)) + header
     planes = np.moveaxis(pixels, -1, 0).astype(pixels.dtype.newbyteorder(">"))
     rows = [row.tobytes() for plane in planes for row in plane]
     if packed:

@@ -29,7 +29,7 @@ def least(
     columns = np.array([row * scale for row, _ in (*equal, *unequal)]).T
     sizes = np.linalg.norm(columns, axis=0)
     values = np.array([value for _, value in (*equal, *unequal)]) / sizes
-    found = quadprog.solve_qp(
+    optimum = quadprog.solve_qp(
         M * scale[:, None] * scale, b * scale, columns / sizes, values, len(equal)
     )
-    return found[0] * scale
+    return optimum[0] * scale

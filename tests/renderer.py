@@ -160,9 +160,9 @@ def same_basis(a: Basis, b: Basis, *, of_file: bool = False) -> None:
     """
     assert a.origin == b.origin
     # float32 sums, or half floats, once taken apart and put together again.
-    same = 4 * (2**-11 if of_file else SAME_SAMPLES) * a.images.max()
-    assert np.abs(a.images - b.images).max() <= same
-    assert np.abs(a.half_differences - b.half_differences).max() <= same
+    tolerance = 4 * (2**-11 if of_file else SAME_SAMPLES) * a.images.max()
+    assert np.abs(a.images - b.images).max() <= tolerance
+    assert np.abs(a.half_differences - b.half_differences).max() <= tolerance
     np.testing.assert_array_equal(a.emitters_seen, b.emitters_seen)
 
 
@@ -174,5 +174,5 @@ def assert_equal_bits(a: Basis, b: Basis) -> None:
     assert (a.indirect is None) == (b.indirect is None)
     if a.indirect is not None and b.indirect is not None:
         for part in ("planes", "noise"):
-            its, other = (getattr(x.indirect, part).array() for x in (a, b))
-            np.testing.assert_array_equal(its, other, err_msg=f"indirect {part}")
+            actual, other = (getattr(x.indirect, part).array() for x in (a, b))
+            np.testing.assert_array_equal(actual, other, err_msg=f"indirect {part}")

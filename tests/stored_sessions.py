@@ -48,8 +48,8 @@ def look(number: int, of: int) -> StoredLook:
 
 
 def told(pixels: Any) -> Any:
-    found = [None if x is None else (x.shape, x.dtype.str, x.tobytes()) for x in pixels or ()]
-    return None if pixels is None else tuple(found)
+    snapshot = [None if x is None else (x.shape, x.dtype.str, x.tobytes()) for x in pixels or ()]
+    return None if pixels is None else tuple(snapshot)
 
 
 def content(store: Store) -> Any:

@@ -25,14 +25,14 @@ def _twice_as_bright(scene: Scene) -> Lighting:
     settings = []
     for light in scene.lights:
         r, g, b = light.emission
-        wanted = 2 * r, 2 * g, 2 * b
-        its = light.name, light.plugin, light.parameter, light.unit
-        settings.append(LightSetting(*its, light.emission, wanted))
+        doubled = 2 * r, 2 * g, 2 * b
+        fields = light.name, light.plugin, light.parameter, light.unit
+        settings.append(LightSetting(*fields, light.emission, doubled))
     return Lighting(tuple(settings))
 
 
-def _results(folder: Path, scene: Scene, **how: Any) -> ResultFolder:
-    return ResultFolder(folder, tuple(answer_files(folder, scene=scene, **how)), (), ("t",))
+def _results(folder: Path, scene: Scene, **options: Any) -> ResultFolder:
+    return ResultFolder(folder, tuple(answer_files(folder, scene=scene, **options)), (), ("t",))
 
 
 def _names(folder: Path) -> set[str]:
@@ -43,11 +43,11 @@ def _names(folder: Path) -> set[str]:
 def test_files_are_named_before_they_are_written(
     scene: Scene, tmp_path: Path, has_lighting: bool
 ) -> None:
-    how = {"scene": scene, "has_lighting": has_lighting}
+    options = {"scene": scene, "has_lighting": has_lighting}
     (tmp_path / "out").mkdir()
-    relit = write_answer(tmp_path / "out", _twice_as_bright(scene), **how)
-    written = {tmp_path / "out" / name for name in _names(tmp_path / "out")}
-    assert written <= set(answer_files(tmp_path / "out", **how))
+    relit = write_answer(tmp_path / "out", _twice_as_bright(scene), **options)
+    written_paths = {tmp_path / "out" / name for name in _names(tmp_path / "out")}
+    assert written_paths <= set(answer_files(tmp_path / "out", **options))
     assert (tmp_path / "out" / "lighting.json").exists() != has_lighting
     assert relit is not None
     assert relit.lights[0].emission == _twice_as_bright(scene).lights[0].emission
@@ -67,8 +67,8 @@ def test_every_way_of_leaving_an_answer_leaves_the_same_bytes(scene: Scene, tmp_
     assert not answer.has_moved_paths
     assert _names(tmp_path / "staged") == _names(tmp_path / "directly") | {"result.json"}
     for name in _names(tmp_path / "directly"):
-        one, same = (tmp_path / x / name for x in ("directly", "staged"))
-        assert one.read_bytes() == same.read_bytes()
+        direct_file, staged_file = (tmp_path / x / name for x in ("directly", "staged"))
+        assert direct_file.read_bytes() == staged_file.read_bytes()
     assert read_lighting(tmp_path / "staged" / "lighting.json").emission == lighting.emission
 
 

@@ -29,17 +29,17 @@ def jumping(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("jumping")
 def test_a_basis_of_so_many_seconds_takes_these(small_room: Scene, tmp_path: Path) -> None:
-    told: list[tuple[int, int]] = []
+    reports: list[tuple[int, int]] = []
 
     def hear(label: str, done: int, total: int, unit: str = "passes") -> None:
-        told.append((done, total))
+        reports.append((done, total))
 
     begin_s = time.monotonic()
     basis = lp.render_basis(small_room, time_s=1.0, progress=hear)
     assert basis.origin.spp >= 1
     # Compilation and the last pass come on top.
     assert time.monotonic() - begin_s < 60
-    assert all(0 <= done <= total for done, total in told)
+    assert all(0 <= done <= total for done, total in reports)
     lp.write_basis(tmp_path / "room.basis.exr", basis)
     assert lp.read_basis(tmp_path / "room.basis.exr").origin == basis.origin
 

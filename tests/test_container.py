@@ -23,8 +23,8 @@ def steps() -> list[tuple[str, str]]:
 
 def copied() -> list[str]:
     """What is copied from the checkout."""
-    given = [shlex.split(rest) for word, rest in steps() if word == "COPY"]
-    return [x for words in given if not words[0].startswith("--") for x in words[:-1]]
+    sources = [shlex.split(rest) for word, rest in steps() if word == "COPY"]
+    return [x for words in sources if not words[0].startswith("--") for x in words[:-1]]
 
 
 def reaches(path: str) -> bool:
@@ -54,10 +54,10 @@ def test_the_package_needs_nothing_that_is_not_copied() -> None:
     """Links of the package lead into folders that come along."""
     for link in (REPOSITORY / "lightpaint").rglob("*"):
         if link.is_symlink():
-            there = link.resolve().relative_to(REPOSITORY.resolve()).as_posix()
-            assert any(there.startswith(f"{path}/") for path in copied()), link
-    named = [PROJECT["readme"], *PROJECT["license-files"]]
-    assert set(named) <= set(copied())
+            link_target = link.resolve().relative_to(REPOSITORY.resolve()).as_posix()
+            assert any(link_target.startswith(f"{path}/") for path in copied()), link
+    named_files = [PROJECT["readme"], *PROJECT["license-files"]]
+    assert set(named_files) <= set(copied())
 
 
 def test_extras_exist_and_the_python_will_do() -> None:

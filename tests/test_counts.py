@@ -47,7 +47,7 @@ def test_no_light_mixes_more_colours_than_a_fixture_has(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "asked",
+    "constraints",
     [
         {"lock": "3200K" + " " * 10**6 + "40%"},
         {"limits": {"min": "0" * 10**6}},
@@ -57,9 +57,9 @@ def test_no_light_mixes_more_colours_than_a_fixture_has(tmp_path: Path) -> None:
         {"x" * 10**6: True},
     ],
 )
-def test_a_value_that_is_too_long_is_said_in_one_short_line(asked: dict[str, Any]) -> None:
+def test_a_value_that_is_too_long_is_said_in_one_short_line(constraints: dict[str, Any]) -> None:
     with pytest.raises(ConstraintError) as refusal:
-        Constraints.of({"a": asked})
+        Constraints.of({"a": constraints})
     assert len(str(refusal.value)) < 1000
 
 
@@ -129,8 +129,8 @@ def test_samples_and_suggestions_have_an_end(tmp_path: Path) -> None:
         with pytest.raises(lp.LightpaintError, match=f"at most {most}"):
             Settings(**{key: most + 1})
     for option in ("--spp", "--verify-spp", "--suggest"):
-        given = (option, str(10**30), "r.xml", "a.png")
-        assert "at most" in run_refused(tmp_path, "solve", *given)
+        arguments = (option, str(10**30), "r.xml", "a.png")
+        assert "at most" in run_refused(tmp_path, "solve", *arguments)
 
 
 # Work that is given up
@@ -176,11 +176,11 @@ def test_ctrl_c_waits_for_no_job_beside() -> None:
 def test_a_solve_asks_whether_it_is_wanted(method: Any) -> None:
     rng = np.random.default_rng(0)
     A = rng.standard_normal((60, 40))
-    asked = []
+    checks = []
 
     def check() -> None:
-        asked.append(1)
-        if len(asked) > 2:
+        checks.append(1)
+        if len(checks) > 2:
             raise PaintError("over")
 
     with pytest.raises(PaintError, match="over"), cancellable(check):

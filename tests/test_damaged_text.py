@@ -100,15 +100,19 @@ def _damaged(content: bytes, file: str, seed: int) -> Iterator[Case]:
     for end in range(len(content)):
         yield Case(file, f"cut at {end}", content[:end])
     for _ in range(400):
-        at, bit = rng.randrange(len(content)), rng.randrange(8)
-        yield Case(file, f"bit {bit} of byte {at}", flip_bit(content, at, bit))
+        position, bit = rng.randrange(len(content)), rng.randrange(8)
+        yield Case(file, f"bit {bit} of byte {position}", flip_bit(content, position, bit))
     starts = [i for i in range(1, len(content)) if content[i - 1 : i] in b' :=[,{"\n']
     for odd in ODD:
-        for at in rng.sample(starts, min(8, len(starts))):
-            end = at + rng.choice((0, 1, 3, 8))
-            yield Case(file, f"{odd[:12]!r} at {at} to {end}", content[:at] + odd + content[end:])
+        for position in rng.sample(starts, min(8, len(starts))):
+            end = position + rng.choice((0, 1, 3, 8))
+            yield Case(
+                file,
+                f"{odd[:12]!r} at {position} to {end}",
+                content[:position] + odd + content[end:],
+            )
     half = len(content) // 2
-    for done, whole in {
+    for damage, damaged_content in {
         "twice": content * 2,
         "with a mark": b"\xef\xbb\xbf" + content,
         "in UTF-16": content.decode().encode("utf-16"),
@@ -119,24 +123,24 @@ def _damaged(content: bytes, file: str, seed: int) -> Iterator[Case]:
         "spaces": b" " * 10_000,
         "half": content[half:],
     }.items():
-        yield Case(file, done, whole)
+        yield Case(file, damage, damaged_content)
 
 
 @pytest.mark.parametrize("kind", ["lighting", "lights", "template"])
 def test_damage(tmp_path: Path, lighting: Path, lights: Path, kind: str) -> None:
-    whole = {"lighting": lighting, "lights": lights}.get(kind) or _write_template(tmp_path)
-    content = whole.read_bytes()
-    cases = list(_damaged(content, whole.name, 1))
-    results = outcomes(kind, {whole.name: content}, cases, tmp_path)
+    source = {"lighting": lighting, "lights": lights}.get(kind) or _write_template(tmp_path)
+    content = source.read_bytes()
+    cases = list(_damaged(content, source.name, 1))
+    results = outcomes(kind, {source.name: content}, cases, tmp_path)
     assert wrong_outcomes(results) == []
     assert len(results) > 800
     # The harness is not blind: both come about, and what is cut is never read as whole.
-    said = [said for _, said in results]
-    assert said.count("refused") > 500
-    assert said.count("same") + said.count("agreed") > 20
+    all_outcomes = [outcome for _, outcome in results]
+    assert all_outcomes.count("refused") > 500
+    assert all_outcomes.count("same") + all_outcomes.count("agreed") > 20
     if kind != "lights":  # of which the first lines are a lights file too
         cut = [(case.done, s) for case, s in results if case.done[:3] == "cut" and s != "refused"]
-        assert {done for done, _ in cut} <= {f"cut at {len(content) - 1}"}
+        assert {damage for damage, _ in cut} <= {f"cut at {len(content) - 1}"}
 
 
 JSON = st.recursive(
@@ -152,15 +156,15 @@ JSON = st.recursive(
 )
 
 
-def _places(value: Any, here: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+def _places(value: Any, place: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
     """Where anything stands in a document."""
-    yield here
+    yield place
     if isinstance(value, dict | list):
         for key in value if isinstance(value, dict) else range(len(value)):
-            yield from _places(value[key], (*here, key))
+            yield from _places(value[key], (*place, key))
 
 
-def _changed(document: Any, place: tuple[Any, ...], value: Any, how: str) -> Any:
+def _changed(document: Any, place: tuple[Any, ...], value: Any, change: str) -> Any:
     """A copy in which `value` stands at a place or beside it, or nothing does."""
     changed = copy.deepcopy(document)
     if not place:
@@ -168,11 +172,11 @@ def _changed(document: Any, place: tuple[Any, ...], value: Any, how: str) -> Any
     holder = changed
     for key in place[:-1]:
         holder = holder[key]
-    if how == "gone":
+    if change == "gone":
         del holder[place[-1]]
-    elif how == "beside" and isinstance(holder, list):
+    elif change == "beside" and isinstance(holder, list):
         holder.insert(place[-1], value)
-    elif how == "beside":
+    elif change == "beside":
         holder["odd"] = value
     else:
         holder[place[-1]] = value
@@ -271,9 +275,9 @@ def test_what_is_no_file_is_not_read(tmp_path: Path, reader: Any) -> None:
     path = tmp_path / name
     for target in ("/dev/zero", "/dev/random", "/dev/stdin", "/proc/self/mem", "/", "gone", name):
         path.symlink_to(target)
-        with pytest.raises(error) as caught:
+        with pytest.raises(error) as refusal:
             read(path)
-        assert is_legible(caught.value, path) or target in str(caught.value)
+        assert is_legible(refusal.value, path) or target in str(refusal.value)
         path.unlink()
     os.mkfifo(path)  # which opening would wait at for ever
     with pytest.raises(error, match="is a device or a pipe"):
@@ -288,9 +292,9 @@ def test_what_is_no_file_is_not_read(tmp_path: Path, reader: Any) -> None:
 @pytest.mark.parametrize("name", ["a\0b", "a" * 5000, "a/" * 3000, "\ud800"])
 def test_names_that_no_file_has(name: str) -> None:
     for read, error in ((read_lighting, LightingError), (read_lights_file, SceneError)):
-        with pytest.raises(error) as caught:
+        with pytest.raises(error) as refusal:
             read(Path(name))
-        assert "\n" not in str(caught.value)
+        assert "\n" not in str(refusal.value)
 
 
 def test_keys_of_very_many_parts_are_refused_at_once(tmp_path: Path) -> None:

@@ -66,8 +66,8 @@ def test_the_light_of_a_picture_that_clips_is_found(folder: Path):
     # Taken by its word, it asks for less light.
     target = lp.read_target("clip.png", transform=ViewTransform("srgb", 2.0))
     plain = lp.Target("t", target.image, target.importance, target.everything)
-    found = lp.solve(lp.read_basis("room.basis.exr"), plain)
-    dimmer = found.lighting.weights_for(lp.read_basis("room.basis.exr"))
+    solution = lp.solve(lp.read_basis("room.basis.exr"), plain)
+    dimmer = solution.lighting.weights_for(lp.read_basis("room.basis.exr"))
     assert (dimmer.sum(axis=0) < 0.9 * TRUTH.sum(axis=0)).any()
     assert "at least so bright" in Path("a/report.html").read_text()
     assert _solved("a")["solve"]["rounds"] > 1
@@ -78,8 +78,8 @@ def test_display_space_on_the_command_line(folder: Path, capsys: pytest.CaptureF
     assert "as srgb" not in capsys.readouterr().out
     display = ["--space", "display", "--exposure", "1"]
     assert main(["solve", "room.basis.exr", "odd.exr", "-o", "dis", *display]) == 0
-    told = " ".join(capsys.readouterr().out.split())
-    assert "Fitted as the eye sees it (srgb at +1.0 stops)" in told
+    output = " ".join(capsys.readouterr().out.split())
+    assert "Fitted as the eye sees it (srgb at +1.0 stops)" in output
     page = Path("dis/report.html").read_text()
     assert "Fitted in display space" in page
     assert "Missed in linear light" in page
@@ -95,21 +95,21 @@ def test_display_space_on_the_command_line(folder: Path, capsys: pytest.CaptureF
     basis, painted = lp.read_basis("room.basis.exr"), lp.read_target("odd.exr").image
     D = ~basis.emitters_seen[..., None]
     transform = ViewTransform("srgb", 1.0)
-    off = {}
+    errors = {}
     for name in ("lin", "dis"):
         x = basis.mix(_weights(name))
-        shown = np.square(transform.encode(x) - transform.encode(painted))
-        off[name] = (D * shown).sum(), (D * np.square(x - painted)).sum()
-    assert off["dis"][0] < off["lin"][0]
-    assert off["dis"][1] > off["lin"][1]
-    assert sum(solved["objective"]) == pytest.approx(off["dis"][0], rel=1e-4)
+        squared = np.square(transform.encode(x) - transform.encode(painted))
+        errors[name] = (D * squared).sum(), (D * np.square(x - painted)).sum()
+    assert errors["dis"][0] < errors["lin"][0]
+    assert errors["dis"][1] > errors["lin"][1]
+    assert sum(solved["objective"]) == pytest.approx(errors["dis"][0], rel=1e-4)
 
 
 def test_the_view_is_that_of_the_picture(folder: Path):
     assert main(["solve", "room.basis.exr", "clip.png", "--space", "display", "-o", "a"]) == 0
     assert _solved("a")["solve"]["display"] == "srgb"
-    named = ["--view", "agx", "--space", "display", "-o", "b"]
-    assert main(["solve", "room.basis.exr", "clip.png", *named]) == 0
+    options = ["--view", "agx", "--space", "display", "-o", "b"]
+    assert main(["solve", "room.basis.exr", "clip.png", *options]) == 0
     assert _solved("b")["solve"]["display"] == "agx"
 
 
@@ -126,14 +126,14 @@ def test_an_exposure_alone_is_one_of_the_templates_view(folder: Path, basis: Bas
         lights={},
     )
     write_png_16(folder / "painted.png", transform.encode(image))
-    for asked, shown in (
+    for arguments, view_text in (
         ([], "agx at -3.0 stops"),
         (["--exposure", "-2.5"], "agx at -2.5 stops"),
         (["--view", "filmic"], "filmic at -3.0 stops"),
     ):
         command = ["solve", "room.basis.exr", "painted.png", "--space", "display", "-o", "a"]
-        assert main([*command, *asked]) == 0
-        assert _solved("a")["solve"]["display"] == shown
+        assert main([*command, *arguments]) == 0
+        assert _solved("a")["solve"]["display"] == view_text
     command = ["solve", "room.basis.exr", "painted.png", "--exposure", "-2.5", "-o", "a"]
     assert main([*command, "--literal"]) == 0
     # What is half a stop less exposed than it was taken for is that much brighter in all places.
@@ -143,21 +143,21 @@ def test_an_exposure_alone_is_one_of_the_templates_view(folder: Path, basis: Bas
 def test_noise_is_corrected_and_the_scene_refined(room: Path, folder: Path):
     """Steps of the last linear problem: towards what a good basis gives."""
     target = lp.read_target("odd.exr")
-    how: dict[str, Any] = {"space": "display", "transform": ViewTransform("srgb", 1.0)}
-    best = lp.solve(lp.read_basis("room.basis.exr"), target, transform=how["transform"])
+    options: dict[str, Any] = {"space": "display", "transform": ViewTransform("srgb", 1.0)}
+    best = lp.solve(lp.read_basis("room.basis.exr"), target, transform=options["transform"])
     truth = best.lighting.weights_for(lp.read_basis("room.basis.exr"))
-    for more in ({}, {"noise_correction": True}, {"refine": 1}):
+    for extra in ({}, {"noise_correction": True}, {"refine": 1}):
         look = lp.paint_with_light(
-            room, target, folder / "out", spp=16, seed=3, use_cache=False, **how, **more
+            room, target, folder / "out", spp=16, seed=3, use_cache=False, **options, **extra
         )
         assert look.verification is not None
         assert look.verification.agrees
         assert look.solution.certificate.display == "srgb at +1.0 stops"
-        found = look.lighting.weights_for(look.basis)
+        weights = look.lighting.weights_for(look.basis)
         assert look.uncertainty is not None
-        off = np.abs(found - truth) / np.maximum(look.uncertainty.standard_error, 1e-3)
+        deviation = np.abs(weights - truth) / np.maximum(look.uncertainty.standard_error, 1e-3)
         # Of nine weights, each with an error that is known to a third.
-        assert np.sqrt(np.square(off).mean()) < 4
+        assert np.sqrt(np.square(deviation).mean()) < 4
 
 
 def test_a_space_that_there_is_none(folder: Path):

@@ -41,8 +41,10 @@ OTHER_FOLDER = {"set_lights.py", "set_scene.py", "--colorconvert"}
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
 def test_files_that_are_named_are_there(document: Path):
-    named = set(re.findall(r"`([\w/]+\.py)`", document.read_text())) - OTHER_FOLDER
-    assert [x for x in sorted(named) if not any(file.endswith("/" + x) for file in FILES)] == []
+    named_files = set(re.findall(r"`([\w/]+\.py)`", document.read_text())) - OTHER_FOLDER
+    assert [
+        x for x in sorted(named_files) if not any(file.endswith("/" + x) for file in FILES)
+    ] == []
 
 
 def test_architecture_is_a_start_of_a_few_pages() -> None:
@@ -127,10 +129,10 @@ def test_keys_of_the_painter_are_those_of_its_page():
     )
     keys = [*((f"'{key}'", label) for label, key in tools), *others]
     assert len(keys) > 30
-    shown = [re.findall(r"'([^']*)'", names) for names, _ in keys]
+    page_keys = [re.findall(r"'([^']*)'", names) for names, _ in keys]
     rows = [
         f"| {' '.join(f'`{name}`' for name in names)} | {does} |"
-        for names, (_, does) in zip(shown, keys, strict=True)
+        for names, (_, does) in zip(page_keys, keys, strict=True)
     ]
     [table] = re.findall(
         r"\| key \| does \|\n\|[-|]+\|\n((?:\|.*\n)+)", (ROOT / "docs" / "painter.md").read_text()
@@ -165,14 +167,14 @@ DEFAULTS = {
 
 def test_numbers_that_the_help_gives_as_defaults_are_those_of_the_code():
     """Help is shown without loading what the numbers come from, so it has them a second time."""
-    said = {
+    defaults = {
         (action.option_strings[-1], default)
         for parser in _parsers()
         for action in parser._actions
         for default in re.findall(r"\(default: (.*\d.*)\)", action.help or "")
     }
-    assert {option for option, _ in said} == set(DEFAULTS)
-    assert [(x, text) for x, text in sorted(said) if DEFAULTS[x] not in text] == []
+    assert {option for option, _ in defaults} == set(DEFAULTS)
+    assert [(x, text) for x, text in sorted(defaults) if DEFAULTS[x] not in text] == []
 
 
 def test_numbers_in_other_words_of_the_help_are_those_of_the_code():
@@ -181,13 +183,13 @@ def test_numbers_in_other_words_of_the_help_are_those_of_the_code():
     )
     preview, final = PRESETS["preview"], PRESETS["final"]
     pixels = round(preview.pixels or 0, -4)
-    for said in (
+    for phrase in (
         f"preview: {preview.spp} samples per pixel on about {pixels:,} pixels",
         f"final: {final.spp} on the whole film",
         f"white: {LAMP_KELVINS[0]} to {LAMP_KELVINS[1]} K",
         f"more than {MAX_SEPARATE} are similar",
     ):
-        assert said in texts
+        assert phrase in texts
 
 
 def test_numbers_of_settings_are_the_same_in_documents_and_on_the_page():
@@ -203,7 +205,7 @@ def test_numbers_of_settings_are_the_same_in_documents_and_on_the_page():
 
 def test_which_files_are_painted_over_is_said_alike():
     """In the README, in the document on targets, and by `lightpaint template` itself."""
-    told = {
+    listed = {
         match[1]
         for line in template_lines(
             Path("template"), [Path("template") / name for name in PLAIN_FILES]
@@ -212,10 +214,12 @@ def test_which_files_are_painted_over_is_said_alike():
     }
     readme = (ROOT / "README.md").read_text()
     [section] = re.findall(r"The first command writes (.*?)Paint over one of the two", readme, re.S)
-    named = re.findall(r"`(\w+\.(?:png|exr))`", section)
+    files = re.findall(r"`(\w+\.(?:png|exr))`", section)
     targets = (ROOT / "docs" / "targets.md").read_text()
-    [opened] = re.findall(r"Open `([\w.]+)` \(16 bits, sRGB\) or `([\w.]+)` \(linear", targets)
-    assert told == set(named) == set(opened)
+    [targets_named] = re.findall(
+        r"Open `([\w.]+)` \(16 bits, sRGB\) or `([\w.]+)` \(linear", targets
+    )
+    assert listed == set(files) == set(targets_named)
 
 
 def test_the_corridor_is_quoted_as_it_stands():
@@ -245,40 +249,40 @@ def _anchors(document: Path) -> set[str]:
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
 def test_links_lead_somewhere(document: Path) -> None:
     text = re.sub(r"```.*?```", "", document.read_text(), flags=re.DOTALL)
-    lost = []
+    broken_links = []
     for link in re.findall(r"\]\(([^)\s]+)\)", text):
         path, _, anchor = link.partition("#")
         if "://" in link:
             continue
         file = (document.parent / path).resolve() if path else document
         if not file.exists() or (anchor and anchor not in _anchors(file)):
-            lost.append(link)
-    assert lost == []
+            broken_links.append(link)
+    assert broken_links == []
 
 
 def test_every_option_is_in_some_document() -> None:
     """Or in the help of a command alone, for those that say all there is to say of themselves."""
     text = " ".join(document.read_text() for document in DOCUMENTS)
-    named = set(re.findall(r"(?<![\w-])(--?[a-zA-Z][a-z-]*)", text))
-    lost = {
+    options = set(re.findall(r"(?<![\w-])(--?[a-zA-Z][a-z-]*)", text))
+    undocumented = {
         action.option_strings[-1]
         for parser in _parsers()
         for action in parser._actions
-        if action.option_strings and not named & set(action.option_strings)
+        if action.option_strings and not options & set(action.option_strings)
     }
-    assert sorted(lost) == []
+    assert sorted(undocumented) == []
 
 
 def test_snippets_name_what_there_is() -> None:
     """Names that snippets of Python import from modules, in all documents."""
-    lost = []
+    missing_names = []
     for document in DOCUMENTS:
         for snippet in re.findall(r"```python\n(.*?)```", document.read_text(), re.DOTALL):
             for node in ast.walk(ast.parse(snippet)):
                 if isinstance(node, ast.ImportFrom) and str(node.module).startswith("lightpaint."):
                     module = import_module(str(node.module))
-                    lost += [x.name for x in node.names if not hasattr(module, x.name)]
-    assert lost == []
+                    missing_names += [x.name for x in node.names if not hasattr(module, x.name)]
+    assert missing_names == []
 
 
 def test_numbers_in_documents_are_those_of_the_code() -> None:
@@ -296,14 +300,14 @@ def test_numbers_in_documents_are_those_of_the_code() -> None:
     assert f"More than {MAX_SEPARATE} emitters that are alike" in text("lights.md")
     assert f"{MAX_BYTES // 2**30} GiB at most" in text("solving.md")
     limits = text("limits.md")
-    for said in (
+    for phrase in (
         f"at most {MAX_PAGES} tabs at a time",
         f"{MAX_UNAUTHENTICATED} connections that have not shown its key",
         f"{MAX_QUEUED} messages or {MAX_QUEUED_BYTES // 2**20} MiB of a page",
         f"A batch has {MAX_LOOKS:,} looks, beside {MAX_FRAMES:,} frames",
         f"a name has {MAX_NAME} characters",
     ):
-        assert said in limits
+        assert phrase in limits
     solving = text("solving.md")
     for preset in PRESETS.values():
         assert f"{preset.spp} samples per pixel" in solving

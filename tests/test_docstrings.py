@@ -93,8 +93,8 @@ DESCRIBED = re.compile(r"(?:^|\. )\s*((?:\*{0,2}[a-z_]\w*, )*\*{0,2}[a-z_]\w*): 
 
 def described(node: ast.ClassDef | ast.FunctionDef) -> set[str]:
     """Return the names that a docstring describes as parameters or attributes."""
-    found = DESCRIBED.findall(ast.get_docstring(node) or "")
-    return {name.strip("*") for names in found for name in names.split(", ")}
+    parameters = DESCRIBED.findall(ast.get_docstring(node) or "")
+    return {name.strip("*") for names in parameters for name in names.split(", ")}
 
 
 def names_in(node: ast.ClassDef | ast.FunctionDef) -> set[str]:

@@ -22,12 +22,12 @@ TIMES = 350.0
 @pytest.fixture
 def basis(make_basis: Any) -> lp.Basis:
     """`sky` lights the wall evenly; `bulb` little, and is seen in four pixels."""
-    seen = np.zeros(SIZE, bool)
-    seen[5:7, 5:7] = True
+    emitter_mask = np.zeros(SIZE, bool)
+    emitter_mask[5:7, 5:7] = True
     images = np.zeros((2, *SIZE, 3))
     images[0, :, :5] = 0.5
-    images[1] = np.where(seen, 1.0, 0.01)[..., None]
-    return make_basis(images=images, names=["sky", "bulb"], seen=seen)
+    images[1] = np.where(emitter_mask, 1.0, 0.01)[..., None]
+    return make_basis(images=images, names=["sky", "bulb"], seen=emitter_mask)
 
 
 @pytest.fixture
@@ -61,13 +61,13 @@ def test_which_pixels_count(
     basis: lp.Basis, image: Any, importance: Any, emitters: str, counts: bool
 ):
     target = lp.Target.of(image, importance)
-    times, said = _said(basis, target, emitters=emitters)
+    times, remarks = _said(basis, target, emitters=emitters)
     if counts:
         assert times < 5
-        assert said == []
+        assert remarks == []
         return
     assert times == pytest.approx(TIMES, rel=1e-4)
-    left, warning = said
+    left, warning = remarks
     assert "4 of 120 painted pixels (3.3 %), and count nothing" in left
     assert 'emitters="count"' in left
     assert warning.startswith("WARNING")
@@ -76,29 +76,29 @@ def test_which_pixels_count(
 
 def test_a_bulb_as_painted_is_no_warning(basis: lp.Basis):
     target = lp.Target.of(basis.mix(np.array([[1.0] * 3, [2.0] * 3])))
-    _, said = _said(basis, target)
-    assert len(said) == 1
-    assert "WARNING" not in said[0]
+    _, remarks = _said(basis, target)
+    assert len(remarks) == 1
+    assert "WARNING" not in remarks[0]
 
 
 def test_where_brighter_is_as_good_nothing_is_too_bright(basis: lp.Basis, image: Any):
     at_least = np.broadcast_to(basis.emitters_seen[..., None], image.shape)
     target = lp.Target("t", image, np.ones(SIZE, np.float32), everything=True, at_least=at_least)
-    _, said = _said(basis, target)
-    assert len(said) == 1
+    _, remarks = _said(basis, target)
+    assert len(remarks) == 1
 
 
 def test_a_bulb_that_is_painted_black_is_a_warning(basis: lp.Basis, image: Any):
     black = np.where(basis.emitters_seen[..., None], 0, image)
-    _, said = _said(basis, lp.Target.of(black))
-    assert "bulb (painted black)" in said[1]
+    _, remarks = _said(basis, lp.Target.of(black))
+    assert "bulb (painted black)" in remarks[1]
 
 
 def test_emitters_that_rule_the_fit_are_named(basis: lp.Basis, image: Any):
     bright = np.where(basis.emitters_seen[..., None], 100, image)
-    _, [said] = _said(basis, lp.Target.of(bright, PAINTED))
-    assert "of the painted energy and rule the fit" in said
-    assert 'emitters="skip"' in said
+    _, [remark] = _said(basis, lp.Target.of(bright, PAINTED))
+    assert "of the painted energy and rule the fit" in remark
+    assert 'emitters="skip"' in remark
     assert _said(basis, lp.Target.of(image, ~basis.emitters_seen))[1] == []
 
 
@@ -112,17 +112,17 @@ def test_nothing_left_is_an_error(basis: lp.Basis, image: Any):
 def test_the_terminal_and_the_report_say_so(basis: lp.Basis, image: Any, tmp_path: Path):
     lp.write_basis(tmp_path / "a.basis.exr", basis)
     write_parts(tmp_path / "t.exr", [ExrPart("", rgb_channels(image))])
-    done = run(tmp_path, "solve", "a.basis.exr", "t.exr", "-o", "out")
-    assert done.returncode == 0
-    assert "emitters are seen in 4 of 120 painted pixels (3.3 %)" in done.stderr
-    assert "--emitters count holds the emitters themselves" in done.stderr
-    assert "WARNING: brighter than painted where they are seen: bulb" in done.stderr
+    completed = run(tmp_path, "solve", "a.basis.exr", "t.exr", "-o", "out")
+    assert completed.returncode == 0
+    assert "emitters are seen in 4 of 120 painted pixels (3.3 %)" in completed.stderr
+    assert "--emitters count holds the emitters themselves" in completed.stderr
+    assert "WARNING: brighter than painted where they are seen: bulb" in completed.stderr
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "emitters are seen in 4 of 120 painted pixels" in page
     assert "WARNING: brighter than painted" in page
     args = ("solve", "a.basis.exr", "t.exr", "-o", "counted", "--emitters", "count")
-    done = run(tmp_path, *args)
-    assert "emitters are seen" not in done.stderr
+    completed = run(tmp_path, *args)
+    assert "emitters are seen" not in completed.stderr
     page = (tmp_path / "counted" / "report.html").read_text(encoding="utf-8")
     assert "emitters are seen in" not in page
     assert "bulb" in succeed(tmp_path, *args[:-1], "skip")
@@ -132,8 +132,8 @@ def test_light_groups_know_of_no_emitters(tmp_path: Path, image: Any):
     channels = rgb_channels(image)
     write_parts(tmp_path / "g.exr", [ExrPart("ViewLayer.Combined_key", channels)])
     write_parts(tmp_path / "t.exr", [ExrPart("", channels)])
-    said = run_refused(tmp_path, "solve", "g.exr", "t.exr", "--emitters", "count")
-    assert "--emitters" in said
+    message = run_refused(tmp_path, "solve", "g.exr", "t.exr", "--emitters", "count")
+    assert "--emitters" in message
 
 
 @pytest.mark.parametrize("untold", [True, False])
@@ -145,7 +145,9 @@ def test_a_bulb_that_is_known_by_sight_alone_can_be_told_so(
     solution = lp.solve(basis, target)
     lights = [replace(x, untold=untold) for x in solution.lighting.lights]
     solution = replace(solution, lighting=replace(solution.lighting, lights=tuple(lights)))
-    said = emitter_remarks(target, solution, lp.combine(basis, solution.lighting))
-    told = [text for text in said if "the camera sees it" in text]
-    assert len(told) == untold
-    assert all("light of bulb on surfaces" in text for text in told)  # and nothing of the sky
+    remarks = emitter_remarks(target, solution, lp.combine(basis, solution.lighting))
+    remarks_of_bulb = [text for text in remarks if "the camera sees it" in text]
+    assert len(remarks_of_bulb) == untold
+    assert all(
+        "light of bulb on surfaces" in text for text in remarks_of_bulb
+    )  # and nothing of the sky

@@ -52,30 +52,30 @@ def namespace(desk: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> di
 
 @pytest.mark.parametrize("name", NAMES)
 def test_examples_run(name: str, namespace: dict[str, Any]):
-    shown = getattr(lp, name)
-    finder = doctest.DocTestFinder(recurse=inspect.isclass(shown))
-    module = inspect.getmodule(shown)
-    tests = [x for x in finder.find(shown, name, module=module, globs=namespace) if x.examples]
+    member = getattr(lp, name)
+    finder = doctest.DocTestFinder(recurse=inspect.isclass(member))
+    module = inspect.getmodule(member)
+    tests = [x for x in finder.find(member, name, module=module, globs=namespace) if x.examples]
     assert name in [test.name for test in tests], "it has no example"
-    said: list[str] = []
+    output: list[str] = []
     runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS)
     for test in tests:
-        runner.run(test, out=said.append)
-    assert not said, "".join(said)
+        runner.run(test, out=output.append)
+    assert not output, "".join(output)
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_sections_are_those_of_the_signature(name: str):
-    shown = getattr(lp, name)
-    head, *parts = SECTION.split(inspect.getdoc(shown) or "")
+    member = getattr(lp, name)
+    head, *parts = SECTION.split(inspect.getdoc(member) or "")
     sections = dict(zip(parts[::2], parts[1::2], strict=True))
     assert re.fullmatch(r"[^\n]+\.( [^\n]+\.)*\n\n.*", head, re.DOTALL)
     assert list(sections)[-1] == "Examples"
-    if is_dataclass(shown):
-        expected = [x.name for x in fields(shown) if not x.name.startswith("_")]
+    if is_dataclass(member):
+        expected = [x.name for x in fields(member) if not x.name.startswith("_")]
         assert _items(sections["Attributes"]) == expected
-    elif inspect.isfunction(shown):
-        assert _items(sections["Args"]) == list(inspect.signature(shown).parameters)
+    elif inspect.isfunction(member):
+        assert _items(sections["Args"]) == list(inspect.signature(member).parameters)
     for error in _items(sections.get("Raises", "")):
         assert error == "Interrupted" or issubclass(getattr(lp.errors, error), lp.LightpaintError)
 

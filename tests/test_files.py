@@ -21,8 +21,8 @@ def old(tmp_path: Path) -> Path:
 
 
 def _fail_halfway(path: Path, problem: BaseException) -> None:
-    with replacing(path) as beside:
-        beside.write_bytes(b"half of")
+    with replacing(path) as temporary:
+        temporary.write_bytes(b"half of")
         raise problem
 
 
@@ -33,19 +33,19 @@ def test_the_new_content_takes_the_place_of_the_old(old: Path):
 
 
 def test_the_old_file_is_there_until_the_block_ends(old: Path):
-    with replacing(old) as beside:
-        assert beside != old
-        beside.write_bytes(b"half of")
+    with replacing(old) as temporary:
+        assert temporary != old
+        temporary.write_bytes(b"half of")
         assert old.read_bytes() == b"old"
     assert old.read_bytes() == b"half of"
 
 
 def test_writers_see_the_true_name_and_the_same_disk(tmp_path: Path):
     # Some choose the format by the ending, and os.replace is atomic on one file system only.
-    with replacing(tmp_path / "a.b.exr") as beside:
-        assert beside.name == "a.b.exr"
-        assert beside.parent.parent == tmp_path
-        beside.touch()
+    with replacing(tmp_path / "a.b.exr") as temporary:
+        assert temporary.name == "a.b.exr"
+        assert temporary.parent.parent == tmp_path
+        temporary.touch()
 
 
 @pytest.mark.parametrize("problem", [ValueError, KeyboardInterrupt, SystemExit, MemoryError])
@@ -63,8 +63,8 @@ def test_what_a_kill_leaves_is_swept_up_and_nothing_else(old: Path, has_begun: b
     script = "import sys; from pathlib import Path; from lightpaint.files import replacing\n"
     script += "with replacing(Path(sys.argv[1])) as beside:\n"
     script += "    beside.touch()\n" * has_begun + "    import os; os.kill(os.getpid(), 9)"
-    done = subprocess.run([sys.executable, "-c", script, str(old)], check=False)
-    assert done.returncode == -signal.SIGKILL
+    completed = subprocess.run([sys.executable, "-c", script, str(old)], check=False)
+    assert completed.returncode == -signal.SIGKILL
     assert len(os.listdir(old.parent)) == 2
     others = [old.parent / f".{name}" for name in ("git", "a.txt.12345678", "b.json.abcdefgh")]
     for other in others:

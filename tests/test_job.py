@@ -56,14 +56,14 @@ def room(tmp_path: Path) -> Path:
     return write_room(tmp_path, lights=lights, sensors=SIDE)
 
 
-def _flat(basis: Basis, **how: Any) -> Target:
+def _flat(basis: Basis, **options: Any) -> Target:
     image, importance = basis.images.sum(axis=0), np.ones(basis.size, np.float32)
-    return Target("flat", image, importance, everything=True, **how)
+    return Target("flat", image, importance, everything=True, **options)
 
 
-def _from_basis(**how: Any) -> Job:
-    how = {"basis": BasisFile("a.basis.exr"), "targets": (Painting("p.exr"),)} | how
-    return Job((), folder=Path("out"), **how)
+def _from_basis(**options: Any) -> Job:
+    options = {"basis": BasisFile("a.basis.exr"), "targets": (Painting("p.exr"),)} | options
+    return Job((), folder=Path("out"), **options)
 
 
 @pytest.mark.usefixtures("folder")
@@ -72,24 +72,24 @@ def test_a_painting_in_the_folder_of_the_lights(tmp_path: Path):
     for name, image in zip(("key", "fill"), pictures(2), strict=True):
         write(tmp_path / "lights" / f"{name}.exr", ("rgb", channels("", image)))
     painting = write(tmp_path / "lights" / "noon.exr", ("rgb", channels("", pictures()[2])))
-    how = {"targets": (Painting(str(painting)),)}
+    options = {"targets": (Painting(str(painting)),)}
     for basis in (GroupsFile("lights"), read_light_groups("lights")):
         with pytest.raises(BasisError, match=r"noon\.exr is among the lights of lights: pass it"):
-            _from_basis(basis=basis, **how)
-    job = _from_basis(basis=GroupsFile("lights", leave_out=(str(painting),)), **how)
+            _from_basis(basis=basis, **options)
+    job = _from_basis(basis=GroupsFile("lights", leave_out=(str(painting),)), **options)
     assert job.groups is not None
     assert job.groups.basis.names == ("fill", "key")
     assert Job.from_json(job.to_json()) == job
-    assert isinstance(back := Job.from_json(job.to_json()).basis, GroupsFile)
-    assert back.leave_out == (str(painting),)
+    assert isinstance(reread := Job.from_json(job.to_json()).basis, GroupsFile)
+    assert reread.leave_out == (str(painting),)
 
 
 @pytest.mark.usefixtures("folder")
 def test_a_path_that_nuke_would_evaluate_is_told_before_the_solve(tmp_path: Path):
     path = (tmp_path / "groups.exr").rename(tmp_path / "take #2.exr")
     job = _from_basis(basis=GroupsFile(str(path)), targets=(Painting("g.exr"),))
-    [told] = [remark for remark in job.remarks if "Nuke" in remark]
-    assert told.startswith("Nuke would evaluate # in the path")
+    [warning] = [remark for remark in job.remarks if "Nuke" in remark]
+    assert warning.startswith("Nuke would evaluate # in the path")
 
 
 ASKED = Constraints.of(
@@ -101,7 +101,7 @@ ASKED = Constraints.of(
 
 @pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize(
-    "how",
+    "options",
     [
         {},
         {"targets": (Painting("p.exr", mask="mask.exr", transform=TransformChoice("agx", None)),)},
@@ -116,27 +116,27 @@ ASKED = Constraints.of(
         {"basis": GroupsFile("groups.exr", "RGBA_{name}"), "targets": (Painting("g.exr"),)},
     ],
 )
-def test_a_round_trip_is_the_same_job(how: Any):
-    job = _from_basis(**how)
-    again = Job.from_json(job.to_json())
-    assert again == job
-    assert again.to_json() == job.to_json()
-    assert again.remarks == job.remarks
+def test_a_round_trip_is_the_same_job(options: Any):
+    job = _from_basis(**options)
+    reread = Job.from_json(job.to_json())
+    assert reread == job
+    assert reread.to_json() == job.to_json()
+    assert reread.remarks == job.remarks
     for name in ("folder", "settings", "by_sensor", "targets", "basis"):
-        assert getattr(again, name) == getattr(job, name)
+        assert getattr(reread, name) == getattr(job, name)
     settings = replace(job.settings, resize=not job.settings.resize)
-    assert again != _from_basis(**{**how, "settings": settings})
+    assert reread != _from_basis(**{**options, "settings": settings})
 
 
 def test_a_job_in_another_process_gives_the_same_answer(folder: Path):
     job = _from_basis(constraints=Constraints.of({"light 0": {"limits": {"max": "40%"}}}))
     [look] = run(job)
-    mine = (folder / "out" / "lighting.json").read_bytes()
+    expected = (folder / "out" / "lighting.json").read_bytes()
     (folder / "job.json").write_text(job.to_json(), encoding="utf-8")
     (folder / "out" / "lighting.json").unlink()
     code = "import sys, lightpaint as lp; lp.run(lp.Job.from_json(open('job.json').read()))"
     subprocess.run([sys.executable, "-c", code], cwd=folder, check=True, env={**os.environ})
-    assert (folder / "out" / "lighting.json").read_bytes() == mine
+    assert (folder / "out" / "lighting.json").read_bytes() == expected
     assert look.lighting.lights[0].constraint == "limits 0 to 40%"
 
 
@@ -156,15 +156,15 @@ def test_a_job_of_a_scene_is_sent_with_all_that_was_said(room: Path, tmp_path: P
 @pytest.mark.usefixtures("folder")
 def test_a_job_in_memory_says_why_it_cannot_be_sent(make_basis: Any):
     basis = make_basis(3)
-    for what, how in {
+    for kind, options in {
         "basis": {"basis": basis},
         "target": {"targets": (_flat(basis),)},
     }.items():
-        job = _from_basis(**how)
-        with pytest.raises(LightpaintError, match=f"cannot be sent: its {what} is in memory"):
+        job = _from_basis(**options)
+        with pytest.raises(LightpaintError, match=f"cannot be sent: its {kind} is in memory"):
             job.to_json()
         assert job == job
-        assert job != _from_basis(**how)
+        assert job != _from_basis(**options)
 
 
 @pytest.mark.usefixtures("folder")
@@ -189,16 +189,16 @@ def test_what_is_no_job_is_refused_in_one_line():
         json.dumps({**good, "settings": {**good["settings"], "refine": "1"}}),
         json.dumps({**good, "by_sensor": 1}),
     ):
-        with pytest.raises(LightpaintError, match="this is not a job: ") as refused:
+        with pytest.raises(LightpaintError, match="this is not a job: ") as refusal:
             Job.from_json(bad)
-        assert "\n" not in str(refused.value)
+        assert "\n" not in str(refusal.value)
     with pytest.raises(LightpaintError, match="spp is 1: expected a whole number >= 2"):
         Job.from_json(json.dumps({**good, "settings": {**good["settings"], "spp": 1}}))
 
 
 @pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize(
-    ("how", "error", "says"),
+    ("options", "error", "says"),
     [
         ({"basis": None}, LightpaintError, "give a scene, a basis, or both"),
         ({"targets": ()}, TargetError, "no painting to solve for"),
@@ -219,9 +219,9 @@ def test_what_is_no_job_is_refused_in_one_line():
         ),
     ],
 )
-def test_what_cannot_be_done_is_said_at_birth(how: Any, error: type[Exception], says: str):
+def test_what_cannot_be_done_is_said_at_birth(options: Any, error: type[Exception], says: str):
     with pytest.raises(error, match=says):
-        _from_basis(**how)
+        _from_basis(**options)
     assert not Path("out").exists()
 
 
@@ -235,34 +235,36 @@ def test_what_cannot_be_done_with_a_scene_is_said_before_it_renders(
     image = np.ones((height, width, 3), np.float32)
     target = Target("t", image, image[..., 0], everything=True)
 
-    def refused(error: type[Exception], says: str, scenes: Any, targets: Any, **how: Any) -> None:
+    def check_refusal(
+        error: type[Exception], says: str, scenes: Any, targets: Any, **options: Any
+    ) -> None:
         with pytest.raises(error, match=says):
-            paint_with_light(scenes, targets, tmp_path / "out", **how)
+            paint_with_light(scenes, targets, tmp_path / "out", **options)
         assert not (tmp_path / "out").exists()
 
-    refused(
+    check_refusal(
         LightpaintError,
         "is 24x20 but the basis is 12x10|resize",
         scene,
         replace(target, image=image[:7, :9], importance=image[:7, :9, 0]),
     )
-    refused(TargetError, "2 targets for 1 views", scene, [target, target])
-    refused(SceneError, "given twice", [scene, scene], [target, target])
-    refused(
+    check_refusal(TargetError, "2 targets for 1 views", scene, [target, target])
+    check_refusal(SceneError, "given twice", [scene, scene], [target, target])
+    check_refusal(
         TargetError, "template of the sensor side, not of", scene, replace(target, sensor="side")
     )
-    refused(
+    check_refusal(
         LightpaintError, "suggested for one view only", [scene, side], [target, target], suggest=1
     )
-    refused(
+    check_refusal(
         SceneError,
         r"^lights=\.\.\. cannot change a scene that is already loaded",
         scene,
         target,
         lights=["bulb"],
     )
-    refused(TargetError, r"^mask=\.\.\. cannot change a target", scene, target, mask="m.exr")
-    refused(
+    check_refusal(TargetError, r"^mask=\.\.\. cannot change a target", scene, target, mask="m.exr")
+    check_refusal(
         ConstraintError,
         "no light 'x'",
         scene,
@@ -272,14 +274,16 @@ def test_what_cannot_be_done_with_a_scene_is_said_before_it_renders(
 
 
 def test_the_lights_file_beside_a_scene_holds_and_is_replaced(room: Path, tmp_path: Path):
-    beside = tmp_path / "room.lights.toml"
-    beside.write_text("[light.bulb]\noff = true\n", encoding="utf-8")
+    lights_file = tmp_path / "room.lights.toml"
+    lights_file.write_text("[light.bulb]\noff = true\n", encoding="utf-8")
     write_rgb(tmp_path / "p.exr", np.ones((20, 24, 3), np.float32))
-    given = Constraints.of({"bulb": {"lock": True}})
-    job = Job((SceneFile(str(room)),), (Painting(str(tmp_path / "p.exr")),), tmp_path, None, given)
+    constraints = Constraints.of({"bulb": {"lock": True}})
+    job = Job(
+        (SceneFile(str(room)),), (Painting(str(tmp_path / "p.exr")),), tmp_path, None, constraints
+    )
     assert [name for name, _, _ in job.all_constraints.lights] == ["bulb", "bulb"]
-    assert job.constraints == given
-    assert f"lights and groups as in {beside}" in job.remarks
+    assert job.constraints == constraints
+    assert f"lights and groups as in {lights_file}" in job.remarks
 
 
 def test_remarks_say_what_was_done_to_a_painting(folder: Path, make_basis: Any):
@@ -332,9 +336,9 @@ def test_a_basis_that_was_obtained_serves_the_next_painting(
     from lightpaint.pipeline import job_bases
 
     rendered: list[Any] = []
-    once = job_bases.obtain_basis
+    obtain_basis = job_bases.obtain_basis
     monkeypatch.setattr(
-        job_bases, "obtain_basis", lambda *a, **k: (rendered.append(a), once(*a, **k))[1]
+        job_bases, "obtain_basis", lambda *a, **k: (rendered.append(a), obtain_basis(*a, **k))[1]
     )
     scene = SceneFile(str(room))
     image = np.ones((20, 24, 3), np.float32)
@@ -365,17 +369,20 @@ def test_a_painting_over_a_smaller_template_is_solved_at_its_size(room: Path, tm
     image = np.full((height, width, 3), 0.5, np.float32)
     importance = np.ones((height, width), np.float32)
     painted = Target("half", image, importance, everything=False)
-    made = replace(painted, content=scene.content, over_look=True)
+    smaller = replace(painted, content=scene.content, over_look=True)
 
-    def job(target: Target, **how: Any) -> Job:
-        return Job((scene,), (target,), tmp_path / "out", settings=Settings(**how))
+    def job(target: Target, **options: Any) -> Job:
+        return Job((scene,), (target,), tmp_path / "out", settings=Settings(**options))
 
-    its = job(made)
-    assert its.views[0].scene is not None
-    assert its.views[0].scene.size == (height, width)
-    assert its.remarks[-1] == f"half: solved at {width}x{height} pixels, the size of its template"
+    solved_job = job(smaller)
+    assert solved_job.views[0].scene is not None
+    assert solved_job.views[0].scene.size == (height, width)
+    assert (
+        solved_job.remarks[-1]
+        == f"half: solved at {width}x{height} pixels, the size of its template"
+    )
     # Whoever says how large wins, and a picture that came from elsewhere has no say.
-    for target, how in ((made, {"resolution": "1/1"}), (painted, {})):
+    for target, options in ((smaller, {"resolution": "1/1"}), (painted, {})):
         with pytest.raises(SizeError, match=f"half is {width}x{height} but the basis is"):
-            job(target, **how)
-    assert job(made, resize=True).views[0].target.size == scene.size
+            job(target, **options)
+    assert job(smaller, resize=True).views[0].target.size == scene.size

@@ -37,33 +37,33 @@ def _keywords(call: Callable[..., Any]) -> list[str]:
 @pytest.mark.parametrize("name", CALLS)
 def test_a_name_with_a_slip_is_told_with_the_one_that_was_meant(name: str) -> None:
     call = CALLS[name]
-    known = _keywords(call)
-    for word in (word for word in known if len(word) > 3):
+    known_keywords = _keywords(call)
+    for word in (word for word in known_keywords if len(word) > 3):
         slip = word[:1] + word[2:]  # a letter that was not typed
-        with pytest.raises(KeywordError) as caught:
+        with pytest.raises(KeywordError) as refusal:
             call(**{slip: None})
-        told = str(caught.value)
-        assert told.startswith(f"{name}() has no argument {slip!r}: did you mean '"), told
-        assert any(f"mean {other!r}?" in told for other in known), told
-        assert isinstance(caught.value, TypeError)
-        assert isinstance(caught.value, lp.LightpaintError)
+        message = str(refusal.value)
+        assert message.startswith(f"{name}() has no argument {slip!r}: did you mean '"), message
+        assert any(f"mean {other!r}?" in message for other in known_keywords), message
+        assert isinstance(refusal.value, TypeError)
+        assert isinstance(refusal.value, lp.LightpaintError)
 
 
 @pytest.mark.parametrize("name", CALLS)
 def test_a_name_that_is_near_none_is_told_with_all(name: str) -> None:
-    with pytest.raises(KeywordError, match=r"has no argument .*; it has") as caught:
+    with pytest.raises(KeywordError, match=r"has no argument .*; it has") as refusal:
         CALLS[name](xyzzyqwv=1)
-    assert "\n" not in str(caught.value)
+    assert "\n" not in str(refusal.value)
 
 
 def test_what_is_passed_on_is_known_too() -> None:
-    for call, slip, meant in (
+    for call, slip, expected in (
         (lp.Settings, "sp", "spp"),
         (lp.solve, "hodl", "hold"),
         (lp.solve, "resiz", "resize"),
         (lp.paint_with_light, "qualiti", "quality"),
     ):
-        with pytest.raises(KeywordError, match=f"mean '{meant}'"):
+        with pytest.raises(KeywordError, match=f"mean '{expected}'"):
             call(**{slip: 1})
 
 
@@ -73,19 +73,21 @@ def test_the_advice_of_an_error_can_be_followed() -> None:
     target = lp.Target.of(large)
     with pytest.raises(lp.LightpaintError, match="pass resize=True"):
         lp.solve(basis, target)
-    found = lp.solve(basis, target, resize=True).lighting
-    again = lp.solve(basis, target.resized((8, 12))).lighting
-    np.testing.assert_array_equal(list(found.emission.values()), list(again.emission.values()))
+    lighting = lp.solve(basis, target, resize=True).lighting
+    expected = lp.solve(basis, target.resized((8, 12))).lighting
+    np.testing.assert_array_equal(
+        list(lighting.emission.values()), list(expected.emission.values())
+    )
 
 
 def test_a_target_is_light() -> None:
     image = small_basis().images[0]
-    for wrong in (-image, np.where(np.arange(12)[:, None] == 3, -image, image)):
+    for invalid in (-image, np.where(np.arange(12)[:, None] == 3, -image, image)):
         with pytest.raises(lp.LightpaintError, match=r"negative luminance in \d+ of 96 pixels"):
-            lp.Target.of(wrong)
-    for wrong in (np.nan, np.inf, -np.inf):
+            lp.Target.of(invalid)
+    for invalid in (np.nan, np.inf, -np.inf):
         with pytest.raises(lp.LightpaintError, match="NaN or Inf in 1 of 96 pixels"):
-            lp.Target.of(np.where(np.arange(96).reshape(8, 12, 1) == 50, wrong, image))
+            lp.Target.of(np.where(np.arange(96).reshape(8, 12, 1) == 50, invalid, image))
     # What does not count, colours that Rec.709 lacks, and what resampling leaves beside edges.
     column = np.tile(np.arange(12) == 3, (8, 1))
     lp.Target.of(np.where(column[..., None], -image, image), ~column)

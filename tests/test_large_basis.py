@@ -69,25 +69,27 @@ def test_results_are_those_of_planes_in_memory(
     assert (look.solution.problem.block_side > 1) == (grain == NOISY)
 
     def numbers(folder: str, name: str) -> list[Any]:
-        found: list[Any] = []
+        results: list[Any] = []
 
         def walk(value: Any) -> None:
             if isinstance(value, dict | list):
-                for its in value.values() if isinstance(value, dict) else value:
-                    walk(its)
+                for expected in value.values() if isinstance(value, dict) else value:
+                    walk(expected)
             else:
-                found.append(value)
+                results.append(value)
 
-        told = json.loads((tmp_path / folder / name).read_text("utf-8"))
+        document = json.loads((tmp_path / folder / name).read_text("utf-8"))
         for key in ("command", "software", "versions"):
-            told.pop(key, None)
-        walk(told)
-        return found
+            document.pop(key, None)
+        walk(document)
+        return results
 
     for name in ("lighting.json", "report.json"):
-        mine, its = numbers("file", name), numbers("memory", name)
-        assert [x for x in mine if isinstance(x, str)] == [x for x in its if isinstance(x, str)]
-        floats = ([x for x in some if isinstance(x, float)] for some in (mine, its))
+        actual, expected = numbers("file", name), numbers("memory", name)
+        assert [x for x in actual if isinstance(x, str)] == [
+            x for x in expected if isinstance(x, str)
+        ]
+        floats = ([x for x in some if isinstance(x, float)] for some in (actual, expected))
         # Sums of the same numbers by bands: round-off, of which solves make a little more.
         np.testing.assert_allclose(*floats, rtol=1e-9, atol=1e-11)
     ends = [(tmp_path / folder / "predicted.exr").read_bytes() for folder in ("file", "memory")]

@@ -32,11 +32,11 @@ def _modules() -> Iterator[tuple[str, str]]:
             yield path.stem, str(path.relative_to(HERE))
 
 
-def _twice(named: Iterator[tuple[str, str]]) -> dict[str, list[str]]:
+def _twice(names: Iterator[tuple[str, str]]) -> dict[str, list[str]]:
     places = defaultdict(list)
-    for name, place in named:
+    for name, place in names:
         places[name].append(place)
-    return {name: its for name, its in places.items() if len(its) > 1}
+    return {name: files for name, files in places.items() if len(files) > 1}
 
 
 def test_no_two_classes_have_one_name() -> None:
@@ -60,15 +60,15 @@ def _names_in_backticks(token: tokenize.TokenInfo) -> Iterator[str]:
 
 def test_names_in_docstrings_and_comments_are_there() -> None:
     """Renamed without its mentions, a thing is looked for in vain."""
-    known: Counter[str] = Counter()
-    told = []
+    known_names: Counter[str] = Counter()
+    mentions = []
     for path in HERE.rglob("*.py"):
         source = io.StringIO(path.read_text(encoding="utf-8"))
         for token in tokenize.generate_tokens(source.readline):
             is_docstring = token.type == tokenize.STRING and token.string.endswith('"""')
             if is_docstring or token.type == tokenize.COMMENT:
-                told += [(name, path.name) for name in _names_in_backticks(token)]
+                mentions += [(name, path.name) for name in _names_in_backticks(token)]
             else:
-                known.update(re.findall(r"\w+", token.string))
-    lost = {(name, file) for name, file in told if not known[name.rpartition(".")[2]]}
-    assert not lost
+                known_names.update(re.findall(r"\w+", token.string))
+    missing = {(name, file) for name, file in mentions if not known_names[name.rpartition(".")[2]]}
+    assert not missing

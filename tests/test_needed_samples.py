@@ -60,10 +60,10 @@ def painting(scene: Scene) -> Target:
     return Target("t", image, np.ones(basis.size, np.float32), everything=True)
 
 
-def answer(scene: Any, target: Any, folder: Path, **how: Any) -> tuple[Any, Heard]:
-    heard = Heard()
-    how = {"verify": False, "report": False, "force": True} | how
-    return paint_with_light(scene, target, folder, progress=heard, **how), heard
+def answer(scene: Any, target: Any, folder: Path, **options: Any) -> tuple[Any, Heard]:
+    recorder = Heard()
+    options = {"verify": False, "report": False, "force": True} | options
+    return paint_with_light(scene, target, folder, progress=recorder, **options), recorder
 
 
 def test_the_scene_stays_loaded_over_the_rounds(
@@ -90,32 +90,32 @@ def test_the_scene_stays_loaded_over_the_rounds(
 @pytest.mark.usefixtures("own_cache")
 def test_samples_go_where_they_are_needed_until_the_error_is_met(small_room: Scene, tmp_path: Path):
     target = painting(small_room)
-    look, heard = answer(small_room, target, tmp_path / "a", error=0.3)
-    reached = picture_errors(look.basis, error_bars(look.solution)).max()
-    assert reached <= 0.3
+    look, recorder = answer(small_room, target, tmp_path / "a", error=0.3)
+    error = picture_errors(look.basis, error_bars(look.solution)).max()
+    assert error <= 0.3
     assert look.basis.origin.spp == PILOT_SPP
     assert look.basis.extra.any()
-    assert heard.work >= {"basis", "top-up"}
-    [said] = [x for x in heard.remarks if "where the painting needs them" in x]
-    assert "lights are known to ± " in said
-    assert "was asked for" not in said
+    assert recorder.work >= {"basis", "top-up"}
+    [remark] = [x for x in recorder.remarks if "where the painting needs them" in x]
+    assert "lights are known to ± " in remark
+    assert "was asked for" not in remark
     # All of it is kept: the same again renders nothing.
-    again, heard = answer(small_room, target, tmp_path / "a", error=0.3)
-    assert not heard.work & {"basis", "top-up"}
-    np.testing.assert_array_equal(again.solution.weights, look.solution.weights)
-    assert any("more where a painting needed them" in x for x in heard.remarks)
+    second, recorder = answer(small_room, target, tmp_path / "a", error=0.3)
+    assert not recorder.work & {"basis", "top-up"}
+    np.testing.assert_array_equal(second.solution.weights, look.solution.weights)
+    assert any("more where a painting needed them" in x for x in recorder.remarks)
     # A smaller error goes on from there.
-    finer, _ = answer(small_room, target, tmp_path / "a", error=reached / 1.5)
+    finer, _ = answer(small_room, target, tmp_path / "a", error=error / 1.5)
     assert (finer.basis.extra >= look.basis.extra).all()
     assert finer.basis.origin.extra_spp > look.basis.origin.extra_spp
 
 
 def test_time_bounds_what_an_error_takes(small_room: Scene, tmp_path: Path):
     target = painting(small_room)
-    how = {"error": 1e-4, "time_s": 0.01, "use_cache": False}
-    look, heard = answer(small_room, target, tmp_path / "a", **how)
+    options = {"error": 1e-4, "time_s": 0.01, "use_cache": False}
+    look, recorder = answer(small_room, target, tmp_path / "a", **options)
     assert look.basis.origin.mean_spp == PILOT_SPP
-    assert any("was asked for" in x for x in heard.remarks)
+    assert any("was asked for" in x for x in recorder.remarks)
 
 
 def test_several_views_share_the_samples(tmp_path: Path):
@@ -123,8 +123,8 @@ def test_several_views_share_the_samples(tmp_path: Path):
     room = write_room(tmp_path, lights=lights, sensors=CLOSE)
     scenes = [load_scene(room, sensor=name) for name in ("camera", "close")]
     targets = [painting(scene) for scene in scenes]
-    looks, heard = answer(scenes, targets, tmp_path / "a", error=0.3, use_cache=False)
-    assert {"top-up of camera", "top-up of close"} <= heard.work
+    looks, recorder = answer(scenes, targets, tmp_path / "a", error=0.3, use_cache=False)
+    assert {"top-up of camera", "top-up of close"} <= recorder.work
     for look, scene in zip(looks, scenes, strict=True):
         assert look.basis.size == scene.size
         assert look.basis.origin.extra_spp > 0

@@ -37,8 +37,8 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     # A build leaves things beside the sources.
     shutil.copytree(REPOSITORY, folder / "copy", ignore=left_out, symlinks=True)
     command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", "."]
-    done = subprocess.run([*command, "copy"], cwd=folder, capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout + done.stderr
+    completed = subprocess.run([*command, "copy"], cwd=folder, capture_output=True, text=True)
+    assert completed.returncode == 0, completed.stdout + completed.stderr
     return folder
 
 
@@ -49,23 +49,23 @@ def test_wheel_solves_the_demo_in_an_empty_folder(built: Path, tmp_path: Path):
     command = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index"]
     subprocess.run([*command, "--target", site, wheel], check=True)
     folder.mkdir()
-    where = {"PYTHONPATH": str(site), "LIGHTPAINT_CACHE": str(tmp_path / "cache")}
-    done = lightpaint(folder, where, "demo", "--spp", "4")
-    assert done.returncode == 0, done.stderr
-    made = folder / "lightpaint-demo"
+    environment = {"PYTHONPATH": str(site), "LIGHTPAINT_CACHE": str(tmp_path / "cache")}
+    completed = lightpaint(folder, environment, "demo", "--spp", "4")
+    assert completed.returncode == 0, completed.stderr
+    demo_folder = folder / "lightpaint-demo"
     report = f"Open {Path('lightpaint-demo', 'evening', 'report.html')} in a browser. "
-    assert done.stdout.splitlines()[-3:-1] == ["", f"{report}Then paint your own:"]
+    assert completed.stdout.splitlines()[-3:-1] == ["", f"{report}Then paint your own:"]
     results = {"lighting.json", "relit.xml", "predicted.exr", "verified.exr", "comparison.png"}
     results |= {"report.html", "report.json", "result.json"}
-    assert {file.name for file in (made / "evening").iterdir()} == results
+    assert {file.name for file in (demo_folder / "evening").iterdir()} == results
     # The very command that it says it runs has the same answer.
-    [said] = re.findall(r"lightpaint: lightpaint (solve .*)", done.stderr)
-    assert said in (made / "evening" / "report.html").read_text("utf-8")
-    answer = weights(made / "evening")
-    again = lightpaint(folder, where, *said.split())
-    assert again.returncode == 0, again.stderr
-    assert "kept from an earlier run" in again.stderr
-    assert weights(made / "evening") == answer
+    [solve_command] = re.findall(r"lightpaint: lightpaint (solve .*)", completed.stderr)
+    assert solve_command in (demo_folder / "evening" / "report.html").read_text("utf-8")
+    answer = weights(demo_folder / "evening")
+    second = lightpaint(folder, environment, *solve_command.split())
+    assert second.returncode == 0, second.stderr
+    assert "kept from an earlier run" in second.stderr
+    assert weights(demo_folder / "evening") == answer
     assert len(answer) == 12
 
 
@@ -74,8 +74,8 @@ def test_source_distribution_has_all_that_the_checks_want(built: Path):
     with tarfile.open(archive) as file:
         members = {Path(*Path(x.name).parts[1:]): x for x in file if not x.isdir()}
     for folder in ("lightpaint", "scenes", "targets", "tests", "notebooks", "benchmarks", "docs"):
-        there = {x.relative_to(built / "copy") for x in (built / "copy" / folder).rglob("*")}
-        assert {x for x in there if (built / "copy" / x).is_file()} <= set(members)
+        files = {x.relative_to(built / "copy") for x in (built / "copy" / folder).rglob("*")}
+        assert {x for x in files if (built / "copy" / x).is_file()} <= set(members)
     for name in ("check", "constraints.txt", "README.md", "LICENSE", "pyproject.toml", ".ci/run"):
         assert Path(name) in members
     assert members[Path("check")].mode & 0o100
@@ -101,19 +101,19 @@ def test_the_demo_does_not_write_over_what_is_there(tmp_path: Path):
 
 
 def test_what_can_break_is_bounded_from_above():
-    wanted = map(Requirement, PROJECT["dependencies"])
-    bounded = {x.name for x in wanted if any(y.operator == "<" for y in x.specifier)}
+    requirements = map(Requirement, PROJECT["dependencies"])
+    bounded = {x.name for x in requirements if any(y.operator == "<" for y in x.specifier)}
     assert bounded >= {"mitsuba", "drjit", "numpy", "OpenEXR", "OpenImageIO", "pillow"}
     assert "karellen-llvm-core" in bounded
 
 
 def test_every_package_is_pinned_within_its_bounds():
-    wanted = [*PROJECT["dependencies"]]
+    queue = [*PROJECT["dependencies"]]
     for extra in PROJECT["optional-dependencies"].values():
-        wanted += extra
-    seen: set[str] = set()
-    while wanted:
-        one = Requirement(wanted.pop())
+        queue += extra
+    names: set[str] = set()
+    while queue:
+        one = Requirement(queue.pop())
         name = canonicalize_name(one.name)
         if name == "pip" or (one.marker is not None and not one.marker.evaluate()):
             continue
@@ -121,10 +121,10 @@ def test_every_package_is_pinned_within_its_bounds():
         [pin] = PINNED[name].specifier
         assert pin.operator == "=="
         assert one.specifier.contains(pin.version), f"{one} and {PINNED[name]}"
-        if (name, *sorted(one.extras)) not in seen:
-            seen.add((name, *sorted(one.extras)))
-            wanted += _of(one)
-    assert len(seen) > 40
+        if (name, *sorted(one.extras)) not in names:
+            names.add((name, *sorted(one.extras)))
+            queue += _of(one)
+    assert len(names) > 40
 
 
 def _of(package: Requirement) -> list[str]:
@@ -133,31 +133,31 @@ def _of(package: Requirement) -> list[str]:
         needed = map(Requirement, requires(package.name) or [])
     except PackageNotFoundError:  # an extra that is not installed here
         return []
-    kept = []
+    requirements = []
     for one in needed:
         if one.marker is None or any(
             one.marker.evaluate({"extra": x}) for x in ("", *package.extras)
         ):
             one.marker = None
-            kept.append(str(one))
-    return kept
+            requirements.append(str(one))
+    return requirements
 
 
 def lightpaint(
-    folder: Path, where: dict[str, str], *arguments: str
+    folder: Path, environment: dict[str, str], *arguments: str
 ) -> subprocess.CompletedProcess[str]:
     """`lightpaint …` of what is installed at PYTHONPATH, and not of the checkout."""
     code = "import sys, lightpaint; from lightpaint.cli import main; sys.stderr.write("
     code += "lightpaint.__file__ + chr(10)); sys.exit(main())"
-    done = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-c", code, *arguments],
         cwd=folder,
-        env={**os.environ, **where},
+        env={**os.environ, **environment},
         capture_output=True,
         text=True,
     )
-    assert done.stderr.startswith(where["PYTHONPATH"])
-    return done
+    assert completed.stderr.startswith(environment["PYTHONPATH"])
+    return completed
 
 
 def weights(folder: Path) -> dict[str, list[float]]:

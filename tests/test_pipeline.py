@@ -57,7 +57,7 @@ def test_a_prediction_of_several_parts_is_an_image_error(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("view", "given", "expected"),
+    ("view", "choice", "expected"),
     [
         ({"sensor": "side", "spp": 64}, None, ("side", 64)),
         ({"sensor": "side", "spp": 64}, 8, ("side", 8)),
@@ -71,7 +71,7 @@ def test_the_view_of_the_solve_is_taken_unless_another_is_given(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     view: dict[str, Any] | None,
-    given: int | None,
+    choice: int | None,
     expected: tuple[str | None, int | None],
 ):
     used: list[Any] = []
@@ -82,5 +82,5 @@ def test_the_view_of_the_solve_is_taken_unless_another_is_given(
     for name, function in instead.items():
         monkeypatch.setattr(repeated_verification, name, function)
     folder = _result(tmp_path, None if view is None else json.dumps(view))
-    verify_result(folder, spp=given)
+    verify_result(folder, spp=choice)
     assert tuple(used) == expected

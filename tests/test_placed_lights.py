@@ -56,14 +56,14 @@ def test_a_spot_that_may_turn_is_turned_and_nothing_else_is_rendered_again(
     assert move.name == "beam"
     assert look.verification is not None
     assert look.verification.agrees
-    there = room.moved({"beam": AIMED}).light("beam").members[0].site
+    site = room.moved({"beam": AIMED}).light("beam").members[0].site
     relit = load_scene(tmp_path / "answer" / "relit.xml")
-    assert np.dot(relit.light("beam").members[0].site.direction, there.direction) > np.cos(0.07)
+    assert np.dot(relit.light("beam").members[0].site.direction, site.direction) > np.cos(0.07)
     # The planes of the others are those of the first basis, but for the rounding of its storage.
     first = lp.render_basis(room, spp=256)
     for k, name in enumerate(first.names):
-        same = np.allclose(look.basis.image(name), first.image(name), rtol=2e-3, atol=1e-5)
-        assert same == (name != "beam"), (k, name)
+        is_same = np.allclose(look.basis.image(name), first.image(name), rtol=2e-3, atol=1e-5)
+        assert is_same == (name != "beam"), (k, name)
 
 
 def test_the_text_of_the_scene_changes_only_where_the_light_hangs(
@@ -73,13 +73,13 @@ def test_the_text_of_the_scene_changes_only_where_the_light_hangs(
     rigging, target = lp.Rigging.of({"beam": {"aim": True}}), painted(room)
     lp.paint_with_light(room, target, tmp_path / "a" / "moved", rigging=rigging, **options)
     lp.paint_with_light(room, target, tmp_path / "a" / "fixed", **options)
-    moved, fixed = (
+    moved_text, fixed = (
         re.sub(r'value="[^"]*"', "", (tmp_path / "a" / name / "relit.xml").read_text())
         for name in ("moved", "fixed")
     )
-    without = [re.sub(r"\s*<lookat[^>]*>\s*", "", text) for text in (moved, fixed)]
+    without = [re.sub(r"\s*<lookat[^>]*>\s*", "", text) for text in (moved_text, fixed)]
     assert without[0] == without[1]
-    assert re.findall("<lookat[^>]*>", moved) != re.findall("<lookat[^>]*>", fixed)
+    assert re.findall("<lookat[^>]*>", moved_text) != re.findall("<lookat[^>]*>", fixed)
 
 
 def test_no_move_leaves_all_where_it_is(room: Scene, tmp_path: Path) -> None:
@@ -128,9 +128,9 @@ def test_a_job_is_sent_with_what_may_move(tmp_path: Path) -> None:
     )
     sources = (lp.SceneFile(str(path)),), (lp.Painting(str(tmp_path / "p.exr")),)
     job = lp.Job(*sources, tmp_path / "out", rigging=rigging)
-    again = lp.Job.from_json(job.to_json())
-    assert again == job
-    assert repr(again.rigging) == repr(rigging)
+    reread = lp.Job.from_json(job.to_json())
+    assert reread == job
+    assert repr(reread.rigging) == repr(rigging)
 
 
 @pytest.mark.parametrize("space", ["linear", "display"])
@@ -139,21 +139,24 @@ def test_what_is_not_painted_is_held_at_the_look_before_the_move(
 ) -> None:
     """A basis with lights elsewhere is solved for the look that was painted over."""
     basis = lp.render_basis(room, spp=64, seed=1)
-    moved = lp.render_basis(room.moved({"beam": AIMED}), spp=64, seed=1)
+    moved_basis = lp.render_basis(room.moved({"beam": AIMED}), spp=64, seed=1)
     look, half = basis.current_look, basis.noise.mix(basis.current_weights)
-    held = replace(moved, former=Estimate(look, half))
-    assert np.array_equal(held.current_look, look)
+    with_hold = replace(moved_basis, former=Estimate(look, half))
+    assert np.array_equal(with_hold.current_look, look)
     importance = np.zeros(basis.size, np.float32)
     importance[:2] = 1
     target = replace(lp.Target.of(look), importance=importance, everything=False)
-    far, near = (lp.solve(its, target, space=space, hold=4, colors="free") for its in (moved, held))
+    far, near = (
+        lp.solve(each_basis, target, space=space, hold=4, colors="free")
+        for each_basis in (moved_basis, with_hold)
+    )
 
     # Where the look to hold is taken for that of the lights as they hang now, nothing is missed.
-    wrong, right = (sum(x.certificate.relative_objective) for x in (far, near))
-    assert wrong < 1e-6 < 1e-4 < right
+    error_far, error_near = (sum(x.certificate.relative_objective) for x in (far, near))
+    assert error_far < 1e-6 < 1e-4 < error_near
     if space == "linear":
-        counted = np.broadcast_to(near.weight > 0, look.shape)
-        np.testing.assert_allclose(near.image[counted], look[counted], rtol=1e-5)
+        is_counted = np.broadcast_to(near.weight > 0, look.shape)
+        np.testing.assert_allclose(near.image[is_counted], look[is_counted], rtol=1e-5)
 
 
 def test_the_report_says_what_moved(room: Scene, tmp_path: Path) -> None:
@@ -197,8 +200,8 @@ def test_a_missing_lamp_is_added_with_its_constraint_and_written_behind_the_user
     assert text.index('id="new_point"') > text.index('id="sky"')
     assert 'id="new_point"' not in own
     # The answer alone brings the lamp into the scene of the file, in which it is not.
-    again = lp.relight(room, look.lighting, tmp_path / "again" / "relit.xml")
-    assert again.light("new_point").emission == pytest.approx(setting.emission)
+    second = lp.relight(room, look.lighting, tmp_path / "again" / "relit.xml")
+    assert second.light("new_point").emission == pytest.approx(setting.emission)
 
 
 def test_two_views_place_a_light_together(tmp_path: Path) -> None:
@@ -209,8 +212,8 @@ def test_two_views_place_a_light_together(tmp_path: Path) -> None:
         <integer name="height" value="20"/></film></sensor>"""
     path = write_room(tmp_path, sensors=second)
     scenes = [load_scene(path, sensor=name) for name in ("camera", "side")]
-    moved = [scene.moved({"beam": AIMED}) for scene in scenes]
-    targets = [lp.Target.of(lp.render_basis(x, spp=128, seed=2).current_look) for x in moved]
+    moved_scenes = [scene.moved({"beam": AIMED}) for scene in scenes]
+    targets = [lp.Target.of(lp.render_basis(x, spp=128, seed=2).current_look) for x in moved_scenes]
     looks = lp.paint_with_light(
         scenes,
         targets,
@@ -223,8 +226,8 @@ def test_two_views_place_a_light_together(tmp_path: Path) -> None:
     )
     assert [look.placement.moves[0].name for look in looks if look.placement] == ["beam"] * 2
     relit = load_scene(tmp_path / "answer" / "relit.xml")
-    there = moved[0].light("beam").members[0].site
-    assert np.dot(relit.light("beam").members[0].site.direction, there.direction) > np.cos(0.07)
+    site = moved_scenes[0].light("beam").members[0].site
+    assert np.dot(relit.light("beam").members[0].site.direction, site.direction) > np.cos(0.07)
     assert "Plan and elevation" in (tmp_path / "answer" / "side" / "report.html").read_text()
 
 
@@ -264,8 +267,8 @@ def test_a_suggestion_is_a_turn_with_its_picture_and_the_line_to_paste(
     assert turn.name == "beam"
     assert turn.aim == 5 * np.ceil((turn.turn + 10) / 5)
     assert tomllib.loads(turn.toml) == {"light": {"beam": {"aim": turn.aim}}}
-    off = [float(np.square(x - target.image).sum()) for x in (turn.without, turn.with_it)]
-    assert off[1] < 0.5 * off[0]
+    losses = [float(np.square(x - target.image).sum()) for x in (turn.without, turn.with_it)]
+    assert losses[1] < 0.5 * losses[0]
     page = (tmp_path / "answer" / "report.html").read_text()
     assert html.escape(turn.toml) in page
     assert json.loads((tmp_path / "answer" / "report.json").read_text())["turn"]["name"] == "beam"
@@ -296,12 +299,12 @@ class _Stop:
 def test_an_interrupted_search_leaves_nothing_half_written(room: Scene, tmp_path: Path) -> None:
     small = room.reduced("1/2")
     target = lp.Target.of(lp.render_basis(small.moved({"beam": AIMED}), spp=64).current_look)
-    how = {"rigging": lp.Rigging.of({"beam": {"aim": 60}}), "spp": 64, "hold": 0}
-    how |= {"space": "linear", "verify": False, "report": False}
+    options = {"rigging": lp.Rigging.of({"beam": {"aim": 60}}), "spp": 64, "hold": 0}
+    options |= {"space": "linear", "verify": False, "report": False}
     with pytest.raises(KeyboardInterrupt):
-        lp.paint_with_light(small, target, tmp_path / "a", **how, progress=_Stop())
+        lp.paint_with_light(small, target, tmp_path / "a", **options, progress=_Stop())
     assert not (tmp_path / "a").exists()
-    look = lp.paint_with_light(small, target, tmp_path / "a", **how)
+    look = lp.paint_with_light(small, target, tmp_path / "a", **options)
     assert look.placement is not None
     assert [move.name for move in look.placement.moves] == ["beam"]
 
@@ -311,30 +314,32 @@ def test_samples_are_added_for_lights_where_they_hang_now(room: Scene, tmp_path:
     small = room.reduced("1/2")
     target = lp.Target.of(lp.render_basis(small.moved({"beam": AIMED}), spp=64).current_look)
     rigging = lp.Rigging.of({"beam": {"aim": 60}})
-    how = {"space": "linear", "hold": 0, "verify": False, "report": False, "use_cache": False}
-    look = lp.paint_with_light(small, target, tmp_path, rigging=rigging, error=0.1, **how)
+    options = {"space": "linear", "hold": 0, "verify": False, "report": False, "use_cache": False}
+    look = lp.paint_with_light(small, target, tmp_path, rigging=rigging, error=0.1, **options)
     assert look.placement is not None
     assert [move.name for move in look.placement.moves] == ["beam"]
     exact = lp.render_basis(look.placement.scene, spp=512, seed=9)
     beam = look.basis.image("beam")
     assert np.abs(beam - exact.image("beam")).sum() < 0.2 * exact.image("beam").sum()
-    found = lp.solve(exact, target, space="linear", hold=0).lighting
-    assert look.lighting["beam"].emission == pytest.approx(found["beam"].emission, rel=0.1)
+    lighting = lp.solve(exact, target, space="linear", hold=0).lighting
+    assert look.lighting["beam"].emission == pytest.approx(lighting["beam"].emission, rel=0.1)
 
 
 def test_variations_hang_as_the_look_that_they_vary(room: Scene, tmp_path: Path) -> None:
     small = room.reduced("1/2")
-    seen = lp.render_basis(small.moved({"beam": AIMED}), spp=64).current_look
+    look_image = lp.render_basis(small.moved({"beam": AIMED}), spp=64).current_look
     for name in ("one", "two"):
-        write_rgb(tmp_path / f"{name}.exr", seen)
-        seen = 0.5 * seen
+        write_rgb(tmp_path / f"{name}.exr", look_image)
+        look_image = 0.5 * look_image
     options = ["--aim", "beam=60", "--resolution", "1/2", "--spp", "64", "--literal"]
     options += ["--variations", "fewer-lights,warmer", "--no-verify", "-o", "out"]
-    done = run(tmp_path, "solve", room.path, "one.exr", "two.exr", *options)
-    assert done.returncode == 0, done.stderr
-    assert done.stderr.count("poses: ") == 2  # a search for each painting
+    completed = run(tmp_path, "solve", room.path, "one.exr", "two.exr", *options)
+    assert completed.returncode == 0, completed.stderr
+    assert completed.stderr.count("poses: ") == 2  # a search for each painting
     for name in ("one", "two"):
-        folders = [tmp_path / "out" / f"{name}{its}" for its in ("", "-fewer-lights", "-warmer")]
+        folders = [
+            tmp_path / "out" / f"{name}{suffix}" for suffix in ("", "-fewer-lights", "-warmer")
+        ]
         sites = [load_scene(x / "relit.xml").light("beam").members[0].site for x in folders]
         assert sites[0] == sites[1] == sites[2]
         assert np.dot(sites[0].direction, room.light("beam").members[0].site.direction) < 0.99

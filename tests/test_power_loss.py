@@ -28,15 +28,15 @@ class Disk:
         self._flushed: dict[int, tuple[int, int]] = {}
 
     def flush(self, descriptor: int) -> None:
-        its = os.fstat(descriptor)
-        self._flushed[its.st_ino] = its.st_size, its.st_mtime_ns
+        status = os.fstat(descriptor)
+        self._flushed[status.st_ino] = status.st_size, status.st_mtime_ns
 
     def rename(self, path: Path) -> None:
         """What the disk has of a file, or of all in a folder, when its name changes."""
         files = [x for x in path.rglob("*") if x.is_file()] if path.is_dir() else [path]
         for file in files:
-            its = file.stat()
-            if self._flushed.get(its.st_ino) != (its.st_size, its.st_mtime_ns):
+            status = file.stat()
+            if self._flushed.get(status.st_ino) != (status.st_size, status.st_mtime_ns):
                 os.truncate(file, 0)
 
 
@@ -49,9 +49,9 @@ def _unsafe(monkeypatch: pytest.MonkeyPatch) -> None:
         disk.flush(descriptor)
 
     def renaming(name: str) -> Callable[..., None]:
-        def rename(source: Path, target: Path, **how: int) -> None:
+        def rename(source: Path, target: Path, **options: int) -> None:
             disk.rename(Path(source))
-            real[name](source, target, **how)
+            real[name](source, target, **options)
 
         return rename
 
@@ -102,9 +102,9 @@ def test_so_is_a_session_that_is_written_anew(tmp_path: Path) -> None:
         store.append(step(1))
         path.unlink()
         store.append(step(2))
-        held = content(store)
+        before = content(store)
     with Store.open(path, IDENTITY) as store:
-        assert content(store) == held
+        assert content(store) == before
 
 
 @pytest.mark.usefixtures("_unsafe")
@@ -119,7 +119,7 @@ def test_so_is_a_damaged_session_that_is_recovered(tmp_path: Path) -> None:
         other.execute("UPDATE pixels SET change = x'00' WHERE step = 3")
     with Store.open(path, IDENTITY) as store:
         store.recover()
-        held = content(store)
-        assert len(held[1]) == 3
+        before = content(store)
+        assert len(before[1]) == 3
     with Store.open(path, IDENTITY) as store:
-        assert content(store) == held
+        assert content(store) == before

@@ -52,13 +52,13 @@ GOOD: dict[str, Any] = {
 
 
 def test_each_value_is_of_the_kind_that_was_meant() -> None:
-    whole = read_record(Whole, GOOD)
-    assert whole == Whole(
+    record = read_record(Whole, GOOD)
+    assert record == Whole(
         *("灯", 3, 2.0, False, "two", (1.0, 2.5, 3.0), ("a", "b"), ((1, 2.0), (3, 4.5))),
         *({"a": "12"}, None, (Part("a"), Part("b", 2.0))),
     )
-    assert type(whole.number) is float
-    assert {type(v) for v in whole.rgb} == {float}
+    assert type(record.number) is float
+    assert {type(v) for v in record.rgb} == {float}
 
 
 @pytest.mark.parametrize(
@@ -141,16 +141,16 @@ def test_json_that_nobody_should_write(text: str, words: str) -> None:
 def test_a_value_may_be_of_several_kinds() -> None:
     for place in (None, 2, "left"):
         assert read_record(Whole, {**GOOD, "place": place}).place == place
-    whole = read_record(Whole, {**GOOD, "groups": {"row": ["a", "b"]}, "mode": "b"})
-    assert (whole.groups, whole.mode) == ({"row": ("a", "b")}, "b")
-    for wrong, says in (
+    record = read_record(Whole, {**GOOD, "groups": {"row": ["a", "b"]}, "mode": "b"})
+    assert (record.groups, record.mode) == ({"row": ("a", "b")}, "b")
+    for invalid, says in (
         ({"place": 1.5}, "place is a whole number >= 0 or a text, not 1.5"),
         ({"place": True}, "place is a whole number >= 0 or a text, not True"),
         ({"groups": {"row": "ab"}}, "groups is an object"),
         ({"mode": "c"}, "mode is one of 'a', 'b', not 'c'"),
     ):
         with pytest.raises(ValueError, match=says):
-            read_record(Whole, {**GOOD, **wrong})
+            read_record(Whole, {**GOOD, **invalid})
 
 
 def test_an_exact_reading_refuses_unknown_keys_of_nested_records() -> None:

@@ -77,8 +77,8 @@ def test_a_painting_in_the_result_folder_is_not_written_over(work_folder: Path) 
             painting.rename(work_folder / "evening" / "x.exr")
             (work_folder / "evening" / "report.html").unlink()
             (work_folder / "evening" / "report.html").symlink_to("x.exr")
-        for how in ([], ["--force"]):
-            line = run_refused(work_folder, *SOLVE, name, "-o", "evening", *how)
+        for options in ([], ["--force"]):
+            line = run_refused(work_folder, *SOLVE, name, "-o", "evening", *options)
             assert "is an input of this command" in line
             assert line.endswith("(-o)")
     (work_folder / "evening" / "x.exr").rename(painting)
@@ -90,24 +90,24 @@ def test_a_painting_in_the_result_folder_is_not_written_over(work_folder: Path) 
 
 
 @pytest.mark.parametrize(
-    ("where", "option"),
+    ("place", "option"),
     [("lighting.json", "--lights-file"), ("comparison.png", "--mask"), ("predicted.exr", "")],
 )
 def test_what_goes_with_a_painting_is_not_written_over_either(
-    work_folder: Path, where: str, option: str
+    work_folder: Path, place: str, option: str
 ) -> None:
-    file = work_folder / "out" / where
+    file = work_folder / "out" / place
     file.parent.mkdir()
-    arguments: list[object] = [*SOLVE, "gallery/evening.exr", option, f"out/{where}"]
-    if where == "predicted.exr":
+    arguments: list[object] = [*SOLVE, "gallery/evening.exr", option, f"out/{place}"]
+    if place == "predicted.exr":
         (work_folder / "a.basis.exr").rename(file)
         arguments = ["solve", "out/predicted.exr", "gallery/evening.exr"]
-    elif where == "comparison.png":
+    elif place == "comparison.png":
         file.write_bytes(png_bytes(np.full((12, 10, 3), 255, np.uint8)))
     else:
         file.write_text("[light.'light 0']\noff = true\n", encoding="utf-8")
     line = run_refused(work_folder, *arguments, "-o", "out", "--force")
-    assert f"out/{where} is an input of this command" in line
+    assert f"out/{place} is an input of this command" in line
 
 
 def test_light_groups_are_not_written_over(work_folder: Path) -> None:
@@ -213,13 +213,13 @@ def test_what_comes_to_the_folder_during_a_run_is_kept(
         lp.Job((), (lp.Painting(f"{name}/evening.exr"),), Path("out"), BasisFile("a.basis.exr"))
         for name in ("template", "gallery")
     )
-    once = pipeline.analyse
+    analyse = pipeline.analyse
     with monkeypatch.context() as patch:
 
-        def meanwhile(*given: Any) -> Any:
-            patch.setattr(pipeline, "analyse", once)
+        def meanwhile(*arguments: Any) -> Any:
+            patch.setattr(pipeline, "analyse", analyse)
             lp.run(other)
-            return once(*given)
+            return analyse(*arguments)
 
         patch.setattr(pipeline, "analyse", meanwhile)
         with pytest.raises(OutputError, match=r"holds the answer to gallery/evening\.exr"):
@@ -298,8 +298,8 @@ def test_targets_in_memory_go_by_their_names(work_folder: Path, make_basis: Any)
 
 
 def test_relight_keeps_what_is_not_its_own(work_folder: Path, room: Path) -> None:
-    def relight(*how: object) -> Any:
-        return run(work_folder, "relight", "room.xml", *how, "--spp", 2)
+    def relight(*arguments: object) -> Any:
+        return run(work_folder, "relight", "room.xml", *arguments, "--spp", 2)
 
     scene = lp.load_scene(room)
     write_rgb(work_folder / "look.exr", np.ones((20, 24, 3), np.float32))
@@ -318,21 +318,23 @@ def test_relight_keeps_what_is_not_its_own(work_folder: Path, room: Path) -> Non
     (work_folder / "other").mkdir()
     (work_folder / "other" / "lighting.json").write_bytes(lighting.read_bytes())
     before = contents(work_folder)
-    done = relight("other/lighting.json")
-    assert done.returncode == 2
-    assert "look holds the answer to look.exr, not to other/lighting.json" in done.stderr
-    done = relight("other/lighting.json", "look/lighting.json")
-    assert "results would overwrite each other in look: run those" in done.stderr
+    completed = relight("other/lighting.json")
+    assert completed.returncode == 2
+    assert "look holds the answer to look.exr, not to other/lighting.json" in completed.stderr
+    completed = relight("other/lighting.json", "look/lighting.json")
+    assert "results would overwrite each other in look: run those" in completed.stderr
     os.link(lighting, work_folder / "other" / "relit.png")
-    done = relight("look/lighting.json", "-o", "other", "--force")
-    assert "other/relit.png is an input of this command" in done.stderr
+    completed = relight("look/lighting.json", "-o", "other", "--force")
+    assert "other/relit.png is an input of this command" in completed.stderr
     (work_folder / "other" / "relit.png").unlink()
     assert contents(work_folder) == before
 
     assert relight("other/lighting.json", "-o", "new").returncode == 0
     assert relight("other/lighting.json", "-o", "new").returncode == 0
-    done = relight("look/lighting.json", "-o", "new")
-    assert "new holds the answer to other/lighting.json, not to look/lighting.json" in done.stderr
+    completed = relight("look/lighting.json", "-o", "new")
+    assert (
+        "new holds the answer to other/lighting.json, not to look/lighting.json" in completed.stderr
+    )
     # What replaces a solve's results leaves none of them behind.
     assert relight("other/lighting.json", "-o", "look", "--force").returncode == 0
     assert contents(work_folder / "look").keys() == {"relit.xml", "relit.exr", "relit.png", RECORD}
@@ -348,8 +350,8 @@ def test_what_can_be_seen_after_a_run_can_be_rendered_and_relit(
         assert look.relit is not None
         assert look.relit.path == Path(folder) / "relit.xml"
         assert lp.verify(look.predicted, look.relit, spp=2).agrees
-        again = lp.relight(look.relit, look.lighting, "again.xml")
-        assert again.light("panel").emission == pytest.approx(look.lighting.emission["panel"])
+        second = lp.relight(look.relit, look.lighting, "again.xml")
+        assert second.light("panel").emission == pytest.approx(look.lighting.emission["panel"])
         way = f'<path value="{os.path.relpath(".", folder)}"/>'
         assert way in (Path(folder) / "relit.xml").read_text(encoding="utf-8")
         assert run(work_folder, "verify", folder).returncode == 0
@@ -358,9 +360,9 @@ def test_what_can_be_seen_after_a_run_can_be_rendered_and_relit(
 def test_views_that_are_not_painted_any_more_go(work_folder: Path, make_basis: Any) -> None:
     from lightpaint.pipeline.results.result_folder import ResultFolder
 
-    both = ResultFolder(Path("out"), (Path("out/a/x"), Path("out/b/x")), (), ("a", "b"))
-    one = replace(both, files=(Path("out/a/x"),), answers=("a",))
-    for folder, names in ((one, ["a"]), (both, ["a", "b"])):
+    result_folder = ResultFolder(Path("out"), (Path("out/a/x"), Path("out/b/x")), (), ("a", "b"))
+    one = replace(result_folder, files=(Path("out/a/x"),), answers=("a",))
+    for folder, names in ((one, ["a"]), (result_folder, ["a", "b"])):
         folder.check()
         with folder.filled() as stage:
             for name in names:
@@ -438,12 +440,12 @@ def test_a_template_keeps_what_is_there(work_folder: Path, room: Path) -> None:
 
 
 def test_a_forced_template_leaves_what_is_not_its_own(work_folder: Path, room: Path) -> None:
-    how = ("template", "room.xml", "--spp", 2)
-    succeed(work_folder, *how)
+    arguments = ("template", "room.xml", "--spp", 2)
+    succeed(work_folder, *arguments)
     (work_folder / "template" / "mattes" / "mine.png").write_text("mine", encoding="utf-8")
     assert (work_folder / "template" / "evening.exr").is_file()
-    succeed(work_folder, *how, "--force")
+    succeed(work_folder, *arguments, "--force")
     assert (work_folder / "template" / "mattes" / "mine.png").is_file()
     assert (work_folder / "template" / "evening.exr").is_file()
-    about = json.loads((work_folder / "template" / "template.json").read_text(encoding="utf-8"))
-    assert all((work_folder / "template" / name).is_file() for name in about["files"])
+    metadata = json.loads((work_folder / "template" / "template.json").read_text(encoding="utf-8"))
+    assert all((work_folder / "template" / name).is_file() for name in metadata["files"])

@@ -80,10 +80,10 @@ def test_every_field_is_tried() -> None:
 
 @pytest.mark.parametrize(("name", "value"), _each(WRONG))
 def test_a_value_that_means_nothing_is_refused_in_one_line(name: str, value: Any) -> None:
-    with pytest.raises(LightpaintError, match=r"expected|not a resolution") as refused:
+    with pytest.raises(LightpaintError, match=r"expected|not a resolution") as refusal:
         Settings(**{name: value})
-    assert "\n" not in str(refused.value)
-    assert repr(value) in str(refused.value)
+    assert "\n" not in str(refusal.value)
+    assert repr(value) in str(refusal.value)
 
 
 @pytest.mark.parametrize(("name", "value"), _each(RIGHT))

@@ -20,19 +20,19 @@ def _own_handler() -> Iterator[None]:
 
 
 def test_an_interrupt_waits_for_the_end_of_a_piece():
-    done = []
+    steps_done = []
 
     def work() -> None:
         with interruptible_between_pieces() as let_through:
             let_through()
             signal.raise_signal(signal.SIGINT)
-            done.append("the piece")
+            steps_done.append("the piece")
             let_through()
-            done.append("another")
+            steps_done.append("another")
 
     with pytest.raises(KeyboardInterrupt):
         work()
-    assert done == ["the piece"]
+    assert steps_done == ["the piece"]
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
@@ -76,41 +76,41 @@ def test_a_handler_outside_python_is_left_alone(monkeypatch: pytest.MonkeyPatch)
     installed: list[Any] = []
     with monkeypatch.context() as patch:
         patch.setattr(signal, "getsignal", lambda _signal: None)
-        patch.setattr(signal, "signal", lambda *given: installed.append(given))
+        patch.setattr(signal, "signal", lambda *arguments: installed.append(arguments))
         with interruptible_between_pieces() as let_through:
             let_through()
     assert installed == []
 
 
 def test_other_threads_get_no_signals():
-    done = []
+    log = []
 
     def work() -> None:
         with interruptible_between_pieces() as let_through:
             let_through()
-            done.append(signal.getsignal(signal.SIGINT))
+            log.append(signal.getsignal(signal.SIGINT))
 
     thread = threading.Thread(target=work)
     thread.start()
     thread.join()
-    assert done == [signal.default_int_handler]
+    assert log == [signal.default_int_handler]
 
 
 def test_what_ends_a_process_otherwise_waits_too():
     """SIGTERM and SIGHUP where a handler of Python's stands; by default they end it at once."""
-    heard: list[int] = []
+    signals_received: list[int] = []
     before = {
-        number: signal.signal(number, lambda number, _: heard.append(number))
+        number: signal.signal(number, lambda number, _: signals_received.append(number))
         for number in (signal.SIGTERM, signal.SIGHUP)
     }
     try:
         with interruptible_between_pieces() as let_through:
             signal.raise_signal(signal.SIGTERM)
-            assert heard == []
+            assert signals_received == []
             let_through()
-            assert heard == [signal.SIGTERM]
+            assert signals_received == [signal.SIGTERM]
             signal.raise_signal(signal.SIGHUP)
-        assert heard == [signal.SIGTERM, signal.SIGHUP]
+        assert signals_received == [signal.SIGTERM, signal.SIGHUP]
         with interruptible_between_pieces():
             assert signal.getsignal(signal.SIGINT) is not signal.default_int_handler
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
@@ -147,6 +147,6 @@ with signals_as_interrupts(came):
     except KeyboardInterrupt:
         sys.exit(128 + came[0])
 """
-    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True)
-    assert done.returncode == 128 + number
-    assert done.stderr == b""
+    completed = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True)
+    assert completed.returncode == 128 + number
+    assert completed.stderr == b""

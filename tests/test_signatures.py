@@ -20,17 +20,17 @@ def _writers() -> Iterator[tuple[str, list[str]]]:
     for file in sorted(set(PACKAGE.rglob("*.py")) - set(PACKAGE.glob("cli/**/*.py"))):
         for node in ast.parse(file.read_text(encoding="utf-8")).body:
             if isinstance(node, ast.FunctionDef) and node.name.startswith("write_"):
-                where = f"{file.relative_to(PACKAGE)}:{node.name}"
-                yield where, [argument.arg for argument in node.args.args]
+                place = f"{file.relative_to(PACKAGE)}:{node.name}"
+                yield place, [argument.arg for argument in node.args.args]
 
 
 def test_there_are_writers_and_the_public_ones_are_among_them() -> None:
-    names = {where.partition(":")[2] for where, _ in _writers()}
+    names = {place.partition(":")[2] for place, _ in _writers()}
     assert {name for name in lightpaint.__all__ if name.startswith("write_")} <= names
     assert len(names) > 10
 
 
-@pytest.mark.parametrize(("where", "parameters"), [*_writers()], ids=str)
-def test_the_place_comes_first(where: str, parameters: list[str]) -> None:
+@pytest.mark.parametrize(("place", "parameters"), [*_writers()], ids=str)
+def test_the_place_comes_first(place: str, parameters: list[str]) -> None:
     assert parameters[0] in PLACES
     assert not set(PLACES) & set(parameters[1:])

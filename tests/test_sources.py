@@ -23,9 +23,9 @@ def test_a_painting_is_read_once_and_anew_when_it_is_asked_for(tmp_path: Path) -
     assert painting.content.image.max() == 0.25
     _painted(tmp_path / "p.exr", 0.5)
     assert painting.content.image.max() == 0.25
-    again = painting.without_content()
-    assert again == painting
-    assert again.content.image.max() == 0.5
+    reread = painting.without_content()
+    assert reread == painting
+    assert reread.content.image.max() == 0.5
 
 
 def test_what_was_read_is_not_sent(tmp_path: Path) -> None:
@@ -46,9 +46,9 @@ def test_what_was_read_is_not_sent(tmp_path: Path) -> None:
 def test_a_file_as_it_is_sent(file: Any) -> None:
     # As if it had been read.
     vars(file)["content"] = object()
-    for same in (file.without_content(), pickle.loads(pickle.dumps(file))):
-        assert same == file
-        assert "content" not in vars(same)
+    for sent_file in (file.without_content(), pickle.loads(pickle.dumps(file))):
+        assert sent_file == file
+        assert "content" not in vars(sent_file)
     if isinstance(file, SceneFile):
         film = SceneFilm(file, resolution="8x8")
         assert film.without_content() == film

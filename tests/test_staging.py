@@ -40,8 +40,8 @@ def read(folder: Path) -> dict[str, str]:
 
 def hidden(folder: Path) -> list[str]:
     """What is left of staging, beside `folder` and in it."""
-    there = (*folder.parent.iterdir(), *folder.iterdir())
-    return [path.name for path in there if MARK in path.name or path.name == JOURNAL]
+    entries = (*folder.parent.iterdir(), *folder.iterdir())
+    return [path.name for path in entries if MARK in path.name or path.name == JOURNAL]
 
 
 def replace(folder: Path) -> None:
@@ -70,11 +70,11 @@ def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
 @pytest.mark.usefixtures("way")
 def test_new_files_take_the_place_of_earlier_ones_and_others_stay(look: Path) -> None:
     look.chmod(0o751)
-    mine, before = (look / "notes.txt").stat().st_ino, look.stat().st_ino
+    own_inode, before = (look / "notes.txt").stat().st_ino, look.stat().st_ino
     replace(look)
     assert look.stat().st_ino == before
     assert read(look) == LATER | OTHERS
-    assert (look / "notes.txt").stat().st_ino == mine
+    assert (look / "notes.txt").stat().st_ino == own_inode
     assert os.readlink(look / "link") == "nowhere"
     assert (look / "empty").is_dir()
     assert not (look / "view").exists()
@@ -161,19 +161,19 @@ def killed_at(step: int, work: Callable[[], None]) -> bool:
     if (child := fork()) == 0:
         count = 0
 
-        def counted(do: Callable[..., object]) -> Callable[..., object]:
-            def counting(*args: object, **how: object) -> object:
+        def count_steps(do: Callable[..., object]) -> Callable[..., object]:
+            def counting(*args: object, **options: object) -> object:
                 nonlocal count
                 count += 1
                 if count > step:
                     os.kill(os.getpid(), signal.SIGKILL)
-                return do(*args, **how)
+                return do(*args, **options)
 
             return counting
 
         for module, names in STEPS:
             for name in names:
-                setattr(module, name, counted(getattr(module, name)))
+                setattr(module, name, count_steps(getattr(module, name)))
         try:
             work()
         except BaseException:
@@ -200,20 +200,20 @@ def _steps(work: Callable[[Path], None], folder: Path) -> Iterator[int]:
 @pytest.mark.usefixtures("way")
 def test_killed_at_any_step_it_comes_to_the_one_or_the_other(tmp_path: Path) -> None:
     """A mixture is there only while files are moved, and only until somebody uses the folder."""
-    whole = (EARLIER | OTHERS, LATER | OTHERS)
-    found = []
+    whole_states = (EARLIER | OTHERS, LATER | OTHERS)
+    states = []
     for step in _steps(replace, tmp_path):
         look = tmp_path / str(step)
-        is_whole, seen = read(look) in whole, read(look)
+        is_whole, state = read(look) in whole_states, read(look)
         finish(look)
-        found.append(whole.index(read(look)))
+        states.append(whole_states.index(read(look)))
         # What is whole stays so, but for a journal that was written and of which nothing is done.
-        assert not is_whole or seen == read(look) or seen == whole[0]
+        assert not is_whole or state == read(look) or state == whole_states[0]
         assert hidden(look) == [], step
     # First all earlier, later all new, and no way back.
-    assert found == sorted(found)
-    assert {0, 1} == set(found)
-    assert len(found) > 25
+    assert states == sorted(states)
+    assert {0, 1} == set(states)
+    assert len(states) > 25
 
 
 def test_killed_while_it_finishes_what_was_killed(tmp_path: Path) -> None:
@@ -292,13 +292,13 @@ def test_a_disk_without_locks(look: Path, monkeypatch: pytest.MonkeyPatch) -> No
         raise OSError("no locks available")
 
     monkeypatch.setattr(fcntl, "flock", refuse)
-    fresh, old = (look.parent / f".look{MARK}{k}" for k in range(2))
-    for stage in (fresh, old):
+    new_folder, old = (look.parent / f".look{MARK}{k}" for k in range(2))
+    for stage in (new_folder, old):
         stage.mkdir()
     os.utime(old, (0, 0))
     replace(look)
     assert read(look) == LATER | OTHERS
-    assert hidden(look) == [fresh.name]
+    assert hidden(look) == [new_folder.name]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="mounts are asked of Linux")

@@ -20,8 +20,8 @@ def _loaded_by(code: str) -> set[str]:
     """Modules that a fresh Python has loaded at the end of this code."""
     code = f"import sys\ntry:\n    {code}\nexcept SystemExit: pass\nprint('\\n', *sys.modules)"
     command = [sys.executable, "-c", code]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    return set(done.stdout.splitlines()[-1].split())
+    completed = subprocess.run(command, capture_output=True, text=True, check=True)
+    return set(completed.stdout.splitlines()[-1].split())
 
 
 @pytest.mark.parametrize(
@@ -51,15 +51,15 @@ def test_every_public_name_is_there_and_seen_by_type_checkers():
     assert len(lp.__all__) == len(set(lp.__all__))
     assert set(lp.__all__) <= set(dir(lp))
     tree = ast.parse(Path(lp.__file__).read_text(encoding="utf-8"))
-    seen = {}
+    names = {}
     for block in (node for node in tree.body if isinstance(node, ast.If)):
         for line in block.body:
             assert isinstance(line, ast.ImportFrom)
             for name in line.names:
                 assert name.asname == name.name  # which is what makes it public to them
-                seen[name.name] = line.module
-    assert set(seen) == {*lp.__all__, *lp._EXTRAS} - {"__version__"}
-    for name, module in seen.items():
+                names[name.name] = line.module
+    assert set(names) == {*lp.__all__, *lp._EXTRAS} - {"__version__"}
+    for name, module in names.items():
         assert getattr(lp, name) is getattr(sys.modules[str(module)], name)
         # Not by way of a module that only imports it.
         assert getattr(lp, name).__module__ == module

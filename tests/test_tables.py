@@ -22,12 +22,16 @@ def solution() -> lp.Solution:
 
 def test_rows_are_lights_and_numbers_are_those_of_the_objects() -> None:
     pytest.importorskip("pandas", reason="pandas")
-    found = solution()
-    basis, rgb = found.basis, ["red", "green", "blue"]
-    for table in (basis.to_dataframe(), found.lighting.to_dataframe(), found.to_dataframe()):
+    answer = solution()
+    basis, rgb = answer.basis, ["red", "green", "blue"]
+    for table in (
+        basis.to_dataframe(),
+        answer.lighting.to_dataframe(),
+        answer.to_dataframe(),
+    ):
         assert list(table.index) == list(basis.names)
-    emission = np.array(list(found.lighting.emission.values()))
-    table = found.to_dataframe()
+    emission = np.array(list(answer.lighting.emission.values()))
+    table = answer.to_dataframe()
     np.testing.assert_array_equal(table[rgb], emission)
     np.testing.assert_array_equal(
         table[["was_red", "was_green", "was_blue"]], basis.current_weights
@@ -37,7 +41,7 @@ def test_rows_are_lights_and_numbers_are_those_of_the_objects() -> None:
     np.testing.assert_allclose(table.stops[:2], stops)
     assert table.stops["lamp 2"] < -20  # off, but for the rounding of the target
     # Numbers are numbers, known or not.
-    plain = found.lighting.to_dataframe()
+    plain = answer.lighting.to_dataframe()
     assert all(plain[name].dtype == np.float64 for name in ("kelvin", "error_red", "upper_blue"))
     look = np.array([lp.combine(basis, {name: 1}).image.mean() for name in basis.names])
     assert (basis.to_dataframe()["mean"] / look > 0.5).all()
@@ -45,25 +49,25 @@ def test_rows_are_lights_and_numbers_are_those_of_the_objects() -> None:
 
 def test_arrays_are_labelled_and_solve_the_same_problem() -> None:
     xarray = pytest.importorskip("xarray", reason="xarray")
-    found = solution()
-    images = found.basis.to_xarray()
+    answer = solution()
+    images = answer.basis.to_xarray()
     assert isinstance(images, xarray.Dataset)
-    np.testing.assert_array_equal(images.images.sel(light="lamp 1"), found.basis.image("lamp 1"))
-    told = found.to_xarray()
+    np.testing.assert_array_equal(images.images.sel(light="lamp 1"), answer.basis.image("lamp 1"))
+    dataset = answer.to_xarray()
     # M w = b where nothing is at a bound: here for what is on.
-    on = told.sel(light=["lamp 0", "lamp 1"])
-    left = (told.M * told.weights.rename(light="other")).sum("other").sel(light=on.light)
+    on = dataset.sel(light=["lamp 0", "lamp 1"])
+    left = (dataset.M * dataset.weights.rename(light="other")).sum("other").sel(light=on.light)
     np.testing.assert_allclose(left.transpose(*on.b.dims), on.b, rtol=1e-6)
-    mixed = (images.images * told.weights).sum("light")
-    np.testing.assert_allclose(mixed, told.predicted, rtol=1e-5)
-    np.testing.assert_array_equal(found.lighting.to_xarray().weight, told.weights)
+    mixed = (images.images * dataset.weights).sum("light")
+    np.testing.assert_allclose(mixed, dataset.predicted, rtol=1e-5)
+    np.testing.assert_array_equal(answer.lighting.to_xarray().weight, dataset.weights)
 
 
 def test_without_them_one_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    found = solution()
+    answer = solution()
     for name, method in (("pandas", "to_dataframe"), ("xarray", "to_xarray")):
         monkeypatch.setitem(sys.modules, name, None)
-        for one in (found, found.lighting, found.basis):
+        for one in (answer, answer.lighting, answer.basis):
             with pytest.raises(lp.LightpaintError, match=rf"needs {name}.*lightpaint\[tables\]"):
                 getattr(one, method)()
 

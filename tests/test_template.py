@@ -39,11 +39,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_first_solve_renders_no_basis(folder: Path):
-    done = run(folder, *UNTOUCHED, "-o", "a")
-    assert done.returncode == 0, done.stderr
-    assert "basis of 16 samples per pixel kept from an earlier run" in done.stderr
-    assert "basis: " not in done.stderr
-    assert "verification" in done.stderr  # which passes are listed
+    completed = run(folder, *UNTOUCHED, "-o", "a")
+    assert completed.returncode == 0, completed.stderr
+    assert "basis of 16 samples per pixel kept from an earlier run" in completed.stderr
+    assert "basis: " not in completed.stderr
+    assert "verification" in completed.stderr  # which passes are listed
 
 
 def test_an_untouched_template_solves_to_the_present_lighting(folder: Path):
@@ -52,8 +52,8 @@ def test_an_untouched_template_solves_to_the_present_lighting(folder: Path):
     look = lp.paint_with_light(folder / "room.xml", target, folder / "b", spp=16)
     weights, current = look.solution.weights, look.basis.current_weights
     assert np.abs(weights - current).max() < 1e-5 * current.max()
-    missed = look.basis.mix(weights).astype(np.float64) - target.image
-    assert np.sqrt(np.square(missed).sum() / np.square(target.image).sum()) < 1e-6
+    residual = look.basis.mix(weights).astype(np.float64) - target.image
+    assert np.sqrt(np.square(residual).sum() / np.square(target.image).sum()) < 1e-6
     # The noise of the target is that of the basis, so there is none to be taken out.
     assert look.solution.problem.noise_removed == 0
 
@@ -61,10 +61,10 @@ def test_an_untouched_template_solves_to_the_present_lighting(folder: Path):
 def test_files_that_other_seeds_and_lights_need_are_theirs(folder: Path):
     """What is kept is that of the same lights, groups, film and seed."""
     for option in (("--seed", 1), ("--lights", "panel"), ("--resolution", "1/2")):
-        kept = len(cache.entries())
+        entry_count = len(cache.entries())
         succeed(folder, "template", "room.xml", "--spp", 4, "--force", "-o", "other", *option)
-        assert len(cache.entries()) == kept + 1
-    kept = len(cache.entries())
+        assert len(cache.entries()) == entry_count + 1
+    entry_count = len(cache.entries())
     succeed(
         folder,
         "template",
@@ -78,7 +78,7 @@ def test_files_that_other_seeds_and_lights_need_are_theirs(folder: Path):
         "--seed",
         7,
     )
-    assert len(cache.entries()) == kept
+    assert len(cache.entries()) == entry_count
 
 
 def test_pictures_are_clean_and_say_so(folder: Path):
@@ -105,10 +105,10 @@ def test_pictures_are_clean_and_say_so(folder: Path):
 def test_only_paint_counts_whichever_look_it_was_painted_on(folder: Path, name: str, bits: int):
     template = read_template(folder / "template")
     image = template.clean if name != "template.exr" else template.image
-    shown = template.transform.encode(image)
-    shown[5:12, 5:12] = (0.9, 0.5, 0.1)
+    display = template.transform.encode(image)
+    display[5:12, 5:12] = (0.9, 0.5, 0.1)
     path = folder / "template" / f"painted {name} {bits}.png"
-    codes = np.round(shown * (2**bits - 1)).astype(np.uint8 if bits == 8 else np.uint16)
+    codes = np.round(display * (2**bits - 1)).astype(np.uint8 if bits == 8 else np.uint16)
     OpenImageIO.ImageBuf(np.ascontiguousarray(codes)).write(str(path))
     importance = lp.read_target(path, template=folder / "template").importance
     painted = np.zeros(importance.shape, bool)
@@ -126,14 +126,14 @@ def test_a_look_that_nobody_painted_on_is_refused(folder: Path, name: str):
 def test_where_each_light_takes_a_render_only_a_kept_basis_is_used(tmp_path: Path):
     """Of an integrator that has no one pass: a render of all lights, until there is a basis."""
     room = write_room(tmp_path)
-    how = ("--integrator", "volpathmis", "--spp", 4)
-    first = run(tmp_path, "template", room, *how)
+    arguments = ("--integrator", "volpathmis", "--spp", 4)
+    first = run(tmp_path, "template", room, *arguments)
     assert first.returncode == 0, first.stderr
     assert "each light needs a render of its own" in first.stderr
     integrators = [entry.origin.integrator for entry in cache.entries() if entry.origin]
     assert "volpath" not in integrators
-    succeed(tmp_path, "basis", room, *how)
-    second = run(tmp_path, "template", room, *how, "--force")
+    succeed(tmp_path, "basis", room, *arguments)
+    second = run(tmp_path, "template", room, *arguments, "--force")
     assert second.returncode == 0, second.stderr
     assert "each light takes" not in second.stderr
     assert "kept from an earlier run" in second.stderr
@@ -142,8 +142,8 @@ def test_where_each_light_takes_a_render_only_a_kept_basis_is_used(tmp_path: Pat
 def test_results_have_their_raw_twins(folder: Path):
     succeed(folder, *UNTOUCHED, "-o", "c")
     with Image.open(folder / "c" / "comparison.png") as file:
-        said = file.text[DENOISED_KEY]
-    assert said.endswith("; raw: predicted.exr, verified.exr")
+        denoiser = file.text[DENOISED_KEY]
+    assert denoiser.endswith("; raw: predicted.exr, verified.exr")
     page = (folder / "c" / "report.html").read_text(encoding="utf-8")
     # Current look, prediction and verification; a painting is shown as it is.
     assert page.count('data-raw=""') == 3

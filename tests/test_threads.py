@@ -41,13 +41,13 @@ def test_jobs_within_which_limit_it_once_more():
     barrier = Barrier(2, timeout=30)
 
     def work(_: int) -> list[set[int]]:
-        seen = []
+        limits = []
         for _ in range(10):
             with one_thread():
                 barrier.wait()
-                seen.append(_threads())
-            seen.append(_threads())
-        return seen
+                limits.append(_threads())
+            limits.append(_threads())
+        return limits
 
     with threadpool_limits(2, "blas"):
         assert parallel_map(work, range(2)) == [[{1}] * 20] * 2
@@ -95,16 +95,16 @@ def test_a_fork_has_threads_of_its_own():
 
 
 def test_inner_products_of_few_lights_are_formed_on_one_thread(monkeypatch: pytest.MonkeyPatch):
-    seen = []
+    thread_names = []
     multiply = np.multiply
 
     def watched(*args: object, **kwargs: object) -> object:
-        seen.append(_threads())
+        thread_names.append(_threads())
         return multiply(*args, **kwargs)  # type: ignore[call-overload]
 
     images, target = np.ones((2, 4, 4, 3), np.float32), np.ones((4, 4, 3), np.float32)
     monkeypatch.setattr(np, "multiply", watched)
     with threadpool_limits(2, "blas"):
         inner_products(images, target, np.ones((4, 4), np.float32))
-    assert seen
-    assert all(threads == {1} for threads in seen)
+    assert thread_names
+    assert all(threads == {1} for threads in thread_names)

@@ -53,28 +53,28 @@ WAYS: dict[str, dict[str, Any]] = {
 @pytest.mark.parametrize("way", WAYS)
 def test_what_nothing_tells_stays_and_has_no_error(basis: lp.Basis, target: lp.Target, way: str):
     [analysis] = lp.analyse(lp.solve(basis, target, **WAYS[way]))
-    key, lamp, back = analysis.solution.lighting.lights
-    assert (key.reached, lamp.reached, back.reached) == (
+    key, lamp, back_light = analysis.solution.lighting.lights
+    assert (key.reached, lamp.reached, back_light.reached) == (
         (True, True, True),
         (True, True, False),
         (False, False, False),
     )
     assert lamp.emission[:2] == pytest.approx((0.5, 0.5), rel=0.05)
     assert lamp.emission[2] == pytest.approx(BEFORE[2], rel=1e-6)
-    assert back.emission == pytest.approx(BEFORE, rel=1e-6)
+    assert back_light.emission == pytest.approx(BEFORE, rel=1e-6)
     assert analysis.solution.certificate.unreached == ("back",)
-    for told in (lamp.standard_error, lamp.interval):
-        assert [x is None for x in told] == [False, False, True]
-    assert back.standard_error is None
-    assert back.interval is None
+    for numbers in (lamp.standard_error, lamp.interval):
+        assert [x is None for x in numbers] == [False, False, True]
+    assert back_light.standard_error is None
+    assert back_light.interval is None
     assert np.isnan(analysis.uncertainty.standard_error).tolist() == [
-        [not told for told in light.reached] for light in (key, lamp, back)
+        [not numbers for numbers in light.reached] for light in (key, lamp, back_light)
     ]
 
 
 def test_one_dimmer_is_told_by_any_channel(basis: lp.Basis, target: lp.Target):
-    asked = lp.Constraints.of({"lamp": {"color": [1, 1, 1]}}, tie=[["key", "back"]])
-    [analysis] = lp.analyse(lp.solve(basis, target, constraints=asked))
+    constraints = lp.Constraints.of({"lamp": {"color": [1, 1, 1]}}, tie=[["key", "back"]])
+    [analysis] = lp.analyse(lp.solve(basis, target, constraints=constraints))
     for light in analysis.solution.lighting.lights:
         assert all(light.reached)
         assert None not in light.standard_error
@@ -116,11 +116,11 @@ def test_people_see_neither_a_colour_nor_an_error(
     [row] = [x for x in succeed(tmp_path, *solved).splitlines() if x.startswith("lamp")]
     assert "#" not in row
     assert " K" not in row
-    said = succeed(tmp_path, *solved, "--table", "full")
-    [row] = [line for line in said.splitlines() if line.startswith("lamp")]
+    output = succeed(tmp_path, *solved, "--table", "full")
+    [row] = [line for line in output.splitlines() if line.startswith("lamp")]
     assert "0.2 (blue unchanged)" in row
     assert "#" not in row
-    [row] = [line for line in said.splitlines() if line.startswith("back")]
+    [row] = [line for line in output.splitlines() if line.startswith("back")]
     assert "(unchanged)" in row
     assert "±" not in row
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
@@ -133,9 +133,9 @@ def test_people_see_neither_a_colour_nor_an_error(
 
 def test_notebooks_and_tables_for_others_show_it(basis: lp.Basis, target: lp.Target):
     solution = lp.solve(basis, target)
-    for shown in (solution, solution.lighting):
-        [row] = [row for row in html_of(shown).split("<tr>") if ">lamp<" in row]
+    for table in (solution, solution.lighting):
+        [row] = [row for row in html_of(table).split("<tr>") if ">lamp<" in row]
         assert "background" not in row
     text = lights_table(SimpleNamespace(basis=basis, layers=()), solution.lighting)
-    told = {row["light"]: row["unreached"] for row in csv.DictReader(io.StringIO(text))}
-    assert told == {"key": "", "lamp": "B", "back": "RGB"}
+    unreached = {row["light"]: row["unreached"] for row in csv.DictReader(io.StringIO(text))}
+    assert unreached == {"key": "", "lamp": "B", "back": "RGB"}

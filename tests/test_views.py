@@ -75,14 +75,16 @@ def test_what_is_painted_in_two_views_is_solved_alike(room: Path, tmp_path: Path
             str(room), paintings, options, requests
         ),
     )
-    identity = session_identity(subjects, {k: its.loaded_scene for k, its in enumerate(subjects)})
+    identity = session_identity(
+        subjects, {k: subject.loaded_scene for k, subject in enumerate(subjects)}
+    )
     assert identity is not None
     assert identity.views == (ViewIdentity("camera", (10, 12)), ViewIdentity("close", (5, 7)))
     exported = Event()
-    told: list[Message] = []
+    messages: list[Message] = []
 
     def hear(message: Message) -> None:
-        told.append(message)
+        messages.append(message)
         if message.kind in ("exported", "notice"):
             exported.set()
 
@@ -96,18 +98,18 @@ def test_what_is_painted_in_two_views_is_solved_alike(room: Path, tmp_path: Path
     studio.handle(ConstrainLight(1, {"lock": True}), {})
     studio.handle(Export(("target", "lighting", "relit", "report")), {})
     assert exported.wait(60)
-    assert told[-1].kind == "exported", told[-1].fields
-    files = told[-1].fields["files"]
+    assert messages[-1].kind == "exported", messages[-1].fields
+    files = messages[-1].fields["files"]
     names = ["painting-camera.exr", "painting-close.exr", "lighting.json", "relit.xml"]
     reports = [f"answer/{name}/report.html" for name in ("camera", "close")]
     assert files == [str(tmp_path / name) for name in (*names, *reports)]
-    words = shlex.split(told[-1].fields["command"])[1:]
+    words = shlex.split(messages[-1].fields["command"])[1:]
     assert main([*words, "-o", str(tmp_path / "again")]) == 0
     emission = read_lighting(tmp_path / "lighting.json").emission
     for other in ("again", "answer"):
-        found = read_lighting(tmp_path / other / "lighting.json").emission
+        stored_emission = read_lighting(tmp_path / other / "lighting.json").emission
         for name, expected in emission.items():
-            np.testing.assert_allclose(found[name], expected, rtol=1e-9)
+            np.testing.assert_allclose(stored_emission[name], expected, rtol=1e-9)
     studio.close()
 
 
@@ -129,15 +131,15 @@ def test_views_add(bases: list[Basis]) -> None:
         (NormalEquations.of(b, t.image, t.importance) for b, t in views[1:]),
         NormalEquations.of(views[0][0], views[0][1].image, views[0][1].importance),
     )
-    found = solution.lighting.weights_for(bases[0])
-    best = joint_progress.objective(found).sum()
+    weights = solution.lighting.weights_for(bases[0])
+    best = joint_progress.objective(weights).sum()
     assert best == pytest.approx(sum(sum(s.certificate.objective) for s in solutions))
     # No other lighting does better: not that of either view alone, nor any nearby.
     for basis, target in views:
-        alone = solve(basis, target).lighting.weights_for(basis)
-        assert joint_progress.objective(alone).sum() >= best
+        single_weights = solve(basis, target).lighting.weights_for(basis)
+        assert joint_progress.objective(single_weights).sum() >= best
     for _ in range(50):
-        near = np.maximum(found + rng.normal(scale=0.05, size=found.shape), 0)
+        near = np.maximum(weights + rng.normal(scale=0.05, size=weights.shape), 0)
         assert joint_progress.objective(near).sum() >= best
 
 
@@ -167,15 +169,15 @@ def test_from_the_command_line(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     weights = np.random.default_rng(3).uniform(0.2, 2, (4, 3))
-    given = []
+    options = []
     for name, basis in zip(("camera", "close"), bases, strict=True):
         write_rgb(tmp_path / f"{name}.exr", basis.mix(weights))
-        given += ["--target", f"{name}={name}.exr"]
-    command = ["solve", str(room), *given, "--spp", "64", "-o", "out", "--lock", "bulb"]
+        options += ["--target", f"{name}={name}.exr"]
+    command = ["solve", str(room), *options, "--spp", "64", "-o", "out", "--lock", "bulb"]
     assert main(command) == 0
-    told = json.loads((tmp_path / "out" / "lighting.json").read_text(encoding="utf-8"))
-    assert told["target"] == "camera + close"
-    assert told["lights"]["bulb"]["emission"] == pytest.approx([0.5, 0.6, 0.7])
+    document = json.loads((tmp_path / "out" / "lighting.json").read_text(encoding="utf-8"))
+    assert document["target"] == "camera + close"
+    assert document["lights"]["bulb"]["emission"] == pytest.approx([0.5, 0.6, 0.7])
     for name in ("camera", "close"):
         for file in (
             "predicted.exr",
@@ -187,9 +189,9 @@ def test_from_the_command_line(
             assert (tmp_path / "out" / name / file).is_file()
     assert main(["verify", "out"]) == 0
     assert main(["verify", "out/close"]) == 0
-    said = capsys.readouterr().out
-    assert said.count("A render confirms it.") == 2
-    assert said.count("agree within noise") >= 3
+    output = capsys.readouterr().out
+    assert output.count("A render confirms it.") == 2
+    assert output.count("agree within noise") >= 3
 
     for arguments, words in (
         (["camera.exr", "--target", "close=close.exr"], "at once"),
@@ -210,8 +212,10 @@ def test_error_bars_are_those_of_all_views_together(bases: list[Basis]) -> None:
         solution = solve([bases[k] for k in views], [targets[k] for k in views])
         return error_bars(solution).standard_error
 
-    alone = errors(0)
-    np.testing.assert_allclose(alone, error_bars(solve(bases[0], targets[0])).standard_error)
+    single_errors = errors(0)
+    np.testing.assert_allclose(
+        single_errors, error_bars(solve(bases[0], targets[0])).standard_error
+    )
 
 
 def test_the_same_view_twice_has_the_scatter_of_independent_ones(make_basis: Any) -> None:
@@ -221,22 +225,24 @@ def test_the_same_view_twice_has_the_scatter_of_independent_ones(make_basis: Any
     noise = 0.05 * images * rng.standard_normal(images.shape)
     basis = make_basis(images=images + noise, half_differences=noise)
     target = painting(basis, rng.uniform(0.2, 2, (4, 3)), "x")
-    alone, twice = (error_bars(solve([basis] * k, [target] * k)).standard_error for k in (1, 2))
-    assert (twice < alone * (1 + 1e-9)).all()
-    assert (twice > alone * (np.sqrt(0.5) - 1e-9)).all()
+    single_errors, twice = (
+        error_bars(solve([basis] * k, [target] * k)).standard_error for k in (1, 2)
+    )
+    assert (twice < single_errors * (1 + 1e-9)).all()
+    assert (twice > single_errors * (np.sqrt(0.5) - 1e-9)).all()
 
 
 def test_error_bars_of_two_views_hold(room: Path) -> None:
     scenes = [load_scene(room, sensor=name) for name in ("camera", "close")]
     weights = np.random.default_rng(6).uniform(0.2, 2, (4, 3))
     targets = [painting(render_basis(s, spp=2048, seed=99), weights, "x") for s in scenes]
-    inside = []
+    is_inside = []
     for seed in range(12):
         solution = solve([render_basis(s, spp=16, seed=seed) for s in scenes], targets)
         low, high = error_bars(solution).interval
-        inside.append((low <= weights) & (weights <= high))
+        is_inside.append((low <= weights) & (weights <= high))
     # 95 % are to be; 144 values, those of one seed and light together, so that some 36 count.
-    assert 0.85 <= np.mean(inside) <= 0.995
+    assert 0.85 <= np.mean(is_inside) <= 0.995
 
 
 def test_what_is_given_up_for_other_views(bases: list[Basis]) -> None:
@@ -244,30 +250,30 @@ def test_what_is_given_up_for_other_views(bases: list[Basis]) -> None:
     views = [(basis, painting(basis, rng.uniform(0, 2, (4, 3)), "x")) for basis in bases]
     solutions = solve(*zip(*views, strict=True)).views
     for (basis, target), solution in zip(views, solutions, strict=True):
-        told, alone = diagnose(solution), solve(basis, target)
+        diagnosis, single = diagnose(solution), solve(basis, target)
         # What no mix reaches is orthogonal to what some mix of any sign would: each from its map.
         D = target.importance[..., None].astype(np.float64)
-        reached, out_of_reach = (
+        attained, out_of_reach = (
             (D * np.square(map_, dtype=np.float64)).sum()
-            for map_ in (told.forbidden_map, told.unreachable_map)
+            for map_ in (diagnosis.forbidden_map, diagnosis.unreachable_map)
         )
-        assert told.forbidden + told.compromise == pytest.approx(reached, rel=1e-4)
-        assert told.unreachable + told.noise == pytest.approx(out_of_reach, rel=1e-4)
-        gap = sum(solution.certificate.objective) - sum(alone.certificate.objective)
-        assert told.compromise == pytest.approx(gap, rel=1e-3)
-        assert told.compromise > 0.1 * told.total
+        assert diagnosis.forbidden + diagnosis.compromise == pytest.approx(attained, rel=1e-4)
+        assert diagnosis.unreachable + diagnosis.noise == pytest.approx(out_of_reach, rel=1e-4)
+        gap = sum(solution.certificate.objective) - sum(single.certificate.objective)
+        assert diagnosis.compromise == pytest.approx(gap, rel=1e-3)
+        assert diagnosis.compromise > 0.1 * diagnosis.total
         # Each is met by itself, so that nothing else can be in the way.
-        assert told.forbidden < 1e-3 * told.total
+        assert diagnosis.forbidden < 1e-3 * diagnosis.total
 
 
 def test_bases_share_the_memory_of_the_joint_one(bases: list[Basis]) -> None:
-    whole, parts = joint_basis(bases)
+    joint, parts = joint_basis(bases)
     for part, basis in zip(parts, bases, strict=True):
         np.testing.assert_array_equal(part.images, basis.images)
         np.testing.assert_array_equal(part.half_differences, basis.half_differences)
-        assert np.shares_memory(part.images, whole.images)
+        assert np.shares_memory(part.images, joint.images)
     # What fills the last row is dark.
-    assert whole.images.sum() == pytest.approx(sum(b.images.sum() for b in bases), rel=1e-5)
+    assert joint.images.sum() == pytest.approx(sum(b.images.sum() for b in bases), rel=1e-5)
 
 
 def test_views_share_no_random_numbers(tmp_path: Path) -> None:
@@ -283,27 +289,27 @@ def test_views_share_no_random_numbers(tmp_path: Path) -> None:
 
 def test_no_pixel_is_held_twice(room: Path, tmp_path: Path) -> None:
     scenes = [load_scene(room, sensor=name) for name in ("camera", "close")]
-    made = [render_basis(scene, spp=4) for scene in scenes]
-    watched = [weakref.ref(basis.images) for basis in made]
-    targets = [painting(basis, np.ones((4, 3)), "x") for basis in made]
+    bases = [render_basis(scene, spp=4) for scene in scenes]
+    watched = [weakref.ref(basis.images) for basis in bases]
+    targets = [painting(basis, np.ones((4, 3)), "x") for basis in bases]
     alive: list[bool] = []
 
     def look(label: str, *_: object) -> None:
         if label == "verification of close":
             alive.extend(ref() is not None for ref in watched)
 
-    paint_with_light(scenes, targets, tmp_path / "out", basis=made, spp=4, progress=look)
-    assert made == []
+    paint_with_light(scenes, targets, tmp_path / "out", basis=bases, spp=4, progress=look)
+    assert bases == []
     assert alive
     assert not any(alive)
 
 
 def test_paintings_of_two_views_seen_through_two_transforms(room: Path, tmp_path: Path) -> None:
     scenes = [load_scene(room, sensor=name) for name in ("camera", "close")]
-    shown = [ViewTransform("agx", 1.0), ViewTransform("srgb")]
+    transforms = [ViewTransform("agx", 1.0), ViewTransform("srgb")]
     targets = [
         replace(painting(render_basis(s, spp=4), np.ones((4, 3)), "x"), transform=view)
-        for s, view in zip(scenes, shown, strict=True)
+        for s, view in zip(scenes, transforms, strict=True)
     ]
     with pytest.raises(TargetError, match=r"painted through agx at \+1 stops and srgb"):
         paint_with_light(scenes, targets, tmp_path / "out", spp=4, space="display")

@@ -109,11 +109,11 @@ def each_with_some(paths: Sequence[str]) -> list[Any]:
 def test_every_path_of_a_command(folder: Path, command: str, kind: str) -> None:
     line, ending = COMMANDS[command]
     made(folder / f"x{ending}", kind)
-    said = run_refused(folder, *line.replace("X", f"x{ending}").split())
-    assert f"x{ending}" in said
+    message = run_refused(folder, *line.replace("X", f"x{ending}").split())
+    assert f"x{ending}" in message
     # A folder may hold light groups, too.
     others = ("EXR", ".exr file") if kind == "folder" else ("holds no light groups",)
-    assert any(words in said for words in (REQUESTS[kind], *others))
+    assert any(words in message for words in (REQUESTS[kind], *others))
 
 
 #: Elements of a scene that name a file, and how its name ends.
@@ -136,17 +136,17 @@ def test_every_file_of_a_scene(folder: Path, element: str, kind: str) -> None:
     text = room.read_text(encoding="utf-8")
     element = element.replace("X", f"x{ending}")
     room.write_text(text.replace("</scene>", f"{element}</scene>"), encoding="utf-8")
-    said = run_refused(folder, "lights", room)
-    assert f"x{ending}" in said
-    assert REQUESTS[kind] in said
+    message = run_refused(folder, "lights", room)
+    assert f"x{ending}" in message
+    assert REQUESTS[kind] in message
 
 
 def test_beside_the_scene_and_in_a_template(folder: Path) -> None:
     (folder / "room.lights.toml").symlink_to("/proc/kmsg")
     (folder / "template").mkdir()
     (folder / "template" / "template.json").symlink_to("/proc/kmsg")
-    said = run_refused(folder, "solve", "b.basis.exr", "painting.exr", "-o", "out")
-    assert "template.json" in said
+    message = run_refused(folder, "solve", "b.basis.exr", "painting.exr", "-o", "out")
+    assert "template.json" in message
 
 
 class HalfWay:

@@ -61,11 +61,11 @@ def _uv(rgb: Any) -> Any:
     ],
 )
 def test_temperature_of_standard_illuminants(x: float, y: float, kelvin: float, duv: float):
-    found = cct_and_duv(_of_chromaticity(x, y))
-    assert found is not None
+    white = cct_and_duv(_of_chromaticity(x, y))
+    assert white is not None
     # The daylight phases are tabulated from factors rounded to three digits.
-    assert found[0] == pytest.approx(kelvin, abs=1.5)
-    assert found[1] == pytest.approx(duv, abs=5e-5)
+    assert white[0] == pytest.approx(kelvin, abs=1.5)
+    assert white[1] == pytest.approx(duv, abs=5e-5)
 
 
 @pytest.mark.parametrize(
@@ -81,9 +81,9 @@ def test_temperature_of_standard_illuminants(x: float, y: float, kelvin: float, 
     ],
 )
 def test_correlated_temperature_of_illuminants(x: float, y: float, kelvin: float):
-    found = cct_and_duv(_of_chromaticity(x, y))
-    assert found is not None
-    assert found[0] == pytest.approx(kelvin, rel=2e-3)  # lamps' are rounded to tens of kelvin
+    white = cct_and_duv(_of_chromaticity(x, y))
+    assert white is not None
+    assert white[0] == pytest.approx(kelvin, rel=2e-3)  # lamps' are rounded to tens of kelvin
 
 
 @pytest.mark.parametrize(
@@ -104,18 +104,18 @@ def test_black_bodies(kelvin: float, x: float, y: float):
 
 @given(st.floats(100, 330), st.floats(-0.01, 0.01))  # all within Rec.709
 def test_duv_is_a_distance_at_a_right_angle(mireds: float, duv: float):
-    on, off = _uv(kelvin_to_rgb(1e6 / mireds)), _uv(kelvin_to_rgb(1e6 / mireds, duv))
-    assert np.hypot(*(off - on)) == pytest.approx(abs(duv), abs=1e-12)
+    on, shifted = _uv(kelvin_to_rgb(1e6 / mireds)), _uv(kelvin_to_rgb(1e6 / mireds, duv))
+    assert np.hypot(*(shifted - on)) == pytest.approx(abs(duv), abs=1e-12)
     along = _uv(kelvin_to_rgb(1e6 / (mireds + 1))) - _uv(kelvin_to_rgb(1e6 / (mireds - 1)))
     # A chord of two mireds differs from the tangent by less than 1e-4; u and v are float64.
-    assert abs((off - on) @ along) / np.hypot(*along) <= 1e-4 * abs(duv) + 1e-15
+    assert abs((shifted - on) @ along) / np.hypot(*along) <= 1e-4 * abs(duv) + 1e-15
 
 
 def test_white_is_d65():
-    found = cct_and_duv(np.ones(3))
-    assert found is not None
-    assert found[0] == pytest.approx(6504, abs=1)
-    np.testing.assert_allclose(kelvin_to_rgb(*found), 1, atol=1e-9)
+    white = cct_and_duv(np.ones(3))
+    assert white is not None
+    assert white[0] == pytest.approx(6504, abs=1)
+    np.testing.assert_allclose(kelvin_to_rgb(*white), 1, atol=1e-9)
 
 
 @given(MIREDS)
@@ -123,18 +123,18 @@ def test_temperature_and_back(mireds: float):
     rgb = kelvin_to_rgb(1e6 / mireds)
     assert rgb.min() >= 0
     assert luminance(rgb) == pytest.approx(1, abs=1e-12)
-    found = cct_and_duv(rgb * 17)
-    assert found is not None
-    assert 1e6 / found[0] == pytest.approx(mireds, rel=1e-9)  # float64
-    assert found[1] == pytest.approx(0, abs=1e-12)
+    white = cct_and_duv(rgb * 17)
+    assert white is not None
+    assert 1e6 / white[0] == pytest.approx(mireds, rel=1e-9)  # float64
+    assert white[1] == pytest.approx(0, abs=1e-12)
 
 
 @given(st.floats(100, 330), st.floats(-0.01, 0.01))  # all within Rec.709
 def test_temperature_off_the_locus_and_back(mireds: float, duv: float):
-    found = cct_and_duv(kelvin_to_rgb(1e6 / mireds, duv))
-    assert found is not None
-    assert 1e6 / found[0] == pytest.approx(mireds, rel=1e-9)
-    assert found[1] == pytest.approx(duv, abs=1e-12)
+    white = cct_and_duv(kelvin_to_rgb(1e6 / mireds, duv))
+    assert white is not None
+    assert 1e6 / white[0] == pytest.approx(mireds, rel=1e-9)
+    assert white[1] == pytest.approx(duv, abs=1e-12)
 
 
 def test_duv_is_positive_towards_green():
@@ -148,9 +148,9 @@ def test_candles_are_redder_than_rec709(kelvin: float):
     assert rgb[2] == 0
     assert luminance(rgb) == pytest.approx(1, abs=1e-12)
     # What was cut off shows, and little.
-    found = cct_and_duv(rgb)
-    assert found is not None
-    assert kelvin < found[0] < 1.03 * kelvin
+    white = cct_and_duv(rgb)
+    assert white is not None
+    assert kelvin < white[0] < 1.03 * kelvin
 
 
 @pytest.mark.parametrize(

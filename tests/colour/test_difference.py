@@ -48,8 +48,8 @@ def test_lab_and_the_difference_of_light_against_colour_science():
     a, b = rng.random((2, 4000, 3))
     expected = [colour.XYZ_to_Lab(x @ rgb_to_xyz(REC709).T) for x in (a, b)]
     np.testing.assert_allclose(lab(a), expected[0], rtol=0, atol=1e-9)
-    apart = colour.delta_E(*expected, method="CIE 2000")
-    np.testing.assert_allclose(delta_e(a, b), apart, rtol=0, atol=1e-9)
+    distances = colour.delta_E(*expected, method="CIE 2000")
+    np.testing.assert_allclose(delta_e(a, b), distances, rtol=0, atol=1e-9)
 
 
 def test_the_library_is_not_waited_for():

@@ -44,8 +44,8 @@ def test_the_standards_inverse_takes_it_back(encoded: float):
 
 @given(stops=st.floats(-8, 8), value=st.floats(0, 4))
 def test_stops_are_powers_of_two(stops: float, value: float):
-    got = encode_display(np.array(value), stops=stops)
-    assert got == pytest.approx(float(encode_display(np.array(value * 2**stops))), abs=1e-15)
+    actual = encode_display(np.array(value), stops=stops)
+    assert actual == pytest.approx(float(encode_display(np.array(value * 2**stops))), abs=1e-15)
 
 
 def test_every_8_bit_value_survives_a_png(tmp_path: Path):

@@ -20,9 +20,9 @@ def room(median: float, *, spread: float = 1.0) -> np.ndarray:
 
 def with_window(image: np.ndarray, light: float, share: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the picture with an emitter in its first rows, and where that is."""
-    seen = np.zeros(SIZE, bool)
-    seen[: round(share * SIZE[0])] = True
-    return np.where(seen[..., None], light, image), seen
+    emitter_mask = np.zeros(SIZE, bool)
+    emitter_mask[: round(share * SIZE[0])] = True
+    return np.where(emitter_mask[..., None], light, image), emitter_mask
 
 
 def median_code(image: np.ndarray, stops: float) -> float:
@@ -33,15 +33,15 @@ def median_code(image: np.ndarray, stops: float) -> float:
 @pytest.mark.parametrize("light", [20.0, 1000.0])
 @pytest.mark.parametrize("share", [0.02, 0.1])
 def test_a_window_in_view_does_not_darken_the_room(light: float, share: float):
-    image, seen = with_window(room(0.15), light, share)
-    assert choose_exposure(image, seen) == 0
+    image, emitter_mask = with_window(room(0.15), light, share)
+    assert choose_exposure(image, emitter_mask) == 0
 
 
 @pytest.mark.parametrize("unit", [1e-3, 40.0, 1e4])
 def test_a_room_in_any_unit_comes_to_middle_grey(unit: float):
-    image, seen = with_window(room(0.2 * unit), 100 * unit, 0.05)
+    image, emitter_mask = with_window(room(0.2 * unit), 100 * unit, 0.05)
     # Exposed for its highlights, a picture of little contrast may be a stop brighter.
-    assert 0 <= median_code(image[~seen], choose_exposure(image, seen)) <= 1.06
+    assert 0 <= median_code(image[~emitter_mask], choose_exposure(image, emitter_mask)) <= 1.06
 
 
 def test_where_nobody_knows_of_emitters_highlights_cost_a_stop_at_most():
@@ -79,10 +79,10 @@ def test_black_has_no_exposure():
 
 
 def test_a_basis_says_where_emitters_are_and_light_groups_do_not(make_basis: BasisFactory):
-    image, seen = with_window(room(0.8), 50.0, 0.05)
-    basis = make_basis(images=np.repeat(image[None], 2, axis=0), seen=seen)
-    assert meter_exposure(image, basis) == choose_exposure(image, seen)
+    image, emitter_mask = with_window(room(0.8), 50.0, 0.05)
+    basis = make_basis(images=np.repeat(image[None], 2, axis=0), seen=emitter_mask)
+    assert meter_exposure(image, basis) == choose_exposure(image, emitter_mask)
     groups = replace(basis, origin=replace(basis.origin, halves=(0, 0)))
     assert meter_exposure(image, groups) == choose_exposure(image)
-    whole = np.concatenate([image.reshape(1, -1, 3)] * 2, axis=1)
-    assert meter_exposure(whole, basis, basis) == choose_exposure(image, seen)
+    doubled = np.concatenate([image.reshape(1, -1, 3)] * 2, axis=1)
+    assert meter_exposure(doubled, basis, basis) == choose_exposure(image, emitter_mask)

@@ -21,8 +21,8 @@ def test_it_has_all_mixes_of_its_primaries_and_no_more(seed: int) -> None:
     for _ in range(50):
         assert hull.has(rng.exponential(1, len(hull.primaries)) @ hull.primaries)
     for rgb in np.vstack([rng.random((200, 3)), white_range(2200, 9000).colors]):
-        its = (chromaticity(rgb) @ DIRECTIONS.T <= hull.reach).all()
-        assert hull.has(rgb) == its
+        is_within = (chromaticity(rgb) @ DIRECTIONS.T <= hull.reach).all()
+        assert hull.has(rgb) == is_within
 
 
 @pytest.mark.parametrize("rgb", [(0, 1, 0), (1, 0, 1), (1, 0, 0), (0, 0, 1), (0.2, 3, 0.5)])

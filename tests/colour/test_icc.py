@@ -20,10 +20,10 @@ def _by_lcms(profile: bytes, pixels: Any) -> Any:
     source = ImageCms.ImageCmsProfile(io.BytesIO(profile))
     image = Image.fromarray(pixels)
     assert image.mode == mode
-    shown = ImageCms.profileToProfile(
+    display = ImageCms.profileToProfile(
         image, source, ImageCms.createProfile("sRGB"), outputMode="RGB", renderingIntent=1
     )
-    return np.asarray(shown)
+    return np.asarray(display)
 
 
 @pytest.mark.parametrize(
@@ -43,21 +43,21 @@ def _by_lcms(profile: bytes, pixels: Any) -> Any:
 def test_little_cms_agrees(curve: bytes, columns: Any):
     profile = icc(curve, columns)
     pixels = np.random.default_rng(0).integers(0, 256, (16, 16, 3), dtype=np.uint8)
-    mine = read_icc(profile)
-    curved = [curve(pixels[..., k] / 255) for k, curve in enumerate(mine.curves)]
-    light = np.stack(curved, axis=-1) @ mine.matrix.T
-    shown = np.round(encode_display(light) * 255)
+    transform = read_icc(profile)
+    curved = [curve(pixels[..., k] / 255) for k, curve in enumerate(transform.curves)]
+    light = np.stack(curved, axis=-1) @ transform.matrix.T
+    display = np.round(encode_display(light) * 255)
     # Little CMS works in 16 bits and rounds to 8; what is out of sRGB both clip.
-    assert np.abs(shown - _by_lcms(profile, pixels)).max() <= 1
+    assert np.abs(display - _by_lcms(profile, pixels)).max() <= 1
 
 
 def test_grey():
     profile = icc(para(0, 1.8), [], space=b"GRAY")
     ramp = np.arange(256, dtype=np.uint8).reshape(16, 16)
-    mine = read_icc(profile)
-    shown = np.round(encode_display(mine.curves[0](ramp / 255)) * 255)
-    np.testing.assert_allclose(shown, _by_lcms(profile, ramp)[..., 0], atol=1)
-    np.testing.assert_array_equal(mine.matrix, np.eye(3))
+    transform = read_icc(profile)
+    display = np.round(encode_display(transform.curves[0](ramp / 255)) * 255)
+    np.testing.assert_allclose(display, _by_lcms(profile, ramp)[..., 0], atol=1)
+    np.testing.assert_array_equal(transform.matrix, np.eye(3))
 
 
 def test_srgb_is_known():
@@ -121,20 +121,20 @@ def test_damaged_profiles(profile: bytes):
 
 
 def test_every_cut_and_flip_is_refused_or_read():
-    whole = icc(para(3, *SRGB_CURVE), P3)
+    content = icc(para(3, *SRGB_CURVE), P3)
     rng = np.random.default_rng(0)
-    refused = 0
+    refusals = 0
     for k in range(1500):
-        damaged = bytearray(whole[: k * len(whole) // 500 if k < 500 else None])
+        damaged = bytearray(content[: k * len(content) // 500 if k < 500 else None])
         if k >= 500:
-            damaged[rng.integers(len(whole))] ^= 1 << rng.integers(8)
+            damaged[rng.integers(len(content))] ^= 1 << rng.integers(8)
         try:
-            mine = read_icc(bytes(damaged))
+            transform = read_icc(bytes(damaged))
         except ImageError:
-            refused += 1
+            refusals += 1
         else:
-            assert np.isfinite(mine.matrix).all()
+            assert np.isfinite(transform.matrix).all()
             with np.errstate(over="ignore"):
-                mine.curves[0](np.linspace(0, 1, 9))
+                transform.curves[0](np.linspace(0, 1, 9))
     # Of the cuts all are.
-    assert refused >= 490
+    assert refusals >= 490

@@ -25,12 +25,12 @@ def test_temperatures_are_those_of_ohno():
         for duv in (-0.01, 0.0, 0.01):
             rgb = kelvin_to_rgb(float(kelvin), duv)
             uv = colour.UCS_to_uv(colour.XYZ_to_UCS(rgb_to_xyz(REC709) @ rgb))
-            found = cct_and_duv(rgb)
-            assert found is not None
+            white = cct_and_duv(rgb)
+            assert white is not None
             np.testing.assert_allclose(uv, uv_of(rgb_to_xyz(REC709) @ rgb), rtol=1e-12)
             expected = colour.temperature.uv_to_CCT_Ohno2013(uv)
-            assert found[0] == pytest.approx(expected[0], rel=1e-4)
-            assert found[1] == pytest.approx(expected[1], abs=1e-6)
+            assert white[0] == pytest.approx(expected[0], rel=1e-4)
+            assert white[1] == pytest.approx(expected[1], abs=1e-6)
 
 
 @pytest.mark.parametrize("kelvin", [1000.0, 1234.5, 6504.0, 40_000.0, 100_000.0])

@@ -43,27 +43,27 @@ def test_spot_without_falloff_is_a_part_of_the_sphere() -> None:
     ("unit", "luminous_unit"), [(RADIANCE, "cd/m²"), (INTENSITY, "cd"), (IRRADIANCE, "lx")]
 )
 def test_luminous_quantities_are_the_scale_times_y(unit: str, luminous_unit: str) -> None:
-    found = photometry((1, 2, 3), unit=unit, unit_flux=(2, 2, 2), cd_per_unit=100)
+    amounts = photometry((1, 2, 3), unit=unit, unit_flux=(2, 2, 2), cd_per_unit=100)
     y = 0.2126 + 2 * 0.7152 + 3 * 0.0722
-    assert found.y == pytest.approx(y)
-    assert found.flux_w == (2, 4, 6)
-    assert found.luminous == pytest.approx(100 * y)
-    assert found.luminous_unit == luminous_unit
-    assert found.flux_lm == pytest.approx(200 * y)
+    assert amounts.y == pytest.approx(y)
+    assert amounts.flux_w == (2, 4, 6)
+    assert amounts.luminous == pytest.approx(100 * y)
+    assert amounts.luminous_unit == luminous_unit
+    assert amounts.flux_lm == pytest.approx(200 * y)
 
 
 def test_without_a_scale_there_are_no_units() -> None:
-    found = photometry((1, 1, 1), unit=RADIANCE, unit_flux=(1, 1, 1))
-    assert (found.luminous, found.luminous_unit, found.flux_lm) == (None, "", None)
-    assert found.amounts == ("", "")
-    assert set(found.fields()) == {"y", "hex", "cct_k", "duv", "flux_w", "flux_y"}
-    assert found.color == "#ffffff 6504 K"
+    amounts = photometry((1, 1, 1), unit=RADIANCE, unit_flux=(1, 1, 1))
+    assert (amounts.luminous, amounts.luminous_unit, amounts.flux_lm) == (None, "", None)
+    assert amounts.amounts == ("", "")
+    assert set(amounts.fields()) == {"y", "hex", "cct_k", "duv", "flux_w", "flux_y"}
+    assert amounts.color == "#ffffff 6504 K"
 
 
 def test_a_light_that_is_off_has_no_colour() -> None:
-    found = photometry((0, 0, 0), unit=RADIANCE, unit_flux=(1, 1, 1), cd_per_unit=5)
-    assert (found.hex, found.kelvin, found.duv, found.color) == (None, None, None, "")
-    assert (found.luminous, found.flux_lm) == (0, 0)
+    amounts = photometry((0, 0, 0), unit=RADIANCE, unit_flux=(1, 1, 1), cd_per_unit=5)
+    assert (amounts.hex, amounts.kelvin, amounts.duv, amounts.color) == (None, None, None, "")
+    assert (amounts.luminous, amounts.flux_lm) == (0, 0)
 
 
 def test_a_saturated_light_has_a_colour_and_no_temperature() -> None:
@@ -71,13 +71,15 @@ def test_a_saturated_light_has_a_colour_and_no_temperature() -> None:
 
 
 def test_a_multiple_has_the_colour_of_its_flux_if_it_is_known() -> None:
-    known = photometry((2, 2, 2), unit="× as authored", unit_flux=(3, 3, 3), cd_per_unit=10)
-    assert known.color == "#ffffff 6504 K"
-    assert (known.luminous, known.flux_lm) == (None, pytest.approx(60))
+    amounts = photometry((2, 2, 2), unit="× as authored", unit_flux=(3, 3, 3), cd_per_unit=10)
+    assert amounts.color == "#ffffff 6504 K"
+    assert (amounts.luminous, amounts.flux_lm) == (None, pytest.approx(60))
     image = photometry((2, 2, 2), unit="× as authored", cd_per_unit=10)
     assert image.fields() == {"y": pytest.approx(2)}
 
 
 def test_amounts_are_easy_to_read() -> None:
-    found = photometry((1, 1, 1), unit=RADIANCE, unit_flux=(0.001, 0.001, 0.001), cd_per_unit=14800)
-    assert found.amounts == ("14,800 cd/m²", "14.8 lm")
+    amounts = photometry(
+        (1, 1, 1), unit=RADIANCE, unit_flux=(0.001, 0.001, 0.001), cd_per_unit=14800
+    )
+    assert amounts.amounts == ("14,800 cd/m²", "14.8 lm")

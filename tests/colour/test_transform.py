@@ -49,9 +49,11 @@ def test_encoding_undoes_decoding(name: str, display: Any):
     transform = ViewTransform(name)
     linear = transform.decode(display)
     inset = linear @ AGX_INSET.T
-    shown = np.ones(2, bool) if name != "agx" else (inset >= 2.0**-12.47).all(axis=-1)
+    is_in_gamut = np.ones(2, bool) if name != "agx" else (inset >= 2.0**-12.47).all(axis=-1)
     # The two halves of sRGB miss each other by 3e-8 in the standard's own numbers.
-    np.testing.assert_allclose(transform.encode(linear)[shown], display[shown], rtol=0, atol=2e-7)
+    np.testing.assert_allclose(
+        transform.encode(linear)[is_in_gamut], display[is_in_gamut], rtol=0, atol=2e-7
+    )
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
@@ -99,8 +101,8 @@ def test_where_the_display_clips_nothing_changes(name: str):
 @given(stops=STOPS, name=st.sampled_from(BUILT_IN))
 def test_stops_scale_light(stops: float, name: str):
     linear = _within(ViewTransform(name), size=20)
-    shown = ViewTransform(name, stops).encode(linear / 2**stops)
-    np.testing.assert_allclose(shown, ViewTransform(name).encode(linear), rtol=1e-12)
+    display = ViewTransform(name, stops).encode(linear / 2**stops)
+    np.testing.assert_allclose(display, ViewTransform(name).encode(linear), rtol=1e-12)
 
 
 def test_srgb_is_the_displays_own_curve():
@@ -138,8 +140,8 @@ def test_agx_at_its_pivot():
 )
 def test_filmic_is_narkowiczs_curve(light: float, toned: float):
     # x (2.51 x + 0.03) / (x (2.43 x + 0.59) + 0.14) by hand, to four digits.
-    shown = decode_display(ViewTransform("filmic").encode(np.full(3, light)))
-    np.testing.assert_allclose(shown, toned, atol=6e-5)
+    display = decode_display(ViewTransform("filmic").encode(np.full(3, light)))
+    np.testing.assert_allclose(display, toned, atol=6e-5)
 
 
 @pytest.mark.parametrize("name", BUILT_IN)

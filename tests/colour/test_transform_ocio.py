@@ -36,13 +36,13 @@ def test_the_default_view_by_name():
 def test_encoding_is_the_librarys_own():
     config = ocio.Config.CreateFromBuiltinConfig("ocio://default")
     name = config.getDefaultView(DISPLAY)
-    shown = ocio.DisplayViewTransform("Linear Rec.709 (sRGB)", DISPLAY, name)
-    cpu = config.getProcessor(shown).getDefaultCPUProcessor()
+    view = ocio.DisplayViewTransform("Linear Rec.709 (sRGB)", DISPLAY, name)
+    cpu = config.getProcessor(view).getDefaultCPUProcessor()
     colours = _colours()
     expected = [cpu.applyRGB((2 * c).tolist()) for c in colours]
-    got = ViewTransform(f"ocio:{DISPLAY}/{name}", 1.0).encode(colours)
+    actual = ViewTransform(f"ocio:{DISPLAY}/{name}", 1.0).encode(colours)
     # Pixel by pixel and many at once, the library rounds in another order.
-    np.testing.assert_allclose(got, expected, rtol=0, atol=1e-5)
+    np.testing.assert_allclose(actual, expected, rtol=0, atol=1e-5)
 
 
 def test_the_plain_view_of_srgb_is_srgb():
@@ -74,9 +74,9 @@ def _own(path: Path, transform: Any) -> None:
     config = ocio.Config()
     config.setMajorVersion(2)
     config.addColorSpace(ocio.ColorSpace(name="lin_rec709"))
-    shown = ocio.ColorSpace(name="Shown")
-    shown.setTransform(transform, ocio.COLORSPACE_DIR_FROM_REFERENCE)
-    config.addColorSpace(shown)
+    own_space = ocio.ColorSpace(name="Shown")
+    own_space.setTransform(transform, ocio.COLORSPACE_DIR_FROM_REFERENCE)
+    config.addColorSpace(own_space)
     config.setRole("scene_linear", "lin_rec709")
     config.setRole("default", "lin_rec709")
     config.addDisplayView("Screen", "Film/dark", "Shown")

@@ -16,8 +16,8 @@ def test_all_whites_are_on_the_locus(low: float, high: float, duv: float) -> Non
     places = np.linspace(0, whites.last, 501)
     colors = whites.at(places)
     np.testing.assert_allclose(luminance(colors), 1, rtol=1e-12)
-    found = [cct_and_duv(rgb) for rgb in colors]
-    kelvins, duvs = np.array([x for x in found if x is not None]).T
+    temperatures = [cct_and_duv(rgb) for rgb in colors]
+    kelvins, duvs = np.array([x for x in temperatures if x is not None]).T
     # The curve's distance from the chord of 8 mireds, and a clipped channel at 1901 K.
     assert np.abs(duvs - duv).max() < 3e-5
     assert np.all(np.diff(kelvins) > 0)
@@ -31,10 +31,10 @@ def test_the_nearest_white_is_that_of_its_temperature() -> None:
         for duv in (-0.01, 0.0, 0.004):
             [near] = whites.nearest(2.5 * np.array([kelvin_to_rgb(kelvin, duv)]))
             assert luminance(near) == pytest.approx(2.5)
-            found = cct_and_duv(near)
-            assert found is not None
+            white = cct_and_duv(near)
+            assert white is not None
             # Pieces of 8 mireds are straight, and meet at an angle.
-            assert 1e6 / found[0] == pytest.approx(1e6 / np.clip(kelvin, 2200, 9000), abs=2)
+            assert 1e6 / white[0] == pytest.approx(1e6 / np.clip(kelvin, 2200, 9000), abs=2)
             if 2200 <= kelvin <= 9000:
                 [green] = whites.greener(np.array([kelvin_to_rgb(kelvin, duv)]))
                 assert green == pytest.approx(duv, abs=2e-5)

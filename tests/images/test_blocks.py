@@ -15,8 +15,10 @@ def test_sums_are_those_of_each_block_and_of_what_is_left_over(
     sums = block_sums(image, factor)
     for row, column in np.ndindex(sums.shape[:2]):
         rows, columns = (slice(factor * k, factor * (k + 1)) for k in (row, column))
-        its = image[rows, columns].sum(axis=(0, 1), dtype=np.float64)
-        np.testing.assert_allclose(sums[row, column], its, rtol=1e-14)  # float64, in another order
+        block = image[rows, columns].sum(axis=(0, 1), dtype=np.float64)
+        np.testing.assert_allclose(
+            sums[row, column], block, rtol=1e-14
+        )  # float64, in another order
     np.testing.assert_allclose(sums.sum(), image.sum(dtype=np.float64), rtol=1e-13)
 
 

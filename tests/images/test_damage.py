@@ -123,14 +123,16 @@ def test_what_has_checksums(tmp_path: Path):
 def test_what_has_none(tmp_path: Path):
     results = _outcomes(_unchecked_files(), tmp_path, 120, "agreed", "alone")
     # Few are such that the other reader has no opinion.
-    assert sum(said == "alone" for _, said in results) < len(results) / 50
+    assert sum(outcome == "alone" for _, outcome in results) < len(results) / 50
 
 
 def test_exr(tmp_path: Path):
     results = _outcomes(_exrs(), tmp_path, 100, "agreed", "alone")
     # The other reader has none of luminance and chroma.
-    alone = [case for case, said in results if said == "alone" and case.file != "chroma.exr"]
-    assert len(alone) < len(results) / 50
+    unharmed = [
+        case for case, outcome in results if outcome == "alone" and case.file != "chroma.exr"
+    ]
+    assert len(unharmed) < len(results) / 50
 
 
 def test_masks(tmp_path: Path):
@@ -162,7 +164,7 @@ def test_estimates(tmp_path: Path):
     ]
     results = outcomes("estimate", {"predicted.exr": content}, cases, tmp_path)
     assert wrong_outcomes(results) == []
-    assert [said for case, said in results if case.done.startswith("no ")] == ["refused"] * 2
+    assert [outcome for case, outcome in results if case.done.startswith("no ")] == ["refused"] * 2
 
 
 @pytest.mark.parametrize("name", ["is", "a", "damaged", "it"])
@@ -184,24 +186,24 @@ def test_names_in_a_file_that_a_terminal_would_obey(tmp_path: Path):
     plain = {"type": OpenEXR.scanlineimage}
     (tmp_path / "a.exr").write_bytes(_exr((plain, {"\x1b[2J": FLOATS[..., 0].copy()}, "x")))
     for read in (read_picture, read_mask):
-        with pytest.raises(ImageError, match=r"a\.exr .*it has \\x1b") as caught:
+        with pytest.raises(ImageError, match=r"a\.exr .*it has \\x1b") as refusal:
             read(tmp_path / "a.exr")
-        assert str(caught.value).isprintable()
+        assert str(refusal.value).isprintable()
 
 
-def _declare_size(content: bytes, at: int, order: Any, width: int, height: int) -> bytes:
+def _declare_size(content: bytes, position: int, order: Any, width: int, height: int) -> bytes:
     size = width.to_bytes(4, order) + height.to_bytes(4, order)
-    return content[:at] + size + content[at + 8 :]
+    return content[:position] + size + content[position + 8 :]
 
 
 @pytest.mark.parametrize(("width", "height"), [(2**31 - 1, 1), (60_000, 60_000), (2**20, 2**20)])
 def test_sizes_that_no_picture_has(tmp_path: Path, width: int, height: int):
-    whole = png(BYTES)
-    bent = _declare_size(whole, 16, "big", width, height)
-    checksum = zlib.crc32(bent[12:29]).to_bytes(4, "big")
+    png_content = png(BYTES)
+    resized = _declare_size(png_content, 16, "big", width, height)
+    checksum = zlib.crc32(resized[12:29]).to_bytes(4, "big")
     photoshop = psd(BYTES)
     files = {
-        "a.png": bent[:29] + checksum + bent[33:],
+        "a.png": resized[:29] + checksum + resized[33:],
         "a.psd": _declare_size(photoshop, 14, "big", height, width),
     }
     for name, content in files.items():

@@ -51,13 +51,13 @@ def _picture() -> tuple[Any, Any, Features]:
 @pytest.mark.parametrize("guided", [True, False])
 def test_it_is_closer_to_the_truth(method: str, guided: bool, scale: float):
     truth, noisy, features = _picture()
-    shown = denoised(scale * noisy, features if guided else None) / scale
-    assert shown.dtype == np.float32
-    raw, left = (np.square(image - truth).mean() for image in (noisy, shown))
+    denoised_image = denoised(scale * noisy, features if guided else None) / scale
+    assert denoised_image.dtype == np.float32
+    raw, left = (np.square(image - truth).mean() for image in (noisy, denoised_image))
     # A mean over n independent pixels has 1/n of the energy of the noise. Some thirty are alike
     # in a window of 7x7; a quarter is what edges and a missing guide may take of that.
     assert left < raw / 4
-    assert shown.mean() == pytest.approx(truth.mean(), rel=0.05)
+    assert denoised_image.mean() == pytest.approx(truth.mean(), rel=0.05)
 
 
 def test_features_of_another_size_are_not_used(method: str):
@@ -79,15 +79,15 @@ def test_borders_are_as_good_as_the_rest():
     flat = np.full((180, 320, 3), 0.5, np.float32)
     normal = np.broadcast_to(np.float32([0, 0, 1]), flat.shape)
     for quality in ("fast", "high"):
-        shown = denoised(flat, Features(flat, normal), quality=quality)
-        np.testing.assert_allclose(shown, flat, rtol=0.01)
+        denoised_image = denoised(flat, Features(flat, normal), quality=quality)
+        np.testing.assert_allclose(denoised_image, flat, rtol=0.01)
 
 
 def test_it_says_how(method: str):
     _, _, features = _picture()
-    said = denoiser_text(features, raw="a.exr")[DENOISED_KEY]
-    assert said.startswith(method)
-    assert said.endswith(" with albedo and normals; raw: a.exr")
+    text = denoiser_text(features, raw="a.exr")[DENOISED_KEY]
+    assert text.startswith(method)
+    assert text.endswith(" with albedo and normals; raw: a.exr")
     assert "albedo" not in denoiser_text(None, raw="a.exr")[DENOISED_KEY]
 
 
@@ -95,9 +95,12 @@ def test_features_are_what_surfaces_are(tmp_path: Path):
     scene = load_scene(write_room(tmp_path))
     features, surfaces = render_features(scene), render_surfaces(scene)
     # Other samples of the same pixels: they differ where an edge runs through one.
-    for mine, its in ((features.albedo, surfaces.albedo), (features.normal, surfaces.normal)):
-        assert np.median(np.abs(mine - its)) < 1e-3  # half floats
-        assert np.abs(mine - its).mean() < 0.05
+    for actual, expected in (
+        (features.albedo, surfaces.albedo),
+        (features.normal, surfaces.normal),
+    ):
+        assert np.median(np.abs(actual - expected)) < 1e-3  # half floats
+        assert np.abs(actual - expected).mean() < 0.05
 
 
 def test_a_render_is_closer_to_one_of_many_samples(tmp_path: Path):
@@ -118,10 +121,10 @@ def test_a_render_is_closer_to_one_of_many_samples(tmp_path: Path):
 def test_without_the_library_one_line_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(sys.modules, "pyoidn", None)
     room = write_room(tmp_path)
-    made = run(tmp_path, "template", room, "--spp", 4)
-    assert made.returncode == 0
-    assert made.stderr.count("Open Image Denoise is not installed") == 1
-    assert MISSING_REMARK[:40] in made.stderr
+    completed = run(tmp_path, "template", room, "--spp", 4)
+    assert completed.returncode == 0
+    assert completed.stderr.count("Open Image Denoise is not installed") == 1
+    assert MISSING_REMARK[:40] in completed.stderr
     with Image.open(tmp_path / "template" / "template.png") as file:
         assert file.text[DENOISED_KEY].startswith("joint bilateral filter")
     succeed(tmp_path, "solve", room, "template/template.exr", "--no-template", "--spp", 4)

@@ -64,8 +64,8 @@ def test_box_mean_agrees_with_scipy(seed: int, height: int, width: int, radius: 
     values = np.random.default_rng(seed).random((height, width, 2))
     size = (2 * radius + 1, 2 * radius + 1, 1)
     # A window that is cut off at the border: the mean of what is inside.
-    inside = uniform_filter(np.ones_like(values), size, mode="constant")
-    expected = uniform_filter(values, size, mode="constant") / inside
+    counts = uniform_filter(np.ones_like(values), size, mode="constant")
+    expected = uniform_filter(values, size, mode="constant") / counts
     # float64, and both sum up running.
     np.testing.assert_allclose(box_mean(values, radius), expected, rtol=1e-10)
 
@@ -85,10 +85,10 @@ def test_there_and_back(tmp_path: Path):
     rng = np.random.default_rng(0)
     image, half = rng.random((2, 5, 7, 3)).astype(np.float32)
     write_estimate(tmp_path / "a.exr", Estimate(image, half), {"lightpaint.seed": "7"})
-    back, _ = read_estimate(tmp_path / "a.exr")
-    np.testing.assert_array_equal(back.image, image)
-    np.testing.assert_array_equal(back.half_difference, half)
-    assert back.image.dtype == back.half_difference.dtype == np.float32
+    reread, _ = read_estimate(tmp_path / "a.exr")
+    np.testing.assert_array_equal(reread.image, image)
+    np.testing.assert_array_equal(reread.half_difference, half)
+    assert reread.image.dtype == reread.half_difference.dtype == np.float32
 
 
 def test_an_image_that_knows_nothing_of_its_noise(tmp_path: Path):

@@ -46,16 +46,16 @@ def _parts(draw: Any) -> list[ExrPart]:
 def test_there_and_back_is_exact(tmp_path_factory: pytest.TempPathFactory, parts: list[ExrPart]):
     path = tmp_path_factory.getbasetemp() / "parts.exr"
     write_parts(path, parts)
-    back = read_parts(path)
-    assert [p.name for p in back] == [p.name for p in parts]
-    for got, want in zip(back, parts, strict=True):
-        assert got.size == want.size
-        assert got.attributes.items() >= want.attributes.items()
-        assert set(got.channels) == set(want.channels)
-        for name, pixels in want.channels.items():
-            assert got.channels[name].dtype == pixels.dtype
+    reread = read_parts(path)
+    assert [p.name for p in reread] == [p.name for p in parts]
+    for actual, expected in zip(reread, parts, strict=True):
+        assert actual.size == expected.size
+        assert actual.attributes.items() >= expected.attributes.items()
+        assert set(actual.channels) == set(expected.channels)
+        for name, pixels in expected.channels.items():
+            assert actual.channels[name].dtype == pixels.dtype
             # To the bit: NaN and the sign of zero are part of it.
-            assert got.channels[name].tobytes() == pixels.tobytes()
+            assert actual.channels[name].tobytes() == pixels.tobytes()
 
 
 def test_other_programs_read_what_we_write(tmp_path: Path):
@@ -113,7 +113,7 @@ def test_damage_is_an_image_error_or_harmless(tmp_path: Path):
     path = tmp_path / "damaged.exr"
     content = _write_kind(path, "parts")
     rng = np.random.default_rng(0)
-    refused = 0
+    refusals = 0
     for _ in range(150):
         damaged = bytearray(content)
         # Three in four of the places lie in the headers.
@@ -123,8 +123,8 @@ def test_damage_is_an_image_error_or_harmless(tmp_path: Path):
         try:
             read_parts(path)
         except ImageError:
-            refused += 1
-    assert refused > 20
+            refusals += 1
+    assert refusals > 20
 
 
 def test_the_terminal_is_given_back(tmp_path: Path, capfd: pytest.CaptureFixture[str]):

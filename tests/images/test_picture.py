@@ -122,9 +122,9 @@ def test_what_imagemagick_writes(tmp_path: Path, options: str, kind: str):
     pixels = _pixels(np.uint16)
     (tmp_path / "source.png").write_bytes(png(pixels))
     *flags, target = options.split()
-    out = f"{target}:{tmp_path / 'painted'}"
+    output = f"{target}:{tmp_path / 'painted'}"
     subprocess.run(
-        [_magick() or "", str(tmp_path / "source.png"), "-depth", "16", *flags, out],
+        [_magick() or "", str(tmp_path / "source.png"), "-depth", "16", *flags, output],
         check=True,
     )
     _assert_is(read_picture(tmp_path / "painted"), pixels, kind)
@@ -213,19 +213,19 @@ def test_views(tmp_path: Path, transform: ViewTransform):
     np.testing.assert_allclose(picture.image, expected, rtol=2e-4, atol=1e-6)
     assert picture.transform == transform
     # What a PNG says of itself holds unless another is given.
-    said = (b"tEXt", b"lightpaint.view\0" + f"{transform.name} {transform.stops!r}".encode())
-    own = _read(tmp_path, png(pixels, said))
+    chunk = (b"tEXt", b"lightpaint.view\0" + f"{transform.name} {transform.stops!r}".encode())
+    own = _read(tmp_path, png(pixels, chunk))
     np.testing.assert_array_equal(own.image, picture.image)
     assert own.transform == transform
     assert (
-        _read(tmp_path, png(pixels, said), transform=ViewTransform()).transform == ViewTransform()
+        _read(tmp_path, png(pixels, chunk), transform=ViewTransform()).transform == ViewTransform()
     )
 
 
-@pytest.mark.parametrize("said", [b"nothing", b"agx much", b"rec709 1.0", b"srgb nan", b" "])
-def test_a_png_that_names_no_view(tmp_path: Path, said: bytes):
+@pytest.mark.parametrize("chunk", [b"nothing", b"agx much", b"rec709 1.0", b"srgb nan", b" "])
+def test_a_png_that_names_no_view(tmp_path: Path, chunk: bytes):
     with pytest.raises(ImageError, match="painted"):
-        _read(tmp_path, png(_pixels(), (b"tEXt", b"lightpaint.view\0" + said)))
+        _read(tmp_path, png(_pixels(), (b"tEXt", b"lightpaint.view\0" + chunk)))
 
 
 # --- TIFF
@@ -324,12 +324,12 @@ def test_grey_tiffs_of_both_polarities(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("photometric", "channels", "named"),
+    ("photometric", "channels", "kind_name"),
     [("separated", 4, "holds CMYK"), ("cielab", 3, "holds Lab")],
 )
-def test_other_colours(tmp_path: Path, photometric: Any, channels: int, named: str):
+def test_other_colours(tmp_path: Path, photometric: Any, channels: int, kind_name: str):
     tifffile.imwrite(tmp_path / "a.tif", _pixels(channels=channels), photometric=photometric)
-    with pytest.raises(ImageError, match=rf"a\.tif {named}: convert it to RGB"):
+    with pytest.raises(ImageError, match=rf"a\.tif {kind_name}: convert it to RGB"):
         read_picture(tmp_path / "a.tif")
 
 
@@ -368,9 +368,9 @@ def test_jpeg(tmp_path: Path, options: Any):
     with Image.open(tmp_path / "a.jpg") as file:
         decoded = np.asarray(file)
     # Two builds of one library may round apart by a code.
-    shown = ViewTransform().encode(picture.image) * 255
-    np.testing.assert_allclose(shown, decoded, atol=1.01)
-    np.testing.assert_array_equal(picture.saturated, np.round(shown) >= 253)
+    display = ViewTransform().encode(picture.image) * 255
+    np.testing.assert_allclose(display, decoded, atol=1.01)
+    np.testing.assert_array_equal(picture.saturated, np.round(display) >= 253)
 
 
 @pytest.mark.parametrize("orientation", range(1, 9))
@@ -386,9 +386,9 @@ def test_pictures_are_upright(tmp_path: Path, orientation: int, suffix: str):
     )
     with Image.open(path) as file:
         upright = np.asarray(ImageOps.exif_transpose(file))
-    shown = ViewTransform().encode(read_picture(path).image) * 255
-    assert shown.shape == upright.shape
-    np.testing.assert_allclose(shown, upright, atol=1.01)
+    display = ViewTransform().encode(read_picture(path).image) * 255
+    assert display.shape == upright.shape
+    np.testing.assert_allclose(display, upright, atol=1.01)
 
 
 def test_jpeg_of_cmyk_is_refused(tmp_path: Path):
@@ -465,7 +465,7 @@ def test_masks_are_numbers(tmp_path: Path, dtype: Any):
 
 
 @pytest.mark.parametrize(
-    ("content", "named"),
+    ("content", "kind_name"),
     [
         (b"#?RADIANCE\n", "a Radiance HDR file"),
         (b"RIFF1234WEBPVP8 ", "a WebP file"),
@@ -474,8 +474,8 @@ def test_masks_are_numbers(tmp_path: Path, dtype: Any):
         (b"%PDF-1.7", "not a picture that can be read"),
     ],
 )
-def test_other_files(tmp_path: Path, content: bytes, named: str):
-    with pytest.raises(ImageError, match=rf"painted is {named}.*: export it as OpenEXR"):
+def test_other_files(tmp_path: Path, content: bytes, kind_name: str):
+    with pytest.raises(ImageError, match=rf"painted is {kind_name}.*: export it as OpenEXR"):
         _read(tmp_path, content)
 
 
@@ -527,7 +527,7 @@ def test_a_merged_picture_of_nothing_is_not_unpacked(
         archive.writestr("mimetype", b"application/x-krita", zipfile.ZIP_STORED)
         archive.writestr("mergedimage.png", head + bytes(2**26))
     unpacked = []
-    monkeypatch.setattr(openraster, "_copy", lambda *given: unpacked.append(given))
+    monkeypatch.setattr(openraster, "_copy", lambda *arguments: unpacked.append(arguments))
     with pytest.raises(ImageError, match=r"that is not a PNG|longer than it can be"):
         _read(tmp_path, buffer.getvalue())
     assert unpacked == []

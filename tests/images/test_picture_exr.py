@@ -85,8 +85,10 @@ def test_layers_by_name(tmp_path: Path):
 def test_layers_of_krita_are_not_taken_for_a_picture(tmp_path: Path):
     """Krita 5.1.5 leaves the background without a prefix, and the paint beside it."""
     background, paint = _rgb(seed=1), _rgb(seed=2)
-    both = _name_channels(background) | _name_channels(paint, "paint.")
-    path = _exr(tmp_path / "a.exr", both, krita_layers_info="<!DOCTYPE krita-extra-layers-info>")
+    channels = _name_channels(background) | _name_channels(paint, "paint.")
+    path = _exr(
+        tmp_path / "a.exr", channels, krita_layers_info="<!DOCTYPE krita-extra-layers-info>"
+    )
     with pytest.raises(
         ImageError, match=r"2 layers of Krita \(one without a name, paint\).*flatten"
     ):
@@ -166,12 +168,12 @@ def test_chroma_between_its_samples(tmp_path: Path):
 
 def test_the_librarys_own_reader_agrees_on_chroma():
     """Both files are the C++ library's (RgbaOutputFile, WRITE_YC; RgbaInputFile)."""
-    mine = read_picture(DATA / "luminance_chroma.exr").image
-    theirs = read_picture(DATA / "luminance_chroma_as_rgb.exr").image
+    image = read_picture(DATA / "luminance_chroma.exr").image
+    reference = read_picture(DATA / "luminance_chroma_as_rgb.exr").image
     # The library computes in half. In the last row and column, past the last chroma, it pads
     # otherwise.
-    np.testing.assert_allclose(mine[:-1, :-1], theirs[:-1, :-1], rtol=0, atol=1e-3)
-    np.testing.assert_allclose(mine, theirs, rtol=0, atol=2e-2)
+    np.testing.assert_allclose(image[:-1, :-1], reference[:-1, :-1], rtol=0, atol=1e-3)
+    np.testing.assert_allclose(image, reference, rtol=0, atol=2e-2)
 
 
 def test_xyz_is_not_adapted(tmp_path: Path):

@@ -53,34 +53,34 @@ def room(rng: np.random.Generator) -> Features:
         axis=-1,
     )
     normal = np.where(on_floor[..., None], np.float32([0, -1, 0]), np.float32([0, 0, -1]))
-    off = np.stack([(x - 15) / 9, (y - 20) / 9], axis=-1)
-    within = np.square(off).sum(axis=-1) < 1
-    depth = -np.sqrt(np.maximum(1 - np.square(off).sum(axis=-1), 0))
-    ball = np.concatenate([off, depth[..., None]], axis=-1)
+    slopes = np.stack([(x - 15) / 9, (y - 20) / 9], axis=-1)
+    within = np.square(slopes).sum(axis=-1) < 1
+    depth = -np.sqrt(np.maximum(1 - np.square(slopes).sum(axis=-1), 0))
+    ball = np.concatenate([slopes, depth[..., None]], axis=-1)
     position = np.where(within[..., None], [15, 20, -30] + 9 * ball, position)
     normal = np.where(within[..., None], ball, normal)
     normal[:4] = position[:4] = 0
     albedo = rng.random((*SIZE, 3))
     position += rng.normal(size=position.shape) * 0.05
-    return Features(*(its.astype(np.float32) for its in (albedo, normal, position)))
+    return Features(*(plane.astype(np.float32) for plane in (albedo, normal, position)))
 
 
 def filter_pixelwise(features: Features, image: Any, radius: int) -> Any:
     """Filter a picture pixel by pixel, in double precision, as the words of the module say."""
     albedo, normal, position = (
-        its.astype(np.float64)
-        for its in (np.maximum(features.albedo, DARKEST), features.normal, features.position)
+        guide.astype(np.float64)
+        for guide in (np.maximum(features.albedo, DARKEST), features.normal, features.position)
     )
-    (height, width), seen = features.size, normal.any(axis=-1)
+    (height, width), is_surface = features.size, normal.any(axis=-1)
     near = [(-1, 0), (1, 0), (0, -1), (0, 1)]
 
-    def inside(y: int, x: int) -> bool:
+    def is_inside(y: int, x: int) -> bool:
         return 0 <= y < height and 0 <= x < width
 
     length = np.full((height, width), np.inf)
     for y, x in np.ndindex(height, width):
-        for q in ((y + dy, x + dx) for dy, dx in near if inside(y + dy, x + dx)):
-            if seen[y, x] and seen[q]:
+        for q in ((y + dy, x + dx) for dy, dx in near if is_inside(y + dy, x + dx)):
+            if is_surface[y, x] and is_surface[q]:
                 length[y, x] = min(length[y, x], np.linalg.norm(position[q] - position[y, x]))
     least = np.array(
         [
@@ -88,25 +88,25 @@ def filter_pixelwise(features: Features, image: Any, radius: int) -> Any:
             for y in range(height)
         ]
     )
-    made = np.zeros(image.shape)
+    filtered = np.zeros(image.shape)
     for y, x in np.ndindex(height, width):
         total, light = 0.0, np.zeros(3)
         for dy, dx in np.ndindex(2 * radius + 1, 2 * radius + 1):
-            q, apart = (y + dy - radius, x + dx - radius), np.hypot(dy - radius, dx - radius)
-            if not inside(*q):
+            q, distance = (y + dy - radius, x + dx - radius), np.hypot(dy - radius, dx - radius)
+            if not is_inside(*q):
                 continue
             weight = 1.0
-            if apart:
-                between = position[q] - position[y, x]
-                off = abs(between @ normal[y, x]) + abs(between @ normal[q])
-                off *= (1 / least[y, x] + 1 / least[q]) / 2
-                weight = np.exp(-off / (NEAR_PLANE * (1 + BEND * apart)))
+            if distance:
+                offset = position[q] - position[y, x]
+                plane_distance = abs(offset @ normal[y, x]) + abs(offset @ normal[q])
+                plane_distance *= (1 / least[y, x] + 1 / least[q]) / 2
+                weight = np.exp(-plane_distance / (NEAR_PLANE * (1 + BEND * distance)))
                 weight *= max(normal[y, x] @ normal[q], 0) ** (2**SQUARINGS)
-                weight *= np.exp(-((apart / (radius / 2)) ** 2) / 2)
+                weight *= np.exp(-((distance / (radius / 2)) ** 2) / 2)
             total += weight
             light += weight * image[q] / albedo[q]
-        made[y, x] = light / total * albedo[y, x]
-    return made
+        filtered[y, x] = light / total * albedo[y, x]
+    return filtered
 
 
 @pytest.mark.parametrize("radius", [2, RADIUS])
@@ -129,8 +129,8 @@ def test_it_is_linear(rng: np.random.Generator):
 def test_even_light_stays_as_it_is_on_any_surface(rng: np.random.Generator):
     """Whatever its albedo: a texture is not blurred."""
     features = room(rng)
-    lit = 3 * np.maximum(features.albedo, DARKEST)
-    np.testing.assert_allclose(SurfaceFilter(features)(lit), lit, rtol=1e-5)
+    lit_image = 3 * np.maximum(features.albedo, DARKEST)
+    np.testing.assert_allclose(SurfaceFilter(features)(lit_image), lit_image, rtol=1e-5)
 
 
 def test_the_unit_of_length_does_not_matter(rng: np.random.Generator):
@@ -168,16 +168,16 @@ def step() -> tuple[Features, Any]:
     features, (_, x) = wall(), grid(*SIZE)
     before = x < 20
     assert features.position is not None
-    moved = features.position + before[..., None] * np.float32([0, 0, 40])
-    return Features(features.albedo, features.normal, moved), before
+    moved_position = features.position + before[..., None] * np.float32([0, 0, 40])
+    return Features(features.albedo, features.normal, moved_position), before
 
 
 def sky() -> tuple[Features, Any]:
     """A wall whose upper end borders on nothing."""
     features, (y, _) = wall(), grid(*SIZE)
-    seen = (y >= 20)[..., None]
+    is_sky = (y >= 20)[..., None]
     assert features.position is not None
-    return Features(features.albedo, features.normal * seen, features.position * seen), y < 20
+    return Features(features.albedo, features.normal * is_sky, features.position * is_sky), y < 20
 
 
 @pytest.mark.parametrize("make", [corner, step, sky])

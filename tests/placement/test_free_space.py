@@ -52,8 +52,8 @@ def test_places_are_in_the_open_at_any_scale(tmp_path: Path, scale: float):
 
 def test_the_same_seed_gives_the_same_places(tmp_path: Path):
     path = write_room(tmp_path)
-    first, again, other = (_space(path, seed)[2].places for seed in (0, 0, 1))
-    np.testing.assert_array_equal(first, again)
+    first, second, other = (_space(path, seed)[2].places for seed in (0, 0, 1))
+    np.testing.assert_array_equal(first, second)
     assert first.shape != other.shape or not np.array_equal(first, other)
 
 
@@ -79,9 +79,9 @@ def test_nothing_in_view_is_no_place(tmp_path: Path):
 def test_where_places_are_in_the_picture(tmp_path: Path):
     scene, loaded, _ = _space(write_room(tmp_path))
     # What the camera looks at is in the middle; what is behind it is not in the picture.
-    middle, behind = pixels_of(scene, loaded, np.array([[0, 0.8, 0], [0, 1, 5.0]]))
+    middle, behind_camera = pixels_of(scene, loaded, np.array([[0, 0.8, 0], [0, 1, 5.0]]))
     assert middle == pytest.approx((0.5, 0.5), abs=1e-3)
-    assert behind is None
+    assert behind_camera is None
     above, right = pixels_of(scene, loaded, np.array([[0, 1.2, 0], [0.3, 0.8, 0]]))
     assert above is not None
     assert right is not None
@@ -97,9 +97,9 @@ def test_far_apart(seed: int, count: int, there: int):
     if len(chosen) < 2 or len(chosen) == there:
         return
     # No place that was left out is farther from the chosen ones than these are from each other.
-    between = np.linalg.norm(chosen[:, None] - chosen, axis=2) + 9 * np.eye(len(chosen))
+    distances = np.linalg.norm(chosen[:, None] - chosen, axis=2) + 9 * np.eye(len(chosen))
     to_chosen = np.linalg.norm(places[:, None] - chosen, axis=2).min(axis=1)
-    assert to_chosen.max() <= between.min() + 1e-12
+    assert to_chosen.max() <= distances.min() + 1e-12
 
 
 def test_far_from_what_is_taken():

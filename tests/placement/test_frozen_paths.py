@@ -38,8 +38,8 @@ def sites(scene: Scene) -> list[Site]:
     return [scene.light(name).members[0].site for name in SEARCHED]
 
 
-def along_paths(scene: Scene, work: Callable[[FrozenPaths], Any], **how: Any) -> Any:
-    return scene.while_loaded(lambda loaded: work(FrozenPaths(scene, loaded, **how)))
+def along_paths(scene: Scene, work: Callable[[FrozenPaths], Any], **options: Any) -> Any:
+    return scene.while_loaded(lambda loaded: work(FrozenPaths(scene, loaded, **options)))
 
 
 def test_columns_are_the_planes_of_a_basis(room: Scene) -> None:
@@ -60,9 +60,9 @@ def test_vertices_of_all_paths_share_kernels(room: Scene) -> None:
     one run of fifteen, with variables in another order.
     """
     command = [sys.executable, str(COUNT_KERNELS), str(room.path), *SEARCHED]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0, done.stderr
-    assert all(1 <= count < 3 for count in json.loads(done.stdout))
+    completed = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert completed.returncode == 0, completed.stderr
+    assert all(1 <= count < 3 for count in json.loads(completed.stdout))
 
 
 def test_a_search_refines_on_a_larger_film_than_it_compares_on(room: Scene) -> None:
@@ -70,7 +70,7 @@ def test_a_search_refines_on_a_larger_film_than_it_compares_on(room: Scene) -> N
 
     def columns(loaded: Any) -> list[Floats]:
         paths = SearchPaths([small], [room], loaded, seed=1)
-        return [at.columns(sites(room)) for at in (paths.compare, paths.refine, paths.judge)]
+        return [film.columns(sites(room)) for film in (paths.compare, paths.refine, paths.judge)]
 
     compared, refined, judged = room.while_loaded(columns)
     assert refined.shape == judged.shape == (3, 2 * 20 * 24, 3)
@@ -86,7 +86,7 @@ def test_half_differences_have_the_power_of_the_noise(room: Scene) -> None:
 
     def columns(loaded: Any) -> list[Floats]:
         paths = SearchPaths([room.reduced("1/2")], [room], loaded, seed=4)
-        return [at.columns(sites(room)) for at in (paths.refine, paths.judge, paths.spread)]
+        return [film.columns(sites(room)) for film in (paths.refine, paths.judge, paths.spread)]
 
     sets = room.while_loaded(columns)
     means, halves = np.split(np.array(sets, dtype=float), 2, axis=2)
@@ -109,32 +109,32 @@ def test_a_filter_along_surfaces_takes_noise_and_no_light(room: Scene) -> None:
     features = render_features(room)
     truth = along_paths(room, lambda p: p.columns(sites(room)), first_hits=100, bounces=100)
 
-    def both(paths: FrozenPaths) -> tuple[Floats, Floats]:
+    def render_pair(paths: FrozenPaths) -> tuple[Floats, Floats]:
         raw = paths.columns(sites(room))
         return raw, paths.filtered_along(features).columns(sites(room))
 
-    raw, filtered = along_paths(room, both, first_hits=100, bounces=2, seed=3)
-    errors = [np.square(its - truth).sum(axis=(1, 2, 3)) for its in (raw, filtered)]
+    raw, filtered = along_paths(room, render_pair, first_hits=100, bounces=2, seed=3)
+    errors = [np.square(image - truth).sum(axis=(1, 2, 3)) for image in (raw, filtered)]
     assert (errors[1] < 0.7 * errors[0]).all()
     assert filtered.mean() == pytest.approx(truth.mean(), rel=0.05)
 
 
 def test_one_place_has_one_column_whatever_came_before(room: Scene) -> None:
-    here = Site(position=(0.2, 1.1, 0.4))
-    there = Site(position=(-0.4, 1.3, 0.1))
+    site = Site(position=(0.2, 1.1, 0.4))
+    other_site = Site(position=(-0.4, 1.3, 0.1))
 
     def columns(paths: FrozenPaths) -> list[Floats]:
         return [
-            paths.columns([here])[0],
-            paths.columns([there, here])[1],
-            paths.columns([there])[0],
+            paths.columns([site])[0],
+            paths.columns([other_site, site])[1],
+            paths.columns([other_site])[0],
         ]
 
     first, second, other = along_paths(room, columns)
     np.testing.assert_array_equal(first, second)
     assert np.abs(first - other).max() > 0
-    again, _, _ = along_paths(room, columns)
-    np.testing.assert_array_equal(first, again)
+    third, _, _ = along_paths(room, columns)
+    np.testing.assert_array_equal(first, third)
     reseeded, _, _ = along_paths(room, columns, seed=1)
     assert np.abs(first - reseeded).max() > 0
 
@@ -153,7 +153,7 @@ def test_light_falls_with_the_square_of_the_distance(room: Scene) -> None:
             for y in (1.0, 1.001)
         ]
         # The cosines are those of a floor at height 0.
-        cosines = [y / np.sqrt(its) for y, its in zip((1.0, 1.001), squares, strict=True)]
+        cosines = [y / np.sqrt(squared) for y, squared in zip((1.0, 1.001), squares, strict=True)]
         is_lit = (near > 0).all(axis=1) & (far > 0).all(axis=1) & (np.abs(points[:, 1]) < 1e-4)
         assert is_lit.sum() > 100
         expected = cosines[0] / squares[0] * squares[1] / cosines[1]
@@ -166,7 +166,7 @@ def test_cones_are_those_of_mitsuba(room: Scene) -> None:
     """A spot's own column is what its cone leaves of one that shines all around."""
     beam = room.light("beam").members[0].site
 
-    def both(paths: FrozenPaths) -> tuple[Floats, Floats]:
+    def render_pair(paths: FrozenPaths) -> tuple[Floats, Floats]:
         vertices = paths.direct
         away = paths.points(vertices).astype(float) - beam.position
         cosine = away @ beam.direction / np.linalg.norm(away, axis=1)
@@ -175,12 +175,12 @@ def test_cones_are_those_of_mitsuba(room: Scene) -> None:
         share = np.clip((beam.cutoff - angle) / (beam.cutoff - beam.beam), 0, 1)
         light = share[:, None] * paths.contributions(vertices, beam)
         pixels, starts = vertices.first_of_pixel
-        made = np.zeros((paths.size[0] * paths.size[1], 3))
-        made[pixels] = np.add.reduceat(light, starts, axis=0)
-        return paths.direct_images([beam])[0], made
+        image = np.zeros((paths.size[0] * paths.size[1], 3))
+        image[pixels] = np.add.reduceat(light, starts, axis=0)
+        return paths.direct_images([beam])[0], image
 
-    whole, made = along_paths(room, both, bounces=0)
-    np.testing.assert_allclose(made, whole, atol=2e-4 * whole.max())  # single precision
+    full_image, image = along_paths(room, render_pair, bounces=0)
+    np.testing.assert_allclose(image, full_image, atol=2e-4 * full_image.max())  # single precision
 
 
 def test_what_paths_cannot_be_frozen_for(room: Scene, tmp_path: Path) -> None:

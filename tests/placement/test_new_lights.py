@@ -33,9 +33,9 @@ def solved(basis: lp.Basis, painted: Scene) -> lp.Solution:
     return lp.solve(basis, lp.Target.of(goal), space="linear", hold=0)
 
 
-def emitter(kind: Any, **more: Any) -> NewEmitter:
+def emitter(kind: Any, **options: Any) -> NewEmitter:
     target = None if kind == "point" else (-0.5, 0.0, -0.2)
-    return NewEmitter("true", kind, lp.Pose(position=THERE, target=target), **more)
+    return NewEmitter("true", kind, lp.Pose(position=THERE, target=target), **options)
 
 
 def place_of(light: lp.AddedLight) -> Any:
@@ -44,14 +44,16 @@ def place_of(light: lp.AddedLight) -> Any:
 
 def test_a_missing_point_is_found_with_its_colour(room: Scene, basis: lp.Basis) -> None:
     painted = room.with_new_emitters([emitter("point", emission=(1.5, 1.0, 0.5))])
-    found = lp.place(room, basis, solved(basis, painted), new=[lp.NewLights("point", name="key")])
-    [light] = found.additions
+    placement = lp.place(
+        room, basis, solved(basis, painted), new=[lp.NewLights("point", name="key")]
+    )
+    [light] = placement.additions
     assert light.name == "key_1"
     assert place_of(light) == pytest.approx(THERE, abs=0.06)
     assert light.emitter.emission == pytest.approx((1.5, 1.0, 0.5), rel=0.15)
     assert light.flux == pytest.approx(tuple(4 * np.pi * x for x in light.emitter.emission))
-    assert found.missed_after < 0.1 * found.missed_before
-    assert [x.name for x in found.scene.emitters][-1] == "key_1"
+    assert placement.missed_after < 0.1 * placement.missed_before
+    assert [x.name for x in placement.scene.emitters][-1] == "key_1"
     assert light.place_error is not None
     assert light.place_error < 0.1
     assert not light.is_hardly_visible
@@ -63,13 +65,13 @@ def test_a_missing_spot_is_found_with_its_cone(room: Scene, basis: lp.Basis) -> 
     true = NewEmitter("true", "spot", pose, emission=(8, 8, 8))
     painted = room.with_new_emitters([true])
     new = lp.NewLights("spot", count=1, freedom=lp.Freedom(line=((-1, 1.2, 0.5), (1, 1.2, 0.5))))
-    found = lp.place(room, basis, solved(basis, painted), new=[new])
-    [light] = found.additions
+    placement = lp.place(room, basis, solved(basis, painted), new=[new])
+    [light] = placement.additions
     assert light.name == "new"
     assert place_of(light) == pytest.approx(THERE, abs=0.06)
     assert np.dot(light.site.direction or (), true.site.direction or ()) > np.cos(np.radians(4))
     assert light.site.cutoff == pytest.approx(28, abs=3)
-    assert found.missed_after < 0.1 * found.missed_before
+    assert placement.missed_after < 0.1 * placement.missed_before
 
 
 def test_a_panel_is_found_by_its_flux(room: Scene, basis: lp.Basis) -> None:
@@ -77,22 +79,22 @@ def test_a_panel_is_found_by_its_flux(room: Scene, basis: lp.Basis) -> None:
     true = NewEmitter("true", "panel", pose, size=(0.4, 0.4), emission=(60, 60, 60))
     painted = room.with_new_emitters([true])
     new = lp.NewLights("panel", count=1, size=(0.2, 0.8))
-    found = lp.place(room, basis, solved(basis, painted), new=[new])
-    [light] = found.additions
-    assert found.missed_after < 0.15 * found.missed_before
+    placement = lp.place(room, basis, solved(basis, painted), new=[new])
+    [light] = placement.additions
+    assert placement.missed_after < 0.15 * placement.missed_before
     # What arrives in the picture is told better than distance and size.
     away = [
         np.linalg.norm(np.subtract(x, (0, 0, 0))) for x in (light.site.position, true.pose.position)
     ]
     assert light.flux[1] / away[0] ** 2 == pytest.approx(60 * 0.16 * np.pi / away[1] ** 2, rel=0.2)
-    [panel] = [x for x in found.scene.emitters if x.name == "new"]
+    [panel] = [x for x in placement.scene.emitters if x.name == "new"]
     assert panel.plugin == "area"
 
 
 def test_nothing_is_added_where_nothing_is_missed(room: Scene, basis: lp.Basis) -> None:
-    found = lp.place(room, basis, solved(basis, room), new=[lp.NewLights("point")])
-    assert found.additions == ()
-    assert found.scene is room
+    placement = lp.place(room, basis, solved(basis, room), new=[lp.NewLights("point")])
+    assert placement.additions == ()
+    assert placement.scene is room
 
 
 @pytest.mark.parametrize(
@@ -109,15 +111,17 @@ def test_nothing_is_added_where_nothing_is_missed(room: Scene, basis: lp.Basis) 
 def test_new_lights_hang_where_they_may(
     room: Scene, basis: lp.Basis, freedom: lp.Freedom, distance: Any
 ) -> None:
-    lit = NewEmitter("true", "point", lp.Pose(position=(-0.4, 1.3, -0.6)), emission=(2, 2, 2))
-    painted = room.with_new_emitters([lit])
+    true_emitter = NewEmitter(
+        "true", "point", lp.Pose(position=(-0.4, 1.3, -0.6)), emission=(2, 2, 2)
+    )
+    painted = room.with_new_emitters([true_emitter])
     new = lp.NewLights("point", count=1, freedom=freedom)
-    found = lp.place(room, basis, solved(basis, painted), new=[new])
-    [light] = found.additions
+    placement = lp.place(room, basis, solved(basis, painted), new=[new])
+    [light] = placement.additions
     place = place_of(light)
     offs = [place[2] + 0.8, np.hypot(place[1] - 1.4, place[2] - 0.5)]
-    off = distance(place) if distance else min(offs, key=abs)
-    assert off == pytest.approx(0, abs=1e-6)
+    deviation = distance(place) if distance else min(offs, key=abs)
+    assert deviation == pytest.approx(0, abs=1e-6)
 
 
 def test_constraints_out_of_view_and_distance_hold(room: Scene, basis: lp.Basis) -> None:
@@ -128,17 +132,17 @@ def test_constraints_out_of_view_and_distance_hold(room: Scene, basis: lp.Basis)
     solution = solved(basis, room.with_new_emitters(others))
     new = lp.NewLights("point", count=2, apart=0.8, in_view=False, name="rim")
     constraints = lp.Constraints.of({"rim_*": {"color": "3000K", "limits": {"max": 0.7}}})
-    found = lp.place(room, basis, solution, new=[new], constraints=constraints)
-    assert found.additions
+    placement = lp.place(room, basis, solution, new=[new], constraints=constraints)
+    assert placement.additions
     warm = lp.Constraints.of({"bulb": {"color": "3000K"}})
     bulb = lp.solve(basis, solution.problem.views.targets[0], constraints=warm, space="linear")
     colour = np.array(bulb.lighting.emission["bulb"])
-    for light in found.additions:
+    for light in placement.additions:
         emission = np.array(light.emitter.emission)
         assert light.seen_at is None
         assert emission @ (0.2126, 0.7152, 0.0722) <= 0.7 + 1e-6
         assert emission / emission[1] == pytest.approx(colour / colour[1], rel=1e-4)
-    places = [place_of(light) for light in found.additions]
+    places = [place_of(light) for light in placement.additions]
     if len(places) == 2:
         assert np.linalg.norm(places[0] - places[1]) >= 0.8 - 1e-9
 
@@ -146,29 +150,29 @@ def test_constraints_out_of_view_and_distance_hold(room: Scene, basis: lp.Basis)
 def test_new_lights_are_like_one_of_the_scene(room: Scene, basis: lp.Basis) -> None:
     painted = room.with_new_emitters([emitter("spot", emission=(9, 9, 9))])
     new = lp.NewLights(like="beam", count=1, name="beam")
-    found = lp.place(room, basis, solved(basis, painted), new=[new])
-    [light] = found.additions
+    placement = lp.place(room, basis, solved(basis, painted), new=[new])
+    [light] = placement.additions
     assert light.name == "beam_1"
     assert light.emitter.kind == "spot"
     assert light.site.cutoff == pytest.approx(30)
 
 
 def test_a_pair_stays_a_mirror_image(tmp_path: Path) -> None:
-    more = """
+    pair_text = """
     <emitter type="point" id="left"><point name="position" x="-0.6" y="1.3" z="0.3"/>
         <rgb name="intensity" value="0.5"/></emitter>
     <emitter type="point" id="right"><point name="position" x="0.6" y="1.3" z="0.3"/>
         <rgb name="intensity" value="0.5"/></emitter>"""
     path = write_room(tmp_path)
-    path.write_text(path.read_text().replace("</scene>", more + "</scene>"))
+    path.write_text(path.read_text().replace("</scene>", pair_text + "</scene>"))
     scene = load_scene(path)
-    there = {"left": lp.Pose(position=(-0.9, 0.9, 0.5)), "right": lp.Pose(position=(0.9, 0.9, 0.5))}
+    poses = {"left": lp.Pose(position=(-0.9, 0.9, 0.5)), "right": lp.Pose(position=(0.9, 0.9, 0.5))}
     basis = lp.render_basis(scene, spp=256, seed=1)
-    solution = solved(basis, scene.moved(there))
+    solution = solved(basis, scene.moved(poses))
     free = {"left": lp.Freedom(within=0.8)}
-    found = lp.place(scene, basis, solution, free, pairs=[lp.MirroredPair(("left", "right"))])
-    assert {move.name for move in found.moves} == {"left", "right"}
-    sites = [found.scene.light(name).members[0].site for name in ("left", "right")]
+    placement = lp.place(scene, basis, solution, free, pairs=[lp.MirroredPair(("left", "right"))])
+    assert {move.name for move in placement.moves} == {"left", "right"}
+    sites = [placement.scene.light(name).members[0].site for name in ("left", "right")]
     a, b = (np.array(site.position, dtype=float) for site in sites)
     assert a * (-1, 1, 1) == pytest.approx(b, abs=1e-6)
     assert a == pytest.approx((-0.9, 0.9, 0.5), abs=0.08)

@@ -40,31 +40,31 @@ def angle(one: Site, other: Site) -> float:
 
 
 def test_a_lamp_is_found_where_the_painting_has_it(room: Scene) -> None:
-    there = (0.3, 1.3, 0.2)
-    painted = room.moved({"bulb": lp.Pose(position=there)})
-    found = placed(room, painted, {"bulb": lp.Freedom(within=1.5)})
-    assert [move.name for move in found.moves] == ["bulb"]
-    assert found.moves[0].new.position == pytest.approx(there, abs=0.1)
-    assert found.missed_after < 0.3 * found.missed_before
-    site = found.scene.light("bulb").members[0].site
-    assert site.position == pytest.approx(found.moves[0].new.position, rel=1e-6)
+    position = (0.3, 1.3, 0.2)
+    painted = room.moved({"bulb": lp.Pose(position=position)})
+    placement = placed(room, painted, {"bulb": lp.Freedom(within=1.5)})
+    assert [move.name for move in placement.moves] == ["bulb"]
+    assert placement.moves[0].new.position == pytest.approx(position, abs=0.1)
+    assert placement.missed_after < 0.3 * placement.missed_before
+    site = placement.scene.light("bulb").members[0].site
+    assert site.position == pytest.approx(placement.moves[0].new.position, rel=1e-6)
 
 
 def test_a_spot_is_turned_to_where_the_painting_has_its_beam(room: Scene) -> None:
     painted = room.moved({"beam": lp.Pose(target=(-0.6, 0, -0.3))})
-    found = placed(room, painted, {"beam": lp.Freedom(aim=True)})
+    placement = placed(room, painted, {"beam": lp.Freedom(aim=True)})
     beam = painted.light("beam").members[0].site
-    assert [move.name for move in found.moves] == ["beam"]
-    assert angle(found.moves[0].new, beam) < 4
-    assert f"turned by {found.moves[0].turn:.0f}°" in str(found.moves[0])
+    assert [move.name for move in placement.moves] == ["beam"]
+    assert angle(placement.moves[0].new, beam) < 4
+    assert f"turned by {placement.moves[0].turn:.0f}°" in str(placement.moves[0])
 
 
 def test_nothing_moves_where_nothing_is_missed(room: Scene) -> None:
     free = {"bulb": lp.Freedom(within=0.5), "beam": lp.Freedom(aim=40), "sun": lp.Freedom(aim=20)}
-    found = placed(room, room, free)
-    assert found.moves == ()
-    assert found.scene is room
-    assert found.missed_after == found.missed_before
+    placement = placed(room, room, free)
+    assert placement.moves == ()
+    assert placement.scene is room
+    assert placement.missed_after == placement.missed_before
 
 
 @pytest.mark.parametrize(
@@ -120,9 +120,9 @@ def test_steps_stay_within_the_freedom(freedom: lp.Freedom) -> None:
     site = start
     for _ in range(200):
         site = light.stepped(site, rng.normal(size=sum(light.dimensions(site))))
-        again = light.permitted(site)
-        assert again.position == pytest.approx(site.position, abs=1e-9)
-        assert again.direction == pytest.approx(site.direction, abs=1e-9)
+        second_site = light.permitted(site)
+        assert second_site.position == pytest.approx(site.position, abs=1e-9)
+        assert second_site.direction == pytest.approx(site.direction, abs=1e-9)
         direction, place = (np.array(x, dtype=float) for x in (site.direction, site.position))
         assert np.linalg.norm(direction) == pytest.approx(1)
         assert angle(site, start) <= freedom.turn + 1e-4

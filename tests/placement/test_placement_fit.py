@@ -63,9 +63,11 @@ def test_the_gradient_of_the_loss_is_that_of_finite_differences() -> None:
     fit = fit_to(2 * TRUE, 0.1 * RNG.normal(size=TRUE.shape))
     start, slope = column(TRUE, 0.1), column(RNG.random((PIXELS, 3)), 0.1)
 
-    def missed(step: float) -> float:
+    def missed_energy(step: float) -> float:
         return fit.fitted(start + np.float32(step) * slope).missed
 
     _, gradient = fit.newton(fit.fitted(start), slope, [0], [0])
     step = 0.001
-    assert -2 * gradient[0] == pytest.approx((missed(step) - missed(-step)) / (2 * step), rel=1e-3)
+    assert -2 * gradient[0] == pytest.approx(
+        (missed_energy(step) - missed_energy(-step)) / (2 * step), rel=1e-3
+    )

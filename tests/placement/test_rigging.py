@@ -148,10 +148,10 @@ def test_a_wrong_value_is_one_line_with_its_file_and_key(
         rigging_of(read_lights_file(path).requests)
         constraints_of(read_lights_file(path).requests)
 
-    with pytest.raises(LightpaintError, match=words) as caught:
+    with pytest.raises(LightpaintError, match=words) as refusal:
         read()
-    assert "room.lights.toml" in str(caught.value)
-    assert "\n" not in str(caught.value)
+    assert "room.lights.toml" in str(refusal.value)
+    assert "\n" not in str(refusal.value)
 
 
 @pytest.mark.parametrize(

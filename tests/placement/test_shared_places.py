@@ -22,9 +22,9 @@ def room(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 @pytest.fixture(scope="module")
 def bases(room: Scene) -> tuple[Basis, Basis]:
     """The basis of the room, and that of the room as painted."""
-    there = {"bulb": lp.Pose(position=BULB), "beam": lp.Pose(target=BEAM)}
+    poses = {"bulb": lp.Pose(position=BULB), "beam": lp.Pose(target=BEAM)}
     return lp.render_basis(room, spp=256, seed=1), lp.render_basis(
-        room.moved(there), spp=256, seed=2
+        room.moved(poses), spp=256, seed=2
     )
 
 
@@ -43,26 +43,26 @@ def test_a_dark_look_places_its_lamp_as_a_bright_one_does(
     """One look shows the bulb alone, one a ten-thousandth of it and the beam: both are found."""
     looks = [solved(bases, bulb=4, panel=0.2), solved(bases, beam=4e-4, panel=1e-5)]
     free = {"bulb": lp.Freedom(within=1.5), "beam": lp.Freedom(aim=True)}
-    found = lp.place(room, bases[0], looks, free)
-    moves = {move.name: move for move in found.moves}
+    placement = lp.place(room, bases[0], looks, free)
+    moves = {move.name: move for move in placement.moves}
     assert moves["bulb"].new.position == pytest.approx(BULB, abs=0.15)
     site = painted_direction(room)
     assert np.dot(moves["beam"].new.direction, site) > np.cos(np.radians(6))
-    assert found.missed_after < 0.3 * found.missed_before
+    assert placement.missed_after < 0.3 * placement.missed_before
     # Alone, each look says nothing of the other's lamp.
-    alone = lp.place(room, bases[0], looks[0], free)
-    assert {move.name for move in alone.moves} == {"bulb"}
+    single = lp.place(room, bases[0], looks[0], free)
+    assert {move.name for move in single.moves} == {"bulb"}
 
 
 def painted_direction(room: Scene) -> np.ndarray:
     """The direction of the beam as painted."""
-    moved = room.moved({"beam": lp.Pose(target=BEAM)})
-    return np.array(moved.light("beam").members[0].site.direction)
+    moved_room = room.moved({"beam": lp.Pose(target=BEAM)})
+    return np.array(moved_room.light("beam").members[0].site.direction)
 
 
 def test_a_look_given_twice_is_one_look(room: Scene, bases: tuple[Basis, Basis]) -> None:
     look, free = solved(bases, bulb=4, panel=0.2), {"bulb": lp.Freedom(within=1.5)}
-    one, two = (lp.place(room, bases[0], its, free) for its in (look, [look, look]))
+    one, two = (lp.place(room, bases[0], looks, free) for looks in (look, [look, look]))
     assert one.moves
     assert one.moves[0].new.position == pytest.approx(two.moves[0].new.position, abs=1e-3)
     assert one.missed_after == pytest.approx(two.missed_after, rel=1e-3)

@@ -96,32 +96,34 @@ def test_a_light_that_is_missing_is_found(
     The second is beside the camera, out of the picture.
     """
     scene, _ = lacking
-    target, solution, found = missing(hidden)
-    first = found[0]
+    target, solution, suggestions = missing(hidden)
+    first = suggestions[0]
     assert np.linalg.norm(np.subtract(first.position, hidden)) < SPACING
     assert (first.seen_at is None) == (hidden != HIDDEN)
     assert first.gain_share > 0.7
     # Of the same colour; how bright depends on how near it is to what it lights.
-    colour, wanted = (np.array(rgb) / sum(rgb) for rgb in (first.emission, INTENSITY))
-    np.testing.assert_allclose(colour, wanted, rtol=0.05)
-    for k, one in enumerate(found):
+    colour, expected = (np.array(rgb) / sum(rgb) for rgb in (first.emission, INTENSITY))
+    np.testing.assert_allclose(colour, expected, rtol=0.05)
+    for k, one in enumerate(suggestions):
         assert one.gain_share >= 0.01
-        assert one.missed_share == pytest.approx(1 - sum(x.gain_share for x in found[: k + 1]))
+        assert one.missed_share == pytest.approx(
+            1 - sum(x.gain_share for x in suggestions[: k + 1])
+        )
 
     # What is promised holds where the light is put into the scene and all is solved anew.
     pasted = scene.path.read_text(encoding="utf-8").replace("</scene>", f"{first.xml}</scene>")
     with_it = tmp_path / "pasted.xml"
     with_it.write_text(pasted, encoding="utf-8")
-    _, _, again = _solved(with_it, target)
-    left = sum(again.certificate.objective) / sum(solution.certificate.objective)
+    _, _, repeat = _solved(with_it, target)
+    left = sum(repeat.certificate.objective) / sum(solution.certificate.objective)
     assert left == pytest.approx(first.missed_share, abs=0.05)
-    np.testing.assert_allclose(again.lighting.emission[first.name], first.emission, rtol=0.15)
+    np.testing.assert_allclose(repeat.lighting.emission[first.name], first.emission, rtol=0.15)
 
 
 def test_the_same_seed_gives_the_same_light(lacking: tuple[Scene, Basis], missing: Any):
-    _, solution, found = missing()
+    _, solution, suggestions = missing()
     [first] = suggest_lights(*lacking, solution, count=1)
-    assert first.position == found[0].position
+    assert first.position == suggestions[0].position
 
 
 def test_the_ring_is_where_the_light_is_seen(tmp_path: Path, missing: Any):
@@ -152,8 +154,8 @@ def test_noise_is_not_taken_for_a_lack_of_light(
     """Few samples, of basis and painting: much is missed, and no light would help."""
     basis, painted = small_room_basis(spp=4), small_room_basis(spp=4, seed=seed)
     solution = solve(basis, _target(painted.mix(painted.current_weights)))
-    missed = sum(solution.certificate.objective) / solution.equations.target_norm2.sum()
-    assert missed > 0.01**2  # else it would not look at all
+    missed_share = sum(solution.certificate.objective) / solution.equations.target_norm2.sum()
+    assert missed_share > 0.01**2  # else it would not look at all
     assert suggest_lights(small_room, basis, solution) == ()
 
 
@@ -185,9 +187,9 @@ def test_other_cameras(tmp_path: Path, sensor: str):
     scene = load_scene(path, sensor="other")
     basis = render_basis(scene, spp=64)
     solution = solve(basis, _target(painted.mix(painted.current_weights)))
-    found = suggest_lights(scene, basis, solution, count=1)
-    assert found[0].gain_share > 0.5
-    assert (found[0].seen_at is None) == (sensor == "orthographic")
+    suggestions = suggest_lights(scene, basis, solution, count=1)
+    assert suggestions[0].gain_share > 0.5
+    assert (suggestions[0].seen_at is None) == (sensor == "orthographic")
 
 
 def test_a_camera_that_sees_nothing_but_the_sky(tmp_path: Path):
@@ -222,10 +224,10 @@ def test_a_basis_of_a_smaller_film_than_the_scene(tmp_path: Path):
 
 
 def test_names_that_are_taken_are_not_given(tmp_path: Path):
-    taken = LIGHTS["sky"].replace('"sky"', '"suggested_1"')
-    taken += LIGHTS["bulb"].replace('"bulb"', '"candidate_1"')
-    target = _target(_current(write_room(tmp_path, lights=taken + EXTRA, name="extra.xml")))
-    [first] = suggest_lights(*_solved(write_room(tmp_path, lights=taken), target), count=1)
+    lights_text = LIGHTS["sky"].replace('"sky"', '"suggested_1"')
+    lights_text += LIGHTS["bulb"].replace('"bulb"', '"candidate_1"')
+    target = _target(_current(write_room(tmp_path, lights=lights_text + EXTRA, name="extra.xml")))
+    [first] = suggest_lights(*_solved(write_room(tmp_path, lights=lights_text), target), count=1)
     assert first.name == "suggested_2"
     assert ElementTree.fromstring(first.xml).attrib == {"type": "point", "id": "suggested_2"}
 
@@ -244,10 +246,10 @@ def test_what_one_pass_cannot_do_is_refused(
         suggest_lights(small_room, basis, solution, count=0)
 
 
-def _made(name: str, gain: float, missed: float, at: Any = (0.25, 0.5)) -> Suggestion:
+def _made(name: str, gain: float, missed_share: float, place: Any = (0.25, 0.5)) -> Suggestion:
     image = np.full((4, 6, 3), 0.5, np.float32)
     xml = emitter_xml(name, (1, 2, 3), (0.5, 0.25, 0))
-    return Suggestion(name, (1, 2, 3), (0.5, 0.25, 0), gain, missed, xml, at, image, image)
+    return Suggestion(name, (1, 2, 3), (0.5, 0.25, 0), gain, missed_share, xml, place, image, image)
 
 
 def test_the_section_says_what_was_found():

@@ -22,9 +22,9 @@ WARM, NEUTRAL, COOL = (tuple(kelvin_to_rgb(k).tolist()) for k in (2700.0, 5000.0
 GREEN, PALE = (0.1, 1.3, 0.2), (0.5, 1.15, 0.5)
 
 
-def _choice(colors: Any, delta_e: float, **about: Any) -> ColorChoice:
-    its = ColorChoice(colors, False, delta_e, "", (1, 1, 1), (1, 1, 1), np.ones((1, 3)))
-    return replace(its, **about)
+def _choice(colors: Any, delta_e: float, **fields: Any) -> ColorChoice:
+    choice = ColorChoice(colors, False, delta_e, "", (1, 1, 1), (1, 1, 1), np.ones((1, 3)))
+    return replace(choice, **fields)
 
 
 CHOSEN = _choice("gentle", 2.6, is_chosen=True)
@@ -53,7 +53,7 @@ def test_hues_have_the_words_of_people(rgb: Any, word: str):
 
 
 @pytest.mark.parametrize(
-    ("other", "said"),
+    ("other", "sentence"),
     [
         (
             _choice("free", 2.1, light="pendant", before=WARM, color=GREEN),
@@ -74,8 +74,8 @@ def test_hues_have_the_words_of_people(rgb: Any, word: str):
         ),
     ],
 )
-def test_a_choice_in_words(other: ColorChoice, said: str):
-    assert spoken_choice(other, CHOSEN) == said
+def test_a_choice_in_words(other: ColorChoice, sentence: str):
+    assert spoken_choice(other, CHOSEN) == sentence
 
 
 def test_at_once_only_what_comes_notably_closer_is_told():
@@ -93,12 +93,12 @@ def test_names_in_the_section_are_text():
     assert section.count("<tr>") == 4
 
 
-@pytest.mark.parametrize("asked", [{}, {"hold": 0.5, "colors": "white"}, {"unpainted": 0.1}])
-def test_what_decided_stands_in_the_page_and_in_its_numbers(make_basis: Any, asked: Any):
+@pytest.mark.parametrize("fit_words", [{}, {"hold": 0.5, "colors": "white"}, {"unpainted": 0.1}])
+def test_what_decided_stands_in_the_page_and_in_its_numbers(make_basis: Any, fit_words: Any):
     basis = make_basis(2)
     target = Target.of(np.full((*basis.size, 3), 0.4, np.float32), name="grey")
-    solution = solve(basis, target, **asked)
-    how: Any = {
+    solution = solve(basis, target, **fit_words)
+    arguments: Any = {
         "basis": basis,
         "target": target,
         "solution": solution,
@@ -106,11 +106,11 @@ def test_what_decided_stands_in_the_page_and_in_its_numbers(make_basis: Any, ask
         "verification": None,
         "command": "",
     }
-    said = fit_sentence(solution)
-    assert f'<p class="meant">{said}</p>' in report_page(**how)
-    meant = json.loads(report_numbers(**how))["meant"]
-    assert meant == {k: v for k, v in fit_options(solution).items() if v is not None}
-    assert meant["colors"] == asked.get("colors", "free")
-    assert meant["hold"] == asked.get("hold", 0)
-    expected = {"white": "lights are white", "free": "any colour"}[meant["colors"]]
-    assert expected in said or "counts 0.1" in said
+    sentence = fit_sentence(solution)
+    assert f'<p class="meant">{sentence}</p>' in report_page(**arguments)
+    meaning = json.loads(report_numbers(**arguments))["meant"]
+    assert meaning == {k: v for k, v in fit_options(solution).items() if v is not None}
+    assert meaning["colors"] == fit_words.get("colors", "free")
+    assert meaning["hold"] == fit_words.get("hold", 0)
+    expected = {"white": "lights are white", "free": "any colour"}[meaning["colors"]]
+    assert expected in sentence or "counts 0.1" in sentence

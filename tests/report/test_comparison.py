@@ -66,8 +66,8 @@ def _tiles(sheet: Any) -> list[Any]:
     """The pictures of a sheet at their own size, found by the surround between them."""
     top = int(np.argmax((sheet != SURROUND).any(axis=(1, 2))))
     # The first line of pixels tells left from right: no caption reaches it.
-    inside = np.concatenate([[False], (sheet[top] != SURROUND).any(axis=-1), [False]])
-    edges = np.flatnonzero(inside[1:] != inside[:-1])
+    is_drawn = np.concatenate([[False], (sheet[top] != SURROUND).any(axis=-1), [False]])
+    edges = np.flatnonzero(is_drawn[1:] != is_drawn[:-1])
     zoom = (edges[1] - edges[0]) // SIZE[1]
     bottom = top + SIZE[0] * zoom
     return [
@@ -150,8 +150,8 @@ def test_captions_do_not_meet(monkeypatch: pytest.MonkeyPatch, size: tuple[int, 
         # What is of one tile stays below it, but for the pixel that is round a letter.
         assert any(tile[0] - 1 <= left and right <= tile[2] + 1 for tile in drawn[0:9:3])
         for other in drawn[:k]:
-            apart = (right <= other[0], other[2] <= left, bottom <= other[1], other[3] <= top)
-            assert any(apart)
+            gaps = (right <= other[0], other[2] <= left, bottom <= other[1], other[3] <= top)
+            assert any(gaps)
 
 
 @pytest.mark.parametrize("size", FILMS)
@@ -184,12 +184,12 @@ def test_the_file_holds_the_image(make_basis: Any, tmp_path: Path):
 
 def test_a_larger_verification_is_shown_whole_beside_enlarged_pixels(make_basis: Any):
     look = _look(make_basis)
-    same = {**look, "verified": look["predicted"]}
+    small_look = {**look, "verified": look["predicted"]}
     larger = {**look, "verified": np.kron(look["predicted"], np.ones((16, 16, 1), np.float32))}
     # 32 pixels are shown 256 wide either way, and here the verification is 512.
-    assert comparison_image(**same).shape[1] < comparison_image(**larger).shape[1]
+    assert comparison_image(**small_look).shape[1] < comparison_image(**larger).shape[1]
     half = {**look, "verified": np.kron(look["predicted"], np.ones((8, 8, 1), np.float32))}
-    np.testing.assert_array_equal(comparison_image(**same), comparison_image(**half))
+    np.testing.assert_array_equal(comparison_image(**small_look), comparison_image(**half))
 
 
 def test_another_size_is_refused(make_basis: Any):
@@ -226,16 +226,16 @@ def test_half_importance_is_half_shown(make_basis: Any):
 
 
 def test_emitters_nobody_painted_are_not_shown_as_target(make_basis: Any):
-    seen = np.zeros(SIZE, bool)
-    seen[4:8, 4:8] = True
-    basis = make_basis(3, SIZE, seen=seen)
+    emitter_mask = np.zeros(SIZE, bool)
+    emitter_mask[4:8, 4:8] = True
+    basis = make_basis(3, SIZE, seen=emitter_mask)
     image = np.full((*SIZE, 3), 0.5, np.float32)
     target = Target("all", image, np.ones(SIZE, np.float32), everything=True)
     picture = target_picture(
         target, solve(basis, target), np.zeros(image.shape), transform=ViewTransform()
     )
-    shown = np.isclose(picture, encode_display(image)).all(axis=-1)
-    np.testing.assert_array_equal(shown, ~seen)
+    is_shown = np.isclose(picture, encode_display(image)).all(axis=-1)
+    np.testing.assert_array_equal(is_shown, ~emitter_mask)
 
 
 @pytest.mark.parametrize(
@@ -265,11 +265,11 @@ def test_residual_is_prediction_minus_target(make_basis: Any):
     offset = np.zeros((*SIZE, 3))
     offset[:12], offset[12:] = 0.2, -0.2
     predicted = solution.image + offset
-    missed = residual_of(solution, predicted, transform=ViewTransform())
-    assert missed.limit == pytest.approx(0.2)
-    assert missed.spoken == ""  # of images that have no noise
-    missed = replace(missed, limit=0.4)
-    picture = residual_picture(missed, solution, current, transform=ViewTransform())
+    residual = residual_of(solution, predicted, transform=ViewTransform())
+    assert residual.limit == pytest.approx(0.2)
+    assert residual.spoken == ""  # of images that have no noise
+    residual = replace(residual, limit=0.4)
+    picture = residual_picture(residual, solution, current, transform=ViewTransform())
     above, below = diverging(np.array([0.5, -0.5]))
     # The prediction is float64 here; sums of the luminance weights round in the last digits.
     np.testing.assert_allclose(picture[:12, :16], np.broadcast_to(above, (12, 16, 3)), rtol=1e-9)
@@ -301,17 +301,17 @@ def test_a_residual_is_averaged_until_its_noise_does_not_show(make_basis: Any):
     target = Target("third", image, np.ones((height, width), np.float32), everything=True)
     # A locked light is shown as it is: the answer itself would be a little dimmer.
     solution = solve(basis, target, constraints=Constraints.of({"light 0": {"lock": True}}))
-    missed = residual_of(solution, basis.mix(solution.weights), transform=ViewTransform())
-    assert missed.radius > 0
-    side = 2 * missed.radius + 1
-    assert missed.spoken == f", averaged over {side}x{side} pixels"
+    residual = residual_of(solution, basis.mix(solution.weights), transform=ViewTransform())
+    assert residual.radius > 0
+    side = 2 * residual.radius + 1
+    assert residual.spoken == f", averaged over {side}x{side} pixels"
     # Away from the edges of the third, which the average blurs: four standard errors of it.
     flat = np.ones(width, bool)
     for edge in (30, 60):
         flat[edge - side : edge + side] = False
-    off = missed.values - truth
-    assert np.sqrt(np.square(off[:, flat]).mean()) < 1.5 * 0.2 / side
-    assert np.abs(missed.values).max() < 0.1 + 5 * 0.2 / side
+    deviation = residual.values - truth
+    assert np.sqrt(np.square(deviation[:, flat]).mean()) < 1.5 * 0.2 / side
+    assert np.abs(residual.values).max() < 0.1 + 5 * 0.2 / side
 
 
 @pytest.mark.parametrize(
@@ -339,14 +339,16 @@ def test_how_much_is_painted_is_one_number(
     target = full.fitted_to(basis.size, resize=False)
     solution = solve(basis, target)
     predicted = combine(basis, solution.lighting)
-    told = {"basis": basis, "target": target, "solution": solution}
+    look_fields = {"basis": basis, "target": target, "solution": solution}
     captions: list[str] = []
     draw = comparison._caption
     monkeypatch.setattr(
-        comparison, "_caption", lambda *about: (captions.append(about[1].detail), draw(*about))[1]
+        comparison,
+        "_caption",
+        lambda *arguments: (captions.append(arguments[1].detail), draw(*arguments))[1],
     )
-    comparison_image(**told, predicted=predicted.image, verified=None)
+    comparison_image(**look_fields, predicted=predicted.image, verified=None)
     assert captions[0] == f"{100 * share:.3g} % painted, the rest hatched"
-    numbers = json.loads(report_numbers(**told, predicted=predicted, verification=None))
+    numbers = json.loads(report_numbers(**look_fields, predicted=predicted, verification=None))
     assert numbers["painting"]["share"] == pytest.approx(share, abs=1e-12)
     assert full.spoken_share == target.spoken_share == f"{100 * share:.3g} %"

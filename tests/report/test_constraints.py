@@ -42,7 +42,7 @@ def test_the_free_optimum_stands_beside_what_was_asked(make_basis: Any) -> None:
     free = _missed(solve(basis, target))
     captions = re.findall(r"<strong>(.*?)\.</strong> (\d+) % missed", page)
     expected = [("Without constraints", free), ("With the constraints", _missed(solution))]
-    assert captions == [(name, f"{100 * missed:.0f}") for name, missed in expected]
+    assert captions == [(name, f"{100 * missed_share:.0f}") for name, missed_share in expected]
     assert captions[0][1] != captions[1][1]
     assert page.count("<img") == 2
     pictures = re.findall(r'src="(data:[^"]*)"', page)
@@ -61,19 +61,19 @@ def test_without_constraints_there_is_nothing_to_show(make_basis: Any) -> None:
     assert _section(basis, target, one) == ""
 
 
-@pytest.mark.parametrize(("sparse", "around"), [(1, [2, 3]), (3, [1, 2, 4, 5]), (5, [3, 4])])
+@pytest.mark.parametrize(("sparse", "neighbours"), [(1, [2, 3]), (3, [1, 2, 4, 5]), (5, [3, 4])])
 def test_what_fewer_and_more_lights_would_miss(
-    make_basis: Any, sparse: int, around: list[int]
+    make_basis: Any, sparse: int, neighbours: list[int]
 ) -> None:
     basis, target, solution = _solved(make_basis, Constraints.of(sparse=sparse))
     page = _section(basis, target, solution)
-    shown = [int(count) for count in re.findall(r"<strong>With (\d) lights?", page)]
-    assert shown == around
+    counts = [int(count) for count in re.findall(r"<strong>With (\d) lights?", page)]
+    assert counts == neighbours
     assert f"{sparse} light{'' if sparse == 1 else 's'}, as asked" in page
     assert page.count("<tr>") == 1 + len(solution.certificate.curve) + 1
-    for count, missed in solution.certificate.curve:
+    for count, missed_share in solution.certificate.curve:
         assert f"{count} light" in page
-        assert f"{100 * missed:.0f} %" in page
+        assert f"{100 * missed_share:.0f} %" in page
 
 
 def test_large_pictures_are_reduced(make_basis: Any) -> None:

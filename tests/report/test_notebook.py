@@ -50,18 +50,18 @@ def naughty(make_basis: Any) -> Look:
 
 def _parts(look: Look) -> list[Any]:
     """Everything of it that a person may look at."""
-    asked = {f"{name}": {"lock": True} for name in look.basis.names}
+    constraints = {f"{name}": {"lock": True} for name in look.basis.names}
     parts = [look, look.target, look.basis, look.solution, look.lighting, look.predicted]
     parts += [look.verification, look.analysis, look.diagnosis, look.uncertainty]
-    parts += [look.solution.certificate, look.solution.problem, lp.Constraints.of(asked)]
+    parts += [look.solution.certificate, look.solution.problem, lp.Constraints.of(constraints)]
     return [*parts, Problem.of(look.basis, look.target, constraints=parts[-1])]
 
 
 def test_reprs_fit_on_one_screen(many: Look, naughty: Look):
     for part in [*_parts(many), *_parts(naughty)]:
-        said = repr(part)
-        assert 20 < len(said) < SCREEN, (type(part), len(said), said)
-        assert said.count("\n") < 24
+        text = repr(part)
+        assert 20 < len(text) < SCREEN, (type(part), len(text), text)
+        assert text.count("\n") < 24
     assert "closest there is" in repr(many.solution)
     assert "agrees" in repr(many.verification)
     assert "… and " in repr(many.lighting)
@@ -88,8 +88,8 @@ def test_pages_are_small_and_show_what_matters(many: Look):
     assert f"and {MANY - 10} more" in page
     assert "closest there is" in page
     # Those that change the picture most.
-    moved = np.abs(many.solution.weights - many.basis.current_weights) * many.basis.totals
-    first = many.basis.names[int(np.argmax(moved @ [0.2126, 0.7152, 0.0722]))]
+    distances = np.abs(many.solution.weights - many.basis.current_weights) * many.basis.totals
+    first = many.basis.names[int(np.argmax(distances @ [0.2126, 0.7152, 0.0722]))]
     assert f">{first}<" in page
 
 
@@ -100,8 +100,8 @@ def test_pictures_are_small_and_dim_what_is_not_painted(many: Look):
     assert Image.open(io.BytesIO(sheet)).size[0] < 800
     painting = many.target._repr_png_()
     assert painting is not None
-    shown = np.asarray(Image.open(io.BytesIO(painting)), np.float64)
-    left, right = np.split(shown, 2, axis=1)
+    pixels = np.asarray(Image.open(io.BytesIO(painting)), np.float64)
+    left, right = np.split(pixels, 2, axis=1)
     assert left.mean() > 1.5 * right.mean()
     assert np.ptp(right, axis=-1).max() == 0  # grey
     assert np.ptp(left, axis=-1).max() > 0

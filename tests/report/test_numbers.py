@@ -57,7 +57,7 @@ class Words(HTMLParser):
             self.shown.append(data)
 
 
-def _look(make_basis: Any, *, lights: Any = None, **asked: Any) -> Look:
+def _look(make_basis: Any, *, lights: Any = None, **options: Any) -> Look:
     rng = np.random.default_rng(3)
     images = rng.random((5, *SIZE, 3)) + 3 * rng.random((5, 1, 1, 3))
     noise = rng.normal(0, 0.01, (2, *images.shape))
@@ -79,7 +79,7 @@ def _look(make_basis: Any, *, lights: Any = None, **asked: Any) -> Look:
         at_least=image > 3,
         transform=ViewTransform("srgb", -1.5),
     )
-    constraints = Constraints.of(lights, **asked) if asked else None
+    constraints = Constraints.of(lights, **options) if options else None
     solution = solve(basis, target, constraints=constraints, transform=target.transform)
     solution = replace(solution, lighting=replace(solution.lighting, cd_per_unit=120.0))
     [analysis] = analyse(solution)
@@ -87,9 +87,9 @@ def _look(make_basis: Any, *, lights: Any = None, **asked: Any) -> Look:
     noisy = rng.normal(0, 0.01, (2, *image.shape)).astype(np.float32)
     verified = Estimate(predicted.image + noisy[0], noisy[1])
     small = image[::3, ::4]
-    about = ((1.23, 4.567, -2.5), (0.3, 0.21, 0.17))
-    lamp = Suggestion("lamp", *about, 0.34, 0.61, "<emitter/>", (0.3, 0.4), small, small)
-    more = replace(lamp, name="more", gain_share=0.11, missed_share=0.49)
+    numbers = ((1.23, 4.567, -2.5), (0.3, 0.21, 0.17))
+    lamp = Suggestion("lamp", *numbers, 0.34, 0.61, "<emitter/>", (0.3, 0.4), small, small)
+    lamp_off = replace(lamp, name="more", gain_share=0.11, missed_share=0.49)
     return Look(
         target=target,
         basis=basis,
@@ -98,7 +98,7 @@ def _look(make_basis: Any, *, lights: Any = None, **asked: Any) -> Look:
         relit=None,
         verification=compare(predicted, verified),
         analysis=analysis,
-        suggestions=(lamp, more),
+        suggestions=(lamp, lamp_off),
     )
 
 
@@ -110,13 +110,13 @@ def _numbers(value: Any) -> Iterator[float]:
         yield float(value)
 
 
-def _is_one_of(text: str, known: Any) -> bool:
+def _is_one_of(text: str, known_numbers: Any) -> bool:
     """Whether a printed number is one that is known, or it in percent, as far as its digits say."""
     mantissa, _, exponent = text.partition("e")
     step = 0.5 * 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
     # A general format drops zeros at the end, and so may say less than it looks.
     step = max(step, 0.5 * 10.0 ** (np.floor(np.log10(max(abs(float(text)), 1e-300))) - 3))
-    pool = np.concatenate([known, 100 * known])
+    pool = np.concatenate([known_numbers, 100 * known_numbers])
     return bool((np.abs(pool - abs(float(text))) <= step * (1 + 1e-6)).any())
 
 
@@ -127,11 +127,11 @@ ASKED: list[dict[str, Any]] = [
 ]
 
 
-@pytest.mark.parametrize("asked", ASKED)
+@pytest.mark.parametrize("options", ASKED)
 def test_every_number_of_the_page_stands_in_a_file(
-    make_basis: Any, tmp_path: Path, asked: Any
+    make_basis: Any, tmp_path: Path, options: Any
 ) -> None:
-    look = _look(make_basis, **asked)
+    look = _look(make_basis, **options)
     write_report(tmp_path, look, command="lightpaint solve")
     write_lighting(tmp_path / "lighting.json", look.lighting)
     files = [json.loads((tmp_path / f"{name}.json").read_text()) for name in ("report", "lighting")]
@@ -143,13 +143,13 @@ def test_every_number_of_the_page_stands_in_a_file(
     lights = files[0]["lights"].values()
     derived += [x["relative_error"] * x["share"] for x in lights if "relative_error" in x]
     constants = [0, 1, 95, 255]
-    known = np.abs(np.concatenate([list(_numbers(files)), derived, constants]))
+    known_numbers = np.abs(np.concatenate([list(_numbers(files)), derived, constants]))
     text = "".join(Words((tmp_path / "report.html").read_text(encoding="utf-8")).shown)
-    shown = text.split("Change the painting")[0].replace("−", "-")
-    shown = re.sub(r"#[0-9a-f]{6}|8×8|95 of 100|ΔE2000|at [-+\d.]+ stops", "", shown)
-    found = re.findall(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?", shown)
-    assert len(found) > 150
-    assert [number for number in found if not _is_one_of(number, known)] == []
+    visible_text = text.split("Change the painting")[0].replace("−", "-")
+    visible_text = re.sub(r"#[0-9a-f]{6}|8×8|95 of 100|ΔE2000|at [-+\d.]+ stops", "", visible_text)
+    numbers = re.findall(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?", visible_text)
+    assert len(numbers) > 150
+    assert [number for number in numbers if not _is_one_of(number, known_numbers)] == []
 
 
 def test_writing_neither_solves_nor_sums_anew(
@@ -158,14 +158,14 @@ def test_writing_neither_solves_nor_sums_anew(
     look = _look(make_basis, sparse=2)
     calls: list[str] = []
 
-    def count(where: Any, name: str) -> None:
-        plain = getattr(where, name)
+    def count(owner: Any, name: str) -> None:
+        plain = getattr(owner, name)
 
-        def counted(*arguments: Any, **options: Any) -> Any:
+        def count_calls(*arguments: Any, **options: Any) -> Any:
             calls.append(name)
             return plain(*arguments, **options)
 
-        monkeypatch.setattr(where, name, counted)
+        monkeypatch.setattr(owner, name, count_calls)
 
     count(solve_module, "_solution")
     count(reduced_problem, "_solve_blocks")
@@ -190,15 +190,15 @@ def test_no_picture_is_encoded_twice(
     look = _look(make_basis)
     plain, encoded = ViewTransform.encode, []
 
-    def counted(self: ViewTransform, image: Any) -> Any:
+    def count_encoding(self: ViewTransform, image: Any) -> Any:
         encoded.append(np.asarray(image).tobytes())
         return plain(self, image)
 
-    monkeypatch.setattr(ViewTransform, "encode", counted)
+    monkeypatch.setattr(ViewTransform, "encode", count_encoding)
     # Two threads that need the same at the same time may both make it.
     monkeypatch.setattr(threads, "_limit", 1)
     write_report(tmp_path, look, command="")
     # Two suggestions have the same pictures here.
-    whole = [its for its in encoded if len(its) == look.predicted.image.nbytes]
-    assert len(whole) > 5
-    assert len(set(whole)) == len(whole)
+    full_size = [encoding for encoding in encoded if len(encoding) == look.predicted.image.nbytes]
+    assert len(full_size) > 5
+    assert len(set(full_size)) == len(full_size)

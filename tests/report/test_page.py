@@ -54,8 +54,8 @@ class Page(HTMLParser):
     def all(self, tag: str) -> list[dict[str, Any]]:
         return [attributes for name, attributes in self.elements if name == tag]
 
-    def text(self, inside: str) -> str:
-        return "".join(text for open_tags, text in self.texts if inside in open_tags)
+    def text(self, tag: str) -> str:
+        return "".join(text for open_tags, text in self.texts if tag in open_tags)
 
 
 def _result(
@@ -230,22 +230,22 @@ def test_lights_in_order_with_what_happens_to_them(make_basis: Any):
     rows = re.split("key|fill|back", page.text("tbody").split("red")[0])[1:]
     assert len(rows) == 3
     assert "back" in body.partition("Reach nothing painted, so unchanged")[2]
-    key, fill, back = rows
+    key, fill, back_row = rows
     assert result["solution"].lighting.lights[1].emission == (0, 0, 0)
     assert "×1.5" in key
     assert "off" in fill
     assert "0.0 %" in fill
     assert result["solution"].certificate.unreached == ("back",)
-    assert "unchanged: reaches nothing painted" in back
+    assert "unchanged: reaches nothing painted" in back_row
 
 
 def test_the_numbers_are_there(make_basis: Any):
     result = _result(make_basis)
-    its, checked = result["solution"].certificate, result["verification"]
+    certificate, checked = result["solution"].certificate, result["verification"]
     text = Page(report_page(**result)).text("main")
     for number in (
-        *(f"{value:.3g}" for value in its.relative_objective),
-        *(f"{value:.1e}" for value in its.kkt_residual),
+        *(f"{value:.3g}" for value in certificate.relative_objective),
+        *(f"{value:.1e}" for value in certificate.kkt_residual),
         f"{checked.rmse:.3g}; noise alone gives {checked.noise_rmse:.3g}",
         f"{checked.z_rms:.3f}; about 1 is noise",
         f"mean {checked.delta_e_mean:.2f}; 95 % of pixels below {checked.delta_e_95:.2f}",
@@ -297,9 +297,9 @@ def test_a_large_picture_becomes_a_good_jpeg():
 def test_a_thumbnail_shows_something_however_dim(level: float):
     image = np.full((20, 400, 3), level, np.float32)
     image[:10, :40] = 1e6 * level
-    seen = np.zeros((20, 400), bool)
-    seen[:10, :40] = True
-    picture, stops = thumbnail(image, seen)
+    emitter_mask = np.zeros((20, 400), bool)
+    emitter_mask[:10, :40] = True
+    picture, stops = thumbnail(image, emitter_mask)
     assert picture.shape == (7, 144, 3)
     assert stops == pytest.approx(-np.log2(level), abs=0.06)  # rounded to tenths
     assert np.median(picture) > 0.95
@@ -371,9 +371,9 @@ def test_what_is_missed_as_squares_in_closed_form(make_basis: Any):
 
 
 @pytest.mark.parametrize(
-    ("scale", "shown"), [(None, ["flux(relative)", "6504 K"]), (100.0, ["200 cd/m²", "600 lm"])]
+    ("scale", "texts"), [(None, ["flux(relative)", "6504 K"]), (100.0, ["200 cd/m²", "600 lm"])]
 )
-def test_colour_and_flux_of_a_light(make_basis: Any, scale: float | None, shown: list[str]):
+def test_colour_and_flux_of_a_light(make_basis: Any, scale: float | None, texts: list[str]):
     result = _result(make_basis)
     solution = result["solution"]
     light = replace(
@@ -383,5 +383,5 @@ def test_colour_and_flux_of_a_light(make_basis: Any, scale: float | None, shown:
     lighting = replace(solution.lighting, lights=lights, cd_per_unit=scale)
     text = report_page(**result | {"solution": replace(solution, lighting=lighting)})
     plain = text.replace("<br>", "")
-    assert all(words in plain for words in [*shown, "#ffffff"])
+    assert all(words in plain for words in [*texts, "#ffffff"])
     assert (" lm" in plain) == (scale is not None)

@@ -31,7 +31,7 @@ TELLS += "document.documentElement['scroll' + side])].join(' '), '*');</script>"
 LISTENS = "<script>onmessage = (told) => { document.body.append(`<${told.data}>`); };</script>"
 
 
-def _page(make_basis: Any, n: int, name: str = "ceiling_lamp_{}", **asked: Any) -> str:
+def _page(make_basis: Any, n: int, name: str = "ceiling_lamp_{}", **options: Any) -> str:
     """A page with all that it may have, of spots of light and a painting that they cannot do."""
     rng = np.random.default_rng(0)
     y, x = np.mgrid[: SIZE[0], : SIZE[1]]
@@ -49,7 +49,7 @@ def _page(make_basis: Any, n: int, name: str = "ceiling_lamp_{}", **asked: Any) 
     importance = np.ones(SIZE, np.float32)
     importance[:, :5] = 0.2
     target = Target("evening", image.astype(np.float32), importance, everything=False)
-    constraints = Constraints.of(**asked) if asked else None
+    constraints = Constraints.of(**options) if options else None
     solution = solve(basis, target, constraints=constraints)
     predicted = combine(basis, solution.lighting)
     return report_page(
@@ -71,8 +71,8 @@ def _errors(solution: Solution) -> Uncertainty:
     scatter = 0.1 * weights + 1e-3
     interval = (np.maximum(weights - 2 * scatter, 0), weights + 2 * scatter)
     norm2 = solution.equations.target_norm2
-    told = np.zeros(len(weights), dtype=bool)
-    return Uncertainty(weights, scatter, scatter, interval, each, each, each, norm2, told)
+    is_bright = np.zeros(len(weights), dtype=bool)
+    return Uncertainty(weights, scatter, scatter, interval, each, each, each, norm2, is_bright)
 
 
 def _laid_out(folder: Path, page: str) -> dict[int, tuple[int, int]]:
@@ -89,12 +89,12 @@ def _laid_out(folder: Path, page: str) -> dict[int, tuple[int, int]]:
     options = ("--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={folder}/profile")
     wait = "--virtual-time-budget=10000"
     url = (folder / "screens.html").as_uri()
-    done = subprocess.run(
+    completed = subprocess.run(
         [program, *options, wait, "--dump-dom", url], capture_output=True, timeout=120, check=False
     )
-    told = re.findall(r"&lt;(\d+) (\d+) (\d+)&gt;", done.stdout.decode())
-    assert len(told) == len(WIDTHS), done.stderr.decode()[-2000:]
-    return {int(screen): (int(width), int(height)) for screen, width, height in told}
+    sizes = re.findall(r"&lt;(\d+) (\d+) (\d+)&gt;", completed.stdout.decode())
+    assert len(sizes) == len(WIDTHS), completed.stderr.decode()[-2000:]
+    return {int(screen): (int(width), int(height)) for screen, width, height in sizes}
 
 
 @pytest.fixture(scope="module")
@@ -104,7 +104,7 @@ def hall(make_basis: Any) -> str:
 
 
 @pytest.mark.parametrize(
-    ("n", "name", "asked"),
+    ("n", "name", "options"),
     [
         (3, "spot_{}", {}),
         (302, "ceiling_lamp_{}", {}),
@@ -112,9 +112,9 @@ def hall(make_basis: Any) -> str:
     ],
 )
 def test_nothing_scrolls_sideways_and_hundreds_of_lights_are_folded(
-    make_basis: Any, hall: str, tmp_path: Path, n: int, name: str, asked: Any
+    make_basis: Any, hall: str, tmp_path: Path, n: int, name: str, options: Any
 ) -> None:
-    page = hall if n == 302 else _page(make_basis, n, name, **asked)
+    page = hall if n == 302 else _page(make_basis, n, name, **options)
     screens = _laid_out(tmp_path, page)
     assert set(screens) == set(WIDTHS)
     for screen, (width, height) in screens.items():
@@ -128,8 +128,8 @@ def test_what_is_folded_is_there(hall: str) -> None:
     page = hall
     script = page.index("<script>")
     assert page.index("ceiling_<wbr>lamp_<wbr>301<") < script
-    shown = re.sub(r"<details.*?</details>", "", page[:script], flags=re.DOTALL)
-    assert len(re.findall('<td class="thumb">', shown)) == ROWS_SHOWN
+    visible_text = re.sub(r"<details.*?</details>", "", page[:script], flags=re.DOTALL)
+    assert len(re.findall('<td class="thumb">', visible_text)) == ROWS_SHOWN
     assert len(re.findall('<td class="thumb">', page)) == 302
     assert "292 more lights, each at most" in page
     assert not re.search(r"<details[^>]*\bopen\b", page)
@@ -140,7 +140,7 @@ def test_what_is_folded_is_there(hall: str) -> None:
             r"lamp_<wbr>(\d+)<small>.*?<span>([\d.]+) %</span>", page, flags=re.DOTALL
         )
     }
-    first = [int(k) for k in re.findall(r'"name">ceiling_<wbr>lamp_<wbr>(\d+)', shown)]
+    first = [int(k) for k in re.findall(r'"name">ceiling_<wbr>lamp_<wbr>(\d+)', visible_text)]
     assert first == sorted(first)
     rest = [share for k, share in shares.items() if k not in first]
     assert min(shares[k] for k in first) >= max(rest)

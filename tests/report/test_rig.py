@@ -56,8 +56,8 @@ def test_the_camera_follows_from_what_pixels_show(noise: float) -> None:
     geometry = ViewGeometry.of(a_room(noise))
     assert geometry is not None
     assert geometry.camera == pytest.approx(EYE, abs=1e-3 + 40 * noise)
-    seen = [geometry.pixel(tuple(p)) for p in geometry.points[::97]]  # type: ignore[arg-type]
-    np.testing.assert_allclose(seen, geometry.pixels[::97], atol=0.02 + 100 * noise)
+    pixels = [geometry.pixel(tuple(p)) for p in geometry.points[::97]]  # type: ignore[arg-type]
+    np.testing.assert_allclose(pixels, geometry.pixels[::97], atol=0.02 + 100 * noise)
     assert geometry.pixel((0.5, 1.5, 9.0)) is None  # behind the camera
 
 
@@ -107,10 +107,10 @@ def test_an_arrow_leads_from_where_a_light_pointed_to_where_it_does_now() -> Non
 def test_lights_far_away_do_not_shrink_the_room(position: Any) -> None:
     room = a_room()
     far = HungLight(EmitterPlace("far", position, (0.0, -1.0, 0.0)), (1.0, 1.0, 1.0))
-    alone, both = rig_drawing(room, [turned()]), rig_drawing(room, [turned(), far])
-    assert alone is not None
-    assert both is not None
-    assert alone.shape == both.shape
+    single, pair = rig_drawing(room, [turned()]), rig_drawing(room, [turned(), far])
+    assert single is not None
+    assert pair is not None
+    assert single.shape == pair.shape
 
 
 @pytest.mark.parametrize(

@@ -42,7 +42,7 @@ def _solved(make_basis: Any, **options: Any) -> Any:
 
 
 @pytest.mark.parametrize(
-    ("painted", "reached", "words"),
+    ("painted", "final", "words"),
     [
         ((2, 2, 2), (1, 1, 1), "brighter"),
         ((1, 1, 1), (2, 2, 2), "darker"),
@@ -54,12 +54,12 @@ def _solved(make_basis: Any, **options: Any) -> Any:
         ((1.01, 1, 1), (1, 1, 1), "a little brighter"),
     ],
 )
-def test_difference_of_colours(painted: Any, reached: Any, words: str):
-    assert spoken_difference(painted, reached) == words
+def test_difference_of_colours(painted: Any, final: Any, words: str):
+    assert spoken_difference(painted, final) == words
 
 
 @pytest.mark.parametrize(
-    ("region", "where"),
+    ("region", "place_words"),
     [
         ((0, 0), "is at the top left"),
         ((0, 1), "is at the top"),
@@ -68,9 +68,9 @@ def test_difference_of_colours(painted: Any, reached: Any, words: str):
         ((2, 2), "is at the bottom right"),
     ],
 )
-def test_places(region: tuple[int, int], where: str):
+def test_places(region: tuple[int, int], place_words: str):
     place = Place(region, 0.38, (0, 0, 1, 1), (1, 1, 4), (1, 1, 1))
-    assert where in spoken_place(place)
+    assert place_words in spoken_place(place)
     assert "(38 %): the paint is brighter and bluer than any mix of the lights." in spoken_place(
         place
     )
@@ -92,34 +92,34 @@ def test_bounds_and_percents():
 
 def test_whites_that_a_light_would_leave_are_told_with_the_side():
     bound = replace(_bound("colour", "spot_tide"), held_by="2200 to 9000 K", tint="greener")
-    said = spoken_bound(bound, 0.4)
-    assert said.startswith("Light spot_tide would have to be greener than its whites (2200 to")
+    sentence = spoken_bound(bound, 0.4)
+    assert sentence.startswith("Light spot_tide would have to be greener than its whites (2200 to")
     assert spoken_hold(bound) == "2200 to 9000 K; would have to be greener"
 
 
 def test_scatter_takes_four_times_the_samples_and_bias_twice(make_basis: Any):
-    basis, _, found, _ = _solved(make_basis)
-    scatter = replace(found, bias=np.zeros((3, 3)))
-    bias = replace(found, scatter=np.zeros((3, 3)), bias=np.ones((3, 3)))
+    basis, _, bars, _ = _solved(make_basis)
+    scatter = replace(bars, bias=np.zeros((3, 3)))
+    bias = replace(bars, scatter=np.zeros((3, 3)), bias=np.ones((3, 3)))
     assert halving_spp(basis, scatter, 0) == 4 * basis.origin.spp
     assert halving_spp(basis, bias, 0) == 2 * basis.origin.spp
-    assert 128 <= halving_spp(basis, found, 0) <= 256
+    assert 128 <= halving_spp(basis, bars, 0) <= 256
 
 
 def test_the_light_that_matters_is_named(make_basis: Any):
-    basis, solution, found, _ = _solved(make_basis)
-    text = uncertainty_sentence(basis, solution, found)
+    basis, solution, bars, _ = _solved(make_basis)
+    text = uncertainty_sentence(basis, solution, bars)
     assert "More samples would change light" in text
     assert "would halve that" in text
-    ends = (found.weights, found.weights)
-    quiet = replace(found, scatter=0 * found.scatter, bias=0 * found.bias, interval=ends)
+    ends = (bars.weights, bars.weights)
+    quiet = replace(bars, scatter=0 * bars.scatter, bias=0 * bars.bias, interval=ends)
     assert "change no light" in uncertainty_sentence(basis, solution, quiet)
 
 
 @given(st.lists(st.floats(0.005, 1), min_size=1, max_size=5))
 def test_percentages_of_parts_add_up(parts: list[float]):
-    whole = sum(parts)
-    shares = [x / whole for x in parts if x / whole >= 0.005]
+    total = sum(parts)
+    shares = [x / total for x in parts if x / total >= 0.005]
     percents = [int(x.removesuffix(" %")) for x in spoken_percents(shares)]
     assert sum(percents) == round(100 * sum(shares))
     # One percent for what is less is the most that any is off, beside the rounding.
@@ -127,13 +127,13 @@ def test_percentages_of_parts_add_up(parts: list[float]):
 
 
 def test_the_parts_of_what_is_missed_add_up(make_basis: Any):
-    *_, found = _solved(make_basis)
+    *_, diagnosis = _solved(make_basis)
     parts = {"unreachable": 0.965, "noise": 0.031, "painting_noise": 0.004, "forbidden": 0.0}
-    split = replace(found, **{name: x * found.total for name, x in parts.items()})
+    split = replace(diagnosis, **{name: x * diagnosis.total for name, x in parts.items()})
     shares = [int(x) for x in re.findall(r"(\d+) %", error_sentences(split)[0])]
     assert shares == [97, 3]
-    less = {**parts, "unreachable": 0.962, "painting_noise": 0.007}
-    split = replace(found, **{name: x * found.total for name, x in less.items()})
+    other_parts = {**parts, "unreachable": 0.962, "painting_noise": 0.007}
+    split = replace(diagnosis, **{name: x * diagnosis.total for name, x in other_parts.items()})
     assert re.findall(r"([\d.]+) %", error_sentences(split)[0]) == ["96", "3", "1"]
 
 
@@ -153,26 +153,30 @@ def test_sentence_and_table_give_the_same_percentages(make_basis: Any):
 
 
 def test_the_most_useful_comes_first(make_basis: Any):
-    *_, found = _solved(make_basis)
-    first, *rest = error_sentences(found)
+    *_, diagnosis = _solved(make_basis)
+    first, *rest = error_sentences(diagnosis)
     assert first.startswith("Of the difference (in energy), ")
     assert "is out of reach of any mix of the lights" in first
     assert len(rest) <= 3
-    met = replace(found, missed=0.009)
-    assert error_sentences(met) == ["The lights can make what is painted."]
-    half = 0.5 * found.total
-    held = replace(found, bounds=(_bound("zero", "key", gain=half, multiplier=(0, 1, 1)),))
-    assert "Light key is off in green and blue and still too much" in error_sentences(held)[-1]
+    almost_met = replace(diagnosis, missed=0.009)
+    assert error_sentences(almost_met) == ["The lights can make what is painted."]
+    half = 0.5 * diagnosis.total
+    with_bound = replace(
+        diagnosis, bounds=(_bound("zero", "key", gain=half, multiplier=(0, 1, 1)),)
+    )
+    assert (
+        "Light key is off in green and blue and still too much" in error_sentences(with_bound)[-1]
+    )
 
 
 def test_what_is_out_of_reach_is_so_beside_what_is_held(make_basis: Any):
-    *_, found = _solved(make_basis)
+    *_, diagnosis = _solved(make_basis)
     appearance = Appearance(12.0, 0.0, 20.0)
-    assert "is out of reach of any mix of the lights," in error_sentences(found, appearance)[0]
-    held = replace(appearance, reasons=(Reason("hold", (), 0.7),))
+    assert "is out of reach of any mix of the lights," in error_sentences(diagnosis, appearance)[0]
+    with_hold = replace(appearance, reasons=(Reason("hold", (), 0.7),))
     assert (
         "is out of reach of any mix of the lights while the rest is "
-        "held," in error_sentences(found, held)[0]
+        "held," in error_sentences(diagnosis, with_hold)[0]
     )
 
 
@@ -199,37 +203,37 @@ def test_what_holds_a_light_is_said(bound: Bound, words: str):
 
 
 def test_the_switched_off_light_that_would_help_most_is_named(make_basis: Any):
-    *_, found = _solved(make_basis)
+    *_, diagnosis = _solved(make_basis)
     shares = {"tie": 0.5, "off": 0.3, "left out": 0.2, "zero": 0.1}
-    bounds = [_bound(kind, kind, gain=share * found.total) for kind, share in shares.items()]
-    *_, first, second = error_sentences(replace(found, bounds=tuple(bounds)))
+    bounds = [_bound(kind, kind, gain=share * diagnosis.total) for kind, share in shares.items()]
+    *_, first, second = error_sentences(replace(diagnosis, bounds=tuple(bounds)))
     assert "tied together" in first
     assert second == spoken_bound(bounds[1], 0.3)
     assert "30 %" in second
     # If it is what helps most of all, once is enough.
-    alone = error_sentences(replace(found, bounds=tuple(bounds[1:])))
-    assert alone[-1] == second
-    assert sum("switched off" in sentence for sentence in alone) == 1
+    sentences = error_sentences(replace(diagnosis, bounds=tuple(bounds[1:])))
+    assert sentences[-1] == second
+    assert sum("switched off" in sentence for sentence in sentences) == 1
     # It is spoken of where others that would help as little are not.
-    little = [replace(bound, gain=0.03 * found.total) for bound in bounds]
-    assert "switched off" in error_sentences(replace(found, bounds=tuple(little)))[-1]
-    assert "dimmer" not in " ".join(error_sentences(replace(found, bounds=tuple(little))))
+    little = [replace(bound, gain=0.03 * diagnosis.total) for bound in bounds]
+    assert "switched off" in error_sentences(replace(diagnosis, bounds=tuple(little)))[-1]
+    assert "dimmer" not in " ".join(error_sentences(replace(diagnosis, bounds=tuple(little))))
     # What hardly helps is not spoken of.
-    faint = replace(bounds[1], gain=0.009 * found.total)
-    assert "switched off" not in " ".join(error_sentences(replace(found, bounds=(faint,))))
+    faint = replace(bounds[1], gain=0.009 * diagnosis.total)
+    assert "switched off" not in " ".join(error_sentences(replace(diagnosis, bounds=(faint,))))
 
 
 def test_the_report_says_how_many_bounds_were_not_looked_into(make_basis: Any):
-    basis, solution, _, found = _solved(make_basis)
-    bound = _bound("limits", "a", gain=0.5 * found.total, multiplier=(-2.5,))
+    basis, solution, _, diagnosis = _solved(make_basis)
+    bound = _bound("limits", "a", gain=0.5 * diagnosis.total, multiplier=(-2.5,))
     current = basis.mix(basis.current_weights)
     page = missed_section(
-        solution, replace(found, bounds=(bound,)), current, transform=ViewTransform()
+        solution, replace(diagnosis, bounds=(bound,)), current, transform=ViewTransform()
     )
     assert "−2.5 <small>per unit of luminance" in page
     assert "were not analysed" not in page
-    found = replace(found, bounds=(bound,), bounds_left_out=7)
-    page = missed_section(solution, found, current, transform=ViewTransform())
+    diagnosis = replace(diagnosis, bounds=(bound,), bounds_left_out=7)
+    page = missed_section(solution, diagnosis, current, transform=ViewTransform())
     assert "7 more seem to matter less and were not analysed" in page
 
 
@@ -253,25 +257,25 @@ def test_lights_are_called_lights_once(names: list[str], words: str):
 
 def test_of_hundreds_of_names_the_first_are_said(make_basis: Any):
     names = [f"spot_{k}" for k in range(302)]
-    said = spoken_bound(_bound("tie", *names), 0.5)
-    assert re.match(r"Lights spot_0, spot_1, .*… and 2\d\d more are tied together", said)
-    assert len(said) < 300
+    sentence = spoken_bound(_bound("tie", *names), 0.5)
+    assert re.match(r"Lights spot_0, spot_1, .*… and 2\d\d more are tied together", sentence)
+    assert len(sentence) < 300
 
 
 def test_a_light_that_is_called_so_is_not_called_twice(make_basis: Any):
-    basis, solution, found, _ = _solved(make_basis, names=["light_1", "light_2", "light_3"])
+    basis, solution, bars, _ = _solved(make_basis, names=["light_1", "light_2", "light_3"])
     assert re.match(
-        r"More samples would change light_\d, ", uncertainty_sentence(basis, solution, found)
+        r"More samples would change light_\d, ", uncertainty_sentence(basis, solution, bars)
     )
 
 
 def test_names_are_escaped(make_basis: Any):
     names = ["<b>1", "<b>2", "<b>3"]
-    basis, solution, found, diagnosis = _solved(make_basis, names=names)
+    basis, solution, bars, diagnosis = _solved(make_basis, names=names)
     bound = _bound("zero", "<b>2", gain=0.5 * diagnosis.total)
     diagnosis = replace(diagnosis, bounds=(bound,))
     current = basis.mix(basis.current_weights)
-    page = sure_section(basis, solution, found)
+    page = sure_section(basis, solution, bars)
     page += missed_section(solution, diagnosis, current, transform=ViewTransform())
     assert "<b>" not in page
     assert "&lt;b&gt;2" in page

@@ -13,13 +13,13 @@ from lightpaint.report.light_sheet import EDGE, GROUND, MAX_LIGHTS, _grid, light
 def told(sheet: np.ndarray, basis: Basis) -> list[float]:
     """Mean difference from the ground in the picture of each light that has a place."""
     grid = _grid(min(len(basis.lights), MAX_LIGHTS), basis.size)
-    found = []
+    tiles = []
     for k in range(min(len(basis.lights), MAX_LIGHTS)):
         x, y = grid.corner(k)
-        inside = sheet[y + 4 : y + grid.height - 4, x + 4 : x + grid.width - 4]
-        found.append(float(np.abs(inside.astype(float) - GROUND).mean()))
+        interior = sheet[y + 4 : y + grid.height - 4, x + 4 : x + grid.width - 4]
+        tiles.append(float(np.abs(interior.astype(float) - GROUND).mean()))
         assert (sheet[y - 1, x - 1 : x + grid.width + 1] == EDGE).all()
-    return found
+    return tiles
 
 
 @pytest.fixture(autouse=True)
@@ -57,16 +57,16 @@ def test_how_bright_a_light_is_does_not_change_its_picture(make_basis: Any) -> N
     basis = make_basis(3, size=(6, 8))
     # Powers of two, so that nothing is rounded; all alike, so that shares are as they were.
     brighter = replace(basis, planes=basis.images * np.float32(1024))
-    same = [light_sheet(x, title="") for x in (basis, brighter)]
-    assert np.array_equal(*same)
+    sheets = [light_sheet(x, title="") for x in (basis, brighter)]
+    assert np.array_equal(*sheets)
 
 
 def test_what_is_off_is_shown_as_it_would_be_and_what_is_not_there_is_not(make_basis: Any) -> None:
     images = np.random.default_rng(1).random((3, 6, 8, 3), np.float32)
     images[1] = 0
     basis = make_basis(images=images, emission=[[0, 0, 0], [1, 1, 1], [2, 1, 0]])
-    off, nowhere, on = told(light_sheet(basis, title=""), basis)
-    assert min(off, on) > 50
+    off_tile, nowhere, on = told(light_sheet(basis, title=""), basis)
+    assert min(off_tile, on) > 50
     assert nowhere < 10
 
 

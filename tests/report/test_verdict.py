@@ -28,14 +28,14 @@ from lightpaint.target.target import Target
 DARK, LIT = (0.1, 0.1, 0.1), (0.4, 0.4, 0.4)
 
 
-def _seen(missed: float, asked: float = 20.0, **about: Any) -> Appearance:
-    region, painted, reached = about.pop("at", ((1, 1), LIT, DARK))
-    place = Place(region, 0.9, (0, 0, 8, 8), painted, reached, about.pop("on", ""))
-    return replace(Appearance(missed, 0.0, asked, place), **about)
+def _seen(missed_delta_e: float, asked_delta_e: float = 20.0, **fields: Any) -> Appearance:
+    region, painted, final = fields.pop("at", ((1, 1), LIT, DARK))
+    place = Place(region, 0.9, (0, 0, 8, 8), painted, final, fields.pop("on", ""))
+    return replace(Appearance(missed_delta_e, 0.0, asked_delta_e, place), **fields)
 
 
 @pytest.mark.parametrize(
-    ("seen", "said"),
+    ("appearance", "sentence"),
     [
         (Appearance(0.0, 0.0, 0.0), "Close: it looks as painted."),
         (_seen(2.9), "Close: it looks as painted."),
@@ -117,8 +117,8 @@ def _seen(missed: float, asked: float = 20.0, **about: Any) -> Appearance:
         ),
     ],
 )
-def test_the_headline_in_words(seen: Appearance, said: str):
-    assert headline(seen) == said
+def test_the_headline_in_words(appearance: Appearance, sentence: str):
+    assert headline(appearance) == sentence
 
 
 PARTS = ("unreachable", "forbidden", "noise", "painting_noise")
@@ -138,29 +138,29 @@ def test_a_headline_names_no_cause_of_less_than_a_third(part: str, share: float)
     """Whatever the rest is, of parts as report.json has them."""
     others = [x for x in PARTS if x not in (part, "unreachable", "forbidden")]
     parts = {part: share} | dict.fromkeys(others, (1 - share) / 4)
-    said = headline(_seen(5.0, local_lights=("lamp",), error_shares=parts))
-    named = [x for x in PARTS if SAID[x] in said]
-    assert all(parts.get(x, 0) >= HEADLINE_SHARE for x in named if x == part)
-    assert (part in named) == (share >= HEADLINE_SHARE)
-    assert ("none of which accounts for a third" in said) == (share < HEADLINE_SHARE)
+    sentence = headline(_seen(5.0, local_lights=("lamp",), error_shares=parts))
+    causes = [x for x in PARTS if SAID[x] in sentence]
+    assert all(parts.get(x, 0) >= HEADLINE_SHARE for x in causes if x == part)
+    assert (part in causes) == (share >= HEADLINE_SHARE)
+    assert ("none of which accounts for a third" in sentence) == (share < HEADLINE_SHARE)
 
 
 @pytest.mark.parametrize(("share", "is_named"), [(0.3, False), (0.36, True)])
 def test_a_headline_names_no_reason_of_less_than_a_third(share: float, is_named: bool):
-    off = Reason("off", ("cove",), share)
-    said = headline(
-        _seen(5.0, local_lights=("lamp",), reasons=(off,), error_shares={"unreachable": 0.9})
+    reason = Reason("off", ("cove",), share)
+    sentence = headline(
+        _seen(5.0, local_lights=("lamp",), reasons=(reason,), error_shares={"unreachable": 0.9})
     )
-    assert ("cove is switched off" in said) == is_named
-    assert ("out of reach" in said) != is_named
+    assert ("cove is switched off" in sentence) == is_named
+    assert ("out of reach" in sentence) != is_named
 
 
 def test_what_changes_elsewhere_is_part_of_the_verdict():
     annex = UnpaintedChange(19.0, 51.0, "annex")
-    close = _seen(1.0, unpainted_change=annex)
-    said = "Unpainted parts change too, most of all the annex, by ΔE 51."
-    assert headline(close) == f"Close: it looks as painted. {said}"
-    assert headline(_seen(5.0, unpainted_change=annex)).endswith(said)
+    close_look = _seen(1.0, unpainted_change=annex)
+    sentence = "Unpainted parts change too, most of all the annex, by ΔE 51."
+    assert headline(close_look) == f"Close: it looks as painted. {sentence}"
+    assert headline(_seen(5.0, unpainted_change=annex)).endswith(sentence)
     corner = UnpaintedChange(3.0, 7.5, region=(0, 2))
     assert headline(_seen(1.0, unpainted_change=corner)).endswith(
         "most of all at the top right, by ΔE 7.5."
@@ -179,9 +179,9 @@ def test_darkness_that_is_painted_dark_is_close(make_basis: Any):
     basis = make_basis(2, (4, 6))
     black = Target.of(np.zeros((4, 6, 3), np.float32), name="night")
     solution = solve(basis, black)
-    said = verdict(solution, combine(basis, solution.lighting), None)
-    assert said.startswith("Close: it looks as painted. Mean ΔE 0.0 over what was painted (")
-    assert said.endswith(" Not checked by a render.")
+    sentence = verdict(solution, combine(basis, solution.lighting), None)
+    assert sentence.startswith("Close: it looks as painted. Mean ΔE 0.0 over what was painted (")
+    assert sentence.endswith(" Not checked by a render.")
 
 
 @pytest.mark.parametrize("bias", [1.0, 1.2])
@@ -194,12 +194,12 @@ def test_the_verdict_tells_of_the_verification(make_basis: Any, bias: float):
     noise = rng.normal(0, 0.02, (3, *predicted.image.shape)).astype(np.float32)
     rendered = Estimate(bias * predicted.image + noise[0], noise[1])
     checked = compare(replace(predicted, half_difference=noise[2]), rendered)
-    said = verdict(solution, predicted, checked)
+    sentence = verdict(solution, predicted, checked)
     if bias == 1:
-        assert said.endswith("A render confirms it.")
+        assert sentence.endswith("A render confirms it.")
     else:
-        assert "A render does NOT confirm it" in said
-        assert "standard errors apart, limit 5" in said
+        assert "A render does NOT confirm it" in sentence
+        assert "standard errors apart, limit 5" in sentence
 
 
 def test_one_number_everywhere(tmp_path: Path, make_basis: Any):
@@ -208,18 +208,18 @@ def test_one_number_everywhere(tmp_path: Path, make_basis: Any):
     write_basis(tmp_path / "b.basis.exr", basis)
     rng = np.random.default_rng(5)
     write_rgb(tmp_path / "p.exr", rng.random((24, 32, 3)).astype(np.float32))
-    done = run(tmp_path, "solve", "b.basis.exr", "p.exr", "-o", "out")
-    assert done.returncode == 0, done.stderr
-    [told] = re.findall(r"Mean ΔE ([\d.]+) over what was painted", done.stdout)
+    completed = run(tmp_path, "solve", "b.basis.exr", "p.exr", "-o", "out")
+    assert completed.returncode == 0, completed.stderr
+    [delta_e] = re.findall(r"Mean ΔE ([\d.]+) over what was painted", completed.stdout)
     certificate = read_lighting(tmp_path / "out" / "lighting.json").certificate
     assert certificate is not None
     assert certificate.delta_e is not None
-    assert f"{certificate.delta_e:.1f}" == told
-    written = json.loads((tmp_path / "out" / "lighting.json").read_text(encoding="utf-8"))
-    assert written["solve"]["delta_e"] == certificate.delta_e
+    assert f"{certificate.delta_e:.1f}" == delta_e
+    stored = json.loads((tmp_path / "out" / "lighting.json").read_text(encoding="utf-8"))
+    assert stored["solve"]["delta_e"] == certificate.delta_e
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert f"Mean ΔE {told} over what was painted" in page
-    for line in (done.stdout, page.split("</header>")[0]):
+    assert f"Mean ΔE {delta_e} over what was painted" in page
+    for line in (completed.stdout, page.split("</header>")[0]):
         assert "meets" not in line
         assert "RMS" not in line.split("missed of the painting")[0]
 
@@ -229,16 +229,16 @@ def test_what_a_render_would_have_missed_is_said(make_basis: BasisFactory):
     solution = solve(basis, Target.of(basis.current_look))
     predicted = combine(basis, solution.lighting)
     checked = compare(predicted, predicted)
-    for power, said in (
+    for power, lights_text in (
         ({"bulb": 0.49, "sun": 1.0}, "5 % in bulb."),
         ({"bulb": 0.3, "sun": 0.1}, "5 % in sun and bulb."),
         ({"a": 0.3, "b": 0.1, "c": 0.2, "d": 0.0}, "5 % in any light."),
         ({"a": 0.3, "b": 0.1, "c": 0.2, "d": 0.9}, "5 % in any light but d."),
         ({"a": 0.3, "b": 0.1, "c": 0.2, **dict.fromkeys("def", 1.0)}, "5 % in b, c and 1 more."),
     ):
-        told = verdict(solution, predicted, replace(checked, power=power))
-        missed = f"The render would probably have missed an error of {said}"
-        assert told.endswith(f"confirms it. {missed}")
+        sentence = verdict(solution, predicted, replace(checked, power=power))
+        warning = f"The render would probably have missed an error of {lights_text}"
+        assert sentence.endswith(f"confirms it. {warning}")
     assert verdict(solution, predicted, replace(checked, power={"sun": 0.5})).endswith("it.")
 
 

@@ -13,7 +13,9 @@ def test_no_module_of_the_viewer_imports_one_of_a_page():
     assert scripts
     for script in scripts:
         place = script.relative_to(ROOM).as_posix()
-        for named in re.findall(r"""(?:from |import\()\s*['"]([^'"]+)['"]""", script.read_text()):
-            path = normpath(join(dirname(place), named))
-            assert (ROOM / path).is_file(), f"{place} imports {named}"
-            assert not path.startswith(".."), f"{place} imports {named}"
+        for specifier in re.findall(
+            r"""(?:from |import\()\s*['"]([^'"]+)['"]""", script.read_text()
+        ):
+            path = normpath(join(dirname(place), specifier))
+            assert (ROOM / path).is_file(), f"{place} imports {specifier}"
+            assert not path.startswith(".."), f"{place} imports {specifier}"

@@ -30,11 +30,11 @@ BARE = '<bsdf type="mask"><ref id="inner"/></bsdf>'
 
 
 def sphere(
-    k: int, *, about: str = "", lamp: str = "", radius: float = 0.02, power: float = 4
+    k: int, *, bsdf: str = "", lamp: str = "", radius: float = 0.02, power: float = 4
 ) -> str:
     """An area light in a grid under the ceiling. about: of the shape; lamp: of its emitter."""
     x, y = -0.8 + 0.1 * (k % 17), 1.8 - 0.1 * (k // 17)
-    return f"""<shape type="sphere" {about}><point name="center" x="{x}" y="{y}" z="-0.5"/>
+    return f"""<shape type="sphere" {bsdf}><point name="center" x="{x}" y="{y}" z="-0.5"/>
         <float name="radius" value="{radius}"/>{{}}
         <emitter type="area" {lamp}><rgb name="radiance" value="{power} 3 2"/></emitter></shape>"""
 
@@ -50,7 +50,7 @@ CITY = (
     + "".join(sphere(k, radius=0.01 + k / 1e4).format('<ref id="glass"/>') for k in range(100))
     + "".join(sphere(k, power=5).format(BARE) for k in range(60))
     + "".join(sphere(k, lamp=f'id="elm__{k}"').format("") for k in range(50))
-    + "".join(sphere(k, about=f'id="lamp{k}"').format('<ref id="glass"/>') for k in range(30))
+    + "".join(sphere(k, bsdf=f'id="lamp{k}"').format('<ref id="glass"/>') for k in range(30))
     + "".join(point(k) for k in range(40))
     + "".join(sphere(k, power=9).format("") for k in range(19))
     + LIGHTS["sky"]
@@ -77,15 +77,15 @@ def test_alike_and_without_names_are_one_light(city: Scene) -> None:
     assert sum(len(light.members) for light in city.lights) == 300
     glass = city.light("glass")
     assert (glass.emission, glass.unit) == ((4, 3, 2), "W/(m² sr)")
-    told = [remark for remark in remarks_of_scene(city) if "similar lamps" in remark]
-    assert len(told) == len(FOUND)
-    assert "100 similar lamps without names form one light, glass" in told[0]
+    remarks = [remark for remark in remarks_of_scene(city) if "similar lamps" in remark]
+    assert len(remarks) == len(FOUND)
+    assert "100 similar lamps without names form one light, glass" in remarks[0]
 
 
 def test_they_can_be_parted(city: Scene) -> None:
-    apart = load_scene(city.path, group_alike=False)
-    assert len(apart.lights) == 300
-    assert apart.identity == apart.content == city.content != city.identity
+    separate = load_scene(city.path, group_alike=False)
+    assert len(separate.lights) == 300
+    assert separate.identity == separate.content == city.content != city.identity
     # A group takes its own; what is left is as alike as before.
     some = load_scene(city.path, groups={"half": ["area_?", "area_1?"]})
     assert found(some) == {**FOUND, "glass": 80}
@@ -164,18 +164,20 @@ def test_from_the_listing_to_the_relit_scene(tmp_path: Path) -> None:
     lamps = "".join(sphere(k).format('<ref id="glass"/>') for k in range(40))
     room = write_room(tmp_path, lights=GLASS + lamps + LIGHTS["sky"])
     small = ("-D", "width=16", "--spp", 2)
-    done = run(tmp_path, "lights", room, "--no-sheet")
-    assert [line.split()[0] for line in done.stdout.splitlines()] == ["light", "glass", "sky"]
-    assert "--no-group-alike separates them, --group name=VALUE makes a light" in done.stderr
+    completed = run(tmp_path, "lights", room, "--no-sheet")
+    assert [line.split()[0] for line in completed.stdout.splitlines()] == ["light", "glass", "sky"]
+    assert "--no-group-alike separates them, --group name=VALUE makes a light" in completed.stderr
     listed = json.loads(succeed(tmp_path, "lights", room, "--json"))["lights"]
     assert [len(light["members"]) for light in listed] == [40, 1]
-    apart = json.loads(succeed(tmp_path, "lights", room, "--json", "--no-group-alike"))["lights"]
-    assert len(apart) == 41
+    separate_lights = json.loads(succeed(tmp_path, "lights", room, "--json", "--no-group-alike"))[
+        "lights"
+    ]
+    assert len(separate_lights) == 41
 
     write_rgb(tmp_path / "p.exr", np.full((20, 16, 3), 0.4, np.float32))
-    done = run(tmp_path, "solve", room, "p.exr", *small, "-o", "out")
-    assert done.returncode == 0, done.stderr
-    assert done.stderr.count("similar lamps") == 1
+    completed = run(tmp_path, "solve", room, "p.exr", *small, "-o", "out")
+    assert completed.returncode == 0, completed.stderr
+    assert completed.stderr.count("similar lamps") == 1
     lighting = read_lighting(tmp_path / "out" / "lighting.json")
     assert [light.name for light in lighting.lights] == ["glass", "sky"]
     relit = load_scene(tmp_path / "out" / "relit.xml", group_alike=False)
@@ -183,5 +185,5 @@ def test_from_the_listing_to_the_relit_scene(tmp_path: Path) -> None:
     assert all(np.array_equal(np.float32(x.emission), solved) for x in relit.emitters[:40])
     # The basis that is kept is found again.
     assert "kept from an earlier run" in run(tmp_path, "basis", room, *small).stderr
-    told = run_refused(tmp_path, "solve", room, "p.exr", *small, "--lock", "area_3")
-    assert "'area_3' is part of the light 'glass': constrain that light" in told
+    message = run_refused(tmp_path, "solve", room, "p.exr", *small, "--lock", "area_3")
+    assert "'area_3' is part of the light 'glass': constrain that light" in message

@@ -38,13 +38,13 @@ def test_a_film_is_cut_into_whole_blocks() -> None:
 
 
 @pytest.mark.parametrize(
-    "asked", ["1/1081", "1/0", "100x50", "960x541", "3840x2160", "0x0", "1920x1"]
+    "resolution", ["1/1081", "1/0", "100x50", "960x541", "3840x2160", "0x0", "1920x1"]
 )
-def test_anything_else_is_refused_with_what_works(asked: str) -> None:
+def test_anything_else_is_refused_with_what_works(resolution: str) -> None:
     with pytest.raises(
         SceneError, match=r"1920x1080 cannot be reduced to .*: 960x540 \(1/2\), 640"
     ):
-        reduction(FULL_HD, asked)
+        reduction(FULL_HD, resolution)
 
 
 def test_a_refusal_names_sizes_that_are_near() -> None:
@@ -54,10 +54,10 @@ def test_a_refusal_names_sizes_that_are_near() -> None:
         reduction(Film(0, (683, 512), (683, 512), (0, 0)), "171x128")
 
 
-@pytest.mark.parametrize("asked", ["", "half", "4", "2/4", "-1/4", "1/4x", "320X180", "1e2x3"])
-def test_what_is_no_resolution_is_said_to_be_none(asked: str) -> None:
+@pytest.mark.parametrize("resolution", ["", "half", "4", "2/4", "-1/4", "1/4x", "320X180", "1e2x3"])
+def test_what_is_no_resolution_is_said_to_be_none(resolution: str) -> None:
     with pytest.raises(SceneError, match="is not a resolution"):
-        reduction(FULL_HD, asked)
+        reduction(FULL_HD, resolution)
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 7), (7, 1)])
@@ -106,25 +106,25 @@ def test_a_pixel_is_the_block_that_a_painting_is_averaged_over(drawn: object) ->
 
     crop, beyond, offset, factors = drawn  # type: ignore[misc]
     size = (crop[0] + offset[0] + beyond[0] - 1, crop[1] + offset[1] + beyond[1] - 1)
-    film = whole = Film(0, size, crop, offset)
+    film = full_film = Film(0, size, crop, offset)
     for factor in factors:
         if factor <= min(film.pixels):
             film = reduced(film, factor)
-    (width, height), (columns, rows) = film.pixels, whole.pixels
+    (width, height), (columns, rows) = film.pixels, full_film.pixels
     # Sizes alone tell the rest.
     factor = whole_factor((rows, columns), (height, width))
     assert factor is not None
     assert factor >= np.prod([1, *(f for f in factors[:1] if f <= min(columns, rows))])
     if len(factors) == 1:
-        assert reduction(whole, f"{width}x{height}") == factor
-    elif film.block * whole.size[0] != factor * film.size[0]:
+        assert reduction(full_film, f"{width}x{height}") == factor
+    elif film.block * full_film.size[0] != factor * film.size[0]:
         return  # a size so small that other blocks are as many
     y, x = np.mgrid[:rows, :columns] + 0.5
-    at = block_mean(np.dstack([x, y]), factor).reshape(-1, 2)
+    centres = block_mean(np.dstack([x, y]), factor).reshape(-1, 2)
     target = Target.of(np.dstack([x, y, x]).astype(np.float32)).fitted_to(
         (height, width), resize=False
     )
-    np.testing.assert_allclose(target.image[..., :2].reshape(-1, 2), at, rtol=1e-6)
+    np.testing.assert_allclose(target.image[..., :2].reshape(-1, 2), centres, rtol=1e-6)
 
     def directions(film: Film, places: np.ndarray) -> np.ndarray:
         camera = mi.load_dict({"type": "perspective", "fov": 40, "film": film.load()})
@@ -135,19 +135,19 @@ def test_a_pixel_is_the_block_that_a_painting_is_averaged_over(drawn: object) ->
     y, x = np.mgrid[:height, :width] + 0.5
     middles = np.dstack([x, y]).reshape(-1, 2) * film.block
     # Directions in float32.
-    np.testing.assert_allclose(directions(film, middles), directions(whole, at), atol=2e-6)
+    np.testing.assert_allclose(directions(film, middles), directions(full_film, centres), atol=2e-6)
 
 
 def test_what_is_left_out_is_said(tmp_path: Path) -> None:
     scene = load_scene(write_room(tmp_path), parameters={"width": 23})
-    asked = Settings(resolution="1/3")
+    small_film = Settings(resolution="1/3")
     small = on_film(scene, None, "1/3")
-    assert remarks_of_film(scene, asked) == []
-    assert remarks_of_film(small, asked) == [
+    assert remarks_of_film(scene, small_film) == []
+    assert remarks_of_film(small, small_film) == [
         "film of 23x20 reduced to 7x6 blocks of 3x3 pixels: 2 columns of pixels at the right and 2 "
         "rows at the bottom are left over and ignored"
     ]
-    assert remarks_of_film(scene.reduced("1/2"), asked)[0].endswith(
+    assert remarks_of_film(scene.reduced("1/2"), small_film)[0].endswith(
         "11x10 blocks of 2x2 pixels: 1 column of pixels at the right is left over and ignored"
     )
     target = Target.of(np.ones((20, 23, 3)))
@@ -156,8 +156,8 @@ def test_what_is_left_out_is_said(tmp_path: Path) -> None:
         "rows at the bottom are left over and ignored"
     ]
     thin = load_scene(write_room(tmp_path), parameters={"width": 700_000})
-    [said] = remarks_of_film(on_film(thin, "preview", None), Settings(quality="preview"))
-    assert said == (
+    [remark] = remarks_of_film(on_film(thin, "preview", None), Settings(quality="preview"))
+    assert remark == (
         'the film cannot be reduced as far as quality="preview" asks: 35000x1 pixels are rendered'
     )
 
@@ -208,25 +208,25 @@ def test_a_small_pixel_is_the_mean_of_its_block(
     assert small.identity == scene.identity
     assert small.size == size
     large = render(scene, spp=1024, stream=Stream.TEMPLATE)
-    whole = large.reduced(factor)
-    beside = block_mean(np.roll(large.image, 1, axis=(0, 1)), factor)
+    full_render = large.reduced(factor)
+    neighbour = block_mean(np.roll(large.image, 1, axis=(0, 1)), factor)
     part = render(small, spp=4096, stream=Stream.VERIFICATION)
     basis = render_basis(small, spp=4096)
-    assert basis.size == whole.size
-    now = basis.mix(basis.current_weights)
+    assert basis.size == full_render.size
+    present_look = basis.mix(basis.current_weights)
     weights = basis.current_weights.astype(np.float32)[:, None, None, :]
     noise = {
         "a render": np.square(part.half_difference, dtype=np.float64),
         "the basis": np.square((basis.half_differences * weights).sum(axis=0), dtype=np.float64),
     }
-    for name, image in {"a render": part.image, "the basis": now}.items():
-        gap = (whole.image - image).astype(np.float64)
-        squares = noise[name] + np.square(whole.half_difference, dtype=np.float64)
+    for name, image in {"a render": part.image, "the basis": present_look}.items():
+        gap = (full_render.image - image).astype(np.float64)
+        squares = noise[name] + np.square(full_render.half_difference, dtype=np.float64)
         # Noise: four and a half standard errors of the sum, and of pixels in the mean square.
         assert abs(gap.sum()) <= 4.5 * np.sqrt(squares.sum()), name
         assert np.square(gap).sum() <= 4 * squares.sum(), name
         # A pixel further is another picture.
-        assert np.square(beside - image).sum() > 4 * squares.sum(), name
+        assert np.square(neighbour - image).sum() > 4 * squares.sum(), name
 
 
 def test_on_blocks_every_plane_is_what_mitsuba_makes_of_their_pixels(tmp_path: Path) -> None:
@@ -247,8 +247,8 @@ def test_on_blocks_every_plane_is_what_mitsuba_makes_of_their_pixels(tmp_path: P
         assert abs(gap.sum()) <= 4.5 * np.sqrt(squares.sum())
         assert np.square(gap).sum() <= 10 * squares.sum()
     assert (together.emitters_seen == separate.emitters_seen).mean() > 0.9
-    small, whole = render_surfaces(scene), render_surfaces(load_scene(scene.path))
+    small, full_surfaces = render_surfaces(scene), render_surfaces(load_scene(scene.path))
     assert small.depth.shape == scene.size
-    for name, coverage in whole.coverage.items():
+    for name, coverage in full_surfaces.coverage.items():
         # Noise of 18 samples a pixel, at the edges.
         assert np.abs(small.coverage[name] - block_mean(coverage, 3)).mean() < 0.03

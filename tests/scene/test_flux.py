@@ -53,13 +53,13 @@ def test_flux_of_a_spot_is_what_arrives_on_a_sphere_around_it(tmp_path: Path) ->
     frame = mi.traverse(spot)["to_world"]
     count = 20_000
     theta = ((np.arange(count) + 0.5) / count * np.pi).astype(np.float32)
-    around = dr.zeros(mi.SurfaceInteraction3f, count)
+    surface = dr.zeros(mi.SurfaceInteraction3f, count)
     on_sphere = mi.Point3f(np.sin(theta), np.zeros_like(theta), np.cos(theta))
-    around.p = frame @ on_sphere
-    _, arrives = spot.sample_direction(around, mi.Point2f(0.5))
+    surface.p = frame @ on_sphere
+    _, arrives = spot.sample_direction(surface, mi.Point2f(0.5))
     irradiance = np.array(arrives)[0]
     flux = float((2 * np.pi * np.sin(theta) * irradiance).sum() * np.pi / count)
-    del loaded, spot, frame, around, arrives
+    del loaded, spot, frame, surface, arrives
     gc.collect()
     assert _flux(scene.light("beam")) == pytest.approx(flux, rel=1e-4)
 

@@ -38,10 +38,10 @@ WRITTEN = {
 }
 
 
-def room(folder: Path, written: str = "lacking") -> Path:
-    """The room with its bulb alone, and `written` for its integrator."""
-    text, _ = WRITTEN[written]
-    if written in ("wrapped", "nested"):
+def room(folder: Path, integrator_text: str = "lacking") -> Path:
+    """The room with its bulb alone, and `integrator_text` for its integrator."""
+    text, _ = WRITTEN[integrator_text]
+    if integrator_text in ("wrapped", "nested"):
         text += "</integrator>"
     (folder / "parts").mkdir(exist_ok=True)
     (folder / "parts" / "of.xml").write_text(f'<scene version="3.0.0">{LACKING}</scene>')
@@ -80,21 +80,21 @@ def test_what_is_no_choice(text: str) -> None:
         IntegratorChoice.of(text)
 
 
-@pytest.mark.parametrize("written", WRITTEN)
-def test_it_is_loaded_and_the_relit_scene_has_it(tmp_path: Path, written: str) -> None:
-    path, (_, depth) = room(tmp_path, written), WRITTEN[written]
-    if written not in ("none", "handled"):
+@pytest.mark.parametrize("integrator_text", WRITTEN)
+def test_it_is_loaded_and_the_relit_scene_has_it(tmp_path: Path, integrator_text: str) -> None:
+    path, (_, depth) = room(tmp_path, integrator_text), WRITTEN[integrator_text]
+    if integrator_text not in ("none", "handled"):
         with pytest.raises(SceneError):
             load_scene(path)
     scene = load_scene(path, integrator="path:rr_depth=4")
-    seen = scene.integrator
-    assert (seen.plugin, seen.max_depth, seen.rr_depth) == ("path", depth, 4)
+    integrator = scene.integrator
+    assert (integrator.plugin, integrator.max_depth, integrator.rr_depth) == ("path", depth, 4)
     relit = lp.relight(scene, _lighting(scene), tmp_path / "relit" / "relit.xml")
-    assert relit.integrator == seen
+    assert relit.integrator == integrator
     assert relit.integrator_choice is None  # it is its own now
     _loads_in_plain_mitsuba(tmp_path / "relit" / "relit.xml")
     # What is not in the place of the integrator is untouched.
-    assert (tmp_path / "relit" / "parts" / "of.xml").exists() == (written == "included")
+    assert (tmp_path / "relit" / "parts" / "of.xml").exists() == (integrator_text == "included")
 
 
 def _lighting(scene: Scene) -> Lighting:
@@ -145,17 +145,19 @@ def test_from_solve_to_verify(tmp_path: Path) -> None:
     chosen = ("--integrator", "path", "--spp", 16)
     assert "bulb" in succeed(tmp_path, "lights", "--no-sheet", path, *chosen[:2])
     succeed(tmp_path, "template", path, *chosen, "-o", "t.exr")
-    done = run(tmp_path, "solve", path, *chosen, "t.exr", "-o", "out")
-    assert done.returncode == 0, done.stderr
-    assert "rendered with path:max_depth=6 instead of the scene's own integrator" in done.stderr
-    assert "A render confirms it." in done.stdout
+    completed = run(tmp_path, "solve", path, *chosen, "t.exr", "-o", "out")
+    assert completed.returncode == 0, completed.stderr
+    assert (
+        "rendered with path:max_depth=6 instead of the scene's own integrator" in completed.stderr
+    )
+    assert "A render confirms it." in completed.stdout
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "path:max_depth=6, not the scene&#x27;s own" in page
     # The relit scene says it itself.
     assert "agree within noise" in succeed(tmp_path, "verify", "out")
     succeed(tmp_path, "relight", path, "out/lighting.json", *chosen, "-o", "again")
-    again, relit = (tmp_path / name / "relit.xml" for name in ("again", "out"))
-    assert again.read_bytes() == relit.read_bytes()
+    second_relit, relit = (tmp_path / name / "relit.xml" for name in ("again", "out"))
+    assert second_relit.read_bytes() == relit.read_bytes()
     assert "bdpt" not in relit.read_text(encoding="utf-8")
     succeed(tmp_path, "basis", path, *chosen, "-o", "b.basis.exr")
     line = run_refused(tmp_path, "solve", "b.basis.exr", "t.exr", *chosen[:2], "-o", "no")
@@ -182,9 +184,9 @@ def test_a_job_carries_it(tmp_path: Path, make_basis: Any) -> None:
     height, width = scene.content.size
     write_rgb(tmp_path / "p.exr", np.ones((height, width, 3), np.float32))
     job = lp.Job((scene,), (lp.Painting(str(tmp_path / "p.exr")),), tmp_path / "out")
-    again = lp.Job.from_json(job.to_json())
-    assert again == job
-    assert again.scenes[0].integrator == "path"
+    reread = lp.Job.from_json(job.to_json())
+    assert reread == job
+    assert reread.scenes[0].integrator == "path"
     other = replace(job, scenes=(lp.SceneFile(str(path), integrator="direct"),))
     assert other != job
     look = lp.paint_with_light(path, tmp_path / "p.exr", tmp_path / "o", integrator="path", spp=2)

@@ -47,20 +47,20 @@ def choose(
     groups: Mapping[str, Sequence[str]] | None = None,
     among: Sequence[Emitter] = HALL,
 ) -> dict[str, Light]:
-    found = choose_lights(among, scene="hall.xml", lights=lights, groups=groups)
-    names = [name for light in found for name in light.member_names]
+    choice = choose_lights(among, scene="hall.xml", lights=lights, groups=groups)
+    names = [name for light in choice for name in light.member_names]
     assert sorted(names) == sorted(e.name for e in among)  # each emitter is somewhere, once
-    assert [light.is_fixed for light in found] == sorted(light.is_fixed for light in found)
-    return {light.name: light for light in found}
+    assert [light.is_fixed for light in choice] == sorted(light.is_fixed for light in choice)
+    return {light.name: light for light in choice}
 
 
 def test_without_a_wish_every_emitter_is_a_light_and_what_cannot_be_scaled_is_kept() -> None:
-    found = choose()
-    assert list(found) == [*(e.name for e in HALL[:-1]), REST]
-    assert found[REST].is_fixed
-    assert found[REST].member_names == ("screen",)
-    assert found["key"].emission == (4, 3, 2)
-    assert found["key"].unit == "W/(m² sr)"
+    choice = choose()
+    assert list(choice) == [*(e.name for e in HALL[:-1]), REST]
+    assert choice[REST].is_fixed
+    assert choice[REST].member_names == ("screen",)
+    assert choice["key"].emission == (4, 3, 2)
+    assert choice["key"].unit == "W/(m² sr)"
     assert not any(light.is_fixed for light in choose(among=HALL[:-1]).values())
 
 
@@ -89,9 +89,9 @@ def test_black_groups() -> None:
 
 
 def test_a_filter_keeps_all_else_in_one_fixed_light() -> None:
-    found = choose(["key", "window_*", "chandelier"], {"chandelier": ["bulb_1", "bulb_2"]})
-    assert list(found) == ["key", "chandelier", "window_1", "window_2", REST]
-    assert found[REST].member_names == ("sky", "mesh", "screen")
+    choice = choose(["key", "window_*", "chandelier"], {"chandelier": ["bulb_1", "bulb_2"]})
+    assert list(choice) == ["key", "chandelier", "window_1", "window_2", REST]
+    assert choice[REST].member_names == ("sky", "mesh", "screen")
     # A group that is not chosen is kept as well, and patterns take what can be taken.
     assert choose(["key"], {"g": ["bulb_*"]})[REST].members == HALL[1:]
     assert "g" in choose(groups={"g": ["s*"]})
@@ -128,9 +128,9 @@ def test_a_name_that_looks_like_a_pattern_is_a_name() -> None:
 def test_wishes_that_cannot_be_met(
     lights: list[str] | None, groups: dict[str, list[str]], words: str
 ) -> None:
-    with pytest.raises(SceneError, match=words) as caught:
+    with pytest.raises(SceneError, match=words) as refusal:
         choose(lights, groups)
-    assert "\n" not in str(caught.value)
+    assert "\n" not in str(refusal.value)
 
 
 def test_a_scene_of_nothing_that_can_be_scaled() -> None:
@@ -167,10 +167,10 @@ def test_lights_file(tmp_path: Path) -> None:
 def test_lights_files_that_are_wrong(tmp_path: Path, text: bytes, words: str) -> None:
     path = tmp_path / "hall.lights.toml"
     path.write_bytes(text)
-    with pytest.raises(SceneError, match=words) as caught:
+    with pytest.raises(SceneError, match=words) as refusal:
         read_lights_file(path)
-    assert "\n" not in str(caught.value)
-    assert "hall.lights.toml" in str(caught.value)
+    assert "\n" not in str(refusal.value)
+    assert "hall.lights.toml" in str(refusal.value)
 
 
 def test_no_lights_file(tmp_path: Path) -> None:

@@ -51,37 +51,37 @@ def test_a_light_with_a_shape_changes_what_the_others_meet(room: Scene) -> None:
 def test_back_and_forth_is_the_same_place(room: Scene, name: str) -> None:
     site = room.light(name).members[0].site
     ahead = np.array(site.position or (0, 0, 0)) + np.array(site.direction or (0, 0, 0))
-    back = lp.Pose(
+    pose_back = lp.Pose(
         position=site.position,
         target=None if site.direction is None else ahead,
         cutoff=site.cutoff,
         beam=site.beam,
     )
     pose = POSES.get(name, lp.Pose(position=(0.2, 1, 0), target=(1, 0, 1)))
-    again = room.moved({name: pose}).moved({name: back}).light(name).members[0].site
+    site_back = room.moved({name: pose}).moved({name: pose_back}).light(name).members[0].site
     for key in ("position", "direction", "cutoff", "beam"):
-        old, new = getattr(site, key), getattr(again, key)
+        old, new = getattr(site, key), getattr(site_back, key)
         assert (old is None) == (new is None)
         if old is not None:
             np.testing.assert_allclose(new, old, atol=2e-6)  # single precision
 
 
 def test_the_file_written_is_the_scene_in_memory(room: Scene, tmp_path: Path) -> None:
-    moved = room.moved({**POSES, "panel": lp.Pose(position=(0.1, 1.5, 0), target=(0, 0, 0.2))})
-    relit = lp.relight(moved, current(moved), tmp_path / "out" / "relit.xml")
-    assert relit.light_identities == moved.light_identities
-    assert relit.unlit_content == moved.unlit_content
+    moved_room = room.moved({**POSES, "panel": lp.Pose(position=(0.1, 1.5, 0), target=(0, 0, 0.2))})
+    relit = lp.relight(moved_room, current(moved_room), tmp_path / "out" / "relit.xml")
+    assert relit.light_identities == moved_room.light_identities
+    assert relit.unlit_content == moved_room.unlit_content
 
 
 def test_plain_mitsuba_renders_it_as_the_basis_predicts(room: Scene, tmp_path: Path) -> None:
     """At one seed both draw the same paths and differ by rounding alone."""
     import mitsuba as mi
 
-    moved = room.moved({**POSES, "panel": lp.Pose(position=(0.1, 1.5, 0), target=(0, 0, 0.2))})
-    lighting = current(moved)
+    moved_room = room.moved({**POSES, "panel": lp.Pose(position=(0.1, 1.5, 0), target=(0, 0, 0.2))})
+    lighting = current(moved_room)
     path = tmp_path / "out" / "relit.xml"
-    relit = lp.relight(moved, lighting, path)
-    basis = lp.render_basis(moved, spp=1024)
+    relit = lp.relight(moved_room, lighting, path)
+    basis = lp.render_basis(moved_room, spp=1024)
     predicted = lp.combine(basis, lighting)
     picture = np.array(mi.render(mi.load_file(str(path)), spp=1024, seed=5))
     assert picture.shape == predicted.image.shape
@@ -90,8 +90,8 @@ def test_plain_mitsuba_renders_it_as_the_basis_predicts(room: Scene, tmp_path: P
 
 
 def test_a_second_move_goes_on_from_the_first(room: Scene) -> None:
-    once = room.moved({"beam": lp.Pose(position=(0, 1.5, 1))})
-    twice = once.moved({"beam": lp.Pose(target=(0, 0, 0))}).light("beam").members[0].site
+    moved_once = room.moved({"beam": lp.Pose(position=(0, 1.5, 1))})
+    twice = moved_once.moved({"beam": lp.Pose(target=(0, 0, 0))}).light("beam").members[0].site
     assert twice.position == (0, 1.5, 1)
     np.testing.assert_allclose(twice.direction, np.array([0, -1.5, -1]) / np.hypot(1.5, 1))
 
@@ -146,10 +146,10 @@ def test_the_smallest_rotation() -> None:
     for _ in range(50):
         a, b = rng.normal(size=(2, 3))
         a, b = a / np.linalg.norm(a), b / np.linalg.norm(b)
-        for there in (b, a, -a):
-            turn = rotation_between(a, there)
-            np.testing.assert_allclose(turn @ a, there, atol=1e-12)
+        for target in (b, a, -a):
+            turn = rotation_between(a, target)
+            np.testing.assert_allclose(turn @ a, target, atol=1e-12)
             np.testing.assert_allclose(turn.T @ turn, np.eye(3), atol=1e-12)
             assert np.linalg.det(turn) == pytest.approx(1)
-            angle = np.arccos(np.clip(a @ there, -1, 1))
+            angle = np.arccos(np.clip(a @ target, -1, 1))
             assert np.trace(turn) == pytest.approx(1 + 2 * np.cos(angle))

@@ -30,19 +30,19 @@ def relit(scene: Scene, path: Path) -> Scene:
 
 
 def test_a_written_scene_has_the_new_lights_of_memory(room: Scene, tmp_path: Path) -> None:
-    lit = room.with_new_emitters([POINT, SPOT, PANEL])
-    written = relit(lit, tmp_path / "relit" / "relit.xml")
-    assert [x.name for x in written.emitters] == [x.name for x in lit.emitters]
-    assert written.light_identities == lit.light_identities
+    lit_room = room.with_new_emitters([POINT, SPOT, PANEL])
+    relit_room = relit(lit_room, tmp_path / "relit" / "relit.xml")
+    assert [x.name for x in relit_room.emitters] == [x.name for x in lit_room.emitters]
+    assert relit_room.light_identities == lit_room.light_identities
     for new in (POINT, SPOT, PANEL):
-        here, there = lit.light(new.name), written.light(new.name)
-        assert here.emission == there.emission == pytest.approx(new.emission)
-        for site in (here.members[0].site, there.members[0].site):
+        light, relit_light = lit_room.light(new.name), relit_room.light(new.name)
+        assert light.emission == relit_light.emission == pytest.approx(new.emission)
+        for site in (light.members[0].site, relit_light.members[0].site):
             assert site.position == pytest.approx(new.pose.position, abs=1e-6)
             assert site.direction == (
                 None if new is POINT else pytest.approx(new.site.direction, abs=1e-6)
             )
-    assert lit.light("aimed").members[0].site.beam == pytest.approx(25 * 0.75)
+    assert lit_room.light("aimed").members[0].site.beam == pytest.approx(25 * 0.75)
 
 
 def test_the_text_of_the_user_is_left_as_it_is(room: Scene, tmp_path: Path) -> None:
@@ -56,23 +56,25 @@ def test_the_text_of_the_user_is_left_as_it_is(room: Scene, tmp_path: Path) -> N
 
 
 def test_planes_of_the_others_stay_if_a_point_is_added(room: Scene) -> None:
-    lit = room.with_new_emitters([POINT, SPOT])
-    assert lit.light_identities[: len(room.lights)] == room.light_identities
+    lit_room = room.with_new_emitters([POINT, SPOT])
+    assert lit_room.light_identities[: len(room.lights)] == room.light_identities
 
 
 def test_the_flux_of_a_panel_is_that_of_its_area(room: Scene) -> None:
-    lit = room.with_new_emitters([PANEL])
-    assert lit.light("sheet").unit_flux == pytest.approx((np.pi * 0.1,) * 3)
+    lit_room = room.with_new_emitters([PANEL])
+    assert lit_room.light("sheet").unit_flux == pytest.approx((np.pi * 0.1,) * 3)
 
 
 def test_a_new_light_moves_like_another(room: Scene, tmp_path: Path) -> None:
     pose = lp.Pose(position=(0.2, 1.4, 0.2), target=(0.1, 0, 0))
-    moved = room.with_new_emitters([SPOT, PANEL]).moved({"aimed": pose, "sheet": pose})
-    there = [NewEmitter(x.name, x.kind, pose, x.size) for x in (SPOT, PANEL)]
-    assert moved.light("sheet").members[0].site.position == pytest.approx(pose.position)
-    assert moved.light("aimed").members[0].site.direction == pytest.approx(there[0].site.direction)
-    written = relit(moved, tmp_path / "relit" / "relit.xml")
-    assert written.light_identities == moved.light_identities
+    moved_room = room.with_new_emitters([SPOT, PANEL]).moved({"aimed": pose, "sheet": pose})
+    moved_emitters = [NewEmitter(x.name, x.kind, pose, x.size) for x in (SPOT, PANEL)]
+    assert moved_room.light("sheet").members[0].site.position == pytest.approx(pose.position)
+    assert moved_room.light("aimed").members[0].site.direction == pytest.approx(
+        moved_emitters[0].site.direction
+    )
+    relit_room = relit(moved_room, tmp_path / "relit" / "relit.xml")
+    assert relit_room.light_identities == moved_room.light_identities
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ def _threads(request: pytest.FixtureRequest) -> Iterator[None]:
     limit_threads(None)
 
 
-def ball(*, off: float = 0.0, factor: float = 1.0) -> object:
+def ball(*, offset: float = 0.0, factor: float = 1.0) -> object:
     """A scene of a smooth mesh: its own normals times `factor`, and so far off."""
     rows, columns = 12, 24
     up, round_ = np.mgrid[0.1 : np.pi - 0.1 : rows * 1j, 0 : 2 * np.pi : columns * 1j]
@@ -30,14 +30,14 @@ def ball(*, off: float = 0.0, factor: float = 1.0) -> object:
     a, b, c, d = corner[:-1, :-1], corner[:-1, 1:], corner[1:, :-1], corner[1:, 1:]
     faces = np.concatenate([np.stack([a, c, b], -1), np.stack([b, c, d], -1)]).reshape(-1, 3)
     mesh = mi.Mesh("ball", rows * columns, len(faces), has_vertex_normals=True)
-    its = mi.traverse(mesh)
-    its["vertex_positions"] = points.astype(np.float32).ravel()
-    its["faces"] = faces.ravel()
-    its.update()
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = points.astype(np.float32).ravel()
+    parameters["faces"] = faces.ravel()
+    parameters.update()
     mesh.recompute_vertex_normals()
-    its = mi.traverse(mesh)
-    its["vertex_normals"] = its["vertex_normals"] * factor + off
-    its.update()
+    parameters = mi.traverse(mesh)
+    parameters["vertex_normals"] = parameters["vertex_normals"] * factor + offset
+    parameters.update()
     return mi.load_dict({"type": "scene", "it": mesh})
 
 
@@ -47,7 +47,7 @@ def normals(scene: object) -> np.ndarray:
 
 
 def test_what_was_computed_is_computed_again() -> None:
-    reference, scene = ball(), ball(off=2e-7)
+    reference, scene = ball(), ball(offset=2e-7)
     # A mesh that is loaded while other threads are at work may have sums in another order.
     make_normals_reproducible(reference)
     expected = normals(reference)

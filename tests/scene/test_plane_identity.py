@@ -16,16 +16,18 @@ from lightpaint.scene.scene_reader import load_scene
 ALL = set(LIGHTS)
 
 
-def identities(folder: Path, edits: dict[str, str] | None = None, **how: Any) -> dict[str, str]:
+def identities(folder: Path, edits: dict[str, str] | None = None, **options: Any) -> dict[str, str]:
     """Identities in the test room by name of light, after some edits of its XML."""
-    options = {key: how.pop(key) for key in ("integrator", "wall", "lights", "film") if key in how}
-    path = write_room(folder, **options)
+    room_options = {
+        key: options.pop(key) for key in ("integrator", "wall", "lights", "film") if key in options
+    }
+    path = write_room(folder, **room_options)
     text = path.read_text(encoding="utf-8")
     for old, new in (edits or {}).items():
         assert old in text
         text = text.replace(old, new)
     path.write_text(text, encoding="utf-8")
-    return by_name(load_scene(path, **how))
+    return by_name(load_scene(path, **options))
 
 
 def by_name(scene: Scene) -> dict[str, str]:
@@ -37,7 +39,7 @@ def changed(before: dict[str, str], after: dict[str, str]) -> set[str]:
 
 
 @pytest.mark.parametrize(
-    ("edit", "moved"),
+    ("edit", "changed_names"),
     [
         # Where a lamp is, where it points, how wide its cone is.
         ({'x="-0.5" y="1" z="0.5"': 'x="-0.4" y="1" z="0.5"'}, {"bulb"}),
@@ -63,15 +65,17 @@ def changed(before: dict[str, str], after: dict[str, str]) -> set[str]:
         ({"</film>": '<rfilter type="gaussian"/></film>'}, set()),
     ],
 )  # fmt: skip
-def test_what_a_change_changes(tmp_path: Path, edit: dict[str, str], moved: set[str]) -> None:
-    assert changed(identities(tmp_path), identities(tmp_path, edit)) == moved
+def test_what_a_change_changes(
+    tmp_path: Path, edit: dict[str, str], changed_names: set[str]
+) -> None:
+    assert changed(identities(tmp_path), identities(tmp_path, edit)) == changed_names
 
 
 def test_a_name_is_no_part_of_it(tmp_path: Path) -> None:
     before = identities(tmp_path)
     renames = {f'id="{name}"': f'id="a_{name}"' for name in LIGHTS}
     after = identities(tmp_path, renames)
-    assert {f"a_{name}": its for name, its in before.items()} == after
+    assert {f"a_{name}": identity for name, identity in before.items()} == after
 
 
 def test_lights_are_told_apart(tmp_path: Path) -> None:
@@ -80,8 +84,8 @@ def test_lights_are_told_apart(tmp_path: Path) -> None:
 
 def test_a_lamp_that_comes_or_goes_leaves_the_others(tmp_path: Path) -> None:
     before = identities(tmp_path)
-    more = "".join(LIGHTS.values()) + '<emitter type="point" id="new"/>'
-    after = identities(tmp_path, lights=more)
+    lamps = "".join(LIGHTS.values()) + '<emitter type="point" id="new"/>'
+    after = identities(tmp_path, lights=lamps)
     assert set(after) - set(before) == {"new"}
     assert changed(before, after) == set()
     # In another order, and without those that are no shape.
@@ -97,10 +101,10 @@ def test_what_surrounds_a_scene_counts_where_paths_pass_surfaces(tmp_path: Path)
         identities(tmp_path, lights=lights), identities(tmp_path, lights=lights + LIGHTS["sky"])
     ) == set()  # fmt: skip
     mask = f'<bsdf type="mask"><float name="opacity" value="0.5"/>{GLOSSY}</bsdf>'
-    its = {"wall": mask, "lights": lights}
-    before = identities(tmp_path, **its)
-    its["lights"] += LIGHTS["sky"]
-    assert changed(before, identities(tmp_path, **its)) == {"bulb", "panel"}
+    options = {"wall": mask, "lights": lights}
+    before = identities(tmp_path, **options)
+    options["lights"] += LIGHTS["sky"]
+    assert changed(before, identities(tmp_path, **options)) == {"bulb", "panel"}
 
 
 def test_parameters_count_by_what_they_change(tmp_path: Path) -> None:
@@ -144,19 +148,19 @@ def test_textures_count_as_they_are_on_disk(tmp_path: Path) -> None:
     slide = bitmap.format("irradiance", "lamp.exr")
     lamp = f'<emitter type="projector" id="beamer">{slide}</emitter>'
     wall = f'<bsdf type="diffuse">{bitmap.format("reflectance", "wall.exr")}</bsdf>'
-    its: dict[str, Any] = {"lights": LIGHTS["bulb"] + lamp, "wall": wall}
-    before = identities(tmp_path, **its)
+    options: dict[str, Any] = {"lights": LIGHTS["bulb"] + lamp, "wall": wall}
+    before = identities(tmp_path, **options)
     write_rgb(tmp_path / "lamp.exr", image * 0.5)
-    assert changed(before, after := identities(tmp_path, **its)) == {"beamer"}
+    assert changed(before, after := identities(tmp_path, **options)) == {"beamer"}
     write_rgb(tmp_path / "wall.exr", image * 0.5)
-    assert changed(after, identities(tmp_path, **its)) == {"bulb", "beamer"}
+    assert changed(after, identities(tmp_path, **options)) == {"bulb", "beamer"}
     write_rgb(tmp_path / "lamp.exr", image)
     write_rgb(tmp_path / "wall.exr", image)
-    assert identities(tmp_path, **its) == before
+    assert identities(tmp_path, **options) == before
     # By content, under whatever name.
     (tmp_path / "lamp.exr").rename(tmp_path / "slide.exr")
-    its["lights"] = its["lights"].replace("lamp.exr", "slide.exr")
-    assert identities(tmp_path, **its) == before
+    options["lights"] = options["lights"].replace("lamp.exr", "slide.exr")
+    assert identities(tmp_path, **options) == before
 
 
 def test_groups_and_what_is_kept_count_by_their_members(tmp_path: Path) -> None:

@@ -52,8 +52,8 @@ def test_emission_is_read_from_the_loaded_light_not_from_its_text(tmp_path: Path
     np.testing.assert_allclose(scene.light("silent").emission, [1, 1, 1], rtol=1e-6)
     # What was read, set as a colour, is the picture that Mitsuba makes of the scene itself.
     read = {light.name: light.emission for light in scene.lights}
-    asked = mitsuba_render(scene, read, seed=1, spp=4)
-    np.testing.assert_allclose(asked, mitsuba_render(scene, seed=1, spp=4), rtol=1e-5, atol=1e-6)
+    render = mitsuba_render(scene, read, seed=1, spp=4)
+    np.testing.assert_allclose(render, mitsuba_render(scene, seed=1, spp=4), rtol=1e-5, atol=1e-6)
 
 
 def test_parameters_and_includes(tmp_path: Path) -> None:
@@ -157,11 +157,11 @@ def test_what_cannot_be_loaded_is_refused_in_one_line(
 ) -> None:
     path = tmp_path / "scene.xml"
     path.write_text(text, encoding="utf-8")
-    with pytest.raises(SceneError) as caught:
+    with pytest.raises(SceneError) as refusal:
         load_scene(path)
-    assert message in str(caught.value)
-    assert "\n" not in str(caught.value)
-    assert str(caught.value).count("Mitsuba refuses") <= 1
+    assert message in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+    assert str(refusal.value).count("Mitsuba refuses") <= 1
     assert capfd.readouterr() == ("", "")
 
 

@@ -35,9 +35,9 @@ def test_albedo_is_what_the_materials_say(seen: Surfaces) -> None:
 
 
 def test_normals_are_of_unit_length_and_in_world_space(seen: Surfaces) -> None:
-    there = seen.depth < BACKGROUND
-    np.testing.assert_allclose(np.linalg.norm(seen.normal[there], axis=-1), 1, atol=1e-6)
-    assert not seen.normal[~there].any()
+    is_hit = seen.depth < BACKGROUND
+    np.testing.assert_allclose(np.linalg.norm(seen.normal[is_hit], axis=-1), 1, atol=1e-6)
+    assert not seen.normal[~is_hit].any()
     floor, wall = seen.coverage["floor"] == 1, seen.coverage["wall"] == 1
     np.testing.assert_allclose(seen.normal[floor], [[0, 1, 0]] * floor.sum(), atol=1e-6)
     np.testing.assert_allclose(seen.normal[wall], [[0, 0, 1]] * wall.sum(), atol=1e-6)
@@ -99,8 +99,8 @@ def test_each_pixel_has_an_object_and_each_object_a_name(tmp_path: Path) -> None
     assert {"floor", "wall", "ball", "sphere", "clay"} <= set(objects.names)
     for name in ("floor", "wall", "ball", "sphere", "clay"):
         # Where all samples of a pixel see it, any do.
-        whole = surfaces.coverage[name] == 1
-        assert objects.mask(name)[whole].mean() > 0.95
+        is_full = surfaces.coverage[name] == 1
+        assert objects.mask(name)[is_full].mean() > 0.95
     assert features.position is not None
     floor, wall = (features.position[surfaces.coverage[name] == 1] for name in ("floor", "wall"))
     # The samples that were counted are others: an edge may run through one of these pixels.
@@ -115,5 +115,5 @@ def test_the_basis_has_them(tmp_path: Path) -> None:
     few = render_basis(scene, spp=2)
     assert few.surface_filter is not None
     assert few.objects is not None
-    more = render_basis(scene, spp=4, start=few)
-    assert more.objects is few.objects
+    continuation = render_basis(scene, spp=4, start=few)
+    assert continuation.objects is few.objects

@@ -71,15 +71,15 @@ def test_nobody_is_passed_over(work: Work):
     """Not even by somebody who takes turn after turn without a pause."""
     is_done = threading.Event()
 
-    def again() -> None:
+    def work_on() -> None:
         while not is_done.is_set():
             work.urgent()
 
-    def once() -> None:
+    def work_urgently() -> None:
         work.urgent()
         is_done.set()
 
-    _together(again, once, work=work)
+    _together(work_on, work_urgently, work=work)
 
 
 def test_who_is_at_leisure_comes_now_and_then(work: Work, monkeypatch: pytest.MonkeyPatch):
@@ -87,7 +87,7 @@ def test_who_is_at_leisure_comes_now_and_then(work: Work, monkeypatch: pytest.Mo
     monkeypatch.setattr("lightpaint.scene.runtime.render_lock.MAX_WAIT_S", 5 * PIECE_S)
     is_done = threading.Event()
 
-    def again() -> None:
+    def work_on() -> None:
         while not is_done.is_set():
             work.urgent()
 
@@ -95,7 +95,7 @@ def test_who_is_at_leisure_comes_now_and_then(work: Work, monkeypatch: pytest.Mo
         work.leisure()
         is_done.set()
 
-    _together(again, leisure, work=work)
+    _together(work_on, leisure, work=work)
     assert work.done.count("leisure") == 6
 
 
@@ -129,19 +129,19 @@ def test_who_waits_for_another_lets_it(work: Work):
     """Somebody who hears of progress may wait for a thread that wants its own turn."""
     turns, is_done = work.turns, threading.Event()
 
-    def tells() -> None:
+    def call_listener() -> None:
         with turns.acquired(), turns.acquired():
             work.piece("first")
             with turns.aside():
                 assert is_done.wait(SOON_S)
             work.piece("last")
 
-    def heard() -> None:
+    def listen() -> None:
         with turns.acquired():
             work.piece("heard")
         is_done.set()
 
-    _together(tells, work.leisure, heard, work=work)
+    _together(call_listener, work.leisure, listen, work=work)
     # Who is at leisure does not come in between.
     assert work.done == ["first", "heard", "last", *["leisure"] * 6]
 
@@ -163,7 +163,7 @@ def test_who_is_interrupted_while_waiting_keeps_nobody(work: Work, monkeypatch: 
 def test_threads_render_what_one_alone_does(small_room: lp.Scene, monkeypatch: pytest.MonkeyPatch):
     """Two scenes in two threads, one of them loaded anew between the passes of the other."""
     monkeypatch.setattr("lightpaint.scene.scene_render.SAMPLES_PER_PASS", 2**11)
-    alone = lp.render_basis(small_room, spp=64)
+    single_render = lp.render_basis(small_room, spp=64)
     order: list[str] = []
     has_begun = threading.Event()
 
@@ -172,23 +172,23 @@ def test_threads_render_what_one_alone_does(small_room: lp.Scene, monkeypatch: p
         has_begun.set()
 
     def frame() -> Floats:
-        made = render(load_scene(small_room.path), spp=4, stream=Stream.VERIFICATION)
+        estimate = render(load_scene(small_room.path), spp=4, stream=Stream.VERIFICATION)
         order.append("frame")
-        return made.image
+        return estimate.image
 
     def frames() -> list[Floats]:
         assert has_begun.wait(SOON_S)
         return [frame() for _ in range(4)]
 
     with ThreadPoolExecutor(1) as threads:
-        others = threads.submit(frames)
+        future = threads.submit(frames)
         with MITSUBA.low_priority():
             basis = lp.render_basis(small_room, spp=64, progress=hears)
-        pictures = others.result(60)
-    first, *more = (k for k, what in enumerate(order) if what == "frame")
+        pictures = future.result(60)
+    first, *other_frames = (k for k, kind in enumerate(order) if kind == "frame")
     assert order[:first]
-    assert order[more[-1] + 1 :]  # it was in the middle
+    assert order[other_frames[-1] + 1 :]  # it was in the middle
     # Sums are added in any order by several threads: float32.
-    np.testing.assert_allclose(basis.images, alone.images, rtol=1e-4, atol=1e-5)
+    np.testing.assert_allclose(basis.images, single_render.images, rtol=1e-4, atol=1e-5)
     for picture in [*pictures, frame()]:
         np.testing.assert_allclose(picture, pictures[0], rtol=1e-4, atol=1e-5)

@@ -11,35 +11,35 @@ import lightpaint as lp
 from lightpaint.target.painting_file import KEY, write_painting
 
 
-def _target(**how: Any) -> lp.Target:
+def _target(**options: Any) -> lp.Target:
     rng = np.random.default_rng(3)
     image = rng.random((6, 8, 3), np.float32) * 4
     importance = np.where(rng.random((6, 8)) < 0.5, 0, rng.random((6, 8))).astype(np.float32)
-    return lp.Target("painting", image, importance, everything=False, **how)
+    return lp.Target("painting", image, importance, everything=False, **options)
 
 
 @pytest.mark.parametrize(
-    "how",
+    "options",
     [
         {"over_look": True, "through_view": True, "transform": lp.ViewTransform("agx", 1.5)},
         {"over_look": True},
         {},
     ],
 )
-def test_a_painting_comes_back_to_the_last_bit(tmp_path: Path, how: Any):
-    target = _target(**how)
+def test_a_painting_comes_back_to_the_last_bit(tmp_path: Path, options: Any):
+    target = _target(**options)
     write_painting(tmp_path / "painting.exr", target)
-    again = lp.read_target(tmp_path / "painting.exr")
-    np.testing.assert_array_equal(again.image, target.image)
-    np.testing.assert_array_equal(again.importance, target.importance)
+    reread = lp.read_target(tmp_path / "painting.exr")
+    np.testing.assert_array_equal(reread.image, target.image)
+    np.testing.assert_array_equal(reread.importance, target.importance)
     for name in ("name", "over_look", "through_view", "transform", "everything", "at_least"):
-        assert getattr(again, name) == getattr(target, name)
+        assert getattr(reread, name) == getattr(target, name)
 
 
 def test_another_view_may_be_asked_for(tmp_path: Path):
     write_painting(tmp_path / "a.exr", _target(through_view=True, transform=lp.ViewTransform()))
-    again = lp.read_target(tmp_path / "a.exr", transform=lp.TransformChoice("agx"))
-    assert again.transform == lp.ViewTransform("agx")
+    reread = lp.read_target(tmp_path / "a.exr", transform=lp.TransformChoice("agx"))
+    assert reread.transform == lp.ViewTransform("agx")
 
 
 @pytest.mark.parametrize(

@@ -42,12 +42,12 @@ def write(folder: Path, template: Template) -> Path:
     return folder
 
 
-def brushed(shown: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def brushed(display: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Display values under a soft brush, and its coverage (h, w)."""
     y, x = np.mgrid[: SIZE[0], : SIZE[1]]
     coverage = np.clip((18 - np.hypot(x - 40, y - 30)) / 8, 0, 1)
-    paint = np.array([0.9, 0.7, 0.3]) * (0.5 + 0.5 * shown)
-    return shown + coverage[..., None] * (paint - shown), coverage
+    paint = np.array([0.9, 0.7, 0.3]) * (0.5 + 0.5 * display)
+    return display + coverage[..., None] * (paint - display), coverage
 
 
 def save(path: Path, display: np.ndarray, transform: ViewTransform) -> None:
@@ -108,12 +108,12 @@ def test_mask_and_alpha_go_before(tmp_path: Path) -> None:
     mask = np.zeros(SIZE, np.uint8)
     mask[:5] = 255
     Image.fromarray(mask).save(tmp_path / "mask.png")
-    counted = read_target(tmp_path / "p8.png", mask=tmp_path / "mask.png").importance
-    assert counted[:5].min() == 1
-    assert counted[5:].max() == 0
+    importance = read_target(tmp_path / "p8.png", mask=tmp_path / "mask.png").importance
+    assert importance[:5].min() == 1
+    assert importance[5:].max() == 0
     layer = np.dstack([np.round(display * 255).astype(np.uint8), mask])
     Image.fromarray(layer).save(tmp_path / "layer.png")
-    np.testing.assert_array_equal(read_target(tmp_path / "layer.png").importance, counted)
+    np.testing.assert_array_equal(read_target(tmp_path / "layer.png").importance, importance)
 
 
 def test_the_template_is_found_where_people_keep_it(
@@ -147,16 +147,16 @@ def test_of_another_size(tmp_path: Path) -> None:
     with pytest.raises(SizeError, match="31x17"):
         read_target(tmp_path / "layer.png", template=tmp_path / "template", paint="light")
     # A file in it stands for the folder.
-    same = tmp_path / "same.png"
-    save(same, brushed(template.shown)[0], template.transform)
-    for named in ("template", "template/template.png", "template/template.json"):
-        assert not read_target(same, template=tmp_path / named).everything
+    same_file = tmp_path / "same.png"
+    save(same_file, brushed(template.shown)[0], template.transform)
+    for name in ("template", "template/template.png", "template/template.json"):
+        assert not read_target(same_file, template=tmp_path / name).everything
 
 
 @pytest.mark.parametrize("name", ["p8.png", "half.exr"])
-@pytest.mark.parametrize("given", [True, False])
+@pytest.mark.parametrize("has_template", [True, False])
 @pytest.mark.parametrize(
-    ("asked", "expected"),
+    ("choice", "expected"),
     [
         (None, ViewTransform("agx", 0.5)),
         (TransformChoice(), ViewTransform("agx", 0.5)),
@@ -169,29 +169,31 @@ def test_of_another_size(tmp_path: Path) -> None:
 )
 def test_what_is_left_open_of_a_view_is_the_templates(
     tmp_path: Path,
-    asked: ViewTransform | TransformChoice | None,
+    choice: ViewTransform | TransformChoice | None,
     expected: ViewTransform,
     name: str,
-    given: bool,
+    has_template: bool,
 ) -> None:
     write(tmp_path, template_of(ViewTransform("agx", 0.5)))
-    shown = np.random.default_rng(1).integers(0, 256, (*SIZE, 3)) / 255
-    save(tmp_path / name, shown, ViewTransform("agx", 0.5))
-    target = read_target(tmp_path / name, transform=asked, template=tmp_path if given else None)
+    display = np.random.default_rng(1).integers(0, 256, (*SIZE, 3)) / 255
+    save(tmp_path / name, display, ViewTransform("agx", 0.5))
+    target = read_target(
+        tmp_path / name, transform=choice, template=tmp_path if has_template else None
+    )
     assert target.transform == expected
     if name == "p8.png":
-        np.testing.assert_allclose(target.image, expected.decode(shown), rtol=1e-4, atol=1e-6)
+        np.testing.assert_allclose(target.image, expected.decode(display), rtol=1e-4, atol=1e-6)
 
 
 def test_what_nobody_says_of_a_view_is_srgbs(tmp_path: Path) -> None:
     for name in ("p8.png", "half.exr"):
         save(tmp_path / name, np.full((4, 4, 3), 0.5), ViewTransform())
-        for asked, expected in (
+        for choice, expected in (
             (TransformChoice(stops=2.0), ViewTransform("srgb", 2.0)),
             (TransformChoice(name="agx"), ViewTransform("agx")),
             (TransformChoice(), ViewTransform() if name == "p8.png" else None),
         ):
-            assert read_target(tmp_path / name, transform=asked).transform == expected
+            assert read_target(tmp_path / name, transform=choice).transform == expected
 
 
 def test_what_no_view_has_cannot_be_asked() -> None:
@@ -205,11 +207,11 @@ def test_a_template_of_another_size_says_nothing_of_the_view(tmp_path: Path) -> 
     """It is not what was painted on: neither compared with nor decoded by."""
     write(tmp_path, template_of(ViewTransform("agx", 2.0)))
     save(tmp_path / "p8.png", np.full((8, 8, 3), 0.5), ViewTransform())
-    for asked, transform in (
+    for choice, transform in (
         (None, ViewTransform()),
         (TransformChoice(stops=1.0), ViewTransform("srgb", 1.0)),
     ):
-        target = read_target(tmp_path / "p8.png", transform=asked)
+        target = read_target(tmp_path / "p8.png", transform=choice)
         assert target.transform == transform
         np.testing.assert_allclose(target.image, transform.decode(np.float32(128 / 255)), rtol=1e-4)
         assert "another size" in target.notes[0]
@@ -290,35 +292,35 @@ CONVERTED = {
 }
 
 
-@pytest.mark.parametrize("how", CONVERTED)
+@pytest.mark.parametrize("style", CONVERTED)
 @pytest.mark.parametrize("name", ["p8.png", "p.jpg", "half.exr"])
-def test_a_conversion_of_all_of_it_is_doubted(tmp_path: Path, how: str, name: str) -> None:
+def test_a_conversion_of_all_of_it_is_doubted(tmp_path: Path, style: str, name: str) -> None:
     template = _room()
     write(tmp_path, template)
-    save(tmp_path / name, np.clip(CONVERTED[how](template.shown, template.image), 0, 1), SRGB)
+    save(tmp_path / name, np.clip(CONVERTED[style](template.shown, template.image), 0, 1), SRGB)
     [note] = read_target(tmp_path / name).notes
     assert "through another view or profile (transform=..., mask=...)" in note
 
 
-def _repainted(how: str, shown: np.ndarray) -> np.ndarray:
-    y, x = np.mgrid[: shown.shape[0], : shown.shape[1]]
-    if how == "light from the other side":
-        return shown * (0.2 + 0.6 * x / x.max())[..., None]
-    if how == "a warm glaze on the left":
-        return 0.1 + shown * (1 - 0.9 * np.array([0.1, 0.4, 0.9]) * (1 - x / x.max())[..., None])
+def _repainted(style: str, display: np.ndarray) -> np.ndarray:
+    y, x = np.mgrid[: display.shape[0], : display.shape[1]]
+    if style == "light from the other side":
+        return display * (0.2 + 0.6 * x / x.max())[..., None]
+    if style == "a warm glaze on the left":
+        return 0.1 + display * (1 - 0.9 * np.array([0.1, 0.4, 0.9]) * (1 - x / x.max())[..., None])
     waves = [0.5 + 0.4 * np.sin(x / 17 + k) * np.cos(y / 11 - k) for k in range(3)]
     free = np.stack(waves, axis=-1)
-    return free if how == "freely" else 0.4 * shown + 0.6 * free
+    return free if style == "freely" else 0.4 * display + 0.6 * free
 
 
 @pytest.mark.parametrize(
-    "how", ["light from the other side", "a warm glaze on the left", "freely", "translucently"]
+    "style", ["light from the other side", "a warm glaze on the left", "freely", "translucently"]
 )
 @pytest.mark.parametrize("name", ["p8.png", "p.jpg", "half.exr"])
-def test_a_repaint_of_all_of_it_is_not(tmp_path: Path, how: str, name: str) -> None:
+def test_a_repaint_of_all_of_it_is_not(tmp_path: Path, style: str, name: str) -> None:
     template = _room()
     write(tmp_path, template)
-    save(tmp_path / name, np.clip(_repainted(how, template.shown), 0, 1), SRGB)
+    save(tmp_path / name, np.clip(_repainted(style, template.shown), 0, 1), SRGB)
     [note] = read_target(tmp_path / name).notes
     compared = "template.exr" if name.endswith("exr") else "template.png"
     share, _, rest = note.partition(" % painted: ")
@@ -356,11 +358,11 @@ def test_paint_as_light_is_multiplied_by_albedo(tmp_path: Path) -> None:
     painted[10:50, 30:50] = 0.1, 0.2, 0.8
     write_rgb(tmp_path / "p.exr", painted)
     target = read_target(tmp_path / "p.exr", paint="light")
-    inside = target.importance > 0
+    is_painted = target.importance > 0
     np.testing.assert_allclose(
-        target.image[inside], painted[inside] * template.albedo[inside], rtol=1e-6
+        target.image[is_painted], painted[is_painted] * template.albedo[is_painted], rtol=1e-6
     )
-    assert inside[12:48, 32:48].all()
+    assert is_painted[12:48, 32:48].all()
 
 
 def test_where_nothing_reflects_light_cannot_be_painted(tmp_path: Path) -> None:
@@ -403,8 +405,8 @@ def test_what_is_no_template_is_refused(tmp_path: Path) -> None:
     template = template_of()
     write(tmp_path, template)
     write_rgb(tmp_path / "p.exr", np.ones((*SIZE, 3)))
-    about = tmp_path / "template.json"
-    good = about.read_text(encoding="utf-8")
+    metadata_file = tmp_path / "template.json"
+    good = metadata_file.read_text(encoding="utf-8")
     for bad, words in (
         ("{", "not a template"),
         ("[]", "not a template"),
@@ -413,10 +415,10 @@ def test_what_is_no_template_is_refused(tmp_path: Path) -> None:
         (good.replace('"stops": 0.0', '"stops": 1e99'), "out of range"),
         (good.replace('"sensor": "camera"', '"sensor": 7'), "sensor is a text"),
     ):
-        about.write_text(bad, encoding="utf-8")
+        metadata_file.write_text(bad, encoding="utf-8")
         with pytest.raises(TargetError, match=words):
             read_target(tmp_path / "p.exr")
-    about.write_text(good, encoding="utf-8")
+    metadata_file.write_text(good, encoding="utf-8")
     (tmp_path / "template.exr").unlink()
     with pytest.raises(TargetError, match=r"template\.exr"):
         read_target(tmp_path / "p.exr")
@@ -426,7 +428,7 @@ def test_png_holds_what_the_view_shows(tmp_path: Path) -> None:
     template = template_of()
     write(tmp_path, template)
     target = read_target(tmp_path / "template.png", find=False)
-    shown = np.clip(template.image, 0, 1)
+    display = np.clip(template.image, 0, 1)
     # Half a code of 16 bits, in light.
-    np.testing.assert_allclose(target.image, shown, atol=2e-5)
-    np.testing.assert_allclose(decode_display(template.shown), shown, atol=2e-5)
+    np.testing.assert_allclose(target.image, display, atol=2e-5)
+    np.testing.assert_allclose(decode_display(template.shown), display, atol=2e-5)

@@ -93,33 +93,33 @@ def run(folder: Path, *command: str, **environment: str) -> None:
         start_new_session=True,
     )
     try:
-        said, _ = started.communicate(timeout=100)
+        output, _ = started.communicate(timeout=100)
     except subprocess.TimeoutExpired:
         os.killpg(started.pid, signal.SIGKILL)  # the program as well as what started it
-        said, _ = started.communicate()
-    assert started.returncode == 0, said.decode(errors="replace")[-2000:]
+        output, _ = started.communicate()
+    assert started.returncode == 0, output.decode(errors="replace")[-2000:]
 
 
 def needs(command: str, program: str) -> str:
     """The path of a program. Scripts are written for the versions that these names stand for."""
-    found = shutil.which(command)
-    if found is None:
+    path = shutil.which(command)
+    if path is None:
         pytest.skip(program)
-    return found
+    return path
 
 
 def check(folder: Path, basis: lp.Basis, exact: str, *names: str) -> None:
     """Each file holds the paint and nothing else, and asks for the lights that `exact` asks for."""
-    wanted = lights(basis, read(folder / exact))
+    expected = lights(basis, read(folder / exact))
     for name in (exact, *names):
         target = read(folder / name)
         is_lossy = name.endswith("jpg")
         reach = REACH + 6 * is_lossy
-        away, inside = reach < DISTANCE, DISTANCE < 8
+        away, near = reach < DISTANCE, DISTANCE < 8
         assert target.importance[away].max() < (0.05 if is_lossy else 1e-6), name
-        assert target.importance[inside].mean() > 0.95, name
-        off = np.linalg.norm(lights(basis, target) - wanted) / np.linalg.norm(wanted)
-        assert off <= PRECISION[name.partition("-")[2]], f"{name}: lights are off by {off:.2g}"
+        assert target.importance[near].mean() > 0.95, name
+        error = np.linalg.norm(lights(basis, target) - expected) / np.linalg.norm(expected)
+        assert error <= PRECISION[name.partition("-")[2]], f"{name}: lights are off by {error:.2g}"
 
 
 def read(path: Path) -> lp.Target:
@@ -141,8 +141,8 @@ def test_gimp(folder: Path, basis: lp.Basis) -> None:
     evaluate = ("--batch-interpreter", "plug-in-script-fu-eval", "-b", f'(load "{script}")')
     run(folder, gimp, "-i", "-f", *evaluate, "-b", "(gimp-quit 1)")
     check(folder, basis, "light-float.exr", "light-float.tif", "light-half.exr", "light-png16.png")
-    shown = [f"shown-{n}" for n in ("tif16.tif", "psd16.psd", "png8.png", "q95.jpg", "q85.jpg")]
-    check(folder, basis, "shown-png16.png", "shown-float.exr", *shown)
+    files = [f"shown-{n}" for n in ("tif16.tif", "psd16.psd", "png8.png", "q95.jpg", "q85.jpg")]
+    check(folder, basis, "shown-png16.png", "shown-float.exr", *files)
     for name in ("same.png", "same.exr"):
         with pytest.raises(TargetError, match="nothing in"):
             lp.read_target(folder / name)
@@ -160,12 +160,12 @@ def test_krita(folder: Path, basis: lp.Basis) -> None:
     error = folder / "error"
     assert not error.exists(), error.read_text(encoding="utf-8")
     check(folder, basis, "light-float.exr", "light-float.tif", "light-png16.png")
-    shown = [f"shown-{n}" for n in ("half.exr", "png8.png", "8.ora", "layers.kra")]
+    files = [f"shown-{n}" for n in ("half.exr", "png8.png", "8.ora", "layers.kra")]
     check(
         folder,
         basis,
         "shown-png16.png",
-        *("shown-tif16.tif", *shown, "shown-q95.jpg", "shown-q85.jpg"),
+        *("shown-tif16.tif", *files, "shown-q95.jpg", "shown-q85.jpg"),
     )
     for name in ("light-layers.exr", "shown-layers.exr"):
         with pytest.raises(ImageError, match=r"layers of Krita .* flatten"):
@@ -204,11 +204,11 @@ def test_oiiotool(folder: Path, basis: lp.Basis) -> None:
     light = (oiiotool, "light-float.exr")
     run(folder, *light, "-d", "half", "-o", "light-half.exr")
     run(folder, *light, "-o", "light-float.tif")
-    shown = (*light, "--colorconvert", "linear", "sRGB")
-    run(folder, *shown, "-d", "uint16", "-o", "light-png16.png")
-    run(folder, *shown, "-d", "uint8", "--dither", "-o", "light-png8.png")
+    options = (*light, "--colorconvert", "linear", "sRGB")
+    run(folder, *options, "-d", "uint16", "-o", "light-png16.png")
+    run(folder, *options, "-d", "uint8", "--dither", "-o", "light-png8.png")
     names = ["half.exr", "float.tif", "png16.png", "png8.png"]
     for quality in (95, 85):
         names.append(f"q{quality}.jpg")
-        run(folder, *shown, "--compression", f"jpeg:{quality}", "-o", f"light-{names[-1]}")
+        run(folder, *options, "--compression", f"jpeg:{quality}", "-o", f"light-{names[-1]}")
     check(folder, basis, "light-float.exr", *(f"light-{name}" for name in names))

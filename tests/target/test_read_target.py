@@ -266,11 +266,11 @@ def test_a_cropped_or_padded_picture_lies_where_it_was_painted(
     target = read_target(tmp_path / "cropped.exr")
     assert target.size == (height, width)
     y, x = np.mgrid[:height, :width]
-    inside = (y >= y0) & (y <= y1) & (x >= x0) & (x <= x1)
-    np.testing.assert_array_equal(target.importance, inside)
-    np.testing.assert_array_equal(target.image[inside][:, 0], y[inside])
-    np.testing.assert_array_equal(target.image[inside][:, 1], x[inside])
+    is_inside = (y >= y0) & (y <= y1) & (x >= x0) & (x <= x1)
+    np.testing.assert_array_equal(target.importance, is_inside)
+    np.testing.assert_array_equal(target.image[is_inside][:, 0], y[is_inside])
+    np.testing.assert_array_equal(target.image[is_inside][:, 1], x[is_inside])
     # A mask does not paint what is not there.
     write_parts(tmp_path / "mask.exr", [ExrPart("", {"Y": np.full((height, width), 0.5, "f4")})])
     target = read_target(tmp_path / "cropped.exr", mask=tmp_path / "mask.exr")
-    np.testing.assert_array_equal(target.importance, 0.5 * inside)
+    np.testing.assert_array_equal(target.importance, 0.5 * is_inside)

@@ -55,15 +55,15 @@ def test_importance_must_be_finite_and_not_negative(bad: float):
 def test_a_target_of_arrays():
     image, mask = np.full((3, 4, 3), 0.25), np.zeros((3, 4), bool)
     mask[1, 2] = True
-    whole, part = Target.of(image), Target.of(image, mask, name="lamp")
-    assert (whole.name, whole.everything, part.name, part.everything) == (
+    full_target, part = Target.of(image), Target.of(image, mask, name="lamp")
+    assert (full_target.name, full_target.everything, part.name, part.everything) == (
         *("target", True),
         *("lamp", False),
     )
-    for target in (whole, part):
+    for target in (full_target, part):
         assert (target.image.dtype, target.importance.dtype) == (np.float32, np.float32)
         np.testing.assert_array_equal(target.image, image)
-    np.testing.assert_array_equal(whole.importance, 1)
+    np.testing.assert_array_equal(full_target.importance, 1)
     np.testing.assert_array_equal(part.importance, mask)
     image[:], mask[:] = 7, True  # whoever goes on painting changes no target
     assert part.image.max() == 0.25
@@ -95,8 +95,8 @@ def test_a_target_is_shown_in_a_few_lines():
     image = np.zeros((1, 8, 3))
     image[0, 1] = 1, 2, 3
     target = Target.of(image, [[1, 1, 0, 0, 0, 0, 0, 0]], name="dusk")
-    said = repr(target)
-    assert said.splitlines() == [
+    text = repr(target)
+    assert text.splitlines() == [
         "Target 'dusk', 8x1",
         "  counts   25 % of the pixels",
         "  light    0 to 3",
@@ -108,7 +108,7 @@ def test_a_target_is_shown_in_a_few_lines():
         notes=("painted on nothing",),
     )
     assert repr(target).splitlines() == [
-        *said.splitlines(),
+        *text.splitlines(),
         "  at least 50 % of what counts, or anything brighter",
         "  seen     through agx at +1.5 stops",
         "  note     painted on nothing",
@@ -154,9 +154,9 @@ def test_the_reduced_problem_is_the_same_problem():
     for _ in range(3):
         small = rng.random((2, 3, 3))
         large = np.kron(small, np.ones((4, 4, 1)))
-        whole = (target.importance[..., None] * (large - target.image) ** 2).sum()
+        full_loss = (target.importance[..., None] * (large - target.image) ** 2).sum()
         part = (reduced.importance[..., None] * (small - reduced.image) ** 2).sum()
-        gaps.append(whole - 16 * part)
+        gaps.append(full_loss - 16 * part)
     np.testing.assert_allclose(gaps, gaps[0], rtol=1e-4)
 
 
@@ -246,10 +246,10 @@ def test_a_painted_template_is_read_through_its_own_view(tmp_path: Any, transfor
     image = np.exp2(np.random.default_rng(0).uniform(-4, 2, (9, 7, 1))) * [[[0.8, 0.9, 1]]] / 64
     picture = write_look(tmp_path / "a.template.exr", image, transform)
     target = read_target(picture)
-    shown = transform.encode(image)
-    np.testing.assert_array_equal(target.at_least, shown >= 65534.5 / 65535)
+    display = transform.encode(image)
+    np.testing.assert_array_equal(target.at_least, display >= 65534.5 / 65535)
     # What 16 bits round away in display values.
-    np.testing.assert_allclose(transform.encode(target.image), shown, atol=0.51 / 65535)
+    np.testing.assert_allclose(transform.encode(target.image), display, atol=0.51 / 65535)
 
 
 @pytest.mark.parametrize("size", [(4, 6), (6, 9), (1, 1), (5, 7), (11, 17), (7, 9)])
@@ -265,7 +265,7 @@ def test_what_means_at_least_in_most_of_a_pixel_means_it_of_its_mean(size: tuple
     marked = [_target(image, importance * at_least[..., k]).resized(size) for k in range(3)]
     resized = target.resized(size)
     counts = np.maximum(resized.importance, 1e-6)[..., None]
-    share = np.dstack([its.importance for its in marked]) / counts
+    share = np.dstack([part.importance for part in marked]) / counts
     clear = abs(share - 0.5) > 1e-4
     assert (share < 0.5).any()
     assert size == (1, 1) or (share > 0.5).any()
@@ -315,11 +315,11 @@ def _weights_of_both_sizes(make_basis: Any, images: Any, painted: Any) -> tuple[
     target = _target(np.minimum(painted, 1), np.ones((side, side)))
     target = replace(target, at_least=painted >= 1)
     blocks = images.reshape(len(images), side // 8, 8, side // 8, 8, 3).mean(axis=(2, 4))
-    found = []
+    weights = []
     for basis in (make_basis(images=images), make_basis(images=blocks)):
         fitted = target.fitted_to(basis.size, resize=False)
-        found.append(solve(basis, fitted).lighting.weights_for(basis))
-    return found[0], found[1]
+        weights.append(solve(basis, fitted).lighting.weights_for(basis))
+    return weights[0], weights[1]
 
 
 @pytest.mark.parametrize("share", [0.02, 0.3])

@@ -24,8 +24,8 @@ ROOM_TEXT = ROOM.format(integrator=PATH, film="", sensors="", wall=GLOSSY, light
 DEVICES = ("/dev/zero", "/dev/random", "/dev/stdin", "/proc/self/mem", "/", "pipe", "gone")
 
 
-def _with(more: str) -> str:
-    return ROOM_TEXT.replace("</scene>", more + "</scene>")
+def _with(addition: str) -> str:
+    return ROOM_TEXT.replace("</scene>", addition + "</scene>")
 
 
 def _entities() -> str:
@@ -40,7 +40,7 @@ def _hostile() -> dict[str, str]:
         f'<bsdf type="mask" id="m{k}"><ref id="m{k - 1}"/></bsdf>' for k in range(1, 9000)
     )
     doubling = "".join(f'<default name="a{k}" value="{f"$a{k - 1}" * 10}"/>' for k in range(1, 10))
-    made = {
+    scenes = {
         "entities": _entities(),
         "itself": _with('<include filename="itself.xml"/>'),
         "to_and": _with('<include filename="fro.xml"/>'),
@@ -63,31 +63,31 @@ def _hostile() -> dict[str, str]:
         "no_scene": "<bsdf version='3.0.0' type='diffuse'/>",
     }
     for size in ("0", "-5", "1000000000", "1000000000000", "nan", "1e9", "9" * 400):
-        made[f"width_{size[:14]}"] = ROOM_TEXT.replace(
+        scenes[f"width_{size[:14]}"] = ROOM_TEXT.replace(
             '"width" value="24"', f'"width" value="{size}"'
         )
     for spp in ("-5", "1000000000", "1000000000000", "many"):
-        made[f"spp_{spp}"] = ROOM_TEXT.replace('"spp" value="16"', f'"spp" value="{spp}"')
+        scenes[f"spp_{spp}"] = ROOM_TEXT.replace('"spp" value="16"', f'"spp" value="{spp}"')
     for number in ("nan", "inf", "-inf", "1e39", "1e999"):
-        made[f"emission_{number}"] = ROOM_TEXT.replace("0.5 0.6 0.7", f"1 {number} 1")
-        made[f"place_{number}"] = ROOM_TEXT.replace('x="-0.5"', f'x="{number}"')
-        made[f"fov_{number}"] = ROOM_TEXT.replace('"fov" value="50"', f'"fov" value="{number}"')
-        made[f"move_{number}"] = ROOM_TEXT.replace('y="1" z="-1"', f'y="{number}"')
-    made["emission_negative"] = ROOM_TEXT.replace("0.5 0.6 0.7", "1 -2 1")
+        scenes[f"emission_{number}"] = ROOM_TEXT.replace("0.5 0.6 0.7", f"1 {number} 1")
+        scenes[f"place_{number}"] = ROOM_TEXT.replace('x="-0.5"', f'x="{number}"')
+        scenes[f"fov_{number}"] = ROOM_TEXT.replace('"fov" value="50"', f'"fov" value="{number}"')
+        scenes[f"move_{number}"] = ROOM_TEXT.replace('y="1" z="-1"', f'y="{number}"')
+    scenes["emission_negative"] = ROOM_TEXT.replace("0.5 0.6 0.7", "1 -2 1")
     for device in DEVICES:
         name = device.replace("/", "_")
         file = f'<string name="filename" value="{device}"/>'
-        made[f"include{name}"] = _with(f'<include filename="{device}"/>')
-        made[f"spectrum{name}"] = _with(
+        scenes[f"include{name}"] = _with(f'<include filename="{device}"/>')
+        scenes[f"spectrum{name}"] = _with(
             f'<bsdf type="diffuse"><spectrum name="reflectance" filename="{device}"/></bsdf>'
         )
-        made[f"bitmap{name}"] = _with(f'<texture type="bitmap">{file}</texture>')
-        made[f"envmap{name}"] = _with(f'<emitter type="envmap">{file}</emitter>')
+        scenes[f"bitmap{name}"] = _with(f'<texture type="bitmap">{file}</texture>')
+        scenes[f"envmap{name}"] = _with(f'<emitter type="envmap">{file}</emitter>')
         for plugin in ("ply", "obj", "serialized"):
-            made[f"{plugin}{name}"] = _with(f'<shape type="{plugin}">{file}</shape>')
-    made["by_path"] = _with('<path value="/dev"/><include filename="zero"/>')
-    made["by_parameter"] = _with('<default name="d" value="/dev"/><include filename="$d/zero"/>')
-    return made
+            scenes[f"{plugin}{name}"] = _with(f'<shape type="{plugin}">{file}</shape>')
+    scenes["by_path"] = _with('<path value="/dev"/><include filename="zero"/>')
+    scenes["by_parameter"] = _with('<default name="d" value="/dev"/><include filename="$d/zero"/>')
+    return scenes
 
 
 def test_hostile_scenes(tmp_path: Path) -> None:
@@ -119,7 +119,9 @@ def test_damage_of_the_text(tmp_path: Path) -> None:
     ]
     results = outcomes("scene", {"bent.xml": content}, cases, tmp_path)
     assert wrong_outcomes(results) == []
-    cut = [case.done for case, said in results if case.done[:3] == "cut" and said != "refused"]
+    cut = [
+        case.done for case, outcome in results if case.done[:3] == "cut" and outcome != "refused"
+    ]
     assert set(cut) <= {f"cut at {len(content) - 1}"}
 
 
@@ -177,7 +179,7 @@ def test_hostile_files_of_a_scene(tmp_path: Path) -> None:
         cases.append(Case(f"asset_{k}.xml", f"{ending} {k}", text.encode()))
     results = outcomes("scene", {}, cases, tmp_path)
     assert wrong_outcomes(results) == []
-    assert sum(said == "refused" for _, said in results) > 100
+    assert sum(outcome == "refused" for _, outcome in results) > 100
 
 
 def _grid(*size: int, channels: int = 1) -> bytes:
@@ -186,15 +188,15 @@ def _grid(*size: int, channels: int = 1) -> bytes:
     return b"VOL\x03" + head + struct.pack(f"<{numbers}f", *(0.5,) * numbers)
 
 
-def _wall(inside: str) -> str:
-    return _with(f'<shape type="cube"><bsdf type="diffuse">{inside}</bsdf></shape>')
+def _wall(content: str) -> str:
+    return _with(f'<shape type="cube"><bsdf type="diffuse">{content}</bsdf></shape>')
 
 
 def test_plugins_that_lack_what_mitsuba_takes_for_granted(tmp_path: Path) -> None:
     """Each of these ended the process by a signal."""
     texture = '<texture type="{}" name="reflectance">{}</texture>'
     volume = '<volume type="gridvolume" name="volume"><string name="filename" value="{}"/></volume>'
-    made = {
+    scenes = {
         "volume": _wall(texture.format("volume", "")),
         "bitmap": _wall(texture.format("bitmap", "")),
         "misspelt": _wall(texture.format("bitmap", '<string name="file" value="a.png"/>')),
@@ -206,8 +208,8 @@ def test_plugins_that_lack_what_mitsuba_takes_for_granted(tmp_path: Path) -> Non
     }
     for k, size in enumerate([(0, 2, 2), (2, 2, 0), (-2, -2, 2), (-2, 2, 2)]):
         (tmp_path / f"{k}.vol").write_bytes(_grid(*size))
-        made[f"grid_{k}"] = _wall(texture.format("volume", volume.format(f"{k}.vol")))
-    cases = [Case(f"{name}.xml", name, text.encode()) for name, text in made.items()]
+        scenes[f"grid_{k}"] = _wall(texture.format("volume", volume.format(f"{k}.vol")))
+    cases = [Case(f"{name}.xml", name, text.encode()) for name, text in scenes.items()]
     assert wrong_outcomes(outcomes("scene", {}, cases, tmp_path), ("refused",)) == []
     with pytest.raises(SceneError, match=r"line \d+: the texture 'bitmap', which has file, needs"):
         load_scene(tmp_path / "misspelt.xml")
@@ -248,13 +250,13 @@ def test_good_files_are_still_read(tmp_path: Path) -> None:
 def test_the_command_says_it_in_one_line(tmp_path: Path, name: str) -> None:
     path = tmp_path / f"{name}.xml"
     path.write_text(_hostile()[name], encoding="utf-8")
-    done = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-m", "lightpaint", "lights", "--no-sheet", str(path)],
         capture_output=True,
         text=True,
         timeout=100,
     )
-    assert done.returncode == 2
-    assert done.stdout == ""
-    assert len(done.stderr.splitlines()) == 1
-    assert path.name in done.stderr
+    assert completed.returncode == 2
+    assert completed.stdout == ""
+    assert len(completed.stderr.splitlines()) == 1
+    assert path.name in completed.stderr

@@ -20,9 +20,9 @@ ROOM_TEXT = ROOM.format(integrator=PATH, film="", sensors="", wall=GLOSSY, light
 SOURCE = '#include <stdio.h>\n__attribute__((constructor)) void ran(void) { fopen("%s", "w"); }\n'
 
 
-def room_with(folder: Path, more: str) -> Path:
+def room_with(folder: Path, addition: str) -> Path:
     path = folder / "room.xml"
-    path.write_text(ROOM_TEXT.replace("</scene>", more + "</scene>"))
+    path.write_text(ROOM_TEXT.replace("</scene>", addition + "</scene>"))
     return path
 
 
@@ -43,7 +43,7 @@ def library(folder: Path, *names: str) -> Path:
 
 
 @pytest.mark.parametrize(
-    "more",
+    "addition",
     [
         '<bsdf type="evil"/>',
         '<bsdf type="./evil"/>',
@@ -60,13 +60,13 @@ def library(folder: Path, *names: str) -> Path:
     ],
 )
 def test_a_plugin_beside_the_scene_is_refused_before_mitsuba_sees_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, more: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, addition: str
 ) -> None:
     mark = library(tmp_path, "plugins/evil", "other/plugins/evil", "evil")
     (tmp_path / "part.xml").write_text('<scene version="3.0.0"><bsdf type="evil"/></scene>')
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SceneError, match=r"room\.xml: .*Mitsuba has no \w+ plugin '.*evil"):
-        load_scene(room_with(tmp_path, more))
+        load_scene(room_with(tmp_path, addition))
     assert not mark.exists()
 
 
@@ -92,10 +92,10 @@ def test_a_plugin_called_like_one_of_mitsubas_is_never_opened(tmp_path: Path) ->
     mark = library(tmp_path, *(f"plugins/{x}" for x in ("hdrfilm", "path", "gaussian", "diffuse")))
     path = room_with(tmp_path, "")
     code = f"import lightpaint as lp; print(len(lp.load_scene({str(path)!r}).lights))"
-    done = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
     )
-    assert done.stdout.strip() == "1"
+    assert completed.stdout.strip() == "1"
     assert not mark.exists()
 
 
@@ -114,6 +114,6 @@ def test_a_user_names_plugins_of_their_own(tmp_path: Path) -> None:
     code = f"import lightpaint as lp; lp.load_scene({str(path)!r})"
     run = {"cwd": tmp_path, "capture_output": True, "text": True}
     env = {**os.environ, "LIGHTPAINT_PLUGINS": str(tmp_path / "mine")}
-    done = subprocess.run([sys.executable, "-c", code], env=env, **run)
-    assert "has 'evil', which this Mitsuba cannot load as a plugin" in done.stderr
+    completed = subprocess.run([sys.executable, "-c", code], env=env, **run)
+    assert "has 'evil', which this Mitsuba cannot load as a plugin" in completed.stderr
     assert mark.exists()  # it was asked for

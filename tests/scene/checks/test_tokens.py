@@ -21,8 +21,8 @@ from lightpaint.scene.scene_reader import load_scene
 
 
 def _tags(text: str) -> list[tuple[str, dict[str, str]]]:
-    found = markup(text.encode())
-    return [(one["tag"].decode(), attributes(one)) for one in found if one["tag"] is not None]
+    tokens = markup(text.encode())
+    return [(one["tag"].decode(), attributes(one)) for one in tokens if one["tag"] is not None]
 
 
 NAMES = st.from_regex(r"[A-Za-z_][A-Za-z0-9_.-]{0,5}", fullmatch=True)
@@ -42,7 +42,7 @@ def test_tags_and_attributes_are_those_of_another_parser(
 
 
 @pytest.mark.parametrize(
-    ("written", "meant"),
+    ("attribute_text", "expected"),
     [
         ("&lt;&gt;&amp;&quot;&apos;", "<>&\"'"),
         ("&#65;&#x42;&#000000000067;&#x00000000044;", "ABCD"),
@@ -51,8 +51,8 @@ def test_tags_and_attributes_are_those_of_another_parser(
         ("&#1114112;&#x110000;&#4294967361;", "&#1114112;&#x110000;&#4294967361;"),
     ],
 )
-def test_what_an_attribute_says(written: str, meant: str) -> None:
-    assert _tags(f'<a b="{written}" b="second"/>') == [("a", {"b": meant})]
+def test_what_an_attribute_says(attribute_text: str, expected: str) -> None:
+    assert _tags(f'<a b="{attribute_text}" b="second"/>') == [("a", {"b": expected})]
 
 
 @pytest.mark.parametrize(
