@@ -832,7 +832,7 @@ def test_a_cell_that_is_put_right_finds_its_file(
     path = tmp_path / "evening.db"
     open_painter(store=path)._studio.handle(protocol.TieLights((("key", "fill"),)), {})
     asked = {"key": {"lock": [1, 1, 1]}, "fill": {"lock": [3, 1, 1]}}
-    with pytest.raises(lp.LightpaintError, match="on one dimmer") as kept:
+    with pytest.raises(lp.LightpaintError, match="share a dimmer") as kept:
         open_painter(store=path, constraints=lp.Constraints.of(asked))
     small = lp.Target("s", np.ones((3, 3, 3), np.float32), np.ones((3, 3), np.float32), True)
     with pytest.raises(lp.LightpaintError, match="3x3") as also_kept:
