@@ -31,6 +31,9 @@ from lightpaint.scene.properties.site import Site
 #: cone, a beam's share of its cone, and the logarithm of a side.
 AIM_UNIT, CONE_UNIT, BEAM_UNIT, SIDE_UNIT = 20.0, 10.0, 0.3, 0.7
 
+#: Relative difference of two cones or sides up to which one of them is enough to try.
+ALIKE = 0.05
+
 #: Least share of a cone that its beam has, if the beam is free.
 LEAST_BEAM = 0.05
 
@@ -142,9 +145,18 @@ class FreeLight:
         if self.freedom.cone is None:
             return np.array([now])
         share = now[1] / (now[0] or 1.0)
-        sizes = np.geomspace(*self.freedom.cone, count)
-        opened = [self._opened(self.site, float(cutoff), share) for cutoff in sizes]
+        cutoffs = _middles(*self.freedom.cone, count)
+        cutoffs = cutoffs[np.abs(cutoffs / now[0] - 1) > ALIKE]
+        opened = [self._opened(self.site, float(cutoff), share) for cutoff in cutoffs]
         return np.array([now, *((x.cutoff, x.beam) for x in opened)], dtype=float)
+
+    def some_sides(self, count: int) -> Doubles:
+        """Return permitted sides of a panel, the present one first."""
+        assert isinstance(self.site, PanelSite)
+        if self.sides is None:
+            return np.array([self.site.side])
+        sides = _middles(*self.sides, count)
+        return np.array([self.site.side, *sides[np.abs(sides / self.site.side - 1) > ALIKE]])
 
     def _tangents(self, site: Site) -> Doubles:
         if not self.freedom.slides or self.places is None or site.position is None:
@@ -163,6 +175,12 @@ class FreeLight:
         share = max(share, LEAST_BEAM) if self.has_free_beam else self._share
         beam = max(min(share * cutoff, cutoff - EDGE), EDGE)
         return replace(site, cutoff=cutoff, beam=beam)
+
+
+def _middles(low: float, high: float, count: int) -> Doubles:
+    """Return the middles of `count` parts of a range of sizes, which are equal as ratios."""
+    edges = np.geomspace(low, high, 2 * count + 1)
+    return np.asarray(edges[1::2])
 
 
 def places_of(freedom: Freedom, position: Doubles, surfaces: Places | None = None) -> Places:

@@ -214,7 +214,7 @@ def _searched(
         found = NewLightSearch(poses, slots, judge).run(found, count)
     found = judge.refined(found, STEPS, progress=count)
     progress("poses", total, total)
-    return judge.judged(start, found)
+    return judge.worthwhile(start, found)
 
 
 def _placement(

@@ -1,6 +1,7 @@
 """Columns of frozen paths: the light that plain renders have, at any place, by the same paths."""
 
 import json
+import math
 import subprocess
 import sys
 from collections.abc import Callable
@@ -12,11 +13,12 @@ import pytest
 from renderer import REPOSITORY, write_room
 
 import lightpaint as lp
-from lightpaint.arrays import Floats
+from lightpaint.arrays import Floats, Position
 from lightpaint.errors import SceneError
 from lightpaint.images.pixel_blocks import block_mean
-from lightpaint.placement.paths.frozen_paths import FrozenPaths
+from lightpaint.placement.paths.frozen_paths import FrozenPaths, PanelSite
 from lightpaint.placement.paths.view_paths import SearchPaths
+from lightpaint.scene.lights.new_emitter import NewEmitter
 from lightpaint.scene.properties.pose import Site
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
@@ -181,6 +183,57 @@ def test_cones_are_those_of_mitsuba(room: Scene) -> None:
 
     full_image, image = along_paths(room, render_pair, bounces=0)
     np.testing.assert_allclose(image, full_image, atol=2e-4 * full_image.max())  # single precision
+
+
+def panel(place: Position, towards: Position, side: float) -> tuple[NewEmitter, PanelSite]:
+    """A panel as an emitter, and as the origin of a column."""
+    pose = lp.Pose(position=place, target=towards)
+    emitter = NewEmitter("seen", "panel", pose, size=(side, side))
+    return emitter, PanelSite(place, emitter.site.direction, side=side)
+
+
+def test_a_panel_that_the_camera_sees_is_in_its_column(tmp_path: Path) -> None:
+    """Its front, with the edges that renders have, and all that it lights."""
+    room = load_scene(write_room(tmp_path, film='<rfilter type="box"/>'))
+    emitter, site = panel((-0.3, 1.2, 0.3), (-0.1, 0.9, 2.0), 0.3)
+    basis = lp.render_basis(room.with_new_emitters([emitter]), spp=1024)
+    plane = basis.image("seen")
+    column = along_paths(room, lambda p: p.columns([site])[0], first_hits=16, bounces=16)
+    assert plane.max() == pytest.approx(1, rel=0.01)
+    assert np.square(column - plane).sum() < 0.005 * np.square(plane).sum()  # noise
+
+
+def test_a_panel_fills_pixels_by_its_area(room: Scene) -> None:
+    """In closed form, for one that is parallel to the picture, however it lies on the pixels."""
+    width = 2 * math.tan(math.radians(25)) / 24  # of a pixel, at a distance of 1
+    eye, ahead = np.array([0.0, 1.0, 3.5]), np.array([0.0, -0.2, -3.5])
+    ahead /= np.linalg.norm(ahead)
+
+    def filled(paths: FrozenPaths, side: float, off: float, away: float, axis: int = -1) -> float:
+        place = eye + away * ahead + (off, 0, 0)
+        lines = paths.sight_lines.near(place.tolist(), side)
+        return float(lines.covered(place.tolist(), axis * ahead[None], side).sum())
+
+    def check(paths: FrozenPaths) -> None:
+        for side, off in (0.3, 0.0), (0.31, 0.04), (0.01, 0.017):
+            expected = (side / (2 * width)) ** 2
+            assert filled(paths, side, off, 2.0) == pytest.approx(expected, rel=0.01)  # cells
+        assert filled(paths, 0.3, 0.0, 2.0, axis=1) == 0  # its back
+        assert filled(paths, 0.3, 0.0, 9.0) == 0  # behind the wall
+
+    along_paths(room, check, first_hits=16, bounces=0)
+
+
+def test_hidden_emitters_are_not_seen(tmp_path: Path) -> None:
+    paths = write_room(tmp_path), "path:max_depth=5"
+    rooms = [
+        load_scene(paths[0], integrator=paths[1] + more) for more in ("", ",hide_emitters=true")
+    ]
+    _, site = panel((-0.3, 1.2, 0.3), (-0.1, 0.9, 2.0), 0.3)
+    seen, hidden = (
+        along_paths(room, lambda p: p.direct_images([site])[0].max(), bounces=0) for room in rooms
+    )
+    assert hidden < 0.5 < seen
 
 
 def test_what_paths_cannot_be_frozen_for(room: Scene, tmp_path: Path) -> None:

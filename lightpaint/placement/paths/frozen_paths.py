@@ -29,6 +29,8 @@ from lightpaint.placement.paths.camera_paths import (
     later_vertices_of,
     longest_path,
 )
+from lightpaint.placement.paths.panels_in_view import SightLines
+from lightpaint.placement.paths.spot_cones import away_from, share_in_cone
 from lightpaint.scene.properties.rotation import across
 from lightpaint.scene.properties.site import Site
 from lightpaint.scene.runtime.render_lock import tracing
@@ -104,15 +106,16 @@ class FrozenPaths:
         if scene.has_media:
             raise SceneError(f"{scene.path} has fog or the like: lights cannot be moved in it")
         self.size, self._scene = scene.size, loaded
-        side = math.isqrt(first_hits)
+        self.hides_panels = scene.integrator.hide_emitters
+        self._side = side = math.isqrt(first_hits)
         if side**2 != first_hits:
             raise SceneError(f"first_hits is {first_hits}: expected a square number, like 16")
-        camera, longest = scene.camera(loaded), longest_path(scene)
+        self._camera, longest = scene.camera(loaded), longest_path(scene)
         rng = np.random.default_rng(pass_seed(seed, Stream.FROZEN_PATHS, 0))
         with tracing():
-            self.direct = first_hits_of(loaded, camera, self.size, side, rng)
+            self.direct = first_hits_of(loaded, self._camera, self.size, side, rng)
             self.indirect = (
-                later_vertices_of(loaded, camera, self.size, bounces, longest, rng)
+                later_vertices_of(loaded, self._camera, self.size, bounces, longest, rng)
                 if bounces and longest > 1
                 else None
             )
@@ -138,7 +141,19 @@ class FrozenPaths:
 
     def direct_images(self, sites: Sequence[Site]) -> Floats:
         """Return the images of direct light alone, (k, h · w, 3) float32; see `columns`."""
-        return self._sums(self.direct, sites)
+        images = self._sums(self.direct, sites)
+        for image, site in zip(images, sites, strict=True):
+            if isinstance(site, PanelSite) and site.position and not self.hides_panels:
+                lines = self.sight_lines.near(site.position, site.side / math.sqrt(2))
+                axis = np.array([site.direction or (0.0, 0.0, 1.0)])
+                shares = lines.covered(site.position, axis, site.side)[0]
+                np.add.at(image, lines.pixels, shares[:, None])
+        return images
+
+    @cached_property
+    def sight_lines(self) -> SightLines:
+        """Where the camera sees panels."""
+        return SightLines.of(self._scene, self._camera, self.size, self._side)
 
     def indirect_images(self, sites: Sequence[Site]) -> Floats:
         """Return the images of indirect light alone, (k, h, w, 3) float32; see `columns`."""
@@ -243,29 +258,12 @@ class _Shone:
             return self.light
         beam = site.cutoff if site.beam is None else site.beam
         direction = np.asarray(site.direction or (0.0, 0.0, 1.0), np.float32)
-        share = _share_in_cone(self._away @ direction, site.cutoff, min(beam, site.cutoff))
+        share = share_in_cone(self._away @ direction, site.cutoff, min(beam, site.cutoff))
         return np.asarray(self.light * share)
 
     @cached_property
     def _away(self) -> Floats:
         return away_from(self.origin.position, self.vertices.points)
-
-
-def away_from(place: Sequence[float], points: Floats) -> Floats:
-    """Return the directions from a place to points, (v, 3) float32 unit vectors."""
-    away = points - np.asarray(place, np.float32)
-    away /= np.maximum(np.sqrt(np.einsum("vk,vk->v", away, away))[:, None], 1e-30)
-    return np.asarray(away)
-
-
-def _share_in_cone(cosine: Floats, cutoff: float, beam: float) -> Floats:
-    """Return the share of its light that a spot sends at cosines to its axis. Angles: degrees.
-
-    As Mitsuba's spot has it: 1 within the beam, linear in the angle to 0 at the cutoff.
-    """
-    angle = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
-    share = (np.float32(cutoff) - angle) / np.float32(max(cutoff - beam, 1e-6))
-    return np.asarray(np.clip(share, 0, 1))
 
 
 def _added(loaded: Any, vertices: Vertices, row: Sequence[Any], at: tuple[Any, Any]) -> Any:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from lightpaint.arrays import Bools, Floats, Indices
 from lightpaint.images.denoiser import Features
 from lightpaint.placement.paths.frozen_paths import FrozenPaths
+from lightpaint.placement.paths.panels_in_view import SightLines
 from lightpaint.placement.space.free_space import (
     CLEARANCE,
     FreeSpace,
@@ -79,6 +81,15 @@ class ViewPaths:
     def contributions(self, site: Site) -> Floats:
         """Return a light's contribution at each first hit, (v, 3), as if it shone all around."""
         return np.concatenate([part.contributions(part.direct, site) for part in self.parts])
+
+    def sight_lines(self) -> list[SightLines]:
+        """Return the lines of sight of each view that shows panels, with indices of all pixels."""
+        starts = np.cumsum([0, *(math.prod(part.size) for part in self.parts)])
+        return [
+            replace(part.sight_lines, pixels=part.sight_lines.pixels + start)
+            for part, start in zip(self.parts, starts, strict=False)
+            if not part.hides_panels
+        ]
 
 
 class SearchPaths:

@@ -74,6 +74,43 @@ class PoseError:
     turn: float | None
 
 
+class _ErrorsOfChanges:
+    """The error with some of the changes from `start` to `best`.
+
+    paths: those that weights are fitted on, and the others.
+    changed: (k,), which movables of `best` have moved or are new.
+    """
+
+    def __init__(
+        self, fit: PlacementFit, start: Arrangement, best: Arrangement, paths: Sequence[ViewPaths]
+    ) -> None:
+        self._fit, self._movables = fit, best.movables
+        self._columns = [
+            [
+                by_column(its.movables, at.columns(all_sites(its.movables, its.sites)))
+                for at in paths
+            ]
+            for its in (start, best)
+        ]
+        old = len(start.movables)
+        self.changed = np.array(
+            [k >= old or site != start.sites[k] for k, site in enumerate(best.sites)], dtype=bool
+        )
+
+    def missed(self, changed: Bools) -> Doubles:
+        """Return the error of pixels with some of the changes, along each of the paths, (2, p)."""
+        columns = []
+        for old, new in zip(*self._columns, strict=True):
+            mixed = {
+                column: new[column] if is_changed else old.get(column, 0 * new[column])
+                for movable, is_changed in zip(self._movables, changed, strict=True)
+                for column in movable.columns
+            }
+            columns.append(self._fit.replaced(mixed))
+        weights = self._fit.fitted(columns[0]).weights
+        return np.stack([self._fit.missed_map(its, weights) for its in columns])
+
+
 class PlacementJudge:
     """A judge of arrangements."""
 
@@ -88,62 +125,43 @@ class PlacementJudge:
         start = self._steps.refitted(best, at)
         return self._steps.descend(start, at, steps, first_share=REFIT_SHARE, progress=progress)
 
-    def judged(self, start: Arrangement, best: Arrangement) -> Found:
-        """Return the worthwhile changes of `best`, whose first movables are those of `start`."""
-        movables, count_before = best.movables, len(start.movables)
-        alternatives = [
-            self._changes(start, best, at) for at in (self._paths.refine, self._paths.judge)
-        ]
+    def worthwhile(self, start: Arrangement, best: Arrangement) -> Found:
+        """Return `best` with its worthwhile changes alone. Its first movables are those of `start`.
 
-        def missed(changed: Bools) -> Doubles:
-            """Return the error with some of the changes, (2, p).
-
-            The rows are for the paths that weights are fitted on, and for the others.
-            """
-            columns = []
-            for old, new in alternatives:
-                changed_columns = self._fit.columns.copy()
-                for k, movable in enumerate(movables):
-                    for column in movable.columns:
-                        changed_columns[column] = new[column] if changed[k] else old.get(column, 0)
-                columns.append(changed_columns)
-            weights = self._fit.fitted(columns[0]).weights
-            return np.stack(
-                [self._fit.missed_map(changed_columns, weights) for changed_columns in columns]
-            )
-
-        def is_worth(lost: Doubles) -> bool:
-            """Return whether an error that a change removes, (2, p), is surely worth it."""
-            return float(lost[1].sum()) >= max(WORTH * total, SURE * standard_error(lost))
-
-        moved = [k >= count_before or x != start.sites[k] for k, x in enumerate(best.sites)]
-        changed = np.array(moved, dtype=bool)
-        before = missed(np.zeros(len(movables), dtype=bool))
-        total, gains = float(before[1].sum()), np.zeros(len(movables))
-        after = missed(changed)
+        The change with the least gain goes first, since others may take over what it did.
+        """
+        errors = _ErrorsOfChanges(self._fit, start, best, (self._paths.refine, self._paths.judge))
+        changed, gains = errors.changed.copy(), np.zeros(len(best.movables))
+        before, after = errors.missed(np.zeros_like(changed)), errors.missed(changed)
         while changed.any():
             lost = {}
             for k in np.flatnonzero(changed):
                 without = changed.copy()
                 without[k] = False
-                lost[int(k)] = missed(without) - after
+                lost[int(k)] = errors.missed(without) - after
                 gains[k] = float(lost[int(k)][1].sum())
             least = min(lost, key=lambda k: gains[k])
-            if is_worth(lost[least]):
+            if gains[least] >= self._least_gain(lost[least], after + lost[least]):
                 break
             changed[least], gains[least] = False, 0.0
-            after = missed(changed)
-        norm2 = self._fit.norm2 or 1.0
+            after = errors.missed(changed)
         # Where the estimate of the noise is too large, less than nothing is missed.
-        rest = max(float(after[1].sum()), 0.0)
-        error = rest + max(total - float(after[1].sum()), 0.0)
-        reported = (np.arange(len(movables)) < count_before) | changed
-        return Found(
-            self._with_changes(start, best, changed),
-            tuple((gains[reported] / max(error, 1e-300)).tolist()),
-            error / norm2,
-            rest / norm2,
-        )
+        norm2, rest = self._fit.norm2 or 1.0, max(float(after[1].sum()), 0.0)
+        error = rest + max(float((before - after)[1].sum()), 0.0)
+        reported = (np.arange(len(changed)) < len(start.movables)) | changed
+        shares = tuple((gains[reported] / max(error, 1e-300)).tolist())
+        kept = self._with_changes(start, best, changed)
+        return Found(kept, shares, error / norm2, rest / norm2)
+
+    def _least_gain(self, lost: Doubles, without: Doubles) -> float:
+        """Return the least error that a change has to remove to be worth it.
+
+        lost: (2, p), the error that it removes; without: the same without it, with all other
+        changes. Its share counts against that, and not against the error before all changes, or one
+        bright light would make all others negligible.
+        """
+        missed = max(float(without[1].sum()), 0.0)
+        return max(WORTH * missed, SURE * standard_error(lost), NOTHING * self._fit.norm2)
 
     def is_worth(self, before: Arrangement, after: Arrangement) -> bool:
         """Return whether the last light has enough gain on paths that nothing was fitted to."""
@@ -162,11 +180,7 @@ class PlacementJudge:
                 ]
             )
         gain = np.array(maps[0]) - np.array(maps[1])
-        least = max(
-            WORTH * float(maps[0][1].sum()),
-            SURE * standard_error(gain),
-            NOTHING * self._fit.norm2,
-        )
+        least = self._least_gain(gain, np.array(maps[0]))
         # Noise of painting and basis is the same for all paths. It is independent between pixels,
         # and a search fits some of it by chance.
         usual = np.sort(maps[0][1])[: max(1, round(USUAL_SHARE * len(maps[0][1])))]
@@ -207,16 +221,6 @@ class PlacementJudge:
             picture = self._fit.picture(fitted, weights)[:, :3].astype(np.float32)
             stages.append(Growth(missed / (self._fit.norm2 or 1.0), picture))
         return stages
-
-    def _changes(
-        self, start: Arrangement, best: Arrangement, at: ViewPaths
-    ) -> tuple[dict[int, Floats], dict[int, Floats]]:
-        """Return columns before and after, by their indices."""
-        changes = []
-        for arrangement in (start, best):
-            columns = at.columns(all_sites(arrangement.movables, arrangement.sites))
-            changes.append(dict(by_column(arrangement.movables, columns)))
-        return changes[0], changes[1]
 
     def _with_changes(self, start: Arrangement, best: Arrangement, changed: Bools) -> Arrangement:
         """Return `best` without unchanged lights."""

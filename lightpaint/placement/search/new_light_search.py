@@ -51,12 +51,15 @@ class NewLightSearch:
         while self._free and arrangement.missed > NOTHING * self._fit.norm2:
             more = self._with_one_more(arrangement)
             progress()
-            if more is None or not self._judge.is_worth(arrangement, more):
+            if more is None:
+                break
+            # Until the others make room for it, a light may seem to gain next to nothing.
+            more = self._steps.descend(more, self._paths.compare, STEPS, first_share=0.5)
+            if not self._judge.is_worth(arrangement, more):
                 break
             added = more.movables[-1]
             self._free = [slot for slot in self._free if slot.columns != added.columns]
-            arrangement = self._steps.descend(more, self._paths.compare, STEPS, first_share=0.5)
-            arrangement = self._without_off(arrangement)
+            arrangement = self._without_off(more)
         return self._merged(self._tried_again(arrangement))
 
     def _tried_again(self, arrangement: Arrangement) -> Arrangement:

@@ -5,15 +5,16 @@ place share their shadow rays and one matrix product.
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats
+from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.placement.free_light import FreeLight
-from lightpaint.placement.paths.frozen_paths import PanelSite, away_from
+from lightpaint.placement.paths.frozen_paths import PanelSite
+from lightpaint.placement.paths.spot_cones import away_from
 from lightpaint.placement.paths.view_paths import ViewPaths
 from lightpaint.placement.placement_fit import Ranking
 from lightpaint.placement.space.free_space import as_position
@@ -22,6 +23,9 @@ from lightpaint.threads import one_thread
 
 #: Degrees between trial directions, and number of trial cones.
 APART, CONES = 20.0, 3
+
+#: Number of trial sides of a panel that the camera sees, and of pixels that are enough to rank it.
+SIDES, SEEN_PIXELS = 3, 256
 
 #: Every second first hit is used.
 THINNING = 2
@@ -42,6 +46,7 @@ class PoseCandidates:
             * self._root[:, c]
             for c in range(self._root.shape[1])
         ]
+        self._whole = ranking
 
     def gains(
         self, light: FreeLight, places: Floats
@@ -59,9 +64,7 @@ class PoseCandidates:
                 continue
             cosine = directions.astype(np.float32) @ away_from(place, self._points).T
             if isinstance(at_place, PanelSite):
-                # From afar, a panel acts as a point whose light falls off with the cosine.
-                gains = self._gains(added * at_place.side**2, np.maximum(cosine, 0))
-                yield gains, partial(_aimed, at_place, directions)
+                yield from self._panels(light, at_place, directions, added, np.maximum(cosine, 0))
                 continue
             for cutoff, beam in cones:
                 # Linear in the cosine instead of the angle, which ranks as well.
@@ -71,14 +74,46 @@ class PoseCandidates:
                 gains = self._gains(added, np.clip(share, 0, 1, out=share))
                 yield gains, partial(_aimed, opened, directions)
 
+    def _panels(
+        self,
+        light: FreeLight,
+        site: PanelSite,
+        directions: Floats,
+        added: Floats,
+        cosine: Floats,
+    ) -> Iterator[tuple[Doubles, Callable[[int], Site]]]:
+        """Yield the gains of panels at one place. added, cosine: at first hits."""
+        sides = light.some_sides(SIDES)
+        assert site.position is not None
+        radius = sides.max() / math.sqrt(2)
+        lines = [its.near(site.position, radius) for its in self._paths.sight_lines()]
+        parts = [(its.some(SEEN_PIXELS), len(its.pixels)) for its in lines if len(its.pixels)]
+        for side in sides if parts else sides[:1]:
+            seen = [
+                (its.pixels, its.covered(site.position, directions, side), count / len(its.pixels))
+                for its, count in parts
+            ]
+            # From afar, a panel acts as a point whose light falls off with the cosine.
+            gains = self._gains(added * side**2, cosine, seen)
+            yield gains, partial(_aimed, replace(site, side=float(side)), directions)
+
     def _suns(self, light: FreeLight) -> Iterator[tuple[Doubles, Callable[[int], Site]]]:
         for direction in light.directions(APART / 2):
             site = replace(light.site, direction=as_position(direction))
             added = self._paths.contributions(site)[::THINNING]
             yield self._gains(added, None), partial(_aimed, site, None)
 
-    def _gains(self, added: Floats, shares: Floats | None) -> Doubles:
-        """Return gains of contributions at first hits, (v, 3), for shares of them, (k, v)."""
+    def _gains(
+        self,
+        added: Floats,
+        shares: Floats | None,
+        seen: Sequence[tuple[Indices, Floats, float]] = (),
+    ) -> Doubles:
+        """Return gains of contributions at first hits, (v, 3), for shares of them, (k, v).
+
+        seen: pixels, (r,), what panels add to them at unit radiance, (k, r), and for how many
+        pixels each stands.
+        """
         inner = [block * added[:, c % 3] for c, block in enumerate(self._weighed)]
         power = np.square(np.tile(added, (1, len(inner) // 3)) * self._root)
         if shares is None:
@@ -87,12 +122,27 @@ class PoseCandidates:
             with one_thread():
                 products = shares @ np.concatenate(inner).T
                 squares = np.square(shares) @ power
+        for pixels, filled, each in seen:
+            # First hits are of some pixels only.
+            filled *= math.sqrt(each / THINNING)
+            products += math.sqrt(each / THINNING) * filled @ self._weighed_at(pixels).T
+            squares += np.square(filled) @ np.square(self._whole.root[pixels])
         gains, start = np.zeros(len(products)), 0
         for c in range(len(inner)):
             block = products[:, start : start + len(inner[c])]
             start += len(inner[c])
             gains += self._ranking.gain(c, block[:, 0], block[:, 1:], squares[:, c])
         return gains
+
+    def _weighed_at(self, pixels: Indices) -> Floats:
+        """Return residuals and columns of others at pixels, weighted twice, as rows."""
+        its = self._whole.at(pixels)
+        return np.concatenate(
+            [
+                np.concatenate([its.residual[None, :, c], its.others[c]]) * its.root[:, c]
+                for c in range(its.root.shape[1])
+            ]
+        )
 
 
 def _aimed(site: Site, directions: Floats | None, k: int) -> Site:

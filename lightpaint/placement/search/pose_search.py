@@ -13,8 +13,9 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Floats
 from lightpaint.placement.movable import Arrangement, Movable, all_sites, by_column
+from lightpaint.placement.paths.frozen_paths import PanelSite
 from lightpaint.placement.paths.view_paths import SearchPaths
-from lightpaint.placement.placement_fit import Fitted, PlacementFit, with_columns
+from lightpaint.placement.placement_fit import Fitted, PlacementFit, Ranking, with_columns
 from lightpaint.placement.search.pose_candidates import PoseCandidates, best_poses
 from lightpaint.placement.search.pose_rules import PoseRules
 from lightpaint.placement.search.pose_steps import PoseSteps
@@ -22,6 +23,10 @@ from lightpaint.scene.properties.pose import Site
 
 #: Number of trial places of a light: if all lights are on lines, otherwise, and for new lights.
 PLACES_ON_LINES, PLACES, PLACES_OF_NEW = 24, 64, 112
+
+#: Number of further trial places of a panel, where the camera may see it, and their largest
+#: distance, relative to the spread of visible points.
+PLACES_IN_VIEW, REACH = 64, 4.0
 
 #: Number of best places around which more are tried, and the number of these.
 BESIDE, AROUND = 6, 8
@@ -97,6 +102,9 @@ class PoseSearch:
         poses: list[tuple[float, Site, int]] = []
         for j, movable in enumerate(movables):
             places = self._places(others, movable)
+            if isinstance(movable.light.site, PanelSite) and movable.light.freedom.slides:
+                seen = self._places_in_view(others, movable, ranking)
+                places = np.concatenate([places, seen])
             ranked = best_poses(direct.gains(movable.light, places), COMPARED)
             if len(places) > 1:
                 nearby = self._places_beside(others, movable, places, ranked)
@@ -135,6 +143,26 @@ class PoseSearch:
         if movable.group is None:
             is_permitted[0] = True
         return places[is_permitted]
+
+    def _places_in_view(self, others: Arrangement, movable: Movable, ranking: Ranking) -> Floats:
+        """Return places of a panel before pixels that are too dark without it."""
+        lacking = np.square(np.maximum(ranking.residual, 0)).sum(axis=1)
+        assert movable.light.places is not None
+        found = []
+        for lines in self.paths.rank.sight_lines():
+            odds = lacking[lines.pixels].astype(float)
+            if not odds.sum() > 0:
+                continue
+            chosen = self._rng.choice(len(odds), PLACES_IN_VIEW, p=odds / odds.sum())
+            length = np.minimum(lines.lengths[chosen], REACH * self.spread)
+            length *= self._rng.uniform(0.05, 0.95, len(chosen))
+            found += [
+                movable.light.places.nearest(place)
+                for place in lines.origins[0][chosen]
+                + length[:, None] * lines.directions[0][chosen]
+            ]
+        places = np.array(found, dtype=float).reshape(-1, 3)
+        return places[self._is_permitted(others, movable, places)] if len(places) else places
 
     def _places_beside(
         self,

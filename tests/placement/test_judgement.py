@@ -1,0 +1,76 @@
+"""Which changes are worth it, on images in place of paths."""
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+import lightpaint as lp
+from lightpaint.arrays import Floats
+from lightpaint.lighting.unknowns.knobs import Knob
+from lightpaint.lighting.unknowns.reduction import Reduction
+from lightpaint.placement.free_light import FreeLight
+from lightpaint.placement.look_goals import LookGoal
+from lightpaint.placement.movable import Arrangement, Movable
+from lightpaint.placement.placement_fit import PlacementFit
+from lightpaint.placement.search.judgement import NOTHING, WORTH, PlacementJudge
+from lightpaint.placement.search.pose_steps import PoseSteps
+from lightpaint.scene.properties.pose import Site
+
+PIXELS = 4000
+RNG = np.random.default_rng(5)
+IMAGES = RNG.random((3, PIXELS, 3)) + 0.2
+
+
+class Paths:
+    """Images of lights, by their x coordinate, with noise of these paths alone."""
+
+    def __init__(self, seed: int, noise: float) -> None:
+        rng = np.random.default_rng(seed)
+        halves = IMAGES + np.sqrt(2) * noise * rng.normal(size=(2, *IMAGES.shape))
+        parts = [halves.mean(axis=0), (halves[0] - halves[1]) / 2]
+        self._columns = np.concatenate(parts, axis=1).astype(np.float32)
+
+    def columns(self, sites: Sequence[Site]) -> Floats:
+        return np.asarray(self._columns[[int((site.position or (0, 0, 0))[0]) for site in sites]])
+
+
+def found(levels: Sequence[float], noise: float = 0.01) -> Any:
+    """What is worth it of three new lights, where the painting has them at these levels."""
+    goal = np.einsum("n,npc->pc", levels, IMAGES)
+    knobs = tuple(Knob.of_any_colour(k) for k in range(3))
+    reduction = Reduction(np.zeros((3, 3)), ("a", "b", "c"), knobs)
+    look = LookGoal(goal, np.ones_like(goal), reduction, None, np.zeros_like(goal))
+    fit = PlacementFit(np.zeros((3, 2 * PIXELS, 3), np.float32), [look])
+    paths = [Paths(seed, noise) for seed in (1, 2)]
+    steps = PoseSteps(fit, 1.0, lambda *_: True)
+    judge = PlacementJudge(fit, steps, SimpleNamespace(refine=paths[0], judge=paths[1]))  # type: ignore[arg-type]
+    sites = tuple(Site((float(k), 0.0, 0.0)) for k in range(3))
+    group = lp.NewLights("point")
+    movables = [
+        Movable(FreeLight(f"new_{k}", site, lp.Freedom()), (k,), None, group)
+        for k, site in enumerate(sites)
+    ]
+    nothing = Arrangement((), (), steps.fitted((), (), paths[0]))
+    best = Arrangement(tuple(movables), sites, steps.fitted(movables, sites, paths[0]))
+    return judge.worthwhile(nothing, best)
+
+
+def test_a_dim_light_beside_a_bright_one_is_worth_it() -> None:
+    """It removes nearly all that is missed without it, but little of what was missed at first."""
+    its = found((1.0, 0.05, 0.0))
+    assert [x.light.name for x in its.arrangement.movables] == ["new_0", "new_1"]
+    assert NOTHING < its.gains[1] < WORTH
+    assert its.after < 0.01 * its.gains[1]
+
+
+def test_lights_that_fit_noise_alone_are_not_worth_it() -> None:
+    its = found((1.0, 0.0, 0.0), noise=0.2)
+    assert [x.light.name for x in its.arrangement.movables] == ["new_0"]
+
+
+def test_a_negligible_light_is_not_worth_it() -> None:
+    """However surely it is seen."""
+    its = found((1.0, 0.005, 0.0), noise=1e-4)
+    assert [x.light.name for x in its.arrangement.movables] == ["new_0"]
