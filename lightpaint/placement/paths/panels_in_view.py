@@ -90,7 +90,7 @@ class SightLines:
         half = np.linalg.norm(self.directions[1] - self.directions[0], axis=1)
         return np.asarray(2 * half)
 
-    def covered(self, place: Sequence[float], directions: Doubles, side: float) -> Floats:
+    def covered(self, place: Sequence[float], directions: Floats | Doubles, side: float) -> Floats:
         """Return the share of its pixel that a panel fills in each cell, (k, r), for directions."""
         axes = np.asarray(directions, np.float32)
         if not len(self.pixels) or not len(axes):

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import Bools, Floats, Indices
+from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.images.denoiser import Features
 from lightpaint.placement.paths.frozen_paths import FrozenPaths
 from lightpaint.placement.paths.panels_in_view import SightLines
@@ -81,6 +81,12 @@ class ViewPaths:
     def contributions(self, site: Site) -> Floats:
         """Return a light's contribution at each first hit, (v, 3), as if it shone all around."""
         return np.concatenate([part.contributions(part.direct, site) for part in self.parts])
+
+    @cached_property
+    def eyes(self) -> list[Doubles]:
+        """The places of the cameras that see panels, (3,) each."""
+        origins = [its.origins[0] for its in self.sight_lines()]
+        return [rows.mean(axis=0, dtype=float) for rows in origins if len(rows)]
 
     def sight_lines(self) -> list[SightLines]:
         """Return the lines of sight of each view that shows panels, with indices of all pixels."""

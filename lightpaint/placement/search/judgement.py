@@ -123,7 +123,11 @@ class PlacementJudge:
         """Return the arrangement after the last steps, on the film of the judgement."""
         at = self._paths.refine
         start = self._steps.refitted(best, at)
-        return self._steps.descend(start, at, steps, first_share=REFIT_SHARE, progress=progress)
+        best = self._steps.descend(start, at, steps, first_share=REFIT_SHARE, progress=progress)
+        slid = self._steps.along_sight(best, at)
+        if slid is best:
+            return best
+        return self._steps.descend(slid, at, REFIT_STEPS, first_share=REFIT_SHARE)
 
     def worthwhile(self, start: Arrangement, best: Arrangement) -> Found:
         """Return `best` with its worthwhile changes alone. Its first movables are those of `start`.
@@ -191,7 +195,7 @@ class PlacementJudge:
         """Return the spread of each pose between fits along independent paths."""
         fits = [best.sites]
         for at in (self._paths.judge, self._paths.spread):
-            start = self._steps.refitted(best, at)
+            start = self._steps.along_sight(self._steps.refitted(best, at), at)
             refit = self._steps.descend(start, at, REFIT_STEPS, first_share=REFIT_SHARE)
             fits.append(refit.sites)
         return [

@@ -1,14 +1,17 @@
 """Gauss-Newton steps of several lights' poses, their weights eliminated."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.placement.free_light import FreeLight
 from lightpaint.placement.movable import Arrangement, Movable, all_sites, by_column
+from lightpaint.placement.paths.frozen_paths import PanelSite
 from lightpaint.placement.paths.view_paths import ViewPaths
 from lightpaint.placement.placement_fit import Fitted, PlacementFit, with_columns
+from lightpaint.placement.space.free_space import as_position
 from lightpaint.scene.properties.pose import Site
 
 #: Largest step of a number, relative to its finite difference.
@@ -22,6 +25,9 @@ RIDGE, RIDGE_GROWTH, RIDGE_SHRINK, LEAST_RIDGE, TRIALS = 1e-2, 6.0, 4.0, 1e-5, 5
 #: length relative to that; and the factors after a step that helped, and after one without
 #: progress.
 FIRST_STEP, LAST_SHARE, SHORTER, MUCH_SHORTER = 0.04, 0.15, 0.6, 0.4
+
+#: Ratios of distances that panels are tried at, and how many times in a row.
+RATIOS, MOST_SLIDES = (1.25, 1.08, 1.025), 8
 
 #: Decrease, as a share of the error, below which a step counts as no progress.
 MIN_PROGRESS = 1e-4
@@ -96,6 +102,48 @@ class PoseSteps:
                 ridge = RIDGE
             step = max((MUCH_SHORTER if share < MIN_PROGRESS else SHORTER) * step, last)
         return arrangement
+
+    def along_sight(self, arrangement: Arrangement, at: ViewPaths) -> Arrangement:
+        """Return the arrangement after panels slid along lines of sight, if that helps.
+
+        They keep their size in the picture. An outline tells everything about a panel's pose but
+        the distance, and leaves Gauss-Newton steps no way to another one, where it fits only with
+        the side that belongs to it.
+        """
+        for k, movable in enumerate(arrangement.movables):
+            if isinstance(movable.light.site, PanelSite) and movable.light.freedom.slides:
+                for eye in at.eyes:
+                    arrangement = self._slid(arrangement, k, eye, at)
+        return arrangement
+
+    def _slid(self, arrangement: Arrangement, k: int, eye: Doubles, at: ViewPaths) -> Arrangement:
+        """Return the arrangement with panel `k` at the best distance from an eye."""
+        for factor in (factor for ratio in RATIOS for factor in (ratio, 1 / ratio)):
+            for _ in range(MOST_SLIDES):
+                trial = self._at_distance(arrangement, k, eye, factor, at)
+                if trial is None or trial.missed >= arrangement.missed:
+                    break
+                arrangement = trial
+        return arrangement
+
+    def _at_distance(
+        self, arrangement: Arrangement, k: int, eye: Doubles, factor: float, at: ViewPaths
+    ) -> Arrangement | None:
+        """Return the arrangement with panel `k` at `factor` times its distance from an eye.
+
+        It is as large as before from there. None if it may not hang there, or not be as large.
+        """
+        movables, site = arrangement.movables, arrangement.sites[k]
+        assert isinstance(site, PanelSite)
+        place = eye + factor * (np.array(site.position, dtype=float) - eye)
+        slid = replace(site, position=as_position(place), side=factor * site.side)
+        permitted = movables[k].light.permitted(slid)
+        assert isinstance(permitted, PanelSite)
+        values = [[*(its.position or ()), its.side] for its in (slid, permitted)]
+        sites = [*arrangement.sites[:k], slid, *arrangement.sites[k + 1 :]]
+        if not np.allclose(*values, rtol=1e-9, atol=1e-9) or not self._permits(movables, sites):
+            return None
+        return arrangement.with_site(k, slid, self._moved(arrangement, sites, [k], at))
 
     def step(
         self,
