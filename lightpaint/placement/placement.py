@@ -84,7 +84,7 @@ class Move:
             done.append(f"slid by {self.distance:.2g}")
         if self.new.cutoff is not None and self.new.cutoff != self.old.cutoff:
             done.append(f"cone {self.old.cutoff:.0f}° to {self.new.cutoff:.0f}°")
-        gain = f"{100 * self.gain_share:.0f} % of what was missed"
+        gain = f"{_percent(self.gain_share)} of what was missed"
         return _with_advice(f"{self.name}: {', '.join(done)}: {gain}", self)
 
 
@@ -151,9 +151,13 @@ class AddedLight:
 
     def __str__(self) -> str:
         x, y, z = self.site.position or (0.0, 0.0, 0.0)
-        gain = f"{100 * self.gain_share:.0f} % of what was missed"
+        gain = f"{_percent(self.gain_share)} of what was missed"
         text = f"{self.name}: a new {self.emitter.kind} at ({x:.2f}, {y:.2f}, {z:.2f}): {gain}"
         return _with_advice(text, self)
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.{1 if share < 0.0095 else 0}f} %"
 
 
 def _with_advice(text: str, change: Move | AddedLight) -> str:
@@ -168,8 +172,8 @@ class Placement:
     Attributes:
         scenes: The scene with these, through the sensor of each view, for new bases and another
             solve.
-        moves: The worthwhile ones, largest gain first; none if no move reliably removes 1 % of the
-            error.
+        moves: The worthwhile ones, largest gain first. Each reliably removes at least 1 % of the
+            error that is left without it.
         additions: The worthwhile new lights, likewise.
         missed_before: The error of the solve as a share of ‖Ψ‖², estimated on paths that no place
             was fitted to.

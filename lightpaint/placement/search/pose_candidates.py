@@ -22,7 +22,7 @@ from lightpaint.scene.properties.pose import Site
 from lightpaint.threads import one_thread
 
 #: Degrees between trial directions, and number of trial cones.
-APART, CONES = 20.0, 3
+APART, CONES = 20.0, 5
 
 #: Number of trial sides of a panel that the camera sees, and of pixels that are enough to rank it.
 SIDES, SEEN_PIXELS = 3, 256

@@ -139,9 +139,11 @@ class PoseSteps:
         slid = replace(site, position=as_position(place), side=factor * site.side)
         permitted = movables[k].light.permitted(slid)
         assert isinstance(permitted, PanelSite)
-        values = [[*(its.position or ()), its.side] for its in (slid, permitted)]
+        asked, given = ([*(its.position or ()), its.side] for its in (slid, permitted))
         sites = [*arrangement.sites[:k], slid, *arrangement.sites[k + 1 :]]
-        if not np.allclose(*values, rtol=1e-9, atol=1e-9) or not self._permits(movables, sites):
+        if not np.allclose(asked, given, rtol=1e-9, atol=1e-9) or not self._permits(
+            movables, sites
+        ):
             return None
         return arrangement.with_site(k, slid, self._moved(arrangement, sites, [k], at))
 
