@@ -1,13 +1,14 @@
 """Records sessions of the painter: moving pictures, and some that stand still.
 
     pip install '.[test]'
-    python docs/images/record.py [--spp 64] [--port 8431] [--only painting|views|lights|places]
+    python docs/images/record.py [--spp 64] [--port 8431] [--only PICTURE]
 
 writes beside itself
 
     painting.webp   somebody paints the gallery: a warm wall, a cool one, light on a figure
     painter.jpg     the painter when that is done
     painter-views.jpg   the stage, painted from the balcony and from a box
+    painter-layers.jpg  the gallery with wishes as layers, one of them unfolded
     lights.webp     somebody drags a spot, and aims it by a click
     painter-lights.jpg  the painter when that is done
     places.webp     somebody paints, and lets the lights move
@@ -168,6 +169,30 @@ def from_two_seats(hand: Hand) -> None:
     hand.wait()
 
 
+def layered(hand: Hand) -> None:
+    """An evening of several wishes, of which one is unfolded."""
+    on, page = hand.of_painting, hand.page
+    page.keyboard.press("a")
+    page.get_by_role("button", name="By numbers", exact=True).click()
+    for label, text in (("Brighter", "-1"), ("Warmer", "-30")):
+        field = page.get_by_role("textbox", name=label, exact=True).first
+        field.fill(text)
+        field.press("Enter")
+    page.get_by_role("button", name="Apply", exact=True).click()
+    page.get_by_role("button", name="Adjust by numbers", exact=True).click()
+    page.get_by_role("button", name="Object", exact=True).click()
+    for place, (right, up) in (((0.61, 0.55), (40, 90)), ((0.295, 0.56), (25, 60))):
+        x, y = on(*place)
+        hand.drag((x, y), (x + right, y - up))
+    page.keyboard.press("b")
+    hand.drag(on(0.03, 0.27), on(0.13, 0.34), on(0.25, 0.41))
+    hand.drag(on(0.895, 0.25), on(0.905, 0.62))
+    hand.wait()
+    page.locator(".layer-name", has_text="Knot").first.click()
+    page.mouse.move(5, 5)
+    hand.wait()
+
+
 def moving_lights(hand: Hand) -> None:
     """A spot that is dragged, and aimed by a click."""
     on, page = hand.of_painting, hand.page
@@ -266,7 +291,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--spp", type=int, default=64)
     parser.add_argument("--port", type=int, default=8431)
-    parser.add_argument("--only", choices=("painting", "views", "lights", "places"))
+    parser.add_argument("--only", choices=("painting", "views", "layers", "lights", "places"))
     asked = parser.parse_args()
     if asked.only in (None, "lights"):
         with painter("gallery", asked.spp, asked.port) as url, using(url) as hand:
@@ -282,6 +307,10 @@ def main() -> None:
         with painter("stage", asked.spp, asked.port, *seats) as url, using(url) as hand:
             from_two_seats(hand)
             hand.page.screenshot(path=HERE / "painter-views.jpg", type="jpeg", quality=88)
+    if asked.only in (None, "layers"):
+        with painter("gallery", asked.spp, asked.port) as url, using(url) as hand:
+            layered(hand)
+            hand.page.screenshot(path=HERE / "painter-layers.jpg", type="jpeg", quality=88)
     if asked.only in (None, "painting"):
         with painter("gallery", asked.spp, asked.port) as url, using(url) as hand:
             session(hand)

@@ -15,7 +15,13 @@ import numpy.typing as npt
 from lightpaint.arrays import RGB, Bools, Floats
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.paint.layers.layer import Layer
-from lightpaint.paint.layers.layer_pixels import MIN_COVERAGE, LayerPixels
+from lightpaint.paint.layers.layer_pixels import (
+    MIN_COVERAGE,
+    LayerPixels,
+    is_empty,
+    relative,
+    shared,
+)
 from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
 
 #: Importance of the rest of a fully painted picture relative to one layer, and the largest accent,
@@ -66,8 +72,17 @@ def compose(layers: Sequence[ShownLayer], current: Floats, region: Region) -> Pi
     light = np.array(current[slices(region)], np.float32)
     result = Pixels(light, np.zeros(light.shape[:2], np.float32))
     for shown in layers:
-        if shown.pixels.overlaps(region):
-            result = _compose_layer(shown, shown.pixels.part(region), result)
+        if is_empty(area := shared(shown.pixels.bounds, region)):
+            continue
+        # A layer changes nothing where it has no pixels, so that small ones cost their area alone.
+        inner = relative(area, region)
+        composed = _compose_layer(shown, shown.pixels.part(area), result.part(inner))
+        result.image[slices(inner)] = composed.image
+        result.importance[slices(inner)] = composed.importance
+        if (marks := composed.at_least) is not None:
+            at_least = np.zeros(light.shape, bool) if result.at_least is None else result.at_least
+            at_least[slices(inner)] = marks
+            result = result._replace(at_least=at_least)
     return result
 
 

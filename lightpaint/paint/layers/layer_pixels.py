@@ -68,10 +68,6 @@ class LayerPixels:
         """True if no pixel of the view is uncovered."""
         return self._totals()[1] >= MIN_COVERAGE
 
-    def overlaps(self, region: Region) -> bool:
-        """Return whether anything may be covered in a region."""
-        return any(key in self._tiles for key in self._keys(region))
-
     def part(self, region: Region) -> Pixels:
         """Return a copy of the pixels of a region."""
         top, bottom, left, right = region
@@ -155,11 +151,8 @@ class LayerPixels:
     ) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
         """Return where a tile lies in a region, and the region in the tile."""
         tile = self._tile_region(key)
-        shared = (
-            *(max(tile[0], region[0]), min(tile[1], region[1])),
-            *(max(tile[2], region[2]), min(tile[3], region[3])),
-        )
-        return slices(_relative(shared, region)), slices(_relative(shared, tile))
+        area = shared(tile, region)
+        return slices(relative(area, region)), slices(relative(area, tile))
 
 
 def enclosing(regions: Sequence[Region]) -> Region:
@@ -177,7 +170,16 @@ def is_empty(region: Region) -> bool:
     return top >= bottom or left >= right
 
 
-def _relative(region: tuple[int, ...], origin: Region) -> Region:
+def shared(first: Region, second: Region) -> Region:
+    """Return the region that is in both; an empty one if none is."""
+    return (
+        *(max(first[0], second[0]), min(first[1], second[1])),
+        *(max(first[2], second[2]), min(first[3], second[3])),
+    )
+
+
+def relative(region: Region, origin: Region) -> Region:
+    """Return a region as seen from the corner of another."""
     top, bottom, left, right = region
     return top - origin[0], bottom - origin[0], left - origin[2], right - origin[2]
 

@@ -7,6 +7,7 @@ import { Dialogs } from './ui/dialogs.js';
 import { PreviewDialog } from './ui/advice.js';
 import { countText } from './ui/format.js';
 import { handleKey, listenWithin } from './ui/keyboard.js';
+import { LayerCount, LayerPanel, hasLayers } from './ui/layers/layer_panel.js';
 import { LightList, LightListActions } from './ui/light_list.js';
 import { LookStrip } from './ui/look_strip.js';
 import { storedTool, storeChanges, storedFolds, storedBrushSize } from './ui/browser_storage.js';
@@ -73,6 +74,7 @@ function listen(app) {
   engine.on('message', (message) => session.receive(message));
   engine.on('loading', (loadProgress) => store.set({ loadProgress }));
   engine.on('adjustment', (dragAdjustment) => store.set({ dragAdjustment }));
+  engine.on('layers', () => store.set((ui) => layersUpdate(engine.layerState(), ui)));
   engine.on('view', ({ view }) => showView(app, view));
   engine.on('lost', ({ count, isStale }) => {
     if (isStale) store.set({ lostStrokes: count });
@@ -93,6 +95,17 @@ function listen(app) {
       },
     });
   });
+}
+
+/** @param {ReturnType<Engine["layerState"]>} layerState @param {Ui} ui @returns {Partial<Ui>} */
+function layersUpdate(layerState, { selectedLayers, hoveredLayer }) {
+  const exists = (/** @type {number | null} */ id) =>
+    layerState.layers.some((layer) => layer.id === id);
+  return {
+    ...layerState,
+    selectedLayers: selectedLayers.filter(exists),
+    hoveredLayer: exists(hoveredLayer) ? hoveredLayer : null,
+  };
 }
 
 /** Width in pixels below which panels overlay the pictures; style.css has the same number. */
@@ -163,12 +176,20 @@ function Side({ ui, app }) {
     /** @type {string} */ title,
     /** @type {any} */ content,
     /** @type {any} */ extra = null,
+    isOpen = Boolean(ui.open[name]),
   ) =>
-    html`<${Fold} title=${title} class=${`is-${name}`} open=${Boolean(ui.open[name])} extra=${extra}
-      toggle=${() => store.set({ open: { ...ui.open, [name]: !ui.open[name] } })}>${content}</${Fold}>`;
+    html`<${Fold} title=${title} class=${`is-${name}`} open=${isOpen} extra=${extra}
+      toggle=${() => store.set({ open: { ...ui.open, [name]: !isOpen } })}>${content}</${Fold}>`;
   return html`<aside class="side" aria-label="Panels">
     ${renderFold('colour', 'Colour', html`<${ColourPanel} ui=${ui} app=${app} />`)}
     ${renderFold('ask', 'Adjust by numbers', html`<${AdjustPanel} ui=${ui} app=${app} />`)}
+    ${renderFold(
+      'layers',
+      'Layers',
+      html`<${LayerPanel} ui=${ui} app=${app} />`,
+      html`<${LayerCount} ui=${ui} />`,
+      ui.open.layers ?? hasLayers(ui),
+    )}
     ${renderFold(
       'lights',
       'Lights',

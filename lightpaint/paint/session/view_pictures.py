@@ -56,6 +56,8 @@ def offer_view(
             name = name_in_view(f"plane/{k}", view.view)
         offer(f"thumb/{k}", partial(_thumbnail, table, name, basis))
     offer("present", lambda: as_halves(view.current))
+    # Layers lie on it, and the page composes them to the bit.
+    offer("ground", lambda: view.current.copy())
     offer("look", lambda: picture_table.display_thumbnail(view.current, transform))
     offer("painting", lambda: view.image.copy())
     offer("importance", lambda: view.importance.copy())

@@ -41,6 +41,8 @@ def unpack(data: bytes, dtype: str, shape: tuple[int, ...]) -> npt.NDArray[np.ge
     if len(plain) != size:
         raise PaintError(f"a damaged picture: {len(plain)} bytes, not {size}")
     rows = np.frombuffer(plain, np.uint8).reshape(kind.itemsize, -1)
+    if not rows.any():  # as before the first stroke on a layer
+        return np.zeros(shape, kind)
     return np.ascontiguousarray(rows.T).reshape(-1).view(kind).reshape(shape)
 
 

@@ -117,6 +117,10 @@ def replay(patches: Sequence[Patch], start: Pixels, bounds: Region | None = None
         if not is_visible.any():
             continue
         after = patch.after
+        if after.at_least is None and is_visible.all():  # as the only patch of a layer
+            image[area], importance[area] = after.image, after.importance
+            is_open[area] = False
+            continue
         image[area][is_visible] = after.image[is_visible]
         importance[area][is_visible] = after.importance[is_visible]
         if after.at_least is not None:

@@ -175,7 +175,11 @@ def test_asking_by_numbers_line_fill_and_undo(run: Any):
         await rest();
         const arrays = { image: { data: new Float32Array(3 * H * W).fill(0.125), shape: [H, W, 3] },
             importance: { data: new Float32Array(H * W), shape: [H, W] } };
-        host.emit("patch", { kind: "patch", region: [0, H, 0, W], arrays });
+        const painting = { id: 0, kind: "pixels", name: "Painting", is_visible: true, strength: 1,
+            importance: 1, group: null, gain: 1, tint: [1, 1, 1], times: 1,
+            regions: [[0, 0, 0, 0]], accents: [1], revision: 1 };
+        const layers = { layers: [painting], next: 2 };
+        host.emit("patch", { kind: "patch", region: [0, H, 0, W], arrays, layers });
         const back = light(30, 3);
         engine.line(at(2, 25), at(18, 25));
         return [wall, floor, back, [light(2, 25), light(10, 25), light(10, 20)], await rest()];

@@ -13,18 +13,24 @@ import { Encoder } from '../../../viewer/drawing/view_transform.js';
 import { maxImportance } from '../../../viewer/drawing/overlay.js';
 import { Screen } from './picture_canvas.js';
 import { hitTest, zoomAround } from '../../../viewer/drawing/view.js';
+import { plainLayer } from './layers/layer_list.js';
+import { LayerStrokes } from './layers/layer_strokes.js';
 import { SessionMirror } from './session_mirror.js';
 
 /** @typedef {import("./brush.js").Point} Point */
 /** @typedef {import("./stroke.js").ToolSettings} ToolSettings */
 /** @typedef {import("./socket_host.js").Host} Host */
 /** @typedef {import("./message_frames.js").Region} Region */
+/** @typedef {import("./messages.js").ChangeLayers} ChangeLayers */
 /** @typedef {import("./message_frames.js").RGB} RGB */
 /** @typedef {import("../../../viewer/drawing/view.js").Kind} Kind */
 /** @typedef {import("../../../viewer/drawing/view.js").Pane} Pane */
 
 /** Albedo below which a surface is black and shows no light. */
 const MIN_ALBEDO = 0.02;
+
+/** The tool of an adjustment by numbers. @type {ToolSettings} */
+const NUMBERS_TOOL = { ...DEFAULT_TOOL, tool: 'adjust', adjustedArea: 'object' };
 
 /** The session on the page's own server. @returns {Host} */
 export function openHost() {
@@ -50,6 +56,16 @@ class PictureEngine extends Emitter {
     this.screen = new Screen(this.element, { view, refill: () => this.mirror.refill() });
     this.mirror = new SessionMirror(host, this.screen, (kind, event) => this.emit(kind, event));
     this.on('lost', () => this.dropStroke());
+    this.layers = new LayerStrokes(
+      this.mirror.layers,
+      (object) => this.mirror.state?.objects?.[object] ?? null,
+    );
+    this.on('layers', () => this.layers.followList());
+    /** A stroke from before the pixels of the layers have arrived.
+     * @type {{points: Point[], isEnded: boolean} | null} */
+    this.earlyStroke = null;
+    /** Called when a stroke changes the mask that is shown. */
+    this.onMaskChange = () => {};
     /** @type {Stroke | null} */
     this.stroke = null;
     /** @type {ToolSettings} */
@@ -144,7 +160,7 @@ class PictureEngine extends Emitter {
 
   /** Return the greatest painted importance, at least 1: full ink in the overlay. */
   maxImportance() {
-    return maxImportance(this.mirror.canvas?.importance ?? new Float32Array(0));
+    return maxImportance(this.mirror.drawnPainting?.importance ?? new Float32Array(0));
   }
 
   /** Return the display codes of light at an exposure. @param {RGB} rgb @param {number} stops */
@@ -188,15 +204,33 @@ class PictureEngine extends Emitter {
     if (this.stroke) this.end();
     const { place } = this;
     if (!place || place.strokes.isSessionLost || this.tool.tool === 'pick') return;
+    if (this.mirror.layers.isLoading) return this.beginLate(point);
+    const canvas = this.layers.begin(this.tool, point);
+    if (!canvas) return;
     const scale = this.panes()[0]?.scale ?? 1;
-    this.stroke = new Stroke(place.canvas, this.tool, point, scale);
+    this.stroke = new Stroke(canvas, this.tool, point, scale);
     this.mirror.isPainting = this.screen.isBrushDown = true;
-    place.strokes.begin();
+    place.strokes.begin(canvas, () => this.layers.layer);
     this.drawChange(this.stroke.begin());
+  }
+
+  /** Begin a stroke once the pixels of the layers have arrived. @param {Point} point */
+  beginLate(point) {
+    /** @type {{points: Point[], isEnded: boolean}} */
+    const early = { points: [], isEnded: false };
+    this.earlyStroke = early;
+    void this.mirror.layers.waitForPixels().then(() => {
+      if (this.earlyStroke !== early) return;
+      this.earlyStroke = null;
+      this.begin(point);
+      if (early.points.length) this.move(early.points);
+      if (early.isEnded) this.end();
+    });
   }
 
   /** @param {Point[]} points */
   move(points) {
+    this.earlyStroke?.points.push(...points);
     if (!this.stroke) return;
     this.drawChange(this.stroke.move(points));
     if (this.stroke.settings.tool === 'adjust') this.emit('adjustment', this.stroke.adjustment);
@@ -204,20 +238,21 @@ class PictureEngine extends Emitter {
 
   end() {
     const { stroke, place } = this;
+    if (this.earlyStroke) this.earlyStroke.isEnded = true;
     if (!stroke || !place) return;
     const { stops, mired } = stroke.adjustment;
     if (stroke.settings.tool === 'adjust' && !stops && !mired) return void this.cancel();
     this.clearStroke();
-    place.canvas.end();
-    place.strokes.end(LABELS[stroke.settings.tool]);
+    place.strokes.end(LABELS[stroke.settings.tool], this.layers.end());
   }
 
   /** Cancel the stroke that has begun. @returns {boolean} whether one had begun */
   cancel() {
     const { stroke, place } = this;
+    this.earlyStroke = null;
     if (!stroke || !place) return false;
     this.clearStroke();
-    const region = place.canvas.drop();
+    const region = this.layers.cancel();
     place.strokes.drop();
     if (region) this.mirror.redraw([region]);
     return true;
@@ -228,7 +263,7 @@ class PictureEngine extends Emitter {
   dropStroke() {
     if (!this.stroke) return;
     this.clearStroke();
-    const region = this.mirror.canvas?.drop();
+    const region = this.layers.cancel();
     if (region) this.mirror.redraw([region]);
   }
 
@@ -250,17 +285,81 @@ class PictureEngine extends Emitter {
     if (this.stroke) this.end();
     const { place } = this;
     if (!place || place.strokes.isSessionLost) return;
-    place.strokes.begin();
-    this.drawChange([adjustArea(place.canvas, adjustment)]);
-    place.canvas.end();
-    place.strokes.end(LABELS.adjust);
+    const point = { x: 0, y: 0, pressure: 1 };
+    const canvas = this.layers.begin(NUMBERS_TOOL, point, adjustment.object ?? -1);
+    if (!canvas) return;
+    place.strokes.begin(canvas, () => this.layers.layer);
+    this.drawChange([adjustArea(canvas, adjustment)]);
+    place.strokes.end(LABELS.adjust, this.layers.end());
+  }
+
+  // Layers
+
+  /** Change layers: at once here, and in the session. @param {ChangeLayers} change */
+  changeLayers(change) {
+    if (this.stroke) this.end();
+    const { place, mirror } = this;
+    if (!place || place.strokes.isSessionLost) return;
+    mirror.layers.change(change);
+    place.strokes.change({ ...change, layers: change.layers?.map(plainLayer) ?? [] });
+  }
+
+  /** Make a layer active. @param {number} id */
+  chooseLayer(id) {
+    this.layers.choose(id);
+  }
+
+  /** Paint the mask of a layer from now on; for null none. @param {number | null} id */
+  paintMask(id) {
+    this.layers.paintMask(id);
+  }
+
+  /** End a change by a slider that has reported no end. */
+  finishLayers() {
+    const { strokes } = this.mirror;
+    if (strokes?.isSliding) strokes.change({ ...strokes.lastChange, is_final: true });
+  }
+
+  /** The layers, the lowest first, and which of them are active. */
+  layerState() {
+    const { list, next, pixelRevisions, isPaintingEmpty } = this.mirror.layers;
+    const { activeId, maskId } = this.layers;
+    return {
+      ...{ layers: list, nextLayer: next, layer: activeId, maskLayer: maskId },
+      ...{ layerRevisions: pixelRevisions, isPaintingEmpty },
+    };
+  }
+
+  /** Return a small picture of a layer: its paint, or its mask in white. @param {number} id
+   * @param {number} width @param {number} height */
+  layerThumbnail(id, width, height) {
+    const { picture } = this.mirror.layers;
+    const rgba = new Uint8ClampedArray(4 * width * height);
+    const [rows, columns] = this.screen.size;
+    const stops = this.mirror.display?.stops ?? 0;
+    for (let at = 0; picture && at < width * height; at++) {
+      const x = Math.floor((((at % width) + 0.5) * columns) / width);
+      const y = Math.floor(((Math.floor(at / width) + 0.5) * rows) / height);
+      const { colour, coverage } = picture.pixelAt(id, x, y);
+      rgba.set(colour ? this.codes(colour, stops) : [255, 255, 255], 4 * at);
+      rgba[4 * at + 3] = 255 * Math.min(1, coverage);
+    }
+    return rgba;
+  }
+
+  /** Return how far a layer, or a group, covers each pixel. @param {number} id */
+  coverage(id) {
+    const [height, width] = this.screen.size;
+    return { data: this.mirror.layers.coverage(id), width, height };
   }
 
   /** @param {Region[]} regions */
   drawChange(regions) {
-    this.mirror.redraw(regions);
     const region = regions.reduce((a, b) => /** @type {Region} */ (union(a, b)), regions[0]);
-    if (region) this.mirror.strokes?.touch(region);
+    if (!region) return;
+    this.mirror.redraw([this.layers.takeChange(region)]);
+    this.mirror.strokes?.touch(region);
+    if (this.layers.maskId !== null) this.onMaskChange();
   }
 
   close() {

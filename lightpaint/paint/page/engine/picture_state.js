@@ -32,6 +32,12 @@ export class PictureState {
     this.isPainting = false;
   }
 
+  /** Light and importance of the painting, as they are drawn.
+   * @returns {{image: Float32Array, importance: Float32Array} | null} */
+  get drawnPainting() {
+    return this.canvas;
+  }
+
   /** Weights that come with a message. @param {Message} message */
   takeWeights(message) {
     const { poses, added_lights: addedLights } = message;
@@ -94,10 +100,10 @@ export class PictureState {
 
   /** @param {Region[]} regions */
   redraw(regions) {
-    const { canvas } = this;
+    const { drawnPainting } = this;
     const region = regions.reduce((a, b) => /** @type {Region} */ (union(a, b)), regions[0]);
-    if (!canvas || !region) return;
-    this.screen.view?.setCanvas(region, canvas.image, canvas.importance);
+    if (!drawnPainting || !region) return;
+    this.screen.view?.setCanvas(region, drawnPainting.image, drawnPainting.importance);
     this.screen.requestDraw(this.isPainting);
   }
 }

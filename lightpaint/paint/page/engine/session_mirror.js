@@ -1,6 +1,7 @@
 /**
  * The page's copy of the session: painting, weights and pictures, kept up to date by its messages.
  */
+import { LayerMirror } from './layers/layer_mirror.js';
 import { PaintCanvas } from './paint_canvas.js';
 import { PictureLoader } from './picture_loader.js';
 import { PictureState } from './picture_state.js';
@@ -35,6 +36,11 @@ export class SessionMirror extends PictureState {
     this.view = 0;
     /** @type {StrokeSender | null} */
     this.strokes = null;
+    this.layers = new LayerMirror(host, {
+      redraw: (region) => this.redraw([region]),
+      onChange: () => this.announceLayers(),
+      onError: (text) => this.emit('trouble', { text }),
+    });
     /** Revision of the session in its last message. */
     this.version = -1;
     /** Number of times that the session has sent the canvas. */
@@ -42,7 +48,12 @@ export class SessionMirror extends PictureState {
     /** Whether the canvas equals the session's. */
     this.isReady = false;
     host.on('state', (message) => this.begin(message));
-    host.on('answer', (message) => this.takeAnswer(message));
+    host.on('answer', (message) => {
+      this.takeAnswer(message);
+      if (!message.layers) return;
+      this.layers.remember(message.layers);
+      if (!this.strokes?.isPending) this.layers.adopt(false);
+    });
     host.on('patch', (message) => this.takePatch(message));
     host.on('closed', () => this.loader.pause());
     host.on('renewed', ({ resources }) => {
@@ -56,7 +67,10 @@ export class SessionMirror extends PictureState {
   /** @param {Message} state */
   begin(state) {
     this.version = -1;
+    this.layers.remember(state.layers);
     this.open(state, this.view);
+    const isOther = state.is_back === false;
+    if (isOther || !this.strokes?.isPending) this.layers.adopt(isOther);
     this.takeWeights(state);
     this.loader.begin(state.resources);
     this.requestPictures();
@@ -91,14 +105,19 @@ export class SessionMirror extends PictureState {
     this.screen.begin([height, width], state.lights.length, this.screen.view?.name);
     this.canvas = new PaintCanvas([height, width], new Uint16Array(3 * height * width));
     if (hasOtherSizes || !this.strokes) {
-      const requestState = () => this.host.send('hello', { version: VERSION }).catch(() => {});
+      const requestState = () => {
+        this.layers.distrustPixels();
+        this.host.send('hello', { version: VERSION }).catch(() => {});
+      };
       this.strokes?.close();
       const reportLoss = (/** @type {number} */ count, /** @type {boolean} */ isStale) =>
         this.emit('lost', { count, isStale });
       this.strokes = new StrokeSender(this.host, requestState, reportLoss);
       this.strokes.count = Math.max(0, Number(state.stroke) || 0);
+      this.strokes.onSettled = () => this.layers.adopt(false);
     }
     this.strokes.paintOn(this.canvas, view);
+    this.layers.open(this.canvas, view);
     this.isReady = false;
     this.knowsPresent = false;
     this.loader.forget();
@@ -129,7 +148,9 @@ export class SessionMirror extends PictureState {
     const { image, importance } = message.arrays;
     const isOwnDrop = strokes?.isDropping;
     if (strokes) strokes.isDropping = false;
+    this.layers.remember(message.layers);
     if (!canvas || !image || !importance || isOwnDrop) return;
+    this.layers.adopt(true);
     const { view = 0, views = [] } = message;
     if (view !== this.view) {
       // Show the view in which undo changed something.
@@ -138,11 +159,7 @@ export class SessionMirror extends PictureState {
     }
     const region = /** @type {Region} */ (message.region);
     this.patchCount++;
-    canvas.set(
-      region,
-      /** @type {Float32Array} */ (image.data),
-      /** @type {Float32Array} */ (importance.data),
-    );
+    this.setPainting(region, image, importance);
     this.redraw([region]);
   }
 
@@ -157,17 +174,14 @@ export class SessionMirror extends PictureState {
       const [image, importance] = await Promise.all(
         ['painting', 'importance'].map((name) => this.host.fetch(nameInView(name, this.view))),
       );
+      await this.layers.waitForPixels();
       // Paint or undo since then is newer.
       if (strokes.isPending || canvas !== this.canvas) return;
       if (strokes.count !== count || this.patchCount !== patchCount) {
         if (!this.isReady) this.sync();
         return;
       }
-      canvas.set(
-        canvas.wholeRegion,
-        /** @type {Float32Array} */ (image.data),
-        /** @type {Float32Array} */ (importance.data),
-      );
+      this.setPainting(canvas.wholeRegion, image, importance);
       this.isReady = true;
       this.redraw([canvas.wholeRegion]);
     } catch (error) {
@@ -177,11 +191,37 @@ export class SessionMirror extends PictureState {
     }
   }
 
+  /** Replace a region of the painting by the session's values. @param {Region} region
+   * @param {Picture} image @param {Picture} importance */
+  setPainting(region, { data: image }, { data: importance }) {
+    const { canvas, layers } = this;
+    const target = layers.isPlain ? canvas : layers.picture;
+    target?.set(
+      region,
+      /** @type {Float32Array} */ (image),
+      /** @type {Float32Array} */ (importance),
+    );
+  }
+
+  /** @override */
+  get drawnPainting() {
+    return this.layers.picture ?? this.canvas;
+  }
+
+  /** Announce that the list of layers has changed, or which of them is active. */
+  announceLayers() {
+    this.emit('layers', {});
+    // Layers lie on the current look in full precision.
+    if (!this.layers.isPlain && !this.loader.wantedNames.has('ground')) this.requestPictures();
+  }
+
   /** Tell the loader which pictures to keep up to date. */
   requestPictures() {
     const { state, display, loader, view } = this;
     if (!state) return;
-    loader.setWanted(wantedPictures(state.lights.length, display, view, loader.resources));
+    const names = wantedPictures(state.lights.length, display, view, loader.resources);
+    const ground = this.layers.isPlain ? null : nameInView('ground', view);
+    loader.setWanted([...names, ['ground', ground]]);
     if ((display?.transform ?? 'srgb') === 'srgb') this.setLut(SRGB);
   }
 
@@ -197,6 +237,7 @@ export class SessionMirror extends PictureState {
       view.setPlane(light, /** @type {Uint16Array} */ (data), state.lights[light].scale ?? 1);
     } else if (slot === 'lut') this.setLut(lutOf(name.slice(4), picture, state.lut));
     else if (slot === 'present') this.setPresent(/** @type {Uint16Array} */ (data));
+    else if (slot === 'ground') this.layers.setGround(/** @type {Float32Array} */ (data));
     else if (slot === 'albedo') canvas.albedo = /** @type {Uint16Array} */ (data);
     else if (slot === 'objects') canvas.objects = /** @type {Int16Array} */ (data);
     else if (slot === 'verified') view.setPicture('verified', /** @type {Uint16Array} */ (data));

@@ -5,18 +5,25 @@
  * confirms it, and sent again as a whole after a lost connection.
  */
 import { union } from '../../../viewer/drawing/cpu_picture.js';
+import { plainLayer } from './layers/layer_list.js';
 
 /** @typedef {import("./message_frames.js").Region} Region */
 /** @typedef {import("./message_frames.js").Arrays} Arrays */
 /** @typedef {import("./message_frames.js").Message} Message */
 /** @typedef {import("./paint_canvas.js").PaintCanvas} PaintCanvas */
 
-/** The stroke in progress. dirty: region not sent yet. wholeRegion: region of the stroke.
- * @typedef {{stroke: number, view: number, dirty: Region | null, wholeRegion: Region | null,
- *   isKnown: boolean}} CurrentStroke */
-/** A finished or cancelled stroke without an answer yet. cutRegion: region to send.
+/** @typedef {import("./messages.js").Layer} Layer */
+/** @typedef {import("./messages.js").ChangeLayers} ChangeLayers */
+
+/** The stroke in progress. canvas: the pixels that it paints. layerOf: returns their layer; null for
+ * the painting that is always there. dirty: region not sent yet. wholeRegion: region of the stroke.
+ * @typedef {{stroke: number, view: number, canvas: PaintCanvas, layerOf: () => Layer | null,
+ *   dirty: Region | null, wholeRegion: Region | null, isKnown: boolean}} CurrentStroke */
+/** A finished or cancelled stroke, or a change of layers, without an answer yet. cutRegion: region
+ * to send.
  * @typedef {{stroke: number, view: number, cutRegion: Region, wholeRegion: Region, arrays: Arrays,
- *   label: string} | {stroke: number, isDropped: true}} PendingStroke */
+ *   label: string, layer: Layer | null} | {stroke: number, isDropped: true} |
+ *   {change: ChangeLayers, isSent: boolean}} PendingStroke */
 
 export class StrokeSender {
   /** @param {import("./socket_host.js").Host} host
@@ -36,6 +43,12 @@ export class StrokeSender {
     /** @type {PendingStroke[]} */
     this.pendingStrokes = [];
     this.isBusy = false;
+    /** Whether a slider of a layer moves. */
+    this.isSliding = false;
+    /** @type {ChangeLayers} */
+    this.lastChange = {};
+    /** Called once everything is answered. */
+    this.onSettled = () => {};
     this.isOpen = true;
     this.isOver = false;
     /** Whether painting is impossible: another page has the session, or it has ended. */
@@ -78,10 +91,10 @@ export class StrokeSender {
    * would receive them. */
   dropUnsent(isStale = false) {
     const count =
-      this.pendingStrokes.filter((stroke) => !('isDropped' in stroke)).length +
-      (this.currentStroke?.wholeRegion ? 1 : 0);
+      this.pendingStrokes.filter(isLoss).length + (this.currentStroke?.wholeRegion ? 1 : 0);
     this.pendingStrokes = [];
     this.currentStroke = null;
+    this.isSliding = false;
     this.resolveWaiting();
     if (count) this.onLoss(count, isStale);
   }
@@ -98,17 +111,18 @@ export class StrokeSender {
   flush() {
     if (!this.isOpen || this.isOver) return;
     for (const pending of this.pendingStrokes) {
-      if ('isDropped' in pending) continue;
-      const { stroke, view, cutRegion, label } = pending;
-      const fields = { stroke, view, region: cutRegion, is_final: true, label };
       // Earlier messages have arrived already.
-      this.host.send('paint', fields, cutArrays(pending)).catch(() => {});
+      if ('cutRegion' in pending)
+        this.host.send('paint', paintFields(pending), cutArrays(pending)).catch(() => {});
+      else if ('change' in pending && !pending.isSent && isLoss(pending))
+        this.host.send('change_layers', pending.change).catch(() => {});
     }
   }
 
   /** Return whether parts of a stroke are pending. */
   get isPending() {
-    return this.isBusy || this.pendingStrokes.length > 0 || this.currentStroke !== null;
+    const isUnfinished = this.isSliding || this.currentStroke !== null;
+    return this.isBusy || isUnfinished || this.pendingStrokes.length > 0;
   }
 
   /** Resolve once all finished strokes are answered. @returns {Promise<void>} */
@@ -123,15 +137,28 @@ export class StrokeSender {
     if (!this.pendingStrokes.length) for (const resolve of this.waiters.splice(0)) resolve();
   }
 
-  begin() {
+  /** Begin a stroke. @param {PaintCanvas | null} [canvas] the pixels that it paints
+   * @param {() => Layer | null} [layerOf] returns their layer */
+  begin(canvas = this.canvas, layerOf = () => null) {
+    if (!canvas) return;
+    const regions = { dirty: null, wholeRegion: null };
     const { view } = this;
     this.currentStroke = {
-      stroke: ++this.count,
-      view,
-      dirty: null,
-      wholeRegion: null,
+      ...{ stroke: ++this.count, view, canvas, layerOf },
+      ...regions,
       isKnown: false,
     };
+  }
+
+  /** Send a change of layers, in the order of the strokes. @param {ChangeLayers} change */
+  change(change) {
+    this.isSliding = change.is_final === false;
+    this.lastChange = change;
+    const last = this.pendingStrokes[this.pendingStrokes.length - 1];
+    // While a slider moves, only its newest place is sent.
+    if (last && 'change' in last && !last.isSent && !isLoss(last)) this.pendingStrokes.pop();
+    this.pendingStrokes.push({ change, isSent: false });
+    this.pump();
   }
 
   /** Queue changed pixels of the stroke. @param {Region} region */
@@ -142,12 +169,13 @@ export class StrokeSender {
     this.pump();
   }
 
-  /** Finish the stroke. @param {string} label what undo calls it */
-  end(label) {
+  /** Finish the stroke. @param {string} label what undo calls it
+   * @param {Layer | null} [layer] of its pixels */
+  end(label, layer = null) {
     const { currentStroke } = this;
     this.currentStroke = null;
-    if (currentStroke?.wholeRegion && this.canvas) {
-      const { stroke, view, wholeRegion } = currentStroke;
+    if (currentStroke?.wholeRegion) {
+      const { stroke, view, wholeRegion, canvas } = currentStroke;
       const cutRegion =
         currentStroke.dirty ??
         /** @type {Region} */ ([wholeRegion[0], wholeRegion[0], wholeRegion[2], wholeRegion[2]]);
@@ -156,8 +184,9 @@ export class StrokeSender {
         view,
         cutRegion,
         wholeRegion,
-        arrays: this.canvas.copy(wholeRegion),
+        arrays: canvas.copy(wholeRegion),
         label,
+        layer,
       });
     }
     this.pump();
@@ -177,8 +206,10 @@ export class StrokeSender {
     this.isOpen = isOpen;
     if (!isOpen) {
       // It is unknown which of them arrived.
-      for (const stroke of this.pendingStrokes)
-        if (!('isDropped' in stroke)) stroke.cutRegion = stroke.wholeRegion;
+      for (const stroke of this.pendingStrokes) {
+        if ('cutRegion' in stroke) stroke.cutRegion = stroke.wholeRegion;
+        if ('change' in stroke) stroke.isSent = false;
+      }
       if (this.currentStroke) this.currentStroke.dirty = this.currentStroke.wholeRegion;
     }
     this.pump();
@@ -189,24 +220,20 @@ export class StrokeSender {
     if (this.isBusy || !this.isOpen || this.isOver) return;
     const [next] = this.pendingStrokes;
     if (next && 'isDropped' in next) this.send('drop_stroke', { stroke: next.stroke }, {}, next);
-    else if (next) {
-      const { stroke, view, cutRegion, label } = next;
-      this.send(
-        'paint',
-        { stroke, view, region: cutRegion, is_final: true, label },
-        cutArrays(next),
-        next,
-      );
-    } else if (this.currentStroke?.dirty && this.canvas) {
-      const { stroke, view, dirty } = this.currentStroke;
+    else if (next && 'change' in next) {
+      next.isSent = true;
+      this.send('change_layers', next.change, {}, next);
+    } else if (next) this.send('paint', paintFields(next), cutArrays(next), next);
+    else if (this.currentStroke?.dirty) {
+      const { stroke, view, dirty, canvas, layerOf } = this.currentStroke;
       this.currentStroke.dirty = null;
       this.currentStroke.isKnown = true;
-      const fields = { stroke, view, region: dirty, is_final: false };
-      this.send('paint', fields, this.canvas.copy(dirty), null);
+      const fields = { stroke, view, region: dirty, is_final: false, ...layerFields(layerOf()) };
+      this.send('paint', fields, canvas.copy(dirty), null);
     }
   }
 
-  /** @template {"paint" | "drop_stroke"} K @param {K} kind
+  /** @template {"paint" | "drop_stroke" | "change_layers"} K @param {K} kind
    * @param {import("./messages.js").Requests[K]} fields @param {Arrays} arrays
    * @param {PendingStroke | null} pending what is answered with it */
   async send(kind, fields, arrays, pending) {
@@ -225,7 +252,21 @@ export class StrokeSender {
     this.isDropping = false;
     this.resolveWaiting();
     this.pump();
+    if (!this.isPending) this.onSettled();
   }
+}
+
+/** Return whether something that somebody did is lost with it. @param {PendingStroke} pending */
+const isLoss = (pending) =>
+  'cutRegion' in pending || ('change' in pending && pending.change.is_final !== false);
+
+/** @param {Layer | null} layer */
+const layerFields = (layer) => (layer ? { layer: layer.id, properties: plainLayer(layer) } : {});
+
+/** Return the fields of a finished stroke.
+ * @param {Extract<PendingStroke, {cutRegion: Region}>} stroke */
+function paintFields({ stroke, view, cutRegion, label, layer }) {
+  return { stroke, view, region: cutRegion, is_final: true, label, ...layerFields(layer) };
 }
 
 /** Return the pixels of a finished stroke that have to be sent.

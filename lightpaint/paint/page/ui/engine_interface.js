@@ -93,12 +93,24 @@
  *   that is in the hand, to have that light there
  * @property {(x: number, y: number) => Omit<Probe, 'light' | 'paint'> | null} probe
  * @property {() => Objects | null} objects which object each pixel shows, once that is known
+ * @property {(change: import("../engine/messages.js").ChangeLayers) => void} changeLayers one step, or
+ *   while a slider moves none yet
+ * @property {() => void} finishLayers ends a change by a slider that has reported no end
+ * @property {(id: number) => void} chooseLayer for the brush to paint
+ * @property {(id: number | null) => void} paintMask of a layer from now on; for null none
+ * @property {() => Pick<import("./ui_state.js").Ui, 'layers' | 'nextLayer' | 'layer' | 'maskLayer'
+ *   | 'layerRevisions' | 'isPaintingEmpty'>} layerState
+ * @property {(id: number) => {data: Float32Array, width: number, height: number}} coverage how far a
+ *   layer, or a group, covers each pixel
+ * @property {(id: number, width: number, height: number) => Uint8ClampedArray<ArrayBuffer>}
+ *   layerThumbnail RGBA
+ * @property {() => void} onMaskChange called when a stroke changes a mask
  * @property {() => number} maxImportance the greatest painted importance, at least 1
  * @property {(rgb: RGB, stops: number) => number[]} codes that light is shown with, at an exposure
  * @property {(name: string, listener: (event: any) => void) => void} on "message": an answer to a
  *   stroke; "loading": {done, total, isFirst} pictures, where some of
  *   the lights have none yet; "adjustment": {stops, mired} of a drag;
- *   "view": {view} in which something was undone; "lost": {count, isStale} strokes that are not
+ *   "layers": {} when `layerState` has changed; "view": {view} in which something was undone; "lost": {count, isStale} strokes that are not
  *   sent any more, since another page has painted meanwhile, or the session is there no more; "trouble": {text}
  * @property {() => void} close
  */

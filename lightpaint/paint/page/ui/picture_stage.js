@@ -10,6 +10,8 @@ import { countText } from './format.js';
 import { useStageInput } from './stage_input.js';
 import { mixName, gainOf, paintOf, effectiveDisplay } from './ui_state.js';
 import { PointerLabel } from './pointer_label.js';
+import { LayerMask } from './layers/layer_mask.js';
+import { MaskNote } from './layers/layer_panel.js';
 import { ObjectOutline } from './object_outline.js';
 import { Pointer } from './pointer_input.js';
 import { firstHint, flowOf, updateDisplay } from './tools.js';
@@ -149,6 +151,8 @@ export function Stage({ ui, app }) {
   return html`<div class=${`stage is-${ui.tool} ${ui.dragAdjustment ? 'is-asking' : ''} ${ui.clickAction ? 'is-pointing' : ''}`} ref=${frame} tabindex="0" role="application"
     aria-label="Pictures. Arrow keys move the brush, Enter paints, Shift Enter a line." aria-describedby="lp-status">
     ${ui.ready && html`<${ObjectOutline} ui=${ui} engine=${engine} panes=${panes} />`}
+    ${ui.ready && html`<${LayerMask} ui=${ui} engine=${engine} panes=${panes} />`}
+    ${ui.ready && html`<${MaskNote} ui=${ui} app=${app} />`}
     <div class="rings" ref=${rings} hidden aria-hidden="true">
       <i class="ring" style=${{ '--paint': toHex(ui.colour) }}></i><i class="ring is-twin"></i>
     </div>

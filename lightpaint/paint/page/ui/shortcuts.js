@@ -139,6 +139,7 @@ export const SHORTCUTS = [
         description: 'cancel the stroke',
         act: ({ engine, store }) => {
           const panelChange = engine.cancel() ? {} : { panel: null };
+          if (store.value.maskLayer !== null) engine.paintMask(null);
           store.set({
             dragAdjustment: null,
             hoveredLight: null,

@@ -94,6 +94,16 @@ import { fromKelvin } from './paint_colour.js';
  * @property {{reason: string, text: string} | null} closure
  * @property {number} lostStrokes number of strokes that no session received
  * @property {Toast[]} toasts
+ * @property {import("../engine/messages.js").Layer[]} layers of the painting, the lowest first
+ * @property {number} layer id of the active one
+ * @property {number | null} openLayer id of the one whose controls are unfolded
+ * @property {number | null} maskLayer id of the layer whose mask is painted
+ * @property {number} nextLayer id of the next new one
+ * @property {Record<number, number>} layerRevisions numbers that grow when a layer's pixels change
+ * @property {boolean} isPaintingEmpty whether nothing is on the layer that is always there
+ * @property {number[]} selectedLayers ids of several layers for one action
+ * @property {number | null} hoveredLayer id of the layer whose mask is shown
+ * @property {string} layerNote what has happened to a layer by key, for screen readers
  * @property {Record<string, number>} resources
  * @property {boolean} hint whether somebody still has to be told what to do
  * @property {Tool} tool
@@ -205,6 +215,16 @@ export function initialState() {
     closure: null,
     lostStrokes: 0,
     toasts: [],
+    layers: [],
+    layer: 0,
+    openLayer: null,
+    maskLayer: null,
+    nextLayer: 1,
+    layerRevisions: {},
+    isPaintingEmpty: true,
+    selectedLayers: [],
+    hoveredLayer: null,
+    layerNote: '',
     resources: {},
     hint: false,
     tool: 'brush',

@@ -1,3 +1,5 @@
+import { newLayer, PAINTING, withLayers } from '../engine/layers/layer_list.js';
+
 /** A picture engine of a few lines, on a 2D canvas: enough to look at the interface, and to test it. */
 
 const encode = (x) =>
@@ -89,6 +91,41 @@ export class FakeEngine {
       return [placed(left, 0, 0, half, height), placed(right, half + 4, 0, half, height)];
     }
     return [placed(left, 0, 0, width, low), placed(right, 0, low + 4, width, low)];
+  }
+
+  layerState() {
+    const { layers = [PAINTING], layer = 0, maskLayer = null } = this;
+    const nextLayer = 1 + Math.max(...layers.map(({ id }) => id));
+    return { layers, nextLayer, layer, maskLayer, layerRevisions: {}, isPaintingEmpty: false };
+  }
+  changeLayers(change) {
+    this.calls.push(['changeLayers', change]);
+    this.layers = withLayers(this.layers ?? [PAINTING], change.layers ?? [], change.order);
+    this.tell('layers', {});
+  }
+  finishLayers() {}
+  /** Have some layers of each kind. */
+  makeLayers(count = 4) {
+    const kinds = ['adjust', 'paint', 'weigh', 'group'];
+    const layers = Array.from({ length: count }, (_, k) =>
+      newLayer(k + 1, kinds[k % 4], { name: `Pedestal with a long name ${k + 1}, +1.2 stops, warmer` }),
+    );
+    this.changeLayers({ layers });
+  }
+  chooseLayer(id) {
+    Object.assign(this, { layer: id, maskLayer: null });
+    this.tell('layers', {});
+  }
+  paintMask(id) {
+    this.maskLayer = id;
+    this.tell('layers', {});
+  }
+  coverage() {
+    const { w: width, h: height } = this.room;
+    return { data: Float32Array.from({ length: width * height }, (_, p) => p % 2), width, height };
+  }
+  layerThumbnail(id, width, height) {
+    return new Uint8ClampedArray(4 * width * height).fill(180);
   }
 
   zoomAt(x, y, factor) {

@@ -1,0 +1,73 @@
+/** Names of layers, made from what they do: "Knot, +1.2 stops, warmer"; "3 strokes, brighter". */
+import { luminance } from '../../../../viewer/drawing/colour.js';
+
+/** @typedef {import("../messages.js").Layer} Layer */
+
+/** Smallest change that a name mentions: in stops, and of red over blue in stops. */
+const [LEAST_STOPS, LEAST_WARMTH] = [0.05, 0.02];
+
+/** Smallest change of painted layers that a name mentions, in stops. */
+const LEAST_SEEN = 0.15;
+
+/** Return what an adjustment does: "+1.2 stops, warmer". @param {Pick<Layer, "gain" | "tint">} layer */
+function adjustmentText({ gain, tint }) {
+  const stops = Math.log2(gain);
+  const warmth = Math.log2(tint[0] / tint[2]);
+  const words = [];
+  if (Math.abs(stops) >= LEAST_STOPS) words.push(stopsText(stops));
+  if (Math.abs(warmth) >= LEAST_WARMTH) words.push(warmth > 0 ? 'warmer' : 'cooler');
+  return words.join(', ') || 'unchanged';
+}
+
+/** @param {number} stops */
+function stopsText(stops) {
+  const size = Math.abs(stops).toFixed(1);
+  return `${stops < 0 ? '−' : '+'}${size} ${size === '1.0' ? 'stop' : 'stops'}`;
+}
+
+/** Return the name of an adjustment. @param {string} area @param {Layer} layer */
+export const adjustmentName = (area, layer) => `${area}, ${adjustmentText(layer)}`;
+
+/** Return the name of a layer with other properties: a name that was made follows them, one that
+ * somebody typed stays. @param {Layer} before @param {Layer} after @returns {string} */
+export function renamed(before, after) {
+  const made = `, ${adjustmentText(before)}`;
+  if (before.kind === 'weigh' && before.name === importanceName(before.times))
+    return importanceName(after.times);
+  if (before.kind !== 'adjust' || !before.name.endsWith(made)) return after.name;
+  return adjustmentName(before.name.slice(0, -made.length), after);
+}
+
+/** @param {number} times */
+export const importanceName = (times) => `Importance ×${Number(times.toPrecision(2))}`;
+
+/** Strokes that a made name counts. */
+const COUNTED = /^(\d+) strokes?\b/;
+
+/** Return the name of a painted layer after another stroke; a typed name stays.
+ * @param {string} name before @param {string} effect @param {boolean} isNew */
+export function strokesName(name, effect, isNew) {
+  const count = isNew ? 1 : 1 + Number(COUNTED.exec(name)?.[1] ?? NaN);
+  if (Number.isNaN(count)) return name;
+  return [`${count} ${count === 1 ? 'stroke' : 'strokes'}`, effect].filter(Boolean).join(', ');
+}
+
+/** Return what becomes of light, in words. @param {number[]} before mean RGB
+ * @param {number[]} after @returns {string} */
+export function effectText(before, after) {
+  const [level, now] = [luminance(before), luminance(after)];
+  if (!(level > 0) || !(now > 0)) return now > level ? 'brighter' : level > 0 ? 'dark' : '';
+  const stops = Math.log2(now / level);
+  const warmth = Math.log2((after[0] * before[2]) / (before[0] * after[2]));
+  const words = [];
+  if (Math.abs(stops) >= LEAST_SEEN) words.push(stops > 0 ? 'brighter' : 'darker');
+  if (Math.abs(warmth) >= LEAST_SEEN) words.push(warmth > 0 ? 'warmer' : 'cooler');
+  return words.join(', ');
+}
+
+/** Return the name of an object as a name begins: `marble_knot` as "Marble knot".
+ * @param {string | null | undefined} name */
+export function areaName(name) {
+  const words = (name ?? '').replace(/[_]+/g, ' ').trim();
+  return words ? words[0].toUpperCase() + words.slice(1, 48) : '';
+}

@@ -1,0 +1,149 @@
+/** The painting as its layers make it: composed tile by tile, where something has changed. */
+import { VALUES } from '../../../../viewer/drawing/half_floats.js';
+import { applyLayer } from './layer_composition.js';
+import { isPlain, PAINTING_ID } from './layer_list.js';
+import { enclosing, tileKeys, tileRegion } from './layer_pixels.js';
+
+/** @typedef {import("../message_frames.js").Region} Region */
+/** @typedef {import("../messages.js").Layer} Layer */
+/** @typedef {import("../paint_canvas.js").PaintCanvas} PaintCanvas */
+/** @typedef {import("./layer_composition.js").ShownLayer} ShownLayer */
+/** @typedef {import("./layer_composition.js").Composed} Composed */
+/** @typedef {import("./layer_pixels.js").LayerPixels} LayerPixels */
+/** @typedef {import("./layer_pixels.js").Tile} Tile */
+
+export class LayerPicture {
+  /** @param {PaintCanvas} painting pixels of the layer that is always there */
+  constructor(painting) {
+    this.painting = painting;
+    /** @type {[number, number]} */
+    this.size = [painting.height, painting.width];
+    /** Pixels of the other layers, by id. @type {Map<number, LayerPixels>} */
+    this.pixels = new Map();
+    /** @type {ShownLayer[]} */
+    this.shown = [];
+    /** The present look in float32, (h, w, 3). @type {Float32Array | null} */
+    this.ground = null;
+    /** Light and importance that are drawn: the painting's own while it is alone. */
+    this.image = painting.image;
+    this.importance = painting.importance;
+    /** Whether parts are not composed yet. */
+    this.isPartial = false;
+  }
+
+  /** Show other layers. The caller composes what has changed.
+   * @param {ShownLayer[]} shown @param {Layer[]} list */
+  show(shown, list) {
+    this.shown = shown;
+    const { painting } = this;
+    const isOwn = this.image !== painting.image;
+    if (isPlain(shown, list)) {
+      this.image = painting.image;
+      this.importance = painting.importance;
+      this.isPartial = false;
+    } else if (!isOwn) {
+      this.image = painting.image.slice();
+      this.importance = painting.importance.slice();
+      this.isPartial = true;
+    }
+  }
+
+  /** Whether the painting alone is drawn. */
+  get isPlain() {
+    return this.image === this.painting.image;
+  }
+
+  /** Replace a region by what the session has composed. @param {Region} region
+   * @param {Float32Array} image @param {Float32Array} importance */
+  set([top, bottom, left, right], image, importance) {
+    const [, across] = this.size;
+    const width = right - left;
+    for (let y = top, source = 0; y < bottom; y++, source += width) {
+      this.image.set(image.subarray(3 * source, 3 * (source + width)), 3 * (y * across + left));
+      this.importance.set(importance.subarray(source, source + width), y * across + left);
+    }
+  }
+
+  /** Compose the layers again in a region. @param {Region | null} region
+   * @returns {Region | null} the region that may have changed */
+  compose(region) {
+    if (!region || this.isPlain) return region;
+    const keys = tileKeys(this.size, region);
+    for (const key of keys) {
+      const { light, counts } = this.tile(key);
+      this.set(tileRegion(this.size, key), light, counts);
+    }
+    return enclosing(keys.map((key) => tileRegion(this.size, key)));
+  }
+
+  /** Compose what is not composed yet. @returns {Region | null} */
+  complete() {
+    if (!this.isPartial) return null;
+    this.isPartial = this.ground === null;
+    return this.compose(this.painting.wholeRegion);
+  }
+
+  /** Return the smallest region that holds these layers. @param {number[]} ids
+   * @returns {Region | null} */
+  boundsOf(ids) {
+    const { painting, pixels } = this;
+    return enclosing(
+      ids.map((id) => (id === PAINTING_ID ? painting.wholeRegion : (pixels.get(id)?.bounds ?? null))),
+    );
+  }
+
+  /** Return colour and coverage of a layer at a pixel; a mask has no colour. @param {number} id
+   * @param {number} x @param {number} y
+   * @returns {{colour: import("../message_frames.js").RGB | null, coverage: number}} */
+  pixelAt(id, x, y) {
+    const { painting, pixels, size } = this;
+    const p = y * size[1] + x;
+    if (id === PAINTING_ID) {
+      const [r, g, b] = painting.image.subarray(3 * p, 3 * p + 3);
+      return { colour: [r, g, b], coverage: painting.importance[p] };
+    }
+    const [key] = tileKeys(size, [y, y + 1, x, x + 1]);
+    const tile = pixels.get(id)?.tiles.get(key);
+    const [top, , left, right] = tileRegion(size, key);
+    const q = (y - top) * (right - left) + x - left;
+    const [r, g, b] = tile?.image?.subarray(3 * q, 3 * q + 3) ?? [];
+    return { colour: tile?.image ? [r, g, b] : null, coverage: tile?.coverage[q] ?? 0 };
+  }
+
+  /** Return light and importance of a tile. @param {number} key
+   * @param {number | null} [without] id of a layer to leave out @returns {Composed} */
+  tile(key, without = null) {
+    const area = tileRegion(this.size, key);
+    const composed = { light: this.groundOf(area), counts: new Float32Array(pixelCount(area)) };
+    for (const layer of this.shown) {
+      if (layer.id === without) continue;
+      const tile =
+        layer.id === PAINTING_ID ? this.paintingTile(area) : this.pixels.get(layer.id)?.tiles.get(key);
+      if (tile) applyLayer(layer, tile, composed);
+    }
+    return composed;
+  }
+
+  /** @param {Region} area @returns {Float32Array} */
+  groundOf([top, bottom, left, right]) {
+    const { ground, painting } = this;
+    const [, across] = this.size;
+    const width = 3 * (right - left);
+    const light = new Float32Array((bottom - top) * width);
+    for (let y = top, to = 0; y < bottom; y++, to += width) {
+      const from = 3 * (y * across + left);
+      if (ground) light.set(ground.subarray(from, from + width), to);
+      else for (let i = 0; i < width; i++) light[to + i] = VALUES[painting.present[from + i]];
+    }
+    return light;
+  }
+
+  /** @param {Region} area @returns {Tile} */
+  paintingTile(area) {
+    const { image, importance } = this.painting.copy(area);
+    return { image: image.data, coverage: importance.data };
+  }
+}
+
+/** @param {Region} region */
+const pixelCount = ([top, bottom, left, right]) => (bottom - top) * (right - left);

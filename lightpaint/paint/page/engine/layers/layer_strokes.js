@@ -1,0 +1,271 @@
+/**
+ * Which layer a stroke paints, and how a wish becomes a layer of its own.
+ *
+ * Adjustments and fills are new layers. The brush paints the active layer if that is painted, else a
+ * new one. The eraser takes from the layer that lies at its first point.
+ */
+import { adjustmentName, areaName, effectText, importanceName, strokesName } from './layer_names.js';
+import { newLayer, PAINTING_ID, plainLayer, withLayers } from './layer_list.js';
+import { LayerCanvas } from './layer_canvas.js';
+import { TILE_SIDE } from './layer_pixels.js';
+
+/** @typedef {import("../brush.js").Point} Point */
+/** @typedef {import("../message_frames.js").Region} Region */
+/** @typedef {import("../messages.js").Layer} Layer */
+/** @typedef {import("../paint_canvas.js").PaintCanvas} PaintCanvas */
+/** @typedef {import("../stroke.js").ToolSettings} ToolSettings */
+/** @typedef {import("./layer_mirror.js").LayerMirror} LayerMirror */
+
+/** Tiles that are looked at to say what a layer does. */
+const LOOKED_AT = 12;
+
+export class LayerStrokes {
+  /** @param {LayerMirror} mirror @param {(object: number) => string | null} objectName */
+  constructor(mirror, objectName) {
+    this.mirror = mirror;
+    this.objectName = objectName;
+    /** Id of the active layer. */
+    this.activeId = PAINTING_ID;
+    /** Whether the brush begins a new layer, since the active one is a finished wish. */
+    this.isWishDone = false;
+    /** Id of the layer whose mask is painted. @type {number | null} */
+    this.maskId = null;
+    /** Pixels under the stroke in progress. @type {PaintCanvas | null} */
+    this.canvas = null;
+    /** Whether it makes a layer. */
+    this.isNew = false;
+    /** What was active before it. */
+    this.previous = { activeId: PAINTING_ID, isWishDone: false };
+    /** The canvas of the last stroke on a layer, for the next one. @type {LayerCanvas | null} */
+    this.lastCanvas = null;
+  }
+
+  /** Make a layer active, for the brush to paint. @param {number} id */
+  choose(id) {
+    this.activeId = id;
+    this.isWishDone = false;
+    this.maskId = null;
+    this.mirror.listener.onChange();
+  }
+
+  /** Paint the mask of a layer from now on; for null none. @param {number | null} id */
+  paintMask(id) {
+    this.maskId = id;
+    if (id !== null) this.activeId = id;
+    this.mirror.listener.onChange();
+  }
+
+  /** Choose another layer if the active one is gone. */
+  followList() {
+    const { list } = this.mirror;
+    if (!this.mirror.layer(this.activeId)) {
+      this.activeId = list[list.length - 1].id;
+      this.isWishDone = this.activeId !== PAINTING_ID;
+    }
+    if (this.maskId !== null && !this.mirror.layer(this.maskId)) this.maskId = null;
+  }
+
+  /** Prepare a stroke. @param {ToolSettings} tool @param {Point} point where it begins
+   * @param {number} [object] that it is about, -1 for none, where no point says so
+   * @returns {PaintCanvas | null} what it paints */
+  begin(tool, point, object) {
+    const { picture } = this.mirror;
+    if (!picture) return null;
+    this.previous = { activeId: this.activeId, isWishDone: this.isWishDone };
+    const found = this.layerFor(tool, point, object);
+    if (!found) return null;
+    const isWish = tool.tool === 'adjust' || tool.tool === 'fill';
+    // Importance lies over what is painted, and the brush goes on below it.
+    if (tool.tool !== 'weight') {
+      this.activeId = found.id;
+      this.isWishDone = isWish && this.maskId === null;
+    }
+    this.isNew = !this.mirror.layer(found.id);
+    if (this.isNew) this.mirror.change({ layers: [found] });
+    this.canvas = found.id === PAINTING_ID ? picture.painting : this.canvasOf(found);
+    return this.canvas;
+  }
+
+  /** @param {Layer} layer @returns {LayerCanvas} */
+  canvasOf(layer) {
+    const pixels = this.mirror.pixelsOf(layer);
+    const { lastCanvas: last } = this;
+    const { painting, size } = /** @type {import("./layer_picture.js").LayerPicture} */ (
+      this.mirror.picture
+    );
+    if (last && last.layer.id === layer.id && last.pixels === pixels) last.layer = layer;
+    else this.lastCanvas = new LayerCanvas(size, layer, pixels, painting);
+    return /** @type {LayerCanvas} */ (this.lastCanvas);
+  }
+
+  /** Return the layer that a stroke paints, which may be new; null for none.
+   * @param {ToolSettings} tool @param {Point} point @param {number | undefined} object
+   * @returns {Layer | null} */
+  layerFor({ tool, importance, adjustedArea }, { x, y }, object) {
+    const { mirror } = this;
+    const masked = this.maskId === null ? undefined : mirror.layer(this.maskId);
+    if (masked && tool !== 'adjust' && tool !== 'fill') return masked;
+    const { painting } = /** @type {import("./layer_picture.js").LayerPicture} */ (mirror.picture);
+    const area = areaName(this.objectName(object ?? painting.objectAt(x, y)));
+    if (tool === 'adjust') {
+      const spot = area ? `Spot on ${area}` : 'Spot';
+      const isSpot = object === undefined && (adjustedArea !== 'object' || !area);
+      return this.layerNew('adjust', { name: isSpot ? spot : area || 'Whole picture' });
+    }
+    if (tool === 'fill') return this.layerNew('paint', { name: area || 'Fill' });
+    if (tool === 'weight') return this.weighing(importance);
+    return tool === 'eraser' ? this.erased(x, y) : this.painted();
+  }
+
+  /** @param {Layer["kind"]} kind @param {Partial<Layer>} properties */
+  layerNew(kind, properties) {
+    return newLayer(this.mirror.next, kind, properties);
+  }
+
+  /** Return the layer that the brush paints. @returns {Layer} */
+  painted() {
+    const active = this.mirror.layer(this.activeId);
+    const isOwn = active?.kind === 'paint' || (active?.kind === 'pixels' && this.isPaintingLowest());
+    if (active && isOwn && this.isShown(active) && !this.isWishDone) return active;
+    return this.layerNew('paint', {});
+  }
+
+  /** Whether nothing lies below the painting that is always there, so that its strokes mix with the
+   * present look. */
+  isPaintingLowest() {
+    return this.mirror.list[0].id === PAINTING_ID;
+  }
+
+  /** @param {Layer} layer */
+  isShown(layer) {
+    const group = layer.group === null ? undefined : this.mirror.layer(layer.group);
+    return layer.is_visible && layer.strength > 0 && group?.is_visible !== false;
+  }
+
+  /** Return the topmost layer of importance by this factor, or a new one. The painting that is alone
+   * has its own. @param {number} times @returns {Layer | null} */
+  weighing(times) {
+    const { list } = this.mirror;
+    const found = [...list]
+      .reverse()
+      .find((layer) => layer.kind === 'weigh' && layer.times === times && this.isShown(layer));
+    if (found) return found;
+    if (list.length === 1) return list[0];
+    return this.layerNew('weigh', { times, name: importanceName(times) });
+  }
+
+  /** Return the layer that the eraser takes from: the active one if it covers the place, else the
+   * topmost that covers it but not everything. @param {number} x @param {number} y
+   * @returns {Layer | null} */
+  erased(x, y) {
+    const { list } = this.mirror;
+    const active = this.mirror.layer(this.activeId);
+    if (list.length === 1) return list[0];
+    const candidates = [...list].reverse().filter((layer) => this.isShown(layer));
+    const found = [...(active && this.isShown(active) ? [active] : []), ...candidates].find(
+      (layer) => this.covers(layer, Math.floor(x), Math.floor(y)) && !this.coversAll(layer),
+    );
+    return found ?? (active?.kind === 'group' ? null : (active ?? null));
+  }
+
+  /** @param {Layer} layer @param {number} x @param {number} y */
+  covers({ id }, x, y) {
+    const { picture } = this.mirror;
+    if (!picture) return false;
+    const { painting, pixels } = picture;
+    if (x < 0 || y < 0 || x >= painting.width || y >= painting.height) return false;
+    if (id === PAINTING_ID) return painting.importance[y * painting.width + x] > 0;
+    return (pixels.get(id)?.coverageAt(x, y) ?? 0) > 0;
+  }
+
+  /** @param {Layer} layer */
+  coversAll({ id }) {
+    const { picture } = this.mirror;
+    const tiles = picture?.pixels.get(id)?.tiles;
+    if (!picture || !tiles) return false;
+    const count = Math.ceil(picture.size[0] / TILE_SIDE) * Math.ceil(picture.size[1] / TILE_SIDE);
+    return tiles.size === count && [...tiles.values()].every(({ coverage }) => coverage[0] > 0);
+  }
+
+  /** The layer of the stroke in progress; null for the painting that is always there.
+   * @returns {Layer | null} */
+  get layer() {
+    return this.canvas instanceof LayerCanvas ? this.canvas.layer : null;
+  }
+
+  /** Take what the stroke has changed into the picture. @param {Region} region
+   * @returns {Region} what has to be drawn */
+  takeChange(region) {
+    const { picture, list } = this.mirror;
+    const { canvas } = this;
+    if (!picture || !canvas) return region;
+    if (canvas instanceof LayerCanvas) {
+      const { layer } = canvas;
+      if (layer !== this.mirror.layer(layer.id))
+        this.mirror.show(withLayers(list, [layer]));
+      canvas.pixels.put(region, { image: canvas.image, coverage: canvas.importance });
+    }
+    return picture.compose(region) ?? region;
+  }
+
+  /** Finish the stroke. @returns {Layer | null} the properties of its layer; null for the painting
+   * that is always there */
+  end() {
+    const { canvas, isNew } = this;
+    canvas?.end();
+    this.canvas = null;
+    if (!(canvas instanceof LayerCanvas)) return null;
+    const layer = { ...canvas.layer, name: this.nameOf(canvas.layer, isNew) };
+    canvas.layer = layer;
+    this.mirror.show(withLayers(this.mirror.list, [layer]));
+    this.mirror.listener.onChange();
+    return plainLayer(layer);
+  }
+
+  /** Cancel the stroke. @returns {Region | null} what has to be drawn */
+  cancel() {
+    const { canvas, mirror, isNew } = this;
+    const { picture } = mirror;
+    const region = canvas?.drop() ?? null;
+    this.canvas = null;
+    Object.assign(this, this.previous);
+    if (!picture || !canvas) return region;
+    if (!(canvas instanceof LayerCanvas)) return picture.compose(region);
+    if (region) canvas.pixels.put(region, { image: canvas.image, coverage: canvas.importance });
+    if (isNew) {
+      mirror.show(mirror.list.filter(({ id }) => id !== canvas.layer.id));
+      picture.pixels.delete(canvas.layer.id);
+    }
+    mirror.listener.onChange();
+    return picture.compose(region);
+  }
+
+  /** @param {Layer} layer @param {boolean} isNew @returns {string} */
+  nameOf(layer, isNew) {
+    if (layer.kind === 'adjust') return isNew ? adjustmentName(layer.name, layer) : layer.name;
+    if (layer.kind !== 'paint' || this.maskId !== null) return layer.name;
+    if (!isNew || !layer.name) return strokesName(layer.name, this.effectOf(layer), isNew);
+    return [layer.name, this.effectOf(layer) || 'filled'].join(', ');
+  }
+
+  /** Return what a layer does to the light below and above it, in words. @param {Layer} layer */
+  effectOf({ id }) {
+    const { picture } = this.mirror;
+    const all = [...(picture?.pixels.get(id)?.tiles ?? [])];
+    const [before, after] = [
+      [0, 0, 0],
+      [0, 0, 0],
+    ];
+    const step = Math.max(1, Math.floor(all.length / LOOKED_AT));
+    for (let k = 0; picture && k < all.length; k += step) {
+      const [key, { coverage }] = all[k];
+      const [without, whole] = [picture.tile(key, id).light, picture.tile(key).light];
+      for (let p = 0; p < coverage.length; p += 3)
+        for (let c = 0; c < 3; c++) {
+          before[c] += coverage[p] * without[3 * p + c];
+          after[c] += coverage[p] * whole[3 * p + c];
+        }
+    }
+    return effectText(before, after);
+  }
+}
