@@ -300,3 +300,72 @@ def test_what_comes_no_closer_to_the_eye_is_not_done(
     assert "no closer to the eye" in place_lights(dim_room)["text"]
     assert session.requests.placed == {}
     assert session.store.position == 1
+
+
+def compared_picture(moving: MovingStudio, look: int) -> np.ndarray:
+    """The picture of a look, with the planes that its lights have by now."""
+    return moving.studio.resource(f"look_plane/{look}").astype(np.float32)
+
+
+def test_compared_looks_have_their_own_places_and_added_lights(moving: MovingStudio) -> None:
+    """Estimated at first, rendered soon, whatever the session does with these lights meanwhile."""
+    studio, session = moving.studio, moving.studio.session
+    moving.send(protocol.SaveLook("before"))
+    moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}))
+    moving.send(protocol.AddLight("point", position=(-0.3, 1.4, 0.4)))
+    moving.rendered()
+    moving.send(protocol.SaveLook("after"))
+    truth = session.basis.mix(session.weights)
+    before, after = studio.state().looks
+    assert (before.places, after.places) == ("", studio.state().places)
+    assert set(after.lights) - set(before.lights) == {"point_1"}
+    studio.rig._rendered.clear()  # as in a session that was opened again
+    for _ in range(2):
+        moving.send(protocol.Undo())
+    assert studio.state().places == ""
+    moving.messages.clear()
+    moving.send(protocol.CompareLooks((after.id,)))
+    name = f"look_plane/{after.id}"
+
+    def arrivals() -> int:
+        return sum(m.kind == "renewed" and name in m.resources for m in moving.messages)
+
+    moving.wait(arrivals)
+    estimate = compared_picture(moving, after.id)
+    moving.wait(lambda: arrivals() == 2)
+    rendered = compared_picture(moving, after.id)
+    assert np.abs(rendered - truth).max() < 2e-3 * truth.max()  # halves
+    assert not np.array_equal(estimate, rendered)
+    here = session.basis.mix(session.weights)
+    assert np.square(estimate - truth).sum() < 0.2 * np.square(here - truth).sum()
+    moving.send(protocol.CompareLooks())
+    with pytest.raises(LightpaintError, match="no picture"):
+        compared_picture(moving, after.id)
+
+
+def test_looks_with_lights_in_different_places_are_not_mixed(moving: MovingStudio) -> None:
+    moving.send(protocol.SaveLook("here"))
+    moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}))
+    moving.send(protocol.SaveLook("there"))
+    with pytest.raises(LightpaintError, match="hang lights in different places"):
+        moving.send(protocol.MixLooks(1, 2, 0.5, "between"))
+    with pytest.raises(LightpaintError, match="there is no look 7"):
+        moving.send(protocol.CompareLooks((7,)))
+
+
+def test_a_mix_of_moved_looks_has_a_thumbnail_of_their_places(moving: MovingStudio) -> None:
+    moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}))
+    moving.rendered()
+    moving.send(protocol.SaveLook("there"))
+    moving.send(protocol.CopyLook(1))
+    moving.send(protocol.Undo())
+    moving.send(protocol.MixLooks(1, 2, 0.5, "between"))
+    thumbnails = [moving.studio.resource(f"look/{k}").astype(float) for k in (1, 3)]
+    assert np.abs(thumbnails[0] - thumbnails[1]).max() <= 1
+
+
+def test_the_number_of_a_deleted_look_does_not_return(moving: MovingStudio) -> None:
+    moving.send(protocol.SaveLook("first"))
+    moving.send(protocol.DropLook(1))
+    moving.send(protocol.SaveLook("second"))
+    assert [look.id for look in moving.studio.state().looks] == [2]

@@ -58,6 +58,7 @@ from lightpaint.paint.protocol.message_parts import (
 )
 from lightpaint.paint.protocol.painting_requests import (
     ChangeLayers,
+    CompareLooks,
     CopyLook,
     DropLook,
     DropStroke,
@@ -111,6 +112,7 @@ __all__ = [
     "ChangeSettings",
     "Closeness",
     "Closing",
+    "CompareLooks",
     "ConstrainLight",
     "ConstrainLights",
     "CopyLook",

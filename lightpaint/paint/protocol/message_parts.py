@@ -109,12 +109,18 @@ class LayerList:
 
 @dataclass(frozen=True)
 class LookInfo:
-    """A kept look. stamp: time in seconds since 1970. thumbnail: name of its picture."""
+    """A kept look. stamp: time in seconds since 1970. thumbnail: name of its picture.
+
+    lights: names of its lights, which may differ from the current ones. weights: of each. places:
+    as in `EditState`.
+    """
 
     id: int
     name: str
     stamp: float | None
+    lights: tuple[str, ...]
     weights: tuple[RGB, ...]
+    places: str
     thumbnail: str
     is_proposal: bool = False
 
@@ -233,7 +239,8 @@ class EditState:
 
     constraints: by name of light, keys and values as in a lights file. ties: names on one dimmer.
     settings: those that were set. effective_settings: those in effect. poses: of moved lights, by
-    name. added_lights: names of lights that the scene does not have. layers: of the painting.
+    name. added_lights: names of lights that the scene does not have. places: a text, equal for
+    equal places of all lights; "" if all hang as in the scene. layers: of the painting.
     """
 
     history: HistoryInfo | None = field(default=None, metadata=OPTIONAL)
@@ -242,6 +249,7 @@ class EditState:
     settings: Mapping[str, Any] | None = field(default=None, metadata=OPTIONAL)
     poses: Mapping[str, Mapping[str, Any]] | None = field(default=None, metadata=OPTIONAL)
     added_lights: tuple[str, ...] | None = field(default=None, metadata=OPTIONAL)
+    places: str | None = field(default=None, metadata=OPTIONAL)
     effective_settings: ResolvedFit | None = field(default=None, metadata=OPTIONAL)
     layers: LayerList | None = field(default=None, metadata=OPTIONAL)
 

@@ -116,6 +116,16 @@ class MixLooks(Message, kind="mix_looks"):
 
 
 @dataclass(frozen=True)
+class CompareLooks(Message, kind="compare_looks"):
+    """A request for pictures of looks whose lights hang elsewhere than now; for none, to stop.
+    Answered by `started`; `renewed` then lists `look_plane/ID` and `look_clean/ID` of each: first
+    with estimated planes of lights that hang nowhere else, later with rendered ones.
+    """
+
+    looks: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
 class DropLook(Message, kind="drop_look"):
     """Delete a look. Answered by `looks`."""
 

@@ -24,6 +24,7 @@ from lightpaint.paint.protocol.light_requests import (
 )
 from lightpaint.paint.protocol.painting_requests import (
     ChangeLayers,
+    CompareLooks,
     CopyLook,
     DropLook,
     DropStroke,
@@ -159,6 +160,7 @@ AnyRequest = (
     | RenameLook
     | CopyLook
     | MixLooks
+    | CompareLooks
     | DropLook
     | Export
     | Verify

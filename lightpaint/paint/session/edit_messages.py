@@ -26,6 +26,7 @@ def edit_state(history: History, live_answer: LiveAnswer, views: Canvases) -> di
         "settings": dict(requests.values),
         "poses": dict(requests.poses),
         "added_lights": tuple(requests.added),
+        "places": requests.place_key,
         "effective_settings": ResolvedFit(fit.space, fit.hold, fit.colors),
         "layers": LayerList(
             tuple(layer_info(layer, views) for layer in views.layers), views.next_layer

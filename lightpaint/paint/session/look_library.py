@@ -2,15 +2,15 @@
 
 import math
 import time
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Doubles, as_rgb
+from lightpaint.arrays import Doubles, Floats, as_rgb
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.paint.layers.layer_stack import LayerStack
@@ -27,9 +27,10 @@ from lightpaint.paint.protocol import (
     RenameLook,
     SaveLook,
 )
+from lightpaint.paint.session.moved_lights import Placed
 from lightpaint.paint.session.picture_table import PictureTable, display_thumbnail
 from lightpaint.paint.session.session import Session
-from lightpaint.paint.store.canvas_pixels import Pixels
+from lightpaint.paint.store.canvas_pixels import Pixels, mix_pixels
 from lightpaint.paint.store.history_steps import StoredLook, name_in_view
 from lightpaint.paint.store.session_requests import SessionRequests
 
@@ -45,11 +46,20 @@ MARKS_ARRAY = "at_least"
 LookRequest = SaveLook | RenameLook | CopyLook | MixLooks | DropLook | Propose
 
 
+@dataclass(frozen=True)
+class LookLighting:
+    """The lighting of a look. placed: places of its lights. emissions: (3,) by name of light."""
+
+    placed: Placed
+    emissions: Mapping[str, Doubles]
+
+
 class LookLibrary:
     """The looks of a session, in its store, and their thumbnails among its pictures."""
 
     def __init__(self, session: Session, pictures: PictureTable) -> None:
         self._session, self._pictures = session, pictures
+        self._last_id = 0  # no number returns, since pages may still have pictures of its look
         try:
             self.infos()
         except (LightpaintError, LookupError, TypeError, ValueError):
@@ -66,7 +76,9 @@ class LookLibrary:
                 id=look.id,
                 name=look.fields["name"],
                 stamp=look.fields.get("stamp"),
-                weights=tuple(map(as_rgb, self._weights(look))),
+                lights=self._names(look),
+                weights=tuple(map(as_rgb, np.asarray(look.arrays["weights"]))),
+                places=_requests(look).place_key,
                 thumbnail=f"look/{look.id}",
                 is_proposal=bool(look.fields.get("is_proposal", False)),
             )
@@ -98,6 +110,14 @@ class LookLibrary:
                     self._pictures.withdraw(name_in_view(f"look/{number}", k))
         return LookList(looks=self.infos(), resources=self._pictures.stable_generations())
 
+    def lighting(self, number: int) -> LookLighting:
+        """Return the lighting of a look. Raises PaintError for a look that does not exist."""
+        look = self._find(number)
+        weights = np.asarray(look.arrays["weights"], np.float64)
+        return LookLighting(
+            _requests(look).placed, dict(zip(self._names(look), weights, strict=True))
+        )
+
     def load(self, message: LoadLook) -> list[Message]:
         """Continue from a look."""
         look = self._find(message.look)
@@ -113,21 +133,14 @@ class LookLibrary:
         """Return the names of the lights in a look."""
         return (*self._session.bases[0].names, *_requests(look).added)
 
-    def _weights(self, look: StoredLook) -> Doubles:
-        """Return the weights of a look, (n, 3), for the current lights.
-
-        Lights that it does not have are off.
-        """
-        requests = _requests(look)
-        return self._in_order(np.asarray(look.arrays["weights"]), requests)
-
-    def _in_order(self, weights: Doubles, requests: SessionRequests) -> Doubles:
-        """Return weights of the current lights from weights of the lights under other requests."""
-        names = (*self._session.bases[0].names, *requests.added)
-        weight_by_name = dict(zip(names, weights, strict=True))
-        return np.array(
-            [weight_by_name.get(name, (0.0, 0.0, 0.0)) for name in self._session.basis.names]
-        )
+    def _light_of(self, weights: Doubles, requests: SessionRequests) -> list[Floats]:
+        """Return the picture of a lighting, by view. weights: of the lights under `requests`."""
+        session = self._session
+        names = (*session.bases[0].names, *requests.added)
+        emissions = dict(zip(names, weights, strict=True))
+        is_here = requests.place_key == session.requests.place_key
+        bases = [x.basis for x in session.views] if is_here else session.bases_at(requests.placed)
+        return [basis.mix(np.array([emissions[x] for x in basis.names])) for basis in bases]
 
     def _paintings(self, look: StoredLook) -> list[Pixels]:
         """Return the paintings of all views; a view that was added later is unpainted."""
@@ -178,7 +191,7 @@ class LookLibrary:
         )
         locks = self._lock_all(np.asarray(weights), self._names(looks[0]), requests[0])
         both = zip(*(self._paintings(look) for look in looks), strict=True)
-        paintings = [_mix_pixels(pair, shares) for pair in both]
+        paintings = [mix_pixels(pair, shares) for pair in both]
         return self._make_look(name, paintings, locks, np.asarray(weights))
 
     def _lock_all(
@@ -235,13 +248,14 @@ class LookLibrary:
     ) -> StoredLook:
         fields = {"name": name, "stamp": time.time(), "wishes": requests.as_json()}
         arrays: dict[str, npt.NDArray[Any]] = {"weights": weights}
-        for view, (image, importance, marks) in zip(self._session.views, paintings, strict=True):
+        pictures = self._light_of(weights, requests)
+        for view, picture, (image, importance, marks) in zip(
+            self._session.views, pictures, paintings, strict=True
+        ):
             arrays_of_view: dict[str, npt.NDArray[Any]] = {
                 "image": np.asarray(image, np.float32),
                 "importance": np.asarray(importance, np.float32),
-                "thumbnail": display_thumbnail(
-                    view.basis.mix(self._in_order(weights, requests)), self._session.transform
-                ),
+                "thumbnail": display_thumbnail(picture, self._session.transform),
             }
             if marks is not None:
                 arrays_of_view[MARKS_ARRAY] = marks.view(np.uint8)
@@ -263,12 +277,14 @@ class LookLibrary:
         try:
             return look.arrays[name_in_view("thumbnail", k)]
         except (LightpaintError, LookupError):
-            return display_thumbnail(
-                self._session.views[k].basis.mix(self._weights(look)), self._session.transform
-            )
+            weights = np.asarray(look.arrays["weights"], np.float64)
+            picture = self._light_of(weights, _requests(look))[k]
+            return display_thumbnail(picture, self._session.transform)
 
     def _next_id(self) -> int:
-        return 1 + max((look.id for look in self._session.store.looks()), default=0)
+        ids = [look.id for look in self._session.store.looks()]
+        self._last_id = max(self._last_id, *ids, 0) + 1
+        return self._last_id
 
     def _find(self, number: int) -> StoredLook:
         for look in self._session.store.looks():
@@ -282,23 +298,6 @@ class LookLibrary:
         if not cleaned:
             raise PaintError("a look needs a name")
         return cleaned
-
-
-def _mix_pixels(pair: tuple[Pixels, Pixels], shares: tuple[float, float]) -> Pixels:
-    """Mix two paintings of a view, each weighted by its share and its importance."""
-    counts = [share * pixels.importance for share, pixels in zip(shares, pair, strict=True)]
-    total = counts[0] + counts[1]
-    whole = np.where(total > 0, total, 1)[..., None]
-    image = np.zeros((*total.shape, 3), np.float32)
-    for count, pixels in zip(counts, pair, strict=True):
-        image += (count[..., None] / whole * pixels.image).astype(np.float32)
-    # A pixel is marked "at least" if it is in all paintings that count there.
-    unsure = np.zeros(image.shape, bool)
-    for count, pixels in zip(counts, pair, strict=True):
-        fixed = True if pixels.at_least is None else ~pixels.at_least
-        unsure |= fixed & (count > 0)[..., None]
-    at_least = ~unsure & (total > 0)[..., None]
-    return Pixels(image, total.astype(np.float32), at_least if at_least.any() else None)
 
 
 def _requests(look: StoredLook) -> SessionRequests:

@@ -71,6 +71,10 @@ class MovedLights:
         lights = self.bases[0].lights
         return self._source.lights(lights, placed) if added_names(placed) else lights
 
+    def bases_at(self, placed: Placed) -> list[Basis]:
+        """Return the bases of all views with lights at these places, rendered or estimated."""
+        return self._source.bases(self.bases, placed)
+
     def begin(self, placed: Placed, views: Canvases) -> None:
         """Give `views` the planes of `placed`, before there is an answer."""
         if placed:

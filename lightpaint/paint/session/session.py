@@ -87,8 +87,6 @@ class Session:
         )
         self.views, self.live_answer = self._edits.views, self._edits.live_answer
 
-    # State
-
     @property
     def version(self) -> int:
         """A number that grows with every change."""
@@ -103,6 +101,10 @@ class Session:
     def bases(self) -> tuple[Basis, ...]:
         """Bases of all views, with every light at its place in the scene."""
         return self._edits.bases
+
+    def bases_at(self, placed: Placed) -> Sequence[Basis]:
+        """Bases of all views with lights at other places, rendered or estimated."""
+        return self._edits.bases_at(placed)
 
     @property
     def requests(self) -> SessionRequests:

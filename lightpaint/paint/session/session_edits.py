@@ -73,6 +73,10 @@ class SessionEdits:
         """Bases of all views, with every light at its place in the scene."""
         return self._moved_lights.bases
 
+    def bases_at(self, placed: Placed) -> Sequence[Basis]:
+        """Return the bases of all views with lights at these places."""
+        return self._moved_lights.bases_at(placed)
+
     @property
     def is_open(self) -> bool:
         """True while a stroke or a slider is not finished."""

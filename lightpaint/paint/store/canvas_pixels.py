@@ -47,6 +47,23 @@ class Pixels(NamedTuple):
         return equal_marks(self.at_least, other.at_least)
 
 
+def mix_pixels(pair: tuple[Pixels, Pixels], shares: tuple[float, float]) -> Pixels:
+    """Mix two paintings of a view, each weighted by its share and its importance."""
+    counts = [share * pixels.importance for share, pixels in zip(shares, pair, strict=True)]
+    total = counts[0] + counts[1]
+    whole = np.where(total > 0, total, 1)[..., None]
+    image = np.zeros((*total.shape, 3), np.float32)
+    for count, pixels in zip(counts, pair, strict=True):
+        image += (count[..., None] / whole * pixels.image).astype(np.float32)
+    # A pixel is marked "at least" if it is in all paintings that count there.
+    unsure = np.zeros(image.shape, bool)
+    for count, pixels in zip(counts, pair, strict=True):
+        fixed = True if pixels.at_least is None else ~pixels.at_least
+        unsure |= fixed & (count > 0)[..., None]
+    at_least = ~unsure & (total > 0)[..., None]
+    return Pixels(image, total.astype(np.float32), at_least if at_least.any() else None)
+
+
 def equal_marks(first: Bools | None, second: Bools | None) -> bool:
     """Return whether two paintings have the same "at least" marks; None for none."""
     if first is None or second is None:

@@ -1,5 +1,7 @@
 """Requests beside the paint: constraints on lights, dimmers, settings of the answer."""
 
+import hashlib
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -75,6 +77,13 @@ class SessionRequests:
         moved = {name: pose for name, pose in self.poses.items() if name not in self.added}
         added = {name: {**light, **self.poses.get(name, {})} for name, light in self.added.items()}
         return moved | added
+
+    @property
+    def place_key(self) -> str:
+        """A short text, equal for equal places of all lights; "" if they hang as in the scene."""
+        if not (placed := self.placed):
+            return ""
+        return hashlib.sha256(json.dumps(placed, sort_keys=True).encode()).hexdigest()[:16]
 
     def with_light(self, name: str, requested: Mapping[str, Any]) -> "SessionRequests":
         """Return these requests with all those on one light replaced.

@@ -17,6 +17,7 @@ from lightpaint.paint.protocol import (
 from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.rig.light_mover import LightMover
 from lightpaint.paint.rig.light_placer import LightPlacer
+from lightpaint.paint.rig.look_comparison import LookComparison
 from lightpaint.paint.session.moved_lights import Placed
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.session_state import state_fields
@@ -34,6 +35,7 @@ class RequestHandler:
         access: The session.
         publisher: Sends messages that answer no request, and has the pictures.
         mover: Moves lights, and adds them by hand.
+        comparison: Shows looks whose lights hang elsewhere.
         jobs: Exports, verifies, explains and previews.
         exact_answers: Looks for a new answer after each change.
         threads: Runs searches for places of lights.
@@ -44,12 +46,14 @@ class RequestHandler:
         access: SessionAccess,
         publisher: Publisher,
         mover: LightMover,
+        comparison: LookComparison,
         jobs: BackgroundJobs,
         exact_answers: ExactAnswers,
         threads: BackgroundThreads,
     ) -> None:
         self._access, self._publisher = access, publisher
         self._mover, self._jobs, self._exact_answers = mover, jobs, exact_answers
+        self._comparison = comparison
         self._subjects = mover.rig.subjects
         self._placer = LightPlacer(access, publisher, mover.rig, threads, self._hang_lights)
 
@@ -101,6 +105,8 @@ class RequestHandler:
                     return [looks.handle(message)]
                 case protocol.MixLooks() | protocol.DropLook() | protocol.Propose():
                     return [looks.handle(message)]
+                case protocol.CompareLooks():
+                    return self._comparison.handle(message)
                 case protocol.Export() | protocol.Verify() | protocol.Explain():
                     return self._jobs.handle(message)
                 case protocol.Preview():

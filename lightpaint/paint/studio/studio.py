@@ -29,6 +29,7 @@ from lightpaint.paint.protocol import (
 from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.rig.lamp_rig import LampRig
 from lightpaint.paint.rig.light_mover import LightMover
+from lightpaint.paint.rig.look_comparison import LookComparison
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import SessionAccess
@@ -98,10 +99,12 @@ class Studio:
         self._sampling = BackgroundSampling(self.subjects, access, self._bases, publisher)
         self._exact_answers = ExactAnswers(access, publisher, self._sampling.give)
         self._write_retry = UnsavedRetry(lambda: self.store, self._publish_save_state)
+        self._comparison = LookComparison(access, publisher, self._mover, threads)
         self._requests = RequestHandler(
             access,
             publisher,
             self._mover,
+            self._comparison,
             BackgroundJobs(
                 access, publisher, self._mover, threads, clean_planes=denoiser.clean_planes
             ),
@@ -145,6 +148,7 @@ class Studio:
         self._exact_answers.stop()
         self._sampling.stop()
         self._mover.stop()
+        self._comparison.stop()
         self._write_retry.stop()
         with self._access.lock:
             if self._access.current is not None:
@@ -234,4 +238,5 @@ class Studio:
         """Publish the state with new bases, and renew what was found with the earlier ones."""
         self.publisher.publish_made(self._requests.state)
         self._mover.render_behind()
+        self._comparison.renew()
         self._exact_answers.notify()

@@ -33,6 +33,7 @@ ASKED = {
 
 #: Requests of a rig and of layers, which the session that tests make up does not have.
 RIG = {"move", "point", "show_rig", "place", "add_light", "remove_light", "change_layers"}
+RIG.add("compare_looks")
 
 
 def check(message: dict[str, Any]) -> None:

@@ -175,3 +175,36 @@ def test_a_light_is_added_by_a_click_dragged_and_removed(room: PaintedRoom) -> N
     page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     wait_until(lambda: "point_1" in session.requests.added)
     page.wait_for_selector('[data-lamp="point_1"]')
+
+
+@pytest.mark.long
+def test_compared_looks_are_shown_with_their_own_places(room: PaintedRoom) -> None:
+    page, session = room.page, room.studio.session
+    page.keyboard.press("Control+s")
+    wait_until(lambda: len(session.store.looks()) == 1)
+    room.drag(room.mark("bulb"), 60, 0)
+    room.until_step(1)
+    page.keyboard.press("Control+s")
+    wait_until(lambda: len(session.store.looks()) == 2)
+    wait_until(lambda: not room.studio.rig.unrendered(session.requests.placed))
+    there, here = session.basis.mix(session.weights), session.bases[0].mix(session.weights)
+    page.keyboard.press("c")  # without the denoiser
+    page.get_by_role("button", name="Compare looks").click()
+
+    def shown(kind: str, row: int, column: int) -> Any:
+        read = f"([kind, x, y]) => {PAINTER}.engine.lightAt(kind, x, y)"
+        return page.evaluate(read, [kind, column, row])
+
+    # Where the move changes most.
+    row, column = divmod(int(np.abs(there - here).sum(-1).argmax()), here.shape[1])
+    assert not np.allclose(here[row, column], there[row, column], rtol=0.3)
+    wait_until(lambda: np.allclose(shown("solution", row, column), here[row, column], rtol=0.1))
+    wait_until(lambda: np.allclose(shown("other", row, column), there[row, column], rtol=0.1))
+    page.get_by_text("Places differ").wait_for()
+    assert page.get_by_role("button", name="Save as look").count() == 0
+    page.keyboard.press("Control+z")
+    wait_until(lambda: room.poses == {})
+    wait_until(lambda: np.allclose(shown("other", row, column), there[row, column], rtol=0.1))
+    wait_until(lambda: np.allclose(shown("solution", row, column), here[row, column], rtol=0.1))
+    page.get_by_role("button", name="Back to the painting").click()
+    wait_until(lambda: np.allclose(shown("solution", row, column), here[row, column], rtol=0.1))

@@ -131,12 +131,17 @@ export interface LayerList {
 
 /**
  * A kept look. stamp: time in seconds since 1970. thumbnail: name of its picture.
+ *
+ * lights: names of its lights, which may differ from the current ones. weights: of each. places:
+ * as in `EditState`.
  */
 export interface LookInfo {
   id: number;
   name: string;
   stamp: number | null;
+  lights: string[];
   weights: RGB[];
+  places: string;
   thumbnail: string;
   is_proposal: boolean;
 }
@@ -251,7 +256,8 @@ export interface Findings {
  *
  * constraints: by name of light, keys and values as in a lights file. ties: names on one dimmer.
  * settings: those that were set. effective_settings: those in effect. poses: of moved lights, by
- * name. added_lights: names of lights that the scene does not have. layers: of the painting.
+ * name. added_lights: names of lights that the scene does not have. places: a text, equal for
+ * equal places of all lights; "" if all hang as in the scene. layers: of the painting.
  */
 export interface EditState {
   history?: HistoryInfo;
@@ -260,6 +266,7 @@ export interface EditState {
   settings?: Record<string, any>;
   poses?: Record<string, Record<string, any>>;
   added_lights?: string[];
+  places?: string;
   effective_settings?: ResolvedFit;
   layers?: LayerList;
 }
@@ -285,6 +292,7 @@ export interface SessionState {
   settings?: Record<string, any>;
   poses?: Record<string, Record<string, any>>;
   added_lights?: string[];
+  places?: string;
   effective_settings?: ResolvedFit;
   layers?: LayerList;
   version: number;
@@ -354,6 +362,7 @@ export interface AnswerUpdate {
   settings?: Record<string, any>;
   poses?: Record<string, Record<string, any>>;
   added_lights?: string[];
+  places?: string;
   effective_settings?: ResolvedFit;
   layers?: LayerList;
   version: number;
@@ -379,6 +388,7 @@ export interface CanvasPatch {
   settings?: Record<string, any>;
   poses?: Record<string, Record<string, any>>;
   added_lights?: string[];
+  places?: string;
   effective_settings?: ResolvedFit;
   layers?: LayerList;
   region: Region;
@@ -445,7 +455,7 @@ export interface ProgressReport {
 export interface TaskStarted {
   kind: 'started';
   reply?: number;
-  task: 'export' | 'verify' | 'explain' | 'preview' | 'rig' | 'place' | 'stop';
+  task: 'export' | 'verify' | 'explain' | 'preview' | 'rig' | 'place' | 'compare' | 'stop';
   arrays: {  };
 }
 
@@ -839,6 +849,15 @@ export interface MixLooks {
 }
 
 /**
+ * A request for pictures of looks whose lights hang elsewhere than now; for none, to stop.
+ * Answered by `started`; `renewed` then lists `look_plane/ID` and `look_clean/ID` of each: first
+ * with estimated planes of lights that hang nowhere else, later with rendered ones.
+ */
+export interface CompareLooks {
+  looks?: number[];
+}
+
+/**
  * Delete a look. Answered by `looks`.
  */
 export interface DropLook {
@@ -957,6 +976,7 @@ export interface Requests {
   rename_look: RenameLook;
   copy_look: CopyLook;
   mix_looks: MixLooks;
+  compare_looks: CompareLooks;
   drop_look: DropLook;
   export: Export;
   verify: Verify;

@@ -8,8 +8,12 @@ import { nameInView } from './message_frames.js';
  * Settings of the display. gains: the lights to display, null for all. instead, other: weights with
  * which to show the solution and the other mix.
  * @typedef {Omit<import("../../../viewer/drawing/view.js").Params, 'live'> & {transform: string, clean: boolean,
- *   visibleLights: boolean[] | null, solutionWeights: RGB[] | null, otherWeights: RGB[] | null}} Display
+ *   visibleLights: boolean[] | null, solutionWeights: RGB[] | null, otherWeights: RGB[] | null,
+ *   lookPictures: (number | null)[] | null}} Display
  */
+
+/** Number of looks that are compared at a time. Their pictures are planes behind those of lights. */
+export const COMPARED_COUNT = 2;
 
 /** Pictures that a page always shows or uses, by name. */
 const SHARED_PICTURES = ['present', 'albedo', 'objects', 'verified', 'beyond'];
@@ -29,6 +33,11 @@ export function wantedPictures(count, display, view, resources) {
     const clean = nameInView(`clean/${k}`, view);
     const hasClean = isClean && clean in resources;
     names.push([`plane ${k}`, hasClean ? clean : nameInView(`plane/${k}`, view)]);
+  }
+  for (let k = 0; k < COMPARED_COUNT; k++) {
+    const look = display?.lookPictures?.[k] ?? null;
+    const name = `look_${isClean ? 'clean' : 'plane'}/${look}`;
+    names.push([`look ${k}`, look === null ? null : nameInView(name, view)]);
   }
   const transform = display?.transform ?? 'srgb';
   names.push(['lut', transform === 'srgb' ? null : `lut/${transform}`]);

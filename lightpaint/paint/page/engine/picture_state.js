@@ -1,7 +1,7 @@
 /** What the pictures on the screen show: a state of the session, weights of the lights, the painting. */
 import { union } from '../../../viewer/drawing/cpu_picture.js';
 import { SRGB } from '../../../viewer/drawing/view_transform.js';
-import { showsPresent } from './picture_slots.js';
+import { COMPARED_COUNT, showsPresent } from './picture_slots.js';
 
 /** @typedef {import("../../../viewer/drawing/view_transform.js").Lut} Lut */
 /** @typedef {import("./message_frames.js").Message} Message */
@@ -67,12 +67,26 @@ export class PictureState {
       solutionWeights = null,
       otherWeights = null,
     } = this.display ?? {};
-    const weights = Float64Array.from(solutionWeights?.flat() ?? this.weights);
-    if (visibleLights)
-      weights.forEach((weight, i) => (weights[i] = visibleLights[Math.floor(i / 3)] ? weight : 0));
-    if (weights.length === 3 * this.state.lights.length) view.setWeights(weights);
-    if (otherWeights) view.setWeights(Float64Array.from(otherWeights.flat()), 'other');
-    this.checkPresent(weights);
+    const weights = this.forPlanes(solutionWeights?.flat() ?? this.weights);
+    const otherMix = otherWeights && this.forPlanes(otherWeights.flat());
+    if (weights && visibleLights)
+      weights.forEach(
+        (weight, i) => (weights[i] = visibleLights[Math.floor(i / 3)] ?? true ? weight : 0),
+      );
+    if (weights) view.setWeights(weights);
+    if (otherMix) view.setWeights(otherMix, 'other');
+    if (weights) this.checkPresent(weights);
+  }
+
+  /** Return weights for all planes of the view, from those of the lights and maybe of compared
+   * looks; null for weights of other lights.
+   * @param {ArrayLike<number>} weights */
+  forPlanes(weights) {
+    const length = 3 * (this.state?.lights.length ?? 0);
+    if (weights.length !== length && weights.length !== length + 3 * COMPARED_COUNT) return null;
+    const planeWeights = new Float64Array(3 * this.screen.count);
+    planeWeights.set(Array.from(weights).slice(0, planeWeights.length));
+    return planeWeights;
   }
 
   /** Unchanged lights give the current look, which arrives before the planes and is denoised.
@@ -85,7 +99,7 @@ export class PictureState {
     const isPresent =
       isClean &&
       !this.haveLightsMoved &&
-      weights.every((weight, i) => Math.abs(weight - present[i]) <= 1e-9 * present[i]);
+      weights.every((weight, i) => Math.abs(weight - (present[i] ?? 0)) <= 1e-9 * (present[i] ?? 0));
     screen.isPresent = isPresent && this.knowsPresent;
     if (screen.isPresent !== this.hasPresent && canvas) this.showPresent();
   }

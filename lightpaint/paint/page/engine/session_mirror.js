@@ -7,7 +7,7 @@ import { PictureLoader } from './picture_loader.js';
 import { PictureState } from './picture_state.js';
 import { SRGB, lutOf } from '../../../viewer/drawing/view_transform.js';
 import { VERSION, nameInView, stateOfView } from './message_frames.js';
-import { showsPresent, sizesText, wantedPictures } from './picture_slots.js';
+import { COMPARED_COUNT, showsPresent, sizesText, wantedPictures } from './picture_slots.js';
 import { StrokeSender } from './stroke_sender.js';
 
 /** @typedef {import("./socket_host.js").Host} Host */
@@ -47,6 +47,8 @@ export class SessionMirror extends PictureState {
     this.patchCount = 0;
     /** Whether the canvas equals the session's. */
     this.isReady = false;
+    /** Whether the view has planes for compared looks; it keeps them. */
+    this.hasLookPlanes = false;
     host.on('state', (message) => this.begin(message));
     host.on('answer', (message) => {
       this.takeAnswer(message);
@@ -98,11 +100,11 @@ export class SessionMirror extends PictureState {
     this.state = state;
     this.view = view;
     if (isSame) {
-      if (previous?.lights.length !== state.lights.length) this.setLights(state.lights.length);
+      if (previous?.lights.length !== state.lights.length) this.setPlanes();
       return;
     }
     const [height, width] = /** @type {[number, number]} */ (state.size);
-    this.screen.begin([height, width], state.lights.length, this.screen.view?.name);
+    this.screen.begin([height, width], this.planeCount, this.screen.view?.name);
     this.canvas = new PaintCanvas([height, width], new Uint16Array(3 * height * width));
     if (hasOtherSizes || !this.strokes) {
       const requestState = () => {
@@ -124,12 +126,17 @@ export class SessionMirror extends PictureState {
     this.setLut(this.lut);
   }
 
-  /** Lights were added or removed: keep the painting and fetch all planes again.
-   * @param {number} count */
-  setLights(count) {
+  /** Number of planes of the view. */
+  get planeCount() {
+    return (this.state?.lights.length ?? 0) + (this.hasLookPlanes ? COMPARED_COUNT : 0);
+  }
+
+  /** The number of planes has changed: keep the painting and fetch all planes again. */
+  setPlanes() {
     const { loader, screen } = this;
+    const count = this.state?.lights.length ?? 0;
     for (let k = count; k < screen.count; k++) loader.setWanted([[`plane ${k}`, null]]);
-    screen.setCount(count);
+    screen.setCount(this.planeCount);
     this.refill();
   }
 
@@ -235,6 +242,9 @@ export class SessionMirror extends PictureState {
       const light = Number(slot.slice(6));
       if (light >= state.lights.length) return;
       view.setPlane(light, /** @type {Uint16Array} */ (data), state.lights[light].scale ?? 1);
+    } else if (slot.startsWith('look ')) {
+      const plane = state.lights.length + Number(slot.slice(5));
+      if (plane < this.screen.count) view.setPlane(plane, /** @type {Uint16Array} */ (data), 1);
     } else if (slot === 'lut') this.setLut(lutOf(name.slice(4), picture, state.lut));
     else if (slot === 'present') this.setPresent(/** @type {Uint16Array} */ (data));
     else if (slot === 'ground') this.layers.setGround(/** @type {Float32Array} */ (data));
@@ -265,7 +275,7 @@ export class SessionMirror extends PictureState {
     this.showPresent();
     if (this.canvas) this.redraw([this.canvas.wholeRegion]);
     this.loader.forget(
-      (slot) => slot.startsWith('plane ') || slot === 'verified' || slot === 'beyond',
+      (slot) => /^(plane|look) /.test(slot) || slot === 'verified' || slot === 'beyond',
     );
     this.requestPictures();
   }
@@ -275,7 +285,15 @@ export class SessionMirror extends PictureState {
     const { display: previous } = this;
     this.display = display;
     this.screen.params = { ...display, live: false };
-    if (previous?.transform !== display.transform || previous?.clean !== display.clean)
+    if (display.lookPictures && !this.hasLookPlanes) {
+      this.hasLookPlanes = true;
+      if (this.screen.view) this.setPlanes();
+    }
+    if (
+      previous?.transform !== display.transform ||
+      previous?.clean !== display.clean ||
+      String(previous?.lookPictures) !== String(display.lookPictures)
+    )
       this.requestPictures();
     this.showWeights();
     if (showsPresent(display) !== showsPresent(previous)) this.showPresent();

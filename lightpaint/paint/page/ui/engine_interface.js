@@ -26,7 +26,8 @@
 
 /**
  * What is drawn, and how. `visibleLights`: those that solo and mute leave; null for all. `solutionWeights`,
- * `otherWeights`: weights for "solution" and "other"; null for the answer's.
+ * `otherWeights`: weights for "solution" and "other", of the lights and maybe of two looks; null for
+ * the answer's. `lookPictures`: ids of these looks, if their lights hang elsewhere.
  * @typedef {object} Display
  * @property {Kind} left
  * @property {Kind} right
@@ -42,6 +43,7 @@
  * @property {boolean[] | null} visibleLights
  * @property {RGB[] | null} solutionWeights
  * @property {RGB[] | null} otherWeights
+ * @property {(number | null)[] | null} lookPictures
  */
 
 /** @typedef {"brush" | "eraser" | "weight" | "pick" | "fill" | "line" | "adjust"} Tool */

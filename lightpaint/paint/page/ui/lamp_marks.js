@@ -11,6 +11,7 @@ import {
   dragVertically,
   clampToBox,
 } from './lamp_geometry.js';
+import { showsElsewhere } from './look_comparison.js';
 import { toHex } from './paint_colour.js';
 import { atFullBrightness, luminance } from './paint_colour.js';
 
@@ -32,7 +33,7 @@ export function LampMarks({ ui, app, panes }) {
   const camera = ui.areLampsMarked && ui.rig ? ui.rig.cameras[ui.view] : null;
   if (!camera) return null;
   return html`<div class=${`lamps ${ui.clickAction ? 'is-pointing' : ''} ${ui.placementProgress ? 'is-placing' : ''}`}>
-    ${distinctPanes(panes).map(
+    ${distinctPanes(panes.filter((pane) => !showsElsewhere(ui, pane.kind))).map(
       (pane, k) => html`<${PaneMarks} key=${k} ui=${ui} app=${app} pane=${pane} camera=${camera}
       isTwin=${k > 0} />`,
     )}</div>`;

@@ -1,5 +1,7 @@
 /** Saving and loading of looks, and which look equals the current state. */
 
+import { isElsewhere, weightsIn } from './look_comparison.js';
+
 /** @typedef {import("./engine_interface.js").RGB} RGB */
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./ui_state.js").Look} Look */
@@ -41,7 +43,8 @@ export async function loadLook({ session, store }, look) {
  * changed since; else one with the answer's lights, as after undo.
  * @param {Ui} ui @returns {number | null}
  */
-export function currentLook({ looks, lastLook, version, history, weights }) {
+export function currentLook(ui) {
+  const { looks, lastLook, version, history, weights } = ui;
   // A page that has just opened or reconnected knows no version.
   const isKnown = version >= 0 && lastLook?.version === version;
   if (lastLook && isKnown && looks.some(({ id }) => id === lastLook.look)) return lastLook.look;
@@ -49,7 +52,10 @@ export function currentLook({ looks, lastLook, version, history, weights }) {
   const isPaintedOn = (/** @type {number} */ id) =>
     id === lastLook?.look && stepsOf(history) !== lastLook.steps;
   const candidates = looks.filter(
-    (look) => !isPaintedOn(look.id) && areWeightsEqual(look.weights, weights),
+    (look) =>
+      !isPaintedOn(look.id) &&
+      !isElsewhere(ui, look) &&
+      areWeightsEqual(weightsIn(ui, look), weights),
   );
   return (candidates.find(({ id }) => id === lastLook?.look) ?? candidates[0])?.id ?? null;
 }

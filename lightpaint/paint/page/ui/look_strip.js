@@ -8,7 +8,14 @@ import { html, useEffect, useLayoutEffect, useRef, useState } from '../vendor/pr
 import { Button, Select, Slider } from './controls.js';
 import { currentLook, loadLook } from './look_actions.js';
 import { MOD } from './shortcuts.js';
-import { mixName, mixedWeights, resetMix } from './ui_state.js';
+import {
+  looksElsewhere,
+  mixName,
+  placesText,
+  resetMix,
+  whyNotSaved,
+  withoutLooks,
+} from './look_comparison.js';
 import { Thumbnail } from './thumbnail.js';
 import { updateDisplay } from './tools.js';
 
@@ -103,21 +110,36 @@ function pairOf(ui) {
   return { a: ids[index > 0 ? index - 1 : 1], b };
 }
 
+/** Have the session make pictures of compared looks whose lights hang elsewhere.
+ * @param {Ui} ui @param {App} app */
+function usePicturesElsewhere(ui, { session, store }) {
+  const ids = looksElsewhere(ui).map(({ id }) => id);
+  const hasRequested = useRef(false);
+  useEffect(() => {
+    if (!ids.length && !hasRequested.current) return;
+    store.set(({ resources }) => ({ resources: withoutLooks(resources, ids) }));
+    void session.send('compare_looks', { looks: ids });
+    hasRequested.current = ids.length > 0;
+  }, [ids.join(' '), ui.looks]);
+}
+
 /** Two looks side by side, and a slider to mix them. @param {{ui: Ui, app: App}} props */
 function LookCrossfade({ ui, app }) {
   const { store } = app;
   const comparison = ui.mix ?? { ...pairOf(ui), share: 1 };
   const choices = ui.looks.map((look) => ({ value: String(look.id), label: look.name }));
   const nameOf = (/** @type {number} */ id) => ui.looks.find((look) => look.id === id)?.name ?? '';
+  const describe = (/** @type {number} */ id) => {
+    const look = ui.looks.find((one) => one.id === id);
+    return look ? placesText(ui, look) : '';
+  };
   const set = (/** @type {{a?: number, b?: number, share?: number}} */ changes) => {
     const mix = { ...comparison, ...changes };
     store.set({ mix });
-    updateDisplay(store, {
-      left: 'solution',
-      right: 'other',
-      solutionWeights: mixedWeights(ui, { ...mix, share: 0 }),
-    });
+    updateDisplay(store, { left: 'solution', right: 'other' });
   };
+  usePicturesElsewhere(ui, app);
+  const refusal = ui.mix && whyNotSaved(ui, ui.mix);
   const keep = () =>
     app.session.send('mix_looks', {
       first: comparison.a,
@@ -129,16 +151,20 @@ function LookCrossfade({ ui, app }) {
     ${
       ui.mix &&
       html`<${Select} label="First look" hidden value=${String(comparison.a)} choices=${choices}
-        tip=${`From ${nameOf(comparison.a)}`}
+        tip=${`From ${describe(comparison.a)}`}
         change=${(/** @type {string} */ id) => set({ a: Number(id) })} />
       <${Slider} label="Crossfade" value=${100 * comparison.share} min=${0} max=${100} unit="%"
         tip=${`Crossfade from ${nameOf(comparison.a)} to ${nameOf(comparison.b)}`}
         change=${(/** @type {number} */ share) => set({ share: share / 100 })} />
       <${Select} label="Second look" hidden value=${String(comparison.b)} choices=${choices}
-        tip=${`To ${nameOf(comparison.b)}`}
+        tip=${`To ${describe(comparison.b)}`}
         change=${(/** @type {string} */ id) => set({ b: Number(id) })} />
-      <${Button} icon="plus" label="Save as look" class="keep" act=${keep}
+      ${
+        refusal
+          ? html`<span class="faint keep" tabindex="0" data-tip=${refusal}>Places differ</span>`
+          : html`<${Button} icon="plus" label="Save as look" class="keep" act=${keep}
         tip=${`Save ${mixName(ui.looks, comparison)}`} />`
+      }`
     }
     <${Button} icon="side" label=${ui.mix ? 'Back to the painting' : 'Compare looks'} class="compare"
       tip=${ui.mix ? 'Show painting and answer again' : 'Two looks side by side, and a crossfade between them'}

@@ -8,7 +8,8 @@ import { toHex } from './paint_colour.js';
 import { reportProbe, refreshProbe, drawRings } from './brush_cursor.js';
 import { countText } from './format.js';
 import { useStageInput } from './stage_input.js';
-import { mixName, gainOf, paintOf, effectiveDisplay } from './ui_state.js';
+import { comparedLooks, isPending, mixName } from './look_comparison.js';
+import { gainOf, paintOf, effectiveDisplay } from './ui_state.js';
 import { PointerLabel } from './pointer_label.js';
 import { LayerMask } from './layers/layer_mask.js';
 import { MaskNote } from './layers/layer_panel.js';
@@ -42,12 +43,12 @@ function nameOf(ui, kind) {
     return `${ui.lights[ui.hoveredLight].label} alone${stops > 0 ? `, ${countText(stops, 'stop')} brighter` : ''}`;
   }
   if (kind === 'other' && ui.mix) {
-    const { b, share } = ui.mix;
-    const name = ui.looks.find((look) => look.id === b)?.name;
-    return share === 1 && name ? name : mixName(ui.looks, ui.mix);
+    const look = comparedLooks(ui, ui.mix)?.[1];
+    return ui.mix.share === 1 && look ? lookText(ui, look) : mixName(ui.looks, ui.mix);
   }
-  if (kind === 'solution' && ui.display.solutionWeights && ui.mix) {
-    return ui.looks.find((look) => look.id === ui.mix?.a)?.name ?? NAMES.solution;
+  if (kind === 'solution' && ui.display.right === 'other' && ui.mix) {
+    const look = comparedLooks(ui, ui.mix)?.[0];
+    return look ? lookText(ui, look) : NAMES.solution;
   }
   const gap = kind === 'solution' || kind === 'painting' ? missingText(ui, kind) : null;
   if (gap) return `${NAMES[kind]}: ${gap}`;
@@ -55,6 +56,11 @@ function nameOf(ui, kind) {
   if (kind === 'verified' && ui.verification?.isOld) return 'Render of an earlier answer';
   return NAMES[kind] ?? kind;
 }
+
+/** Return the name of a look, and whether its lights are still shown where they hang now.
+ * @param {Ui} ui @param {import("./ui_state.js").Look} look */
+const lookText = (ui, look) =>
+  isPending(ui, look) ? `${look.name}: moving its lights …` : look.name;
 
 /** Return what a picture does not show yet; null if it is complete. @param {Ui} ui
  * @param {'solution' | 'painting'} kind */
@@ -107,7 +113,20 @@ export function Stage({ ui, app }) {
   // At once, so that the names are at the pictures' places.
   useMemo(
     () => engine.show(effectiveDisplay(ui)),
-    [ui.display, ui.tool, ui.solo, ui.mute, ui.hoveredLight, ui.mix, ui.ready, ui.weights, ui.view],
+    [
+      ui.display,
+      ui.tool,
+      ui.solo,
+      ui.mute,
+      ui.hoveredLight,
+      ui.mix,
+      ui.ready,
+      ui.weights,
+      ui.view,
+      ui.places,
+      ui.looks,
+      ui.resources,
+    ],
   );
   const hasAlbedo = ui.resources[nameInView('albedo', ui.view)] !== undefined;
   // Set before the next press of a pointer.

@@ -6,7 +6,7 @@
 /** @typedef {import('../engine/messages.js').Events} Events */
 
 import { stateOfView } from '../engine/message_frames.js';
-import { mixedWeights, resetMix } from './ui_state.js';
+import { comparedLooks, resetMix } from './look_comparison.js';
 
 /** State of requested tasks while none is running.
  * @type {Record<string, Partial<Ui>>} */
@@ -48,6 +48,7 @@ export function stateUpdate(message, /** @type {import('./ui_state.js').Ui} */ p
     effectiveSettings: message.effective_settings ?? {},
     poses: message.poses ?? {},
     addedLights: message.added_lights ?? [],
+    places: message.places ?? '',
     history: message.history,
     looks,
     resources: message.resources ?? {},
@@ -125,7 +126,7 @@ export function looksUpdate({ looks, resources }, ui) {
 /** Return whether a compared look no longer exists.
  * @param {import('./ui_state.js').Look[]} looks @param {Ui} ui */
 function isLookMissing(looks, ui) {
-  return ui.mix !== null && !mixedWeights({ ...ui, looks }, ui.mix);
+  return ui.mix !== null && !comparedLooks({ ...ui, looks }, ui.mix);
 }
 
 /** @param {{name: string, stops: number} | undefined} transform */
@@ -259,6 +260,7 @@ export function answerUpdate(message, ui) {
   }
   if (message.effective_settings) changes.effectiveSettings = message.effective_settings;
   if (message.added_lights) changes.addedLights = message.added_lights;
+  if (message.places !== undefined) changes.places = message.places ?? '';
   if (message.lights) Object.assign(changes, answerFields(message, ui));
   else if (!message.exact) {
     changes.isLive = true;

@@ -1,5 +1,6 @@
 /** The state of the interface: data from the session, and settings of the page itself. */
 
+import { comparedDisplay } from './look_comparison.js';
 import { fromKelvin } from './paint_colour.js';
 
 /** @typedef {import("./engine_interface.js").RGB} RGB */
@@ -59,6 +60,7 @@ import { fromKelvin } from './paint_colour.js';
  * @property {string[][]} ties
  * @property {Record<string, Record<string, any>>} poses of lights that were moved, by name
  * @property {string[]} addedLights names of lights that the scene does not have
+ * @property {string} places a text, equal for equal places of all lights
  * @property {import("../engine/messages.js").Rig | null} rig where the lights hang, once it is known
  * @property {boolean} areLampsMarked whether lights are marked in the pictures
  * @property {number | null} lamp the marked light that was chosen, which has handles
@@ -156,6 +158,7 @@ const DEFAULT_DISPLAY = {
   visibleLights: null,
   solutionWeights: null,
   otherWeights: null,
+  lookPictures: null,
 };
 
 /** @returns {Ui} */
@@ -187,6 +190,7 @@ export function initialState() {
     ties: [],
     poses: {},
     addedLights: [],
+    places: '',
     rig: null,
     areLampsMarked: false,
     lamp: null,
@@ -271,8 +275,7 @@ export function effectiveDisplay(ui) {
       hasSolo ? ui.solo.includes(k) : !ui.mute.includes(k),
     );
   }
-  const mixed = ui.mix && mixedWeights(ui, ui.mix);
-  if (mixed) display.otherWeights = mixed;
+  Object.assign(display, comparedDisplay(ui));
   const k = ui.hoveredLight;
   if (k !== null) {
     const gain = gainOf(ui, k);
@@ -303,28 +306,6 @@ export function gainOf(ui, k) {
 function soloColour(rgb, light) {
   if (Math.max(...rgb) > 0) return rgb;
   return Math.max(...light.present) > 0 ? light.present : [1, 1, 1];
-}
-
-/** Reset the comparison of two looks. @param {Ui} ui @returns {Partial<Ui>} */
-export function resetMix({ display }) {
-  const pair = /** @type {const} */ ({ left: 'painting', right: 'solution' });
-  return { mix: null, display: { ...display, ...pair, solutionWeights: null, otherWeights: null } };
-}
-
-/** @param {Ui} ui @param {{a: number, b: number, share: number}} mix @returns {RGB[] | null} */
-export function mixedWeights(ui, { a, b, share }) {
-  const [first, second] = [a, b].map((id) => ui.looks.find((look) => look.id === id)?.weights);
-  if (!first || !second) return null;
-  return first
-    .map((rgb, k) => [0, 1, 2].map((c) => (1 - share) * rgb[c] + share * second[k][c]))
-    .map((rgb) => /** @type {RGB} */ (rgb));
-}
-
-/** Name of a mix of two looks. @param {Look[]} looks
- * @param {{a: number, b: number, share: number}} mix @returns {string} */
-export function mixName(looks, { a, b, share }) {
-  const [first, second] = [a, b].map((id) => looks.find((look) => look.id === id)?.name ?? '');
-  return `${first} → ${second}, ${Math.round(100 * share)} %`;
 }
 
 /** Return the linear light of the current paint. At 0 stops it is as bright as white at the scene's

@@ -79,7 +79,9 @@ export function crowd(host) {
     host.looks.push({
       id: (host.ids += 1),
       name: k % 3 ? `Warm evening, sculptures only, before the guests come: ${k}` : `Look ${k}`,
+      lights: room.lights.map((light) => light.name),
       weights: room.lights.map(({ present }) => present.map((x) => x * (1 + k / 40))),
+      places: '',
       delta_e: 12.3,
       stamp: 0,
       thumbnail: `look/${k + 1}`,

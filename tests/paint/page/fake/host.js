@@ -277,7 +277,9 @@ export class FakeHost {
     this.looks.push({
       id,
       name,
+      lights: this.room.lights.map((light) => light.name),
       weights: this.weights.map((rgb) => [...rgb]),
+      places: '',
       stamp: 0,
       thumbnail: `look/${id}`,
       is_proposal: false,

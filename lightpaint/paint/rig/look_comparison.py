@@ -1,0 +1,121 @@
+"""Pictures of looks whose lights hang elsewhere than now, while a page compares them."""
+
+from collections.abc import Mapping
+from functools import partial
+
+import numpy as np
+
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.cache.denoised_planes import as_halves
+from lightpaint.basis.denoised_mixes import denoise_mix
+from lightpaint.errors import LightpaintError
+from lightpaint.paint.background_threads import BackgroundThreads, LatestWork, StoppedError
+from lightpaint.paint.protocol import CompareLooks, Message, Notice, PictureUpdate, TaskStarted
+from lightpaint.paint.publisher import Publisher
+from lightpaint.paint.rig.light_mover import LightMover
+from lightpaint.paint.session.look_library import LookLighting
+from lightpaint.paint.session.picture_table import Picture
+from lightpaint.paint.session_access import SessionAccess
+from lightpaint.paint.store.history_steps import name_in_view
+
+#: Names of the pictures of a look, raw and denoised, before its number.
+PLAIN, CLEAN = "look_plane/", "look_clean/"
+
+
+class LookComparison:
+    """The pictures of compared looks, each with its own lights at its own places.
+
+    mover: renders planes that no look has yet. threads: run the work.
+    """
+
+    def __init__(
+        self,
+        access: SessionAccess,
+        publisher: Publisher,
+        mover: LightMover,
+        threads: BackgroundThreads,
+    ) -> None:
+        self._access, self._publisher, self._mover = access, publisher, mover
+        self._threads = threads
+        self._work = LatestWork(self._show, publisher.publish)
+        self._looks: Mapping[int, LookLighting] = {}
+        self._offered = set[str]()  # names of pictures
+        self._is_working = False
+
+    def stop(self) -> None:
+        """End the background work."""
+        self._looks = {}
+        self._work.stop()
+
+    def handle(self, message: CompareLooks) -> list[Message]:
+        """Start to show looks, instead of those of the last request. Raises PaintError."""
+        self._looks = {number: self._access.looks.lighting(number) for number in message.looks}
+        kept = {name for k in self._looks for name in (f"{PLAIN}{k}", f"{CLEAN}{k}")}
+        for name in [x for x in self._offered if x.partition("@")[0] not in kept]:
+            self._publisher.pictures.withdraw(name)
+            self._offered.discard(name)
+        self.renew()
+        return [TaskStarted(task="compare")]
+
+    def renew(self) -> None:
+        """Show the looks again, with the present bases."""
+        if not self._looks:
+            return
+        if not self._is_working:
+            self._is_working = True
+            self._threads.start_low_priority(self._work.run, "compare")
+        self._work.give(self._looks)
+
+    def _show(self, looks: Mapping[int, LookLighting]) -> None:
+        """Publish pictures of looks with the planes that there are, then with rendered ones."""
+
+        def check() -> None:
+            if self._looks is not looks or not self._publisher.is_open:
+                raise StoppedError
+
+        rig = self._mover.rig
+        try:
+            estimated = [k for k, look in looks.items() if rig.unrendered(look.placed)]
+            for number, look in looks.items():
+                check()
+                self._show_look(looks, number, look)
+            for number in estimated:
+                self._mover.finish(looks[number].placed, check)
+                check()
+                self._show_look(looks, number, looks[number])
+        except StoppedError:
+            pass
+        except LightpaintError as error:
+            self._publisher.publish(Notice(text=str(error), tone="warn"))
+
+    def _show_look(
+        self, looks: Mapping[int, LookLighting], number: int, look: LookLighting
+    ) -> None:
+        """Publish the pictures of a look in all views."""
+        unmoved = self._access.session.bases
+        for view, basis in enumerate(self._mover.rig.bases(unmoved, look.placed)):
+            pictures = {
+                name_in_view(f"{prefix}{number}", view): picture
+                for prefix, picture in _pictures(basis, look).items()
+            }
+            self._publisher.publish_made(partial(self._put, looks, pictures))
+
+    def _put(
+        self, looks: Mapping[int, LookLighting], pictures: Mapping[str, Picture]
+    ) -> PictureUpdate | None:
+        """Offer pictures, unless other looks are compared by now."""
+        if self._looks is not looks:
+            return None
+        table = self._publisher.pictures
+        for name, picture in pictures.items():
+            table.put(name, picture)
+        self._offered |= {*pictures}
+        return PictureUpdate(resources={name: table.generations[name] for name in pictures})
+
+
+def _pictures(basis: Basis, look: LookLighting) -> dict[str, Picture]:
+    """Return the picture of a look, raw and denoised. basis: has all its lights in their places."""
+    dark = np.zeros(3)
+    weights = np.array([look.emissions.get(name, dark) for name in basis.names])
+    mixed = basis.mix(weights)
+    return {PLAIN: as_halves(mixed), CLEAN: as_halves(denoise_mix(basis, weights, mixed=mixed))}
