@@ -34,7 +34,7 @@ def signals_as_interrupts(received: list[int]) -> Iterator[None]:
         received.append(number)
         raise KeyboardInterrupt
 
-    before = {
+    previous_handlers = {
         number: signal.signal(number, end)
         for number in ENDING_SIGNALS
         if number == signal.SIGINT or signal.getsignal(number) is not signal.SIG_IGN
@@ -43,7 +43,7 @@ def signals_as_interrupts(received: list[int]) -> Iterator[None]:
         with _resending(received):
             yield
     finally:
-        for number, handler in before.items():
+        for number, handler in previous_handlers.items():
             signal.signal(number, signal.SIG_DFL if handler is None else handler)
 
 

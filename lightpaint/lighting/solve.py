@@ -101,7 +101,7 @@ def solution_of(problem: Problem, *, start: Doubles | None = None) -> Solution:
     if problem.dimming is not None or (dimming[problem.keeps_color] == 1).all():
         return solution
     dimmed = replace(solution.problem, dimming=dimming)
-    before, tried = solution.certificate, solution.tried
+    certificate, tried = solution.certificate, solution.tried
     begin, reached = solution.weights, solution.reached
     if problem.is_linear:
         nearer = _solve_under_reduction(dimmed, begin)
@@ -111,7 +111,7 @@ def solution_of(problem: Problem, *, start: Doubles | None = None) -> Solution:
         del solution
         nearer = _descend(dimmed, begin, reached, blocks, is_near=True)
     result = nearer.with_certificate_fields(
-        curve=before.curve, rounds=before.rounds + nearer.certificate.rounds
+        curve=certificate.curve, rounds=certificate.rounds + nearer.certificate.rounds
     )
     return replace(result, tried=tried)
 
@@ -162,9 +162,9 @@ def solve_again(solution: Solution, problem: Problem) -> Solution:
         return _solve_squares(replace(problem, reduction=problem.full), solution.weights)
     assert solution.reweighting is not None
     step = _solve_under_reduction(problem, solution.weights, solution.reached)
-    before, reweighting = solution.certificate, solution.reweighting
+    certificate, reweighting = solution.certificate, solution.reweighting
     converged = step.certificate.converged and reweighting.converged
-    history = {name: getattr(before, name) for name in ("curve", "rounds")}
+    history = {name: getattr(certificate, name) for name in ("curve", "rounds")}
     result = step.with_certificate_fields(converged=converged, **history)
     return replace(result, tried=solution.tried, reweighting=reweighting)
 

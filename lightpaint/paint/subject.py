@@ -195,7 +195,9 @@ def obtain_bases(subjects: Sequence[Subject], progress: Progress = silent) -> It
         improved = [next(bases, None) for bases in streams]
         if all(basis is None for basis in improved):
             return
-        current = [basis or before for basis, before in zip(improved, current, strict=True)]
+        current = [
+            basis or current_basis for basis, current_basis in zip(improved, current, strict=True)
+        ]
         yield list(current)
 
 

@@ -72,13 +72,14 @@ class _RenderWatch:
     def report_reuse(self, count: int, of: int) -> None:
         """Say how many of all lights are reused."""
         self.is_reused = True
-        left = of - count
+        remainder = of - count
         if self._has_moved:
-            self._listen.note(f"{left} of {of} lights are rendered where they are now")
+            self._listen.note(f"{remainder} of {of} lights are rendered where they are now")
             return
         self._listen.say(
             f"{count} of {of} lights come from an earlier run; "
-            f"{left} {'is' if left == 1 else 'are'} rendered (use_cache=False renders all again)"
+            f"{remainder} {'is' if remainder == 1 else 'are'} rendered "
+            "(use_cache=False renders all again)"
         )
 
 

@@ -85,7 +85,7 @@ def add_needed_samples(job: Job, bases: list[Basis], listen: Listener) -> list[B
     def is_over() -> bool:
         return time.monotonic() - begin_s > limit_s
 
-    before = [basis.origin.mean_spp for basis in bases]
+    earlier_spp = [basis.origin.mean_spp for basis in bases]
     with kept_loaded([view.scene for view in job.views if view.scene is not None]) as tracers:
         for _ in range(MAX_ROUNDS):
             state = Certainty.of(without_noise(job, solution_of(problem_of(job, bases))))
@@ -97,7 +97,7 @@ def add_needed_samples(job: Job, bases: list[Basis], listen: Listener) -> list[B
                 bases = _topped_up(job, bases, state, is_over, tracers, listen)
             else:
                 bases = _doubled(job, bases, listen)
-    has_added_samples = sum(x.origin.mean_spp for x in bases) > sum(before)
+    has_added_samples = sum(x.origin.mean_spp for x in bases) > sum(earlier_spp)
     text = _text(state, bases)
     if state.error > settings.error:
         text += f"; ± {spoken_percent(settings.error)} was asked for"

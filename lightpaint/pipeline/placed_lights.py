@@ -125,6 +125,6 @@ def moved_basis(
     )
     if settings.error is None:
         settings = replace(settings, spp=max(2, round(before.origin.mean_spp)))
-    found = obtain(scene, settings, listen, before=before, render=render)
+    basis = obtain(scene, settings, listen, before=before, render=render)
     # The look that was painted over, and that unpainted parts keep, is from before the move.
-    return replace(found, former=Estimate(before.current_look, before.current_noise))
+    return replace(basis, former=Estimate(before.current_look, before.current_noise))

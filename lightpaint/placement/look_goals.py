@@ -57,8 +57,8 @@ def goal_of(
     constraints: see `fit_of`.
     """
     images: list[Floats] = [np.zeros((height * width, 3)) for height, width in sizes]
-    weights: list[Floats] = [np.zeros_like(its) for its in images]
-    noises: list[Floats] = [np.zeros_like(its) for its in images]
+    weights: list[Floats] = [np.zeros_like(plane) for plane in images]
+    noises: list[Floats] = [np.zeros_like(plane) for plane in images]
     for k, view in enumerate(views):
         problem = solution.problem.view_problem(k)
         reduced = reduced_goal(problem, problem.basis.size[0] // sizes[view][0])

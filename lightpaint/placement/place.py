@@ -119,7 +119,7 @@ def place(
         )
         poses = PoseSearch(coarse, paths, PoseRules(paths), seed=seed)
         if watch is not None:
-            poses.steps.watch = lambda its: watch(_sites_by_name(its, names))
+            poses.steps.watch = lambda arrangement: watch(_sites_by_name(arrangement, names))
         judge = PlacementJudge(fine, poses.steps.with_fit(fine), paths)
         found = _searched(poses, judge, movables, slots, progress)
         return _Result.of(found, judge, paths, large[0])
@@ -159,14 +159,14 @@ class _Result:
 
     def is_hardly_visible(self, k: int) -> bool:
         """Return whether the picture says little about the place of movable `k`."""
-        its = self.errors[k]
-        is_long = its.place is not None and its.place > LONG_ERROR * self.spread
-        return is_long or (its.turn is not None and its.turn > WIDE_ERROR)
+        error = self.errors[k]
+        is_long = error.place is not None and error.place > LONG_ERROR * self.spread
+        return is_long or (error.turn is not None and error.turn > WIDE_ERROR)
 
     def grown(self, k: int) -> dict[str, Any]:
         """Return the `k`-th new light, with the pictures without and with it."""
         pixels = self.size[0] * self.size[1]
-        pictures = [its.picture[:pixels].reshape(*self.size, 3) for its in self.growth[k : k + 2]]
+        pictures = [step.picture[:pixels].reshape(*self.size, 3) for step in self.growth[k : k + 2]]
         return {
             "missed_share": self.growth[k + 1].missed,
             "without": pictures[0],
@@ -176,12 +176,12 @@ class _Result:
 
 def _sites_by_name(arrangement: Arrangement, names: Sequence[str]) -> dict[str, Site]:
     """Return the pose of each light of movables, by name. names: of the lights of the scene."""
-    made = {}
+    sites = {}
     for movable, site in zip(arrangement.movables, arrangement.sites, strict=True):
-        made[movable.light.name] = site
+        sites[movable.light.name] = site
         if movable.mirror is not None:
-            made[names[movable.columns[1]]] = movable.mirror.site(site)
-    return made
+            sites[names[movable.columns[1]]] = movable.mirror.site(site)
+    return sites
 
 
 def _additions(found: Found) -> list[int]:
@@ -239,8 +239,8 @@ def _placement(
             names = [movable.light.name]
             if movable.mirror is not None:
                 names.append(scenes[0].lights[movable.columns[1]].name)
-            for name, its in zip(names, movable.sites(site), strict=True):
-                moves.append(Move(name, scenes[0].light(name).members[0].site, its, **about))
+            for name, new_site in zip(names, movable.sites(site), strict=True):
+                moves.append(Move(name, scenes[0].light(name).members[0].site, new_site, **about))
     moves.sort(key=lambda move: -move.gain_share)
     additions.sort(key=lambda light: -light.gain_share)
     placed = hung(scenes, moves, additions)

@@ -146,7 +146,7 @@ class PlacementFit:
 
     def _mixed(self, columns: Floats, weights: Doubles) -> Doubles:
         looks = [weights[:, 3 * k : 3 * k + 3] for k in range(len(self._looks))]
-        return np.concatenate([np.einsum("npc,nc->pc", columns, its) for its in looks], axis=1)
+        return np.concatenate([np.einsum("npc,nc->pc", columns, look) for look in looks], axis=1)
 
     def missed_map(self, columns: Floats, weights: Doubles) -> Doubles:
         """Return the loss of each pixel, (p,), with weights that were found on other paths."""
@@ -210,7 +210,7 @@ class PlacementFit:
 
     def _equations(self, columns: Floats, k: int) -> NormalEquations:
         """Return the equations of look k."""
-        root, goal = (its[:, 3 * k : 3 * k + 3] for its in (self._root, self._goal))
+        root, goal = (matrix[:, 3 * k : 3 * k + 3] for matrix in (self._root, self._goal))
         weighed, pull = columns[:, : self.pixels] * root, self._looks[k].pull
         b = np.einsum("ipc,pc->ci", weighed, goal)
         equations = NormalEquations(_products(weighed), b, np.square(goal).sum(axis=0))
@@ -268,6 +268,8 @@ def fit_of(
 
 def _on_films(planes: Sequence[Planes], sizes: Sequence[tuple[int, int]]) -> Iterator[Floats]:
     """Yield the planes of each view on a small film, (n, p, 3)."""
-    for its, size in zip(planes, sizes, strict=True):
-        small = np.stack([block_mean(plane, its.size[0] // size[0]) for plane in its])
+    for view_planes, size in zip(planes, sizes, strict=True):
+        small = np.stack(
+            [block_mean(plane, view_planes.size[0] // size[0]) for plane in view_planes]
+        )
         yield small.reshape(len(small), -1, 3)

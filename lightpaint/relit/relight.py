@@ -82,15 +82,19 @@ def _loaded(path: Path, scene: Scene) -> Scene:
     Parameters that only lights used are unused now, and Mitsuba rejects values for unused
     parameters.
     """
-    left = dict(scene.parameters)
+    parameters = dict(scene.parameters)
     while True:
         try:
-            return load_scene(path, sensor=scene.sensor, parameters=left, use_lights_file=False)
+            return load_scene(
+                path, sensor=scene.sensor, parameters=parameters, use_lights_file=False
+            )
         except SceneError as error:
-            unused_parameters = set(left) & set(UNUSED_PARAMETER.findall(str(error)))
+            unused_parameters = set(parameters) & set(UNUSED_PARAMETER.findall(str(error)))
             if not unused_parameters:
                 raise
-            left = {name: value for name, value in left.items() if name not in unused_parameters}
+            parameters = {
+                name: value for name, value in parameters.items() if name not in unused_parameters
+            }
 
 
 def settle(scene: Scene, lighting: Lighting, path: Path, home: Path) -> bool:

@@ -104,8 +104,8 @@ def light_sheet(
     grid = _grid(len(shown_indices), basis.size)
     factor = max(1, min(basis.size[1] // grid.width, min(basis.size)))
     cells = [_cell(basis, k, float(shares[k]), factor) for k in shown_indices]
-    left = _rest_sentence(shares, shown_indices)
-    sheet = Image.new("RGB", grid.size(has_foot=bool(left)), GROUND)
+    foot = _rest_sentence(shares, shown_indices)
+    sheet = Image.new("RGB", grid.size(has_foot=bool(foot)), GROUND)
     draw, large = ImageDraw.Draw(sheet), ImageFont.load_default(round(1.1 * grid.text))
     small = ImageFont.load_default(round(0.9 * grid.text))
     room = sheet.width - 2 * grid.gap
@@ -117,9 +117,9 @@ def light_sheet(
         draw.text((sheet.width - grid.gap, baseline), subtitle, FAINT, small, anchor="rs")
     for k, cell in enumerate(cells):
         _draw(sheet, cell, grid, grid.corner(k))
-    if left:
+    if foot:
         y = sheet.height - round(2.2 * grid.text)
-        draw.text((grid.gap, y), shorten_to_width(left, small, room), FAINT, small)
+        draw.text((grid.gap, y), shorten_to_width(foot, small, room), FAINT, small)
     height = max(sheet.width - sheet.height - 1, PLAN_HEIGHT)
     plan = rig_drawing(basis.features, lights, up=up, width=sheet.width, height=height)
     return np.asarray(sheet) if plan is None else _with_plan(np.asarray(sheet), plan)

@@ -205,7 +205,7 @@ def _lights(
     basis: Basis, solution: Solution, uncertainty: Uncertainty | None
 ) -> Mapping[str, dict[str, Any]]:
     lighting = solution.lighting
-    shares, before = (energy_shares(basis, x) for x in (lighting, Lighting.current(basis)))
+    shares, current_shares = (energy_shares(basis, x) for x in (lighting, Lighting.current(basis)))
     by_name: dict[str, dict[str, Any]] = {}
     for k, (light, setting) in enumerate(zip(basis.lights, lighting.lights, strict=True)):
         # Only channels that reach something painted; the others are undetermined.
@@ -213,7 +213,7 @@ def _lights(
         now, new = (float(luminance(told_of * np.array(x.emission))) for x in (light, setting))
         by_name[light.name] = {
             "share": float(shares[k]),
-            "share_before": float(before[k]),
+            "share_before": float(current_shares[k]),
             "emission_before": light.emission,
             "luminance": new,
             "times": new / now if now > 0 else None,

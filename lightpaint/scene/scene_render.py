@@ -72,8 +72,10 @@ def plan_passes(
     lists = []
     # After an interrupt the second half may have fewer samples; then it comes first.
     for half in (0, 1) if done[0] <= done[1] else (1, 0):
-        left = -(-max(0, -(-spp // 2) - done[half]) // step)
-        sizes = [largest] * (left // largest) + [left % largest] * (left % largest > 0)
+        remainder = -(-max(0, -(-spp // 2) - done[half]) // step)
+        sizes = [largest] * (remainder // largest) + [remainder % largest] * (
+            remainder % largest > 0
+        )
         lists.append([(half, size * step) for size in sizes])
     return [
         next_pass for pair in zip_longest(*lists) for next_pass in pair if next_pass is not None

@@ -59,10 +59,10 @@ def render_first_hits(
 ) -> tuple[Features, Objects]:
     """Return features and the map of visible objects. loaded: the loaded `scene`, if available."""
 
-    def both(loaded: Any) -> tuple[Features, Objects]:
+    def render_both(loaded: Any) -> tuple[Features, Objects]:
         return loaded_features(scene, loaded, seed), _objects(scene, loaded, seed)
 
-    return scene.while_loaded(both) if loaded is None else both(loaded)
+    return scene.while_loaded(render_both) if loaded is None else render_both(loaded)
 
 
 def loaded_features(scene: Scene, loaded: Any, seed: int) -> Features:

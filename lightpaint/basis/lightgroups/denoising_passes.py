@@ -104,8 +104,8 @@ def split_passes(layers: Sequence[RenderLayer]) -> tuple[list[RenderLayer], Deno
         else by_name[owner].image.astype(np.float32) - pair["direct"].image
         for owner, pair in parts.items()
     }
-    left = [x for x in light_layers if x.name not in used_names]
-    return left, DenoisingPasses(tuple(surfaces), indirect)
+    lights = [x for x in light_layers if x.name not in used_names]
+    return lights, DenoisingPasses(tuple(surfaces), indirect)
 
 
 def _plain_name(layer: RenderLayer) -> str:

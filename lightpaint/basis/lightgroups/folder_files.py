@@ -62,19 +62,19 @@ def candidate_files(
         )
     left_out = [Path(file) for file in leave_out]
     reasons = {file: _reason_against(file, left_out) for file in files}
-    left = [file for file in files if not reasons[file]]
+    candidates = [file for file in files if not reasons[file]]
     reasons |= {
         file: "not named .exr" for file in visible if file not in reasons and _is_readable(file)
     }
     text = _list_with_reasons({file: reason for file, reason in reasons.items() if reason})
-    if not left:
+    if not candidates:
         empty_message = (
             f"{folder} holds no .exr file" if not text else f"{folder} holds no light: {text}"
         )
         raise BasisError(
             f"{empty_message}; give the EXR with the light groups, or a folder of them"
         )
-    return left, [f"left out of the lights: {text}"] if text else []
+    return candidates, [f"left out of the lights: {text}"] if text else []
 
 
 def _visible(folder: Path) -> list[Path]:

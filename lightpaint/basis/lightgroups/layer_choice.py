@@ -110,10 +110,12 @@ def _by_convention(
     file_name: str,
 ) -> LayerChoice:
     remarks = []
-    left = [m[0] for m in matches if OTHER_VERSION.fullmatch(m[0])]
-    matches = [m for m in matches if m[0] not in left]
-    if left:
-        remarks.append(f"{some_names(left)}: taken for another version of a layer, and left out")
+    other_versions = [m[0] for m in matches if OTHER_VERSION.fullmatch(m[0])]
+    matches = [m for m in matches if m[0] not in other_versions]
+    if other_versions:
+        remarks.append(
+            f"{some_names(other_versions)}: taken for another version of a layer, and left out"
+        )
     views = list(dict.fromkeys(m.groupdict().get("view") or "" for m in matches))
     view = views[0]
     if len(views) > 1:
@@ -161,8 +163,8 @@ def _by_pattern(layers: Mapping[str, Sequence[str]], pattern: str, file_name: st
             f"pattern={pattern!r} must have {NAME_FIELD} once, where the name of the light stands, "
             "like 'Light_{name}'"
         )
-    before, after = pattern.split(NAME_FIELD)
-    name_pattern = re.compile(f"{re.escape(before)}(.+){re.escape(after)}", re.DOTALL)
+    prefix, suffix = pattern.split(NAME_FIELD)
+    name_pattern = re.compile(f"{re.escape(prefix)}(.+){re.escape(suffix)}", re.DOTALL)
     matches = []
     for layer, other_names in layers.items():
         match = next(
@@ -176,9 +178,9 @@ def _by_pattern(layers: Mapping[str, Sequence[str]], pattern: str, file_name: st
     names = [layer for layer in layers if layer not in [matched for _, matched in matches]]
     first = {
         (
-            before.rstrip(SEPARATORS) + after
+            prefix.rstrip(SEPARATORS) + suffix
         ).casefold(),  # View.Combined.left of View.Combined_key.left
-        (before + after).strip(SEPARATORS).casefold(),
+        (prefix + suffix).strip(SEPARATORS).casefold(),
     } - {""}
     beauty = next((name for name in names if name.casefold() in first), beauty_name(names))
     if beauty is None:

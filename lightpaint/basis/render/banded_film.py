@@ -89,8 +89,8 @@ class WholeFilm(FilmSums):
         self, tracer: "Tracer", begun: int, start: tuple[Floats, Floats] | None = None
     ) -> None:
         super().__init__(tracer, begun, tracer.scene.size[0])
-        before = (None, None) if start is None else start
-        self._halves = [tracer.planes(self._bands[0], sums) for sums in before]
+        start_sums = (None, None) if start is None else start
+        self._halves = [tracer.planes(self._bands[0], sums) for sums in start_sums]
 
     def _trace(self, half: int, rows: range, first: int, spp: int) -> None:
         self._tracer.add(self._halves[half], half, rows, first, spp)
@@ -121,9 +121,9 @@ class BandedFilm(FilmSums):
         super().__init__(tracer, begun, max(1, BAND_BYTES // (12 * planes * width)))
         self.sums = FileSums((2, planes, height, width, 3))
         self._seen = np.zeros((height, width), dtype=bool)
-        for half, before in enumerate(start or ()):
+        for half, earlier_sums in enumerate(start or ()):
             for rows in self._bands:
-                self.sums.write(half, rows, before[:, rows.start : rows.stop])
+                self.sums.write(half, rows, earlier_sums[:, rows.start : rows.stop])
 
     def _trace(self, half: int, rows: range, first: int, spp: int) -> None:
         planes = self._tracer.planes(rows, self.sums.read(half, rows))

@@ -171,8 +171,8 @@ def pixel_batches(counts: Indices, planes: int) -> Iterator[Indices]:
     )
     start = 0
     while start < pixels.size:
-        before = ends[start - 1] if start else 0
-        end = max(start + 1, int(np.searchsorted(ends, before + largest, side="right")))
+        offset = ends[start - 1] if start else 0
+        end = max(start + 1, int(np.searchsorted(ends, offset + largest, side="right")))
         end = min(end, start + max_count)
         yield pixels[start:end]
         start = end

@@ -69,11 +69,11 @@ def steps(pixels: int, budget: Budget, done: int, progress: Progress) -> Iterato
     """
     largest = largest_pass(pixels, shorter=PASS_DIVISOR)
     if budget.time_s is None:
-        left = half_of(budget.spp) - done
-        count = -(-left // largest)
+        remainder = half_of(budget.spp) - done
+        count = -(-remainder // largest)
         progress("basis", 0, count)
         for k in range(count):
-            yield min(largest, left - k * largest)
+            yield min(largest, remainder - k * largest)
             progress("basis", k + 1, count)
         return
     clock = Clock(budget.time_s, progress)

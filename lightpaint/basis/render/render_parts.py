@@ -75,15 +75,15 @@ def plan_parts(scene: Scene, spp: int, *, start: Basis | None = None) -> list[Pa
     if method_of(scene) != ONE_PASS:
         return _separate_parts(scene, spp, start)
     done = 0 if start is None else start.origin.halves[0]
-    left = half_of(spp) - done
-    if left <= 0:
+    remainder = half_of(spp) - done
+    if remainder <= 0:
         return []
     # The number of rows is chosen so that all their samples take some seconds.
-    by_work = PART_SAMPLES // (2 * width * left)
+    by_work = PART_SAMPLES // (2 * width * remainder)
     by_memory = PART_MAX_BYTES // (2 * plane_count(scene) * width * 12)
     count = -(-height // max(1, min(by_work, by_memory)))
     edges = [height * k // count for k in range(count + 1)]
-    return [Part(top, bottom, done, left) for top, bottom in pairwise(edges)]
+    return [Part(top, bottom, done, remainder) for top, bottom in pairwise(edges)]
 
 
 def _separate_parts(scene: Scene, spp: int, start: Basis | None) -> list[Part]:

@@ -126,8 +126,8 @@ def spoken_settings(settings: Settings) -> str:
     transform = values.pop("transform")
     values |= {"view": transform and spoken_view(transform), "command": None}
     # Mention skipped stages, but not stages that always run.
-    given = {k: v for k, v in values.items() if v is not False and v not in (None, "")}
-    return ", ".join(f"{k} {v}" for k, v in given.items() if k not in ("verify", "report"))
+    nonempty = {k: v for k, v in values.items() if v is not False and v not in (None, "")}
+    return ", ".join(f"{k} {v}" for k, v in nonempty.items() if k not in ("verify", "report"))
 
 
 def undetermined_remark(look: Look) -> str:
@@ -205,12 +205,14 @@ def change(light: BasisLight, setting: LightSetting) -> str:
         return "fixed"
     if not any(setting.reached):
         return "unchanged"
-    before, after = (float(luminance(np.array(x.emission))) for x in (light, setting))
-    if after <= OFF_SHARE * before:
+    current_luminance, answer_luminance = (
+        float(luminance(np.array(x.emission))) for x in (light, setting)
+    )
+    if answer_luminance <= OFF_SHARE * current_luminance:
         return "off"
-    if before == 0:
+    if current_luminance == 0:
         return "on"
-    stops = f"{np.log2(after / before):+.1f}"
+    stops = f"{np.log2(answer_luminance / current_luminance):+.1f}"
     return "0.0" if stops in ("+0.0", "-0.0") else stops.replace("-", "−")
 
 

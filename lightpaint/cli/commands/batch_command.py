@@ -88,12 +88,12 @@ def _run(plan_: Plan, run_options: RunOptions, note: Callable[[str], Any]) -> Ba
     listen = terminal.TerminalListener()
 
     def on_step(look: PlannedLook, result: ItemResult) -> None:
-        name, left = f"{look.entry.name}: {result.kind}", time_left(result)
+        name, time_text = f"{look.entry.name}: {result.kind}", time_left(result)
         if result.failure:
             note(f"{name} failed: {result.failure}")
             return
         note(f"{name} done in {result.spent_s:.2f} s")
-        listen.say(f"{name} done in {result.spent_s:.1f} s{left}")
+        listen.say(f"{name} done in {result.spent_s:.1f} s{time_text}")
 
     def time_left(result: ItemResult) -> str:
         return "" if result.left_s is None else f", {spoken_time(result.left_s)} left"

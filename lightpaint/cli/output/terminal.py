@@ -176,8 +176,8 @@ class TerminalListener:
                 lines.err(f"{label}: {_counted(total, unit)}")
             return
         if label not in self._tasks:
-            what = label if unit in ("passes", label) else f"{label} ({unit})"
-            self._tasks[label] = self._bars.add_task(visible(what), total=total)
+            title = label if unit in ("passes", label) else f"{label} ({unit})"
+            self._tasks[label] = self._bars.add_task(visible(title), total=total)
         self._bars.update(self._tasks[label], completed=done, total=total)
 
     def at_work(self, worker: str, task: str | None) -> None:

@@ -141,10 +141,12 @@ def _move_to_first_limit(
     share = float(np.clip(shares.min(initial=1.0), 0, 1))
     first_cap = -1
     for k in np.flatnonzero(exceeded):
-        before, after = float(q.A[k] @ x), float(q.A[k] @ target)
-        wall = q.cap_upper[k] if after > q.cap_upper[k] else q.cap_lower[k]
+        start_sum, target_sum = float(q.A[k] @ x), float(q.A[k] @ target)
+        wall = q.cap_upper[k] if target_sum > q.cap_upper[k] else q.cap_lower[k]
         cap_share = (
-            min(max((wall - before) / (after - before), 0.0), 1.0) if after != before else 0.0
+            min(max((wall - start_sum) / (target_sum - start_sum), 0.0), 1.0)
+            if target_sum != start_sum
+            else 0.0
         )
         if cap_share < share or (first_cap < 0 and not hit.size):
             share, first_cap = cap_share, int(k)

@@ -233,11 +233,11 @@ def clip_to_sums(a: Doubles, x: Doubles, low: Doubles, high: Doubles, goal: Doub
     ends = np.sort(np.concatenate([(low - x) / a, (high - x) / a], axis=1), axis=1)
     at_ends = x[:, None] + ends[..., None] * a[:, None]
     sums = np.einsum("km,kem->ke", a, np.clip(at_ends, low[:, None], high[:, None]))
-    after = (sums < goal[:, None]).sum(axis=1)
+    segments = (sums < goal[:, None]).sum(axis=1)
     walls = np.empty((len(a), ends.shape[1] + 2))
     walls[:, 0], walls[:, 1:-1], walls[:, -1] = -np.inf, ends, np.inf
     rows = np.arange(len(a))
-    first, last = walls[rows, after], walls[rows, after + 1]
+    first, last = walls[rows, segments], walls[rows, segments + 1]
     # A t between the two that enclose the answer.
     least, most = (np.where(np.isfinite(end), end, 0) for end in (first, last))
     middle = (least + most) / 2

@@ -45,12 +45,12 @@ def bounds_of(solution: Solution) -> tuple[tuple[Bound, ...], int]:
     least = MIN_GAIN * float(solution.equations.target_norm2.sum())
     active = [bound for bound in find_active_bounds(answer) if bound.estimate > least]
     active.sort(key=lambda bound: -bound.estimate)
-    before, bounds = _relative_objective(problem.solved, answer.w), []
+    objective, bounds = _relative_objective(problem.solved, answer.w), []
     size = len(answer.reduction.unknowns) // len(answer.reduction.channel_groups)
     count = min(max(MAX_UNKNOWNS // max(size, 1), MIN_RELEASED), MAX_RELEASED)
     for active_bound in active[:count]:
         freed = _freed_weights(equations, answer, active_bound)
-        gain = before - _relative_objective(problem.solved, freed)
+        gain = objective - _relative_objective(problem.solved, freed)
         if problem.pull is None:
             gain = max(gain, 0.0)  # except for round-off
         names = tuple(solution.basis.names[k] for k in active_bound.lights)

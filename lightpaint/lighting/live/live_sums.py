@@ -68,9 +68,9 @@ class PaintedTiles:
         self._paint.update(region, with_M=with_importance)
         if not with_importance:
             return
-        before = self._unpainted[region].copy()
+        replaced = self._unpainted[region].copy()
         self._set_unpainted(region)
-        if not np.array_equal(before, self._unpainted[region]):
+        if not np.array_equal(replaced, self._unpainted[region]):
             self._is_old = (
                 region if self._is_old is None else _bounding_region(self._is_old, region)
             )
@@ -214,8 +214,8 @@ class Films:
         mixed = [self._mixed(start) for start in starts]
         values = [missed(w, x) for w, x in zip(starts, mixed, strict=True)]
         k = int(np.argmin(values))
-        start, before, value = starts[k], mixed[k], values[k]
-        squares = pixels.squares(before, from_clipping=False)
+        start, picture, value = starts[k], mixed[k], values[k]
+        squares = pixels.squares(picture, from_clipping=False)
         image, weight = (x.astype(np.float32) for x in squares)
         # With few lights, threads of BLAS would mostly wait for each other.
         with one_thread() if len(start) <= MAX_CHEAP_LIGHTS else nullcontext():

@@ -64,7 +64,7 @@ def find_near_optimum(
     terms = WeightTerms(pull)
     found_near, least = None, total_loss(lit.pixels, terms, start, lit.predicted(start))
     w = run_rounds(part, terms, start, solve, from_clipping=True, until=FIRST_STEP).weights
-    before, tolerance = np.inf, STEP_RATIO * FIRST_STEP
+    last_step, tolerance = np.inf, STEP_RATIO * FIRST_STEP
     for _ in range(MAX_CORRECTIONS):
         value, slope = lit.objective_and_gradient(w)
         value += terms.value(w)
@@ -76,11 +76,11 @@ def find_near_optimum(
         tilted = WeightTerms(pull, part.objective_and_gradient(w)[1] - slope, w)
         result = run_rounds(part, tilted, w, solve, from_clipping=False, until=tolerance)
         step, w = relative_change(result.equations, w, result.weights), result.weights
-        if step > MAX_STEP_RATIO * before:
+        if step > MAX_STEP_RATIO * last_step:
             return found_near
         if step <= MIN_STEP:
             return w
-        before, tolerance = step, STEP_RATIO * min(step, FIRST_STEP)
+        last_step, tolerance = step, STEP_RATIO * min(step, FIRST_STEP)
     return w
 
 

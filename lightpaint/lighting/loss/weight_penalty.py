@@ -55,9 +55,11 @@ def dimming_factors(current: Doubles, weights: Doubles) -> Doubles:
     The pull to a light's colour is quadratic in its light, and would vanish for a dim light. This
     factor makes it linear.
     """
-    now, after = (np.asarray(luminance(x), np.float64) for x in (current, weights))
-    least = np.where(now > 0, now / MAX_DIMMING, 1)
-    return np.clip(now / np.maximum(after, least), 1, MAX_DIMMING)
+    current_luminance, luminances = (
+        np.asarray(luminance(x), np.float64) for x in (current, weights)
+    )
+    least = np.where(current_luminance > 0, current_luminance / MAX_DIMMING, 1)
+    return np.clip(current_luminance / np.maximum(luminances, least), 1, MAX_DIMMING)
 
 
 def pull_to_current(power: Doubles, current: Doubles) -> NormalEquations:

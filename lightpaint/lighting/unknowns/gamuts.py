@@ -156,9 +156,9 @@ class Gamuts:
             whites = np.maximum(own_reach, self._whites + off_white)
             reach = np.minimum(reach, whites + PAINTED_FACTOR * beyond_whites)
             reach = np.round(reach / REACH_STEP) * REACH_STEP
-            gamut, before = ColorHull(reach, self._own[light]), self._former_gamuts.get(light)
-            is_same = before is not None and np.array_equal(before.reach, reach)
-            self._gamuts[light] = before if before is not None and is_same else gamut
+            gamut, former_gamut = ColorHull(reach, self._own[light]), self._former_gamuts.get(light)
+            is_same = former_gamut is not None and np.array_equal(former_gamut.reach, reach)
+            self._gamuts[light] = former_gamut if former_gamut is not None and is_same else gamut
         return self._gamuts[light]
 
     def refresh(self) -> None:

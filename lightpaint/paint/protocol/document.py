@@ -33,8 +33,8 @@ def replace_sections(text: str) -> str:
     """Return a document with its generated parts replaced."""
     for name, section in sections().items():
         pattern = rf"<!-- {name} -->\n.*?<!-- end of {name} -->"
-        before, after = re.split(pattern, text, flags=re.DOTALL)
-        text = f"{before}<!-- {name} -->\n\n{section}\n<!-- end of {name} -->{after}"
+        head, tail = re.split(pattern, text, flags=re.DOTALL)
+        text = f"{head}<!-- {name} -->\n\n{section}\n<!-- end of {name} -->{tail}"
     return text
 
 
@@ -53,7 +53,9 @@ def _entry(name: str, record: type[Any]) -> str:
         lines.append("\n".join(["| field | type |", "|---|---|", *rows]))
     hints = get_type_hints(record)
     arrays = [x.name for x in fields(record) if get_origin(hints[x.name]) is np.ndarray]
-    buffers = [f"`{x}` {what}" for x, what in getattr(record, "request_buffers", {}).items()]
+    buffers = [
+        f"`{x}` {description}" for x, description in getattr(record, "request_buffers", {}).items()
+    ]
     if arrays or buffers:
         lines.append("Buffers: " + ", ".join(buffers or [f"`{x}`" for x in arrays]) + ".")
     return "\n\n".join(lines) + "\n"

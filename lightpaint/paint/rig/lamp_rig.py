@@ -170,7 +170,7 @@ class LampRig:
     def moved_scene(self, placed: Placed, view: int = 0) -> Scene:
         """Return the scene of a view with lights moved and added."""
         scene, added = self.subjects[view].loaded_scene, added_names(placed)
-        named = {name: _pose(name, its) for name, its in placed.items() if name not in added}
+        named = {name: _pose(name, values) for name, values in placed.items() if name not in added}
         scene = scene.moved(named) if named else scene
         emitters = [new_emitter(name, placed[name]) for name in added]
         return scene.with_new_emitters(emitters) if emitters else scene

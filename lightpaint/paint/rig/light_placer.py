@@ -124,7 +124,7 @@ class LightPlacer:
                     for move in placement.moves
                 }
                 placed |= {light.name: values_of(light.emitter) for light in placement.additions}
-                before, after = self._differences(snapshot, placed)
+                current_delta_e, placed_delta_e = self._differences(snapshot, placed)
                 check()
         except StoppedError:
             if self._request is None:  # otherwise a page would wait for the next one
@@ -137,11 +137,12 @@ class LightPlacer:
             reason = "none reliably removes a hundredth of the error"
             self._publish(f"No light was {_done(request)}: {reason}.")
             return
-        if after >= before:
+        if placed_delta_e >= current_delta_e:
             # The search measures light, which may differ from the visible error, for example in the
             # dark.
             reason = (
-                f"what was found is no closer to the eye (ΔE {after:.1f} instead of {before:.1f})"
+                f"what was found is no closer to the eye (ΔE {placed_delta_e:.1f} "
+                f"instead of {current_delta_e:.1f})"
             )
             self._publish(f"No light was {_done(request)}: {reason}.")
             return
@@ -162,10 +163,10 @@ class LightPlacer:
         requests = snapshot.requests.with_poses(moves).with_added(new)
         bases = self._rig.bases(self._access.session.bases, requests.placed)
         differences = []
-        for its in (snapshot, replace(snapshot, bases=tuple(bases))):
-            solution = its.solution()
+        for state in (snapshot, replace(snapshot, bases=tuple(bases))):
+            solution = state.solution()
             assert solution is not None
-            differences.append(its.delta_e(solution))
+            differences.append(state.delta_e(solution))
         return differences[0], differences[1]
 
     def _publish(self, text: str, names: tuple[str, ...] = ()) -> None:

@@ -73,9 +73,9 @@ def _hung(
             raise PaintError(f"{name} has no place and no direction: it cannot be moved")
         return {"target": _listed(-way)}
     distance = float(np.linalg.norm(np.array(site.position) - lit))
-    before = float(np.linalg.norm(start - lit))
-    distance_needed = max(distance - before, BEYOND_EDGE * distance)
-    nudge = 1e-3 * max(distance, before)
+    current_distance = float(np.linalg.norm(start - lit))
+    distance_needed = max(distance - current_distance, BEYOND_EDGE * distance)
+    nudge = 1e-3 * max(distance, current_distance)
     room = BEFORE_WALL * free_length(start + nudge * way, way)
     if room < LEAST_ROOM * distance:
         raise PaintError(f"there is no room for {name} on that line: choose another place")

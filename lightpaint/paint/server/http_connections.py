@@ -50,9 +50,9 @@ class BoundedHttp(H11Protocol):
 
     def data_received(self, data: bytes) -> None:
         """Read a part of a request."""
-        before = self.scope
+        previous_scope = self.scope
         super().data_received(data)
-        if self.scope is before or self not in self.unauthenticated:
+        if self.scope is previous_scope or self not in self.unauthenticated:
             return
         if self.is_allowed(self.scope):
             self._forget()

@@ -70,12 +70,14 @@ class GracefulServer(uvicorn.Server):
 @contextmanager
 def stop_on_hangup(server: uvicorn.Server) -> Iterator[None]:
     """Stop `server` when its terminal closes, as SIGTERM does, unless SIGHUP is ignored (nohup)."""
-    before = signal.getsignal(signal.SIGHUP)
-    is_handled = threading.current_thread() is threading.main_thread() and callable(before)
+    previous_handler = signal.getsignal(signal.SIGHUP)
+    is_handled = threading.current_thread() is threading.main_thread() and callable(
+        previous_handler
+    )
     if is_handled:
         signal.signal(signal.SIGHUP, lambda *_: server.handle_exit(signal.SIGTERM, None))
     try:
         yield
     finally:
         if is_handled:
-            signal.signal(signal.SIGHUP, before)
+            signal.signal(signal.SIGHUP, previous_handler)

@@ -45,8 +45,8 @@ class History:
         """Set requests, as a step. Raises LightpaintError for impossible ones."""
         self._live_answer.check(requests)
         self.close_stroke("stroke")
-        before = self._live_answer.requests_at_rest
-        fields = {"before": before.as_json(), "after": requests.as_json()}
+        requests_at_rest = self._live_answer.requests_at_rest
+        fields = {"before": requests_at_rest.as_json(), "after": requests.as_json()}
         self._store.append(Step("requests", label, fields))
         self._live_answer.set_requests(requests)
 
@@ -54,8 +54,11 @@ class History:
         self, layers: LayerStack, patches: Sequence[Patch], requests: SessionRequests, label: str
     ) -> Changes:
         """Replace the layers, their pixels and the requests, as one step. Returns the changes."""
-        before, change = self._live_answer.requests, self._views.layers.change_to(layers)
-        fields: dict[str, Any] = {"before": before.as_json(), "after": requests.as_json()}
+        replaced_requests, change = self._live_answer.requests, self._views.layers.change_to(layers)
+        fields: dict[str, Any] = {
+            "before": replaced_requests.as_json(),
+            "after": requests.as_json(),
+        }
         fields |= {"stack": change} if change else {}
         self._store.append(Step("look_loaded", label, fields, tuple(patches)))
         changes = self._views.move(layers, patches, self._done_steps)

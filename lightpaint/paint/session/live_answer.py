@@ -49,9 +49,9 @@ class LiveAnswer:
 
     def set_views(self, views: Sequence[LiveView]) -> None:
         """Continue with these views; new lights start at their current emission."""
-        before, self._basis = self._basis, views[0].basis
-        if before.names != self._basis.names:
-            self.weights = weights_by_name(self.weights, before.names, self._basis.lights)
+        former_basis, self._basis = self._basis, views[0].basis
+        if former_basis.names != self._basis.names:
+            self.weights = weights_by_name(self.weights, former_basis.names, self._basis.lights)
         self._live = LiveSolver(views, fit=self.fit, constraints=self._constraints(self.requests))
         self._live.prepare()
 

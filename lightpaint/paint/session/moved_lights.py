@@ -100,11 +100,11 @@ class MovedLights:
             return
         bases = self._source.bases(self.bases, placed)
         self._placed = dict(placed)
-        seen = [
+        mask_pairs = [
             (x.emitters_seen, view.basis.emitters_seen)
             for x, view in zip(bases, views, strict=True)
         ]
-        if not all(np.array_equal(*its) for its in seen):  # a panel has become visible
+        if not all(np.array_equal(*masks) for masks in mask_pairs):  # a panel has become visible
             views.replace_lights(bases)
             live_answer.set_views(views.live)
             return

@@ -288,10 +288,10 @@ class Session:
         placed: poses of existing lights; full descriptions of new ones, as in `added`.
         """
         self._edits.reset_slider()
-        known_poses = {name: its for name, its in placed.items() if name in self.basis.names}
+        known_poses = {name: values for name, values in placed.items() if name in self.basis.names}
         requests = move_lights(self.requests, self.basis.lights, known_poses)
         requests = requests.with_added(
-            {k: its for k, its in placed.items() if k not in known_poses}
+            {k: values for k, values in placed.items() if k not in known_poses}
         )
         self._edits.check_places(requests.placed)
         return [self._append_requests(label, requests)]

@@ -63,7 +63,7 @@ class SessionEdits:
             settings=settings,
             constraints=constraints,
             transform=transform,
-            lights_of=lambda its: self._moved_lights.lights(its.placed),
+            lights_of=lambda session_requests: self._moved_lights.lights(session_requests.placed),
         )
         self.history = History(store, self.views, self.live_answer)
         self._update_answer()

@@ -119,9 +119,11 @@ class SessionSnapshot:
         view, for its pictures.
         """
         solution = self.solution()
-        after = weights if solution is None else solution.weights
+        answer_weights = weights if solution is None else solution.weights
         planes, transform = clean or self.bases[view], self.transform
-        before, afterwards = (display_thumbnail(planes.mix(x), transform) for x in (weights, after))
+        before, afterwards = (
+            display_thumbnail(planes.mix(x), transform) for x in (weights, answer_weights)
+        )
         if solution is None:
             return ChangePreview(
                 before, afterwards, *preview_text(0.0, None, delta_e=(0, 0), is_at_cost=False)
@@ -132,7 +134,7 @@ class SessionSnapshot:
             PaintComparison.of_problem(view_solution.problem),
             view_solution.problem.views.targets[0],
         )
-        pictures = [self.bases[judged_view].mix(x) for x in (weights, after)]
+        pictures = [self.bases[judged_view].mix(x) for x in (weights, answer_weights)]
         closes = look.share_removed(*pictures)
         elsewhere = unpainted_change(
             look, self.bases[judged_view], target.importance > 0, *pictures

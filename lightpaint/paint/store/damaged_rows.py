@@ -38,13 +38,13 @@ def row_numbers(old: sqlite3.Connection, *columns: tuple[str, str]) -> tuple[set
     """Return the numbers that rows have in any of these tables and columns; and whether there may
     be more, as no table can be read to its end.
     """
-    found: set[int] = set()
+    all_numbers: set[int] = set()
     is_whole = []
     for table, column in columns:
         numbers, is_read = _numbers_in(old, table, column)
-        found |= numbers
+        all_numbers |= numbers
         is_whole.append(is_read)
-    return found, Losses(may_be_more=not any(is_whole))
+    return all_numbers, Losses(may_be_more=not any(is_whole))
 
 
 def _numbers_in(old: sqlite3.Connection, table: str, column: str) -> tuple[set[int], bool]:

@@ -111,11 +111,11 @@ class SessionRequests:
         def others(entries: Mapping[str, Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
             return {key: value for key, value in entries.items() if key != name}
 
-        left = (tuple(x for x in names if x != name) for names in self.ties)
+        ties = (tuple(x for x in names if x != name) for names in self.ties)
         return replace(
             self,
             lights=others(self.lights),
-            ties=tuple(names for names in left if len(names) > 1),
+            ties=tuple(names for names in ties if len(names) > 1),
             poses=others(self.poses),
             added=others(self.added),
         )

@@ -126,13 +126,13 @@ def add_round(
 
     scenes = [subjects[k].loaded_scene for k in snapshot.painted_views]
     with MITSUBA.low_priority(), kept_loaded(scenes) as tracers:
-        for number, (k, its) in enumerate(rounds):
+        for number, (k, view_counts) in enumerate(rounds):
             if is_enough():
                 break
             bases[k] = top_up_basis(
                 scenes[number],
                 bases[k],
-                its,
+                view_counts,
                 use_cache=settings.use_cache,
                 is_enough=is_enough,
                 progress=of_view(number),

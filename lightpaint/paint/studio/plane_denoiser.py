@@ -65,8 +65,8 @@ class PlaneDenoiser:
                 current_looks.append(denoise_current_look(basis))
             else:
                 current_looks.append(cached.current)
-                kept = self._by_view if cached.is_whole else self._small
-                kept[k] = _ViewPlanes(basis, cached, is_cached=True)
+                planes_by_view = self._by_view if cached.is_whole else self._small
+                planes_by_view[k] = _ViewPlanes(basis, cached, is_cached=True)
         return current_looks
 
     def planes_for(self, bases: Sequence[Basis]) -> list[DenoisedPlanes | None]:
@@ -89,8 +89,8 @@ class PlaneDenoiser:
         """Return each view's denoised planes of blocks of pixels, which a result has left."""
         small = [self._small.get(k) for k in range(len(bases))]
         return [
-            its.planes if its is not None and its.matches(basis) else None
-            for its, basis in zip(small, bases, strict=True)
+            view_planes.planes if view_planes is not None and view_planes.matches(basis) else None
+            for view_planes, basis in zip(small, bases, strict=True)
         ]
 
     def denoise(self, session: Session) -> None:

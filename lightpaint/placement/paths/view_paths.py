@@ -157,8 +157,8 @@ class SearchPaths:
 
     def _coarse(self, k: int) -> ViewPaths:
         features = [
-            its.reduced(its.size[0] // view.size[0])
-            for its, view in zip(self._features, self._small, strict=True)
+            view_features.reduced(view_features.size[0] // view.size[0])
+            for view_features, view in zip(self._features, self._small, strict=True)
         ]
         return ViewPaths(self._made(k, self._small, features, COARSE_SAMPLES[k]))
 
@@ -173,7 +173,7 @@ class SearchPaths:
         self, k: int, views: Sequence[Scene], features: Sequence[Features], samples: tuple[int, int]
     ) -> list[FrozenPaths]:
         view_paths = []
-        for j, (view, its) in enumerate(zip(views, features, strict=True)):
+        for j, (view, view_features) in enumerate(zip(views, features, strict=True)):
             paths = FrozenPaths(
                 view,
                 self.loaded,
@@ -181,5 +181,5 @@ class SearchPaths:
                 bounces=samples[1],
                 seed=pass_seed(self._seed, Stream.FROZEN_PATHS, k + SETS * j),
             )
-            view_paths.append(paths.filtered_along(its))
+            view_paths.append(paths.filtered_along(view_features))
         return view_paths

@@ -46,10 +46,10 @@ def scene_script(
     emitters: name, Mitsuba's parameter and emission of each adjusted emitter. places: places of all
     emitters in the answer. up: the scene's up axis.
     """
-    rows, left = [], []
+    rows, unset_names = [], []
     for name, parameter, emission in emitters:
         if parameter not in KINDS:  # a multiple, which gives no absolute value
-            left.append(name)
+            unset_names.append(name)
             continue
         numbers = ", ".join(f"{channel:.9g}" for channel in emission)
         rows.append(f"    {name!r}: ({KINDS[parameter]!r}, ({numbers})),\n")
@@ -58,7 +58,7 @@ def scene_script(
         target=_in_docstring(target),
         source=_in_docstring(source),
         lights="{\n" + "".join(rows) + "}",
-        left=repr(tuple(left)),
+        left=repr(tuple(unset_names)),
         **_placed(places, up),
     )
 

@@ -83,11 +83,11 @@ def usd_overrides(
     layer.comment = about
     # The layer's own stage is closed when this call returns: while open, it would look for
     # sublayers as soon as there are any, starting from a layer without a path.
-    left, unplaced = _write_lights(layer, opened_stage, list(emitters), places, up)
+    unset_names, unplaced = _write_lights(layer, opened_stage, list(emitters), places, up)
     if stage is not None:
         layer.subLayerPaths.append(Path(os.path.relpath(stage, folder)).as_posix())
         _like(layer, stage)
-    return Overrides(layer.ExportToString(), left, unplaced)
+    return Overrides(layer.ExportToString(), unset_names, unplaced)
 
 
 def _write_lights(
@@ -109,14 +109,14 @@ def _write_lights(
         prims = _prims_of(opened_stage, names)
     writer = UsdPlaces(layer_stage, opened_stage, prims, places, up)
     light_prims = {**prims, **writer.add_new(_scope(opened_stage))}
-    left = []
+    unset_names = []
     for name, parameter, emission in emitters:
         if parameter not in NORMALIZED or name not in light_prims:
-            left.append(name)
+            unset_names.append(name)
             continue
         path, kind = light_prims[name]
         _override(layer_stage.OverridePrim(path), kind, parameter, emission)
-    return tuple(left), writer.move()
+    return tuple(unset_names), writer.move()
 
 
 def _assumed_prims(names: Iterable[str]) -> dict[str, tuple[str, str]]:

@@ -99,7 +99,7 @@ class UsdPlaces:
 
         These are lights at other positions in the stage than in the scene, and meshes.
         """
-        left = []
+        unmoved = []
         for place in self._changed:
             if place.name not in self._prims:
                 continue
@@ -109,8 +109,8 @@ class UsdPlaces:
             elif kind in AIMED and self._is_expected(path, place):
                 self._place(path, place, self._world(path))
             else:
-                left.append(place.name)
-        return tuple(left)
+                unmoved.append(place.name)
+        return tuple(unmoved)
 
     def _defined(self, scope: str, path: str, schema: str) -> Any:
         """Return a new prim below `scope`, defining the scope too if the stage has none."""

@@ -174,14 +174,14 @@ def change(light: BasisLight, setting: LightSetting) -> str:
 
 def _changed(light: BasisLight, setting: LightSetting) -> str:
     is_reached = np.array(setting.reached)
-    before = float(luminance(np.where(is_reached, light.emission, 0)))
-    after = float(luminance(np.where(is_reached, setting.emission, 0)))
-    if after == 0:
-        return "off" if before > 0 else "stays off"
-    if before == 0:
+    current_luminance = float(luminance(np.where(is_reached, light.emission, 0)))
+    answer_luminance = float(luminance(np.where(is_reached, setting.emission, 0)))
+    if answer_luminance == 0:
+        return "off" if current_luminance > 0 else "stays off"
+    if current_luminance == 0:
         return "was off, now on"
-    stops = f"{np.log2(after / before):+.2f} stops".replace("-", "−")
-    return f"×{after / before:.3g} <small>{stops}</small>"
+    stops = f"{np.log2(answer_luminance / current_luminance):+.2f} stops".replace("-", "−")
+    return f"×{answer_luminance / current_luminance:.3g} <small>{stops}</small>"
 
 
 def _constraint_note(setting: LightSetting) -> str:

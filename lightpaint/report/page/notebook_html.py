@@ -165,8 +165,8 @@ def basis_png(basis: Basis) -> bytes:
     height, width = pictures[0].shape[:2]
     text = 12
     rows, columns = -(-len(chosen) // MAX_COLUMNS), min(MAX_COLUMNS, len(chosen))
-    left = len(basis.lights) - len(chosen)
-    size = (columns * (width + 4) + 4, rows * (height + 2 * text) + 4 + (2 * text if left else 0))
+    rest = len(basis.lights) - len(chosen)
+    size = (columns * (width + 4) + 4, rows * (height + 2 * text) + 4 + (2 * text if rest else 0))
     sheet = Image.new("RGB", size, SURROUND)
     draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(text)
     for k, (light, picture) in enumerate(zip(chosen, pictures, strict=True)):
@@ -175,8 +175,8 @@ def basis_png(basis: Basis) -> bytes:
         draw.text(
             (x, y + height + 2), shorten_to_width(basis.names[light], font, width), TEXT, font
         )
-    if left:
-        draw.text((4, size[1] - 2 * text), f"and {left} more", TEXT, font)
+    if rest:
+        draw.text((4, size[1] - 2 * text), f"and {rest} more", TEXT, font)
     return png_bytes(np.asarray(sheet))
 
 
@@ -202,8 +202,8 @@ def _table(headings: Sequence[str], row: Callable[[int], Sequence[str]], sizes: 
 
     chosen = _largest_indices(np.asarray(sizes, np.float64), MAX_LIGHTS)
     body = "".join(cells("td", row(k)) for k in chosen)
-    left = len(sizes) - len(chosen)
-    note = f"<p>… and {left} more, which matter less</p>" if left else ""
+    rest = len(sizes) - len(chosen)
+    note = f"<p>… and {rest} more, which matter less</p>" if rest else ""
     return f"<table>{cells('th', headings)}{body}</table>{note}"
 
 

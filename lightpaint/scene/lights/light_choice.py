@@ -120,11 +120,11 @@ def remove_separated(
     """Return the groups without the `separated` emitters; groups with a single emitter are
     dropped.
     """
-    left = {
+    remaining_groups = {
         name: tuple(emitter for emitter in emitters if emitter.name not in separated)
         for name, emitters in groups.items()
     }
-    return {name: members for name, members in left.items() if len(members) > 1}
+    return {name: members for name, members in remaining_groups.items() if len(members) > 1}
 
 
 def _is_lamp(emitter: Emitter) -> bool:
@@ -153,13 +153,13 @@ def _free_name(stem: str, taken: Collection[str]) -> str:
 
 def _with_rest(lights: Sequence[Light], emitters: Sequence[Emitter]) -> tuple[Light, ...]:
     adjusted_names = {member.name for light in lights for member in light.members}
-    left = [emitter for emitter in emitters if emitter.name not in adjusted_names]
-    if not left:
+    rest = [emitter for emitter in emitters if emitter.name not in adjusted_names]
+    if not rest:
         return tuple(lights)
     name, used_names = REST, {light.name for light in lights} | {e.name for e in emitters}
     while name in used_names:
         name += "_"
-    return (*lights, keep(name, left))
+    return (*lights, keep(name, rest))
 
 
 def _members_of_groups(

@@ -268,10 +268,10 @@ def _unpainted_change(
     if not target.over_look or target.everything:
         return None
     kinds = ConstraintsByLight.of(solution.problem.constraints, basis.lights).kinds()
-    before = basis.current_weights.copy()
+    reference_weights = basis.current_weights.copy()
     for kind in FIXING_KINDS:
         fixed_lights = list(kinds.get(kind, ()))
-        before[fixed_lights] = solution.weights[fixed_lights]
-    is_current = np.array_equal(before, basis.current_weights)
-    now = basis.current_look if is_current else basis.mix(before)
+        reference_weights[fixed_lights] = solution.weights[fixed_lights]
+    is_current = np.array_equal(reference_weights, basis.current_weights)
+    now = basis.current_look if is_current else basis.mix(reference_weights)
     return unpainted_change(look, basis, target.importance > 0, now, predicted.image)

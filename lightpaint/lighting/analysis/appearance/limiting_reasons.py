@@ -221,10 +221,10 @@ def _find_loosening(solution: Solution, sample: PixelSample, full_gain: float) -
     weights = released_weights(solution, fit=replace(sample.problem.fit, hold=hold))
     [target] = solution.problem.views.targets
     basis = solution.basis
-    before, after = basis.mix(solution.weights), basis.mix(weights)
+    image, loosened_image = basis.mix(solution.weights), basis.mix(weights)
     look = PaintComparison.of_problem(solution.problem)
-    change = unpainted_change(look, basis, target.importance > 0, before, after)
-    return Loosening(hold, look.share_removed(before, after), change)
+    change = unpainted_change(look, basis, target.importance > 0, image, loosened_image)
+    return Loosening(hold, look.share_removed(image, loosened_image), change)
 
 
 def _weaker_hold(sample: PixelSample, gain: float) -> float:

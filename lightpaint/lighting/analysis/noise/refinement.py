@@ -70,10 +70,10 @@ def refine(solution: Solution, mixed: Estimate) -> Solution:
     basis_residual = problem.solved.b - np.einsum("cij,jc->ci", M, w)
 
     sums = noise_sums(solution)
-    before, lacking = gradient_bias(solution, sums)
+    noisy_weights, lacking = gradient_bias(solution, sums)
     # The error of the gradient there, and the error by the noise in M on the way here.
     remains = 1 - problem.noise_removed
-    lacking = lacking + remains * np.einsum("cij,jc->ci", sums.power, w - before)
+    lacking = lacking + remains * np.einsum("cij,jc->ci", sums.power, w - noisy_weights)
     noise = Residuals.of(solution).noise(slice(None)).reshape(mixed.image.shape)
     # The render does not change the noise of a painting that is the current look.
     t = _render_share(solution, lacking, noise, mixed.half_difference.astype(np.float64))

@@ -158,9 +158,9 @@ class _GradientStep:
     def of(cls, solution: Solution, noise: Noise) -> "_GradientStep":
         """Return the step that the solve of `solution` takes without noise."""
         problem = solution.problem
-        before, lacking = gradient_bias(solution, noise)
-        step = problem.solved.b - np.einsum("cij,jc->ci", problem.solved.M, before) + lacking
-        return cls(before, step, problem.equations.target_norm2)
+        weights, lacking = gradient_bias(solution, noise)
+        step = problem.solved.b - np.einsum("cij,jc->ci", problem.solved.M, weights) + lacking
+        return cls(weights, step, problem.equations.target_norm2)
 
     def equations(self, M: Doubles) -> NormalEquations:
         """Return the equations that take this step with another M, (3, n, n)."""
