@@ -29,7 +29,7 @@ class FakeSession:
     def __init__(self) -> None:
         self.on_message: Callable[[Message], None] | None = None
         self.before_paint: Callable[[], object] = lambda: None
-        self.heard: list[AnyRequest] = []
+        self.requests: list[AnyRequest] = []
         self.threads: set[int] = set()
         self.pictures: dict[str, npt.NDArray[Any]] = {
             "present": np.arange(2 * 3 * 3, dtype=np.float16).reshape(2, 3, 3),
@@ -38,7 +38,7 @@ class FakeSession:
 
     def handle(self, request: AnyRequest, arrays: dict[str, npt.NDArray[Any]]) -> list[Message]:
         self.threads.add(threading.get_ident())
-        self.heard.append(request)
+        self.requests.append(request)
         match request:
             case Paint(label="refuse"):
                 raise PaintError("this cannot be painted")

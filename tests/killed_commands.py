@@ -75,7 +75,7 @@ class Outcome:
 
     kind: str
     code: int
-    said: str
+    stderr: str
 
 
 class Stage:
@@ -217,8 +217,8 @@ def _main() -> int:
             number = chance.choice([signal.SIGKILL, signal.SIGKILL, signal.SIGTERM])
             when, until = next(turns[name])
             outcome = stages[name].killed(until, number)
-            if "Traceback" in outcome.said:
-                print(outcome.said)
+            if "Traceback" in outcome.stderr:
+                print(outcome.stderr)
             mixtures[name, when, number.name, outcome.kind, outcome.code] += 1
     for row, count in sorted(mixtures.items()):
         print(count, *row, sep="\t")

@@ -47,8 +47,8 @@ class RunningServer:
         return f"{name}: {value}"
 
     @property
-    def here(self) -> str:
-        """The name of the server, as requests have it."""
+    def address(self) -> str:
+        """The address of the server, as requests have it."""
         return f"127.0.0.1:{self.server.port}"
 
     def _run(self) -> None:
@@ -80,7 +80,7 @@ class Page:
 
     def __init__(self, serving: RunningServer) -> None:
         self.connection = serving.connection()
-        address = serving.here
+        address = serving.address
         self.protocol = ClientProtocol(
             parse_uri(f"ws://{address}/live"), subprotocols=[Subprotocol(PROTOCOL)]
         )
@@ -88,24 +88,24 @@ class Page:
         offer = {"Sec-WebSocket-Protocol": ", ".join(offered(serving.key))}
         request.headers = Headers({**dict(request.headers), **offer, "Origin": f"http://{address}"})
         self.protocol.send_request(request)
-        self._sent()
-        self.hears()
+        self._flush()
+        self.receive()
         assert self.protocol.handshake_exc is None
 
-    def says(self, kind: str, **fields: object) -> None:
+    def send(self, kind: str, **fields: object) -> None:
         self.protocol.send_binary(to_frame(RawMessage(kind, {"seq": 1, **fields}).content(), []))
-        self._sent()
+        self._flush()
 
-    def sends(self, data: bytes) -> None:
-        """Whatever it is."""
+    def send_bytes(self, data: bytes) -> None:
+        """Send any bytes."""
         self.connection.sendall(data)
 
-    def says_goodbye(self) -> None:
+    def send_goodbye(self) -> None:
         self.protocol.send_close(1001)
-        self._sent()
+        self._flush()
 
-    def hears(self) -> list[dict[str, object]]:
-        """The next that comes; nothing at the end."""
+    def receive(self) -> list[dict[str, object]]:
+        """Return the next messages that come; none at the end."""
         while True:
             data = self.connection.recv(1 << 16)
             if not data:
@@ -115,7 +115,7 @@ class Page:
                 frames = [bytes(e.data) for e in events if getattr(e, "opcode", None) == 2]
                 return [from_frame(frame)[0] for frame in frames]
 
-    def _sent(self) -> None:
+    def _flush(self) -> None:
         self.connection.sendall(b"".join(self.protocol.data_to_send()))
 
 

@@ -36,10 +36,10 @@ class MovingStudio:
         self.studio.start()
         self.wait(lambda: any(m.kind == "state" for m in self.messages))
 
-    def wait(self, is_it: Callable[[], Any], seconds: float = 60) -> Any:
-        until = time.monotonic() + seconds
-        while time.monotonic() < until:
-            if result := is_it():
+    def wait(self, condition: Callable[[], Any], seconds: float = 60) -> Any:
+        deadline = time.monotonic() + seconds
+        while time.monotonic() < deadline:
+            if result := condition():
                 return result
             time.sleep(0.02)
         raise AssertionError([m.fields.get("text", m.kind) for m in self.messages])
@@ -100,12 +100,12 @@ def pixel_of(moving: MovingStudio, point: Any) -> tuple[float, float]:
 def exact_answer(moving: MovingStudio) -> Any:
     """The exact answer to what was done last, and what is said of it."""
 
-    def is_it(fields: Any) -> bool:
+    def is_exact(fields: Any) -> bool:
         return "delta_e" in fields and fields["version"] == moving.studio.session.version
 
     return moving.wait(
         lambda: next(
-            (m.fields for m in moving.messages if m.kind == "answer" and is_it(m.fields)), None
+            (m.fields for m in moving.messages if m.kind == "answer" and is_exact(m.fields)), None
         )
     )
 

@@ -11,10 +11,12 @@ class Painter:
     def __init__(self, page: Any) -> None:
         self.page = page
 
-    def said(self, kind: str) -> list[dict[str, Any]]:
-        """What was sent to the session, of a kind, once all is still."""
+    def requests(self, kind: str) -> list[dict[str, Any]]:
+        """Return the requests of a kind that were sent to the session, once all is still."""
         self.still()
-        return [one for one in self.page.evaluate("() => window.host.said") if one["kind"] == kind]
+        return [
+            one for one in self.page.evaluate("() => window.host.requests") if one["kind"] == kind
+        ]
 
     def still(self) -> None:
         """Wait until all is answered, and shown: what a change brings may come a frame after it."""
@@ -94,8 +96,8 @@ class Finger:
         self.page = page
         self.session = page.context.new_cdp_session(page)
 
-    def goes(self, *places: tuple[float, float]) -> None:
-        """Comes down at the first place, and is lifted at the last."""
+    def drag(self, *places: tuple[float, float]) -> None:
+        """Come down at the first place, and lift at the last."""
         for k, (x, y) in enumerate(places):
             kind = "touchMove" if k else "touchStart"
             points = [{"x": x, "y": y, "id": 0}]

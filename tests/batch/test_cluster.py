@@ -163,16 +163,16 @@ def render_small_parts(patch: pytest.MonkeyPatch, cache: Path) -> None:
 
 @dataclass
 class ItemListener:
-    """Listens, and tells `when` of all that is said."""
+    """A listener that passes every remark to `when`."""
 
     when: Callable[[str], None] = lambda text: None
-    said: list[str] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
     workers: dict[str, str | None] = field(default_factory=dict)
 
     def __call__(self, *_: Any) -> None: ...
 
     def say(self, text: str) -> None:
-        self.said.append(text)
+        self.remarks.append(text)
         self.when(text)
 
     note = say
@@ -183,7 +183,7 @@ class ItemListener:
     @property
     def starts(self) -> Counter[str]:
         """How often each item was begun."""
-        return Counter(text.split(" begun by ")[0] for text in self.said if " begun by " in text)
+        return Counter(text.split(" begun by ")[0] for text in self.remarks if " begun by " in text)
 
 
 def run_item(
@@ -243,7 +243,7 @@ def test_a_cluster_does_what_one_process_does(
     assert listener.starts["bright 0"] == listener.starts["bright 1"] == 1
     assert listener.starts["bright: render"] == 0
     assert list(listener.workers.values()) == [None, None]
-    assert len({text.split()[-1] for text in listener.said if " begun by " in text}) == 2
+    assert len({text.split()[-1] for text in listener.remarks if " begun by " in text}) == 2
     # Again nothing is done; and on a shared disk it is the same.
     assert run_item(folder, "all", workers, listener).done == []
     run_item(folder, "shared", workers, ItemListener(), shared_fs=True)
@@ -263,7 +263,7 @@ def test_a_worker_killed_in_the_middle_of_a_basis_costs_one_part(
     assert contents(folder / "killed") == expected
     repeated = {name: count for name, count in listener.starts.items() if count > 1}
     assert repeated == {"training": 2, "part 3": 2}
-    assert any("is lost; trying elsewhere" in text for text in listener.said)
+    assert any("is lost; trying elsewhere" in text for text in listener.remarks)
     # What was kept of the parts has gone.
     assert list(spool.iterdir()) == []
 
@@ -374,7 +374,7 @@ def test_workers_of_another_version_are_left_out(
     monkeypatch.setattr("lightpaint.batch.cluster.workers.own_versions", lambda: own_versions)
     listener = ItemListener()
     with Cluster(workers.address, listener):  # type: ignore[arg-type]
-        assert sum("is left out: it has lightpaint" in text for text in listener.said) == 2
+        assert sum("is left out: it has lightpaint" in text for text in listener.remarks) == 2
 
 
 @pytest.fixture

@@ -64,14 +64,14 @@ class RemarkListener(Listener):
 
     def __init__(self) -> None:
         self.labels: list[str] = []
-        self.said: list[str] = []
+        self.remarks: list[str] = []
 
     def __call__(self, label: str, done: int, total: int, unit: str = "passes") -> None:
         if done == 0:
             self.labels.append(label)
 
     def say(self, text: str) -> None:
-        self.said.append(text)
+        self.remarks.append(text)
 
 
 def run_all(folder: Path, **options: Any) -> tuple[Any, RemarkListener]:
@@ -109,7 +109,7 @@ def test_looks_hang_their_lights_once_and_dim_them_each(folder: Path) -> None:
     day, night = (read_lighting(folder / "out" / x / "lighting.json") for x in ("day", "night"))
     assert night["beam"].emission[0] == pytest.approx(day["beam"].emission[0] / 100, rel=0.05)
     assert read_placement(folder / "out" / "places" / "day.json").looks == ("day", "night")
-    remarks = [text for text in listener.said if "beam turned by" in text]
+    remarks = [text for text in listener.remarks if "beam turned by" in text]
     assert len(remarks) == 1
     assert remarks[0].startswith("day, night: ")
     # The gallery shows the plan once, and each report says who shares the places.

@@ -34,5 +34,5 @@ def test_the_earlier_or_the_new(
     if number == signal.SIGTERM:
         assert outcome.code == 143
         assert outcome.kind == "earlier"
-        assert outcome.said.endswith(": interrupted\n")
-        assert "Traceback" not in outcome.said
+        assert outcome.stderr.endswith(": interrupted\n")
+        assert "Traceback" not in outcome.stderr

@@ -48,8 +48,8 @@ def test_hundreds_of_half_sent_requests_shut_nobody_out(serving: RunningServer) 
     assert status(serving, "/") == 200  # a page that is being opened
     another = Page(serving)
     for client in (page, another):
-        client.says("hello", version=VERSION)
-        assert client.hears()[0]["kind"] in ("state", "closed")
+        client.send("hello", version=VERSION)
+        assert client.receive()[0]["kind"] in ("state", "closed")
     assert len(connected_sockets(serving)) <= http_connections.MAX_UNAUTHENTICATED + 4
     # The latest have the best chance of being people.
     assert is_cut(serving.connections[1])
@@ -62,10 +62,10 @@ def test_a_request_comes_in_time_or_its_connection_is_closed(
     silent, half, second, slow, trusted = (serving.connection() for _ in range(5))
     page = Page(serving)
     half.sendall(HALF)
-    second.sendall(f"GET / HTTP/1.1\r\nHost: {serving.here}\r\n\r\n".encode())
+    second.sendall(f"GET / HTTP/1.1\r\nHost: {serving.address}\r\n\r\n".encode())
     assert second.recv(12) == b"HTTP/1.1 200"
     second.sendall(HALF)
-    headers = f"Host: {serving.here}\r\n{serving.key_header}\r\n\r\n"
+    headers = f"Host: {serving.address}\r\n{serving.key_header}\r\n\r\n"
     trusted.sendall(f"GET /data/present HTTP/1.1\r\n{headers}".encode())
     assert trusted.recv(12) == b"HTTP/1.1 200"
     trusted.sendall(HALF)
@@ -81,8 +81,8 @@ def test_a_request_comes_in_time_or_its_connection_is_closed(
     while second.recv(1 << 16):
         pass  # what it had asked for comes whole
     # Who has shown the key, and a page, have all the time they want.
-    page.says("hello", version=VERSION)
-    assert page.hears()[0]["kind"] == "state"
+    page.send("hello", version=VERSION)
+    assert page.receive()[0]["kind"] == "state"
     trusted.sendall(f".0.1:{serving.server.port}\r\n{serving.key_header}\r\n\r\n".encode())
     wait_until(lambda: b"HTTP/1.1 200" in trusted.recv(1 << 16), "it is not answered again")
 
@@ -97,7 +97,7 @@ def test_an_answer_that_is_taken_slowly_is_not_cut(
     for connection in connected_sockets(serving):  # else the system takes it all
         accepted = connection.transport.get_extra_info("socket")
         accepted.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
-    asking.sendall(f"GET /main.js HTTP/1.1\r\nHost: {serving.here}\r\n\r\n".encode())
+    asking.sendall(f"GET /main.js HTTP/1.1\r\nHost: {serving.address}\r\n\r\n".encode())
     head = asking.recv(1 << 12)
     [length] = [
         int(line.partition(b":")[2])
@@ -116,7 +116,7 @@ def test_what_is_sent_goes_at_once(serving: RunningServer) -> None:
     """Nothing waits until what was sent before it is acknowledged (RFC 896): 40 ms an answer."""
     keeper, page = serving.connection(), Page(serving)
     keeper.sendall(HALF)
-    page.says("hello", version=VERSION)
+    page.send("hello", version=VERSION)
     wait_until(lambda: len(connected_sockets(serving)) >= 2, "they are not there")
     for connection in connected_sockets(serving):
         accepted = connection.transport.get_extra_info("socket")
@@ -176,13 +176,13 @@ def test_malformed_frames_cost_their_page_its_connection_at_most(
         bytes(100),
     ):
         page = Page(serving)
-        page.says("hello", version=VERSION)
-        assert page.hears()[0]["kind"] in ("state", "closed")
+        page.send("hello", version=VERSION)
+        assert page.receive()[0]["kind"] in ("state", "closed")
         with suppress(OSError):
-            page.sends(junk)
+            page.send_bytes(junk)
             page.connection.recv(1 << 16)
         page.connection.close()
     last = Page(serving)
-    last.says("hello", version=VERSION)
-    assert last.hears()[0]["kind"] in ("state", "closed")
+    last.send("hello", version=VERSION)
+    assert last.receive()[0]["kind"] in ("state", "closed")
     assert capfd.readouterr() == ("", "")

@@ -217,7 +217,7 @@ def test_an_observer_neither_paints_nor_takes_the_session(
         assert told["text"].startswith("an observer may fetch, export and propose")
         paint(program, 6, is_final=True)
         assert receive(program)["kind"] == "failed"
-        assert served_session.session.heard == []
+        assert served_session.session.requests == []
         paint(page, 2, is_final=True)
         assert receive(page)["kind"] == "answer"
 
@@ -259,10 +259,10 @@ def messages_to_painter(served: ServedSession, observers: int) -> list[tuple[str
 def test_who_paints_is_sent_the_same_however_many_observe(served_session: ServedSession) -> None:
     """An observer costs a stroke no message, and takes no session."""
     alone = messages_to_painter(served_session, 0)
-    strokes = [request for request in served_session.session.heard if request.kind == "paint"]
+    strokes = [request for request in served_session.session.requests if request.kind == "paint"]
     assert len(strokes) == 8
     assert messages_to_painter(served_session, 3) == alone
-    again = [request for request in served_session.session.heard if request.kind == "paint"]
+    again = [request for request in served_session.session.requests if request.kind == "paint"]
     assert len(again) == 2 * len(strokes)
 
 
@@ -335,7 +335,7 @@ def test_what_observers_ask_for_waits_while_a_brush_is_down(served_session: Serv
         paint(page, 3, is_final=True)
         assert receive(page)["reply"] == 3
         assert [receive(program).get("reply") for _ in range(2)] == [None, 7]
-    kinds = [said.kind for said in served_session.session.heard]
+    kinds = [said.kind for said in served_session.session.requests]
     assert kinds == ["paint", "paint", "export"]
 
 

@@ -47,8 +47,8 @@ class ServedSession:
         (folder / "engine" / "gl.js").write_text("export {}", "utf-8")
         (folder / "secret.py").write_text("secret", "utf-8")
         (folder / ".hidden.js").write_text("secret", "utf-8")
-        self.session, self.said = FakeSession(), list[str]()
-        self.line = Connections(self.session, None, self.said.append)
+        self.session, self.messages = FakeSession(), list[str]()
+        self.line = Connections(self.session, None, self.messages.append)
         files = page_files(folder)
         app = page_app(self.line, files=files)
         self.guard = Guard(app, address=address, public=files)
@@ -395,7 +395,7 @@ def test_mistakes_are_answered_and_end_nothing(known_browser: ServedSession) -> 
         assert (failed["kind"], failed["reply"]) == ("failed", 2)
         assert "ZeroDivisionError" in failed["text"]
         assert "Traceback" not in failed["text"]
-        assert "Traceback" in known_browser.said[-1]
+        assert "Traceback" in known_browser.messages[-1]
         socket.send_bytes(paint(3))
         assert receive(socket)["kind"] == "answer"
 
@@ -439,7 +439,7 @@ def test_junk_is_answered_and_the_session_alive(
         assert receive(socket)["kind"] == "failed"
         socket.send_bytes(paint(6))
         assert receive(socket)["kind"] == "answer"
-    assert len(known_browser.session.heard) == 1
+    assert len(known_browser.session.requests) == 1
 
 
 def test_a_page_of_another_version_is_told(known_browser: ServedSession) -> None:
@@ -454,7 +454,7 @@ def test_nothing_is_done_before_hello(known_browser: ServedSession) -> None:
     with known_browser.socket() as socket:
         socket.send_bytes(paint(1))
         assert receive(socket)["kind"] == "closed"
-    assert known_browser.session.heard == []
+    assert known_browser.session.requests == []
 
 
 def test_live_paint_that_newer_covers_is_answered_and_not_done(
@@ -480,10 +480,10 @@ def test_live_paint_that_newer_covers_is_answered_and_not_done(
         free.set()
         answers = [receive(socket) for _ in range(7)]
     assert sorted(answer["reply"] for answer in answers) == [1, 2, 3, 4, 5, 6, 7]
-    strokes = [said.stroke for said in known_browser.session.heard]
+    strokes = [said.stroke for said in known_browser.session.requests]
     assert strokes[0] == 1
     assert strokes[-1] == 2
-    assert sum(said.is_final for said in known_browser.session.heard) == 1
+    assert sum(said.is_final for said in known_browser.session.requests) == 1
     assert len(strokes) <= 7
 
 
@@ -504,7 +504,7 @@ def test_the_second_tab_is_told_and_may_take_over(known_browser: ServedSession) 
         assert "reply" not in told
         first.send_bytes(paint(6))
         assert receive(first)["reason"] == "taken"
-        assert known_browser.session.heard == []
+        assert known_browser.session.requests == []
         second.send_bytes(paint(7))
         assert receive(second)["kind"] == "answer"
         first.send_bytes(frame("take_over", 8))
@@ -577,7 +577,7 @@ HELLO = frame("hello", 0, version=VERSION)
 
 
 def strokes_of(session: FakeSession) -> list[int]:
-    return [request.stroke for request in session.heard if isinstance(request, Paint)]
+    return [request.stroke for request in session.requests if isinstance(request, Paint)]
 
 
 def test_what_a_page_says_last_is_done_though_it_has_gone() -> None:
@@ -783,7 +783,7 @@ def test_two_pages_that_fight_over_the_session_harm_nobody(known_browser: Served
                 assert message["kind"] == "closed"
             assert message["reason"] == "taken"
     assert [
-        request.stroke for request in known_browser.session.heard if isinstance(request, Paint)
+        request.stroke for request in known_browser.session.requests if isinstance(request, Paint)
     ] == [*range(40)]
 
 

@@ -51,12 +51,12 @@ class StudioClient:
         self.studio.start()
         self.wait(lambda m: m.kind == "state")
 
-    def wait(self, is_it: Callable[[Message], Any], seconds: float = 60) -> Message:
-        """The first message, from now or from before, that is it."""
-        until = time.monotonic() + seconds
-        while time.monotonic() < until:
+    def wait(self, is_match: Callable[[Message], Any], seconds: float = 60) -> Message:
+        """Return the first message, from now or from before, that matches."""
+        deadline = time.monotonic() + seconds
+        while time.monotonic() < deadline:
             for message in list(self.messages):
-                if is_it(message):
+                if is_match(message):
                     return message
             time.sleep(0.01)
         raise AssertionError([m.kind for m in self.messages])

@@ -108,10 +108,10 @@ class Page:
         data = {"method": "custom", "content": content}
         buffers = [memoryview(x.tobytes()) for x in arrays.values()]
         self.painter.comm.handle_msg({"content": {"data": data}, "buffers": buffers})
-        [(answer, buffers)] = [x for x in self.heard() if x[0].get("reply") == self.seq]
+        [(answer, buffers)] = [x for x in self.messages() if x[0].get("reply") == self.seq]
         return answer | {"arrays": _arrays(answer, buffers)}
 
-    def heard(self) -> list[Any]:
+    def messages(self) -> list[Any]:
         """What this page was told."""
         return [x for x in self.painter.comm.messages if x[0].get("page") == self.page]
 
@@ -155,7 +155,7 @@ def test_a_page_opens_fetches_and_paints(basis: lp.Basis, open_painter: Any) -> 
     np.testing.assert_allclose(answer["arrays"]["weights"], weights, atol=1e-5)
 
     def exact() -> list[Any]:
-        return [content for content, _ in page.heard() if content.get("exact")]
+        return [content for content, _ in page.messages() if content.get("exact")]
 
     wait_for(lambda: len(exact()) > 1)  # the second has all that is known of the first
     wait_for(lambda: told)
@@ -177,7 +177,7 @@ def test_what_is_set_from_a_cell_shows(basis: lp.Basis, open_painter: Any, tmp_p
     painter.observe(lambda change: told.append(change.name))
     painter.target = lp.Target("cell", image, np.ones(SIZE, np.float32), everything=True)
     assert sorted(set(told)) == ["lighting", "target", "targets"]
-    patch, buffers = next(x for x in page.heard() if x[0]["kind"] == "patch")
+    patch, buffers = next(x for x in page.messages() if x[0]["kind"] == "patch")
     np.testing.assert_array_equal(_arrays(patch, buffers)["image"], image)
     assert patch["history"]["undo"] == ["painting from a cell"]
     np.testing.assert_allclose(painter.lighting.weights_for(basis), weights, atol=1e-5)
@@ -333,7 +333,7 @@ def test_several_views_have_a_target_each(basis: lp.Basis, tmp_path: Path) -> No
     whole = np.ones(SIZE, np.float32)
     painter.targets = [None, lp.Target("side", images[1], whole, everything=True)]
     assert painter.target is None
-    [patch] = [x for x, _ in page.heard() if x["kind"] == "patch" and x["view"] == 1]
+    [patch] = [x for x, _ in page.messages() if x["kind"] == "patch" and x["view"] == 1]
     assert patch["views"] == [0, 1]
     # One view is as good as both where it shows all lights.
     np.testing.assert_allclose(painter.lighting.weights_for(basis), weights, atol=1e-5)
@@ -570,7 +570,7 @@ def test_a_callback_that_fails_is_shown(basis: lp.Basis, open_painter: Any, caps
     page.say("hello", version=protocol.VERSION)
     painter.observe(lambda _: 1 / 0, "target")
     assert page.paint(basis.images[0])["kind"] == "answer"
-    said = wait_for(lambda: [x["text"] for x, _ in page.heard() if x["kind"] == "notice"])
+    said = wait_for(lambda: [x["text"] for x, _ in page.messages() if x["kind"] == "notice"])
     assert "callback of painter.target failed: ZeroDivisionError" in said[0]
     assert "ZeroDivisionError" in capsys.readouterr().err
     # And it goes on.
@@ -627,7 +627,7 @@ def test_what_a_callback_cannot_set_is_shown(
     painter.observe(lambda _: setattr(painter, "constraints", fill), "targets")
     painter.observe(lambda _: setattr(painter, "constraints", key), "lighting")
     painter.target = lp.Target.of(basis.images[0])
-    said = [x["text"] for x, _ in page.heard() if x["kind"] == "notice"]
+    said = [x["text"] for x, _ in page.messages() if x["kind"] == "notice"]
     assert any("painter.constraints is a lp.Constraints or None, not int" in x for x in said)
     assert any("no light 'lamp'" in x for x in said)
     assert "no light 'lamp'" in capsys.readouterr().err
@@ -647,7 +647,7 @@ def test_callbacks_that_never_come_to_an_end_are_stopped(
 
     painter.observe(again, "lighting")
     painter.target = lp.Target.of(basis.images[0])
-    said = [x["text"] for x, _ in page.heard() if x["kind"] == "notice"]
+    said = [x["text"] for x, _ in page.messages() if x["kind"] == "notice"]
     assert "callbacks of the painter set something again" in said[0]
 
 
@@ -691,11 +691,11 @@ def test_who_is_shown_last_has_it(basis: lp.Basis, open_painter: Any) -> None:
     first, second = Page(painter), Page(painter, OTHER)
     first.say("hello", version=protocol.VERSION)
     second.say("hello", version=protocol.VERSION)
-    assert first.heard()[-1][0]["reason"] == "taken"
+    assert first.messages()[-1][0]["reason"] == "taken"
     assert first.paint(basis.images[0])["reason"] == "taken"
     assert second.paint(basis.images[0])["kind"] == "answer"
     assert first.say("take_over")["kind"] == "state"
-    assert second.heard()[-1][0]["reason"] == "taken"
+    assert second.messages()[-1][0]["reason"] == "taken"
 
 
 def test_callbacks_come_in_the_thread_of_the_kernel(
@@ -742,7 +742,9 @@ def test_a_full_disk_is_said_and_tried_again(
         yield
 
     def said(tone: str) -> Any:
-        return [x["text"] for x, _ in page.heard() if x["kind"] == "notice" and x["tone"] == tone]
+        return [
+            x["text"] for x, _ in page.messages() if x["kind"] == "notice" and x["tone"] == tone
+        ]
 
     monkeypatch.setattr(background_threads, "RETRY_S", 0.01)
     painter = open_painter(store=tmp_path / "evening.db")

@@ -422,14 +422,14 @@ def test_two_scenes_in_one_folder_share_what_is_the_same(
 
 def test_a_person_is_told(tmp_path: Path, make_listener: Callable[[], Any]) -> None:
     obtain(room(tmp_path), Settings(spp=4), make_listener())
-    hears = make_listener()
-    obtain(room(tmp_path, MOVED), Settings(spp=4), hears)
-    assert hears.said == [
+    listener = make_listener()
+    obtain(room(tmp_path, MOVED), Settings(spp=4), listener)
+    assert listener.remarks == [
         "4 of 5 lights come from an earlier run; 1 is rendered (use_cache=False renders all again)"
     ]
-    hears = make_listener()
-    obtain(room(tmp_path, MOVED), Settings(spp=4), hears)
-    assert hears.said == [
+    listener = make_listener()
+    obtain(room(tmp_path, MOVED), Settings(spp=4), listener)
+    assert listener.remarks == [
         "basis of 4 samples per pixel kept from an earlier run (use_cache=False renders it again)"
     ]
 
@@ -438,12 +438,12 @@ def test_a_person_is_told(tmp_path: Path, make_listener: Callable[[], Any]) -> N
 def make_listener() -> Callable[[], Any]:
     class Hears:
         def __init__(self) -> None:
-            self.said: list[str] = []
+            self.remarks: list[str] = []
 
         def __call__(self, *_: object) -> None: ...
 
         def say(self, text: str) -> None:
-            self.said.append(text)
+            self.remarks.append(text)
 
     return Hears
 

@@ -1,26 +1,26 @@
 /** Sessions that are none, for tests of what is sent. */
 import { Emitter } from "/engine/socket_host.js";
 
-/** Keeps what is said until a test answers it. */
+/** Keeps requests until a test answers them. */
 export class SlowHost extends Emitter {
-  said = [];
+  requests = [];
   isOpen = true;
 
   send(kind, fields = {}, arrays = {}) {
     if (!this.isOpen) return Promise.reject(new Error("lost"));
     return new Promise((resolve, reject) => {
-      this.said.push({ kind, fields, arrays, resolve, reject });
+      this.requests.push({ kind, fields, arrays, resolve, reject });
     });
   }
 
   /** How many messages are on their way. */
   get inFlight() {
-    return this.said.filter((one) => !one.isDone).length;
+    return this.requests.filter((one) => !one.isDone).length;
   }
 
   /** Answer the first that is not. */
   async answer(kind = "answer", more = {}) {
-    const next = this.said.find((one) => !one.isDone);
+    const next = this.requests.find((one) => !one.isDone);
     next.isDone = true;
     this.emit(kind, { kind, arrays: {}, ...more });
     next.resolve({ kind, arrays: {}, ...more });
@@ -29,7 +29,7 @@ export class SlowHost extends Emitter {
 
   async lose() {
     this.isOpen = false;
-    for (const one of this.said.filter((x) => !x.isDone)) {
+    for (const one of this.requests.filter((x) => !x.isDone)) {
       one.isDone = true;
       one.reject(new Error("lost"));
     }
@@ -44,9 +44,9 @@ export class SlowHost extends Emitter {
     await settle();
   }
 
-  /** What was said, without pixels. */
+  /** The requests, without pixels. */
   get told() {
-    return this.said.map(({ kind, fields, arrays }) => ({
+    return this.requests.map(({ kind, fields, arrays }) => ({
       kind,
       ...fields,
       shapes: Object.fromEntries(Object.entries(arrays).map(([k, v]) => [k, v.shape])),

@@ -3,7 +3,7 @@ import { Emitter } from "/engine/socket_host.js";
 import { array } from "/bench.js";
 
 export class SiteHost extends Emitter {
-  said = [];
+  requests = [];
   fetched = [];
 
   constructor(state) {
@@ -18,7 +18,7 @@ export class SiteHost extends Emitter {
   }
 
   async send(kind, fields = {}, arrays = {}) {
-    this.said.push({ kind, fields, arrays });
+    this.requests.push({ kind, fields, arrays });
     const made = { kind: kind === "drop" ? "patch" : "answer", arrays: {} };
     this.emit(made.kind, made);
     return made;

@@ -65,16 +65,16 @@ def test_overlays_by_their_key_say_what_their_colours_mean(painter: Painter) -> 
     assert "too dark" in legend.inner_text()
     press("o")  # asks for what it shows
     painter.page.get_by_text("Out of reach", exact=True).wait_for()
-    request_count = len(painter.said("explain"))
+    request_count = len(painter.requests("explain"))
     assert request_count == 1
     # An answer to an earlier painting is none.
     painter.tell(kind="explained", sentences=["Old"], view=0, is_old=True)
     painter.page.wait_for_function(
-        "(asked) => host.said.filter(({ kind }) => kind === 'explain').length > asked",
+        "(asked) => host.requests.filter(({ kind }) => kind === 'explain').length > asked",
         arg=request_count,
     )
     painter.page.get_by_text("Out of reach", exact=True).wait_for()
-    assert len(painter.said("explain")) == request_count + 1
+    assert len(painter.requests("explain")) == request_count + 1
     press("o")
     assert "grey" in legend.inner_text()
     press("o")
@@ -121,15 +121,15 @@ def test_truth(painter: Painter) -> None:
     painter.button("False colour").click()
     assert painter.ui("display")["overlay"] == "falsecolor"
     painter.button("Out of reach").click()  # asks for what it shows
-    assert painter.said("explain")
+    assert painter.requests("explain")
     assert painter.page.get_by_text("The cove is at its limit").is_visible()
     painter.button("Verify").click()
-    assert painter.said("verify")[-1]["run"] is True
+    assert painter.requests("verify")[-1]["run"] is True
     bar = painter.page.get_by_role("progressbar", name="Verifying")
     painter.tell(kind="progress", task="verify", done=5, total=16, unit="passes")
     assert bar.get_attribute("aria-valuenow") == "5"
     painter.button("Stop", exact=True).click()
-    assert painter.said("verify")[-1]["run"] is False
+    assert painter.requests("verify")[-1]["run"] is False
     painter.button("Verify").click()
     painter.tell(kind="progress", task="lights", done=5, total=16, unit="passes")
     painter.tell(kind="stopped", task="verify")
@@ -151,20 +151,20 @@ def test_how_pictures_are_shown(painter: Painter) -> None:
     show = painter.page.evaluate("() => window.engine.shown")
     assert (show["left"], show["transform"], show["stops"]) == ("present", "agx", 1.5)
     assert show["clean"] is False
-    assert not painter.said("change_settings")  # for the eye only
+    assert not painter.requests("change_settings")  # for the eye only
 
 
 def test_looks(painter: Painter) -> None:
     painter.button("Save look").click()
     painter.stroke()
     painter.page.keyboard.press("Control+s")
-    assert [request["name"] for request in painter.said("save_look")] == ["Look 1", "Look 2"]
+    assert [request["name"] for request in painter.requests("save_look")] == ["Look 1", "Look 2"]
     painter.button("Look 2", exact=True).click()
     painter.page.get_by_label("Name of Look 2").fill("Dawn")
     painter.page.get_by_label("Name of Look 2").press("Enter")
-    assert painter.said("rename_look")[-1] == {"kind": "rename_look", "look": 2, "name": "Dawn"}
+    assert painter.requests("rename_look")[-1] == {"kind": "rename_look", "look": 2, "name": "Dawn"}
     painter.button("Load Look 1").click()
-    assert painter.said("load_look")[-1]["look"] == 1
+    assert painter.requests("load_look")[-1]["look"] == 1
     painter.button("Compare looks").click()
     painter.type("Crossfade", "25")
     request, two = (look["weights"] for look in painter.ui("looks"))
@@ -180,10 +180,10 @@ def test_looks(painter: Painter) -> None:
     painter.page.locator(".look").first.hover()
     painter.button("Duplicate Look 1").click()
     painter.button("Delete Look 1", exact=True).click()
-    assert not painter.said("drop_look")  # asks once more
+    assert not painter.requests("drop_look")  # asks once more
     painter.button("Delete Look 1: press again").click()
-    assert painter.said("drop_look")[-1]["look"] == 1
-    assert painter.said("copy_look")[-1]["look"] == 1
+    assert painter.requests("drop_look")[-1]["look"] == 1
+    assert painter.requests("copy_look")[-1]["look"] == 1
 
 
 @pytest.mark.parametrize("way", ["deleted", "elsewhere"])
@@ -200,7 +200,7 @@ def test_looks_are_compared_while_both_are_there(new_painter: Any, way: str) -> 
         painter.page.locator(".look").first.hover()
         painter.button("Delete Look 1", exact=True).click()
         painter.button("Delete Look 1: press again").click()
-        assert painter.said("drop_look")
+        assert painter.requests("drop_look")
     else:
         painter.page.evaluate("() => { host.drop_look({ look: 1 }); host.tell(host.state()); }")
     painter.still()
@@ -333,7 +333,7 @@ def test_what_lies_between_two_looks_is_kept_under_a_name_that_says_so(painter: 
     painter.button("Compare looks").click()
     painter.type("Crossfade", "60")
     painter.button("Save as look").click()
-    request = painter.said("mix_looks")[-1]
+    request = painter.requests("mix_looks")[-1]
     assert (request["first"], request["second"], request["part"]) == (1, 2, 0.6)
     assert request["name"] == "Look 1 → Look 2, 60 %"
     painter.button("Back to the painting").click()
@@ -382,7 +382,7 @@ def test_a_key_that_is_held_down_keeps_one_look(painter: Painter) -> None:
         painter.page.keyboard.down("s")
     painter.page.keyboard.up("s")
     painter.page.keyboard.up("Control")
-    assert [request["name"] for request in painter.said("save_look")] == ["Look 1"]
+    assert [request["name"] for request in painter.requests("save_look")] == ["Look 1"]
     painter.page.keyboard.down("]")
     size = painter.ui("size")
     painter.page.keyboard.down("]")  # what goes by steps goes on
@@ -393,7 +393,7 @@ def test_files_are_written_and_their_command_shown(painter: Painter) -> None:
     painter.button("Export").click()
     painter.page.get_by_label("Report").uncheck()
     painter.page.get_by_role("dialog").get_by_role("button", name="Export", exact=True).click()
-    assert painter.said("export")[-1]["outputs"] == ["target", "picture", "lighting", "relit"]
+    assert painter.requests("export")[-1]["outputs"] == ["target", "picture", "lighting", "relit"]
     window = painter.page.get_by_role("dialog")
     assert window.locator(".exported li").all_inner_texts() == [
         "target", "picture", "lighting", "relit",
@@ -414,7 +414,7 @@ def test_files_are_written_and_their_command_shown(painter: Painter) -> None:
 def test_settings(painter: Painter) -> None:
     painter.button("Solve settings").click()
     painter.button("Ignore").click()
-    assert painter.said("change_settings")[-1]["settings"]["hold"] == 0
+    assert painter.requests("change_settings")[-1]["settings"]["hold"] == 0
     painter.button("Hold", exact=True).click()
     painter.type("Strength", "2.5")
     painter.button("Linear").click()
@@ -424,16 +424,16 @@ def test_settings(painter: Painter) -> None:
     painter.button("Stay", exact=True).click()
     painter.type("Pull", "0.02")
     settings_asked: dict[str, Any] = {}
-    for request in painter.said("change_settings"):
+    for request in painter.requests("change_settings"):
         settings_asked |= request["settings"]
     assert settings_asked == {
         "hold": 2.5, "space": "linear", "colors": "white", "literal": True,
         "prefer_current": 0.02, "sparse": 3,
     }  # fmt: skip
     painter.type("At most", "")
-    assert painter.said("change_settings")[-1]["settings"]["sparse"] is None
+    assert painter.requests("change_settings")[-1]["settings"]["sparse"] is None
     painter.button("May change").click()
-    assert painter.said("change_settings")[-1]["settings"]["prefer_current"] is None
+    assert painter.requests("change_settings")[-1]["settings"]["prefer_current"] is None
 
 
 def test_settings_leave_the_pictures_seen_and_the_keys_alone(painter: Painter) -> None:
@@ -475,7 +475,7 @@ def test_settings_typed_into_are_closed_by_escape(painter: Painter) -> None:
 def test_escape_gives_up_the_stroke_before_it_closes_anything(painter: Painter) -> None:
     painter.button("Solve settings").click()
     painter.give_up()
-    assert painter.said("drop_stroke")
+    assert painter.requests("drop_stroke")
     assert painter.page.locator(".settings").is_visible()
 
 
@@ -531,14 +531,14 @@ def test_what_is_advised_is_seen_before_it_is_done(
     dialog.get_by_text("changes the annex by ΔE 49").wait_for()
     assert [dialog.locator("canvas").nth(k).get_attribute("width") for k in (0, 1)] == ["16"] * 2
     field = {"change_settings": "settings", "constrain_lights": "constraints"}[kind]
-    assert painter.said("preview")[-1][field] == change
-    assert not painter.said(kind)  # nothing is done yet
+    assert painter.requests("preview")[-1][field] == change
+    assert not painter.requests(kind)  # nothing is done yet
     painter.page.keyboard.press("Escape")
     dialog.wait_for(state="detached")
-    assert not painter.said(kind)
+    assert not painter.requests(kind)
     button.click()
     painter.button("Apply").click()
-    assert painter.said(kind)[-1][field] == change
+    assert painter.requests(kind)[-1][field] == change
     assert dialog.count() == 0
 
 
@@ -548,7 +548,7 @@ def test_a_preview_of_before_is_none(painter: Painter) -> None:
     painter.tell(**answer, headline="A first step, 10 %.", help=help_)
     painter.page.evaluate("() => { window.host.preview = () => ({ kind: 'started' }); }")
     painter.button("Loosen").click()
-    number = painter.said("preview")[-1]["number"]
+    number = painter.requests("preview")[-1]["number"]
     painter.tell(kind="previewed", number=number - 1, text="Old.", arrays={})
     assert painter.page.get_by_text("Computing the preview").is_visible()
     assert painter.button("Apply").is_disabled()
@@ -609,8 +609,8 @@ def test_looks_that_are_kept_at_once_have_names_of_their_own(painter: Painter) -
             "() => window.dispatchEvent("
             "new KeyboardEvent('keydown', { key: 's', ctrlKey: true, bubbles: true }))"
         )
-    assert [request["name"] for request in painter.said("save_look")] == ["Look 1", "Look 2"]
-    kinds = [request["kind"] for request in painter.page.evaluate("() => host.said")]
+    assert [request["name"] for request in painter.requests("save_look")] == ["Look 1", "Look 2"]
+    kinds = [request["kind"] for request in painter.page.evaluate("() => host.requests")]
     assert kinds.index("constrain_light") < kinds.index("save_look")
 
 
@@ -624,7 +624,7 @@ def test_what_is_half_typed_is_given_up_by_escape(painter: Painter) -> None:
     level.fill("-1")
     level.press("Escape")
     level.blur()
-    assert painter.said("change_settings") == painter.said("constrain_light") == []
+    assert painter.requests("change_settings") == painter.requests("constrain_light") == []
 
 
 def test_where_a_page_may_not_copy_it_says_so(new_painter: Any) -> None:
@@ -640,6 +640,6 @@ def test_a_double_click_begins_no_render(painter: Painter) -> None:
     """The panel comes to lie under its second click."""
     painter.button("Analysis").click()
     painter.button("Verify").dispatch_event("click", {"detail": 2})
-    assert painter.said("verify") == []
+    assert painter.requests("verify") == []
     painter.button("Verify").click()
-    assert painter.said("verify")
+    assert painter.requests("verify")

@@ -38,7 +38,7 @@ class Firefox:
 
     def __init__(self, socket: ClientConnection) -> None:
         self.socket, self.number = socket, 0
-        self.heard: list[Any] = []
+        self.received: list[Any] = []
         self.ask("session.new", capabilities={})
         self.ask("session.subscribe", events=["log.entryAdded"])
         self.tab = self.ask("browsingContext.getTree")["contexts"][0]["context"]
@@ -51,7 +51,7 @@ class Firefox:
             if message.get("id") == self.number:
                 assert message["type"] == "success", message
                 return message["result"]
-            self.heard.append(message)
+            self.received.append(message)
 
     def open(self, url: str) -> None:
         self.ask("browsingContext.navigate", context=self.tab, url=url, wait="complete")
@@ -76,7 +76,7 @@ class Firefox:
 
     def errors(self) -> list[str]:
         """What the console has shown."""
-        events = [event.get("params", {}) for event in self.heard]
+        events = [event.get("params", {}) for event in self.received]
         return [event["text"] for event in events if event.get("level") == "error"]
 
     def press(self, *keys: str) -> None:

@@ -14,7 +14,7 @@ def test_a_stroke_goes_to_the_engine_and_the_hint_goes_away(new_painter: Any) ->
     painter.stroke()
     assert [call[1] for call in painter.calls("begin")] == ["brush"]
     assert painter.calls("end")
-    assert painter.said("paint")[-1]["is_final"] is True
+    assert painter.requests("paint")[-1]["is_final"] is True
     assert not painter.page.get_by_text("Paint how it should look").is_visible()
     assert painter.page.get_by_text("Close to what was painted").is_visible()
 
@@ -42,8 +42,8 @@ def test_keys_of_paint_programs(painter: Painter) -> None:
     assert (painter.ui("colour"), painter.ui("second")["colour"]) == (second, first)
     press("Control+z")
     press("Control+Shift+Z")
-    assert painter.said("undo")
-    assert painter.said("redo")
+    assert painter.requests("undo")
+    assert painter.requests("redo")
     for layout in ("wipe", "blink", "side"):
         press("v")
         assert painter.ui("display")["layout"] == layout
@@ -95,7 +95,7 @@ def test_escape_leaves_a_stroke(painter: Painter) -> None:
     painter.give_up()
     assert painter.calls("cancel")
     assert not painter.calls("end")
-    assert painter.said("drop_stroke")
+    assert painter.requests("drop_stroke")
 
 
 def test_one_finger_paints_and_two_move_and_zoom(new_painter: Any) -> None:
@@ -570,12 +570,12 @@ def test_undo_takes_back_what_a_field_has_taken(painter: Painter) -> None:
     assert not field.evaluate("(one) => one.spellcheck")
     field.fill("+1 st")
     field.press("Control+z")  # the text alone
-    assert painter.said("undo") == []
+    assert painter.requests("undo") == []
     field.fill("+1 st")
     field.press("Enter")
     painter.still()
     field.press("Control+z")
-    assert len(painter.said("undo")) == 1
+    assert len(painter.requests("undo")) == 1
 
 
 #: Outlines as they are drawn, beside what they are to be: (wrong pixels, white ones).

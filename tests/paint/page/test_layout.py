@@ -147,12 +147,12 @@ def test_a_look_is_kept_from_anywhere(new_painter: Any, query: str) -> None:
         return str(painter.page.evaluate("() => window.prevented.at(-1)"))
 
     def kept_looks() -> int:
-        return len(painter.said("save_look"))
+        return len(painter.requests("save_look"))
 
     level = painter.page.get_by_role("textbox", name="key, level")
     level.fill("-1")
     assert press("Control+s") == "strue"
-    kinds = [request["kind"] for request in painter.page.evaluate("() => window.host.said")]
+    kinds = [request["kind"] for request in painter.page.evaluate("() => window.host.requests")]
     assert kinds[-2:] == ["constrain_light", "save_look"]
     assert level.input_value() == "\u22121.0 st"
     assert level.evaluate("(one) => one.getRootNode().activeElement === one")

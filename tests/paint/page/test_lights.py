@@ -15,12 +15,12 @@ def visible_lights(painter: Painter) -> list[bool] | None:
 
 def newest_constraints(painter: Painter) -> Any:
     """Return the constraints of the last request on one light."""
-    return painter.said("constrain_light")[-1]["constraints"]
+    return painter.requests("constrain_light")[-1]["constraints"]
 
 
 def test_a_light_is_moved_by_hand_and_freed(painter: Painter) -> None:
     painter.slide("key, stops from now", "ArrowRight", 20)
-    requests = painter.said("constrain_light")
+    requests = painter.requests("constrain_light")
     assert requests[-1]["light"] == 0
     assert requests[-1]["is_final"] is True
     current = painter.page.evaluate("() => window.painter.store.value.lights[0].present")
@@ -51,7 +51,7 @@ def test_a_level_is_typed_in_stops_or_percent(painter: Painter) -> None:
     ):
         painter.type("key, level", text)
         assert lock() == pytest.approx([factor * x for x in current], rel=1e-6)
-    count = len(painter.said("constrain_light"))
+    count = len(painter.requests("constrain_light"))
     for text in ("bright", "-3 %", "21 st", "12", "80", "-200"):
         painter.type("key, level", text)
         painter.page.get_by_role("textbox", name="key, level").blur()
@@ -62,15 +62,15 @@ def test_a_level_is_typed_in_stops_or_percent(painter: Painter) -> None:
     toast_count = len(painter.ui("toasts"))
     painter.type("key, level", " ")
     assert len(painter.ui("toasts")) == toast_count
-    assert len(painter.said("constrain_light")) == count
+    assert len(painter.requests("constrain_light")) == count
     level = painter.page.get_by_role("textbox", name="key, level")
     assert level.input_value() == "\u22129.0 st"
     level.press("ArrowUp")
     assert lock() == pytest.approx([2**-8.9 * x for x in current], rel=1e-6)
     painter.type("key, level", "off")
-    count = len(painter.said("constrain_light"))
+    count = len(painter.requests("constrain_light"))
     level.press("ArrowDown")  # there is nothing below it
-    assert len(painter.said("constrain_light")) == count
+    assert len(painter.requests("constrain_light")) == count
     assert level.input_value() == "off"
     level.press("ArrowUp")
     assert level.input_value() == "\u22127.9 st"
@@ -98,7 +98,7 @@ def test_a_light_is_held_at_what_is_typed_in_any_unit(painter: Painter) -> None:
 def test_of_a_light_that_is_off_there_are_no_percent(painter: Painter) -> None:
     painter.type("cove, level", "80 %")
     assert "cove is off now" in painter.ui("toasts")[-1]["text"]
-    assert painter.said("constrain_light") == []
+    assert painter.requests("constrain_light") == []
     painter.type("cove, level", "as now")
     assert newest_constraints(painter) == {"lock": [0, 0, 0]}
 
@@ -106,7 +106,7 @@ def test_of_a_light_that_is_off_there_are_no_percent(painter: Painter) -> None:
 def test_limits_that_leave_nothing_are_not_sent(painter: Painter) -> None:
     painter.page.get_by_role("button", name="key", exact=True).click()
     painter.type("Max", "150")
-    count = len(painter.said("constrain_light"))
+    count = len(painter.requests("constrain_light"))
     for label, before, text, words in (
         ("Min", "", "200", "The minimum (200 %) is above the maximum (150 %)"),
         ("Min", "", "150", ""),
@@ -119,7 +119,7 @@ def test_limits_that_leave_nothing_are_not_sent(painter: Painter) -> None:
             assert field.input_value() == before
         else:
             count += 1
-        assert len(painter.said("constrain_light")) == count
+        assert len(painter.requests("constrain_light")) == count
 
 
 @pytest.mark.parametrize("size", [(1280, 720), (1920, 1080), (690, 560), (480, 640)])
@@ -217,7 +217,7 @@ def test_what_a_light_may_do(painter: Painter) -> None:
     panel.get_by_role("button", name="As now", exact=True).click()
     assert newest_constraints(painter) == {"lock": True}
     painter.choose("Tie to", "cove")
-    assert painter.said("tie")[-1]["ties"] == [["key", "cove"]]
+    assert painter.requests("tie")[-1]["ties"] == [["key", "cove"]]
     group = painter.page.get_by_role("group", name="key and cove, tied")
     painter.page.evaluate("() => painter.session.constrainLight(0, { color: '3200K' })")
     colour = painter.page.get_by_role("combobox", name="Colour", exact=True)
@@ -229,7 +229,7 @@ def test_what_a_light_may_do(painter: Painter) -> None:
     assert group.locator(".light").count() == 0
     group.get_by_role("button", name="key and cove, tied").first.click()
     painter.button("Untie").click()
-    assert painter.said("tie")[-1]["ties"] == []
+    assert painter.requests("tie")[-1]["ties"] == []
 
 
 def test_who_holds_a_light_holds_its_dimmer(painter: Painter) -> None:
@@ -245,7 +245,8 @@ def test_who_holds_a_light_holds_its_dimmer(painter: Painter) -> None:
     free.click()
     assert newest_constraints(painter) == {}
     assert (
-        painter.said("constrain_light")[-1]["light"] == painter.said("constrain_light")[0]["light"]
+        painter.requests("constrain_light")[-1]["light"]
+        == painter.requests("constrain_light")[0]["light"]
     )  # key holds both
     key.get_by_role("button", name="Lock key as it is").wait_for()
 
@@ -373,7 +374,7 @@ def test_solo_and_mute_ask_nothing_of_the_solve(painter: Painter) -> None:
     assert not painter.calls("begin")
     painter.button("Mute: show the picture without key").click()
     assert visible_lights(painter) == [k != 0 for k in range(7)]
-    assert not painter.said("constrain_light")
+    assert not painter.requests("constrain_light")
     painter.page.locator(".light-thumb").nth(1).hover()
     painter.still()
     shown_view = painter.page.evaluate("() => window.engine.shown")
@@ -420,7 +421,7 @@ def test_64_lights_are_found_sorted_and_folded(new_painter: Any) -> None:
 def test_a_number_is_taken_as_it_is_shown(painter: Painter) -> None:
     painter.button("Solve settings").click()
     painter.type("At most", "1.5")
-    assert painter.said("change_settings")[-1]["settings"] == {"sparse": 2}
+    assert painter.requests("change_settings")[-1]["settings"] == {"sparse": 2}
     assert painter.page.get_by_role("textbox", name="At most").input_value() == "2"
 
 
@@ -444,27 +445,27 @@ def test_a_finger_scrolls_lights_and_moves_none(new_painter: Any) -> None:
     x, y, _ = place()
     scrolled = "() => document.querySelector('.is-lights .fold-body').scrollTop"
     before, value = painter.page.evaluate(scrolled), slider.input_value()
-    finger.goes(*((x, y - 12 * k) for k in range(8)), *[(x, y - 84)] * 8)
+    finger.drag(*((x, y - 12 * k) for k in range(8)), *[(x, y - 84)] * 8)
     assert painter.page.evaluate(scrolled) > before + 40
     painter.page.evaluate("() => document.activeElement.blur()")
-    assert painter.said("constrain_light") == []
+    assert painter.requests("constrain_light") == []
     assert slider.input_value() == value
     x, y, _ = place()
-    finger.goes(*((x + 6 * k, y + k) for k in range(8)))
-    requests = painter.said("constrain_light")
+    finger.drag(*((x + 6 * k, y + k) for k in range(8)))
+    requests = painter.requests("constrain_light")
     assert {request["light"] for request in requests} == {4}
     assert [request["is_final"] for request in requests][:: len(requests) - 1] == [False, True]
     assert mark(x + 42) == pytest.approx(0, abs=10)  # half of the mark, which stays on the track
     search = painter.page.get_by_role("searchbox", name="Search lights")
     search.focus()
-    finger.goes((x, y))
+    finger.drag((x, y))
     assert slider.evaluate("(one) => one === document.activeElement")
     assert [
-        request["is_final"] for request in painter.said("constrain_light")[len(requests) :]
+        request["is_final"] for request in painter.requests("constrain_light")[len(requests) :]
     ] == [True]
     assert mark(x) == pytest.approx(0, abs=10)
     slider.press("ArrowRight")  # keys are heard as before
-    assert len(painter.said("constrain_light")) > len(requests) + 1
+    assert len(painter.requests("constrain_light")) > len(requests) + 1
     painter.page.mouse.click(x + 30, y)  # and so is a mouse
     assert mark(x + 30) == pytest.approx(0, abs=10)
 
@@ -552,7 +553,7 @@ def test_all_lights_are_let_go_of_in_one_step(painter: Painter) -> None:
     steps = painter.ui("history")["count"]
     free.click()
     free.wait_for(state="detached")
-    [request] = painter.said("constrain_lights")
+    [request] = painter.requests("constrain_lights")
     assert request["constraints"] == {"key": {"limits": {"max": "150%"}}, "cove": {}}
     assert painter.ui("history")["count"] == steps + 1
     assert painter.page.locator(".dimmer.is-held").count() == 0

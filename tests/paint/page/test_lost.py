@@ -16,7 +16,7 @@ def test_a_tab_that_comes_second_says_where_the_painter_is(new_painter: Any) -> 
     assert abs(box["x"] + box["width"] / 2 - view["x"] - view["width"] / 2) < 2
     notice.get_by_role("button", name="Take over").click()
     painter.page.locator(".lightpaint .tag").first.wait_for()
-    assert painter.said("take_over")
+    assert painter.requests("take_over")
     assert notice.count() == 0
 
 
@@ -27,7 +27,7 @@ def test_what_fails_is_said_and_the_painter_lives(painter: Painter) -> None:
     painter.button("Dismiss").click()
     assert not painter.page.get_by_text("the disk is full").is_visible()
     painter.button("Save look").click()
-    assert len(painter.said("save_look")) == 2
+    assert len(painter.requests("save_look")) == 2
 
 
 def test_a_session_that_is_lost_or_taken(painter: Painter) -> None:
@@ -39,7 +39,7 @@ def test_a_session_that_is_lost_or_taken(painter: Painter) -> None:
     painter.stroke()
     assert not painter.calls("begin")  # who does not have it does not paint on it
     painter.button("Take over").click()
-    assert painter.said("take_over")
+    assert painter.requests("take_over")
     assert not painter.page.get_by_role("alert").is_visible()
 
 
@@ -66,7 +66,7 @@ def test_a_place_that_has_lost_the_painter_gets_its_pictures_when_it_has_it_agai
         "() => engine.mirror.isReady && !engine.mirror.loader.missingSlots().length"
     )
     painter.stroke()
-    assert painter.said("paint")
+    assert painter.requests("paint")
 
 
 def fail_next_request(painter: Painter) -> None:
@@ -87,7 +87,7 @@ def test_what_is_refused_is_shown_no_longer(painter: Painter) -> None:
     assert at_most.input_value() == ""
     painter.choose("Colour", "kelvin")
     constraints = {"limits": {"min": "20%"}, "kelvin": [2700, 6500]}
-    assert painter.said("constrain_light")[-1]["constraints"] == constraints
+    assert painter.requests("constrain_light")[-1]["constraints"] == constraints
     fail_next_request(painter)
     painter.choose("Colour", "any")
     painter.still()
@@ -135,7 +135,7 @@ def test_a_kernel_that_does_not_answer_is_said_to_until_it_does(new_painter: Any
     painter.page.clock.resume()
     painter.page.evaluate("() => { model.isBusy = false; void model.work(); }")
     painter.page.wait_for_function("() => !document.querySelector('[role=alert]')")
-    assert painter.said("paint")[-1]["is_final"] is True
+    assert painter.requests("paint")[-1]["is_final"] is True
     assert alert_text(painter) == ""
     painter.page.clock.fast_forward(60_000)  # nothing is waited for
     assert alert_text(painter) == ""

@@ -183,13 +183,13 @@ def test_a_finger_scrolls_past_sliders(make_basis: Any, open_file: Any, browser:
         slider.evaluate("(one) => one.scrollIntoView({ block: 'center' })")
         box, value = slider.bounding_box(), float(slider.input_value())
         x, y = box["x"] + 0.2 * box["width"], box["y"] + box["height"] / 2
-        finger.goes(*((x, y + 12 * k) for k in range(8)), *[(x, y + 84)] * 8)
+        finger.drag(*((x, y + 12 * k) for k in range(8)), *[(x, y + 84)] * 8)
         assert page.evaluate("window.scrolls") == k + 1
         assert float(slider.input_value()) == value
         slider.evaluate("(one) => one.scrollIntoView({ block: 'center' })")
         box = slider.bounding_box()
         y = box["y"] + box["height"] / 2
-        finger.goes(*((x + 6 * k, y) for k in range(8)))
+        finger.drag(*((x + 6 * k, y) for k in range(8)))
         part = slider.evaluate("(one) => (one.value - one.min) / (one.max - one.min)")
         assert part * box["width"] == pytest.approx(x + 42 - box["x"], abs=10)
     context.close()

@@ -74,7 +74,7 @@ def run(page: Any, site_of: Any) -> Any:
                 }};
                 const rest = async () => {{
                     await until(() => !engine.mirror.strokes.isPending);
-                    return host.said.map(({{ kind, fields }}) => [kind, fields]);
+                    return host.requests.map(({{ kind, fields }}) => [kind, fields]);
                 }};
                 {script}
             }}""",

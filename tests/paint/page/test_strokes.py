@@ -22,7 +22,7 @@ def host_messages(page: Any) -> Any:
                 const canvas = bench.plain(20, 30, 0);
                 const host = new SlowHost();
                 const strokes = new StrokeSender(
-                    host, () => host.refused = true, (...said) => host.lost = said);
+                    host, () => host.refused = true, (...details) => host.lost = details);
                 strokes.paintOn(canvas, 0);
                 {script}
             }}"""
@@ -83,7 +83,7 @@ def test_what_is_done_is_sent_as_it_was_then(host_messages: Any):
         strokes.begin(); canvas.image.fill(2); strokes.touch([0, 2, 0, 2]);
         strokes.end("b");
         for (let k = 0; k < 3; k++) await host.answer();
-        return host.said.map(({ fields, arrays }) =>
+        return host.requests.map(({ fields, arrays }) =>
             [fields.stroke, fields.is_final, ...arrays.image.data.slice(0, 1)]);
         """
     )
@@ -98,7 +98,7 @@ def test_a_lost_connection_loses_no_stroke(host_messages: Any):
         await host.lose();
         strokes.begin(); strokes.touch([8, 9, 8, 9]); strokes.end("b");
         strokes.begin(); strokes.touch([1, 2, 1, 2]); strokes.touch([3, 4, 3, 4]);
-        host.said.length = 0;
+        host.requests.length = 0;
         await host.find(1);
         for (let k = 0; k < 3; k++) await host.answer();
         return host.told;
@@ -120,7 +120,7 @@ def test_what_another_page_has_not_let_through_is_given_up(host_messages: Any):
         host.emit("closed", { kind: "closed", reason: "taken" });
         await host.lose();
         strokes.begin(); strokes.touch([8, 9, 8, 9]);
-        host.said.length = 0;
+        host.requests.length = 0;
         host.emit("state", { kind: "state", stroke: 7, is_back: false });
         await host.find(7);
         const lost = host.lost;

@@ -27,7 +27,7 @@ def test_files_that_are_written_are_seen_when_their_window_is_closed(painter: Pa
     chip = page.locator(".working")
     chip.get_by_text("Exporting files: 25 %").wait_for()
     page.get_by_role("button", name="Stop: exporting files").click()
-    assert painter.said("export")[-1] == {"kind": "export", "outputs": [], "run": False}
+    assert painter.requests("export")[-1] == {"kind": "export", "outputs": [], "run": False}
     painter.tell(
         kind="exported", files=["/shows/gallery-evening/lighting.json"], command="", is_stopped=True
     )

@@ -19,7 +19,7 @@ export class FakeHost {
       room,
       isFirst,
       isElsewhere,
-      said: [],
+      requests: [],
       hearers: {},
       looks: [],
       ids: 0,
@@ -66,7 +66,7 @@ export class FakeHost {
 
   /** Every message is answered, a little later; tests may have it fail, or wait. */
   async send(kind, fields = {}, arrays = {}) {
-    this.said.push({ kind, ...fields });
+    this.requests.push({ kind, ...fields });
     this.busy = (this.busy ?? 0) + 1;
     await new Promise((done) => setTimeout(done, 1));
     const failed = (text) => ({ kind: 'failed', text });
@@ -74,7 +74,7 @@ export class FakeHost {
       ? failed(this.fails)
       : (this[kind]?.(fields, arrays) ?? failed(`no ${kind}`));
     this.fails = null;
-    const reply = { arrays: {}, ...made, reply: this.said.length };
+    const reply = { arrays: {}, ...made, reply: this.requests.length };
     this.tell(reply);
     this.busy -= 1;
     return reply;
