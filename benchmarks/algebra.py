@@ -102,12 +102,15 @@ def solves(repeats: int) -> None:
             nnls(L.T, np.linalg.solve(L, b), maxiter=100 * len(b))
 
         one = partial(minimise, M, b[0], start=np.ones(n))
-        anything = reduce_to(Constraints(), lights(n))
+        free_reduction = reduce_to(Constraints(), lights(n))
         three = partial(
-            solve_reduced, NormalEquations(all_M, b, np.ones(3)), anything, np.ones((n, 3))
+            solve_reduced, NormalEquations(all_M, b, np.ones(3)), free_reduction, np.ones((n, 3))
         )
         second = partial(
-            solve_reduced, NormalEquations(all_M, other, np.ones(3)), anything, three().weights
+            solve_reduced,
+            NormalEquations(all_M, other, np.ones(3)),
+            free_reduction,
+            three().weights,
         )
         optimum = one()
         print(
@@ -173,12 +176,14 @@ def looks() -> None:
     for n in (12, 64):
         images, target, importance = picture(n)
         M, b, norm2 = inner_products(images, target, importance)
-        rng, anything = np.random.default_rng(2), reduce_to(Constraints(), lights(n))
+        rng, free_reduction = np.random.default_rng(2), reduce_to(Constraints(), lights(n))
         weights, count = np.ones((n, 3)), 0
         start = time.perf_counter()
         while time.perf_counter() - start < 2:
             other = b * rng.uniform(0.5, 1.5, b.shape)
-            weights = solve_reduced(NormalEquations(M, other, norm2), anything, weights).weights
+            weights = solve_reduced(
+                NormalEquations(M, other, norm2), free_reduction, weights
+            ).weights
             count += 1
         print(f"{n:8d}{count / (time.perf_counter() - start):10.0f}")
 

@@ -85,13 +85,13 @@ def measure(scene: Scene, spp: int, repeats: int, only: int) -> None:
 
 def one_pass(scene: Scene, spp: int, *, seed: int) -> Run:
     """The basis as lightpaint renders it, from the first pass to the finished arrays."""
-    begun: list[float] = []
+    starts: list[float] = []
 
     def progress(_label: str, _done: int, _total: int) -> None:
-        begun.append(time.process_time())
+        starts.append(time.process_time())
 
     basis = render_basis(scene, spp=spp, seed=seed, progress=progress)
-    seconds = time.process_time() - begun[0]
+    seconds = time.process_time() - starts[0]
     variances = np.square(basis.half_differences, dtype=np.float64).mean(axis=(1, 2, 3))
     del basis
     gc.collect()

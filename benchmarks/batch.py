@@ -88,9 +88,9 @@ def cluster(workers: int, folder: Path) -> Iterator[str]:
 
 def took(work: Callable[[], object], address: str | None = None) -> Took:
     """What `work` takes here and, at `address`, workers."""
-    before, here_s, begun = _workers_s(address), time.process_time(), time.perf_counter()
+    before, here_s, start_s = _workers_s(address), time.process_time(), time.perf_counter()
     work()
-    clock_s = time.perf_counter() - begun
+    clock_s = time.perf_counter() - start_s
     cpu_s = [time.process_time() - here_s]
     cpu_s += [total_s - before.get(worker, 0.0) for worker, total_s in _workers_s(address).items()]
     return Took(clock_s, max(cpu_s), sum(cpu_s))
@@ -153,9 +153,9 @@ def looks(folder: Path, count: int, steps: str, **options: Any) -> None:
     (folder / "looks.toml").write_text(text, encoding="utf-8")
     with tempfile.TemporaryDirectory(dir=folder) as place:
         address = options.get("cluster")
-        begun = time.perf_counter()
+        start_s = time.perf_counter()
         planned = plan(folder / "looks.toml", Path(place) / "out")
-        checked_s = time.perf_counter() - begun
+        checked_s = time.perf_counter() - start_s
 
         if address:  # workers begin with the first
             assert not run_batch(planned.select("p000[01]"), RunOptions(**options)).failed

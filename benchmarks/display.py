@@ -58,14 +58,14 @@ def main() -> None:
         difference = np.abs(size * (solution.weights - expected.weights)).max()
         loss = loss_with_pull(solution) / loss_with_pull(expected) - 1
         view_options = ("--view", view.name, "--exposure", str(view.stops))
-        used, clock = command(
+        cpu_s, clock = command(
             options.basis, options.painting, *view_options, repeats=options.repeats
         )
         rounds = [x.certificate.rounds for x in (solution, expected)]
         print(
             f"{name:8s} {a:8.2f} {rounds[0]:7d} {b:8.2f} {rounds[1]:7d} {b / a:6.1f}x "
             f"{difference / (size * expected.weights).max():8.0e} {loss:+8.0e} "
-            f"{used:6.2f} {clock:6.2f} {used / literal[0]:5.2f}x",
+            f"{cpu_s:6.2f} {clock:6.2f} {cpu_s / literal[0]:5.2f}x",
             flush=True,
         )
 
@@ -91,8 +91,8 @@ def command(basis: str, painting: str, *options: str, repeats: int) -> tuple[flo
             run = [sys.executable, "-m", "lightpaint", *words]
             subprocess.run(run, check=True, capture_output=True)
             clock, after = time.perf_counter() - start, os.times()
-        used = after.children_user + after.children_system
-        took.append((used - before.children_user - before.children_system, clock))
+        cpu_s = after.children_user + after.children_system
+        took.append((cpu_s - before.children_user - before.children_system, clock))
     used_s, clock_s = zip(*took, strict=True)
     return min(used_s), min(clock_s)
 

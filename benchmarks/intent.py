@@ -146,32 +146,32 @@ def main() -> None:
             for style in options.styles
         }
         head(cases)
-        nothing = judged_alike(cases, basis.mix(basis.current_weights))
-        row("doing nothing", nothing, nothing, nothing)
+        idle_errors = judged_alike(cases, basis.mix(basis.current_weights))
+        row("doing nothing", idle_errors, idle_errors, idle_errors)
         for setting in options.settings:
             own = judged_alike(cases, basis.mix(unpainted(basis, SETTINGS[setting])))
-            if own != nothing:
-                row(f"nothing, {setting}", own, nothing, own)
+            if own != idle_errors:
+                row(f"nothing, {setting}", own, idle_errors, own)
             start_s = time.perf_counter()
             errors = {
                 style: [x.judged(answer(basis, x, SETTINGS[setting])) for x in cases_of_style]
                 for style, cases_of_style in cases.items()
             }
             taken_s = time.perf_counter() - start_s
-            row(setting, errors, nothing, own, taken_s / (options.cases * len(cases)))
+            row(setting, errors, idle_errors, own, taken_s / (options.cases * len(cases)))
         for spp in options.few:
             few = obtain_basis(scene, spp=spp, seed=1, use_cache=False)
             errors = {
                 style: [x.judged(basis.mix(weights(few, x.over(few), {}))) for x in cases_of_style]
                 for style, cases_of_style in cases.items()
             }
-            row(f"default, {spp} spp", errors, nothing, nothing)
+            row(f"default, {spp} spp", errors, idle_errors, idle_errors)
         groups = as_light_groups(basis)
         errors = {
             style: [x.judged(answer(groups, x, {})) for x in cases_of_style]
             for style, cases_of_style in cases.items()
         }
-        row("default, light groups", errors, nothing, nothing)
+        row("default, light groups", errors, idle_errors, idle_errors)
         numbers = range(options.first, options.first + options.cases)
         lamps = [over_lamp(basis, np.random.default_rng([99, k])) for k in numbers]
         lamps = {"lamps": [x for x in lamps if x is not None]}
@@ -323,12 +323,12 @@ def painted(
 def over_lamp(basis: lp.Basis, rng: np.random.Generator) -> Case | None:
     """A stroke over a lamp in view and what is around it; None where no lamp is in view."""
     current, emitter_mask = basis.current_look, basis.emitters_seen
-    whose = np.argmax(luminance(current_pictures(basis)), axis=0)
-    lamps = [k for k in np.unique(whose[emitter_mask]) if not basis.is_fixed[k]]
+    brightest_lights = np.argmax(luminance(current_pictures(basis)), axis=0)
+    lamps = [k for k in np.unique(brightest_lights[emitter_mask]) if not basis.is_fixed[k]]
     if not lamps:
         return None
     k = int(rng.choice(lamps))
-    rows, columns = np.nonzero(emitter_mask & (whose == k))
+    rows, columns = np.nonzero(emitter_mask & (brightest_lights == k))
     pixel = int(rng.integers(rows.size))
     y, x = np.mgrid[: basis.size[0], : basis.size[1]]
     away = np.hypot(y - rows[pixel], x - columns[pixel]) / basis.size[0]

@@ -212,13 +212,13 @@ def measure(scene: Scene, long: Path, spp: int, repeats: int, output: Path) -> N
 
 def render_timed(scene: Scene, spp: int, seed: int) -> tuple[Basis, float]:
     """Return a basis and the processor's seconds from its first pass on."""
-    begun: list[float] = []
+    starts: list[float] = []
 
     def progress(*_: object) -> None:
-        begun.append(time.process_time())
+        starts.append(time.process_time())
 
     basis = render_basis(scene, spp=spp, seed=seed, progress=progress)
-    return basis, time.process_time() - begun[0]
+    return basis, time.process_time() - starts[0]
 
 
 def render_alone(

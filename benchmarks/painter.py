@@ -409,12 +409,12 @@ def print_moves(path: str, moves: int = 30) -> None:
             time.sleep(2)
             k, parts = studio.session.basis.names.index(name), []
             for step in range(moves):
-                began = time.process_time(), time.perf_counter()
+                start = time.process_time(), time.perf_counter()
                 pose = {"position": (place + np.array([0.01 * step, 0, 0])).tolist()}
                 studio.handle(protocol.MoveLights({name: pose}, is_final=False), {})
                 studio.resource(f"clean/{k}").tobytes()
                 ended = time.process_time(), time.perf_counter()
-                parts.append([b - a for a, b in zip(began, ended, strict=True)])
+                parts.append([b - a for a, b in zip(start, ended, strict=True)])
             cpu, wall = np.median(parts[5:], axis=0)
             lights = len(scene.lights)
             print(
@@ -491,8 +491,8 @@ def started(
     page.wait_for_function(f"() => {PAINTER}.engine.mirror.strokes.count && {PAINTER}.engine.mirror"
                            ".strokes.isPending === false", timeout=60_000)  # fmt: skip
     times.append(time.perf_counter() - begin)
-    used = Path(f"/proc/{painter.pid}/stat").read_text().rpartition(")")[2].split()[11:13]
-    times.append(sum(map(int, used)) / os.sysconf("SC_CLK_TCK"))
+    cpu_ticks = Path(f"/proc/{painter.pid}/stat").read_text().rpartition(")")[2].split()[11:13]
+    times.append(sum(map(int, cpu_ticks)) / os.sysconf("SC_CLK_TCK"))
     if is_first:
         until = time.monotonic() + 600
         while not list(Path(folder).glob("*.clean.npz")) and time.monotonic() < until:

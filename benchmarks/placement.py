@@ -262,8 +262,10 @@ def plain_share(basis: lp.Basis, painted: Floats) -> float:
     factor = basis.size[0] // painted.shape[0]
     planes = np.stack([block_mean(plane, factor).reshape(-1, 3) for plane in basis.planes])
     goal = painted.reshape(-1, 3)
-    left = [nnls(planes[:, :, c].T.astype(float), goal[:, c].astype(float))[1] for c in range(3)]
-    return float(np.linalg.norm(left) / np.linalg.norm(goal))
+    residuals = [
+        nnls(planes[:, :, c].T.astype(float), goal[:, c].astype(float))[1] for c in range(3)
+    ]
+    return float(np.linalg.norm(residuals) / np.linalg.norm(goal))
 
 
 def listed(values: list[float], form: str) -> str:

@@ -181,7 +181,7 @@ def _read_all(folder: Path) -> None:
 
 
 def _describe_outcome(reader: Reader, path: Path, known_value: Any) -> str:
-    began = time.process_time()  # however busy the machine is
+    start_s = time.process_time()  # however busy the machine is
     try:
         read = reader.read(path)
     except LightpaintError as error:
@@ -194,7 +194,7 @@ def _describe_outcome(reader: Reader, path: Path, known_value: Any) -> str:
         return f"{type(error).__name__}: {str(error)[:200]!r}"
     else:
         outcome = "same" if read == known_value else reader.opinion(path, read)
-    took = time.process_time() - began
+    took = time.process_time() - start_s
     return outcome if took < SECONDS else f"took {took:.1f} s"
 
 

@@ -50,8 +50,8 @@ def fake_blender() -> tuple[ModuleType, ModuleType]:
     bpy, vectors = ModuleType("bpy"), ModuleType("mathutils")
     lights = SimpleNamespace(new=lambda name, kind: SimpleNamespace(type=kind, users=1))
     bpy.data = SimpleNamespace(objects=FakeObjects(), worlds={}, lights=lights)  # type: ignore[attr-defined]
-    nothing = SimpleNamespace(link=lambda item: None)
-    scene = SimpleNamespace(collection=SimpleNamespace(objects=nothing))
+    scene_link = SimpleNamespace(link=lambda item: None)
+    scene = SimpleNamespace(collection=SimpleNamespace(objects=scene_link))
     layer = SimpleNamespace(update=lambda: None)
     bpy.context = SimpleNamespace(scene=scene, view_layer=layer)  # type: ignore[attr-defined]
     vectors.Matrix = FakeMatrix  # type: ignore[attr-defined]

@@ -122,8 +122,10 @@ class Stage:
         finish(self.look)
         if kind in ("earlier", "new") and self.what_is_there() != kind:
             kind = f"{kind}, and another when finished"
-        left = [path.name for path in self.hidden]
-        return Outcome(f"{kind}, with {left}" if left else kind, process.returncode, stderr)
+        leftovers = [path.name for path in self.hidden]
+        return Outcome(
+            f"{kind}, with {leftovers}" if leftovers else kind, process.returncode, stderr
+        )
 
     def what_is_there(self) -> str:
         """`earlier`, `new`, or what is wrong."""
@@ -215,11 +217,11 @@ def _main() -> int:
         for k in range(options.kills):
             name = list(COMMANDS)[k % len(COMMANDS)]
             number = chance.choice([signal.SIGKILL, signal.SIGKILL, signal.SIGTERM])
-            when, until = next(turns[name])
+            moment, until = next(turns[name])
             outcome = stages[name].killed(until, number)
             if "Traceback" in outcome.stderr:
                 print(outcome.stderr)
-            mixtures[name, when, number.name, outcome.kind, outcome.code] += 1
+            mixtures[name, moment, number.name, outcome.kind, outcome.code] += 1
     for row, count in sorted(mixtures.items()):
         print(count, *row, sep="\t")
     return int(any(row[3] not in ("earlier", "new") for row in mixtures))

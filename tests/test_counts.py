@@ -36,9 +36,9 @@ MANY = ["#ff0000", "#00ff00"] * 1500
 def test_no_light_mixes_more_colours_than_a_fixture_has(tmp_path: Path) -> None:
     assert MAX_PRIMARIES == 16
     Constraints.of({"a": {"primaries": MANY[:16]}})
-    says = "lists {} colours: at most 16 can be mixed"
+    message = "lists {} colours: at most 16 can be mixed"
     for count in (17, len(MANY)):
-        with pytest.raises(ConstraintError, match=says.format(count)):
+        with pytest.raises(ConstraintError, match=message.format(count)):
             Constraints.of({"a": {"primaries": MANY[:count]}})
     path = tmp_path / "hall.lights.toml"
     path.write_text(f"[light.a]\nprimaries = {json.dumps(MANY)}\n")
@@ -74,12 +74,12 @@ def test_lists_of_lights_have_an_end(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match=f"at most {MAX_NAME} characters"):
         choose_lights([], scene="hall.xml", groups={"x" * 10**6: ["a"]})
     path = tmp_path / "hall.lights.toml"
-    for text, says in (
+    for text, message in (
         (f"lights = {json.dumps(names)}", f"at most {MAX_LISTED}"),
         (f"[groups]\n{'x' * 10**6} = ['a']", f"a name of more than {MAX_NAME} characters"),
     ):
         path.write_text(text)
-        with pytest.raises(SceneError, match=says):
+        with pytest.raises(SceneError, match=message):
             read_lights_file(path)
 
 
@@ -136,9 +136,9 @@ def test_samples_and_suggestions_have_an_end(tmp_path: Path) -> None:
 # Work that is given up
 
 
-def _without_end(began: threading.Event) -> None:
+def _without_end(has_begun: threading.Event) -> None:
     check = cancellation_check()
-    began.set()
+    has_begun.set()
     while True:
         check()
         time.sleep(0.001)
@@ -149,9 +149,9 @@ def test_a_server_ends_while_its_session_is_at_work() -> None:
         on_message: Callable[[Message], None] | None = None
 
     async def serve_and_end() -> None:
-        line, began = Connections(Slow(), None), threading.Event()  # type: ignore[arg-type]
-        work = asyncio.ensure_future(line._thread.run(_without_end, began))
-        await asyncio.to_thread(began.wait)
+        line, has_begun = Connections(Slow(), None), threading.Event()  # type: ignore[arg-type]
+        work = asyncio.ensure_future(line._thread.run(_without_end, has_begun))
+        await asyncio.to_thread(has_begun.wait)
         await asyncio.wait_for(line.close(), 10)
         with pytest.raises(PaintError, match="the painter has ended"):
             await work
@@ -160,13 +160,13 @@ def test_a_server_ends_while_its_session_is_at_work() -> None:
 
 
 def test_ctrl_c_waits_for_no_job_beside() -> None:
-    began = threading.Event()
+    has_begun = threading.Event()
 
     def work(is_other: bool) -> None:
         if threading.current_thread() is threading.main_thread():
-            began.wait()
+            has_begun.wait()
             raise KeyboardInterrupt
-        _without_end(began)
+        _without_end(has_begun)
 
     with pytest.raises(KeyboardInterrupt):
         parallel_map(work, [False, True])

@@ -116,12 +116,12 @@ def test_the_view_is_that_of_the_picture(folder: Path):
 def test_an_exposure_alone_is_one_of_the_templates_view(folder: Path, basis: Basis):
     """And a view alone is at the template's exposure: half of what is asked is the template's."""
     image, transform = basis.mix(TRUTH), ViewTransform("agx", -3.0)
-    nothing = np.zeros_like(image)
+    black = np.zeros_like(image)
     write_template(
         folder,
         Template(image / 2, transform),
-        normals=nothing,
-        depth=nothing[..., 0],
+        normals=black,
+        depth=black[..., 0],
         mattes={},
         lights={},
     )

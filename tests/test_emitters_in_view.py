@@ -67,9 +67,9 @@ def test_which_pixels_count(
         assert remarks == []
         return
     assert times == pytest.approx(TIMES, rel=1e-4)
-    left, warning = remarks
-    assert "4 of 120 painted pixels (3.3 %), and count nothing" in left
-    assert 'emitters="count"' in left
+    remark, warning = remarks
+    assert "4 of 120 painted pixels (3.3 %), and count nothing" in remark
+    assert 'emitters="count"' in remark
     assert warning.startswith("WARNING")
     assert "bulb (350 times)" in warning
 

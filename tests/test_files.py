@@ -73,8 +73,8 @@ def test_what_a_kill_leaves_is_swept_up_and_nothing_else(old: Path, has_begun: b
     (old.parent / ".c.txt.12345678").touch()
     before = set(old.parent.iterdir())
     sweep(old.parent)
-    [gone] = before - set(old.parent.iterdir())
-    assert gone.name.startswith(f".{old.name}.")
+    [removed] = before - set(old.parent.iterdir())
+    assert removed.name.startswith(f".{old.name}.")
     sweep(old.parent / "nowhere")
 
 

@@ -198,7 +198,7 @@ def test_what_is_no_job_is_refused_in_one_line():
 
 @pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize(
-    ("options", "error", "says"),
+    ("options", "error", "message"),
     [
         ({"basis": None}, LightpaintError, "give a scene, a basis, or both"),
         ({"targets": ()}, TargetError, "no painting to solve for"),
@@ -219,8 +219,8 @@ def test_what_is_no_job_is_refused_in_one_line():
         ),
     ],
 )
-def test_what_cannot_be_done_is_said_at_birth(options: Any, error: type[Exception], says: str):
-    with pytest.raises(error, match=says):
+def test_what_cannot_be_done_is_said_at_birth(options: Any, error: type[Exception], message: str):
+    with pytest.raises(error, match=message):
         _from_basis(**options)
     assert not Path("out").exists()
 
@@ -236,9 +236,9 @@ def test_what_cannot_be_done_with_a_scene_is_said_before_it_renders(
     target = Target("t", image, image[..., 0], everything=True)
 
     def check_refusal(
-        error: type[Exception], says: str, scenes: Any, targets: Any, **options: Any
+        error: type[Exception], message: str, scenes: Any, targets: Any, **options: Any
     ) -> None:
-        with pytest.raises(error, match=says):
+        with pytest.raises(error, match=message):
             paint_with_light(scenes, targets, tmp_path / "out", **options)
         assert not (tmp_path / "out").exists()
 

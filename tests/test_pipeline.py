@@ -74,13 +74,13 @@ def test_the_view_of_the_solve_is_taken_unless_another_is_given(
     choice: int | None,
     expected: tuple[str | None, int | None],
 ):
-    used: list[Any] = []
-    instead = {
-        "load_scene": lambda _path, sensor, **_: used.append(sensor),
-        "verify": lambda *_args, spp, **_options: used.append(spp),
+    sensors: list[Any] = []
+    replacements = {
+        "load_scene": lambda _path, sensor, **_: sensors.append(sensor),
+        "verify": lambda *_args, spp, **_options: sensors.append(spp),
     }
-    for name, function in instead.items():
+    for name, function in replacements.items():
         monkeypatch.setattr(repeated_verification, name, function)
     folder = _result(tmp_path, None if view is None else json.dumps(view))
     verify_result(folder, spp=choice)
-    assert tuple(used) == expected
+    assert tuple(sensors) == expected

@@ -143,13 +143,13 @@ def test_a_value_may_be_of_several_kinds() -> None:
         assert read_record(Whole, {**GOOD, "place": place}).place == place
     record = read_record(Whole, {**GOOD, "groups": {"row": ["a", "b"]}, "mode": "b"})
     assert (record.groups, record.mode) == ({"row": ("a", "b")}, "b")
-    for invalid, says in (
+    for invalid, message in (
         ({"place": 1.5}, "place is a whole number >= 0 or a text, not 1.5"),
         ({"place": True}, "place is a whole number >= 0 or a text, not True"),
         ({"groups": {"row": "ab"}}, "groups is an object"),
         ({"mode": "c"}, "mode is one of 'a', 'b', not 'c'"),
     ):
-        with pytest.raises(ValueError, match=says):
+        with pytest.raises(ValueError, match=message):
             read_record(Whole, {**GOOD, **invalid})
 
 

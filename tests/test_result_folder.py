@@ -43,10 +43,10 @@ def room(work_folder: Path) -> Path:
 def no_render(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing is rendered: what is refused is refused before."""
 
-    def never(*_: object, **__: object) -> None:
+    def fail(*_: object, **__: object) -> None:
         raise AssertionError("this was to be refused before it renders")
 
-    # The modules that import `obtain` first: what they import then must not be `never` for good.
+    # The modules that import `obtain` first: what they import then must not be `fail` for good.
     for name in (
         "templates.obtain",
         "templates.render",
@@ -54,7 +54,7 @@ def no_render(monkeypatch: pytest.MonkeyPatch) -> None:
         "relit_renders.render",
         "job_bases.obtain",
     ):
-        monkeypatch.setattr(f"lightpaint.pipeline.{name}", never)
+        monkeypatch.setattr(f"lightpaint.pipeline.{name}", fail)
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -83,8 +83,8 @@ def test_a_painting_in_the_result_folder_is_not_written_over(work_folder: Path) 
             assert line.endswith("(-o)")
     (work_folder / "evening" / "x.exr").rename(painting)
     (work_folder / "evening" / "report.html").unlink()
-    left = contents(work_folder)
-    assert {name: left[name] for name in before if name != "evening/report.html"} == {
+    files_before = contents(work_folder)
+    assert {name: files_before[name] for name in before if name != "evening/report.html"} == {
         name: data for name, data in before.items() if name != "evening/report.html"
     }
 
@@ -216,12 +216,12 @@ def test_what_comes_to_the_folder_during_a_run_is_kept(
     analyse = pipeline.analyse
     with monkeypatch.context() as patch:
 
-        def meanwhile(*arguments: Any) -> Any:
+        def write_meanwhile(*arguments: Any) -> Any:
             patch.setattr(pipeline, "analyse", analyse)
             lp.run(other)
             return analyse(*arguments)
 
-        patch.setattr(pipeline, "analyse", meanwhile)
+        patch.setattr(pipeline, "analyse", write_meanwhile)
         with pytest.raises(OutputError, match=r"holds the answer to gallery/evening\.exr"):
             lp.run(job)
     assert json.loads((work_folder / "out" / RECORD).read_text())["answers"] == [

@@ -141,8 +141,8 @@ def test_what_comes_while_files_are_moved_is_not_lost(
 
     monkeypatch.setattr(staging, "_finish_stage", late)
     replace(look)
-    came = {"painting.png": "just saved", "deep/more": "new", "notes.txt": "anew"}
-    assert read(look) == LATER | OTHERS | came
+    newcomers = {"painting.png": "just saved", "deep/more": "new", "notes.txt": "anew"}
+    assert read(look) == LATER | OTHERS | newcomers
 
 
 #: Where a process may be killed: before each of these.
@@ -190,9 +190,9 @@ def _steps(work: Callable[[Path], None], folder: Path) -> Iterator[int]:
     while True:
         look = folder / str(step)
         fill(look, EARLIER | OTHERS)
-        goes_on = killed_at(step, lambda look=look: work(look))  # type: ignore[misc]
+        is_unfinished = killed_at(step, lambda look=look: work(look))  # type: ignore[misc]
         yield step
-        if not goes_on:
+        if not is_unfinished:
             return
         step += 1
 
@@ -231,11 +231,11 @@ def test_killed_while_it_finishes_what_was_killed(tmp_path: Path) -> None:
             cut_short(look)
         os.waitpid(child, 0)
         assert read(look) == EARLIER | OTHERS
-        goes_on = killed_at(step, lambda look=look: finish(look))  # type: ignore[misc]
+        is_unfinished = killed_at(step, lambda look=look: finish(look))  # type: ignore[misc]
         finish(look)
         assert read(look) == LATER | OTHERS
         assert hidden(look) == []
-        if not goes_on:
+        if not is_unfinished:
             return
     raise AssertionError("it never came to its end")
 

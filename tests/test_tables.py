@@ -56,8 +56,8 @@ def test_arrays_are_labelled_and_solve_the_same_problem() -> None:
     dataset = answer.to_xarray()
     # M w = b where nothing is at a bound: here for what is on.
     on = dataset.sel(light=["lamp 0", "lamp 1"])
-    left = (dataset.M * dataset.weights.rename(light="other")).sum("other").sel(light=on.light)
-    np.testing.assert_allclose(left.transpose(*on.b.dims), on.b, rtol=1e-6)
+    products = (dataset.M * dataset.weights.rename(light="other")).sum("other").sel(light=on.light)
+    np.testing.assert_allclose(products.transpose(*on.b.dims), on.b, rtol=1e-6)
     mixed = (images.images * dataset.weights).sum("light")
     np.testing.assert_allclose(mixed, dataset.predicted, rtol=1e-5)
     np.testing.assert_array_equal(answer.lighting.to_xarray().weight, dataset.weights)

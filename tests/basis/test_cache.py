@@ -302,9 +302,9 @@ def test_the_longest_unused_goes_first(scene: Scene, monkeypatch: pytest.MonkeyP
         os.utime(entry.path, (1000 + age, 1000 + age))
     monkeypatch.setattr(cache, "MAX_BYTES", int(2.5 * oldest.size))
     obtain_basis(scene, spp=2, seed=3)
-    left = {entry.path for entry in cache.entries()}
-    assert by_age[2].path in left
-    assert len(left) == 2
+    remaining_files = {entry.path for entry in cache.entries()}
+    assert by_age[2].path in remaining_files
+    assert len(remaining_files) == 2
     left_over = cache.entries()
     assert cache.delete_entries(left_over) == sum(entry.size for entry in left_over)
     assert cache.entries() == []
@@ -356,7 +356,7 @@ def test_bases_are_dropped_by_scene_or_file(
     assert completed.stdout.count("hall.xml") == 2
     assert f"2 deleted from {empty_cache}: {size / 1e6:.1f} MB are free" in completed.stdout
     assert scenes("*") == ["?", "room.xml"]
-    for line, says in (
+    for line, message in (
         (["drop", "hall"], "no basis of 'hall' is kept in"),
         (["drop", "room", "gone"], "no basis of 'gone' is kept in"),  # and the other stays
         (["drop"], "cache drop needs the name of a scene"),
@@ -365,7 +365,7 @@ def test_bases_are_dropped_by_scene_or_file(
     ):
         completed = run(tmp_path, "cache", *line, **environment)
         assert completed.returncode == 2
-        assert says in completed.stderr
+        assert message in completed.stderr
         assert len(completed.stderr.splitlines()) == 1
     assert "it has room.xml" in run(tmp_path, "cache", "drop", "gone", **environment).stderr
     assert scenes("*") == ["?", "room.xml"]

@@ -159,8 +159,12 @@ def test_rough_planes_add_up_and_are_nearer_to_light_without_grain(make_basis: A
     assert planes.dtype == np.float32
     total = np.einsum("nhwc,nc->hwc", planes, basis.current_weights)
     np.testing.assert_allclose(total, current, rtol=1e-5)  # single precision
-    grain, left = (np.sqrt(np.mean((image - light) ** 2)) for image in (basis.images, planes))
-    assert left < grain / 5  # of 64 pixels each is a mean, and of the total nothing is left
+    grain, remaining_grain = (
+        np.sqrt(np.mean((image - light) ** 2)) for image in (basis.images, planes)
+    )
+    assert (
+        remaining_grain < grain / 5
+    )  # of 64 pixels each is a mean, and of the total nothing is left
 
 
 def test_clean_blocks_bring_rough_planes_nearer_to_the_light(make_basis: Any):
@@ -175,8 +179,10 @@ def test_clean_blocks_bring_rough_planes_nearer_to_the_light(make_basis: Any):
     blocks = DenoisedPlanes(small, np.ones(2), current)
     for k in range(2):
         rough, better = (RoughPlanes(basis, current, x).plane(k) for x in (None, blocks))
-        rough_error, left = (np.sqrt(np.mean((x - light[k]) ** 2)) for x in (rough, better))
-        assert left < rough_error / 2
+        rough_error, remaining_error = (
+            np.sqrt(np.mean((x - light[k]) ** 2)) for x in (rough, better)
+        )
+        assert remaining_error < rough_error / 2
         # Away from the shadow's edge, over which a gain is interpolated.
         for part in (np.s_[:, :20], np.s_[:, 28:]):
             blocks_of = [block_mean(x, 2)[part] for x in (better, light[k])]

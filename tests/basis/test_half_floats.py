@@ -243,9 +243,9 @@ def test_weights_are_the_same_to_far_below_their_error(
     gap = np.abs(solution.weights - expected.weights)
     # HIDDEN of the noise of an image at most, and here its rounding is less: 2^-11 / 0.02.
     assert (gap <= 0.05 * bars.standard_error).all()
-    again = lp.error_bars(solution)
-    assert again is not None
-    np.testing.assert_allclose(again.standard_error, bars.standard_error, rtol=0.01)
+    reread_bars = lp.error_bars(solution)
+    assert reread_bars is not None
+    np.testing.assert_allclose(reread_bars.standard_error, bars.standard_error, rtol=0.01)
 
 
 def test_a_file_of_the_format_before_is_read() -> None:

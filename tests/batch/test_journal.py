@@ -92,8 +92,8 @@ def test_damage_is_said_and_half_a_line_of_a_kill_is_not(tmp_path: Path) -> None
     first = data.index(b"\n")
     (tmp_path / JOURNAL).write_bytes(data[: first // 2] + b"\xff" + data[first // 2 + 1 :])
     [remark] = Journal(tmp_path).remarks
-    its = tmp_path / JOURNAL
-    assert remark == f"{its} has a line that cannot be read: its step will be done again"
+    journal_path = tmp_path / JOURNAL
+    assert remark == f"{journal_path} has a line that cannot be read: its step will be done again"
     (tmp_path / JOURNAL).write_bytes(data[:-20])
     journal = Journal(tmp_path)
     assert not journal.remarks

@@ -99,10 +99,10 @@ def test_light_groups_in_a_folder_among_paintings_are_the_same_elsewhere(
         item = task(base / "groups.toml", base / "out", look)
         parcel = pack(item, FileHashes(), run="a", is_shared=False)
         send_parcel(store, parcel)
-        done = store.run_parcel(parcel, run_item_locally)
-        assert done.failure == ""
-        assert done.files is not None
-        unpack(item, done.files)
+        results = store.run_parcel(parcel, run_item_locally)
+        assert results.failure == ""
+        assert results.files is not None
+        unpack(item, results.files)
         assert contents(folder / f"out/{look}") == contents(folder / f"expected/{look}")
 
 

@@ -108,8 +108,8 @@ def test_what_a_worker_answers_that_is_no_answer_is_its_own_failure() -> None:
         (ItemResult("look", "answer", "", files={"a": "text"}), True),  # type: ignore[dict-item]
     ):
 
-        def result(timeout: float, its: Any = reply) -> Any:
-            return its
+        def result(timeout: float, value: Any = reply) -> Any:
+            return value
 
         future: Any = SimpleNamespace(
             item=item, worker="w", future=SimpleNamespace(result=result, status="finished")

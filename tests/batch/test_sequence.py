@@ -128,10 +128,10 @@ def test_frames_go_evenly_from_the_first_to_the_last(frames: int, keys: int) -> 
 
 
 def test_other_lights_are_refused() -> None:
-    lit = lighting(np.ones((3, 3)))
-    other = Lighting(lit.lights[:2])
+    lit_lighting = lighting(np.ones((3, 3)))
+    other = Lighting(lit_lighting.lights[:2])
     with pytest.raises(LightingError, match="of different lights"):
-        interpolate([lit, other], 0.5, space="log")
+        interpolate([lit_lighting, other], 0.5, space="log")
 
 
 @given(WEIGHTS, st.sampled_from(sorted(SHIFTED_WORDS)))

@@ -199,7 +199,7 @@ def test_light_groups_are_lit_without_a_picture_too(tmp_path: Path) -> None:
     interleaved(tmp_path / "groups.exr", layers)
     write_rgb(tmp_path / "bright.exr", 2 * images[0] + images[2])
     write_rgb(tmp_path / "dark.exr", np.maximum(images.sum(axis=0) / 4 - 0.05, 0))
-    lightings, left = {}, {}
+    lightings, remaining_files = {}, {}
     for step in ("lights", "solve"):
         text = LOOKS.replace('scene = "room.xml"', 'light_groups = "groups.exr"')
         text = text.replace("spp = 16, ", "").replace("WANT", step)
@@ -210,11 +210,11 @@ def test_light_groups_are_lit_without_a_picture_too(tmp_path: Path) -> None:
         for name in outcome.done:
             folder = tmp_path / step / name
             lightings[step, name] = read_lighting(folder / "lighting.json")
-            left[step, name] = {file.name for file in folder.iterdir()}
+            remaining_files[step, name] = {file.name for file in folder.iterdir()}
     for name in ("bright", "dark"):
         assert lightings["lights", name].emission == lightings["solve", name].emission
-        assert left["lights", name] == {"lighting.json", "result.json"}
-        assert left["solve", name] > left["lights", name]
+        assert remaining_files["lights", name] == {"lighting.json", "result.json"}
+        assert remaining_files["solve", name] > remaining_files["lights", name]
     bright = np.array(list(lightings["lights", "bright"].emission.values()))
     # float32 pixels.
     np.testing.assert_allclose(bright, [[2.0] * 3, [0.0] * 3, [1.0] * 3], atol=1e-6)

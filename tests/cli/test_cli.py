@@ -299,8 +299,8 @@ def test_results_of_two_solves_never_stand_together(
     shutil.copytree(solved_job[0], folder)
     (folder / "notes.txt").write_text("mine", encoding="utf-8")
     succeed(tmp_path, "solve", basis_file, COOL, "--mask", COOL_MASK, "-o", folder, "--force")
-    left = {p.name for p in folder.iterdir()}
-    assert left == (RESULTS - {"relit.xml", "verified.exr"}) | {"notes.txt"}
+    remaining_names = {p.name for p in folder.iterdir()}
+    assert remaining_names == (RESULTS - {"relit.xml", "verified.exr"}) | {"notes.txt"}
     # A folder that no solve has written to is not tidied.
     other = tmp_path / "other"
     other.mkdir()

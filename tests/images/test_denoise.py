@@ -53,10 +53,10 @@ def test_it_is_closer_to_the_truth(method: str, guided: bool, scale: float):
     truth, noisy, features = _picture()
     denoised_image = denoised(scale * noisy, features if guided else None) / scale
     assert denoised_image.dtype == np.float32
-    raw, left = (np.square(image - truth).mean() for image in (noisy, denoised_image))
+    raw, remaining_noise = (np.square(image - truth).mean() for image in (noisy, denoised_image))
     # A mean over n independent pixels has 1/n of the energy of the noise. Some thirty are alike
     # in a window of 7x7; a quarter is what edges and a missing guide may take of that.
-    assert left < raw / 4
+    assert remaining_noise < raw / 4
     assert denoised_image.mean() == pytest.approx(truth.mean(), rel=0.05)
 
 
@@ -112,10 +112,10 @@ def test_a_render_is_closer_to_one_of_many_samples(tmp_path: Path):
     raw, truth = (basis.mix(basis.current_weights) for basis in (few, many))
     noise = np.square(raw - truth).mean()
     for quality in ("fast", "high"):
-        left = np.square(denoised(raw, few.features, quality=quality) - truth).mean()
+        remaining_noise = np.square(denoised(raw, few.features, quality=quality) - truth).mean()
         # Measured: 0.16 to 0.2. A picture twenty pixels high is edges for a good part, where a
         # denoiser gains nothing; twice that leaves room for other versions of its networks.
-        assert left < 0.4 * noise
+        assert remaining_noise < 0.4 * noise
 
 
 def test_without_the_library_one_line_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

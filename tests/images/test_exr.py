@@ -176,10 +176,10 @@ def test_threads_that_read_at_once_give_the_terminal_back(
     path = tmp_path / "cut.exr"
     path.write_bytes(_write_kind(path, "parts")[:-1])
     before = [os.stat(fd) for fd in (1, 2)]
-    began = threading.Barrier(4)
+    barrier = threading.Barrier(4)
 
     def read() -> None:
-        began.wait()
+        barrier.wait()
         for _ in range(20):
             with pytest.raises(ImageError):
                 read_parts(path)
@@ -259,11 +259,11 @@ def test_absurd_sizes_are_refused_at_once(
     start = content.index(b"dataWindow\0box2i\0") + len(b"dataWindow\0box2i\0") + 4
     content[start : start + 16] = struct.pack("<4i", *window)
     path.write_bytes(content)
-    began = time.perf_counter()
+    start_s = time.perf_counter()
     with pytest.raises(ImageError, match=message):
         read_parts(path)
     # It takes 0.2 ms; to decode, or only to allocate, would take many seconds.
-    assert time.perf_counter() - began < 1
+    assert time.perf_counter() - start_s < 1
 
 
 def test_of_a_crop_the_pixels_that_are_there_are_read(tmp_path: Path):

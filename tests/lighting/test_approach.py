@@ -46,11 +46,11 @@ def _random_problem(make_basis: Any, seed: int, *, n: int = 4) -> tuple[Basis, T
     return basis, Target("t", image.astype(np.float32), importance, everything=False)
 
 
-def _solve_by_rounds(few: pytest.MonkeyPatch, *args: Any, **how: Any) -> Solution:
+def _solve_by_rounds(few: pytest.MonkeyPatch, *args: Any, **options: Any) -> Solution:
     """By rounds over all pixels alone."""
     with few.context() as patch:
         patch.setattr(warm_start, "MIN_SAMPLE", 10**9)
-        return solve(*args, **how)
+        return solve(*args, **options)
 
 
 def _value(solution: Solution, w: Any) -> float:
@@ -109,9 +109,9 @@ def test_it_ends_where_rounds_over_all_pixels_do(
     target = replace(target, at_least=target.image > 0.8)
     constraint_words = dict(constraint_words)
     constraints = Constraints.of(constraint_words.pop("lights", {}), **constraint_words)
-    how: dict[str, Any] = {"transform": transform, "constraints": constraints, "hold": 0.3}
-    expected = _solve_by_rounds(few_samples, basis, target, **how)
-    solution = solve(basis, target, **how)
+    options: dict[str, Any] = {"transform": transform, "constraints": constraints, "hold": 0.3}
+    expected = _solve_by_rounds(few_samples, basis, target, **options)
+    solution = solve(basis, target, **options)
     assert solution.certificate.rounds < expected.certificate.rounds
     value = _value(solution, expected.weights)
     assert _value(solution, solution.weights) <= value * (1 + 1e-9)
@@ -124,10 +124,10 @@ def test_several_views_are_one(make_basis: Any, few_samples: Any):
     parts = [_random_problem(make_basis, seed) for seed in (4, 5)]
     bases = [replace(basis, lights=parts[0][0].lights) for basis, _ in parts]
     targets = [target for _, target in parts]
-    how = {"transform": VIEWS[0], "hold": 0.3}
+    options = {"transform": VIEWS[0], "hold": 0.3}
     expected, solution = (
-        _solve_by_rounds(few_samples, bases, targets, **how),
-        solve(bases, targets, **how),
+        _solve_by_rounds(few_samples, bases, targets, **options),
+        solve(bases, targets, **options),
     )
     assert solution.certificate.rounds < expected.certificate.rounds
     np.testing.assert_allclose(solution.weights, expected.weights, atol=2e-5)

@@ -27,8 +27,8 @@ def gallery() -> lp.Basis:
     return render_basis(lp.load_scene(ROOT / "scenes/gallery/scene.xml").reduced("80x45"), spp=128)
 
 
-def _duv(basis: lp.Basis, target: lp.Target, **how: Any) -> np.ndarray:
-    solution = correct_noise(lp.solve(basis, target, **how))
+def _duv(basis: lp.Basis, target: lp.Target, **options: Any) -> np.ndarray:
+    solution = correct_noise(lp.solve(basis, target, **options))
     assert solution.problem.fit.colors == "gentle"
     return white_range(1901, 100_000).greener(solution.weights)
 

@@ -38,8 +38,8 @@ def _paint(basis: Basis, region: Any, color: Any, *, times: bool = False) -> lp.
     image[region] = image[region] * color if times else color
     counts = np.zeros(SIZE, np.float32)
     counts[region] = 1
-    how: dict[str, Any] = {"through_view": True, "over_look": True}
-    return lp.Target("t", image, counts, False, transform=lp.ViewTransform(), **how)
+    options: dict[str, Any] = {"through_view": True, "over_look": True}
+    return lp.Target("t", image, counts, False, transform=lp.ViewTransform(), **options)
 
 
 def _lantern_levels(basis: Basis, target: lp.Target, **fit: Any) -> tuple[float, float]:

@@ -122,9 +122,9 @@ def noisy_basis(make_basis: Any) -> Basis:
 def _paint_over(basis: Basis, times: float) -> lp.Target:
     mean = basis.current_look.mean(axis=(0, 1))
     look = np.broadcast_to(times * mean, (*basis.size, 3)).astype(np.float32)
-    how: dict[str, Any] = {"through_view": True, "over_look": True}
+    options: dict[str, Any] = {"through_view": True, "over_look": True}
     counts = np.ones(basis.size, np.float32)
-    return lp.Target("t", look, counts, False, transform=lp.ViewTransform(), **how)
+    return lp.Target("t", look, counts, False, transform=lp.ViewTransform(), **options)
 
 
 def test_blocks_are_as_large_as_noise_asks(noisy_basis: Basis):

@@ -120,9 +120,9 @@ def test_colors_are_pulled_as_the_formula_says(make_basis: Any, monkeypatch: pyt
         return float((D[..., None] * residual**2).sum() + COLOR_PULL * D.mean() * pull)
 
     bounds, dimming, start = [(0, None)] * current.size, np.ones(4), current.ravel()
-    how = {"method": "L-BFGS-B", "options": {"ftol": 1e-15, "maxiter": 5000}}
+    options = {"method": "L-BFGS-B", "options": {"ftol": 1e-15, "maxiter": 5000}}
     for _ in range(2):
-        optimum = minimize(cost, start, bounds=bounds, **how)
+        optimum = minimize(cost, start, bounds=bounds, **options)
         assert optimum.success
         before, start = dimming, optimum.x
         luminances = np.maximum(optimum.x.reshape(-1, 3) @ LUMINANCE, 1e-9)

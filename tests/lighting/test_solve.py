@@ -280,8 +280,8 @@ def test_what_is_kept_leaves_scipy_the_rest_of_the_target(
     root = np.sqrt(target.importance.astype(np.float64)).ravel()
     for c in range(3):
         columns = basis.images[..., c].reshape(n, -1).astype(np.float64) * root
-        left = target.image[..., c].ravel() * root - columns[fixed].sum(axis=0)
-        expected, norm = nnls(columns[free].T, left)
+        remainder = target.image[..., c].ravel() * root - columns[fixed].sum(axis=0)
+        expected, norm = nnls(columns[free].T, remainder)
         # The solver stops at a KKT residual of 1e-10 of a problem that is well conditioned.
         np.testing.assert_allclose(weights[free, c], expected, atol=1e-7)
         assert solution.certificate.objective[c] == pytest.approx(norm**2, rel=1e-9)

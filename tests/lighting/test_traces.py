@@ -27,9 +27,11 @@ def _basis(images: Any, *, spp: int = 0) -> Basis:
     return Basis(lights, images, np.zeros_like(images), np.zeros(SIZE, dtype=bool), origin)
 
 
-def _solve(images: Any, painted: Any, **how: Any) -> Any:
+def _solve(images: Any, painted: Any, **options: Any) -> Any:
     image = painted.astype(np.float32)
-    return solve(_basis(images), Target("t", image, np.ones(SIZE, np.float32), True), **how).weights
+    return solve(
+        _basis(images), Target("t", image, np.ones(SIZE, np.float32), True), **options
+    ).weights
 
 
 @pytest.mark.parametrize("layers", [np.float32, np.float16])
@@ -91,6 +93,6 @@ def test_what_is_asked_is_kept():
 def test_of_a_basis_that_knows_its_noise_nothing_is_taken():
     images = pictures(2, size=SIZE)
     weights = np.array([[1.0] * 3, [1e-12] * 3])
-    how: Any = {"image": images[0], "is_constrained": np.zeros(2, bool)}
-    assert (remove_traces(_basis(images, spp=8), weights, **how) == weights).all()
-    assert (remove_traces(_basis(images), weights, **how)[1] == 0).all()
+    options: Any = {"image": images[0], "is_constrained": np.zeros(2, bool)}
+    assert (remove_traces(_basis(images, spp=8), weights, **options) == weights).all()
+    assert (remove_traces(_basis(images), weights, **options)[1] == 0).all()

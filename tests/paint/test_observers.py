@@ -59,8 +59,10 @@ class ServedSession:
         self.browser = TestClient(self.guard, base_url=f"http://{HOST}")
 
     def program(self, token: str | None = None, **headers: str) -> WebSocketTestSession:
-        shown = bearer(self.guard.program_token if token is None else token)
-        return self.browser.websocket_connect(f"ws://{HOST}/live", headers={**shown, **headers})
+        key_headers = bearer(self.guard.program_token if token is None else token)
+        return self.browser.websocket_connect(
+            f"ws://{HOST}/live", headers={**key_headers, **headers}
+        )
 
     def page(self) -> WebSocketTestSession:
         key = self.browser.get("/key", headers=bearer(self.guard.token)).text
@@ -76,9 +78,9 @@ async def _unserved(scope: Any, receive: Any, send: Any) -> None:
 
 @pytest.fixture
 def served_session() -> Iterator[ServedSession]:
-    made = ServedSession()
-    with made.browser:
-        yield made
+    session = ServedSession()
+    with session.browser:
+        yield session
 
 
 def send_request(socket: WebSocketTestSession, kind: str, seq: int = 1, **fields: Any) -> None:
@@ -154,9 +156,10 @@ def test_a_page_gets_in_by_no_programs_token(
     """Neither of this server, nor of another one by whatever name it leads here."""
     with pytest.raises(REFUSED), served_session.program(**headers):
         pass
-    shown = bearer(served_session.guard.program_token)
+    key_headers = bearer(served_session.guard.program_token)
     assert (
-        served_session.browser.get("/data/present", headers={**shown, **headers}).status_code != 200
+        served_session.browser.get("/data/present", headers={**key_headers, **headers}).status_code
+        != 200
     )
 
 
@@ -179,9 +182,9 @@ def test_observers_hear_what_comes_of_painting_and_the_painter_keeps_the_session
         paint(page, 2, is_final=True)
         assert receive(page)["reply"] == 2
         for program in (one, other):
-            told = receive(program)
-            assert told["kind"] == "answer"
-            assert "reply" not in told
+            message = receive(program)
+            assert message["kind"] == "answer"
+            assert "reply" not in message
         served_session.session.on_message(fake_progress("basis", 3))  # type: ignore[misc]
         assert [receive(x)["kind"] for x in (page, one, other)] == ["progress"] * 3
         paint(page, 3, is_final=True)
@@ -212,9 +215,9 @@ def test_an_observer_neither_paints_nor_takes_the_session(
         send_request(program, "observe", version=VERSION)
         receive(program)
         send_request(program, kind, 5, **fields)
-        told = receive(program)
-        assert (told["kind"], told["reply"]) == ("failed", 5)
-        assert told["text"].startswith("an observer may fetch, export and propose")
+        message = receive(program)
+        assert (message["kind"], message["reply"]) == ("failed", 5)
+        assert message["text"].startswith("an observer may fetch, export and propose")
         paint(program, 6, is_final=True)
         assert receive(program)["kind"] == "failed"
         assert served_session.session.requests == []
@@ -258,12 +261,14 @@ def messages_to_painter(served: ServedSession, observers: int) -> list[tuple[str
 
 def test_who_paints_is_sent_the_same_however_many_observe(served_session: ServedSession) -> None:
     """An observer costs a stroke no message, and takes no session."""
-    alone = messages_to_painter(served_session, 0)
+    single_messages = messages_to_painter(served_session, 0)
     strokes = [request for request in served_session.session.requests if request.kind == "paint"]
     assert len(strokes) == 8
-    assert messages_to_painter(served_session, 3) == alone
-    again = [request for request in served_session.session.requests if request.kind == "paint"]
-    assert len(again) == 2 * len(strokes)
+    assert messages_to_painter(served_session, 3) == single_messages
+    paint_requests = [
+        request for request in served_session.session.requests if request.kind == "paint"
+    ]
+    assert len(paint_requests) == 2 * len(strokes)
 
 
 @pytest.mark.parametrize(("kind", "ask"), [("page", "hello"), ("program", "observe")])
@@ -272,10 +277,10 @@ def test_no_older_state_follows_a_newer_one(
 ) -> None:
     """The first basis arrives while a client is told that there is none yet."""
 
-    known = dict.fromkeys(served_session.session.pictures, 1)
+    known_versions = dict.fromkeys(served_session.session.pictures, 1)
 
     def pending_then_known(**_: Any) -> SessionPending:
-        served_session.session.on_message(fake_state(known))  # type: ignore[misc]
+        served_session.session.on_message(fake_state(known_versions))  # type: ignore[misc]
         served_session.session.on_message(PictureUpdate(resources={"present": 2}))  # type: ignore[misc]
         wait_until(
             lambda: served_session.line.generations.get("present") == 2, "they are not handled"
@@ -335,7 +340,7 @@ def test_what_observers_ask_for_waits_while_a_brush_is_down(served_session: Serv
         paint(page, 3, is_final=True)
         assert receive(page)["reply"] == 3
         assert [receive(program).get("reply") for _ in range(2)] == [None, 7]
-    kinds = [said.kind for said in served_session.session.requests]
+    kinds = [request.kind for request in served_session.session.requests]
     assert kinds == ["paint", "paint", "export"]
 
 
@@ -412,9 +417,9 @@ def test_of_what_a_canvas_holds_observers_get_the_lighting() -> None:
         weights=np.ones((2, 3)),
     )
     observers.Observers([slow]).send(patch)
-    [(told, _)] = slow._unsent
-    assert told.kind == "answer"
-    assert list(told.arrays) == ["weights"]
+    [(message, _)] = slow._unsent
+    assert message.kind == "answer"
+    assert list(message.arrays) == ["weights"]
 
 
 # Proposals
@@ -434,39 +439,39 @@ def looks(make_basis: Any) -> tuple[Session, LookLibrary]:
 
 
 def test_a_proposal_is_a_look_that_holds_its_lighting(looks: tuple[Session, LookLibrary]) -> None:
-    session, its = looks
+    session, library = looks
     first, second, third = session.basis.names
     before = session.weights.copy()
-    told = its.handle(Propose("evening", {first: (1.0, 2.0, 3.0), second: (0.0, 0.0, 0.0)}))
-    assert isinstance(told, LookList)
-    [look] = told.looks
+    reply = library.handle(Propose("evening", {first: (1.0, 2.0, 3.0), second: (0.0, 0.0, 0.0)}))
+    assert isinstance(reply, LookList)
+    [look] = reply.looks
     assert look.is_proposal
     np.testing.assert_array_equal(session.weights, before)
-    wanted = np.array([[1, 2, 3], [0, 0, 0], before[2]])
-    np.testing.assert_allclose(look.weights, wanted)
-    its.load(LoadLook(look.id))
-    np.testing.assert_allclose(session.weights, wanted)
+    expected = np.array([[1, 2, 3], [0, 0, 0], before[2]])
+    np.testing.assert_allclose(look.weights, expected)
+    library.load(LoadLook(look.id))
+    np.testing.assert_allclose(session.weights, expected)
     assert third in session.requests.lights
 
 
 def test_a_later_proposal_of_the_name_takes_its_place_but_never_that_of_a_look(
     looks: tuple[Session, LookLibrary],
 ) -> None:
-    session, its = looks
+    session, library = looks
     name = session.basis.names[0]
-    its.handle(SaveLook("evening"))
+    library.handle(SaveLook("evening"))
     for level in (1.0, 2.0):
-        its.handle(Propose("evening", {name: (level, level, level)}))
-    kept, proposed = its.infos()
-    assert (kept.is_proposal, proposed.is_proposal) == (False, True)
+        library.handle(Propose("evening", {name: (level, level, level)}))
+    kept_info, proposed = library.infos()
+    assert (kept_info.is_proposal, proposed.is_proposal) == (False, True)
     assert proposed.weights[0] == (2.0, 2.0, 2.0)
-    its.handle(RenameLook(proposed.id, "evening"))
-    its.handle(Propose("evening", {}))
-    assert [look.is_proposal for look in its.infos()] == [False, False, True]
+    library.handle(RenameLook(proposed.id, "evening"))
+    library.handle(Propose("evening", {}))
+    assert [look.is_proposal for look in library.infos()] == [False, False, True]
 
 
 def test_a_proposal_that_cannot_be_is_refused(looks: tuple[Session, LookLibrary]) -> None:
-    session, its = looks
+    session, library = looks
     name = session.basis.names[0]
     for lights, words in (
         ({"nothing": (1.0, 1.0, 1.0)}, "no light is called 'nothing'"),
@@ -474,10 +479,10 @@ def test_a_proposal_that_cannot_be_is_refused(looks: tuple[Session, LookLibrary]
         ({name: (float("nan"), 1.0, 1.0)}, "expected numbers >= 0"),
     ):
         with pytest.raises(PaintError, match=words):
-            its.handle(Propose("x", lights))
-    assert its.infos() == ()
+            library.handle(Propose("x", lights))
+    assert library.infos() == ()
     for k in range(MAX_PROPOSALS):
-        its.handle(Propose(f"look {k}", {}))
+        library.handle(Propose(f"look {k}", {}))
     with pytest.raises(PaintError, match="proposals exist"):
-        its.handle(Propose("one more", {}))
-    its.handle(Propose("look 0", {}))
+        library.handle(Propose("one more", {}))
+    library.handle(Propose("look 0", {}))

@@ -28,7 +28,7 @@ def test_messages_of_two_threads_are_sent_in_the_order_in_which_they_were_made(
     publisher: Publisher,
 ) -> None:
     """The first is still being sent when the second could be made."""
-    made: list[str] = []
+    made_names: list[str] = []
     sent: list[str] = []
     is_sending, another_waits = threading.Event(), threading.Event()
 
@@ -39,8 +39,8 @@ def test_messages_of_two_threads_are_sent_in_the_order_in_which_they_were_made(
         sent.append(message.fields["text"])
 
     def make() -> Message:
-        made.append(str(len(made)))
-        return Notice(text=made[-1], tone="info")
+        made_names.append(str(len(made_names)))
+        return Notice(text=made_names[-1], tone="info")
 
     def publish_second() -> None:
         assert is_sending.wait(10)
@@ -49,10 +49,10 @@ def test_messages_of_two_threads_are_sent_in_the_order_in_which_they_were_made(
 
     publisher.on_message = receive
     with ThreadPoolExecutor(2) as threads:
-        both = threads.submit(publish_second), threads.submit(publisher.publish_made, make)
-        for it in both:
+        futures = threads.submit(publish_second), threads.submit(publisher.publish_made, make)
+        for it in futures:
             it.result(10)
-    assert made == sent == ["0", "1"]
+    assert made_names == sent == ["0", "1"]
 
 
 @pytest.mark.parametrize("count", [1, 3])
@@ -67,10 +67,10 @@ def test_a_message_is_made_under_the_lock_of_the_session_and_sent_without(
             return another.submit(take).result()
 
     def take() -> bool:
-        taken = lock.acquire(timeout=0.05)
-        if taken:
+        has_lock = lock.acquire(timeout=0.05)
+        if has_lock:
             lock.release()
-        return taken
+        return has_lock
 
     free_while: dict[str, list[bool]] = {"made": [], "sent": []}
 
@@ -118,13 +118,13 @@ def test_a_picture_that_is_replaced_has_another_generation(publisher: Publisher)
 def test_nothing_is_sent_after_the_end(
     publisher: Publisher, send: Callable[[Publisher], None]
 ) -> None:
-    heard: list[Message] = []
-    publisher.on_message = heard.append
+    received: list[Message] = []
+    publisher.on_message = received.append
     send(publisher)
-    assert len(heard) == 1
+    assert len(received) == 1
     publisher.close()
     send(publisher)
-    assert len(heard) == 1
+    assert len(received) == 1
 
 
 def test_a_report_of_progress_ends_its_task_after_the_end(publisher: Publisher) -> None:

@@ -480,10 +480,10 @@ def test_live_paint_that_newer_covers_is_answered_and_not_done(
         free.set()
         answers = [receive(socket) for _ in range(7)]
     assert sorted(answer["reply"] for answer in answers) == [1, 2, 3, 4, 5, 6, 7]
-    strokes = [said.stroke for said in known_browser.session.requests]
+    strokes = [request.stroke for request in known_browser.session.requests]
     assert strokes[0] == 1
     assert strokes[-1] == 2
-    assert sum(said.is_final for said in known_browser.session.requests) == 1
+    assert sum(request.is_final for request in known_browser.session.requests) == 1
     assert len(strokes) <= 7
 
 
@@ -493,24 +493,24 @@ def test_live_paint_that_newer_covers_is_answered_and_not_done(
 def test_the_second_tab_is_told_and_may_take_over(known_browser: ServedSession) -> None:
     with known_browser.socket("a") as first, known_browser.socket("b") as second:
         assert greet(first)["kind"] == "state"
-        told = greet(second, 3)
-        assert (told["kind"], told["reason"], told["reply"]) == ("closed", "taken", 3)
+        message = greet(second, 3)
+        assert (message["kind"], message["reason"], message["reply"]) == ("closed", "taken", 3)
         second.send_bytes(paint(4))
         assert receive(second)["reason"] == "taken"
         second.send_bytes(frame("take_over", 5))
         assert receive(second)["kind"] == "state"
-        told = receive(first)
-        assert (told["kind"], told["reason"]) == ("closed", "taken")
-        assert "reply" not in told
+        message = receive(first)
+        assert (message["kind"], message["reason"]) == ("closed", "taken")
+        assert "reply" not in message
         first.send_bytes(paint(6))
         assert receive(first)["reason"] == "taken"
         assert known_browser.session.requests == []
         second.send_bytes(paint(7))
         assert receive(second)["kind"] == "answer"
         first.send_bytes(frame("take_over", 8))
-        told = receive(first)
+        message = receive(first)
         # What it has not said yet is of before the other one.
-        assert (told["kind"], told["is_back"]) == ("state", False)
+        assert (message["kind"], message["is_back"]) == ("state", False)
         assert greet(first, 9)["is_back"]
 
 

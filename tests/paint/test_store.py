@@ -262,9 +262,9 @@ def test_a_full_disk_loses_nothing_and_is_written_when_there_is_room(disk: Path)
     copy = disk.parent / "copy.db"
     for ending in ("", "-wal"):
         shutil.copy(f"{path}{ending}", f"{copy}{ending}")
-    with Store.open(copy, IDENTITY) as left:  # as if it were killed now
-        assert content(left)[1] == content_before[1][:written_steps]
-        assert left.looks() == []
+    with Store.open(copy, IDENTITY) as copied_store:  # as if it were killed now
+        assert content(copied_store)[1] == content_before[1][:written_steps]
+        assert copied_store.looks() == []
     subprocess.run(["mount", "-o", "remount,size=8m", str(disk)], check=True)
     assert store.flush() is None
     assert store.unsaved is None
@@ -281,8 +281,8 @@ def test_what_cannot_be_written_at_the_end_is_said(disk: Path) -> None:
         store.append(big(0))
     with pytest.raises(OutputError, match=r"the last steps are lost: .* is full"):
         store.close()
-    with Store.open(disk / "session.db", IDENTITY) as left:
-        assert len(left.steps) > 0
+    with Store.open(disk / "session.db", IDENTITY) as reopened:
+        assert len(reopened.steps) > 0
 
 
 LIMITED = """
@@ -444,20 +444,20 @@ def test_what_can_be_read_of_a_damaged_session_is_there(
     with Store.open(path, IDENTITY) as store:
         if not store.remarks:  # what nobody has looked at yet
             store.recover()
-        position, left, kept_looks = content(store)
+        position, steps_left, kept_looks = content(store)
         [remark] = store.remarks
         assert loss in remark
         assert "\n" not in remark
         assert f"is kept as {tmp_path / 'session-1.db'}" in remark
-        assert position == len(left)
-        assert all(item in steps for item in left)
+        assert position == len(steps_left)
+        assert all(item in steps for item in steps_left)
         assert {item[0] for item in kept_looks} <= {item[0] for item in looks}
         store.append(step(5))
     # But for the header, where it counts how often it was opened to be written.
     assert (tmp_path / "session-1.db").read_bytes()[100:] == before[100:]
     with Store.open(path, IDENTITY) as store:
         assert store.remarks == []
-        assert len(store.steps) == len(left) + 1
+        assert len(store.steps) == len(steps_left) + 1
 
 
 @pytest.mark.usefixtures("without_process_check")
@@ -497,10 +497,10 @@ def test_bytes_and_pages_that_are_others_never_end_in_more_than_a_line(tmp_path:
                 content(store)
             except (PaintError, KeyError):
                 store.recover()
-            _, left, kept_looks = content(store)
-            is_whole = len(left) == len(steps) and len(kept_looks) == len(looks)
+            _, steps_left, kept_looks = content(store)
+            is_whole = len(steps_left) == len(steps) and len(kept_looks) == len(looks)
             assert is_whole or store.remarks
-            for a_step in left:
+            for a_step in steps_left:
                 # Labels have no check of their own: a byte of one may be another.
                 assert any(a_step[3] == original[3] for original in steps)
             if store.remarks:
@@ -512,14 +512,14 @@ def test_bytes_and_pages_that_are_others_never_end_in_more_than_a_line(tmp_path:
 
 
 @pytest.mark.parametrize(
-    ("tables", "left", "lost_text"),
+    ("tables", "steps_left", "lost_text"),
     [
         (("step", "pixels"), (0, 2), "an unknown number of steps could not be read"),
         (("look", "look_array"), (4, 0), "an unknown number of looks could not be read"),
     ],
 )
 def test_what_nobody_can_count_is_not_called_nothing(
-    tmp_path: Path, tables: tuple[str, str], left: tuple[int, int], lost_text: str
+    tmp_path: Path, tables: tuple[str, str], steps_left: tuple[int, int], lost_text: str
 ) -> None:
     """The first pages of two tables lie side by side: one bad block of a disk takes both."""
     path = tmp_path / "session.db"
@@ -536,7 +536,7 @@ def test_what_nobody_can_count_is_not_called_nothing(
     path.write_bytes(data)
     with Store.open(path, IDENTITY) as store:
         _, steps, looks = content(store)
-        assert (len(steps), len(looks)) == left
+        assert (len(steps), len(looks)) == steps_left
         [remark] = store.remarks
         assert lost_text in remark
 
@@ -553,8 +553,8 @@ def test_of_a_file_that_was_cut_off_its_beginning_is_read(tmp_path: Path) -> Non
     assert roots["look"] == max(roots["step"], roots["pixels"]) + 1
     os.truncate(path, (roots["look"] - 1) * 16384)
     with Store.open(path, IDENTITY) as store:
-        _, left, looks = content(store)
-        assert (left, looks) == (steps, [])
+        _, steps_left, looks = content(store)
+        assert (steps_left, looks) == (steps, [])
         [remark] = store.remarks
         assert "an unknown number of looks could not be read" in remark
 
@@ -602,8 +602,8 @@ def test_a_session_whose_file_is_removed_is_written_anew(tmp_path: Path, is_all:
         copy = tmp_path / "copy.db"
         for ending in ("", "-wal"):  # as if it were killed now
             shutil.copy(f"{path}{ending}", f"{copy}{ending}")
-        with Store.open(copy, IDENTITY) as left:
-            assert content(left) == content_before
+        with Store.open(copy, IDENTITY) as copied_store:
+            assert content(copied_store) == content_before
         path.unlink()  # at the end, too
     with Store.open(path, IDENTITY) as reopened:
         assert content(reopened) == content_before

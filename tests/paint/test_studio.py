@@ -43,10 +43,15 @@ class StudioClient:
 
     def __init__(self, folder: Path, *bases: lp.Basis, scene: Any = None) -> None:
         command = partial(command_for_paintings, "room.basis.exr")
-        how = {"command": lambda paths, requests: command(paths, (), requests), "scene": scene}
-        subjects = [Subject(f"view {k}", folder, basis=its, **how) for k, its in enumerate(bases)]
+        options = {"command": lambda paths, requests: command(paths, (), requests), "scene": scene}
+        subjects = [
+            Subject(f"view {k}", folder, basis=view_basis, **options)
+            for k, view_basis in enumerate(bases)
+        ]
         self.messages: list[Message] = []
-        self.studio = Studio(subjects, lambda its: Store.open(folder / "session.db", its))
+        self.studio = Studio(
+            subjects, lambda view_basis: Store.open(folder / "session.db", view_basis)
+        )
         self.studio.on_message = self.messages.append
         self.studio.start()
         self.wait(lambda m: m.kind == "state")
@@ -104,9 +109,9 @@ def basis(make_basis: Any) -> lp.Basis:
 @pytest.fixture
 def client(basis: lp.Basis, tmp_path: Path) -> Iterator[StudioClient]:
     """A studio that is open."""
-    made = StudioClient(tmp_path, basis)
-    yield made
-    made.studio.close()
+    studio_client = StudioClient(tmp_path, basis)
+    yield studio_client
+    studio_client.studio.close()
 
 
 def test_what_is_exported_is_solved_alike(client: StudioClient, basis: lp.Basis, tmp_path: Path):
@@ -124,13 +129,13 @@ def test_what_is_exported_is_solved_alike(client: StudioClient, basis: lp.Basis,
     words = exported.fields["command"]
     assert "--limit" in words
     assert "--colors free" in words
-    asked = lp.Constraints.of({basis.names[1]: {"limits": {"min": 0.1, "max": 0.45}}})
+    constraints = lp.Constraints.of({basis.names[1]: {"limits": {"min": 0.1, "max": 0.45}}})
     look = lp.paint_with_light(
         None,
         tmp_path / "painting.exr",
         tmp_path / "again",
         basis=basis,
-        constraints=asked,
+        constraints=constraints,
         colors="free",
     )
     np.testing.assert_allclose(look.solution.weights, exact.arrays["weights"], rtol=1e-12)
@@ -149,8 +154,8 @@ def test_what_is_not_of_a_painting_is_exported_without_one(client: StudioClient,
     files = [str(tmp_path / "answer.png"), str(tmp_path / "lighting.json")]
     assert exported == {"files": files, "command": "", "is_unpainted": True}
     client.studio.handle(protocol.Export(("target",)), {})
-    said = client.wait(lambda m: m.kind == "notice" and "nothing is painted" in m.fields["text"])
-    assert said.fields["task"] == "export"
+    notice = client.wait(lambda m: m.kind == "notice" and "nothing is painted" in m.fields["text"])
+    assert notice.fields["task"] == "export"
 
 
 def test_a_stroke_whose_end_was_never_heard_is_kept_at_the_end(
@@ -170,13 +175,13 @@ def test_one_export_is_written_at_a_time(client: StudioClient, monkeypatch: pyte
     at_work, most = 0, 0
     real = session_exports.export
 
-    def export(*given: Any) -> Any:
+    def export(*arguments: Any) -> Any:
         nonlocal at_work, most
         at_work += 1
         most = max(most, at_work)
         time.sleep(0.1)
         try:
-            yield from real(*given)
+            yield from real(*arguments)
         finally:
             at_work -= 1
 
@@ -193,12 +198,12 @@ def test_an_export_can_be_stopped(
     client: StudioClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     """What is there by then stays, and is named; one that begins later is not stopped with it."""
-    begun = threading.Event()
+    has_begun = threading.Event()
 
     def report(_subjects: Any, _moment: Any, progress: Any) -> Iterator[Path]:
         for k in range(10_000):
             progress("verification", k, 10_000)
-            begun.set()
+            has_begun.set()
             time.sleep(0.001)
         yield tmp_path / "never.html"
 
@@ -206,7 +211,7 @@ def test_an_export_can_be_stopped(
     client.paint(1, 0.8)
     client.exact()
     client.studio.handle(protocol.Export(("lighting", "report")), {})
-    assert begun.wait(60)
+    assert has_begun.wait(60)
     client.studio.handle(protocol.Export((), run=False), {})
     exported = client.wait(lambda m: m.kind == "exported", seconds=5)
     files = [str(tmp_path / name) for name in ("painting.exr", "lighting.json")]
@@ -232,33 +237,33 @@ def test_denoised_planes_of_few_samples_do_until_there_are_better_ones(
     """A picture without grain is not shown with it again while the lights are still rendered."""
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
     better = replace(basis, planes=basis.images * np.float32(1.5))
-    is_taken, goes_on = threading.Event(), threading.Event()
+    is_taken, release = threading.Event(), threading.Event()
     cleaned: list[lp.Basis] = []
     real = plane_denoiser.denoise_to_halves
 
-    def denoise_to_halves(its: lp.Basis, k: int) -> Any:
-        if its.images is better.images:
+    def denoise_to_halves(noisy_basis: lp.Basis, k: int) -> Any:
+        if noisy_basis.images is better.images:
             is_taken.set()
-            goes_on.wait(30)
-        cleaned.append(its)
-        return real(its, k)
+            release.wait(30)
+        cleaned.append(noisy_basis)
+        return real(noisy_basis, k)
 
     monkeypatch.setattr(plane_denoiser, "denoise_to_halves", denoise_to_halves)
     monkeypatch.setattr(session_bases, "obtain_bases", lambda *_: iter([[basis], [better]]))
-    heard = StudioClient(tmp_path, basis)
+    client = StudioClient(tmp_path, basis)
     assert is_taken.wait(30)
     assert len(cleaned) == len(basis.lights)
-    fields = heard.studio.state().fields
+    fields = client.studio.state().fields
     for k, light in enumerate(fields["lights"]):
         assert f"clean/{k}" in fields["resources"]
-        shown = heard.studio.resource(f"clean/{k}").astype(np.float64) * light["scale"]
-        assert shown.mean() == pytest.approx(basis.images[k].mean(), rel=0.1)
-    goes_on.set()
-    heard.wait(lambda m: m.kind == "progress" and m.fields["done"] == 1)
+        display = client.studio.resource(f"clean/{k}").astype(np.float64) * light["scale"]
+        assert display.mean() == pytest.approx(basis.images[k].mean(), rel=0.1)
+    release.set()
+    client.wait(lambda m: m.kind == "progress" and m.fields["done"] == 1)
     for k, light in enumerate(fields["lights"]):
-        shown = heard.studio.resource(f"clean/{k}").astype(np.float64) * light["scale"]
-        assert shown.mean() == pytest.approx(better.images[k].mean(), rel=0.1)
-    heard.studio.close()
+        display = client.studio.resource(f"clean/{k}").astype(np.float64) * light["scale"]
+        assert display.mean() == pytest.approx(better.images[k].mean(), rel=0.1)
+    client.studio.close()
 
 
 def test_lights_of_unknown_noise_are_cleaned_too(
@@ -270,9 +275,9 @@ def test_lights_of_unknown_noise_are_cleaned_too(
     none = np.zeros_like(basis.half_differences)
     unknown = replace(basis, noise=none, origin=origin)
     assert not unknown.knows_noise
-    heard = StudioClient(tmp_path, unknown)
-    heard.wait(lambda m: m.kind == "renewed" and "clean/2" in m.fields["resources"])
-    heard.studio.close()
+    client = StudioClient(tmp_path, unknown)
+    client.wait(lambda m: m.kind == "renewed" and "clean/2" in m.fields["resources"])
+    client.studio.close()
 
 
 def test_what_is_said_comes_in_the_order_in_which_it_came_about(
@@ -280,69 +285,69 @@ def test_what_is_said_comes_in_the_order_in_which_it_came_about(
 ):
     """Else a page forgets a picture that another thread made while all there is was told."""
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
-    goes_on, is_telling, better = threading.Event(), threading.Event(), replace(basis)
+    release, is_telling, better = threading.Event(), threading.Event(), replace(basis)
     tell = Publisher.publish
 
     def obtain_bases(*_: Any) -> Iterator[list[lp.Basis]]:
         yield [basis]
-        assert goes_on.wait(30)
+        assert release.wait(30)
         yield [better]
 
     def slow(self: Publisher, message: Message | None) -> None:
-        if message is not None and message.kind == "state" and goes_on.is_set():
+        if message is not None and message.kind == "state" and release.is_set():
             is_telling.set()
             time.sleep(0.2)
         tell(self, message)
 
     monkeypatch.setattr(Publisher, "publish", slow)
     monkeypatch.setattr(session_bases, "obtain_bases", obtain_bases)
-    heard = StudioClient(tmp_path, basis)
-    goes_on.set()
+    client = StudioClient(tmp_path, basis)
+    release.set()
     assert is_telling.wait(30)
-    heard.studio.publisher.publish_picture("verified", np.zeros((*SIZE, 3), np.float16))
-    heard.wait(lambda _: sum(m.kind == "state" for m in heard.messages) == 2)
-    heard.wait(lambda m: m.kind == "renewed" and "verified" in m.fields["resources"])
-    known: dict[str, int] = {}
-    for message in heard.messages:
+    client.studio.publisher.publish_picture("verified", np.zeros((*SIZE, 3), np.float16))
+    client.wait(lambda _: sum(m.kind == "state" for m in client.messages) == 2)
+    client.wait(lambda m: m.kind == "renewed" and "verified" in m.fields["resources"])
+    known_versions: dict[str, int] = {}
+    for message in client.messages:
         if message.kind in ("state", "renewed"):
-            its = message.fields["resources"]
-            known = its if message.kind == "state" else known | its
-    assert "verified" in known
-    heard.studio.close()
+            versions = message.fields["resources"]
+            known_versions = versions if message.kind == "state" else known_versions | versions
+    assert "verified" in known_versions
+    client.studio.close()
 
 
 def test_denoised_planes_come_later_and_keep_the_light(
     basis: lp.Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
-    heard = StudioClient(tmp_path / "first", basis)
-    heard.wait(lambda m: m.kind == "renewed" and "clean/2" in m.fields["resources"])
-    state = heard.studio.state().fields
+    client = StudioClient(tmp_path / "first", basis)
+    client.wait(lambda m: m.kind == "renewed" and "clean/2" in m.fields["resources"])
+    state = client.studio.state().fields
     for k, light in enumerate(state["lights"]):
         raw, clean = (
-            heard.studio.resource(f"{kind}/{k}").astype(np.float64) * light["scale"]
+            client.studio.resource(f"{kind}/{k}").astype(np.float64) * light["scale"]
             for kind in ("plane", "clean")
         )
         # Half floats have 11 bits; a denoiser may move light, and not make any.
         np.testing.assert_allclose(raw, basis.images[k], rtol=2**-11, atol=1e-7)
         assert clean.mean() == pytest.approx(raw.mean(), rel=0.1)
     np.testing.assert_allclose(
-        heard.studio.resource("painting"), heard.studio.session.views[0].image
+        client.studio.resource("painting"), client.studio.session.views[0].image
     )
     until = time.monotonic() + 60
     while not read_denoised_planes(basis) and time.monotonic() < until:
         time.sleep(0.01)
     # The next session has the same at once, and one of other pixels has not.
-    again = StudioClient(tmp_path / "again", basis)
-    first = again.wait(lambda m: m.kind == "state").fields
+    second_client = StudioClient(tmp_path / "again", basis)
+    first = second_client.wait(lambda m: m.kind == "state").fields
     for k in range(len(basis.lights)):
         assert f"clean/{k}" in first["resources"]
-        same = (one.studio.resource(f"clean/{k}") for one in (heard, again))
+        same = (one.studio.resource(f"clean/{k}") for one in (client, second_client))
         np.testing.assert_array_equal(*same)
-    current_looks = (one.studio.session.views[0].current for one in (heard, again))
+    current_looks = (one.studio.session.views[0].current for one in (client, second_client))
     np.testing.assert_array_equal(*current_looks)
     assert read_denoised_planes(replace(basis, planes=2 * basis.images)) is None
-    for one in (heard, again):
+    for one in (client, second_client):
         one.studio.close()
 
 
@@ -362,9 +367,9 @@ def test_kept_pictures_that_are_damaged_are_made_again(
     assert cache_denoised_planes(basis, replace(clean, halves=clean.halves[:1]))
     assert read_denoised_planes(basis) is None
     assert cache_denoised_planes(basis, clean)
-    found = read_denoised_planes(basis)
-    assert found is not None
-    np.testing.assert_array_equal(found.halves, clean.halves)
+    planes = read_denoised_planes(basis)
+    assert planes is not None
+    np.testing.assert_array_equal(planes.halves, clean.halves)
 
 
 def test_a_look_is_gone_back_to_and_undone(client: StudioClient):
@@ -390,20 +395,20 @@ def test_a_look_is_gone_back_to_and_undone(client: StudioClient):
 def test_a_look_that_is_gone_back_to_has_its_own_answer_at_once(client: StudioClient):
     """Not one that comes from that of another look, until the exact one is there."""
     client.paint(1, 0.8)
-    kept = client.exact().arrays["weights"]
+    kept_weights = client.exact().arrays["weights"]
     [looks] = client.studio.handle(protocol.SaveLook("day"), {})
     client.paint(2, 0.02, (0, 12, 0, 16))
     other = client.exact().arrays["weights"]
-    assert np.abs(other - kept).max() > 0.1 * kept.max()
+    assert np.abs(other - kept_weights).max() > 0.1 * kept_weights.max()
     [patch] = client.studio.handle(protocol.LoadLook(looks.fields["looks"][0]["id"]), {})
-    np.testing.assert_array_equal(patch.arrays["weights"], kept)
-    np.testing.assert_allclose(client.exact().arrays["weights"], kept, rtol=1e-6)
+    np.testing.assert_array_equal(patch.arrays["weights"], kept_weights)
+    np.testing.assert_allclose(client.exact().arrays["weights"], kept_weights, rtol=1e-6)
 
 
 def test_rounds_of_samples_are_counted_as_one_work():
     """In samples per pixel of those that are wanted, whatever the passes are of."""
-    heard: list[tuple[int, int, str]] = []
-    tell = lambda _, done, total, unit="passes": heard.append((done, total, unit))  # noqa: E731
+    reports: list[tuple[int, int, str]] = []
+    tell = lambda _, done, total, unit="passes": reports.append((done, total, unit))  # noqa: E731
     one, other = subject.joint_progress(tell, 2)
     for part in (one, other):
         hear = subject.progress_in_samples(part, 0, 8, 64, lights=3)
@@ -414,11 +419,11 @@ def test_rounds_of_samples_are_counted_as_one_work():
         for light in ("key", "fill", "rim"):  # rendered each alone
             for k in range(3):
                 hear(f"basis: {light}", k, 2)
-    assert {unit for *_, unit in heard} == {"samples per pixel"}
-    assert {total for _, total, _ in heard} == {128}
-    shares = [done for done, *_ in heard[5:]]
+    assert {unit for *_, unit in reports} == {"samples per pixel"}
+    assert {total for _, total, _ in reports} == {128}
+    shares = [done for done, *_ in reports[5:]]
     assert shares == sorted(shares)
-    assert heard[-1][:2] == (128, 128)
+    assert reports[-1][:2] == (128, 128)
 
 
 def test_what_lies_between_two_looks_is_kept(client: StudioClient):
@@ -443,16 +448,18 @@ def test_what_was_done_is_there_again(client: StudioClient, basis: lp.Basis, tmp
     client.studio.handle(protocol.SaveLook("a"), {})
     session = client.studio.session
     client.studio.close()
-    again = StudioClient(tmp_path, basis)
-    np.testing.assert_array_equal(again.studio.session.views[0].image, session.views[0].image)
-    assert again.studio.session.requests == session.requests
-    state = again.studio.state().fields
+    second_client = StudioClient(tmp_path, basis)
+    np.testing.assert_array_equal(
+        second_client.studio.session.views[0].image, session.views[0].image
+    )
+    assert second_client.studio.session.requests == session.requests
+    state = second_client.studio.state().fields
     assert len(state["history"]["undo"]) == 3
     assert [look["name"] for look in state["looks"]] == ["a"]
-    again.studio.handle(protocol.Undo(), {})
-    again.studio.handle(protocol.Undo(), {})
-    assert again.studio.session.views[0].importance[2, 20] == 0
-    again.studio.close()
+    second_client.studio.handle(protocol.Undo(), {})
+    second_client.studio.handle(protocol.Undo(), {})
+    assert second_client.studio.session.views[0].importance[2, 20] == 0
+    second_client.studio.close()
 
 
 def test_a_full_disk_is_said_to_pages_and_to_the_terminal(
@@ -463,7 +470,7 @@ def test_a_full_disk_is_said_to_pages_and_to_the_terminal(
         raise sqlite3.OperationalError("database or disk is full")
         yield
 
-    def said(message: Message) -> bool:
+    def is_disk_notice(message: Message) -> bool:
         return message.kind == "notice"
 
     at_terminal: list[str] = []
@@ -471,11 +478,11 @@ def test_a_full_disk_is_said_to_pages_and_to_the_terminal(
     with monkeypatch.context() as patch:
         patch.setattr(write_queue, "transaction", full)
         client.paint(1, 0.8)
-        text = client.wait(said).fields["text"]
+        text = client.wait(is_disk_notice).fields["text"]
         assert "disk is full" in text
-    client.wait(lambda m: said(m) and m.fields["tone"] == "info")
+    client.wait(lambda m: is_disk_notice(m) and m.fields["tone"] == "info")
     assert at_terminal == [text, "all that was painted is kept again"]
-    assert [m.fields["text"] for m in client.messages if said(m)] == at_terminal
+    assert [m.fields["text"] for m in client.messages if is_disk_notice(m)] == at_terminal
 
 
 def test_why_it_is_not_closer(client: StudioClient, monkeypatch: pytest.MonkeyPatch):
@@ -521,17 +528,19 @@ def test_a_preview_shows_what_the_change_does_then(
     version, before = studio.session.version, studio.session.weights.copy()
     for number, values in enumerate(({"hold": 0.5}, {"hold": 0.0}, {"colors": "white"})):
         assert studio.handle(protocol.Preview(number, values), {})[0].kind == "started"
-        seen = client.wait(lambda m, n=number: m.kind == "previewed" and m.fields["number"] == n)
+        preview = client.wait(lambda m, n=number: m.kind == "previewed" and m.fields["number"] == n)
         assert studio.session.version == version + 2 * number
         np.testing.assert_array_equal(studio.session.weights, before)
-        assert not seen.fields["is_old"]
-        assert "of the difference" in seen.fields["text"] or "no closer" in seen.fields["text"]
+        assert not preview.fields["is_old"]
+        assert (
+            "of the difference" in preview.fields["text"] or "no closer" in preview.fields["text"]
+        )
         studio.handle(protocol.ChangeSettings(values), {})
         client.exact()
         mixed = studio.session.views[0].basis.mix(studio.session.weights)
-        shown = picture_table.display_thumbnail(mixed, studio.session.transform)
-        np.testing.assert_array_equal(seen.arrays["after"], shown)
-        assert (seen.arrays["after"] != seen.arrays["before"]).any()
+        display = picture_table.display_thumbnail(mixed, studio.session.transform)
+        np.testing.assert_array_equal(preview.arrays["after"], display)
+        assert (preview.arrays["after"] != preview.arrays["before"]).any()
         studio.handle(protocol.Undo(), {})
         client.exact()
     with pytest.raises(lp.LightpaintError, match="nothing is called 'holds'"):
@@ -546,14 +555,14 @@ def test_letting_go_gradually_is_judged_on_the_whole_picture(client: StudioClien
     assert advised is not None
     assert advised["kind"] == "hold"
     assert 0 < advised["hold"] < 3
-    [found] = [
+    [preview] = [
         client.wait(lambda m: m.kind == "previewed" and m.fields["number"] == 1)
         for _ in client.studio.handle(protocol.Preview(1, {"hold": advised["hold"]}), {})
     ]
     share = round(100 * advised["gain"])
-    told = re.match(r"Removes (\d+) % of the difference", found.fields["text"])
-    assert told is not None
-    assert int(told[1]) == share
+    match = re.match(r"Removes (\d+) % of the difference", preview.fields["text"])
+    assert match is not None
+    assert int(match[1]) == share
     changed = []
     for hold in (advised["hold"], 0.0):
         client.studio.handle(protocol.ChangeSettings({"hold": hold}), {})
@@ -600,11 +609,11 @@ def studio_of_scenes(
     """A studio of two views, and what stands for their renders."""
     side = replace(basis, origin=replace(basis.origin, sensor="side"))
     scene: Any = SimpleNamespace(spp=4)
-    made = EndlessVerification(monkeypatch)
-    heard = StudioClient(tmp_path, basis, side, scene=scene)
-    yield heard, made
-    made.is_enough.set()
-    heard.studio.close()
+    verification = EndlessVerification(monkeypatch)
+    client = StudioClient(tmp_path, basis, side, scene=scene)
+    yield client, verification
+    verification.is_enough.set()
+    client.studio.close()
 
 
 def is_stopped(message: Message) -> bool:
@@ -615,46 +624,46 @@ def is_stopped(message: Message) -> bool:
 def test_a_verifying_render_can_be_stopped(
     studio_of_scenes: tuple[StudioClient, EndlessVerification],
 ):
-    heard, renders = studio_of_scenes
-    heard.studio.handle(protocol.Verify(), {})
-    heard.wait(lambda m: m.kind == "progress" and m.fields["task"] == "verify")
-    [told] = heard.studio.handle(protocol.Verify(run=False), {})
-    assert (told.kind, told.fields["task"]) == ("started", "stop")
-    heard.wait(is_stopped)
+    client, renders = studio_of_scenes
+    client.studio.handle(protocol.Verify(), {})
+    client.wait(lambda m: m.kind == "progress" and m.fields["task"] == "verify")
+    [message] = client.studio.handle(protocol.Verify(run=False), {})
+    assert (message.kind, message.fields["task"]) == ("started", "stop")
+    client.wait(is_stopped)
     assert renders.at_work == 0
     # And there can be another.
-    heard.studio.handle(protocol.Verify(view=1), {})
+    client.studio.handle(protocol.Verify(view=1), {})
     renders.is_enough.set()
-    assert heard.wait(lambda m: m.kind == "verified").fields["view"] == 1
-    assert heard.studio.resource("verified@1").shape == (*SIZE, 3)
+    assert client.wait(lambda m: m.kind == "verified").fields["view"] == 1
+    assert client.studio.resource("verified@1").shape == (*SIZE, 3)
     # A page that begins anew is told of it, and whether the answer is another one since.
     about = {"agrees": True, "text": "A render confirms it.", "view": 1}
-    assert heard.studio.state().fields["verifications"] == [about | {"is_old": False}]
-    heard.paint(1, 0.8)
-    assert heard.studio.state().fields["verifications"] == [about | {"is_old": True}]
+    assert client.studio.state().fields["verifications"] == [about | {"is_old": False}]
+    client.paint(1, 0.8)
+    assert client.studio.state().fields["verifications"] == [about | {"is_old": True}]
 
 
 def test_a_render_that_is_stopped_before_it_begins_does_not_begin(
     studio_of_scenes: tuple[StudioClient, EndlessVerification], monkeypatch: pytest.MonkeyPatch
 ):
     """The exact answer comes first, and may take longer than somebody waits."""
-    heard, renders = studio_of_scenes
-    heard.paint(1, 0.8)
-    heard.exact()
-    begun, goes_on = threading.Event(), threading.Event()
+    client, renders = studio_of_scenes
+    client.paint(1, 0.8)
+    client.exact()
+    has_begun, release = threading.Event(), threading.Event()
     solution = SessionSnapshot.solution
 
     def slow(snapshot: SessionSnapshot) -> Any:
-        begun.set()
-        goes_on.wait(30)
+        has_begun.set()
+        release.wait(30)
         return solution(snapshot)
 
     monkeypatch.setattr(SessionSnapshot, "solution", slow)
-    heard.studio.handle(protocol.Verify(), {})
-    assert begun.wait(30)
-    heard.studio.handle(protocol.Verify(run=False), {})
-    goes_on.set()
-    heard.wait(is_stopped)
+    client.studio.handle(protocol.Verify(), {})
+    assert has_begun.wait(30)
+    client.studio.handle(protocol.Verify(run=False), {})
+    release.set()
+    client.wait(is_stopped)
     assert not renders.views
 
 
@@ -662,44 +671,44 @@ def test_who_verifies_again_stops_the_render_before(
     studio_of_scenes: tuple[StudioClient, EndlessVerification],
 ):
     """Somebody has painted on, or come back with another page."""
-    heard, renders = studio_of_scenes
-    heard.studio.handle(protocol.Verify(), {})
-    heard.wait(lambda _: renders.at_work)
+    client, renders = studio_of_scenes
+    client.studio.handle(protocol.Verify(), {})
+    client.wait(lambda _: renders.at_work)
     for view in (0, 1):
-        heard.studio.handle(protocol.Verify(view=view), {})
-    heard.wait(lambda _: renders.views[-1] == "view 1")
+        client.studio.handle(protocol.Verify(view=view), {})
+    client.wait(lambda _: renders.views[-1] == "view 1")
     renders.is_enough.set()
-    assert heard.wait(lambda m: m.kind == "verified").fields["view"] == 1
+    assert client.wait(lambda m: m.kind == "verified").fields["view"] == 1
     assert renders.most == 1
     # The page was not told that nothing is rendered while the last one was still to come.
-    assert not any(is_stopped(message) for message in heard.messages)
+    assert not any(is_stopped(message) for message in client.messages)
 
 
 def test_what_is_painted_while_an_answer_is_sought_is_answered_too(
     client: StudioClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    begun, goes_on = threading.Event(), threading.Event()
+    has_begun, release = threading.Event(), threading.Event()
     solution = SessionSnapshot.solution
 
     def slow(snapshot: SessionSnapshot) -> Any:
         if threading.current_thread().name == "lightpaint-export":
-            begun.set()
-        goes_on.wait(30)
+            has_begun.set()
+        release.wait(30)
         return solution(snapshot)
 
     monkeypatch.setattr(SessionSnapshot, "solution", slow)
     client.paint(1, 0.8)
     client.studio.handle(protocol.Export(("target", "lighting")), {})
-    assert begun.wait(30)
+    assert has_begun.wait(30)
     painted = client.studio.session.views[0].image.copy()
     answer = client.paint(2, 0.1, (3, 12, 16, 30))
     assert answer.fields["stroke"] == 2  # at once
-    goes_on.set()
+    release.set()
     exact = client.exact()
     np.testing.assert_array_equal(exact.arrays["weights"], client.studio.session.weights)
     client.wait(lambda m: m.kind == "exported")
-    written = lp.read_target(tmp_path / "painting.exr")
-    np.testing.assert_allclose(written.image[10, 20], painted[10, 20], rtol=1e-3)
+    painting = lp.read_target(tmp_path / "painting.exr")
+    np.testing.assert_allclose(painting.image[10, 20], painted[10, 20], rtol=1e-3)
 
 
 @pytest.fixture
@@ -714,17 +723,17 @@ def two_bases(basis: lp.Basis) -> list[lp.Basis]:
 
 
 def test_several_views_are_painted_kept_and_exported(two_bases: list[lp.Basis], tmp_path: Path):
-    heard = StudioClient(tmp_path, *two_bases)
-    studio = heard.studio
+    client = StudioClient(tmp_path, *two_bases)
+    studio = client.studio
     names = [basis.origin.sensor for basis in two_bases]
     state = studio.state().fields
     assert [view["name"] for view in state["views"]] == names
     assert [view["size"] for view in state["views"]] == [list(basis.size) for basis in two_bases]
     assert studio.resource("plane/2@1").shape == (10, 16, 3)
-    heard.paint(1, 0.8)
-    assert heard.exact().fields["closeness"][0]["delta_e"] >= 0
-    heard.paint(2, 0.1, (1, 6, 2, 9), view=1)
-    exact = heard.exact()
+    client.paint(1, 0.8)
+    assert client.exact().fields["closeness"][0]["delta_e"] >= 0
+    client.paint(2, 0.1, (1, 6, 2, 9), view=1)
+    exact = client.exact()
     assert [one["delta_e"] >= 0 for one in exact.fields["closeness"]] == [True, True]
     assert exact.fields["delta_e"] == max(one["delta_e"] for one in exact.fields["closeness"])
     for shares in exact.fields["shares"]:
@@ -732,16 +741,16 @@ def test_several_views_are_painted_kept_and_exported(two_bases: list[lp.Basis], 
     [looks] = studio.handle(protocol.SaveLook("two"), {})
     studio.handle(protocol.Undo(), {})
     assert not studio.session.views[1].is_painted
-    made = studio.handle(protocol.LoadLook(looks.fields["looks"][0]["id"]), {})
-    assert [message.fields["view"] for message in made] == [0, 1]
+    messages = studio.handle(protocol.LoadLook(looks.fields["looks"][0]["id"]), {})
+    assert [message.fields["view"] for message in messages] == [0, 1]
     assert studio.resource("look/1@1").dtype == np.uint8
-    again = heard.exact()
-    np.testing.assert_allclose(again.arrays["weights"], exact.arrays["weights"], rtol=1e-9)
+    exact_again = client.exact()
+    np.testing.assert_allclose(exact_again.arrays["weights"], exact.arrays["weights"], rtol=1e-9)
     studio.handle(protocol.Explain(1), {})
-    assert heard.wait(lambda m: m.kind == "explained").fields["view"] == 1
+    assert client.wait(lambda m: m.kind == "explained").fields["view"] == 1
     assert studio.resource("beyond@1").shape == (10, 16)
     studio.handle(protocol.Export(("target", "picture", "lighting")), {})
-    exported = heard.wait(lambda m: m.kind == "exported").fields
+    exported = client.wait(lambda m: m.kind == "exported").fields
     files = [tmp_path / f"painting-{name}.exr" for name in names]
     pictures = [tmp_path / f"answer-{name}.png" for name in names]
     assert exported["files"] == [*map(str, files + pictures), str(tmp_path / "lighting.json")]
@@ -753,25 +762,25 @@ def test_several_views_are_painted_kept_and_exported(two_bases: list[lp.Basis], 
     solution = correct_noise(lp.solve(two_bases, [lp.read_target(file) for file in files]))
     np.testing.assert_allclose(solution.weights, exact.arrays["weights"], rtol=1e-9)
     studio.handle(protocol.Export(("report",)), {})
-    said = heard.wait(lambda m: m.kind == "notice" and "needs their scene" in m.fields["text"])
-    assert said.fields["task"] == "export"
+    notice = client.wait(lambda m: m.kind == "notice" and "needs their scene" in m.fields["text"])
+    assert notice.fields["task"] == "export"
     with pytest.raises(lp.LightpaintError, match="no view 2"):
         studio.handle(protocol.Explain(2), {})
     studio.close()
 
 
 def test_a_view_that_comes_later_finds_the_session(two_bases: list[lp.Basis], tmp_path: Path):
-    heard = StudioClient(tmp_path, two_bases[0])
-    heard.paint(1, 0.8)
-    heard.studio.handle(protocol.SaveLook("alone"), {})
-    painted = heard.studio.session.views[0].image.copy()
-    heard.studio.close()
-    heard = StudioClient(tmp_path, *two_bases)
-    studio = heard.studio
-    heard.paint(2, 0.1, (1, 6, 2, 9), view=1)
-    heard.paint(3, 0.4, (0, 6, 2, 9))
-    told = studio.state().fields["history"]["undo"]
-    assert told == [f"stroke, {name}" for name in ("sensor", "side", "sensor")]
+    client = StudioClient(tmp_path, two_bases[0])
+    client.paint(1, 0.8)
+    client.studio.handle(protocol.SaveLook("alone"), {})
+    painted = client.studio.session.views[0].image.copy()
+    client.studio.close()
+    client = StudioClient(tmp_path, *two_bases)
+    studio = client.studio
+    client.paint(2, 0.1, (1, 6, 2, 9), view=1)
+    client.paint(3, 0.4, (0, 6, 2, 9))
+    undo_labels = studio.state().fields["history"]["undo"]
+    assert undo_labels == [f"stroke, {name}" for name in ("sensor", "side", "sensor")]
     # The look knows nothing of the view, and leaves it as it was before it was painted.
     studio.handle(protocol.LoadLook(1), {})
     np.testing.assert_array_equal(studio.session.views[0].image, painted)
@@ -792,25 +801,25 @@ def test_a_render_that_fails_is_said_to_who_waits(tmp_path: Path):
             raise ZeroDivisionError("of our own")
             yield
 
-    heard: list[Message] = []
+    messages: list[Message] = []
     studio = Studio([Broken("room.xml", tmp_path)], lambda _: Store.open(tmp_path / "x.db", _))
-    studio.on_message = heard.append
+    studio.on_message = messages.append
     studio._obtain_bases()
-    assert heard[0].fields["done"] == studio.state().fields["progress"]["done"] == 1
-    assert heard[-1].kind == "waiting"
-    assert "ZeroDivisionError: of our own" in heard[-1].fields["text"]
+    assert messages[0].fields["done"] == studio.state().fields["progress"]["done"] == 1
+    assert messages[-1].kind == "waiting"
+    assert "ZeroDivisionError: of our own" in messages[-1].fields["text"]
 
 
 def test_a_render_that_comes_after_another_stroke_is_of_an_earlier_answer(
     studio_of_scenes: tuple[StudioClient, EndlessVerification],
 ):
-    heard, renders = studio_of_scenes
-    heard.paint(1, 0.8)
-    heard.exact()
-    heard.studio.handle(protocol.Verify(), {})
-    heard.wait(lambda m: m.kind == "progress" and m.fields["task"] == "verify")
-    heard.paint(2, 0.3)
+    client, renders = studio_of_scenes
+    client.paint(1, 0.8)
+    client.exact()
+    client.studio.handle(protocol.Verify(), {})
+    client.wait(lambda m: m.kind == "progress" and m.fields["task"] == "verify")
+    client.paint(2, 0.3)
     renders.is_enough.set()
-    assert heard.wait(lambda m: m.kind == "verified").fields["is_old"] is True
-    [said] = heard.studio.state().fields["verifications"]
-    assert said["is_old"] is True
+    assert client.wait(lambda m: m.kind == "verified").fields["is_old"] is True
+    [verification] = client.studio.state().fields["verifications"]
+    assert verification["is_old"] is True

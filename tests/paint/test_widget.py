@@ -55,8 +55,8 @@ VIEW = lp.ViewTransform("srgb", 0.5)
 class RecordingComm(comm.base_comm.BaseComm):  # type: ignore[misc,name-defined]
     """A line to a page that there is none of."""
 
-    def publish_msg(self, msg_type: str, **said: Any) -> None:
-        data, buffers = said.get("data") or {}, said.get("buffers") or []
+    def publish_msg(self, msg_type: str, **message: Any) -> None:
+        data, buffers = message.get("data") or {}, message.get("buffers") or []
         if data.get("method") == "custom":
             self.messages.append((data["content"], [bytes(x) for x in buffers]))
         elif data.get("method") == "update":
@@ -68,7 +68,7 @@ def page_line(monkeypatch: pytest.MonkeyPatch) -> None:
     """Widgets have such a line, where no kernel runs; nor any loop, as Playwright leaves one."""
     monkeypatch.setattr("lightpaint.paint.notebook.widget_views._running_loop", lambda: None)
     noted = type("Line", (RecordingComm,), {"messages": [], "synced": {}})
-    monkeypatch.setattr(comm, "create_comm", lambda *_, **how: noted(**how))
+    monkeypatch.setattr(comm, "create_comm", lambda *_, **options: noted(**options))
 
 
 @pytest.fixture
@@ -80,15 +80,15 @@ def basis(make_basis: Any) -> lp.Basis:
 @pytest.fixture
 def open_painter(basis: lp.Basis, tmp_path: Path) -> Iterator[Callable[..., Any]]:
     """Painters that are closed at the end."""
-    made = []
+    painters = []
 
-    def make(**how: Any) -> Any:
-        made.append(lp.Painter(basis, folder=tmp_path, **{**HOW, **how}))
-        made[-1].comm.messages = []
-        return made[-1]
+    def make(**options: Any) -> Any:
+        painters.append(lp.Painter(basis, folder=tmp_path, **{**HOW, **options}))
+        painters[-1].comm.messages = []
+        return painters[-1]
 
     yield make
-    for painter in made:
+    for painter in painters:
         painter.close()
 
 
@@ -102,8 +102,10 @@ class Page:
         """Say something; the answer, with its arrays."""
         self.seq += 1
         arrays = arrays or {}
-        told = [{"name": k, "dtype": x.dtype.name, "shape": x.shape} for k, x in arrays.items()]
-        about = [{**one, "shape": list(one["shape"])} for one in told]
+        arrays_info = [
+            {"name": k, "dtype": x.dtype.name, "shape": x.shape} for k, x in arrays.items()
+        ]
+        about = [{**one, "shape": list(one["shape"])} for one in arrays_info]
         content = {"kind": kind, "seq": self.seq, **fields, "buffers": about}
         data = {"method": "custom", "content": content}
         buffers = [memoryview(x.tobytes()) for x in arrays.values()]
@@ -129,13 +131,13 @@ def _arrays(content: Any, buffers: Any) -> dict[str, Any]:
     }
 
 
-def wait_for(what: Callable[[], Any]) -> Any:
+def wait_for(condition: Callable[[], Any]) -> Any:
     """What it gives, once it does."""
     end_s = time.monotonic() + 60
-    while not (found := what()):
+    while not (result := condition()):
         assert time.monotonic() < end_s
         time.sleep(0.01)
-    return found
+    return result
 
 
 def test_a_page_opens_fetches_and_paints(basis: lp.Basis, open_painter: Any) -> None:
@@ -147,8 +149,8 @@ def test_a_page_opens_fetches_and_paints(basis: lp.Basis, open_painter: Any) -> 
     plane = page.say("fetch", name="plane/1")["arrays"]["data"]
     unit = plane.astype(np.float32) * state["lights"][1]["scale"]
     np.testing.assert_allclose(unit, basis.images[1], rtol=2**-10, atol=1e-6)  # halves
-    told: list[Any] = []
-    painter.observe(lambda change: told.append(change.new), "lighting")
+    lightings: list[Any] = []
+    painter.observe(lambda change: lightings.append(change.new), "lighting")
     weights = np.array([[1, 0.5, 0.2], [0.1, 0.7, 0.3], [0, 0.2, 0.9]])
     answer = page.paint(basis.mix(weights))
     assert answer["kind"] == "answer"
@@ -158,10 +160,10 @@ def test_a_page_opens_fetches_and_paints(basis: lp.Basis, open_painter: Any) -> 
         return [content for content, _ in page.messages() if content.get("exact")]
 
     wait_for(lambda: len(exact()) > 1)  # the second has all that is known of the first
-    wait_for(lambda: told)
+    wait_for(lambda: lightings)
     assert not any("reply" in content for content in exact())
     np.testing.assert_allclose(painter.lighting.weights_for(basis), weights, atol=1e-5)
-    [lighting] = told
+    [lighting] = lightings
     assert lighting is painter.lighting
     np.testing.assert_array_equal(painter.target.image, np.float32(basis.mix(weights)))
     np.testing.assert_allclose(painter.solution.weights, weights, atol=1e-5)
@@ -173,10 +175,10 @@ def test_what_is_set_from_a_cell_shows(basis: lp.Basis, open_painter: Any, tmp_p
     page.say("hello", version=protocol.VERSION)
     weights = np.array([[1, 0.5, 0.2], [0.1, 0.7, 0.3], [0.4, 0.2, 0.9]])
     image = basis.mix(weights).astype(np.float32)
-    told: list[str] = []
-    painter.observe(lambda change: told.append(change.name))
+    trait_names: list[str] = []
+    painter.observe(lambda change: trait_names.append(change.name))
     painter.target = lp.Target("cell", image, np.ones(SIZE, np.float32), everything=True)
-    assert sorted(set(told)) == ["lighting", "target", "targets"]
+    assert sorted(set(trait_names)) == ["lighting", "target", "targets"]
     patch, buffers = next(x for x in page.messages() if x[0]["kind"] == "patch")
     np.testing.assert_array_equal(_arrays(patch, buffers)["image"], image)
     assert patch["history"]["undo"] == ["painting from a cell"]
@@ -186,14 +188,14 @@ def test_what_is_set_from_a_cell_shows(basis: lp.Basis, open_painter: Any, tmp_p
     assert painter.lighting.emission["key"] == (0, 0, 0)
     page.say("undo")
     wait_for(lambda: not painter.constraints)
-    held = lp.Lighting.of_weights(basis, np.full((3, 3), 0.25))
-    painter.lighting = held
-    assert painter.lighting.emission == held.emission
-    assert painter.solution.lighting.emission == held.emission
+    lighting = lp.Lighting.of_weights(basis, np.full((3, 3), 0.25))
+    painter.lighting = lighting
+    assert painter.lighting.emission == lighting.emission
+    assert painter.solution.lighting.emission == lighting.emission
     state = page.say("hello", version=protocol.VERSION)
     assert state["constraints"]["fill"] == {"lock": [0.25, 0.25, 0.25]}
     painter.save(tmp_path / "evening.json")
-    assert lp.read_lighting(tmp_path / "evening.json").emission == held.emission
+    assert lp.read_lighting(tmp_path / "evening.json").emission == lighting.emission
     painter.save(tmp_path / "evening.exr")
     np.testing.assert_array_equal(lp.read_target(tmp_path / "evening.exr").image, image)
     painter.target = None
@@ -202,7 +204,7 @@ def test_what_is_set_from_a_cell_shows(basis: lp.Basis, open_painter: Any, tmp_p
 
 
 @pytest.mark.parametrize(
-    "how",
+    "options",
     [
         {"everything": True},
         {},
@@ -210,13 +212,13 @@ def test_what_is_set_from_a_cell_shows(basis: lp.Basis, open_painter: Any, tmp_p
         {"through_view": True, "over_look": True, "transform": VIEW},
     ],
 )
-def test_a_target_is_answered_as_by_solve(basis: lp.Basis, open_painter: Any, how: Any) -> None:
+def test_a_target_is_answered_as_by_solve(basis: lp.Basis, open_painter: Any, options: Any) -> None:
     """And so is the painter's own target, and so are both of them with something left out."""
     image = np.random.default_rng(3).random((*SIZE, 3)).astype(np.float32)
     counts = np.ones(SIZE, np.float32)
-    if "everything" not in how:
+    if "everything" not in options:
         counts[:, :8] = 0
-    target = lp.Target("t", image, counts, **{"everything": False, **how})
+    target = lp.Target("t", image, counts, **{"everything": False, **options})
     painter = open_painter(target=target, colors=None, hold=None, space=None)
     expected = lp.solve(basis, target)
     assert painter.solution.problem.space == expected.problem.space
@@ -225,17 +227,17 @@ def test_a_target_is_answered_as_by_solve(basis: lp.Basis, open_painter: Any, ho
     np.testing.assert_allclose(painter.solution.weights, expected.weights, rtol=1e-6, atol=1e-9)
 
 
-@pytest.mark.parametrize("how", [{}, {"through_view": True, "over_look": True}])
+@pytest.mark.parametrize("options", [{}, {"through_view": True, "over_look": True}])
 def test_the_first_answer_to_an_untouched_target_is_the_present(
-    basis: lp.Basis, open_painter: Any, how: Any
+    basis: lp.Basis, open_painter: Any, options: Any
 ) -> None:
     painter = open_painter(colors=None, hold=None, space=None)
-    told: list[Any] = []
-    painter.observe(lambda change: told.append(change.new), "lighting")
+    lightings: list[Any] = []
+    painter.observe(lambda change: lightings.append(change.new), "lighting")
     counts = np.ones(SIZE, np.float32)
-    painter.target = lp.Target("t", basis.current_look.copy(), counts, False, **how)
+    painter.target = lp.Target("t", basis.current_look.copy(), counts, False, **options)
     assert painter.solution is not None
-    for lighting in (*told, painter.lighting):
+    for lighting in (*lightings, painter.lighting):
         weights = lighting.weights_for(basis)
         np.testing.assert_allclose(weights, basis.current_weights, atol=1e-6)
 
@@ -255,15 +257,15 @@ def test_two_threads_may_tell_at_once(
         pauses_s.each = pause_s
         time.sleep(pause_s)  # one begins, and ends, before the other
         weights = np.full((3, 3), pause_s)
-        asked = lp.Constraints.of({"key": {"lock": pause_s}})
+        constraints = lp.Constraints.of({"key": {"lock": pause_s}})
         painter._session_traits.update(
-            {"lighting": lp.Lighting.of_weights(basis, weights), "constraints": asked}
+            {"lighting": lp.Lighting.of_weights(basis, weights), "constraints": constraints}
         )
 
     monkeypatch.setattr(painter, "set_trait", slowly)
     with ThreadPoolExecutor(2) as threads:
-        for told in [threads.submit(tell, pause_s) for pause_s in (0.02, 0.03)]:
-            told.result()
+        for future in [threads.submit(tell, pause_s) for pause_s in (0.02, 0.03)]:
+            future.result()
     # What was told is no wish of a cell, and a cell is heard again.
     assert not painter._studio.session.store.steps
     painter.constraints = lp.Constraints.of({"fill": {"off": True}})
@@ -278,19 +280,19 @@ def test_what_is_told_is_of_one_time(
     now, snapshot = painter._studio.snapshot_and_lighting, painter._studio.snapshot
 
     def painted_on(look: Callable[[], Any]) -> Any:
-        found = look()
+        values = look()
         monkeypatch.undo()
-        whole = Pixels(paint, np.ones(SIZE, np.float32), None)
-        painter._studio.load({0: whole}, painter._studio.session.requests, "by another")
-        return found
+        pixels = Pixels(paint, np.ones(SIZE, np.float32), None)
+        painter._studio.load({0: pixels}, painter._studio.session.requests, "by another")
+        return values
 
     before = painter._studio.session.weights.copy()
     monkeypatch.setattr(painter._studio, "snapshot_and_lighting", lambda: painted_on(now))
     monkeypatch.setattr(painter._studio, "snapshot", lambda: painted_on(snapshot))
-    told = painter._session_traits.current_values()
-    assert told["target"] is None
+    current_values = painter._session_traits.current_values()
+    assert current_values["target"] is None
     assert not np.allclose(painter._studio.session.weights, before)
-    np.testing.assert_array_equal(told["lighting"].weights_for(basis), before)
+    np.testing.assert_array_equal(current_values["lighting"].weights_for(basis), before)
 
 
 def test_it_is_called_as_what_is_painted(basis: lp.Basis, tmp_path: Path, monkeypatch: Any) -> None:
@@ -298,15 +300,15 @@ def test_it_is_called_as_what_is_painted(basis: lp.Basis, tmp_path: Path, monkey
     lp.write_basis("hall.basis.exr", basis)
     lp.write_basis("annex.basis.exr", basis)
     side = replace(basis, origin=replace(basis.origin, sensor="side"))
-    for given, said in (
+    for subject, text in (
         (lp.read_basis("hall.basis.exr"), "Painter(hall, 3 lights, 20x12)"),
         (lp.read_basis("annex.basis.exr"), "Painter(annex, 3 lights, 20x12)"),
         ([replace(basis, source="hall/scene.xml"), side], "Painter(hall, 3 lights, 2 views)"),
     ):
-        painter = lp.Painter(given)
+        painter = lp.Painter(subject)
         painter.comm.messages = []
-        assert repr(painter) == said
-        name = said.split("(")[1].split(",")[0]
+        assert repr(painter) == text
+        name = text.split("(")[1].split(",")[0]
         state = Page(painter).say("hello", version=protocol.VERSION)
         assert (state["scene"], state["folder"]) == (name, str(tmp_path / f"{name}.paint"))
         painter.close()
@@ -330,14 +332,14 @@ def test_several_views_have_a_target_each(basis: lp.Basis, tmp_path: Path) -> No
     assert [view["name"] for view in state["views"]] == names
     weights = np.array([[1, 0.5, 0.2], [0.1, 0.7, 0.3], [0.4, 0.2, 0.9]])
     images = [view.mix(weights).astype(np.float32) for view in (basis, side)]
-    whole = np.ones(SIZE, np.float32)
-    painter.targets = [None, lp.Target("side", images[1], whole, everything=True)]
+    importance = np.ones(SIZE, np.float32)
+    painter.targets = [None, lp.Target("side", images[1], importance, everything=True)]
     assert painter.target is None
     [patch] = [x for x, _ in page.messages() if x["kind"] == "patch" and x["view"] == 1]
     assert patch["views"] == [0, 1]
     # One view is as good as both where it shows all lights.
     np.testing.assert_allclose(painter.lighting.weights_for(basis), weights, atol=1e-5)
-    painter.target = lp.Target("front", images[0], whole, everything=True)
+    painter.target = lp.Target("front", images[0], importance, everything=True)
     assert [target.name for target in painter.targets] == [f"painting {name}" for name in names]
     expected = lp.solve([basis, side], painter.targets, **HOW)
     np.testing.assert_allclose(painter.solution.weights, expected.weights, rtol=1e-12)
@@ -346,8 +348,8 @@ def test_several_views_have_a_target_each(basis: lp.Basis, tmp_path: Path) -> No
     with pytest.raises(lp.LightpaintError, match=r"painter.targets is a list of 2"):
         painter.targets = [None]
     painter.close()
-    for views, said in (([basis, basis], "a view is there twice"), ([], "at least one view")):
-        with pytest.raises(lp.LightpaintError, match=said):
+    for views, message in (([basis, basis], "a view is there twice"), ([], "at least one view")):
+        with pytest.raises(lp.LightpaintError, match=message):
             lp.Painter(views)
 
 
@@ -374,13 +376,13 @@ def test_what_cannot_be_set_is_said_where_it_is_set(basis: lp.Basis, open_painte
 def test_what_cannot_be_given_is_said_at_once(
     basis: lp.Basis, open_painter: Any, tmp_path: Path
 ) -> None:
-    for how, said in (
+    for options, message in (
         ({"transform": "agx"}, r"transform is 'agx': expected a ViewTransform, like lp.ViewTran"),
         ({"constraints": {"key": {"off": True}}}, r"are a dict: give lp.Constraints.of\(\.\.\.\)"),
         ({"spp": 4}, r"spp=\.\.\. cannot change a saved basis: leave it out, or give the scene"),
     ):
-        with pytest.raises(lp.LightpaintError, match=said):
-            open_painter(**how)
+        with pytest.raises(lp.LightpaintError, match=message):
+            open_painter(**options)
     with pytest.raises(TypeError, match=r"lp.Painter has no argument 'heigth': did you mean 'heig"):
         open_painter(heigth=300)
     with pytest.raises(TypeError, match=r"lp.Painter has no argument 'sp': did you mean 'spp'"):
@@ -421,10 +423,10 @@ def test_what_is_said_is_said_in_words_of_a_notebook(
     with pytest.raises(lp.LightpaintError, match=f"damaged .*: {elsewhere}, or give") as junk:
         open_painter(store=tmp_path / "junk.db")
     assert not any(word in str(junk.value) for word in ("folder", "new="))
-    used = Store.open(tmp_path / "used.db", Identity.of([basis]))
+    store = Store.open(tmp_path / "used.db", Identity.of([basis]))
     with pytest.raises(lp.LightpaintError, match=f"is in use: .*, or {elsewhere}$"):
         open_painter(store=tmp_path / "used.db")
-    used.close()
+    store.close()
     with pytest.raises(lp.LightpaintError, match="store is 3: expected the path of a file"):
         open_painter(store=3)
 
@@ -487,14 +489,14 @@ def test_what_cannot_be_set_is_said_while_it_still_renders(
 ) -> None:
     ProgressiveScene(basis, tmp_path, monkeypatch)
     small = lp.Target("s", np.ones((3, 3, 3), np.float32), np.ones((3, 3), np.float32), True)
-    for target, said in (
+    for target, message in (
         (small, "3x3"),
         ([small], "3x3"),
         ([None, None], "list of 1"),
         (small.image, "not ndarray"),
         ([small.image], "lp.Target or None, not ndarray"),
     ):
-        with pytest.raises(lp.LightpaintError, match=said):
+        with pytest.raises(lp.LightpaintError, match=message):
             open_painter(target=target)
 
 
@@ -507,10 +509,10 @@ def test_messages_about_a_basis_come_while_nobody_holds_the_session(
     forward, was_free = studio.on_message, []
 
     def is_free() -> bool:
-        got = studio._access.lock.acquire(timeout=20)
-        if got:
+        has_lock = studio._access.lock.acquire(timeout=20)
+        if has_lock:
             studio._access.lock.release()
-        return got
+        return has_lock
 
     def receive(message: Any) -> None:
         with ThreadPoolExecutor(1) as another:
@@ -531,8 +533,8 @@ def test_what_cannot_be_set_later_ends_no_render(
         raise PaintError("no room for it")
 
     rendered = ProgressiveScene(basis, tmp_path, monkeypatch)
-    whole = lp.Target("s", np.ones((*SIZE, 3), np.float32), np.ones(SIZE, np.float32), True)
-    painter = open_painter(target=whole)
+    full_target = lp.Target("s", np.ones((*SIZE, 3), np.float32), np.ones(SIZE, np.float32), True)
+    painter = open_painter(target=full_target)
     with monkeypatch.context() as patch:
         patch.setattr(Studio, "load", no)
         rendered.goes_on.set()
@@ -548,20 +550,20 @@ def test_what_cannot_be_set_later_ends_no_render(
         lambda: [x["text"] for x, _ in painter.comm.messages if x["kind"] == "notice"]
     )
     assert painter.target is None
-    painter.target = whole
-    np.testing.assert_array_equal(painter.target.image, whole.image)
+    painter.target = full_target
+    np.testing.assert_array_equal(painter.target.image, full_target.image)
 
 
 def test_what_is_set_while_it_renders_is_set_once_it_can_be(
     basis: lp.Basis, open_painter: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rendered = ProgressiveScene(basis, tmp_path, monkeypatch)
-    whole = lp.Target("s", np.ones((*SIZE, 3), np.float32), np.ones(SIZE, np.float32), True)
-    painter = open_painter(target=whole)
+    full_target = lp.Target("s", np.ones((*SIZE, 3), np.float32), np.ones(SIZE, np.float32), True)
+    painter = open_painter(target=full_target)
     assert painter.target is None
     rendered.goes_on.set()
     wait_for(lambda: painter.target is not None)
-    np.testing.assert_array_equal(painter.target.image, whole.image)
+    np.testing.assert_array_equal(painter.target.image, full_target.image)
 
 
 def test_a_callback_that_fails_is_shown(basis: lp.Basis, open_painter: Any, capsys: Any) -> None:
@@ -570,8 +572,8 @@ def test_a_callback_that_fails_is_shown(basis: lp.Basis, open_painter: Any, caps
     page.say("hello", version=protocol.VERSION)
     painter.observe(lambda _: 1 / 0, "target")
     assert page.paint(basis.images[0])["kind"] == "answer"
-    said = wait_for(lambda: [x["text"] for x, _ in page.messages() if x["kind"] == "notice"])
-    assert "callback of painter.target failed: ZeroDivisionError" in said[0]
+    notices = wait_for(lambda: [x["text"] for x, _ in page.messages() if x["kind"] == "notice"])
+    assert "callback of painter.target failed: ZeroDivisionError" in notices[0]
     assert "ZeroDivisionError" in capsys.readouterr().err
     # And it goes on.
     assert page.paint(basis.images[1], 1)["kind"] == "answer"
@@ -584,11 +586,11 @@ def test_a_callback_that_fails_silences_no_other(
         raise ValueError("boom")
 
     painter = open_painter()
-    told: list[str] = []
+    lightings: list[str] = []
     painter.observe(fails, "lighting")
-    painter.observe(lambda change: told.append(change.name), "lighting")
+    painter.observe(lambda change: lightings.append(change.name), "lighting")
     painter.target = lp.Target.of(basis.images[0])
-    assert "lighting" in told
+    assert "lighting" in lightings
     # Where it failed, and nothing of how it came to be called.
     frames = [x for x in capsys.readouterr().err.splitlines() if x.startswith("  File")]
     assert frames
@@ -604,14 +606,14 @@ def test_a_callback_that_fails_silences_no_other(
 
 def test_what_a_callback_sets_is_set_once_all_are_told(basis: lp.Basis, open_painter: Any) -> None:
     painter = open_painter()
-    off = lp.Constraints.of({"key": {"off": True}})
-    told: list[str] = []
-    painter.observe(lambda _: setattr(painter, "constraints", off), "lighting")
-    painter.observe(lambda change: told.append(change.name))
+    off_constraints = lp.Constraints.of({"key": {"off": True}})
+    lightings: list[str] = []
+    painter.observe(lambda _: setattr(painter, "constraints", off_constraints), "lighting")
+    painter.observe(lambda change: lightings.append(change.name))
     painter.target = lp.Target.of(basis.images[0])
-    assert painter.constraints == off
+    assert painter.constraints == off_constraints
     assert painter.lighting.emission["key"] == (0, 0, 0)
-    assert told.index("constraints") > told.index("target")
+    assert lightings.index("constraints") > lightings.index("target")
     # What is set again to what it is has changed nothing, and is no step to be undone.
     assert len(painter._studio.session.store.steps) == 2
 
@@ -627,9 +629,9 @@ def test_what_a_callback_cannot_set_is_shown(
     painter.observe(lambda _: setattr(painter, "constraints", fill), "targets")
     painter.observe(lambda _: setattr(painter, "constraints", key), "lighting")
     painter.target = lp.Target.of(basis.images[0])
-    said = [x["text"] for x, _ in page.messages() if x["kind"] == "notice"]
-    assert any("painter.constraints is a lp.Constraints or None, not int" in x for x in said)
-    assert any("no light 'lamp'" in x for x in said)
+    notices = [x["text"] for x, _ in page.messages() if x["kind"] == "notice"]
+    assert any("painter.constraints is a lp.Constraints or None, not int" in x for x in notices)
+    assert any("no light 'lamp'" in x for x in notices)
     assert "no light 'lamp'" in capsys.readouterr().err
     assert painter.constraints == key
 
@@ -642,13 +644,13 @@ def test_callbacks_that_never_come_to_an_end_are_stopped(
     page.say("hello", version=protocol.VERSION)
     levels = iter(np.linspace(0.1, 0.9, 1000).tolist())
 
-    def again(_: Any) -> None:
+    def set_again(_: Any) -> None:
         painter.constraints = lp.Constraints.of({"key": {"lock": next(levels)}})
 
-    painter.observe(again, "lighting")
+    painter.observe(set_again, "lighting")
     painter.target = lp.Target.of(basis.images[0])
-    said = [x["text"] for x, _ in page.messages() if x["kind"] == "notice"]
-    assert "callbacks of the painter set something again" in said[0]
+    notices = [x["text"] for x, _ in page.messages() if x["kind"] == "notice"]
+    assert "callbacks of the painter set something again" in notices[0]
 
 
 @pytest.mark.filterwarnings("ignore")
@@ -660,8 +662,8 @@ def test_junk_is_answered(
     page.say("hello", version=protocol.VERSION)
     assert page.say("nothing")["kind"] == "failed"
     assert page.say("fetch", name="../secret")["kind"] == "failed"
-    bad = {"image": np.full((*SIZE, 3), np.nan, np.float32)}
-    assert "NaN" in page.say("paint", bad, stroke=0, region=[0, 12, 0, 20])["text"]
+    invalid = {"image": np.full((*SIZE, 3), np.nan, np.float32)}
+    assert "NaN" in page.say("paint", invalid, stroke=0, region=[0, 12, 0, 20])["text"]
     monkeypatch.setattr(painter._studio, "handle", lambda *_: 1 / 0)
     assert "failed inside lightpaint: ZeroDivisionError" in page.say("undo")["text"]
     assert "Traceback" in capsys.readouterr().err
@@ -681,8 +683,8 @@ def test_constraints_that_cannot_be_met_are_refused_in_their_cell(tmp_path: Path
 def test_what_cannot_begin_is_told_to_who_asked(open_painter: Any) -> None:
     """Also where nobody has begun, and by a page of a version that says more."""
     painter = open_painter()
-    told = Page(painter).say("hello", version=protocol.VERSION + 1, with_news=True)
-    assert (told["kind"], told["reason"]) == ("closed", "version")
+    reply = Page(painter).say("hello", version=protocol.VERSION + 1, with_news=True)
+    assert (reply["kind"], reply["reason"]) == ("closed", "version")
     assert Page(painter, OTHER).say("nothing")["kind"] == "failed"
 
 
@@ -701,7 +703,7 @@ def test_who_is_shown_last_has_it(basis: lp.Basis, open_painter: Any) -> None:
 def test_callbacks_come_in_the_thread_of_the_kernel(
     basis: lp.Basis, open_painter: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    heard: list[Any] = []
+    thread_ids: list[Any] = []
 
     async def cell() -> None:
         loop = asyncio.get_running_loop()
@@ -709,10 +711,10 @@ def test_callbacks_come_in_the_thread_of_the_kernel(
         painter = open_painter()
         page = Page(painter)
         page.say("hello", version=protocol.VERSION)
-        painter.observe(lambda _: heard.append(threading.current_thread()), "lighting")
+        painter.observe(lambda _: thread_ids.append(threading.current_thread()), "lighting")
         page.paint(basis.images[0])
         for _ in range(3000):
-            if heard:
+            if thread_ids:
                 break
             await asyncio.sleep(0.01)
 
@@ -720,7 +722,7 @@ def test_callbacks_come_in_the_thread_of_the_kernel(
     thread = threading.Thread(target=lambda: asyncio.run(cell()))
     thread.start()
     thread.join()
-    assert heard[0] is thread
+    assert thread_ids[0] is thread
 
 
 def test_a_session_with_a_file_goes_on(basis: lp.Basis, open_painter: Any, tmp_path: Path) -> None:
@@ -729,8 +731,8 @@ def test_a_session_with_a_file_goes_on(basis: lp.Basis, open_painter: Any, tmp_p
     page.say("hello", version=protocol.VERSION)
     page.paint(basis.images[2])
     painter.close()
-    again = open_painter(store=tmp_path / "evening.db")
-    np.testing.assert_array_equal(again.target.image, basis.images[2])
+    second_painter = open_painter(store=tmp_path / "evening.db")
+    np.testing.assert_array_equal(second_painter.target.image, basis.images[2])
 
 
 def test_a_full_disk_is_said_and_tried_again(
@@ -741,7 +743,7 @@ def test_a_full_disk_is_said_and_tried_again(
         raise sqlite3.OperationalError("database or disk is full")
         yield
 
-    def said(tone: str) -> Any:
+    def notices(tone: str) -> Any:
         return [
             x["text"] for x, _ in page.messages() if x["kind"] == "notice" and x["tone"] == tone
         ]
@@ -753,12 +755,12 @@ def test_a_full_disk_is_said_and_tried_again(
     with monkeypatch.context() as patch:
         patch.setattr(write_queue, "transaction", full)
         assert page.paint(basis.images[2])["kind"] == "answer"
-        [why] = wait_for(lambda: said("warn"))
-        assert "evening.db cannot be written (database or disk is full)" in why
-        assert not said("info")
-    assert wait_for(lambda: said("info")) == ["all that was painted is kept again"]
+        [notice] = wait_for(lambda: notices("warn"))
+        assert "evening.db cannot be written (database or disk is full)" in notice
+        assert not notices("info")
+    assert wait_for(lambda: notices("info")) == ["all that was painted is kept again"]
     assert painter._studio.store.unsaved is None
-    assert said("warn") == [why]  # once, however often it was tried
+    assert notices("warn") == [notice]  # once, however often it was tried
 
 
 def test_a_cell_with_a_file_runs_again(
@@ -769,9 +771,9 @@ def test_a_cell_with_a_file_runs_again(
     page.say("hello", version=protocol.VERSION)
     page.paint(basis.images[2])
     monkeypatch.chdir(tmp_path)
-    again = open_painter(store="evening.db")
+    second_painter = open_painter(store="evening.db")
     assert painter.comm is None
-    np.testing.assert_array_equal(again.target.image, basis.images[2])
+    np.testing.assert_array_equal(second_painter.target.image, basis.images[2])
 
 
 def test_who_is_closed_cannot_be_set(basis: lp.Basis, open_painter: Any) -> None:
@@ -792,11 +794,11 @@ def test_who_closes_waits_for_no_other_painter(
     """Whose renders may go on for as long as they like."""
     monkeypatch.setattr(Studio, "has_scenes", property(lambda _: True))
     one, _ = open_painter(), open_painter()
-    mine = list(one._studio._threads._threads)
+    threads = list(one._studio._threads._threads)
     begun_s = time.monotonic()
     one.close()
     assert time.monotonic() - begun_s < 30
-    assert not any(thread.is_alive() for thread in mine)
+    assert not any(thread.is_alive() for thread in threads)
 
 
 def test_who_is_closed_is_let_go_of(basis: lp.Basis, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -808,9 +810,9 @@ def test_who_is_closed_is_let_go_of(basis: lp.Basis, monkeypatch: pytest.MonkeyP
         painter.close()
         return ref(painter)
 
-    its = closed()
+    reference = closed()
     gc.collect()
-    assert its() is None
+    assert reference() is None
 
 
 def test_who_cannot_keep_what_was_done_has_ended_all_the_same(
@@ -833,16 +835,16 @@ def test_a_cell_that_is_put_right_finds_its_file(
     """Whatever was wrong with it, and also where an exception keeps what it was raised in."""
     path = tmp_path / "evening.db"
     open_painter(store=path)._studio.handle(protocol.TieLights((("key", "fill"),)), {})
-    asked = {"key": {"lock": [1, 1, 1]}, "fill": {"lock": [3, 1, 1]}}
-    with pytest.raises(lp.LightpaintError, match="share a dimmer") as kept:
-        open_painter(store=path, constraints=lp.Constraints.of(asked))
+    constraints = {"key": {"lock": [1, 1, 1]}, "fill": {"lock": [3, 1, 1]}}
+    with pytest.raises(lp.LightpaintError, match="share a dimmer") as refusal:
+        open_painter(store=path, constraints=lp.Constraints.of(constraints))
     small = lp.Target("s", np.ones((3, 3, 3), np.float32), np.ones((3, 3), np.float32), True)
     with pytest.raises(lp.LightpaintError, match="3x3") as also_kept:
         open_painter(store=path, target=small)
     # It is anybody's, not only the next painter's of this kernel.
     with Store.open(path, Identity.of([basis])) as store:
         assert [step.kind for step in store.steps] == ["requests"]
-    del kept, also_kept
+    del refusal, also_kept
 
 
 def test_without_the_extra_there_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -868,7 +870,7 @@ def test_the_script_is_one_module() -> None:
 
 
 @pytest.mark.parametrize(
-    ("files", "said"),
+    ("files", "message"),
     [
         ({"a.js": "export default 3\n"}, "cannot bundle `export default 3`"),
         ({"a.js": "export let x = 3\n"}, "cannot bundle `export let x = 3`"),
@@ -882,10 +884,10 @@ def test_the_script_is_one_module() -> None:
         ({"a.js": "import x from './b.js'\n", "b.js": "\n"}, "imports 'x'"),
     ],
 )
-def test_what_is_not_understood_is_refused(files: Any, said: str, monkeypatch: Any) -> None:
+def test_what_is_not_understood_is_refused(files: Any, message: str, monkeypatch: Any) -> None:
     monkeypatch.setattr("lightpaint.viewer.bundle.source", lambda path: files[path])
     monkeypatch.setattr("lightpaint.viewer.bundle._code", lambda path: files[path])
-    with pytest.raises(BundleError, match=said):
+    with pytest.raises(BundleError, match=message):
         bundled.__wrapped__("a.js")
 
 

@@ -115,8 +115,8 @@ def test_a_light_that_is_missing_is_found(
     with_it = tmp_path / "pasted.xml"
     with_it.write_text(pasted, encoding="utf-8")
     _, _, repeat = _solved(with_it, target)
-    left = sum(repeat.certificate.objective) / sum(solution.certificate.objective)
-    assert left == pytest.approx(first.missed_share, abs=0.05)
+    remaining_loss = sum(repeat.certificate.objective) / sum(solution.certificate.objective)
+    assert remaining_loss == pytest.approx(first.missed_share, abs=0.05)
     np.testing.assert_allclose(repeat.lighting.emission[first.name], first.emission, rtol=0.15)
 
 
@@ -201,10 +201,10 @@ def test_a_camera_that_sees_nothing_but_the_sky(tmp_path: Path):
         write_room(tmp_path, lights=LIGHTS["sky"] + LIGHTS["bulb"], sensors=away), sensor="away"
     )
     basis = render_basis(scene, spp=4)
-    everything = Target(
+    full_target = Target(
         "t", np.random.default_rng(0).random((20, 24, 3)), np.ones((20, 24)), everything=False
     )
-    assert suggest_lights(scene, basis, solve(basis, everything)) == ()
+    assert suggest_lights(scene, basis, solve(basis, full_target)) == ()
 
 
 def test_a_basis_of_a_smaller_film_than_the_scene(tmp_path: Path):

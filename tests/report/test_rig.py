@@ -77,8 +77,8 @@ def test_a_picture_without_positions_has_no_plan() -> None:
     assert ViewGeometry.of(flat) is None
     assert rig_drawing(flat, [turned()]) is None
     assert aim_picture(np.zeros((*SIZE, 3), np.uint8), flat, (turned(),)) is None
-    nothing = Features(room.albedo, np.zeros_like(room.normal), room.position)
-    assert rig_drawing(nothing, [turned()]) is None
+    empty_features = Features(room.albedo, np.zeros_like(room.normal), room.position)
+    assert rig_drawing(empty_features, [turned()]) is None
 
 
 def test_a_plan_marks_what_changed_and_nothing_else() -> None:

@@ -139,17 +139,17 @@ def test_the_parts_of_what_is_missed_add_up(make_basis: Any):
 
 def test_sentence_and_table_give_the_same_percentages(make_basis: Any):
     """Alone, the first part rounds to 96 %; with the others it is 97 %, so that they add up."""
-    basis, solution, _, found = _solved(make_basis)
+    basis, solution, _, diagnosis = _solved(make_basis)
     parts = {"unreachable": 0.9649, "noise": 0.0246, "painting_noise": 0.0105, "forbidden": 0.0}
-    split = replace(found, **{name: x * found.total for name, x in parts.items()})
+    split = replace(diagnosis, **{name: x * diagnosis.total for name, x in parts.items()})
     current = basis.mix(basis.current_weights)
     page = missed_section(solution, split, current, transform=ViewTransform())
     sentence, _, rest = page.partition("</p>")
     [table] = re.findall(r'<table class="shares">(.*?)</table>', rest)
-    told = re.findall(r"([\d.]+) %", sentence)
-    assert len(told) == 3
-    assert sum(map(int, told)) == 100
-    assert sorted(told) == sorted(x for x in re.findall(r"([\d.]+) %", table) if x != "0")
+    shares = re.findall(r"([\d.]+) %", sentence)
+    assert len(shares) == 3
+    assert sum(map(int, shares)) == 100
+    assert sorted(shares) == sorted(x for x in re.findall(r"([\d.]+) %", table) if x != "0")
 
 
 def test_the_most_useful_comes_first(make_basis: Any):

@@ -165,7 +165,7 @@ def test_from_solve_to_verify(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("choice", "says"),
+    ("choice", "message"),
     [
         ("nope", "no integrator plugin 'nope'; the requested integrator is nope"),
         ("path:max_deep=3", "unreferenced property .* the requested integrator"),
@@ -173,8 +173,8 @@ def test_from_solve_to_verify(tmp_path: Path) -> None:
         ("Path", "'Path' is not an integrator"),
     ],
 )
-def test_a_choice_that_mitsuba_refuses(tmp_path: Path, choice: str, says: str) -> None:
-    with pytest.raises(SceneError, match=says):
+def test_a_choice_that_mitsuba_refuses(tmp_path: Path, choice: str, message: str) -> None:
+    with pytest.raises(SceneError, match=message):
         load_scene(write_room(tmp_path), integrator=choice)
 
 
@@ -204,7 +204,7 @@ OLD = """<scene version="0.6.0">
 
 
 @pytest.mark.parametrize(
-    ("changes", "says"),
+    ("changes", "message"),
     [
         (("hdrfilm", "ldrfilm"), r"\(version 0.6.0\).*line 6.*'ldrfilm'.*; write hdrfilm there"),
         (("lookat ", "lookAt "), r"\(version 0.6.0\).*line 3.*<lookAt>.*; write lookat there"),
@@ -218,13 +218,13 @@ OLD = """<scene version="0.6.0">
     ],
 )
 def test_a_scene_of_mitsuba_0_6_is_told(
-    tmp_path: Path, changes: tuple[str, str], says: str
+    tmp_path: Path, changes: tuple[str, str], message: str
 ) -> None:
     path = tmp_path / "old.xml"
     path.write_text(OLD, encoding="utf-8")
     assert load_scene(path).integrator.max_depth == 8  # where nothing else is missing, it is read
     path.write_text(OLD.replace(*changes), encoding="utf-8")
-    with pytest.raises(SceneError, match=f"is a scene of Mitsuba 0.6 .*{says}") as raised:
+    with pytest.raises(SceneError, match=f"is a scene of Mitsuba 0.6 .*{message}") as raised:
         load_scene(path)
     assert str(raised.value).count("old.xml") <= 2
 

@@ -119,8 +119,8 @@ def test_parameters_count_by_what_they_change(tmp_path: Path) -> None:
 def test_another_integrator_is_another_scene(tmp_path: Path) -> None:
     before = identities(tmp_path)
     assert changed(before, identities(tmp_path, integrator=PATH.replace("path", "volpath"))) == ALL
-    instead = load_scene(write_room(tmp_path), integrator="direct")
-    assert changed(before, by_name(instead)) == ALL
+    direct_scene = load_scene(write_room(tmp_path), integrator="direct")
+    assert changed(before, by_name(direct_scene)) == ALL
 
 
 def test_includes_and_folders_do_not_count(tmp_path: Path) -> None:

@@ -106,8 +106,8 @@ def test_each_pixel_has_an_object_and_each_object_a_name(tmp_path: Path) -> None
     # The samples that were counted are others: an edge may run through one of these pixels.
     assert (np.abs(floor[:, 1]) < 1e-5).mean() > 0.95
     assert (np.abs(wall[:, 2] + 1) < 1e-5).mean() > 0.95
-    nothing = sum(surfaces.coverage.values()) == 0
-    assert (objects.index[nothing] == -1).mean() > 0.95
+    is_background = sum(surfaces.coverage.values()) == 0
+    assert (objects.index[is_background] == -1).mean() > 0.95
 
 
 def test_the_basis_has_them(tmp_path: Path) -> None:

@@ -167,7 +167,7 @@ def test_threads_render_what_one_alone_does(small_room: lp.Scene, monkeypatch: p
     order: list[str] = []
     has_begun = threading.Event()
 
-    def hears(label: str, done: int, total: int, unit: str = "passes") -> None:
+    def note_pass(label: str, done: int, total: int, unit: str = "passes") -> None:
         order.append("pass")
         has_begun.set()
 
@@ -183,7 +183,7 @@ def test_threads_render_what_one_alone_does(small_room: lp.Scene, monkeypatch: p
     with ThreadPoolExecutor(1) as threads:
         future = threads.submit(frames)
         with MITSUBA.low_priority():
-            basis = lp.render_basis(small_room, spp=64, progress=hears)
+            basis = lp.render_basis(small_room, spp=64, progress=note_pass)
         pictures = future.result(60)
     first, *other_frames = (k for k, kind in enumerate(order) if kind == "frame")
     assert order[:first]

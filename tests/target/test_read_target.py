@@ -160,14 +160,14 @@ def test_negative_colours_are_legitimate(write: Any, image: Any):
 
 @pytest.mark.parametrize("channel", ["A", "W"])
 @pytest.mark.parametrize(
-    ("bad", "message"),
+    ("value", "message"),
     [(-0.25, "between -0.25 and 1"), (np.nan, "finite"), (np.inf, "finite")],
 )
 def test_importance_that_makes_no_sense(
-    write: Any, image: Any, channel: str, bad: float, message: str
+    write: Any, image: Any, channel: str, value: float, message: str
 ):
     values = np.ones(SIZE, np.float32)
-    values[3, 3] = bad
+    values[3, 3] = value
     with pytest.raises(TargetError, match=message):
         read_target(write(rgb=image, **{channel: values}))
     with pytest.raises(TargetError, match=message):

@@ -199,9 +199,9 @@ def test_grain_is_taken_out_of_light_of_unknown_noise():
     rng = np.random.default_rng(7)
     truth = np.full((120, 160, 3), 2, np.float32)
     raw = truth + rng.normal(size=truth.shape).astype(np.float32)
-    left = np.square(blend_by_grain(raw, truth) - truth).mean()
+    remaining_error = np.square(blend_by_grain(raw, truth) - truth).mean()
     # A mean over 121 pixels of what differs by chance, the largest of four directions: some 0.1.
-    assert left < 0.03
+    assert remaining_error < 0.03
 
 
 @pytest.mark.parametrize("step", [(0, 1), (1, 0), (1, 1)])

@@ -172,7 +172,7 @@ def test_a_pattern_finds_what_no_convention_does():
 
 
 @pytest.mark.parametrize(
-    ("names", "pattern", "says"),
+    ("names", "pattern", "message"),
     [
         (
             ["", "L_key", "L_fill"],
@@ -188,8 +188,8 @@ def test_a_pattern_finds_what_no_convention_does():
         ([f"x{k}" for k in range(99)], None, "x61, … and 37 more$"),
     ],
 )
-def test_what_cannot_be_told_lists_the_layers(names: list[str], pattern: Any, says: str):
-    with pytest.raises(BasisError, match=says) as raised:
+def test_what_cannot_be_told_lists_the_layers(names: list[str], pattern: Any, message: str):
+    with pytest.raises(BasisError, match=message) as raised:
         _choose(*names, pattern=pattern)
     assert "\n" not in str(raised.value)
 

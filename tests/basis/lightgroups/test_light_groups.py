@@ -354,7 +354,7 @@ def test_a_sequence_of_frames_is_refused(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("layers", "says"),
+    ("layers", "message"),
     [
         (lambda p: p.mkdir(), "holds no .exr file"),
         (lambda p: write(p, ("z", {"Z": np.ones(SIZE, np.float32)})), "has no RGB layers"),
@@ -362,10 +362,10 @@ def test_a_sequence_of_frames_is_refused(tmp_path: Path):
         (lambda p: interleaved(p, {"": pictures()[0]}), "no layers named like"),
     ],
 )
-def test_what_has_no_light_groups_is_refused(tmp_path: Path, layers: Any, says: str):
+def test_what_has_no_light_groups_is_refused(tmp_path: Path, layers: Any, message: str):
     path = tmp_path / "x.exr"
     layers(path)
-    with pytest.raises(BasisError, match=says):
+    with pytest.raises(BasisError, match=message):
         read_light_groups(path)
 
 

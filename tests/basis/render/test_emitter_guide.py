@@ -135,8 +135,8 @@ def test_a_damaged_memory_is_forgotten(tmp_path: Path, damage: str) -> None:
 def test_a_kept_emitter_that_is_never_sampled_is_as_dark_as_in_mitsuba(tmp_path: Path) -> None:
     from renderer import LIGHTS, mitsuba_render
 
-    never = '<float name="sampling_weight" value="0"/></emitter>'
-    bulb, panel = (LIGHTS[name].replace("</emitter>", never) for name in ("bulb", "panel"))
+    unsampled = '<float name="sampling_weight" value="0"/></emitter>'
+    bulb, panel = (LIGHTS[name].replace("</emitter>", unsampled) for name in ("bulb", "panel"))
     path = write_room(tmp_path, lights=bulb + panel + LIGHTS["sky"])
     scene = load_scene(path, lights=["sky"])
     basis = render_basis(scene, spp=512)

@@ -29,8 +29,10 @@ def test_direct_light_is_that_of_one_bounce(tmp_path: Path):
     all_bounces, direct = (render_basis(scene.only([name]), spp=SPP) for scene in scenes)
     assert all_bounces.indirect is not None
     assert direct.indirect is None
-    left = all_bounces.images - all_bounces.indirect.planes.array()
-    np.testing.assert_allclose(left, direct.images, rtol=1e-5, atol=1e-5 * direct.images.max())
+    direct_images = all_bounces.images - all_bounces.indirect.planes.array()
+    np.testing.assert_allclose(
+        direct_images, direct.images, rtol=1e-5, atol=1e-5 * direct.images.max()
+    )
     noise = all_bounces.half_differences - all_bounces.indirect.noise.array()
     scale = np.abs(direct.half_differences).max()
     np.testing.assert_allclose(noise, direct.half_differences, rtol=1e-4, atol=1e-5 * scale)

@@ -64,10 +64,12 @@ def test_an_image_is_the_mean_of_renders_of_that_light_alone(scene: Scene) -> No
     basis = render_basis(scene, spp=16, seed=7)
     assert basis.origin.each_light == ()
     for k, name in enumerate(basis.names):
-        only = {x: WHITE if x == name else BLACK for x in basis.names}
+        single_light = {x: WHITE if x == name else BLACK for x in basis.names}
         of_light = pass_seed(7, Stream.BASIS, k)
         halves = [
-            mitsuba_render(scene, only, seed=pass_seed(of_light, Stream.BASIS, number), spp=4)
+            mitsuba_render(
+                scene, single_light, seed=pass_seed(of_light, Stream.BASIS, number), spp=4
+            )
             for number in range(4)
         ]
         mean = np.mean(halves, axis=0)

@@ -73,11 +73,11 @@ def test_in_two_goes_as_in_one(small_room: Scene, counts: Any, tmp_path: Path):
     basis = render_basis(small_room, spp=8)
     first = np.random.default_rng(1).integers(0, counts + 1)
     in_one = pixel_top_up.top_up(small_room, basis, counts)
-    begun = pixel_top_up.top_up(small_room, basis, first)
-    same_basis(pixel_top_up.top_up(small_room, begun, counts - first), in_one)
-    write_basis(tmp_path / "b.exr", begun)
+    partial = pixel_top_up.top_up(small_room, basis, first)
+    same_basis(pixel_top_up.top_up(small_room, partial, counts - first), in_one)
+    write_basis(tmp_path / "b.exr", partial)
     read = read_basis(tmp_path / "b.exr")
-    np.testing.assert_array_equal(read.extra, begun.extra)
+    np.testing.assert_array_equal(read.extra, partial.extra)
     same_basis(pixel_top_up.top_up(small_room, read, counts - first), in_one, of_file=True)
 
 

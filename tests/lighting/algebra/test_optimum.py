@@ -58,9 +58,9 @@ def _certify(optimum: Optimum, M: Any, b: Any, lower: Any, upper: Any, caps: Any
         normals += [scaled] if a @ x <= cap.lower + room else []
         normals += [-scaled] if a @ x >= cap.upper - room else []
     gradient = (M @ x - b) * size
-    left = nnls(np.array(normals).T, gradient)[1] if normals else np.linalg.norm(gradient)
+    distance = nnls(np.array(normals).T, gradient)[1] if normals else np.linalg.norm(gradient)
     terms = np.abs(M * size[:, None]) @ np.abs(x) + np.abs(b * size)
-    assert left <= 1e-10 * max(terms.max(), 1e-300)
+    assert distance <= 1e-10 * max(terms.max(), 1e-300)
 
 
 @pytest.fixture(params=["clipped steps", "polish"])

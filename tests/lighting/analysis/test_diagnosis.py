@@ -171,9 +171,9 @@ def test_the_look_that_is_kept_has_the_noise_of_the_prediction(make_basis: Any):
     noise = np.zeros((1, *SIZE, 3))
     noise[0, :, 9:] = np.random.default_rng(3).normal(0, 0.3, (SIZE[0], 9, 3))
     basis = make_basis(images=np.ones((1, *SIZE, 3)) + noise, half_differences=noise)
-    left = np.broadcast_to(np.arange(SIZE[1]) < 9, SIZE)
+    is_left = np.broadcast_to(np.arange(SIZE[1]) < 9, SIZE)
     brighter = np.broadcast_to(1.5 * basis.current_weights[0], (*SIZE, 3))
-    target = replace(_target(brighter, left), over_look=True)
+    target = replace(_target(brighter, is_left), over_look=True)
     solution = solve(basis, target, unpainted=1.0, space="linear")
     diagnosis = diagnose(solution)
     change = solution.weights[0] - basis.current_weights[0]

@@ -69,9 +69,9 @@ def test_paint_is_no_noise(kind: str) -> None:
 
 
 def test_only_what_counts_is_looked_at() -> None:
-    left = X < 60
-    residual = np.where(left[..., None], 0, _noise("normal"))
-    assert grain(residual, left).max() == 0
+    is_left = X < 60
+    residual = np.where(is_left[..., None], 0, _noise("normal"))
+    assert grain(residual, is_left).max() == 0
     assert grain(residual, ~EVERYWHERE).max() == 0
     # A mask of single pixels has no neighbours to compare.
     assert grain(residual, (X % 3 == 0) & (Y % 3 == 0)).max() == 0

@@ -35,8 +35,8 @@ def test_a_solve_from_python_is_that_of_paint_with_light(room: Path, tmp_path: P
     scene = lp.load_scene(room)
     basis = lp.render_basis(scene, spp=8)
     write_rgb(tmp_path / "t.exr", _target(basis).image)
-    how = {"spp": 8, "noise_correction": False}
-    look = lp.paint_with_light(scene, tmp_path / "t.exr", tmp_path / "out", **how)
+    options = {"spp": 8, "noise_correction": False}
+    look = lp.paint_with_light(scene, tmp_path / "t.exr", tmp_path / "out", **options)
     # Threads that learn where lights matter may leave one sample in a million to another light.
     solution = lp.solve(look.basis, lp.read_target(tmp_path / "t.exr"))
     assert look.basis.requests == basis.requests == scene.requests

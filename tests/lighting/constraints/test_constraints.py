@@ -581,8 +581,10 @@ def test_the_best_few_lights(make_basis: Any, seed: int) -> None:
     # The roots of float64 sums.
     assert (np.diff(misses) < 1e-12).all()
     assert misses[1] == pytest.approx(np.sqrt(objective / (y @ y)))
-    left = [light.name for light in solution.lighting.lights if "left out" in light.constraint]
-    assert len(left) == 3
+    left_out_names = [
+        light.name for light in solution.lighting.lights if "left out" in light.constraint
+    ]
+    assert len(left_out_names) == 3
 
 
 def test_few_lights_among_ties_and_lower_limits(make_basis: Any) -> None:

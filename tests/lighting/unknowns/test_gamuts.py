@@ -54,8 +54,8 @@ def _painting(basis: lp.Basis, tint: Any, *, brighter: float = 1.7) -> tuple[Any
 
 def _target(image: Any, weight: Any) -> lp.Target:
     transform = lp.ViewTransform("srgb", 0.0)
-    how: dict[str, Any] = {"through_view": True, "over_look": True, "transform": transform}
-    return lp.Target("t", image, weight, everything=False, **how)
+    options: dict[str, Any] = {"through_view": True, "over_look": True, "transform": transform}
+    return lp.Target("t", image, weight, everything=False, **options)
 
 
 def _is_white(weights: Any) -> bool:

@@ -91,11 +91,11 @@ def test_optimality_conditions(n: int, kind: str):
         residual = values - np.einsum("cmi,ci->cm", columns, w)
         # Cosine-like: what is left of the target along each light, over the target's length.
         # The solver's 1e-10 is over something smaller by up to a factor of 50.
-        left = np.einsum("cmi,cm->ci", columns, residual)
-        left /= np.linalg.norm(columns, axis=1) * np.linalg.norm(values, axis=1)[:, None]
+        correlations = np.einsum("cmi,cm->ci", columns, residual)
+        correlations /= np.linalg.norm(columns, axis=1) * np.linalg.norm(values, axis=1)[:, None]
         assert (w >= 0).all()
-        assert np.abs(left[w > 0]).max(initial=0) < 1e-9
-        assert left[w == 0].max(initial=-1) < 1e-9
+        assert np.abs(correlations[w > 0]).max(initial=0) < 1e-9
+        assert correlations[w == 0].max(initial=-1) < 1e-9
 
 
 @pytest.mark.parametrize("start_at", [0.0, 1e-3, 1e3])

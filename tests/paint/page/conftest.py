@@ -104,8 +104,8 @@ def page(tab: Any, site: Site) -> Iterator[Any]:
     blank_page.goto(f"{site.url}/empty.html")
     yield blank_page
     site.arrays.clear()
-    left, errors[:] = errors[:], []
-    assert left == []
+    page_errors, errors[:] = errors[:], []
+    assert page_errors == []
 
 
 class Tabs:

@@ -81,8 +81,8 @@ def open_file(offline_tab: tuple[Any, list[str]], tmp_path: Path) -> Any:
     yield open_text
     page.goto("about:blank")
     page.set_viewport_size({"width": 1100, "height": 800})
-    left, errors[:] = errors[:], []
-    assert left == []
+    page_errors, errors[:] = errors[:], []
+    assert page_errors == []
 
 
 def pixels(page: Any) -> Any:

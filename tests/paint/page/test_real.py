@@ -262,10 +262,10 @@ def open_page(browser: Any) -> Iterator[Callable[..., PainterUser]]:
         return line.type in ("error", "warning") and OURS not in line.text
 
     yield open_in_browser
-    left = errors.copy()
+    page_errors = errors.copy()
     for context in contexts:
         context.close()
-    assert left == []
+    assert page_errors == []
 
 
 @pytest.mark.parametrize("view", ["cpu", "gl"])
