@@ -190,8 +190,8 @@ class LookLibrary:
             s * np.asarray(x.arrays["weights"]) for s, x in zip(shares, looks, strict=True)
         )
         locks = self._lock_all(np.asarray(weights), self._names(looks[0]), requests[0])
-        both = zip(*(self._paintings(look) for look in looks), strict=True)
-        paintings = [mix_pixels(pair, shares) for pair in both]
+        pairs = zip(*(self._paintings(look) for look in looks), strict=True)
+        paintings = [mix_pixels(pair, shares) for pair in pairs]
         return self._make_look(name, paintings, locks, np.asarray(weights))
 
     def _lock_all(
