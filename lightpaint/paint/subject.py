@@ -218,6 +218,11 @@ def painting_path(folder: Path, sensor: str) -> Path:
     return folder / (f"painting-{sensor}.exr" if sensor else "painting.exr")
 
 
+def places_path(folder: Path) -> Path:
+    """Return the export path of the places of moved and added lights."""
+    return folder / "places.json"
+
+
 def picture_path(folder: Path, sensor: str) -> Path:
     """Return the export path of the answer's picture in a view. sensor: "" for the only view."""
     return folder / (f"answer-{sensor}.png" if sensor else "answer.png")

@@ -1,6 +1,8 @@
 """Lights that a session moves: poses in undo, looks and files, planes that renders have."""
 
+import json
 import math
+import shlex
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,6 +15,8 @@ from moving import MovingStudio, exact_answer, opened_rig, pixel_of, place_light
 from renderer import LIGHTS
 
 import lightpaint as lp
+from lightpaint.cli import main
+from lightpaint.cli.commands.paint_command import command_for_paintings
 from lightpaint.errors import LightpaintError
 from lightpaint.paint import protocol
 from lightpaint.paint.rig.rig_state import rig_state
@@ -369,3 +373,28 @@ def test_the_number_of_a_deleted_look_does_not_return(moving: MovingStudio) -> N
     moving.send(protocol.DropLook(1))
     moving.send(protocol.SaveLook("second"))
     assert [look.id for look in moving.studio.state().looks] == [2]
+
+
+def test_exported_places_give_the_same_lamps_in_the_terminal(moving: MovingStudio) -> None:
+    """Up to the noise of 16 samples; unpainted parts are held near the look before the move."""
+    moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}))
+    moving.send(protocol.AddLight("point", position=(-0.3, 1.4, 0.4)))
+    stroke(moving)
+    moving.send(protocol.ConstrainLights({x: {"lock": True} for x in ("bulb", "point_1")}))
+    exact_answer(moving.rendered())
+    moving.send(protocol.Export(("target", "lighting")))
+    moving.wait(lambda: next((m for m in moving.messages if m.kind == "exported"), None))
+    folder, requests = moving.folder, moving.studio.session.requests
+    paintings = {"": str(folder / "painting.exr")}
+    options = ["--spp", "16", "--no-cache", "--no-verify"]
+    line = command_for_paintings(str(folder / "room.xml"), paintings, options, requests)
+    words = shlex.split(line)[1:]
+    assert main([*words, "-o", str(folder / "terminal")]) == 0
+    here, there = (
+        {name: its["emission"] for name, its in json.loads(file.read_text())["lights"].items()}
+        for file in (folder / "lighting.json", folder / "terminal" / "lighting.json")
+    )
+    assert here.keys() == there.keys()
+    assert here["bulb"] == pytest.approx([0.5, 0.6, 0.7])
+    for name, emission in here.items():
+        assert there[name] == pytest.approx(emission, rel=3e-3, abs=1e-3), name

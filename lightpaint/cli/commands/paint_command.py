@@ -163,6 +163,11 @@ def command_for_paintings(
     words = ["lightpaint solve", quote(source)]
     for sensor, path in paintings.items():
         words.append(f"--target {quote(f'{sensor}={path}')}" if sensor else quote(path))
+    if requests.placed:
+        from lightpaint.paint.subject import places_path
+
+        folder = Path(next(iter(paintings.values()))).parent
+        words.append(f"--places {quote(str(places_path(folder)))}")
     return " ".join([*words, *options, *options_of(requests)])
 
 

@@ -146,6 +146,11 @@ def add_rigging(parser: argparse.ArgumentParser) -> None:
         "copy; WHERE is a rail or surface of the lights file, or a shape (default: anywhere)",
     )
     group.add_argument(
+        "--places",
+        metavar="FILE",
+        help="hang lights as the places.json of a painter's export says, without a search",
+    )
+    group.add_argument(
         "--no-move",
         dest="move_lights",
         action="store_false",

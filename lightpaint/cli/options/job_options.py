@@ -15,7 +15,7 @@ from lightpaint.files import check_files, is_name, is_utf_8, one_line
 from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
 from lightpaint.lighting.constraints.constraints_file import read_constraints
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.job.sources import Painting, SceneFile
+from lightpaint.pipeline.job.sources import Painting, PlacementFile, SceneFile
 from lightpaint.placement.rigging.rigging import Rigging
 from lightpaint.scene.lights.lights_file import MOVES
 
@@ -59,14 +59,27 @@ def jobs_of(
         constraints = read_constraints(options.lights_file).and_then(constraints)
     if options.views:
         scenes, folder = _scenes_of_views(options), _folder_of_views(options, paths)
-        job_fields: dict[str, Any] = {"by_sensor": True, "rigging": rigging}
+        job_fields: dict[str, Any] = {
+            "by_sensor": True,
+            "rigging": rigging,
+            "placement": placement_of(options),
+        }
         return [Job(scenes, tuple(paintings), folder, None, constraints, settings, **job_fields)]
     # One scene, loaded once for all jobs.
     source = () if basis is not None else (scene_of(options),)
     jobs = []
     for painting, folder in zip(paintings, _folders_of_looks(options, paths), strict=True):
         try:
-            job = Job(source, (painting,), folder, basis, constraints, settings, rigging=rigging)
+            job = Job(
+                source,
+                (painting,),
+                folder,
+                basis,
+                constraints,
+                settings,
+                rigging=rigging,
+                placement=placement_of(options),
+            )
             jobs.append(job)
         except LOOK_ERRORS as error:
             if failures is None or not options.keep_going or len(paintings) == 1:
@@ -147,6 +160,11 @@ def rigging_of(options: Namespace) -> Rigging:
         for name, value in getattr(options, key):
             lights.setdefault(name, {})[key] = value
     return Rigging.of(lights, new=options.added, where=BY_OPTION)
+
+
+def placement_of(options: Namespace) -> PlacementFile | None:
+    """Return the file of places that the options name, if any."""
+    return None if options.places is None else PlacementFile(options.places)
 
 
 def folders_of(output: Path | None, names: Sequence[str]) -> list[Path]:

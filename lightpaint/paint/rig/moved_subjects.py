@@ -1,10 +1,16 @@
 """The subjects of a session with moved lights, for its exports and verification."""
 
 from dataclasses import replace
+from pathlib import Path
 
+from lightpaint.files import write_text
+from lightpaint.paint.rig.added_lights import new_emitter
 from lightpaint.paint.rig.lamp_rig import LampRig
+from lightpaint.paint.session.moved_lights import Placed, added_names
 from lightpaint.paint.session.snapshot import SessionSnapshot
-from lightpaint.paint.subject import Subject
+from lightpaint.paint.subject import Subject, places_path
+from lightpaint.placement.placement import AddedLight, Move
+from lightpaint.placement.placement_record import PlacementRecord
 
 
 def of_moved_scenes(
@@ -21,3 +27,17 @@ def of_moved_scenes(
         for basis, scene in zip(snapshot.bases, scenes, strict=True)
     )
     return moved, replace(snapshot, bases=bases)
+
+
+def write_places(rig: LampRig, placed: Placed) -> Path:
+    """Write the places of moved and added lights for `solve`; return the file."""
+    added = added_names(placed)
+    moves = tuple(
+        Move(name, rig.site(name, {}), rig.site(name, values), gain_share=0.0)
+        for name, values in placed.items()
+        if name not in added
+    )
+    additions = tuple(AddedLight(new_emitter(x, placed[x]), gain_share=0.0) for x in added)
+    path = places_path(rig.subjects[0].folder)
+    write_text(path, PlacementRecord(moves, additions, 0.0, 0.0).to_json())
+    return path

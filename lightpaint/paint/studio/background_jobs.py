@@ -26,7 +26,7 @@ from lightpaint.paint.protocol import (
 )
 from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.rig.light_mover import LightMover
-from lightpaint.paint.rig.moved_subjects import of_moved_scenes
+from lightpaint.paint.rig.moved_subjects import of_moved_scenes, write_places
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import SessionAccess
 from lightpaint.paint.store.history_steps import name_in_view
@@ -113,8 +113,6 @@ class BackgroundJobs:
 
     def solve_command(self, sensors: Sequence[str], requests: SessionRequests) -> str:
         """Return the command that solves exported paintings to the same answer; "" if none."""
-        if requests.placed:
-            return ""  # which cannot express them
         subject = self._subjects[0]
         paths = {sensor: str(painting_path(subject.folder, sensor)) for sensor in sensors}
         return subject.command(paths, requests) if paths else ""
@@ -177,6 +175,8 @@ class BackgroundJobs:
                     check()
                     for file in export(subjects, snapshot, lighting, message.outputs, report):
                         files.append(file)  # one by one: a stop keeps those already written
+                    if snapshot.requests.placed and NEEDS_PAINTING & set(message.outputs):
+                        files.append(write_places(self._mover.rig, snapshot.requests.placed))
         except StoppedError:
             if self._stop_count != stop_count:
                 result = ExportResult(files=_absolute_names(files), command="", is_stopped=True)

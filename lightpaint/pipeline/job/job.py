@@ -14,6 +14,7 @@ from typing import Any
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.cached_render import check_same_view
 from lightpaint.basis.lightgroups.light_groups import LightGroups
+from lightpaint.basis.lights import Lights
 from lightpaint.basis.render.render_origin import basis_lights
 from lightpaint.display_text import short_repr
 from lightpaint.errors import LightpaintError
@@ -151,8 +152,10 @@ class Job:
             all_constraints = constraints_of(source.requests).and_then(all_constraints)
         if scenes and basis is not None:
             check_same_view(scenes[0], basis)
+        if self.placement is not None and not scenes:
+            raise LightpaintError("lights can only hang in their scene: give it, too")
         # Reports impossible constraints before rendering.
-        reduce_to(all_constraints, basis_lights(scenes[0]) if basis is None else basis.lights)
+        reduce_to(all_constraints, basis.lights if basis is not None else self._lights(scenes))
         if self.settings.suggest:
             check_suggestible(scenes[0])
         all_rigging = rigging_for(self.rigging, scenes, self.settings)
@@ -166,6 +169,12 @@ class Job:
         self._set(views=views, all_constraints=all_constraints, fit=fit, results=results)
         self._set(all_rigging=all_rigging)
         self._set(remarks=tuple(self._remarks(targets, scenes)))
+
+    def _lights(self, scenes: Sequence[Scene]) -> Lights:
+        """Return the lights of the answer: those of the scene, and those of given places."""
+        if self.placement is None:
+            return basis_lights(scenes[0])
+        return basis_lights(content(self.placement).hung_in(scenes).scene)
 
     @property
     def groups(self) -> LightGroups | None:

@@ -263,10 +263,8 @@ export function initialState() {
   };
 }
 
-/**
- * Return what is drawn: the chosen display with temporary changes.
- * @param {Ui} ui @returns {Display}
- */
+/** Return what is drawn: the chosen display with temporary changes.
+ * @param {Ui} ui @returns {Display} */
 export function effectiveDisplay(ui) {
   const display = { ...ui.display, overlay: overlayOf(ui) };
   const hasSolo = ui.solo.length > 0;
