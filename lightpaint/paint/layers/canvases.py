@@ -89,6 +89,8 @@ class Canvases:
         """
         if used := [n for n in layers.ids if n not in self.layers.ids and n < self.next_layer]:
             raise PaintError(f"layer {used[0]} was another one: the next is {self.next_layer}")
+        if layers == self.layers:
+            return
         self.layers = layers
         self.next_layer = max(self.next_layer, 1 + max(layers.ids))
         for view in self:

@@ -40,6 +40,7 @@ class LayerPixels:
         self.size, self.revision = size, 0
         self._tiles: dict[tuple[int, int], _Tile] = {}
         self._summary: tuple[float, float] | None = None
+        self._bounds: Region | None = None
 
     @classmethod
     def replayed(cls, size: tuple[int, int], patches: Sequence[Patch]) -> "LayerPixels":
@@ -56,7 +57,9 @@ class LayerPixels:
     @property
     def bounds(self) -> Region:
         """The smallest region of whole tiles that contains all covered pixels."""
-        return enclosing([self._tile_region(key) for key in self._tiles])
+        if self._bounds is None:
+            self._bounds = enclosing([self._tile_region(key) for key in self._tiles])
+        return self._bounds
 
     @property
     def mean_coverage(self) -> float:
@@ -86,7 +89,7 @@ class LayerPixels:
 
     def put(self, region: Region, pixels: Pixels) -> None:
         """Replace the pixels of a region."""
-        self._summary = None
+        self._summary = self._bounds = None
         self.revision += 1
         for key in self._keys(region):
             source, to = self._areas(key, region)
