@@ -208,3 +208,19 @@ def test_compared_looks_are_shown_with_their_own_places(room: PaintedRoom) -> No
     wait_until(lambda: np.allclose(shown("solution", row, column), here[row, column], rtol=0.1))
     page.get_by_role("button", name="Back to the painting").click()
     wait_until(lambda: np.allclose(shown("solution", row, column), here[row, column], rtol=0.1))
+
+
+@pytest.mark.long
+def test_axe_finds_nothing_with_a_light_added_and_moved(room: PaintedRoom, axe: str) -> None:
+    """Handles are on, and the fields of the light's pose are unfolded."""
+    page, session = room.page, room.studio.session
+    page.get_by_role("button", name="Add a light").click()
+    page.mouse.click(*room.seen((-0.4, 0, 0.3)))
+    wait_until(lambda: "spot_1" in session.requests.added)
+    page.wait_for_selector('[data-lamp="spot_1"]')
+    room.drag(room.mark("spot_1"), 40, 0)
+    room.until_step(2)
+    row = page.get_by_role("group", name="spot_1", exact=True)
+    row.get_by_role("button", name="Remove").wait_for()
+    page.evaluate(axe)
+    assert violations(page, ".lightpaint") == []
