@@ -152,7 +152,7 @@ class FrozenPaths:
 
     @cached_property
     def sight_lines(self) -> SightLines:
-        """Where the camera sees panels."""
+        """The lines of sight along which the camera sees panels."""
         return SightLines.of(self._scene, self._camera, self.size, self._side)
 
     def indirect_images(self, sites: Sequence[Site]) -> Floats:

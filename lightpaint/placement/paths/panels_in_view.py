@@ -1,4 +1,4 @@
-"""What a camera sees of a panel itself: the share of each pixel that its front fills.
+"""The panel itself in a picture: the share of each pixel that its front fills.
 
 Paths meet a panel on their way from the camera, too. Its outline is a sharp edge, often brighter
 than all else, so the share of each cell that it covers is computed, and not sampled: otherwise the
