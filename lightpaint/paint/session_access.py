@@ -4,6 +4,7 @@ from threading import RLock
 
 from lightpaint.errors import PaintError
 from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.paint.layers.view_layers import ViewLayers
 from lightpaint.paint.session.look_library import LookLibrary
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.snapshot import SessionSnapshot
@@ -63,6 +64,12 @@ class SessionAccess:
         """Return the current paintings and requests. Raises PaintError before there is a basis."""
         with self.lock:
             return self.session.snapshot()
+
+    def layers(self) -> tuple[ViewLayers, ...]:
+        """Return the current layers of each view. Raises PaintError before there is a basis."""
+        with self.lock:
+            views = self.session.views
+            return tuple(ViewLayers.of(view, views.layers) for view in views)
 
     def snapshot_at_rest(self) -> SessionSnapshot | None:
         """Return the snapshot; None before there is a basis and while a stroke is open."""

@@ -34,7 +34,7 @@ class Subject:
     constraints: of the solve. choice: the view transform to paint through. folder: receives
     exports. command: returns the command that solves exported paintings, given by sensor ("" for
     the only view), with the session's requests; "" if there is none. view_count: number of views
-    that share the time budget of the bases.
+    that share the time budget of the bases. layers: file of layers with which to begin, as a step.
     """
 
     source: str
@@ -47,6 +47,7 @@ class Subject:
     choice: TransformChoice = field(default_factory=TransformChoice)
     command: Callable[[Mapping[str, str], SessionRequests], str] = lambda paintings, requests: ""
     view_count: int = 1
+    layers: Path | None = None
 
     @property
     def name(self) -> str:
@@ -216,6 +217,12 @@ def sensor_name(scene: Scene | SceneFacts) -> str:
 def painting_path(folder: Path, sensor: str) -> Path:
     """Return the export path of a view's painting. sensor: "" for the only view."""
     return folder / (f"painting-{sensor}.exr" if sensor else "painting.exr")
+
+
+def layers_paths(folder: Path, sensor: str) -> tuple[Path, Path]:
+    """Return the export paths of a view's layers. sensor: "" for the only view."""
+    name = f"layers-{sensor}" if sensor else "layers"
+    return folder / f"{name}.exr", folder / f"{name}.ora"
 
 
 def places_path(folder: Path) -> Path:

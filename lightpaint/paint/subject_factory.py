@@ -69,6 +69,7 @@ def make_subject(
     choice: TransformChoice | None = None,
     command: Callable[[Mapping[str, str], SessionRequests], str] = lambda paintings, requests: "",
     view_count: int = 1,
+    layers: Path | None = None,
 ) -> Subject:
     """Return one view to be painted, checked as far as possible without a renderer.
 
@@ -76,6 +77,10 @@ def make_subject(
     LightpaintError if the source cannot be painted, or its lights cannot meet the constraints.
     """
     settings, constraints = settings or Settings(), constraints or Constraints()
+    if layers is not None:
+        if view_count > 1:
+            raise PaintError(f"{layers} has the layers of one view: open that view alone")
+        file_length(layers, "file of layers", PaintError)
     if isinstance(source, SceneFile | Scene):
         scene = _scene_on_film(source, settings, constraints)
         fields: dict[str, Any] = {"scene": scene}
@@ -96,6 +101,7 @@ def make_subject(
         choice=choice or TransformChoice(),
         command=command,
         view_count=view_count,
+        layers=layers,
         **fields,
     )
 

@@ -4,15 +4,12 @@ Each program paints on a template, by a script and with its own means, and saves
 it has. What docs/benchmarks.md says of formats was measured in the same way on a real scene.
 """
 
-import os
-import shutil
-import signal
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from paint_programs import needs, run
 
 import lightpaint as lp
 from lightpaint.colour.display.view_transform import ViewTransform
@@ -74,38 +71,6 @@ def folder(basis: lp.Basis, tmp_path_factory: pytest.TempPathFactory) -> Path:
         lights={},
     )
     return folder
-
-
-def run(folder: Path, *command: str, **environment: str) -> None:
-    """Run a program that has 100 s, a home of its own, and none of our Python."""
-    (folder / "home").mkdir(exist_ok=True)
-    own = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "XDG_", "VIRTUAL"))}
-    # Where its own Python looks for modules is decided by the first one on the path.
-    path = [*(str(Path(part).parent) for part in command if Path(part).is_absolute()), os.defpath]
-    own |= {"HOME": str(folder / "home"), "PATH": os.pathsep.join(path), **environment}
-    started = subprocess.Popen(
-        command,
-        cwd=folder,
-        env=own,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        start_new_session=True,
-    )
-    try:
-        output, _ = started.communicate(timeout=100)
-    except subprocess.TimeoutExpired:
-        os.killpg(started.pid, signal.SIGKILL)  # the program as well as what started it
-        output, _ = started.communicate()
-    assert started.returncode == 0, output.decode(errors="replace")[-2000:]
-
-
-def needs(command: str, program: str) -> str:
-    """The path of a program. Scripts are written for the versions that these names stand for."""
-    path = shutil.which(command)
-    if path is None:
-        pytest.skip(program)
-    return path
 
 
 def check(folder: Path, basis: lp.Basis, exact: str, *names: str) -> None:

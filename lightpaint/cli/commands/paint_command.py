@@ -47,6 +47,7 @@ def paint(
     constraints: Constraints,
     choice: TransformChoice,
     options: tuple[str, ...],
+    layers: Path | None,
     new: bool,
     host: str | None,
     port: int | None,
@@ -69,6 +70,7 @@ def paint(
         settings=settings,
         constraints=constraints,
         choice=choice,
+        layers=layers,
         # `solve` takes only one basis, which has one view.
         **({} if len(sources) > 1 and isinstance(sources[0], BasisFile) else {"command": command}),
     )

@@ -176,7 +176,7 @@ def _paint_arguments(
     session_name = f"{scene_name(Path(source.path))}.paint"
     [folder] = folders_of(options.output and Path(options.output), [session_name])
     # The command that the page shows for exported paintings has only options that `solve` knows.
-    excluded = ["output", "new", "host", "port", "with_browser", "view", "exposure"]
+    excluded = ["output", "new", "layers", "host", "port", "with_browser", "view", "exposure"]
     excluded += ["as_json", "is_quiet", "is_verbose"]
     excluded += ["lights"] * isinstance(source, GroupsFile) + ["sensors"] * (len(sources) > 1)
     return {
@@ -186,6 +186,7 @@ def _paint_arguments(
         "constraints": constraints,
         "choice": transform_of(options),
         "options": options_but(options.parser, words[words.index("paint") + 1 :], *excluded),
+        "layers": None if options.layers is None else Path(options.layers),
         "new": options.new,
         "host": options.host,
         "port": options.port,

@@ -219,6 +219,12 @@ def add_server(parser: argparse.ArgumentParser) -> None:
         " the current one)",
     )
     parser.add_argument(
+        "--layers",
+        metavar="FILE",
+        help="replace the layers by those of this file: layers.exr of an export, or an .ora of any "
+        "program (a step that can be undone)",
+    )
+    parser.add_argument(
         "--port",
         type=arguments.at_least(0, maximum=65535),
         metavar="N",

@@ -38,17 +38,27 @@ TRANSFORM_KEY = "lightpaint.view"
 
 
 def write_png_16(
-    path: Path, image_display: Floats, *, texts: Mapping[str, str] | None = None
+    path: Path,
+    image_display: Floats,
+    *,
+    texts: Mapping[str, str] | None = None,
+    profile: bytes | None = None,
 ) -> None:
-    """Write display values in [0, 1], (h, w) or (h, w, 3), as a 16-bit PNG, atomically.
+    """Write display values in [0, 1], (h, w), (h, w, 3) or (h, w, 4), as a 16-bit PNG, atomically.
 
-    texts: Latin-1 texts to store in the file.
+    Colour is not multiplied by alpha, as PNG has it. texts: Latin-1 texts to store in the file.
+    profile: an ICC profile to store in it.
     """
     import OpenImageIO
 
     values = np.round(image_display * 65535).astype(np.uint16)
     height, width = values.shape[:2]
-    spec = OpenImageIO.ImageSpec(width, height, 1 if values.ndim == 2 else 3, "uint16")
+    channels = 1 if values.ndim == 2 else values.shape[2]
+    spec = OpenImageIO.ImageSpec(width, height, channels, "uint16")
+    if channels == 4:
+        spec["oiio:UnassociatedAlpha"] = 1
+    if profile is not None:
+        spec.attribute("ICCProfile", f"uint8[{len(profile)}]", np.frombuffer(profile, np.uint8))
     for key, text in (texts or {}).items():
         spec.attribute(key, text)
     with replacing(path) as temporary:

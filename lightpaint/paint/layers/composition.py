@@ -76,7 +76,8 @@ def compose(layers: Sequence[ShownLayer], current: Floats, region: Region) -> Pi
             continue
         # A layer changes nothing where it has no pixels, so that small ones cost their area alone.
         inner = relative(area, region)
-        composed = _compose_layer(shown, shown.pixels.part(area), result.part(inner))
+        pixels, below = shown.pixels.part(area), result.part(inner)
+        composed = compose_layer(shown.layer, pixels, below, shown.accent)
         result.image[slices(inner)] = composed.image
         result.importance[slices(inner)] = composed.importance
         if (marks := composed.at_least) is not None:
@@ -86,10 +87,9 @@ def compose(layers: Sequence[ShownLayer], current: Floats, region: Region) -> Pi
     return result
 
 
-def _compose_layer(shown: ShownLayer, pixels: Pixels, below: Pixels) -> Pixels:
+def compose_layer(layer: Layer, pixels: Pixels, below: Pixels, accent: float = 1.0) -> Pixels:
     """Return the pixels below a layer with the layer applied."""
-    layer = shown.layer
-    factor = np.float32(shown.accent * layer.importance)
+    factor = np.float32(accent * layer.importance)
     if layer.kind == "pixels":
         return _replace(layer, pixels, below, factor)
     coverage = pixels.importance

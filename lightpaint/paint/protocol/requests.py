@@ -85,11 +85,11 @@ class Export(Message, kind="export"):
     """Write results to the folder of the session, or stop that. Answered by `started`, later by
     `exported`, which names the files written, even if stopped.
 
-    outputs: `target`: a painting of each painted view; `picture`: the displayed answer in each
-    view.
+    outputs: `target`: a painting of each painted view; `layers`: its layers; `picture`: the
+    displayed answer in each view.
     """
 
-    outputs: tuple[Literal["target", "picture", "lighting", "relit", "report"], ...]
+    outputs: tuple[Literal["target", "picture", "lighting", "relit", "report", "layers"], ...]
     run: bool = True
 
 

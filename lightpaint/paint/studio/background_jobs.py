@@ -155,7 +155,11 @@ class BackgroundJobs:
         stop_count: how often exports had been stopped when this one was requested.
         """
         # Imported here: it loads all rooms, and painting needs only a few.
-        from lightpaint.paint.studio.session_exports import NEEDS_PAINTING, export
+        from lightpaint.paint.studio.session_exports import (
+            NEEDS_PAINTING,
+            WRITES_PAINTING,
+            export,
+        )
 
         def check() -> None:
             if self._stop_count != stop_count:
@@ -170,12 +174,14 @@ class BackgroundJobs:
         try:
             # A stop also ends the exact solve, which may take long.
             with cancellable(check):
+                layers = self._access.layers() if "layers" in message.outputs else ()
                 subjects, snapshot, lighting = self._exact_answer(check)
                 with self._write_lock:
                     check()
-                    for file in export(subjects, snapshot, lighting, message.outputs, report):
+                    outputs = message.outputs
+                    for file in export(subjects, snapshot, lighting, outputs, report, layers):
                         files.append(file)  # one by one: a stop keeps those already written
-                    if snapshot.requests.placed and NEEDS_PAINTING & set(message.outputs):
+                    if snapshot.requests.placed and WRITES_PAINTING & set(message.outputs):
                         files.append(write_places(self._mover.rig, snapshot.requests.placed))
         except StoppedError:
             if self._stop_count != stop_count:
@@ -183,15 +189,13 @@ class BackgroundJobs:
                 self._publisher.publish(result)
             return
         # The command names only paintings that this export wrote: older files may differ.
-        needs_painting, is_painted = (
-            bool(NEEDS_PAINTING & set(message.outputs)),
-            bool(snapshot.painted_views),
-        )
-        sensors = snapshot.painted_sensors if needs_painting and is_painted else ()
+        has_painting = bool(WRITES_PAINTING & set(message.outputs))
+        is_missing = bool(NEEDS_PAINTING & set(message.outputs)) and not snapshot.painted_views
+        sensors = snapshot.painted_sensors if has_painting and not is_missing else ()
         result = ExportResult(
             files=_absolute_names(files),
             command=self.solve_command(sensors, snapshot.requests),
-            is_unpainted=needs_painting and not is_painted,
+            is_unpainted=is_missing,
         )
         self._publisher.publish(result)
 

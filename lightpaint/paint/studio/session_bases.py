@@ -5,7 +5,9 @@ from collections.abc import Callable, Sequence
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.denoised_planes import DenoisedPlanes
+from lightpaint.files import one_line
 from lightpaint.paint.background_threads import StoppedError
+from lightpaint.paint.layers.layer_file_reading import read_layers
 from lightpaint.paint.protocol import ProgressReport, Tone
 from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.rig.light_mover import LightMover
@@ -98,6 +100,10 @@ class SessionBases:
                 constraints=first.constraints,
                 plane_source=None if first.scene is None else self._mover.rig,
             )
+            if first.layers is not None:
+                layered = read_layers(first.layers, bases[0].size, session.transform)
+                label = f"layers of {one_line(first.layers.name)}"
+                session.load({}, session.requests, label, layers=layered)
             looks = LookLibrary(session, self._publisher.pictures)
             for remark in store.remarks:
                 self._warn(remark, "warn")

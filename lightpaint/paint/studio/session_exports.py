@@ -16,8 +16,10 @@ from lightpaint.images.denoiser import denoised, denoiser_text
 from lightpaint.images.formats.png import png_bytes
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.paint.layers.layer_files import write_layers_exr, write_layers_openraster
+from lightpaint.paint.layers.view_layers import ViewLayers
 from lightpaint.paint.session.snapshot import SessionSnapshot
-from lightpaint.paint.subject import Subject, painting_path, picture_path
+from lightpaint.paint.subject import Subject, layers_paths, painting_path, picture_path
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.pipeline import run
 from lightpaint.pipeline.results.answer_folder import LIGHTING, RELIT, write_answer
@@ -33,8 +35,9 @@ from lightpaint.target.template import texts_of
 #: Folder of the report, in that of the session.
 ANSWER_FOLDER = "answer"
 
-#: Exports that need a painting.
-NEEDS_PAINTING = {"target", "report"}
+#: Exports that write the painting, and those that need one.
+WRITES_PAINTING = {"target", "report"}
+NEEDS_PAINTING = WRITES_PAINTING | {"layers"}
 
 
 def export(
@@ -43,12 +46,13 @@ def export(
     lighting: Lighting,
     outputs: Sequence[str],
     progress: Progress,
+    layers: Sequence[ViewLayers] = (),
 ) -> Iterator[Path]:
     """Write the requested files into the folder of the session; yield each one once it exists.
 
-    subjects: of all views. If nothing is painted, files that need a painting are left out. Raises
-    PaintError for files that this session cannot export, OutputError for files that cannot be
-    written.
+    subjects, layers: of all views; layers are needed for their files alone. If nothing is painted,
+    files that need a painting are left out. Raises PaintError for files that this session cannot
+    export, OutputError for files that cannot be written.
     """
     if not snapshot.painted_views:
         outputs = [name for name in outputs if name not in NEEDS_PAINTING]
@@ -59,10 +63,12 @@ def export(
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"cannot make {folder}: {error.strerror}") from None
-    if set(outputs) & NEEDS_PAINTING:
+    if set(outputs) & WRITES_PAINTING:
         for sensor, target in zip(snapshot.painted_sensors, snapshot.painted_targets, strict=True):
             write_painting(painting_path(folder, sensor), target)
             yield painting_path(folder, sensor)
+    if "layers" in outputs:
+        yield from _write_layers(folder, snapshot, layers)
     if "picture" in outputs:
         for sensor, basis in zip(snapshot.sensors, snapshot.bases, strict=True):
             write_bytes(
@@ -79,6 +85,20 @@ def export(
         yield folder / RELIT
     if "report" in outputs:
         yield from _write_report(subjects, snapshot, progress)
+
+
+def _write_layers(
+    folder: Path, snapshot: SessionSnapshot, layers: Sequence[ViewLayers]
+) -> Iterator[Path]:
+    """Write the layers of each painted view."""
+    for view, sensor in zip(snapshot.painted_views, snapshot.painted_sensors, strict=True):
+        exr, openraster = layers_paths(folder, sensor)
+        write_layers_exr(exr, layers[view], snapshot.bases[view].origin.sensor)
+        yield exr
+        target = snapshot.targets[view]
+        assert target is not None
+        write_layers_openraster(openraster, layers[view], target.image, snapshot.transform)
+        yield openraster
 
 
 def answer_png(basis: Basis, lighting: Lighting, transform: ViewTransform) -> bytes:

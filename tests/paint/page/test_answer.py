@@ -409,6 +409,9 @@ def test_files_are_written_and_their_command_shown(painter: Painter) -> None:
     painter.page.get_by_role("dialog").get_by_role("button", name="Export", exact=True).click()
     painter.page.get_by_text("Nothing is painted yet, so no painting").wait_for()
     assert not painter.page.get_by_text("lightpaint solve gallery.xml").count()
+    painter.page.get_by_role("checkbox", name="Layers").check()  # not by itself: it takes room
+    painter.page.get_by_role("dialog").get_by_role("button", name="Export", exact=True).click()
+    assert painter.requests("export")[-1]["outputs"][-1] == "layers"
 
 
 def test_settings(painter: Painter) -> None:

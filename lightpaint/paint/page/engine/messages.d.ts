@@ -868,11 +868,11 @@ export interface DropLook {
  * Write results to the folder of the session, or stop that. Answered by `started`, later by
  * `exported`, which names the files written, even if stopped.
  *
- * outputs: `target`: a painting of each painted view; `picture`: the displayed answer in each
- * view.
+ * outputs: `target`: a painting of each painted view; `layers`: its layers; `picture`: the
+ * displayed answer in each view.
  */
 export interface Export {
-  outputs: ('target' | 'picture' | 'lighting' | 'relit' | 'report')[];
+  outputs: ('target' | 'picture' | 'lighting' | 'relit' | 'report' | 'layers')[];
   run?: boolean;
 }
 

@@ -38,6 +38,11 @@ function ShortcutsDialog({ close }) {
  *   description: string}[]} */
 const EXPORTS = [
   { key: 'target', label: 'Painting', description: 'painting.exr, for lightpaint solve' },
+  {
+    key: 'layers',
+    label: 'Layers',
+    description: 'layers.exr and layers.ora, for Krita, GIMP and others',
+  },
   { key: 'picture', label: 'Picture', description: 'answer.png: the answer as a picture' },
   {
     key: 'lighting',
@@ -48,7 +53,10 @@ const EXPORTS = [
   { key: 'report', label: 'Report', description: 'report.html: painting, answer and analysis' },
 ];
 
-const UNPAINTED_TEXT = 'Nothing is painted yet, so no painting and no report were exported.';
+/** Exports that are not ticked at first: few people need them. @type {string[]} */
+const UNTICKED = ['layers'];
+
+const UNPAINTED_TEXT = 'Nothing is painted yet, so no painting, layers or report were exported.';
 
 /** @param {{ui: Ui, app: App, close: () => void}} props */
 function ExportDialog({ ui, app, close }) {
@@ -57,7 +65,9 @@ function ExportDialog({ ui, app, close }) {
       (key !== 'relit' || ui.state?.can_render) &&
       (key !== 'report' || ui.state?.can_report !== false),
   );
-  const [outputs, setOutputs] = useState(available.map(({ key }) => key));
+  const [outputs, setOutputs] = useState(
+    available.map(({ key }) => key).filter((key) => !UNTICKED.includes(key)),
+  );
   const isBusy = ui.isExporting;
   const { exportResult } = ui;
   const folder = ui.state?.folder ?? '';

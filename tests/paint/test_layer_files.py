@@ -1,0 +1,371 @@
+"""Files of layers hold what the painter shows, and come back as layers."""
+
+import json
+import time
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from layered_sessions import SIZES, RandomEditor, bases_of, identity_of, open_session
+from paint_programs import needs, run
+from PIL import Image
+
+import lightpaint as lp
+from lightpaint.errors import ImageError, PaintError
+from lightpaint.images.formats.exr import ExrPart, read_parts, write_parts
+from lightpaint.images.formats.openraster_stack import RasterGroup, read_openraster
+from lightpaint.paint import protocol
+from lightpaint.paint.layers.composition import compose_layer
+from lightpaint.paint.layers.layer import Layer
+from lightpaint.paint.layers.layer_file_reading import read_layers
+from lightpaint.paint.layers.layer_files import (
+    KEY,
+    LOOK_NAME,
+    write_layers_exr,
+    write_layers_openraster,
+)
+from lightpaint.paint.layers.layer_stack import LayerStack
+from lightpaint.paint.layers.layered_paintings import LayeredPaintings
+from lightpaint.paint.layers.view_layers import ViewLayers
+from lightpaint.paint.protocol import Message
+from lightpaint.paint.session.session import Session
+from lightpaint.paint.store.canvas_pixels import Pixels
+from lightpaint.paint.store.store import MemoryStore
+from lightpaint.paint.studio.studio import Studio
+from lightpaint.paint.subject import Subject
+from lightpaint.paint.subject_factory import make_subjects
+
+SIZE = SIZES[0]
+KRITA_SCRIPTS = Path(__file__).parents[1] / "target" / "programs"
+WHOLE = (0, SIZE[0], 0, SIZE[1])
+TRANSFORM = lp.ViewTransform("srgb", -2.0)
+CURRENT = np.random.default_rng(1).uniform(0.1, 2, (*SIZE, 3)).astype(np.float32)
+
+
+def worked_on(seed: int, count: int = 20) -> Session:
+    editor = RandomEditor(seed, views=1)
+    for _ in range(count):
+        editor.act()
+    return editor.session
+
+
+def view_layers(session: Session) -> ViewLayers:
+    return ViewLayers.of(session.views[0], session.views.layers)
+
+
+def loaded(layered: LayeredPaintings) -> Session:
+    session = open_session(MemoryStore(identity_of(1)), 1)
+    session.load({}, session.requests, "layers", layers=layered)
+    return session
+
+
+def without_ids(session: Session) -> list[dict[str, Any]]:
+    """The layers of a session, whose ids are new after loading."""
+    layers = session.views.layers
+    names = {layer.id: layer.name for layer in layers}
+    return [
+        {**layer.as_json(), "id": 0, "group": layer.group and names[layer.group]}
+        for layer in layers
+    ]
+
+
+def layered(*layers: tuple[Layer, Any, Any], group: Layer | None = None) -> ViewLayers:
+    """Layers with a colour and a coverage, and a group without."""
+    pixels = {}
+    for layer, colour, coverage in layers:
+        image = np.broadcast_to(np.asarray(colour, np.float32), (*SIZE, 3)).astype(np.float32)
+        mask = np.broadcast_to(np.float32(coverage), SIZE).astype(np.float32)
+        pixels[layer.id] = WHOLE, Pixels(image, mask)
+    groups = [] if group is None else [group]
+    return ViewLayers(LayerStack.of([*(x for x, *_ in layers), *groups]), pixels, CURRENT)
+
+
+def shown(items: Any) -> np.ndarray:
+    """What a program shows that lays these layers over each other, in display values."""
+    picture = np.zeros((*SIZE, 3))
+    for item in items:
+        inner = item.layers if isinstance(item, RasterGroup) else [item]
+        for layer in inner if item.is_visible else ():
+            if layer.is_visible:
+                (y, x), (h, w) = layer.corner, layer.display.shape[:2]
+                alpha = layer.display[..., 3:] * layer.opacity
+                below = picture[y : y + h, x : x + w]
+                picture[y : y + h, x : x + w] = below + alpha * (layer.display[..., :3] - below)
+    return picture
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_layers_come_back_from_an_exr_as_they_were(tmp_path: Path, seed: int) -> None:
+    session = worked_on(seed)
+    path = tmp_path / "layers.exr"
+    write_layers_exr(path, view_layers(session), "eye")
+    again = loaded(read_layers(path, SIZE, session.transform))
+    assert without_ids(again) == without_ids(session)
+    view, other = session.views[0], again.views[0]
+    # Colour is multiplied by alpha in the file and divided again: two roundings of float32.
+    np.testing.assert_allclose(other.image, view.image, rtol=1e-5, atol=1e-7)
+    np.testing.assert_array_equal(other.importance, view.importance)
+
+
+def test_an_exr_shows_each_layer_multiplied_by_alpha_in_its_order(tmp_path: Path) -> None:
+    path = tmp_path / "layers.exr"
+    group = Layer(3, "group", "Night")
+    view = layered(
+        (Layer(1, "paint", "Lamp, +1.2 stops"), (2.0, 1.0, 0.5), 0.5),
+        (Layer(2, "adjust", "Darker", gain=0.25, group=3), 0.0, 1.0),
+        group=group,
+    )
+    write_layers_exr(path, view, "eye")
+    channels = read_parts(path)[0].channels
+    names = list(dict.fromkeys(name.rpartition(".")[0] for name in sorted(channels)))
+    assert names == ["02 Night/Darker", "03 Lamp, +1,2 stops", "05 Unpainted"]
+    np.testing.assert_array_equal(channels["03 Lamp, +1,2 stops.R"], 1.0)
+    np.testing.assert_array_equal(channels["03 Lamp, +1,2 stops.A"], 0.5)
+    np.testing.assert_array_equal(channels["05 Unpainted.G"], CURRENT[..., 1])
+    below = CURRENT[..., 0] + 0.5 * (2 - CURRENT[..., 0])
+    # Luminance is computed in float32.
+    np.testing.assert_allclose(channels["02 Night/Darker.R"], 0.25 * below, rtol=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_an_openraster_file_shows_the_target(tmp_path: Path, seed: int) -> None:
+    """Where layers cover fully: programs mix display values, and the painter mixes light."""
+    rng = np.random.default_rng(seed)
+    edge = int(rng.integers(5, 60))
+    mask = (np.arange(SIZE[1]) < edge) * np.ones(SIZE)
+    view = layered(
+        (Layer(1, "paint"), (0.5, 0.4, 0.3), mask),
+        (Layer(2, "adjust", gain=2.0, tint=(1.1, 1.0, 0.9), strength=1.5), 0.0, mask[:, ::-1]),
+        (Layer(3, "weigh", times=3.0), 0.0, 1.0),
+        (Layer(4, "pixels", is_visible=False), 3.0, 1.0),
+        (Layer(5, "pixels", strength=1.5), 0.7, mask),
+    )
+    below = Pixels.unpainted(CURRENT)
+    for layer in view.layers.shown():
+        if layer.id in view.pixels:
+            below = compose_layer(layer, view.pixels[layer.id][1], below)
+    path = tmp_path / "layers.ora"
+    write_layers_openraster(path, view, below.image, TRANSFORM)
+    size, items = read_openraster(path)
+    assert size == SIZE
+    assert len(items) == 5  # importance has no look
+    np.testing.assert_allclose(shown(items), TRANSFORM.encode(below.image), atol=2e-5)  # 16 bits
+    assert lp.read_target(path).transform == TRANSFORM
+
+
+def test_an_openraster_file_is_as_the_format_prescribes(tmp_path: Path) -> None:
+    path = tmp_path / "layers.ora"
+    group = Layer(3, "group", "Night", is_visible=False)
+    view = layered(
+        (Layer(1, "paint", 'Lamp "<&>"', strength=0.25), (2.0, 1.0, 0.5), 0.5),
+        (Layer(2, "adjust", "Darker", gain=0.25, group=3), 0.0, 1.0),
+        group=group,
+    )
+    write_layers_openraster(path, view, CURRENT, TRANSFORM)
+    assert path.read_bytes()[30:54] == b"mimetypeimage/openraster"
+    with zipfile.ZipFile(path) as archive:
+        assert archive.infolist()[0].compress_type == zipfile.ZIP_STORED
+        root = ElementTree.fromstring(archive.read("stack.xml"))
+        assert (root.get("w"), root.get("h")) == (str(SIZE[1]), str(SIZE[0]))
+        with archive.open("Thumbnails/thumbnail.png") as file:
+            assert max(Image.open(file).size) <= 256
+        with archive.open("mergedimage.png") as file:
+            assert Image.open(file).size == (SIZE[1], SIZE[0])
+        [stack] = root
+        top, *others = stack
+        assert (top.tag, top.get("name"), top.get("visibility")) == ("stack", "Night", "hidden")
+        assert [x.get("name") for x in top] == ["Darker"]
+        lamp, look = others
+        assert (lamp.get("name"), lamp.get("opacity")) == ('Lamp "<&>"', "0.25")
+        assert look.get("name") == LOOK_NAME
+        assert all(x.get("src") in archive.namelist() for x in (top[0], lamp, look))
+
+
+def test_an_openraster_file_comes_back_as_layers_of_paint(tmp_path: Path) -> None:
+    path = tmp_path / "layers.ora"
+    view = layered(
+        (Layer(1, "paint", "Lamp", strength=0.25), (2.0, 1.0, 0.5), 0.5),
+        (Layer(2, "pixels", "Strokes", is_visible=False, group=3), (0.5, 0.5, 1.0), 1.0),
+        group=Layer(3, "group", "Night", is_visible=False),
+    )
+    write_layers_openraster(path, view, CURRENT, TRANSFORM)
+    again = read_layers(path, SIZE, TRANSFORM)
+    layers = {layer.name: layer for layer in again.layers}
+    assert set(layers) == {"Painting", "Lamp", "Night", "Strokes"}
+    lamp, strokes, night = layers["Lamp"], layers["Strokes"], layers["Night"]
+    assert (lamp.kind, lamp.strength, lamp.is_visible) == ("paint", 0.25, True)
+    assert (strokes.kind, strokes.group, strokes.is_visible) == ("paint", night.id, False)
+    assert (night.kind, night.is_visible) == ("group", False)
+    _, pixels = again.pixels[0, lamp.id]
+    # White is at 4; 16 bits of a display value, whose light has 2.4 times its relative error.
+    np.testing.assert_allclose(pixels.image[0, 0], (2.0, 1.0, 0.5), rtol=2e-4)
+    np.testing.assert_allclose(pixels.importance, 0.5, atol=1e-5)
+
+
+def test_files_without_usable_layers_are_refused_in_one_line(tmp_path: Path) -> None:
+    view = layered((Layer(1, "paint"), 0.5, 0.5))
+    exr, openraster = tmp_path / "layers.exr", tmp_path / "layers.ora"
+    write_layers_exr(exr, view, "eye")
+    write_layers_openraster(openraster, view, CURRENT, TRANSFORM)
+    for path in (exr, openraster):
+        with pytest.raises(PaintError, match="70x12 pixels, and the view 8x9"):
+            read_layers(path, (9, 8), TRANSFORM)
+    [part] = read_parts(exr)
+    write_parts(exr, [ExrPart("other", part.channels)])
+    with pytest.raises(PaintError, match="does not say what its layers mean"):
+        read_layers(exr, SIZE, TRANSFORM)
+    for text in ("{", '{"format": "other"}', "[]", part.attributes[KEY].replace('"paint"', '"x"')):
+        write_parts(exr, [ExrPart("other", part.channels, {KEY: text})])
+        with pytest.raises(PaintError, match="its layers are damaged"):
+            read_layers(exr, SIZE, TRANSFORM)
+    values = {**part.channels, "01 Layer.A": 4 * part.channels["01 Layer.A"]}
+    write_parts(exr, [ExrPart("layers", values, part.attributes)])
+    with pytest.raises(PaintError, match="beyond 0 to 1"):
+        read_layers(exr, SIZE, TRANSFORM)
+    content = openraster.read_bytes()
+    openraster.write_bytes(content[: len(content) // 2])
+    with pytest.raises(ImageError, match="is damaged"):
+        read_layers(openraster, SIZE, TRANSFORM)
+    (tmp_path / "other").write_text("nothing")
+    with pytest.raises(PaintError, match="no layers to open"):
+        read_layers(tmp_path / "other", SIZE, TRANSFORM)
+
+
+def test_a_list_of_layers_may_not_declare_anything(tmp_path: Path) -> None:
+    path = tmp_path / "layers.ora"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("mimetype", "image/openraster")
+        archive.writestr("stack.xml", '<!DOCTYPE x [<!ENTITY a "b">]><image w="1" h="1"/>')
+    with pytest.raises(ImageError, match="declarations of its own"):
+        read_layers(path, SIZE, TRANSFORM)
+
+
+def test_krita_opens_both_files_and_saves_layers_that_come_back(tmp_path: Path) -> None:
+    # It wants a display, and on Linux takes no other than X11's.
+    krita, display = needs("kritarunner", "Krita"), needs("xvfb-run", "Xvfb")
+    half = (np.arange(SIZE[1]) < 35) * np.ones(SIZE)
+    view = layered(
+        (Layer(1, "paint", "Lamp, +1.2 stops", strength=0.4), (2.0, 1.0, 0.5), half),
+        (Layer(2, "adjust", "Darker", gain=0.25, group=3), 0.0, half[:, ::-1]),
+        (Layer(4, "pixels", "Strokes", is_visible=False), (0.2, 0.3, 0.4), 0.5 * half),
+        group=Layer(3, "group", "Night"),
+    )
+    write_layers_exr(tmp_path / "layers.exr", view, "eye")
+    write_layers_openraster(tmp_path / "layers.ora", view, CURRENT, TRANSFORM)
+    run(
+        tmp_path,
+        *(display, "-a", krita, "-s", "lightpaint_krita_layers"),
+        PYTHONPATH=str(KRITA_SCRIPTS),
+        LIGHTPAINT_FOLDER=str(tmp_path),
+    )
+    error = tmp_path / "error"
+    assert not error.exists(), error.read_text(encoding="utf-8")
+    found = json.loads((tmp_path / "found.json").read_text(encoding="utf-8"))
+    # The lowest first.
+    names = [name for name, *_ in found["exr"]]
+    assert [name[3:] for name in names] == [
+        LOOK_NAME,
+        *("Lamp, +1,2 stops", "Strokes", "Night/Darker"),
+    ]
+    assert names == sorted(names, reverse=True)
+    # An EXR has neither eye nor strength: hidden strokes cover.
+    np.testing.assert_allclose(found["pixel"], (0.2, 0.3, 0.4, 1.0), rtol=1e-6)
+    assert found["ora"] == [
+        [LOOK_NAME, 1.0, True, []],
+        ["Lamp, +1.2 stops", 0.4, True, []],
+        ["Strokes", 1.0, False, []],
+        ["Night", 1.0, True, [["Darker", 1.0, True, []]]],
+    ]
+    again = read_layers(tmp_path / "again.ora", SIZE, TRANSFORM)
+    layers = {layer.name: layer for layer in again.layers}
+    assert set(layers) == {"Painting", "Lamp, +1.2 stops", "Night", "Darker", "Strokes"}
+    lamp = layers["Lamp, +1.2 stops"]
+    assert lamp.strength == pytest.approx(0.4, abs=1 / 255)
+    assert not layers["Strokes"].is_visible
+    assert layers["Darker"].group == layers["Night"].id
+    region, pixels = again.pixels[0, lamp.id]
+    assert region == (0, SIZE[0], 0, 35)
+    # Krita saves 8 bits: half a step in 188, whose light has 2.4 times its relative error.
+    np.testing.assert_allclose(pixels.image[3, 3], (2.0, 1.0, 0.5), rtol=0.015)
+
+
+@contextmanager
+def opened(subject: Subject) -> Iterator[tuple[Studio, list[Message]]]:
+    """A studio with its session, and what it publishes."""
+    messages: list[Message] = []
+    studio = Studio([subject], MemoryStore)
+    studio.on_message = messages.append
+    studio.start()
+    try:
+        wait_for(messages, "state", "notice")
+        yield studio, messages
+    finally:
+        studio.close()
+
+
+def wait_for(messages: list[Message], *kinds: str) -> Message:
+    """The first message of these kinds."""
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline:
+        for message in list(messages):
+            if message.kind in kinds:
+                return message
+        time.sleep(0.01)
+    raise AssertionError([message.kind for message in messages])
+
+
+@pytest.mark.parametrize(("name", "precision"), [("layers.exr", 1e-4), ("layers.ora", 1e-3)])
+def test_exported_layers_open_in_another_session(
+    tmp_path: Path, name: str, precision: float
+) -> None:
+    """With the same lights, to the precision of floats or of 16 bits; and undo takes them back."""
+    [basis] = bases_of(1)
+    subject = Subject("room", tmp_path, basis=basis)
+    with opened(subject) as (studio, messages):
+        layer = Layer(1, "adjust", "All, darker", gain=0.7)
+        request = protocol.Paint(1, WHOLE, True, layer=1, properties=layer)
+        studio.handle(request, {"importance": np.ones(SIZE, np.float32)})
+        shape = (SIZE[0], 10)
+        arrays = {
+            "image": np.full((*shape, 3), 0.2, np.float32),
+            "importance": np.ones(shape, np.float32),
+        }
+        studio.handle(protocol.Paint(2, (0, SIZE[0], 30, 40), True), arrays)
+        studio.handle(protocol.Export(("layers",)), {})
+        exported = wait_for(messages, "exported").fields
+        assert exported["files"] == [str(tmp_path / "layers.exr"), str(tmp_path / "layers.ora")]
+        assert exported["command"] == ""
+        expected = studio.snapshot().solution()
+    with opened(replace(subject, layers=tmp_path / name)) as (studio, _):
+        names = {layer.name for layer in studio.session.views.layers}
+        assert names == {"Painting", "All, darker"}
+        found = studio.snapshot().solution()
+        assert found is not None
+        assert expected is not None
+        np.testing.assert_allclose(found.weights, expected.weights, rtol=precision)
+        studio.handle(protocol.Undo(), {})
+        assert not studio.session.views.is_painted
+
+
+def test_a_session_of_another_size_says_why_it_does_not_open(tmp_path: Path) -> None:
+    write_layers_exr(tmp_path / "other.exr", layered((Layer(1, "paint"), 0.5, 0.5)), "eye")
+    basis = bases_of(2)[1]
+    subject = Subject("room", tmp_path, basis=basis, layers=tmp_path / "other.exr")
+    with opened(subject) as (studio, messages):
+        text = wait_for(messages, "notice").fields["text"]
+        assert "other.exr has 70x12 pixels, and the view 8x9" in text
+        assert isinstance(studio.failure, PaintError)
+
+
+def test_layers_are_of_one_view_and_have_to_exist(tmp_path: Path) -> None:
+    first, other = bases_of(2)
+    with pytest.raises(PaintError, match="has the layers of one view"):
+        make_subjects([first, other], tmp_path, layers=tmp_path / "layers.exr")
+    with pytest.raises(PaintError, match=r"layers\.exr"):
+        make_subjects([first], tmp_path, layers=tmp_path / "layers.exr")
