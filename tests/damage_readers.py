@@ -59,6 +59,12 @@ class Reader:
             )
             arrays = (basis.images, basis.half_differences, basis.emitters_seen)
             return basis.lights, basis.origin, [(a.shape, a.tobytes()) for a in arrays]
+        if self.kind == "layers":
+            from lightpaint.colour.display.view_transform import ViewTransform
+            from lightpaint.paint.layers.layer_file_reading import read_layers
+
+            fields, arrays = read_layers(path, (6, 5), ViewTransform()).as_fields()
+            return fields, {name: (a.shape, a.tobytes()) for name, a in arrays.items()}
         if self.kind == "groups":
             from lightpaint.basis.lightgroups.light_groups import read_light_groups
 
@@ -73,7 +79,7 @@ class Reader:
         """What is to be said of a damaged file that was read as something else than before."""
         if self.kind == "picture":
             return _second_opinion(path, read.picture)
-        if self.kind in ("scene", "groups", "mask", "estimate"):
+        if self.kind in ("scene", "groups", "mask", "estimate", "layers"):
             return "read"  # a bit that is turned in a number of these nobody can know of
         return "agreed" if self.agrees(path, read) else f"misread as {read!r}"[:300]
 

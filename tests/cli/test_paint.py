@@ -86,6 +86,7 @@ def test_what_is_painted_and_where_it_is_kept(
 @pytest.mark.usefixtures("work_folder")
 def test_the_command_for_what_is_exported_has_the_options_that_solve_has() -> None:
     line = "--new scene.xml -q --spp 8 --lock a=40% --port 0 -s 1 --no-browser --hold 0.5 -o x"
+    line += " --layers my.ora"
     values = painter_arguments(f"{line} --group g=a,b* --view agx --host 127.0.0.1")
     words = ("--spp=8", "--lock=a=40%", "-s", "1", "--hold=0.5", "'--group=g=a,b*'")
     assert values["options"] == words
@@ -93,6 +94,7 @@ def test_the_command_for_what_is_exported_has_the_options_that_solve_has() -> No
     options = command_parser().parse_args(arguments)
     assert settings_of(options, arguments).hold == values["settings"].hold == 0.5
     assert painter_arguments("--lights groups.exr --lock a")["options"] == ("--lock=a",)
+    assert values["layers"] == Path("my.ora")
     assert (values["new"], values["port"], values["host"]) == (True, 0, "127.0.0.1")
 
 
@@ -135,6 +137,8 @@ def test_several_views_are_named_by_sensors_or_are_bases(make_basis: Any) -> Non
         ("groups.exr --seed 3", "--seed cannot be used with groups.exr"),
         ("room.basis.exr --lock lamp", "lamp"),
         ("none.basis.exr", "none.basis.exr"),
+        ("room.basis.exr --layers none.ora", r"none\.ora"),
+        ("room.basis.exr --layers room.basis.exr", "does not say what its layers mean"),
         ("room.basis.exr --port 70000", "70000"),
         ("room.basis.exr -o room.basis.exr", "cannot write"),
     ],

@@ -1,5 +1,6 @@
 """Files of layers hold what the painter shows, and come back as layers."""
 
+import io
 import json
 import time
 import zipfile
@@ -12,6 +13,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from damaged_files import Case, damage, outcomes, read_despite_cut, wrong_outcomes
 from layered_sessions import SIZES, RandomEditor, bases_of, identity_of, open_session
 from paint_programs import needs, run
 from PIL import Image
@@ -237,6 +239,57 @@ def test_files_without_usable_layers_are_refused_in_one_line(tmp_path: Path) -> 
         read_layers(tmp_path / "other", SIZE, TRANSFORM)
 
 
+def test_damaged_files_are_refused_or_read(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    pixels = Pixels(*(rng.random(shape, np.float32) for shape in ((6, 5, 3), (6, 5))))
+    layers = [Layer(1, "paint", group=2), Layer(2, "group", "Night"), Layer(3, "pixels")]
+    named = dict.fromkeys((1, 3), ((0, 6, 0, 5), pixels))
+    view = ViewLayers(LayerStack.of(layers), named, CURRENT[:6, :5])
+    exr, openraster = tmp_path / "layers.exr", tmp_path / "layers.ora"
+    write_layers_exr(exr, view, "eye")
+    write_layers_openraster(openraster, view, CURRENT[:6, :5], TRANSFORM)
+    contents = {path.name: path.read_bytes() for path in (exr, openraster)}
+    cases = [
+        case
+        for k, (name, content) in enumerate(contents.items())
+        for case in damage(name, content, k, 150, 150)
+    ]
+    # What stands in the list of layers is under no checksum that a liar could not renew.
+    with zipfile.ZipFile(openraster) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    text = members["stack.xml"].decode()
+    for old, new in LIES:
+        assert old in text
+        content = archived({**members, "stack.xml": text.replace(old, new).encode()})
+        cases.append(Case("layers.ora", f"said {new[:40]}", content))
+    results = outcomes("layers", contents, cases, tmp_path)
+    assert wrong_outcomes(results) == []
+    assert read_despite_cut(results) == []
+    lies = [outcome for case, outcome in results if case.done.startswith("said ")]
+    assert lies == ["refused"] * len(LIES)
+
+
+#: Words of a list of layers, and what a liar writes instead.
+LIES = (
+    ('w="5"', 'w="-5"'),
+    ('h="6"', 'h="6000000000000"'),
+    ('x="0"', 'x="nan"'),
+    ('y="0"', 'y="inf"'),
+    ('opacity="1"', 'opacity="much"'),
+    ('src="data/layer0.png"', 'src="../../layer0.png"'),
+    ('src="data/layer0.png"', 'src="stack.xml"'),
+    ("<image ", "<!-- -->" + 3000 * "<stack>" + "<image "),
+)
+
+
+def archived(members: dict[str, bytes]) -> bytes:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name, content in members.items():
+            archive.writestr(name, content)
+    return buffer.getvalue()
+
+
 def test_a_list_of_layers_may_not_declare_anything(tmp_path: Path) -> None:
     path = tmp_path / "layers.ora"
     with zipfile.ZipFile(path, "w") as archive:
@@ -367,5 +420,5 @@ def test_layers_are_of_one_view_and_have_to_exist(tmp_path: Path) -> None:
     first, other = bases_of(2)
     with pytest.raises(PaintError, match="has the layers of one view"):
         make_subjects([first, other], tmp_path, layers=tmp_path / "layers.exr")
-    with pytest.raises(PaintError, match=r"layers\.exr"):
+    with pytest.raises(ImageError, match=r"no such image file: .*layers\.exr"):
         make_subjects([first], tmp_path, layers=tmp_path / "layers.exr")

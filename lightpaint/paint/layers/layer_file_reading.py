@@ -10,7 +10,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Bools
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import ImageError, PaintError
-from lightpaint.images.formats.exr import ExrPart, read_parts
+from lightpaint.images.formats.exr import ExrPart, read_headers, read_parts
 from lightpaint.images.formats.file_kinds import head_of, kind_of
 from lightpaint.images.formats.openraster import layered_kind
 from lightpaint.images.formats.openraster_stack import RasterGroup, RasterLayer, read_openraster
@@ -34,27 +34,35 @@ def read_layers(path: Path, size: tuple[int, int], transform: ViewTransform) -> 
     size: (height, width) of the view, which the file must have. transform: by which the display
     values of an OpenRaster file become light. Raises PaintError or ImageError.
     """
-    head = head_of(path, HEAD_BYTES)
-    match kind_of(head):
-        case "exr":
-            layered = _of_exr(path, size)
-        case "zip" if layered_kind(path, head) == "ora":
-            layered = _of_openraster(path, size, transform)
-        case _:
-            raise PaintError(f"{path} has no layers to open: expected a .ora file, or layers.exr")
+    is_exr = check_kind(path)
+    layered = _of_exr(path, size) if is_exr else _of_openraster(path, size, transform)
     if not layered.pixels:
         raise PaintError(f"{path} has no layer with anything on it")
     return layered
 
 
-def _of_exr(path: Path, size: tuple[int, int]) -> LayeredPaintings:
-    parts = [part.in_display_window() for part in read_parts(path)]
-    texts = [part.attributes[KEY] for part in parts if KEY in part.attributes]
-    if not texts:
+def check_kind(path: Path) -> bool:
+    """Return whether a file of layers is an EXR, and not an OpenRaster; pixels are not read.
+
+    Raises PaintError or ImageError for any other file.
+    """
+    head = head_of(path, HEAD_BYTES)
+    kind = kind_of(head)
+    if kind == "zip" and layered_kind(path, head) == "ora":
+        return False
+    if kind != "exr":
+        raise PaintError(f"{path} has no layers to open: expected a .ora file, or layers.exr")
+    if not any(KEY in texts for texts in read_headers(path)[0]):
         raise PaintError(
             f"{path} does not say what its layers mean, as an EXR saved again by another program: "
             "open the painter's own file, or an .ora file"
         )
+    return True
+
+
+def _of_exr(path: Path, size: tuple[int, int]) -> LayeredPaintings:
+    parts = [part.in_display_window() for part in read_parts(path)]
+    texts = [part.attributes[KEY] for part in parts if KEY in part.attributes]
     _check_size(path, parts[0].size, size)
     channels = {name: pixels for part in parts for name, pixels in part.channels.items()}
     try:
