@@ -124,7 +124,7 @@ def test_a_message_has_no_more_than_a_page_has_use_for(content: dict[str, Any]) 
 
 def test_samples_and_suggestions_have_an_end(tmp_path: Path) -> None:
     """Before passes are listed, which so many would fill the memory with."""
-    for key, most in (("spp", 2**20), ("verify_spp", 2**20), ("suggest", 100)):
+    for key, most in (("spp", 2**20), ("verify_spp", 2**20), ("suggest", 32)):
         Settings(**{key: most})
         with pytest.raises(lp.LightpaintError, match=f"at most {most}"):
             Settings(**{key: most + 1})

@@ -13,6 +13,9 @@ import re
 from functools import cache
 from importlib import resources
 
+#: A mark that ends a rule or a declaration of a style sheet, with the space around it.
+_CSS_SPACE = re.compile(r"\s*([{};])\s*")
+
 _IMPORT = re.compile(
     r"^import\s+(?:(?P<names>[^;'\"]+?)\s+from\s+)?(?P<q>['\"])(?P<path>[^'\"]+)(?P=q);?[ \t]*$",
     re.MULTILINE,
@@ -54,8 +57,8 @@ def _code(path: str) -> str:
 
 @cache
 def styles(*paths: str) -> str:
-    """Return style sheets joined, without their comments."""
-    return "\n".join(_minified(source(path)) for path in paths)
+    """Return style sheets joined, without their comments and spaces between rules."""
+    return "\n".join(_CSS_SPACE.sub(r"\1", _minified(source(path))) for path in paths)
 
 
 @cache
@@ -137,8 +140,7 @@ def _as_constant(path: str, number: dict[str, int]) -> str:
         raise BundleError(
             f"{path}: cannot bundle `{line[:60]}`: write it as another import or export"
         )
-    # Indentation has no meaning, not even in these templates, and would be a tenth of a report.
-    body = "\n".join(line.strip() for line in text.splitlines() if line.strip())
+    body = unindented(text)
     return f"const m{number[path]} = (() => {{\n{body}\nreturn {{ {', '.join(exports)} }}\n}})()"
 
 
@@ -172,6 +174,14 @@ def _exported(path: str) -> tuple[str, ...]:
     for match in _EXPORT_LIST.finditer(text):
         names += [name for _, name in _pairs(match["names"])]
     return tuple(names)
+
+
+def unindented(text: str) -> str:
+    """Return code without indentation and empty lines, which would be a tenth of a report.
+
+    Neither has a meaning, not even in the templates of these scripts.
+    """
+    return "\n".join(line.strip() for line in text.splitlines() if line.strip())
 
 
 def _minified(text: str) -> str:

@@ -29,8 +29,8 @@ def of_moved_scenes(
     return moved, replace(snapshot, bases=bases)
 
 
-def write_places(rig: LampRig, placed: Placed) -> Path:
-    """Write the places of moved and added lights for `solve`; return the file."""
+def write_places(folder: Path, rig: LampRig, placed: Placed) -> Path:
+    """Write the places of moved and added lights for `solve` to `folder`; return the file."""
     added = added_names(placed)
     moves = tuple(
         Move(name, rig.site(name, {}), rig.site(name, values), gain_share=0.0)
@@ -38,6 +38,6 @@ def write_places(rig: LampRig, placed: Placed) -> Path:
         if name not in added
     )
     additions = tuple(AddedLight(new_emitter(x, placed[x]), gain_share=0.0) for x in added)
-    path = places_path(rig.subjects[0].folder)
+    path = places_path(folder)
     write_text(path, PlacementRecord(moves, additions, 0.0, 0.0).to_json())
     return path

@@ -182,7 +182,8 @@ class BackgroundJobs:
                     for file in export(subjects, snapshot, lighting, outputs, report, layers):
                         files.append(file)  # one by one: a stop keeps those already written
                     if snapshot.requests.placed and WRITES_PAINTING & set(message.outputs):
-                        files.append(write_places(self._mover.rig, snapshot.requests.placed))
+                        places = snapshot.requests.placed
+                        files.append(write_places(subjects[0].folder, self._mover.rig, places))
         except StoppedError:
             if self._stop_count != stop_count:
                 result = ExportResult(files=_absolute_names(files), command="", is_stopped=True)

@@ -48,6 +48,7 @@ from lightpaint.report.rig.hung_lights import HungLights
 from lightpaint.report.verdict import verdict
 from lightpaint.report.visible_emitters import emitter_remarks
 from lightpaint.target.target import Target
+from lightpaint.viewer.bundle import unindented
 
 
 def report_page(
@@ -119,7 +120,7 @@ def report_page(
     parts["missed"] += parts.pop("constraints") + colors_section(color_choices)
     parts["mixer"] += mixer_assets()
     template = resources.files("lightpaint.report.page").joinpath("page.html.in")
-    return Template(template.read_text(encoding="utf-8")).substitute(
+    return Template(unindented(template.read_text(encoding="utf-8"))).substitute(
         **parts,
         **_texts(basis, target, solution, predicted, verification, appearance),
         exposure=_exposure(transform, predicted.image, looks.denoiser),
