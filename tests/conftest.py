@@ -27,8 +27,9 @@ from lightpaint.scene.scene_reader import load_scene
 
 # Shared machines are slow now and then, which is no failure; a fixed choice of examples makes
 # a run repeatable.
-settings.register_profile("lightpaint", deadline=None, derandomize=True)
-settings.load_profile("lightpaint")
+settings.register_profile("check", deadline=None, derandomize=True, max_examples=40)
+settings.register_profile("nightly", deadline=None, derandomize=True, max_examples=100)
+settings.load_profile("check")
 
 BasisFactory = Callable[..., Basis]
 
@@ -44,6 +45,8 @@ CHROMIUM = [
 
 def pytest_configure(config: pytest.Config) -> None:
     """Let tests press Ctrl-C, and workers of pytest-xdist share the cores."""
+    if not config.getoption("markexpr"):
+        settings.load_profile("nightly")  # ./check --all
     # What a shell starts in the background ignores it.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     if hasattr(config, "workerinput"):
