@@ -128,9 +128,10 @@ def test_samples_and_suggestions_have_an_end(tmp_path: Path) -> None:
         Settings(**{key: most})
         with pytest.raises(lp.LightpaintError, match=f"at most {most}"):
             Settings(**{key: most + 1})
-    for option in ("--spp", "--verify-spp", "--suggest"):
-        arguments = (option, str(10**30), "r.xml", "a.png")
-        assert "at most" in run_refused(tmp_path, "solve", *arguments)
+        option = f"--{key.replace('_', '-')}"
+        refusal = run_refused(tmp_path, "solve", option, str(most + 1), "r.xml", "a.png")
+        assert option in refusal
+        assert "at most" in refusal
 
 
 # Work that is given up

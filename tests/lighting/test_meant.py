@@ -135,7 +135,7 @@ def test_colors_are_pulled_as_the_formula_says(make_basis: Any, monkeypatch: pyt
 
 
 def test_lamps_that_only_dim_cost_nothing(make_basis: Any):
-    """What the current colours can do is done exactly, however strong the pull."""
+    """A painting that the lights meet in their current colours keeps these, at any pull."""
     basis = _basis(make_basis)
     dimmed = basis.current_weights * np.array([[0.2], [3.0], [0.0], [1.0]])
     target = replace(lp.Target.of(basis.mix(dimmed).astype(np.float32)), over_look=True)

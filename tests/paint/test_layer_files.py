@@ -89,7 +89,7 @@ def layered(*layers: tuple[Layer, Any, Any], group: Layer | None = None) -> View
 
 
 def shown(items: Any) -> np.ndarray:
-    """What a program shows that lays these layers over each other, in display values."""
+    """Return the layers composited in order, as a paint program shows them, in display values."""
     picture = np.zeros((*SIZE, 3))
     for item in items:
         inner = item.layers if isinstance(item, RasterGroup) else [item]

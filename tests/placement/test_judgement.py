@@ -37,7 +37,7 @@ class Paths:
 
 
 def found(levels: Sequence[float], noise: float = 0.01) -> Any:
-    """What is worth it of three new lights, where the painting has them at these levels."""
+    """Return which of three new lights the judge keeps, for a painting lit by all at `levels`."""
     goal = np.einsum("n,npc->pc", levels, IMAGES)
     knobs = tuple(Knob.of_any_colour(k) for k in range(3))
     reduction = Reduction(np.zeros((3, 3)), ("a", "b", "c"), knobs)

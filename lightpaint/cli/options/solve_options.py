@@ -134,7 +134,7 @@ def add_method(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--suggest",
-        type=arguments.at_least(1, maximum=100),
+        type=arguments.at_least(1, maximum=32),
         nargs="?",
         const=3,
         default=0,
