@@ -69,8 +69,10 @@ def suggest_lights(
     except NoPlaceError:
         return ()
     names = free_names(NAME, len(placement.additions), [x.name for x in scene.emitters])
-    # Gains refer to all that is missed, noise and what small films do not show included.
-    scale = placement.missed_before * float(solution.norm2.sum()) / solution.energy
+    # Gains refer to all that is missed, noise and what small films do not show included. Energies
+    # are of the last linear problem, since the loss of a display fit has another scale.
+    norm2 = float(solution.equations.target_norm2.sum())
+    scale = placement.missed_before * norm2 / solution.energy
     return _suggestions(placement, names, scale)
 
 
