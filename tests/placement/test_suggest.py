@@ -19,6 +19,8 @@ from lightpaint.errors import SceneError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solve
+from lightpaint.placement.new_lights import NewLights
+from lightpaint.placement.place import place
 from lightpaint.placement.suggestions.light_search import (
     check_suggestible,
     emitter_xml,
@@ -118,6 +120,19 @@ def test_a_light_that_is_missing_is_found(
     remaining_loss = sum(repeat.certificate.objective) / sum(solution.certificate.objective)
     assert remaining_loss == pytest.approx(first.missed_share, abs=0.05)
     np.testing.assert_allclose(repeat.lighting.emission[first.name], first.emission, rtol=0.15)
+
+
+def test_gains_of_a_display_fit_are_shares_of_its_last_linear_problem(
+    lacking: tuple[Scene, Basis], missing: Any
+):
+    """Its loss has another scale, by which a light would remove more than there is."""
+    scene, basis = lacking
+    solution = solve(basis, missing()[0], space="display")
+    [first] = suggest_lights(scene, basis, solution, count=1)
+    [light] = place(scene, basis, solution, new=[NewLights("point", count=1)]).additions
+    # The search's film is that of the basis here: nothing is missed that it does not see but noise.
+    assert first.gain_share == pytest.approx(light.gain_share, rel=0.1)
+    assert solution.norm2.sum() != pytest.approx(solution.equations.target_norm2.sum(), rel=0.2)
 
 
 def test_the_same_seed_gives_the_same_light(lacking: tuple[Scene, Basis], missing: Any):
