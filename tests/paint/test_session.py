@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,12 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.origin import Origin
 from lightpaint.cli.commands.paint_command import options_of
 from lightpaint.colour.color import LUMINANCE, kelvin_to_rgb
+from lightpaint.lighting.answer.combination import dimmed
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import DEFAULT_HOLD
 from lightpaint.paint import protocol
+from lightpaint.paint.session.look_library import LookLibrary
+from lightpaint.paint.session.picture_table import PictureTable
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.history_steps import Identity
@@ -391,6 +395,61 @@ def test_several_lights_are_asked_in_one_step(basis: lp.Basis):
     with pytest.raises(lp.LightpaintError, match="nobody"):
         session.handle(protocol.ConstrainLights({"nobody": {}}), {})
     assert session.requests == requests_before
+
+
+def test_a_slider_over_several_lights_is_one_step_with_its_own_label(basis: lp.Basis):
+    session = session_of(basis)
+    session.handle(*paint(1, (2, 9, 3, 12), 0.9))
+    lights = {f"lamp {k}": {"lock": [0.2, 0.2, 0.2]} for k in (0, 1)}
+    for is_final in (False, False, True):
+        session.handle(protocol.ConstrainLights(lights, is_final, "dim 2 lights, \u22121.3 st"), {})
+        np.testing.assert_allclose(session.weights[:2], 0.2, rtol=1e-9)
+        assert session.is_open is not is_final
+    assert [step.label for step in session.store.steps][1:] == ["dim 2 lights, \u22121.3 st"]
+    session.handle(protocol.Undo(), {})
+    assert session.requests.lights == {}
+
+
+def test_the_master_dims_what_is_shown_and_nothing_that_is_asked(basis: lp.Basis):
+    store = MemoryStore(Identity.of([basis]))
+    session = session_of(basis, store)
+    session.handle(*paint(1, (2, 9, 3, 12), 0.9))
+    answer, snapshot = session.weights.copy(), session.snapshot()
+    looks = LookLibrary(session, PictureTable())
+    session.handle(protocol.SetMaster(0.7), {})
+    np.testing.assert_array_equal(session.weights, answer)
+    solutions = [one.solution() for one in (snapshot, session.snapshot())]
+    np.testing.assert_array_equal(*(one.weights for one in solutions if one))
+    assert session.edit_state["master"] == 0.7
+    assert session.edit_state["history"].undo[-1] == "master 70 %"
+    looks.handle(protocol.SaveLook("dimmed"))
+    [look] = looks.infos()
+    np.testing.assert_allclose(look.weights, 0.7 * answer)
+    # It stays in the file, a look brings it back, and other changes keep it.
+    assert session_of(basis, store).requests.master == 0.7
+    session.handle(protocol.Undo(), {})
+    assert session.requests.master == 1
+    looks.load(protocol.LoadLook(look.id))
+    session.handle(protocol.ConstrainLight(0, {"lock": True}), {})
+    assert session.requests.master == 0.7
+    # What shone is locked where two looks are mixed.
+    looks.handle(protocol.MixLooks(look.id, look.id, 0.5, "mixed"))
+    mixed = looks.infos()[-1]
+    np.testing.assert_allclose(mixed.weights, 0.7 * answer)
+    looks.load(protocol.LoadLook(mixed.id))
+    assert session.requests.master == 1
+    for level in (-0.1, 2.1, float("nan")):
+        with pytest.raises(lp.LightpaintError, match="from 0 to 2"):
+            session.handle(protocol.SetMaster(level), {})
+
+
+def test_a_dimmed_lighting_keeps_fixed_lights_and_no_error_bars(basis: lp.Basis):
+    fixed = replace(basis.lights[0], is_fixed=True, emission=(1.0, 1.0, 1.0))
+    lights = replace(basis, lights=(fixed, *basis.lights[1:]))
+    lighting = lp.Lighting.of_weights(lights, np.ones((3, 3)))
+    half = dimmed(lighting, 0.5)
+    assert [light.emission for light in half.lights] == [(1, 1, 1), *2 * [(0.5, 0.5, 0.5)]]
+    assert dimmed(lighting, 1) is lighting
 
 
 @pytest.mark.parametrize("space", ["linear", "display"])

@@ -143,9 +143,14 @@ def test_what_is_exported_is_solved_alike(client: StudioClient, basis: lp.Basis,
     np.testing.assert_allclose(
         [emission[name] for name in basis.names], exact.arrays["weights"], rtol=1e-12
     )
+    client.studio.handle(protocol.SetMaster(0.5), {})
     client.messages.clear()
     client.studio.handle(protocol.Export(("lighting",)), {})
     assert client.wait(lambda m: m.kind == "exported").fields["command"] == ""
+    emission = lp.read_lighting(tmp_path / "lighting.json").emission
+    np.testing.assert_allclose(
+        [emission[name] for name in basis.names], 0.5 * exact.arrays["weights"], rtol=1e-12
+    )
 
 
 def test_what_is_not_of_a_painting_is_exported_without_one(client: StudioClient, tmp_path: Path):

@@ -1,17 +1,19 @@
 """The linear sum of basis images, Σ w_i Φ_i."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Doubles
+from lightpaint.arrays import Doubles, as_rgb
 from lightpaint.basis.basis import Basis
 from lightpaint.display_text import some_of
 from lightpaint.errors import LightingError, UnknownLightError
 from lightpaint.images.estimate import Estimate
 from lightpaint.keywords import keywords
+from lightpaint.lighting.answer.light_setting import LightSetting
 from lightpaint.lighting.answer.lighting import Lighting
 
 
@@ -45,6 +47,31 @@ def combine(
         else _weights(basis, lighting_or_weights)
     )
     return Estimate(basis.mix(weights), basis.noise.mix(weights))
+
+
+def dimmed(lighting: Lighting, factor: float) -> Lighting:
+    """Return a lighting whose lights, but for fixed ones, shine at `factor` times their emission.
+
+    It is no answer to the painting any more, so that it has no certificate and no error bars.
+    """
+    if factor == 1:
+        return lighting
+
+    def setting(light: LightSetting) -> LightSetting:
+        if light.is_fixed:
+            return light
+        emission, weight = (as_rgb(factor * np.asarray(x)) for x in (light.emission, light.weight))
+        return replace(
+            light,
+            emission=emission,
+            weight=weight,
+            constraint="",
+            is_active=False,
+            standard_error=None,
+            interval=None,
+        )
+
+    return replace(lighting, lights=tuple(map(setting, lighting.lights)), certificate=None)
 
 
 def _weights(basis: Basis, values: Mapping[str, Any] | npt.ArrayLike) -> Doubles:

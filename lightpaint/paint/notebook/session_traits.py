@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from typing import Any, Protocol
 
+from lightpaint.lighting.answer.combination import dimmed
 from lightpaint.paint.background_threads import error_text
 from lightpaint.paint.notebook.widget_arguments import LOADERS, LoadArguments, same_paintings
 from lightpaint.paint.protocol import Message
@@ -91,7 +92,8 @@ class SessionTraits:
 
         An exact answer arrives twice, the second time with its analysis.
         """
-        snapshot, lighting = self._studio.snapshot_and_lighting()
+        snapshot, answer = self._studio.snapshot_and_lighting()
+        lighting = dimmed(answer, snapshot.requests.master)
         targets, earlier_targets = snapshot.targets, self._owner.targets
         earlier_lighting = self._owner.lighting
         lighting = lighting.for_target(

@@ -15,6 +15,7 @@ from typing import Any, Unpack
 from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
 from lightpaint.errors import PaintError
 from lightpaint.lighting.analysis.analysis import analyse, with_findings
+from lightpaint.lighting.answer.combination import dimmed
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
@@ -259,8 +260,9 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
     def _lighting(self) -> Lighting:
         """Return the exact answer, or the requested lighting if nothing is painted."""
-        solution = self.solution
-        return self._studio.snapshot_and_lighting()[1] if solution is None else solution.lighting
+        solution, (snapshot, answer) = self.solution, self._studio.snapshot_and_lighting()
+        lighting = answer if solution is None else solution.lighting
+        return dimmed(lighting, snapshot.requests.master)
 
     # Messages of page and studio
 

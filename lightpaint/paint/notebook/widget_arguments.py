@@ -169,7 +169,7 @@ def load_constraints(session: Session, constraints: Any) -> LoadArguments:
         raise PaintError(f"painter.constraints is a lp.Constraints or None, not {kind}")
     lights, values = session.basis.lights, session.requests.values
     requests = SessionRequests.from_constraints(constraints or Constraints(), lights, values)
-    return {}, requests, "constraints from a cell"
+    return {}, requests.with_master(session.requests.master), "constraints from a cell"
 
 
 #: Functions that turn a trait's new value into arguments of `Studio.load`.

@@ -32,6 +32,7 @@ from lightpaint.paint.protocol.light_requests import (
     PlaceLights,
     PointLight,
     RemoveLight,
+    SetMaster,
     ShowRig,
     TieLights,
 )
@@ -161,6 +162,7 @@ __all__ = [
     "SaveLook",
     "SessionPending",
     "SessionState",
+    "SetMaster",
     "ShowRig",
     "TableInfo",
     "TakeOver",

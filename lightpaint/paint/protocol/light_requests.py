@@ -24,11 +24,26 @@ class ConstrainLight(Message, kind="constrain_light"):
 
 @dataclass(frozen=True)
 class ConstrainLights(Message, kind="constrain_lights"):
-    """New constraints on several lights, by name, as in `constrain_light`: one step. Answered by
-    `answer`.
+    """New constraints on several lights, by name, as in `constrain_light`: one step and one solve.
+    Answered by `answer`.
+
+    is_final: as in `constrain_light`. label: its name for undo; "" for the names of the lights.
     """
 
     constraints: Mapping[str, Mapping[str, Any]]
+    is_final: bool = True
+    label: str = ""
+
+
+@dataclass(frozen=True)
+class SetMaster(Message, kind="set_master"):
+    """The master dimmer: one step. Answered by `answer`.
+
+    level: factor of all lights but fixed ones, 0 to 2, applied to the answer. It changes neither
+    the painting nor the solve.
+    """
+
+    level: float
 
 
 @dataclass(frozen=True)

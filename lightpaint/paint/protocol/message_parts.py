@@ -240,7 +240,9 @@ class EditState:
     constraints: by name of light, keys and values as in a lights file. ties: names on one dimmer.
     settings: those that were set. effective_settings: those in effect. poses: of moved lights, by
     name. added_lights: names of lights that the scene does not have. places: a text, equal for
-    equal places of all lights; "" if all hang as in the scene. layers: of the painting.
+    equal places of all lights; "" if all hang as in the scene. layers: of the painting. master:
+    factor of all lights but fixed ones, by the master dimmer: a light shines at `master` times its
+    weight.
     """
 
     history: HistoryInfo | None = field(default=None, metadata=OPTIONAL)
@@ -252,6 +254,7 @@ class EditState:
     places: str | None = field(default=None, metadata=OPTIONAL)
     effective_settings: ResolvedFit | None = field(default=None, metadata=OPTIONAL)
     layers: LayerList | None = field(default=None, metadata=OPTIONAL)
+    master: float | None = field(default=None, metadata=OPTIONAL)
 
 
 #: Tone of a message to the user.

@@ -19,6 +19,7 @@ from lightpaint.paint.protocol.light_requests import (
     PlaceLights,
     PointLight,
     RemoveLight,
+    SetMaster,
     ShowRig,
     TieLights,
 )
@@ -146,6 +147,7 @@ AnyRequest = (
     | Redo
     | ConstrainLight
     | ConstrainLights
+    | SetMaster
     | MoveLights
     | PointLight
     | AddLight

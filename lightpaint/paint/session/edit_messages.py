@@ -31,6 +31,7 @@ def edit_state(history: History, live_answer: LiveAnswer, views: Canvases) -> di
         "layers": LayerList(
             tuple(layer_info(layer, views) for layer in views.layers), views.next_layer
         ),
+        "master": requests.master,
     }
 
 

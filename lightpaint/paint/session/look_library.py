@@ -77,7 +77,7 @@ class LookLibrary:
                 name=look.fields["name"],
                 stamp=look.fields.get("stamp"),
                 lights=self._names(look),
-                weights=tuple(map(as_rgb, np.asarray(look.arrays["weights"]))),
+                weights=tuple(map(as_rgb, self._output(look))),
                 places=_requests(look).place_key,
                 thumbnail=f"look/{look.id}",
                 is_proposal=bool(look.fields.get("is_proposal", False)),
@@ -113,10 +113,8 @@ class LookLibrary:
     def lighting(self, number: int) -> LookLighting:
         """Return the lighting of a look. Raises PaintError for a look that does not exist."""
         look = self._find(number)
-        weights = np.asarray(look.arrays["weights"], np.float64)
-        return LookLighting(
-            _requests(look).placed, dict(zip(self._names(look), weights, strict=True))
-        )
+        emissions = dict(zip(self._names(look), self._output(look), strict=True))
+        return LookLighting(_requests(look).placed, emissions)
 
     def load(self, message: LoadLook) -> list[Message]:
         """Continue from a look."""
@@ -133,8 +131,19 @@ class LookLibrary:
         """Return the names of the lights in a look."""
         return (*self._session.bases[0].names, *_requests(look).added)
 
+    def _output(self, look: StoredLook) -> Doubles:
+        """Return the weights that the lights of a look shine at."""
+        weights = np.asarray(look.arrays["weights"], np.float64)
+        return self._output_of(weights, _requests(look))
+
+    def _output_of(self, weights: Doubles, requests: SessionRequests) -> Doubles:
+        """Return what lights with these weights shine at, those that requests add being last."""
+        is_fixed = self._session.bases[0].is_fixed
+        return requests.output(weights, np.append(is_fixed, [False] * len(requests.added)))
+
     def _light_of(self, weights: Doubles, requests: SessionRequests) -> list[Floats]:
         """Return the picture of a lighting, by view. weights: of the lights under `requests`."""
+        weights = self._output_of(weights, requests)
         session = self._session
         names = (*session.bases[0].names, *requests.added)
         emissions = dict(zip(names, weights, strict=True))
@@ -186,9 +195,7 @@ class LookLibrary:
                 f"{first} and {second} hang lights in different places: no lighting lies between "
                 "them; go on from one of the two"
             )
-        weights = sum(
-            s * np.asarray(x.arrays["weights"]) for s, x in zip(shares, looks, strict=True)
-        )
+        weights = sum(s * self._output(x) for s, x in zip(shares, looks, strict=True))
         locks = self._lock_all(np.asarray(weights), self._names(looks[0]), requests[0])
         pairs = zip(*(self._paintings(look) for look in looks), strict=True)
         paintings = [mix_pixels(pair, shares) for pair in pairs]
@@ -209,7 +216,8 @@ class LookLibrary:
     def _proposed_look(self, message: Propose) -> StoredLook:
         """Return a look of the current painting with a proposed lighting."""
         name, session = self._clean_name(message.name), self._session
-        weights, lights = session.weights.copy(), session.basis.lights
+        lights = session.basis.lights
+        weights = session.requests.output(session.weights, session.basis.is_fixed)
         names = list(session.basis.names)
         for light, emission in message.lights.items():
             if light not in names:

@@ -15,6 +15,7 @@ RequestChange = (
     | protocol.MoveLights
     | protocol.RemoveLight
     | protocol.TieLights
+    | protocol.SetMaster
     | protocol.ChangeSettings
 )
 
@@ -31,7 +32,7 @@ def changed_requests(
             return constrain_light(requests, lights, message)
         case protocol.ConstrainLights():
             changed = constrain_lights(requests, lights, message.constraints)
-            return ", ".join(message.constraints), changed
+            return message.label or ", ".join(message.constraints), changed
         case protocol.MoveLights():
             changed = move_lights(requests, lights, message.poses)
             return f"move {', '.join(message.poses)}", changed
@@ -39,6 +40,9 @@ def changed_requests(
             return f"remove {message.name}", remove_light(requests, lights, message.name)
         case protocol.TieLights():
             return "tie", tie_lights(requests, lights, message.ties)
+        case protocol.SetMaster():
+            changed = requests.with_master(message.level)
+            return f"master {100 * message.level:.0f} %", changed
         case protocol.ChangeSettings():
             changed = requests.with_values(message.settings)
             return ", ".join(TITLES[key] for key in message.settings), changed

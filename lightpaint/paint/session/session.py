@@ -167,7 +167,8 @@ class Session:
 
         A moving slider is reset before any other request, and if its last value is refused.
         """
-        if not isinstance(message, protocol.ConstrainLight | protocol.MoveLights):
+        sliders = protocol.ConstrainLight | protocol.ConstrainLights | protocol.MoveLights
+        if not isinstance(message, sliders):
             self._edits.reset_slider()
         try:
             return self._dispatch(message, arrays)

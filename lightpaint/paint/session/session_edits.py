@@ -1,6 +1,7 @@
 """The edits of a session: paint, layers, requests and steps, each followed by the answer."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy.typing as npt
@@ -147,9 +148,14 @@ class SessionEdits:
         return changes
 
     def append_requests(self, label: str, requests: SessionRequests) -> None:
-        """Set requests, as a step."""
+        """Set requests, as a step. The answer stays if only the master dimmer has changed."""
+        before = self.live_answer.requests_at_rest
+        is_answered = not self.is_open and replace(before, master=requests.master) == requests
         self.history.append_requests(label, requests)
-        self._update_answer()
+        if is_answered:
+            self.version += 1
+        else:
+            self._update_answer()
 
     def replace_all(
         self,

@@ -6,17 +6,24 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+
+from lightpaint.arrays import Bools, Doubles
 from lightpaint.basis.lights import BasisLight
 from lightpaint.errors import PaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.light_patterns import tables_by_light, tied_lights
 from lightpaint.pipeline.job.settings import Settings
+from lightpaint.validation import is_amount, is_number
 
 #: Settings of the answer: those of its fit, and those of all lights together.
 FIT_KEYS, ALL_LIGHTS_KEYS = ("hold", "space", "colors", "literal"), ("prefer_current", "sparse")
 
 #: Keys that hold a light at a level.
 HOLD_KEYS = ("lock", "off")
+
+#: Greatest factor of the master dimmer: a stop above the answer.
+MAX_MASTER = 2.0
 
 #: Titles of these settings on the page.
 TITLES = {
@@ -38,6 +45,7 @@ class SessionRequests:
     poses: of lights that were moved, by name: position, target, cutoff and beam, as in a `Pose`.
     added: lights that the scene does not have, by name, behind all others: kind, pose, size and
     emission, as in a `NewEmitter`.
+    master: factor of all lights but fixed ones, applied to the answer.
     """
 
     lights: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
@@ -45,6 +53,7 @@ class SessionRequests:
     values: Mapping[str, Any] = field(default_factory=dict)
     poses: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     added: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    master: float = 1.0
 
     @classmethod
     def of(cls, data: Mapping[str, Any]) -> "SessionRequests":
@@ -52,7 +61,9 @@ class SessionRequests:
         ties = tuple(tuple(names) for names in data.get("ties", ()))
         poses = {name: dict(pose) for name, pose in data.get("poses", {}).items()}
         added = {name: dict(light) for name, light in data.get("added", {}).items()}
-        return cls(dict(data.get("lights", {})), ties, dict(data.get("values", {})), poses, added)
+        lights, values = dict(data.get("lights", {})), dict(data.get("values", {}))
+        requests = cls(lights, ties, values, poses, added)
+        return requests.with_master(data.get("master", 1.0))
 
     def as_json(self) -> dict[str, Any]:
         """Return plain values."""
@@ -65,6 +76,7 @@ class SessionRequests:
             "values": dict(self.values),
             **({"poses": moved} if moved else {}),
             **({"added": added} if added else {}),
+            **({"master": self.master} if self.master != 1 else {}),
         }
 
     @property
@@ -126,6 +138,18 @@ class SessionRequests:
         for names in ties:
             lights = _hold_once(lights, names)
         return replace(self, lights=lights, ties=tuple(map(tuple, ties)))
+
+    def with_master(self, level: float) -> "SessionRequests":
+        """Return these requests with the master dimmer at a factor. Raises PaintError."""
+        if not (is_number(level) and is_amount(level) and level <= MAX_MASTER):
+            raise PaintError(
+                f"the master dimmer is at {level}: expected a factor from 0 to {MAX_MASTER:g}"
+            )
+        return replace(self, master=float(level))
+
+    def output(self, weights: Doubles, is_fixed: Bools) -> Doubles:
+        """Return the weights that lights shine at, (n, 3), from those of the answer."""
+        return np.where(is_fixed[:, None], weights, self.master * weights)
 
     def with_values(self, values: Mapping[str, Any]) -> "SessionRequests":
         """Return these requests with these values, None for defaults. Raises PaintError."""

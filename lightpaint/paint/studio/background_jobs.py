@@ -12,6 +12,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.denoised_planes import DenoisedPlanes, as_halves
 from lightpaint.errors import PaintError
 from lightpaint.lighting.analysis.analysis import analyse, with_findings
+from lightpaint.lighting.answer.combination import dimmed
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.paint import protocol
 from lightpaint.paint.background_threads import BackgroundThreads, StoppedError
@@ -133,7 +134,8 @@ class BackgroundJobs:
     def _exact_answer(
         self, check: Callable[[], None]
     ) -> tuple[tuple[Subject, ...], SessionSnapshot, Lighting]:
-        """Return the subjects with their current lights, the paintings, and the exact answer.
+        """Return the subjects with their current lights, the paintings, and the exact answer under
+        the master dimmer.
 
         check: raises to stop.
         """
@@ -147,7 +149,7 @@ class BackgroundJobs:
         elif is_moved:
             basis = snapshot.bases[0]
             lighting = Lighting.of_weights(basis, lighting.weights_for(basis))
-        return subjects, snapshot, lighting
+        return subjects, snapshot, dimmed(lighting, snapshot.requests.master)
 
     def _run_export(self, message: protocol.Export, stop_count: int) -> None:
         """Write the requested files.

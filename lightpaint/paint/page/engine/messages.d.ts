@@ -257,7 +257,9 @@ export interface Findings {
  * constraints: by name of light, keys and values as in a lights file. ties: names on one dimmer.
  * settings: those that were set. effective_settings: those in effect. poses: of moved lights, by
  * name. added_lights: names of lights that the scene does not have. places: a text, equal for
- * equal places of all lights; "" if all hang as in the scene. layers: of the painting.
+ * equal places of all lights; "" if all hang as in the scene. layers: of the painting. master:
+ * factor of all lights but fixed ones, by the master dimmer: a light shines at `master` times its
+ * weight.
  */
 export interface EditState {
   history?: HistoryInfo;
@@ -269,6 +271,7 @@ export interface EditState {
   places?: string;
   effective_settings?: ResolvedFit;
   layers?: LayerList;
+  master?: number;
 }
 
 /**
@@ -295,6 +298,7 @@ export interface SessionState {
   places?: string;
   effective_settings?: ResolvedFit;
   layers?: LayerList;
+  master?: number;
   version: number;
   scene: string;
   folder: string;
@@ -365,6 +369,7 @@ export interface AnswerUpdate {
   places?: string;
   effective_settings?: ResolvedFit;
   layers?: LayerList;
+  master?: number;
   version: number;
   stroke: number;
   exact: boolean;
@@ -391,6 +396,7 @@ export interface CanvasPatch {
   places?: string;
   effective_settings?: ResolvedFit;
   layers?: LayerList;
+  master?: number;
   region: Region;
   view: number;
   views: number[];
@@ -694,11 +700,25 @@ export interface ConstrainLight {
 }
 
 /**
- * New constraints on several lights, by name, as in `constrain_light`: one step. Answered by
- * `answer`.
+ * New constraints on several lights, by name, as in `constrain_light`: one step and one solve.
+ * Answered by `answer`.
+ *
+ * is_final: as in `constrain_light`. label: its name for undo; "" for the names of the lights.
  */
 export interface ConstrainLights {
   constraints: Record<string, Record<string, any>>;
+  is_final?: boolean;
+  label?: string;
+}
+
+/**
+ * The master dimmer: one step. Answered by `answer`.
+ *
+ * level: factor of all lights but fixed ones, 0 to 2, applied to the answer. It changes neither
+ * the painting nor the solve.
+ */
+export interface SetMaster {
+  level: number;
 }
 
 /**
@@ -962,6 +982,7 @@ export interface Requests {
   redo: Redo;
   constrain_light: ConstrainLight;
   constrain_lights: ConstrainLights;
+  set_master: SetMaster;
   move: MoveLights;
   point: PointLight;
   add_light: AddLight;
