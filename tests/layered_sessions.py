@@ -12,6 +12,7 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.origin import Origin
 from lightpaint.paint import protocol
 from lightpaint.paint.layers.layer import Layer, LayerKind
+from lightpaint.paint.layers.selection import selection_mask
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.store import MemoryStore, Store
@@ -69,15 +70,18 @@ class RandomEditor:
         views = (session or self.session).views
         return [x.tobytes() for view in views for x in (view.image, view.importance)]
 
-    def state(self, session: Session | None = None) -> tuple[Any, list[bytes]]:
-        """Layers and targets."""
-        return (session or self.session).views.layers, self.pixels(session)
+    def state(self, session: Session | None = None) -> tuple[Any, list[bytes], list[Any]]:
+        """Layers, targets and selections."""
+        views = (session or self.session).views
+        selections = [view.selection for view in views]
+        masks = [(x.bounds, selection_mask(x).tobytes()) for x in selections]
+        return views.layers, self.pixels(session), masks
 
     def act(self, *, with_undo: bool = True) -> None:
         """Do something, whatever it is."""
         position = self.session.store.position
         ids = [layer.id for layer in self.session.views.layers if layer.id]
-        choices = ["add", "add", "paint"]
+        choices = ["add", "add", "paint", "select"]
         choices += ["change", "drop", "delete", "order", "copy", "group", "drag"] if ids else []
         choices += ["undo"] if with_undo and position else []
         action = choices[self.rng.integers(len(choices))]
@@ -89,6 +93,8 @@ class RandomEditor:
         elif action == "drop":
             self.paint(self.session.views.layers[number], is_final=False)
             self.session.handle(protocol.DropStroke(self.strokes), {})
+        elif action == "select":
+            self.select()
         elif action == "undo":
             self.session.handle(protocol.Undo(), {})
         else:
@@ -152,6 +158,15 @@ class RandomEditor:
             self.paint(properties, is_final=False)
             self.strokes -= 1
         self.paint(properties)
+
+    def select(self) -> None:
+        """Select a part of some view, or nothing."""
+        view = int(self.rng.integers(len(self.session.views)))
+        height, width = self.session.views[view].size
+        left = int(self.rng.integers(width))
+        mask = np.rint(255 * random_mask(self.rng, (height, width))).astype(np.uint8)
+        request = protocol.Select((0, height, left, width), view=view)
+        self.session.handle(request, {"mask": mask[:, left:] * (self.rng.random() < 0.8)})
 
     def paint(self, layer: Layer, *, is_final: bool = True) -> None:
         """Paint into a layer, in some view."""

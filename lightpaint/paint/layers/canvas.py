@@ -18,6 +18,7 @@ from lightpaint.paint.layers.layer_stack import (
     LayerStack,
 )
 from lightpaint.paint.layers.open_stroke import OpenStroke
+from lightpaint.paint.layers.selection import SELECTION_ID
 from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
 from lightpaint.paint.store.history_steps import Patch, Step
 from lightpaint.target.target import Target
@@ -34,6 +35,7 @@ class Canvas:
         current: (h, w, 3) linear, the current look, denoised: it shows where nothing is painted.
         painting: The target; `at_least` is None while no pixel is marked.
         live: The sums that follow the target.
+        selection: The mask that strokes keep to; without coverage there is none.
     """
 
     def __init__(
@@ -46,6 +48,7 @@ class Canvas:
             number: LayerPixels.replayed(basis.size, patches.get(number, ()))
             for number in layers.ids
         }
+        self.selection = LayerPixels.replayed(basis.size, patches.get(SELECTION_ID, ()))
         self._shown = self._with_accents(layers)
         self.improve(basis, current)
 

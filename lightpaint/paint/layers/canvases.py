@@ -17,6 +17,7 @@ from lightpaint.paint.layers.layer_stack import (
     next_layer_id,
     stack_after,
 )
+from lightpaint.paint.layers.selection import SELECTION_ID, put_selection
 from lightpaint.paint.store.canvas_pixels import Pixels, Region
 from lightpaint.paint.store.history_steps import Patch, Step
 
@@ -153,14 +154,20 @@ class Canvases:
         steps: the steps done at that point, from which returning layers get their pixels.
         """
         for patch in patches:
-            if patch.layer in self.layers.ids:
+            if patch.layer == SELECTION_ID:
+                put_selection(self[patch.view].selection, patch, is_back=is_back)
+            elif patch.layer in self.layers.ids:
                 pixels = patch.before if is_back else patch.after
                 self[patch.view].put(patch.layer, patch.region, pixels)
         self.layers = self._layers_at_rest = layers
         self.next_layer = max(self.next_layer, 1 + max(layers.ids))
         regions = []
         for view in self:
-            put = [patch.region for patch in patches if patch.view == view.view]
+            put = [
+                patch.region
+                for patch in patches
+                if patch.view == view.view and patch.layer != SELECTION_ID
+            ]
             region = enclosing([view.show(layers, steps), *put])
             if not is_empty(region):
                 regions.append((view.view, region))

@@ -21,6 +21,7 @@ from lightpaint.paint.protocol.events import (
     PictureData,
     PictureUpdate,
     Rig,
+    SelectionUpdate,
     SessionPending,
     SessionState,
 )
@@ -52,6 +53,7 @@ from lightpaint.paint.protocol.message_parts import (
     Place,
     ResolvedFit,
     SampleCount,
+    SelectionInfo,
     TableInfo,
     Tone,
     TransformInfo,
@@ -70,6 +72,7 @@ from lightpaint.paint.protocol.painting_requests import (
     Redo,
     RenameLook,
     SaveLook,
+    Select,
     Undo,
 )
 from lightpaint.paint.protocol.requests import (
@@ -160,6 +163,9 @@ __all__ = [
     "Rig",
     "SampleCount",
     "SaveLook",
+    "Select",
+    "SelectionInfo",
+    "SelectionUpdate",
     "SessionPending",
     "SessionState",
     "SetMaster",

@@ -150,6 +150,11 @@ class CanvasPatch(EditState, Message, kind="patch"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class SelectionUpdate(EditState, Message, kind="selected"):
+    """The new selection: the answer to `select`, which changes no light."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class PictureUpdate(Message, kind="renewed"):
     """New or replaced pictures, and their numbers. Unasked."""
 
@@ -231,6 +236,7 @@ EVENTS: Mapping[str, type[Any]] = {
         SessionPending,
         AnswerUpdate,
         CanvasPatch,
+        SelectionUpdate,
         PictureUpdate,
         PictureData,
         LookList,

@@ -108,6 +108,17 @@ class LayerList:
 
 
 @dataclass(frozen=True)
+class SelectionInfo:
+    """What is selected: the picture `selection/VIEW`, (rows, columns) uint8, in each view.
+
+    regions: of that picture, by view; empty without a selection. revision: grows when one changes.
+    """
+
+    regions: tuple[Region, ...]
+    revision: int
+
+
+@dataclass(frozen=True)
 class LookInfo:
     """A kept look. stamp: time in seconds since 1970. thumbnail: name of its picture.
 
@@ -242,7 +253,7 @@ class EditState:
     name. added_lights: names of lights that the scene does not have. places: a text, equal for
     equal places of all lights; "" if all hang as in the scene. layers: of the painting. master:
     factor of all lights but fixed ones, by the master dimmer: a light shines at `master` times its
-    weight.
+    weight. selection: the part of the painting that strokes keep to.
     """
 
     history: HistoryInfo | None = field(default=None, metadata=OPTIONAL)
@@ -255,6 +266,7 @@ class EditState:
     effective_settings: ResolvedFit | None = field(default=None, metadata=OPTIONAL)
     layers: LayerList | None = field(default=None, metadata=OPTIONAL)
     master: float | None = field(default=None, metadata=OPTIONAL)
+    selection: SelectionInfo | None = field(default=None, metadata=OPTIONAL)
 
 
 #: Tone of a message to the user.

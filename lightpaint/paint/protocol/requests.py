@@ -36,6 +36,7 @@ from lightpaint.paint.protocol.painting_requests import (
     Redo,
     RenameLook,
     SaveLook,
+    Select,
     Undo,
 )
 
@@ -142,6 +143,7 @@ AnyRequest = (
     Hello
     | Paint
     | ChangeLayers
+    | Select
     | DropStroke
     | Undo
     | Redo

@@ -9,7 +9,14 @@ import numpy.typing as npt
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.layers.layer import Layer
-from lightpaint.paint.protocol import CanvasPatch, LayerInfo, LayerList, Message, ResolvedFit
+from lightpaint.paint.protocol import (
+    CanvasPatch,
+    LayerInfo,
+    LayerList,
+    Message,
+    ResolvedFit,
+    SelectionInfo,
+)
 from lightpaint.paint.session.answer_messages import unpainted_text
 from lightpaint.paint.session.history import History
 from lightpaint.paint.session.live_answer import LiveAnswer
@@ -32,6 +39,10 @@ def edit_state(history: History, live_answer: LiveAnswer, views: Canvases) -> di
             tuple(layer_info(layer, views) for layer in views.layers), views.next_layer
         ),
         "master": requests.master,
+        "selection": SelectionInfo(
+            tuple(view.selection.bounds for view in views),
+            sum(view.selection.revision for view in views),
+        ),
     }
 
 

@@ -8,6 +8,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.errors import NothingToUndoError, PaintError
 from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.layers.layer_stack import LayerStack
+from lightpaint.paint.layers.selection import put_selection
 from lightpaint.paint.protocol import HistoryInfo
 from lightpaint.paint.session.live_answer import LiveAnswer
 from lightpaint.paint.store.canvas_pixels import Region
@@ -40,6 +41,11 @@ class History:
             fields = {"stack": change} if change else {}
             self._store.append(Step("stroke" if patches else "layers", label, fields, patches))
         self._views.close()
+
+    def append_selection(self, label: str, patch: Patch) -> None:
+        """Select a part of a view, as a step."""
+        self._store.append(Step("selection", label, patches=(patch,)))
+        put_selection(self._views[patch.view].selection, patch, is_back=False)
 
     def append_requests(self, label: str, requests: SessionRequests) -> None:
         """Set requests, as a step. Raises LightpaintError for impossible ones."""

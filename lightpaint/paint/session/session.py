@@ -186,6 +186,9 @@ class Session:
             case protocol.ChangeLayers():
                 self._edits.change_layers(message)
                 return [self._answer_to_edit(is_final=message.is_final)]
+            case protocol.Select():
+                self._edits.select(message, arrays)
+                return [protocol.SelectionUpdate(**self.edit_state)]
             case protocol.DropStroke():
                 return self._patch_messages(self._edits.drop_stroke())
             case protocol.Undo():
@@ -248,10 +251,7 @@ class Session:
         self._edits.renew_planes(names)
 
     def client_left(self, *, with_stroke: bool) -> None:
-        """Reset an abandoned slider, after the client has left or before it reconnects.
-
-        with_stroke: whether an open stroke becomes a step.
-        """
+        """Close what is open, as `SessionEdits.close_open`, when a client leaves or returns."""
         self._edits.close_open(with_stroke=with_stroke)
 
     def load(

@@ -15,6 +15,7 @@ from lightpaint.paint import protocol
 from lightpaint.paint.layers.layer import PAINTING_ID
 from lightpaint.paint.layers.layer_stack import LayerStack
 from lightpaint.paint.layers.layered_paintings import LayeredPaintings
+from lightpaint.paint.layers.selection import selection_patch
 from lightpaint.paint.session.history import Changes, History, restore
 from lightpaint.paint.session.live_answer import LiveAnswer, weights_by_name
 from lightpaint.paint.session.moved_lights import MovedLights, Placed, PlaneSource
@@ -129,6 +130,16 @@ class SessionEdits:
         if request.is_final:
             self.history.close_stroke(request.label)
         self._update_answer()
+
+    def select(self, request: protocol.Select, arrays: Mapping[str, npt.NDArray[Any]]) -> None:
+        """Select a part of a view, as a step; an open stroke becomes one before it."""
+        selection = self.views[request.view].selection
+        patch = selection_patch(selection, request.view, request.region, arrays)
+        if self.views.is_open:
+            self.history.close_stroke("stroke")
+            self._update_answer()
+        if patch is not None:
+            self.history.append_selection(request.label, patch)
 
     def drop_stroke(self) -> Changes:
         """Drop the open stroke; return its views and regions."""

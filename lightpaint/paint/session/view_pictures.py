@@ -12,6 +12,7 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import PaintError
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.canvases import Canvases
+from lightpaint.paint.layers.selection import selection_mask
 from lightpaint.paint.protocol import ViewInfo
 from lightpaint.paint.session import picture_table
 from lightpaint.paint.session.edit_messages import layer_picture
@@ -70,8 +71,9 @@ def offer_view(
 
 
 def offer_layers(table: PictureTable, views: Canvases) -> None:
-    """Offer the pixels of the layers, as `layer/3`."""
+    """Offer the pixels of the layers, as `layer/3`, and what is selected, as `selection/0`."""
     table.offer_family("layer", partial(_layer, views))
+    table.offer_family("selection", partial(_selection, views))
 
 
 def _layer(views: Canvases, name: str) -> Picture:
@@ -79,6 +81,12 @@ def _layer(views: Canvases, name: str) -> Picture:
     if not (number.isdecimal() and (view or "0").isdecimal()):
         raise PaintError(f"there is no picture {f'layer/{name}'[:40]!r}")
     return layer_picture(views.layers[int(number)], views[int(view or 0)])
+
+
+def _selection(views: Canvases, view: str) -> Picture:
+    if not view.isdecimal():
+        raise PaintError(f"there is no picture {f'selection/{view}'[:40]!r}")
+    return selection_mask(views[int(view)].selection)
 
 
 def _plane(basis: Basis, k: int) -> Picture:

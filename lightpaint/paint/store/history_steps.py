@@ -22,7 +22,8 @@ class Patch:
     """The pixels of one region of a view, before a step and after it.
 
     region: (top, bottom, left, right). before, after: its pixels. view: index in the session.
-    layer: id of the layer whose pixels they are; 0 is the painting that names none.
+    layer: id of the layer whose pixels they are; 0 is the painting that names none, and -1 the
+    selection.
     """
 
     region: Region
@@ -36,9 +37,9 @@ class Patch:
 class Step:
     """A change that can be undone.
 
-    kind: "stroke", "layers", "requests" (of lights, ties, settings) or "look_loaded". label: shown
-    by undo. fields: plain JSON: requests `before` and `after`, and the change of the layers,
-    `stack`. patches: the changed pixels, of one view or several.
+    kind: "stroke", "layers", "selection", "requests" (of lights, ties, settings) or "look_loaded".
+    label: shown by undo. fields: plain JSON: requests `before` and `after`, and the change of the
+    layers, `stack`. patches: the changed pixels, of one view or several.
     """
 
     kind: str

@@ -130,6 +130,16 @@ export interface LayerList {
 }
 
 /**
+ * What is selected: the picture `selection/VIEW`, (rows, columns) uint8, in each view.
+ *
+ * regions: of that picture, by view; empty without a selection. revision: grows when one changes.
+ */
+export interface SelectionInfo {
+  regions: Region[];
+  revision: number;
+}
+
+/**
  * A kept look. stamp: time in seconds since 1970. thumbnail: name of its picture.
  *
  * lights: names of its lights, which may differ from the current ones. weights: of each. places:
@@ -259,7 +269,7 @@ export interface Findings {
  * name. added_lights: names of lights that the scene does not have. places: a text, equal for
  * equal places of all lights; "" if all hang as in the scene. layers: of the painting. master:
  * factor of all lights but fixed ones, by the master dimmer: a light shines at `master` times its
- * weight.
+ * weight. selection: the part of the painting that strokes keep to.
  */
 export interface EditState {
   history?: HistoryInfo;
@@ -272,6 +282,7 @@ export interface EditState {
   effective_settings?: ResolvedFit;
   layers?: LayerList;
   master?: number;
+  selection?: SelectionInfo;
 }
 
 /**
@@ -299,6 +310,7 @@ export interface SessionState {
   effective_settings?: ResolvedFit;
   layers?: LayerList;
   master?: number;
+  selection?: SelectionInfo;
   version: number;
   scene: string;
   folder: string;
@@ -370,6 +382,7 @@ export interface AnswerUpdate {
   effective_settings?: ResolvedFit;
   layers?: LayerList;
   master?: number;
+  selection?: SelectionInfo;
   version: number;
   stroke: number;
   exact: boolean;
@@ -397,6 +410,7 @@ export interface CanvasPatch {
   effective_settings?: ResolvedFit;
   layers?: LayerList;
   master?: number;
+  selection?: SelectionInfo;
   region: Region;
   view: number;
   views: number[];
@@ -405,6 +419,26 @@ export interface CanvasPatch {
   exact: boolean;
   mode: string;
   arrays: { image: Picture; importance: Picture; weights: Picture };
+}
+
+/**
+ * The new selection: the answer to `select`, which changes no light.
+ */
+export interface SelectionUpdate {
+  kind: 'selected';
+  reply?: number;
+  history?: HistoryInfo;
+  constraints?: Record<string, Record<string, any>>;
+  ties?: string[][];
+  settings?: Record<string, any>;
+  poses?: Record<string, Record<string, any>>;
+  added_lights?: string[];
+  places?: string;
+  effective_settings?: ResolvedFit;
+  layers?: LayerList;
+  master?: number;
+  selection?: SelectionInfo;
+  arrays: {  };
 }
 
 /**
@@ -665,6 +699,19 @@ export interface ChangeLayers {
   copies?: Record<string, number>;
   is_final?: boolean;
   label?: string;
+}
+
+/**
+ * The selection of a view: a mask that clients multiply what they paint by; one step. With an
+ * array `mask` (rows, columns) uint8, 255 for a fully selected pixel. Answered by `selected`.
+ *
+ * region: of the mask; nothing is selected outside it. An empty one, or a mask of zeros, is no
+ * selection: then everything can be painted. label: its name for undo. view: index of the view.
+ */
+export interface Select {
+  region: Region;
+  label?: string;
+  view?: number;
 }
 
 /**
@@ -953,6 +1000,7 @@ export interface Events {
   waiting: SessionPending;
   answer: AnswerUpdate;
   patch: CanvasPatch;
+  selected: SelectionUpdate;
   renewed: PictureUpdate;
   fetched: PictureData;
   looks: LookList;
@@ -977,6 +1025,7 @@ export interface Requests {
   hello: Hello;
   paint: Paint;
   change_layers: ChangeLayers;
+  select: Select;
   drop_stroke: DropStroke;
   undo: Undo;
   redo: Redo;
