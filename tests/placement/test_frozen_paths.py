@@ -17,7 +17,7 @@ from lightpaint.arrays import Floats, Position
 from lightpaint.errors import SceneError
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.placement.paths.frozen_paths import FrozenPaths, PanelSite
-from lightpaint.placement.paths.light_sums import LightSums
+from lightpaint.placement.paths.path_sums import PathSums
 from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.scene.lights.new_emitter import NewEmitter
 from lightpaint.scene.properties.pose import Site
@@ -64,7 +64,7 @@ def test_sums_of_one_light_are_its_column(room: Scene, first_hits: int) -> None:
 
     def compare(paths: FrozenPaths) -> None:
         assert paths.indirect is not None
-        direct, indirect = (LightSums(paths, x) for x in (paths.direct, paths.indirect))
+        direct, indirect = (PathSums(paths, x) for x in (paths.direct, paths.indirect))
         for site, column in zip(placed, paths.columns(placed), strict=True):
             image = np.array(direct(site)) + np.array(indirect(site))
             paths.add_panel(image.reshape(-1, 3), site)

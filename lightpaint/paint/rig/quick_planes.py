@@ -17,7 +17,7 @@ from lightpaint.arrays import Floats, aligned
 from lightpaint.images.denoiser import DARKEST, Features
 from lightpaint.images.surface_filter import SurfaceFilter
 from lightpaint.placement.paths.frozen_paths import FrozenPaths
-from lightpaint.placement.paths.light_sums import LightSums
+from lightpaint.placement.paths.path_sums import PathSums
 from lightpaint.scene.properties.film import reduction_to
 from lightpaint.scene.properties.pose import Site
 from lightpaint.scene.runtime.render_lock import tracing
@@ -50,11 +50,11 @@ class QuickPlanes:
         hits = isqrt(min(max(FIRST_HITS // prod(scene.size), 1), MOST_PER_PIXEL)) ** 2
         paths = min(max(PATHS // prod(small.size), 1), MOST_PER_PIXEL)
         direct = FrozenPaths(scene, loaded, first_hits=hits, bounces=0)
-        self._direct = LightSums(direct, direct.direct)
+        self._direct = PathSums(direct, direct.direct)
         scattered = FrozenPaths(small, loaded, first_hits=1, bounces=paths)
         self._cell_size, self._filter = small.size, SurfaceFilter(cells)
         later = scattered.indirect
-        self._indirect = None if later is None else LightSums(scattered, later)
+        self._indirect = None if later is None else PathSums(scattered, later)
         self._spread = _Spreading(features, cells)
         self._add_panel = direct.add_panel
 

@@ -22,7 +22,7 @@ from lightpaint.scene.properties.site import Site
 from lightpaint.scene.runtime.render_lock import tracing
 
 
-class LightSums:
+class PathSums:
     """Sums of the light of one site at a time over the vertices of each pixel.
 
     paths: have these vertices, and stay loaded.
