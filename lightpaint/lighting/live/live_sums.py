@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import nullcontext
-from functools import cached_property
 from math import ceil
 
 import numpy as np
@@ -119,29 +118,10 @@ class SmallFilm:
 
     def _average(self, image: Floats) -> Floats:
         """Return (h', w', 3) means over blocks of a picture (h, w, 3)."""
-        side, (height, width) = self._side, image.shape[:2]
-        if side == 1 or (self._shown.all() and not (height % side or width % side)):
-            return block_mean(image, side)
-        # Rows are added as they lie in memory, in float32: six times as fast as sums of blocks.
-        sums = np.zeros((self._size[0], 3 * width), np.float32)
-        rows, shown = image.reshape(height, -1), self._shown_values
-        for k in range(min(side, height)):
-            added = rows[k::side] * shown[k::side]
-            sums[: len(added)] += added
-        columns = np.arange(0, width, side)
-        sums_by_pixel = sums.reshape(len(sums), -1, 3).astype(np.float64)
-        total = np.add.reduceat(sums_by_pixel, columns, axis=1)
-        return np.asarray(total / self._shown_in_block, np.float32)
-
-    @cached_property
-    def _shown_values(self) -> Floats:
-        """Value 1 for each value of a pixel that counts, else 0, (h, 3 w) float32."""
-        return np.repeat(self._shown.astype(np.float32), 3, axis=1)
-
-    @cached_property
-    def _shown_in_block(self) -> Doubles:
-        """Number of pixels that count in each block, (h', w', 1)."""
-        return block_sums(self._shown, self._side)[..., None]
+        if self._side == 1 or self._shown.all():
+            return _block_average(image, self._side)
+        total = block_sums(image * self._shown[..., None], self._side)
+        return np.asarray(total / block_sums(self._shown, self._side)[..., None], np.float32)
 
     def replace_planes(self, basis: Basis, lights: Iterable[int]) -> None:
         """Average the replaced planes of some lights, by number."""
@@ -184,6 +164,11 @@ class SmallFilm:
                 for x in (self._painted, self._current)
             )
         self._transform = transform
+
+    def mix(self, weights: Doubles) -> Floats:
+        """Return the averaged picture (h', w', 3) of a lighting, linear. weights: (n, 3)."""
+        mixed = np.stack([w @ rows for w, rows in zip(weights.T, self.rows, strict=True)], axis=-1)
+        return np.asarray(mixed.reshape(*self._size, 3), np.float32)
 
     def pixels(self, rest_weight: float, transform: ViewTransform | None) -> PaintedPixels:
         """Return the loss of these pixels; an average counts as much as all pixels in it."""
@@ -280,6 +265,17 @@ def _block_range(along: slice, side: int, length: int) -> tuple[int, int]:
 def _spread(blocks: Doubles, side: int, size: tuple[int, ...]) -> Doubles:
     """Return the value of its block for each pixel, (h, w)."""
     return np.asarray(enlarged(blocks, side)[: size[0], : size[1]])
+
+
+def _block_average(image: Floats, side: int) -> Floats:
+    """Return means over blocks, (h', w', 3)."""
+    height, width = image.shape[:2]
+    if side == 1:
+        return image
+    if not (height % side or width % side):
+        return block_mean(image, side)
+    ones = block_sums(np.ones((height, width)), side)
+    return np.asarray(block_sums(image, side) / ones[..., None], np.float32)
 
 
 def _planes(image: Floats) -> Doubles:

@@ -88,6 +88,10 @@ class LiveView:
             self._display.set_transform(transform)
         return self._display
 
+    def small_picture(self, weights: Doubles) -> Floats:
+        """Return the picture of a lighting averaged to the film's size, linear. weights: (n, 3)."""
+        return self.film(self._transform).mix(weights)
+
     def set_transform(self, transform: ViewTransform | None) -> None:
         """Set the view transform of the comparison."""
         if transform != self._transform:

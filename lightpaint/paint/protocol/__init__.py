@@ -24,6 +24,7 @@ from lightpaint.paint.protocol.events import (
     SelectionUpdate,
     SessionPending,
     SessionState,
+    StepList,
 )
 from lightpaint.paint.protocol.light_requests import (
     AddLight,
@@ -54,6 +55,7 @@ from lightpaint.paint.protocol.message_parts import (
     ResolvedFit,
     SampleCount,
     SelectionInfo,
+    StepInfo,
     TableInfo,
     Tone,
     TransformInfo,
@@ -61,10 +63,13 @@ from lightpaint.paint.protocol.message_parts import (
 )
 from lightpaint.paint.protocol.painting_requests import (
     ChangeLayers,
+    ClearPainting,
     CompareLooks,
     CopyLook,
     DropLook,
     DropStroke,
+    GoToStep,
+    ListSteps,
     LoadLook,
     MixLooks,
     Paint,
@@ -73,6 +78,7 @@ from lightpaint.paint.protocol.painting_requests import (
     RenameLook,
     SaveLook,
     Select,
+    StartOver,
     Undo,
 )
 from lightpaint.paint.protocol.requests import (
@@ -114,6 +120,7 @@ __all__ = [
     "CanvasPatch",
     "ChangeLayers",
     "ChangeSettings",
+    "ClearPainting",
     "Closeness",
     "Closing",
     "CompareLooks",
@@ -130,6 +137,7 @@ __all__ = [
     "Failure",
     "Fetch",
     "Findings",
+    "GoToStep",
     "Hello",
     "HistoryInfo",
     "LayerInfo",
@@ -137,6 +145,7 @@ __all__ = [
     "LightAnswer",
     "LightInfo",
     "LightPlace",
+    "ListSteps",
     "LoadLook",
     "LookInfo",
     "LookList",
@@ -170,6 +179,9 @@ __all__ = [
     "SessionState",
     "SetMaster",
     "ShowRig",
+    "StartOver",
+    "StepInfo",
+    "StepList",
     "TableInfo",
     "TakeOver",
     "TaskStarted",

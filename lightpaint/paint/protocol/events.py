@@ -21,6 +21,7 @@ from lightpaint.paint.protocol.message_parts import (
     LookInfo,
     Place,
     SampleCount,
+    StepInfo,
     TableInfo,
     Tone,
     TransformInfo,
@@ -170,6 +171,19 @@ class PictureData(Message, kind="fetched"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class StepList(Message, kind="steps"):
+    """The last steps of the history, in order, including undone ones: the answer to `list_steps`.
+
+    earlier: number of steps before them. done: id of the last step that is not undone; 0 at the
+    beginning.
+    """
+
+    steps: tuple[StepInfo, ...]
+    earlier: int
+    done: int
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class LookList(Message, kind="looks"):
     """The kept looks, and all pictures: the answer to requests about looks, and unasked when an
     observer has proposed one.
@@ -239,6 +253,7 @@ EVENTS: Mapping[str, type[Any]] = {
         SelectionUpdate,
         PictureUpdate,
         PictureData,
+        StepList,
         LookList,
         ProgressReport,
         TaskStarted,

@@ -172,6 +172,21 @@ class HistoryInfo:
 
 
 @dataclass(frozen=True)
+class StepInfo:
+    """A step of the history. stamp: time in seconds since 1970; null if unknown.
+
+    id: a number that no other step has; the picture `step/ID` shows the answer after it.
+    is_milestone: the last step before a pause or before everything was replaced, or the last of
+    many.
+    """
+
+    id: int
+    label: str
+    stamp: float | None
+    is_milestone: bool
+
+
+@dataclass(frozen=True)
 class ResolvedFit:
     """The resolved values of all settings, as in `lightpaint.Fit`."""
 

@@ -9,6 +9,9 @@ from lightpaint.paint.layers.layer import PAINTING_ID, Layer
 from lightpaint.paint.protocol.base import Message
 from lightpaint.paint.store.canvas_pixels import Region
 
+#: Maximum number of steps in one list.
+MAX_LISTED_STEPS = 10_000
+
 
 @dataclass(frozen=True)
 class Paint(Message, kind="paint"):
@@ -88,6 +91,38 @@ class Undo(Message, kind="undo"):
 @dataclass(frozen=True)
 class Redo(Message, kind="redo"):
     """Redo a step that was undone. Answered by `patch`."""
+
+
+@dataclass(frozen=True)
+class ListSteps(Message, kind="list_steps"):
+    """A request for the last `count` steps of the history. Answered by `steps`."""
+
+    count: int = 100
+
+    def __post_init__(self) -> None:
+        if not 0 < self.count <= MAX_LISTED_STEPS:
+            raise ValueError(f"count is 1 to {MAX_LISTED_STEPS}")
+
+
+@dataclass(frozen=True)
+class GoToStep(Message, kind="go_to_step"):
+    """Undo or redo up to the state after a step, by its id; 0 is the beginning. Answered by
+    `patch`.
+    """
+
+    step: int
+
+
+@dataclass(frozen=True)
+class ClearPainting(Message, kind="clear_painting"):
+    """Delete all layers and all paint, in all views: one step. Answered by `patch`."""
+
+
+@dataclass(frozen=True)
+class StartOver(Message, kind="start_over"):
+    """Go back to the scene as it was before anything was painted or requested, except for looks:
+    one step. Answered by `patch`, or by `state` if lights had been added.
+    """
 
 
 @dataclass(frozen=True)

@@ -25,10 +25,13 @@ from lightpaint.paint.protocol.light_requests import (
 )
 from lightpaint.paint.protocol.painting_requests import (
     ChangeLayers,
+    ClearPainting,
     CompareLooks,
     CopyLook,
     DropLook,
     DropStroke,
+    GoToStep,
+    ListSteps,
     LoadLook,
     MixLooks,
     Paint,
@@ -37,6 +40,7 @@ from lightpaint.paint.protocol.painting_requests import (
     RenameLook,
     SaveLook,
     Select,
+    StartOver,
     Undo,
 )
 
@@ -147,6 +151,10 @@ AnyRequest = (
     | DropStroke
     | Undo
     | Redo
+    | ListSteps
+    | GoToStep
+    | ClearPainting
+    | StartOver
     | ConstrainLight
     | ConstrainLights
     | SetMaster

@@ -1,16 +1,23 @@
 """The history of a session: steps, and their changes of canvases and requests."""
 
-from collections.abc import Sequence
+import time
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from lightpaint.arrays import Floats
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import NothingToUndoError, PaintError
 from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.layers.layer_stack import LayerStack
 from lightpaint.paint.layers.selection import put_selection
-from lightpaint.paint.protocol import HistoryInfo
+from lightpaint.paint.protocol import HistoryInfo, StepInfo, StepList
 from lightpaint.paint.session.live_answer import LiveAnswer
+from lightpaint.paint.session.milestones import find_milestones
+from lightpaint.paint.session.picture_table import display_thumbnail
 from lightpaint.paint.store.canvas_pixels import Region
 from lightpaint.paint.store.database import DamagedError
 from lightpaint.paint.store.history_steps import Patch, Step
@@ -19,6 +26,9 @@ from lightpaint.paint.store.store import Store
 
 #: Number of steps listed to a page, backwards and forwards.
 LISTED_STEPS = 50
+
+#: Approximate pixels of the longer side of a step's picture.
+PICTURE_SIDE = 96
 
 #: Views, and the region of each that changed.
 Changes = Sequence[tuple[int, Region]]
@@ -34,17 +44,22 @@ class History:
     def __init__(self, store: Store, views: Canvases, live_answer: LiveAnswer) -> None:
         self._store, self._views, self._live_answer = store, views, live_answer
 
+    def _append(
+        self, kind: str, label: str, fields: Mapping[str, Any], patches: Sequence[Patch] = ()
+    ) -> None:
+        self._store.append(Step(kind, label, {**fields, "stamp": time.time()}, tuple(patches)))
+
     def close_stroke(self, label: str) -> None:
         """Append the open stroke, or the open change of the layers, as a step, if there is one."""
         change, patches = self._views.open_change()
         if change or patches:
             fields = {"stack": change} if change else {}
-            self._store.append(Step("stroke" if patches else "layers", label, fields, patches))
+            self._append("stroke" if patches else "layers", label, fields, patches)
         self._views.close()
 
     def append_selection(self, label: str, patch: Patch) -> None:
         """Select a part of a view, as a step."""
-        self._store.append(Step("selection", label, patches=(patch,)))
+        self._append("selection", label, {}, (patch,))
         put_selection(self._views[patch.view].selection, patch, is_back=False)
 
     def append_requests(self, label: str, requests: SessionRequests) -> None:
@@ -53,7 +68,7 @@ class History:
         self.close_stroke("stroke")
         requests_at_rest = self._live_answer.requests_at_rest
         fields = {"before": requests_at_rest.as_json(), "after": requests.as_json()}
-        self._store.append(Step("requests", label, fields))
+        self._append("requests", label, fields)
         self._live_answer.set_requests(requests)
 
     def replace_all(
@@ -66,7 +81,7 @@ class History:
             "after": requests.as_json(),
         }
         fields |= {"stack": change} if change else {}
-        self._store.append(Step("look_loaded", label, fields, tuple(patches)))
+        self._append("look_loaded", label, fields, patches)
         changes = self._views.move(layers, patches, self._done_steps)
         self._live_answer.set_requests(requests)
         return changes
@@ -80,22 +95,71 @@ class History:
 
         Raises NothingToUndoError at either end, PaintError for a step whose pixels are lost.
         """
-        steps, current = self._store.steps, self._store.position
-        position, is_back = current + by, by < 0
-        if not 0 <= position <= len(steps):
+        position, is_back = self._store.position + by, by < 0
+        if not 0 <= position <= len(self._store.steps):
             raise NothingToUndoError(f"There is nothing to {'undo' if is_back else 'redo'}.")
-        step = steps[position] if is_back else steps[current]
+        return self._go_to(position)
+
+    def go_to(self, step_id: int) -> Changes:
+        """Go to the state after a step, or to the beginning for 0, and return the changes.
+
+        Raises PaintError for a step that does not exist, or one whose pixels are lost.
+        """
+        ids = (0, *self._store.step_ids)
+        if step_id not in ids:
+            raise PaintError(
+                f"there is no step {step_id}: another took its place after it was undone"
+            )
+        return self._go_to(ids.index(step_id))
+
+    def _go_to(self, position: int) -> Changes:
+        current, is_back = self._store.position, position < self._store.position
+        passed = self._store.steps[min(position, current) : max(position, current)]
+        if is_back:
+            passed.reverse()
+        order = -1 if is_back else 1
+        patches = [patch for step in passed for patch in step.patches[::order]]
         try:
-            for patch in step.patches:
+            for patch in patches:
                 _ = patch.before if is_back else patch.after
         except DamagedError:
             raise PaintError(self._store.recover()) from None
         self._store.move_to(position)
-        layers = self._views.layers.changed(step.fields.get("stack", {}), is_back=is_back)
-        changes = self._views.move(layers, step.patches, self._done_steps, is_back=is_back)
-        if requests := step.fields.get("before" if is_back else "after"):
+        layers, requests = self._views.layers, None
+        for step in passed:
+            layers = layers.changed(step.fields.get("stack", {}), is_back=is_back)
+            requests = step.fields.get("before" if is_back else "after", requests)
+        changes = self._views.move(layers, patches, self._done_steps, is_back=is_back)
+        if requests is not None:
             self._live_answer.set_requests(SessionRequests.of(requests))
         return changes
+
+    def picture(self, step_id: int) -> npt.NDArray[np.uint8]:
+        """Return the small picture of the answer after a step, (h, w, 3); black if it has none."""
+        picture = self._store.step_picture(step_id)
+        return np.zeros((1, 1, 3), np.uint8) if picture is None else picture
+
+    def keep_picture(self, weights: Doubles, transform: ViewTransform) -> None:
+        """Keep a small picture of a lighting with the last step, of the view that it changed.
+
+        weights: (n, 3). transform: to show it through.
+        """
+        position = self._store.position
+        patches = self._store.steps[position - 1].patches if position else ()
+        view = self._views[patches[0].view if patches else 0]
+        light = view.live.small_picture(weights)
+        self._store.put_step_picture(display_thumbnail(light, transform, side=PICTURE_SIDE))
+
+    def list_steps(self, count: int) -> StepList:
+        """Return the last `count` steps, including undone ones."""
+        steps, ids = self._store.steps, self._store.step_ids
+        first = max(0, len(steps) - count)
+        milestones = find_milestones(steps)
+        listed = tuple(
+            StepInfo(ids[k], self._label(steps[k]), steps[k].stamp, k in milestones)
+            for k in range(first, len(steps))
+        )
+        return StepList(steps=listed, earlier=first, done=self._store.last_id)
 
     def info(self) -> HistoryInfo:
         """Return the labels of the steps that can be undone and redone."""

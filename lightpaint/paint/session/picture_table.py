@@ -90,9 +90,14 @@ def plane_thumbnail(plane: Floats, emitters_seen: Bools) -> Picture:
     return np.round(picture * 255).astype(np.uint8)
 
 
-def display_thumbnail(light: Floats, transform: ViewTransform) -> Picture:
-    """Return a thumbnail of a linear picture (h, w, 3), in display values."""
-    factor = min(1, THUMBNAIL_SIDE / max(light.shape[:2]))
+def display_thumbnail(
+    light: Floats, transform: ViewTransform, side: int = THUMBNAIL_SIDE
+) -> Picture:
+    """Return a thumbnail of a linear picture (h, w, 3), in display values.
+
+    side: approximate pixels of its longer side.
+    """
+    factor = min(1, side / max(light.shape[:2]))
     encoded = transform.encode(resized(light, factor) if factor < 1 else light)
     return np.round(encoded * 255).astype(np.uint8)
 

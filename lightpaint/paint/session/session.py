@@ -14,6 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
@@ -35,7 +36,7 @@ from lightpaint.paint.session.request_changes import (
     move_lights,
     previewed_requests,
 )
-from lightpaint.paint.session.session_edits import SessionEdits
+from lightpaint.paint.session.session_edits import SessionEdits, Travel
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.session_requests import SessionRequests
@@ -158,6 +159,14 @@ class Session:
         self.live_answer.check(requests)
         return requests
 
+    def list_steps(self, count: int) -> protocol.StepList:
+        """Return the last `count` steps of the history."""
+        return self._edits.history.list_steps(count)
+
+    def step_picture(self, step: int) -> npt.NDArray[np.uint8]:
+        """Return the small picture of the answer after a step, (h, w, 3)."""
+        return self._edits.history.picture(step)
+
     # Requests and answers
 
     def handle(
@@ -191,10 +200,8 @@ class Session:
                 return [protocol.SelectionUpdate(**self.edit_state)]
             case protocol.DropStroke():
                 return self._patch_messages(self._edits.drop_stroke())
-            case protocol.Undo():
-                return self._patch_messages(self._edits.move_step(-1))
-            case protocol.Redo():
-                return self._patch_messages(self._edits.move_step(+1))
+        if isinstance(message, Travel):
+            return self._patch_messages(self._edits.travel(message))
         if isinstance(message, RequestChange):
             return [self._change_requests(message)]
         raise PaintError(f"a session has no answer to {type(message).__name__}")
@@ -220,6 +227,7 @@ class Session:
             return None
         if solution is not None:
             self.live_answer.weights = solution.weights
+            self._edits.keep_picture()
         findings = self.findings
         if judgement is not None:
             findings = judgement.complete(findings)

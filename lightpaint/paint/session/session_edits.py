@@ -24,6 +24,11 @@ from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.store import Store
 from lightpaint.pipeline.job.settings import Settings
 
+#: Requests to go to another state, earlier, later or new.
+Travel = (
+    protocol.Undo | protocol.Redo | protocol.GoToStep | protocol.ClearPainting | protocol.StartOver
+)
+
 
 class SessionEdits:
     """The canvases, requests and steps of a session, and the answer that follows each change.
@@ -50,6 +55,8 @@ class SessionEdits:
         plane_source: PlaneSource,
     ) -> None:
         self.version, self.stroke = 0, -1
+        self._store, self._transform = store, transform
+        self._pictured_step: int | None = None
         try:
             self.views, requests = restore(bases, current_looks, store)
         except (LightpaintError, ArithmeticError, LookupError, TypeError, ValueError):
@@ -149,14 +156,35 @@ class SessionEdits:
 
     # Steps
 
-    def move_step(self, by: int) -> Changes:
-        """Move back or forth by one step, and return its changes."""
+    def travel(self, request: Travel) -> Changes:
+        """Go to another state of the session, and return the changes."""
         if self.views.is_open:
             self.history.close_stroke("stroke")
             self._update_answer()
-        changes = self.history.move(by)
+        match request:
+            case protocol.Undo() | protocol.Redo():
+                changes = self.history.move(-1 if isinstance(request, protocol.Undo) else +1)
+            case protocol.GoToStep():
+                changes = self.history.go_to(request.step)
+            case protocol.ClearPainting() | protocol.StartOver():
+                return self._clear(keep_requests=isinstance(request, protocol.ClearPainting))
         self._update_answer()
         return changes
+
+    def _clear(self, *, keep_requests: bool) -> Changes:
+        """Delete all layers and paint, and the requests too if not kept: one step."""
+        requests = self.live_answer.requests_at_rest if keep_requests else SessionRequests()
+        label = "clear painting" if keep_requests else "start over"
+        empty = LayeredPaintings(LayerStack(), {})
+        return self.replace_all({}, requests, label, layers=empty)
+
+    def keep_picture(self) -> None:
+        """Keep a small picture of the answer with the last step, for the list of steps."""
+        self._pictured_step = self._store.last_id
+        shown = self.live_answer.requests_at_rest.output(
+            self.live_answer.weights, self.live_answer.basis.is_fixed
+        )
+        self.history.keep_picture(shown, self._transform)
 
     def append_requests(self, label: str, requests: SessionRequests) -> None:
         """Set requests, as a step. The answer stays if only the master dimmer has changed."""
@@ -247,3 +275,5 @@ class SessionEdits:
         self.version += 1
         self._moved_lights.follow(self.live_answer.requests.placed, self.views, self.live_answer)
         self.live_answer.solve()
+        if not self.is_open and self._pictured_step != self._store.last_id:
+            self.keep_picture()

@@ -1,6 +1,6 @@
 """The pictures of a session's views for its pages, and their descriptions."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -74,6 +74,17 @@ def offer_layers(table: PictureTable, views: Canvases) -> None:
     """Offer the pixels of the layers, as `layer/3`, and what is selected, as `selection/0`."""
     table.offer_family("layer", partial(_layer, views))
     table.offer_family("selection", partial(_selection, views))
+
+
+def offer_steps(table: PictureTable, picture_of: Callable[[int], Picture]) -> None:
+    """Offer the small pictures of the history's steps, as `step/12`."""
+
+    def picture(step: str) -> Picture:
+        if not step.isdecimal():
+            raise PaintError(f"there is no picture {f'step/{step}'[:40]!r}")
+        return picture_of(int(step))
+
+    table.offer_family("step", picture)
 
 
 def _layer(views: Canvases, name: str) -> Picture:

@@ -35,6 +35,11 @@ CREATE TABLE look (id INTEGER PRIMARY KEY, fields TEXT);
 CREATE TABLE look_array (look INTEGER, name TEXT, dtype TEXT, shape TEXT, data BLOB);
 """
 
+#: Small pictures of the answers after steps. A session can do without, so files may lack it.
+PICTURE_TABLE = """
+CREATE TABLE IF NOT EXISTS step_picture (step INTEGER PRIMARY KEY, shape TEXT, data BLOB)
+"""
+
 _DAMAGED = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
 
 
@@ -60,19 +65,20 @@ def open_database(path: Path | None, identity: Identity | None) -> sqlite3.Conne
 
 
 def _prepare(database: sqlite3.Connection, path: Path | None, identity: Identity | None) -> None:
-    for setting in (
-        "locking_mode = EXCLUSIVE",  # first of all: WAL then needs no room for shared memory
-        "trusted_schema = OFF",  # tables that others made may not call anything
-        "page_size = 16384",
-        "auto_vacuum = INCREMENTAL",
-        "journal_mode = WAL",
-        f"synchronous = {SYNCHRONOUS}",
-    ):
-        database.execute(f"PRAGMA {setting}").fetchall()
+    database.execute("PRAGMA locking_mode = EXCLUSIVE")  # WAL needs no shared memory then
+    database.execute("PRAGMA trusted_schema = OFF")  # tables that others made may not call anything
+    [(tables,)] = database.execute("SELECT count(*) FROM sqlite_schema")
+    if not tables:  # of a file that has some these would be written again, perhaps to a full disk
+        database.execute("PRAGMA page_size = 16384")
+        database.execute("PRAGMA auto_vacuum = INCREMENTAL")
+    database.execute("PRAGMA journal_mode = WAL").fetchall()
+    database.execute(f"PRAGMA synchronous = {SYNCHRONOUS}")
     with transaction(database):
         [(application,)] = database.execute("PRAGMA application_id")
         [(version,)] = database.execute("PRAGMA user_version")
-        [(tables,)] = database.execute("SELECT count(*) FROM sqlite_schema")
+        [(tables, has_pictures)] = database.execute(
+            "SELECT count(*), sum(name = 'step_picture') FROM sqlite_schema"
+        )
         if not tables:
             for statement in filter(str.strip, TABLES.split(";")):
                 database.execute(statement)
@@ -85,6 +91,8 @@ def _prepare(database: sqlite3.Connection, path: Path | None, identity: Identity
                 f"{path} was written by another version of lightpaint (format {version}, not "
                 f"{VERSION}): {START_AFRESH}"
             )
+        if not has_pictures:
+            database.execute(PICTURE_TABLE)
         if identity is not None:
             _check_identity(database, path, identity)
             _store_identity(database, json.dumps(asdict(identity)))

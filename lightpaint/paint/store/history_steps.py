@@ -38,14 +38,21 @@ class Step:
     """A change that can be undone.
 
     kind: "stroke", "layers", "selection", "requests" (of lights, ties, settings) or "look_loaded".
-    label: shown by undo. fields: plain JSON: requests `before` and `after`, and the change of the
-    layers, `stack`. patches: the changed pixels, of one view or several.
+    label: shown by undo. fields: plain JSON: requests `before` and `after`, the change of the
+    layers, `stack`, and the time, `stamp`, in seconds since 1970. patches: the changed pixels, of
+    one view or several.
     """
 
     kind: str
     label: str
     fields: Mapping[str, Any] = field(default_factory=dict)
     patches: tuple[Patch, ...] = ()
+
+    @property
+    def stamp(self) -> float | None:
+        """Its time in seconds since 1970; None if the file does not tell."""
+        stamp = self.fields.get("stamp")
+        return float(stamp) if isinstance(stamp, int | float) else None
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,6 +29,7 @@ def insert_step(
     """
     database.execute("DELETE FROM step WHERE id > ?", (last_kept,))
     database.execute("DELETE FROM pixels WHERE step > ?", (last_kept,))
+    database.execute("DELETE FROM step_picture WHERE step > ?", (last_kept,))
     database.execute("INSERT INTO step VALUES (?, ?, ?, ?, ?)", row)
     if blobs is not None:
         database.execute("INSERT INTO pixels VALUES (?, ?, ?)", (row[0], *blobs))
@@ -44,6 +45,22 @@ def pixels_row(database: sqlite3.Connection, step: int) -> tuple[bytes, bytes] |
     """Return the pixels before a step, and their change; None if there are none."""
     query = "SELECT before, change FROM pixels WHERE step = ?"
     row: tuple[bytes, bytes] | None = database.execute(query, (step,)).fetchone()
+    return row
+
+
+def insert_picture(database: sqlite3.Connection, *, step: int, shape: str, data: bytes) -> None:
+    """Write the small picture of a step in the place of an earlier one, unless it was cut off."""
+    database.execute(
+        "INSERT OR REPLACE INTO step_picture SELECT ?, ?, ? WHERE ? = 0 OR EXISTS "
+        "(SELECT 1 FROM step WHERE id = ?)",
+        (step, shape, data, step, step),
+    )
+
+
+def picture_row(database: sqlite3.Connection, step: int) -> tuple[str, bytes] | None:
+    """Return shape, as JSON, and data of the small picture of a step; None if there is none."""
+    query = "SELECT shape, data FROM step_picture WHERE step = ?"
+    row: tuple[str, bytes] | None = database.execute(query, (step,)).fetchone()
     return row
 
 

@@ -11,13 +11,17 @@ Pixels are stored packed (`compression.py`) and read when they are needed, so th
 history takes no memory.
 """
 
+import json
 import sqlite3
 from functools import partial
 from pathlib import Path
 from threading import RLock
 
+import numpy as np
+import numpy.typing as npt
+
 from lightpaint.errors import OutputError, PaintError
-from lightpaint.paint.store.compression import pack_patches
+from lightpaint.paint.store.compression import pack, pack_patches
 from lightpaint.paint.store.damaged_rows import DAMAGE_ERRORS
 from lightpaint.paint.store.database import (
     DamagedError,
@@ -30,6 +34,7 @@ from lightpaint.paint.store.lazy_arrays import LookArrays, pack_arrays
 from lightpaint.paint.store.session_rows import (
     delete_look,
     insert_look,
+    insert_picture,
     insert_step,
     look_rows,
     places_json,
@@ -159,6 +164,31 @@ class Store:
                 raise PaintError(f"no step {position}: there are {len(self.steps)}")
             self.position = position
             self._enqueue(lambda _: None)
+
+    @property
+    def step_ids(self) -> tuple[int, ...]:
+        """Ids of all steps, in order: positive, and growing."""
+        return tuple(self._ids)
+
+    @property
+    def last_id(self) -> int:
+        """Id of the last step that is done; 0 before the first."""
+        return self._ids[self.position - 1] if self.position else 0
+
+    def put_step_picture(self, picture: npt.NDArray[np.uint8]) -> None:
+        """Keep a small picture (h, w, 3) of the state after the last step that is done.
+
+        It is written with what is written next: a session that ends before that lacks a picture.
+        """
+        with self._lock:
+            step, shape = self.last_id, json.dumps(picture.shape)
+            self._arrays.keep_picture(step, picture)
+            data = pack(np.ascontiguousarray(picture))
+            self._queue.add(partial(insert_picture, step=step, shape=shape, data=data))
+
+    def step_picture(self, step: int) -> npt.NDArray[np.uint8] | None:
+        """Return the small picture of a step by its id, 0 for the beginning; None without one."""
+        return self._arrays.picture(step)
 
     @property
     def has_file(self) -> bool:

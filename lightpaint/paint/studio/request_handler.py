@@ -105,6 +105,8 @@ class RequestHandler:
                     return [looks.handle(message)]
                 case protocol.MixLooks() | protocol.DropLook() | protocol.Propose():
                     return [looks.handle(message)]
+                case protocol.ListSteps():
+                    return [session.list_steps(message.count)]
                 case protocol.CompareLooks():
                     return self._comparison.handle(message)
                 case protocol.Export() | protocol.Verify() | protocol.Explain():

@@ -14,7 +14,12 @@ from lightpaint.paint.rig.light_mover import LightMover
 from lightpaint.paint.session.look_library import LookLibrary
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.session_state import offered_transforms
-from lightpaint.paint.session.view_pictures import offer_layers, offer_transforms, offer_view
+from lightpaint.paint.session.view_pictures import (
+    offer_layers,
+    offer_steps,
+    offer_transforms,
+    offer_view,
+)
 from lightpaint.paint.session_access import SessionAccess
 from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.store import Store
@@ -125,6 +130,7 @@ class SessionBases:
             offer_view(pictures, view, basis, session.transform, clean, small)
         offer_transforms(pictures, offered_transforms(session))
         offer_layers(pictures, session.views)
+        offer_steps(pictures, session.step_picture)
         self._mover.offer_all(session)
 
     def denoise(self) -> None:

@@ -192,6 +192,20 @@ export interface HistoryInfo {
 }
 
 /**
+ * A step of the history. stamp: time in seconds since 1970; null if unknown.
+ *
+ * id: a number that no other step has; the picture `step/ID` shows the answer after it.
+ * is_milestone: the last step before a pause or before everything was replaced, or the last of
+ * many.
+ */
+export interface StepInfo {
+  id: number;
+  label: string;
+  stamp: number | null;
+  is_milestone: boolean;
+}
+
+/**
  * The resolved values of all settings, as in `lightpaint.Fit`.
  */
 export interface ResolvedFit {
@@ -459,6 +473,21 @@ export interface PictureData {
   reply?: number;
   name: string;
   arrays: { data: Picture };
+}
+
+/**
+ * The last steps of the history, in order, including undone ones: the answer to `list_steps`.
+ *
+ * earlier: number of steps before them. done: id of the last step that is not undone; 0 at the
+ * beginning.
+ */
+export interface StepList {
+  kind: 'steps';
+  reply?: number;
+  steps: StepInfo[];
+  earlier: number;
+  done: number;
+  arrays: {  };
 }
 
 /**
@@ -734,6 +763,34 @@ export interface Redo {
 }
 
 /**
+ * A request for the last `count` steps of the history. Answered by `steps`.
+ */
+export interface ListSteps {
+  count?: number;
+}
+
+/**
+ * Undo or redo up to the state after a step, by its id; 0 is the beginning. Answered by
+ * `patch`.
+ */
+export interface GoToStep {
+  step: number;
+}
+
+/**
+ * Delete all layers and all paint, in all views: one step. Answered by `patch`.
+ */
+export interface ClearPainting {
+}
+
+/**
+ * Go back to the scene as it was before anything was painted or requested, except for looks:
+ * one step. Answered by `patch`, or by `state` if lights had been added.
+ */
+export interface StartOver {
+}
+
+/**
  * New constraints on one light; an empty object frees it. Answered by `answer`.
  *
  * constraints: keys and values as in a lights file: lock, off, limits, color, kelvin, duv,
@@ -1003,6 +1060,7 @@ export interface Events {
   selected: SelectionUpdate;
   renewed: PictureUpdate;
   fetched: PictureData;
+  steps: StepList;
   looks: LookList;
   progress: ProgressReport;
   started: TaskStarted;
@@ -1029,6 +1087,10 @@ export interface Requests {
   drop_stroke: DropStroke;
   undo: Undo;
   redo: Redo;
+  list_steps: ListSteps;
+  go_to_step: GoToStep;
+  clear_painting: ClearPainting;
+  start_over: StartOver;
   constrain_light: ConstrainLight;
   constrain_lights: ConstrainLights;
   set_master: SetMaster;
