@@ -6,6 +6,7 @@ import { Fold } from './ui/controls.js';
 import { Dialogs } from './ui/dialogs.js';
 import { PreviewDialog } from './ui/advice.js';
 import { countText } from './ui/format.js';
+import { HistoryPanel } from './ui/history_panel.js';
 import { handleKey, listenWithin } from './ui/keyboard.js';
 import { LayerCount, LayerPanel, hasLayers } from './ui/layers/layer_panel.js';
 import { LightList, LightListActions } from './ui/light_list.js';
@@ -190,6 +191,7 @@ function Side({ ui, app }) {
       html`<${LayerCount} ui=${ui} />`,
       ui.open.layers ?? hasLayers(ui),
     )}
+    ${renderFold('history', 'History', html`<${HistoryPanel} ui=${ui} app=${app} />`)}
     ${renderFold(
       'lights',
       'Lights',

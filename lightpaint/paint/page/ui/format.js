@@ -107,5 +107,13 @@ export function relativePath(file, folder) {
   return file.startsWith(folder) ? file.slice(folder.length).replace(/^[/\\]+/, '') : file;
 }
 
+/** @param {number} stamp seconds since 1970 @returns {string} the time of day, in the user's own form */
+export const clockText = (stamp) =>
+  new Date(1000 * stamp).toLocaleTimeString([], { hour: '2-digit', minute: '2-digit' });
+
+/** @param {number} stamp seconds since 1970 @returns {string} day and time, in the user's own form */
+export const dateText = (stamp) =>
+  new Date(1000 * stamp).toLocaleString([], { dateStyle: 'medium', timeStyle: 'short' });
+
 /** Return a sentence with no-break spaces between numbers and units. @param {string} text */
 export const joinUnits = (text) => text.replace(/(\d) (?=%)|(ΔE) (?=\d)/g, '$1$2\u00a0');

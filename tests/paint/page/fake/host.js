@@ -198,7 +198,8 @@ export class FakeHost {
     };
   }
   step(label, undo) {
-    this.steps.push({ label, undo });
+    this.stepCount = (this.stepCount ?? 0) + 1;
+    this.steps.push({ id: this.stepCount, label, undo });
     this.undone = [];
   }
 
@@ -247,6 +248,35 @@ export class FakeHost {
   redo() {
     const step = this.undone.pop();
     if (step) this.steps.push(step);
+    return this.patch();
+  }
+  list_steps({ count }) {
+    const all = [...this.steps, ...this.undone.toReversed()];
+    return {
+      kind: 'steps',
+      steps: all.slice(-count).map(({ id, label }) => ({
+        id,
+        label,
+        stamp: 1.7e9 + 60 * id,
+        is_milestone: id % 20 === 0,
+      })),
+      earlier: Math.max(0, all.length - count),
+      done: this.steps.at(-1)?.id ?? 0,
+    };
+  }
+  go_to_step({ step }) {
+    const all = [...this.steps, ...this.undone.toReversed()];
+    const count = all.findIndex(({ id }) => id === step) + 1;
+    this.steps = all.slice(0, count);
+    this.undone = all.slice(count).toReversed();
+    return this.patch();
+  }
+  clear_painting() {
+    this.step('clear painting');
+    return this.patch();
+  }
+  start_over() {
+    this.step('start over');
     return this.patch();
   }
   constrain_light({ light, constraints, is_final }) {

@@ -1,0 +1,117 @@
+/** The list of steps, the last on top: a click goes to one, and undone ones stay until a new one. */
+
+import { html, useEffect, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
+import { Button, Checkbox } from './controls.js';
+import { clockText, dateText } from './format.js';
+import { Thumbnail } from './thumbnail.js';
+
+/** @typedef {import("./ui_state.js").Ui} Ui */
+/** @typedef {import("./shortcuts.js").App} App */
+/** @typedef {import("../engine/messages.js").StepInfo} Step */
+/** @typedef {import("../engine/messages.js").Events["steps"]} StepList */
+
+/** Steps listed at first, and added each time that more are requested. */
+const LISTED_COUNT = 100;
+
+/** Steps above which a list can be reduced to milestones. */
+const MIN_FILTERED_COUNT = 12;
+
+/** The state before all steps. @type {Step} */
+const BEGINNING = { id: 0, label: 'Beginning', stamp: null, is_milestone: true };
+
+/** @param {string} label */
+const capitalized = (label) => label.charAt(0).toUpperCase() + label.slice(1);
+
+/** Request the list, and again whenever the history has changed.
+ * @param {Ui} ui @param {App} app @param {number} count @returns {StepList | null} */
+function useSteps(ui, { session }, count) {
+  const [list, setList] = useState(/** @type {StepList | null} */ (null));
+  useEffect(() => {
+    let isOutdated = false;
+    if (ui.ready && ui.closure === null)
+      void session.send('list_steps', { count }).then((reply) => {
+        if (reply?.kind === 'steps' && !isOutdated) setList(/** @type {any} */ (reply));
+      });
+    return () => {
+      isOutdated = true;
+    };
+  }, [ui.history, ui.ready, ui.closure, count]);
+  return list;
+}
+
+/** @param {{ui: Ui, app: App}} props */
+export function HistoryPanel({ ui, app }) {
+  const [count, setCount] = useState(LISTED_COUNT);
+  const [hasMilestonesOnly, setMilestonesOnly] = useState(false);
+  const list = useSteps(ui, app, count);
+  const element = useRef(/** @type {HTMLElement | null} */ (null));
+  const { steps = [], earlier = 0, done = 0 } = list ?? {};
+  const all = earlier ? steps : [BEGINNING, ...steps];
+  const doneIndex = all.findIndex(({ id }) => id === done);
+  const rows = all
+    .map((step, k) => ({ step, isUndone: k > doneIndex, isCurrent: step.id === done }))
+    .filter(({ step, isCurrent }) => !hasMilestonesOnly || step.is_milestone || isCurrent)
+    .reverse();
+  useLayoutEffect(() => {
+    element.current?.querySelector('[aria-current]')?.scrollIntoView({ block: 'nearest' });
+  }, [done, list === null]);
+  if (!ui.history.count && !ui.history.redo.length)
+    return html`<p class="faint panel-note">Every step is listed here, with its picture. Click one to go back
+      to it.</p>`;
+  return html`<ul class="steps" ref=${element} aria-label="Steps, the last on top">
+      ${rows.map(
+        ({ step, isUndone, isCurrent }) => html`<${StepRow} key=${step.id} step=${step} ui=${ui}
+          app=${app} isUndone=${isUndone} isCurrent=${isCurrent} />`,
+      )}
+      ${
+        earlier > 0 &&
+        html`<li><${Button} label=${`Earlier steps (${earlier})`} class="is-flat"
+          act=${() => setCount(count + LISTED_COUNT)} /></li>`
+      }
+    </ul>
+    <div class="history-actions">
+      ${
+        (hasMilestonesOnly || all.length > MIN_FILTERED_COUNT) &&
+        html`<${Checkbox} label="Milestones only" checked=${hasMilestonesOnly}
+          change=${setMilestonesOnly}
+          tip="The steps before a pause or a new start, and every twentieth" />`
+      }
+      <${NewStart} ui=${ui} app=${app} />
+    </div>`;
+}
+
+/** @param {{ui: Ui, app: App}} props */
+function NewStart({ ui, app }) {
+  const { session, engine } = app;
+  const hasPaint = ui.layers.length > 1 || !ui.isPaintingEmpty;
+  const send = (/** @type {"clear_painting" | "start_over"} */ kind) => {
+    engine.cancel();
+    void session.send(kind);
+  };
+  return html`<${Button} label="Clear painting" disabled=${!hasPaint} act=${() => send('clear_painting')}
+      tip="Delete all paint and layers. Lights keep what you asked of them." />
+    <${Button} label="Start over" disabled=${!ui.history.count} act=${() => send('start_over')}
+      tip="Back to the scene as it was. Looks stay, and undo goes back." />`;
+}
+
+/** @param {{step: Step, ui: Ui, app: App, isUndone: boolean, isCurrent: boolean}} props */
+function StepRow({ step, ui, app, isUndone, isCurrent }) {
+  const { id, label, stamp, is_milestone: isMilestone } = step;
+  const text = capitalized(label);
+  const goTo = () => {
+    // As undo: the stroke in progress is the last action.
+    app.engine.cancel();
+    if (!isCurrent) void app.session.send('go_to_step', { step: id });
+  };
+  // The answer to the last step gets better while nobody paints.
+  const generation = isCurrent ? 2 * ui.version + (ui.isLive ? 0 : 1) : 0;
+  const kind = ['step', isCurrent && 'is-current', isUndone && 'is-undone'].filter(Boolean);
+  return html`<li><button type="button" class=${kind.join(' ')} onClick=${goTo}
+      aria-current=${isCurrent ? 'step' : undefined}
+      data-tip=${stamp === null ? undefined : `${text}, ${dateText(stamp)}`}>
+    <${Thumbnail} name=${`step/${id}`} generation=${generation} app=${app} />
+    <span class=${`step-label ${isMilestone ? 'is-milestone' : ''}`}>${text}</span>
+    ${isUndone && html`<span class="only-read">, undone</span>`}
+    <span class="faint">${stamp === null ? '' : clockText(stamp)}</span>
+  </button></li>`;
+}
