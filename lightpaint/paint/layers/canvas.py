@@ -11,16 +11,15 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import PaintError
 from lightpaint.lighting.live.live_view import LiveView
-from lightpaint.paint.layers.composition import ShownLayer, accents, compose
+from lightpaint.paint.layers.composed_layers import Change, ComposedLayers
 from lightpaint.paint.layers.layer import Layer
 from lightpaint.paint.layers.layer_pixels import LayerPixels, enclosing, is_empty
-from lightpaint.paint.layers.layer_stack import (
-    LayerStack,
-)
+from lightpaint.paint.layers.layer_stack import LayerStack
 from lightpaint.paint.layers.open_stroke import OpenStroke
 from lightpaint.paint.layers.selection import SELECTION_ID
 from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
 from lightpaint.paint.store.history_steps import Patch, Step
+from lightpaint.paint.store.stored_compositions import StoredComposition
 from lightpaint.target.target import Target
 
 #: Largest importance, and largest light, that a page may paint.
@@ -32,31 +31,54 @@ class Canvas:
 
     Attributes:
         basis: The planes of its lights.
-        current: (h, w, 3) linear, the current look, denoised: it shows where nothing is painted.
-        painting: The target; `at_least` is None while no pixel is marked.
         live: The sums that follow the target.
         selection: The mask that strokes keep to; without coverage there is none.
     """
 
     def __init__(
-        self, view: int, basis: Basis, current: Floats, layers: LayerStack, steps: Sequence[Step]
+        self,
+        view: int,
+        basis: Basis,
+        current: Floats,
+        layers: LayerStack,
+        steps: Sequence[Step],
+        stored: StoredComposition | None = None,
     ) -> None:
-        self.view = view
+        """Open the painting of a view after some steps.
+
+        layers, stored: as for `ComposedLayers`.
+        """
+        self.view, self.basis = view, basis
         self._open_strokes: dict[int, OpenStroke] = {}
-        patches = _patches_by_layer(steps, view)
-        self._layers = {
-            number: LayerPixels.replayed(basis.size, patches.get(number, ()))
-            for number in layers.ids
-        }
-        self.selection = LayerPixels.replayed(basis.size, patches.get(SELECTION_ID, ()))
-        self._shown = self._with_accents(layers)
-        self.improve(basis, current)
+        self._restore(current, layers, steps, stored)
+
+    def _restore(
+        self,
+        current: Floats,
+        layers: LayerStack,
+        steps: Sequence[Step],
+        stored: StoredComposition | None = None,
+    ) -> None:
+        masks = [
+            patch
+            for step in steps
+            for patch in step.patches
+            if patch.layer == SELECTION_ID and patch.view == self.view
+        ]
+        self.selection = LayerPixels.replayed(self.basis.size, masks)
+        self._layers = ComposedLayers(self.view, current, layers, steps, stored)
+        self.live = LiveView(self.basis, self.image, self.importance)
 
     def improve(self, basis: Basis, current: Floats) -> None:
         """Replace the basis by one of more samples; open strokes stay open."""
-        self.basis, self.current = basis, np.asarray(current, np.float32)
-        self.painting = compose(self._shown, self.current, self.full_region)
+        self.basis = basis
+        self._layers.replace_current(current)
         self.live = LiveView(basis, self.image, self.importance)
+
+    def rebuild(self, layers: LayerStack, steps: Sequence[Step]) -> None:
+        """Continue with the layers after these steps; open strokes are dropped."""
+        self.close()
+        self._restore(self.current, layers, steps)
 
     def replace_lights(self, basis: Basis) -> None:
         """Continue with a basis of other lights."""
@@ -70,6 +92,16 @@ class Canvas:
         """
         self.basis = basis
         self.live.replace_planes(basis, lights)
+
+    @property
+    def current(self) -> Floats:
+        """(h, w, 3) linear, the current look, denoised: it shows where nothing is painted."""
+        return self._layers.current
+
+    @property
+    def painting(self) -> Pixels:
+        """The target; `at_least` is None while no pixel is marked."""
+        return self._layers.target
 
     @property
     def image(self) -> npt.NDArray[np.float32]:
@@ -108,13 +140,15 @@ class Canvas:
 
     def layer(self, number: int) -> LayerPixels:
         """Return the pixels of a layer. Raises PaintError if there is none."""
-        if number not in self._layers:
-            raise PaintError(f"there is no layer {number}")
-        return self._layers[number]
+        return self._layers.layer(number)
 
     def accent(self, number: int) -> float:
         """Return the accent of a layer; 1 for a hidden one."""
-        return next((shown.accent for shown in self._shown if shown.layer.id == number), 1.0)
+        return self._layers.accent(number)
+
+    def composition(self) -> StoredComposition:
+        """Return a copy of the target, and what is known of the layers without their pixels."""
+        return self._layers.composition()
 
     def pixels(self, region: Region) -> Pixels:
         """Return a copy of the pixels of a region."""
@@ -141,8 +175,7 @@ class Canvas:
 
     def put(self, layer: int, region: Region, pixels: Pixels) -> None:
         """Put pixels into a layer."""
-        self.layer(layer).put(region, pixels)
-        self._compose(region)
+        self._follow(self._layers.put(layer, region, pixels))
 
     def paint(self, layer: int, region: Region, pixels: Pixels) -> None:
         """Paint pixels by hand: they belong to the open stroke on that layer."""
@@ -159,48 +192,15 @@ class Canvas:
         steps: steps after which to take the pixels of layers that come back. at_rest: whether to
         update accents to what the layers cover now; under the brush they stay.
         """
-        missing = set(layers.ids) - set(self._layers)
-        patches = _patches_by_layer(steps, self.view) if missing and steps else {}
-        for number in missing:
-            self._layers[number] = LayerPixels.replayed(self.size, patches.get(number, ()))
-        before = self._shown
-        self._shown = self._with_accents(layers, None if at_rest else before)
-        same_below = _equal_count(before, self._shown)
-        same_above = _equal_count(before[same_below:][::-1], self._shown[same_below:][::-1])
-        changed = [
-            *before[same_below : len(before) - same_above],
-            *self._shown[same_below : len(self._shown) - same_above],
-        ]
-        region = enclosing([shown.pixels.bounds for shown in changed])
-        self._layers = {number: self._layers[number] for number in layers.ids}
-        self._compose(region)
-        return region
+        change = self._layers.show(layers, steps, at_rest=at_rest)
+        self._follow(change)
+        return change.region
 
-    def _with_accents(
-        self, layers: LayerStack, before: Sequence[ShownLayer] | None = None
-    ) -> list[ShownLayer]:
-        """Return the layers that show. before: those whose accents are kept."""
-        pairs = [(layer, self._layers[layer.id]) for layer in layers.shown()]
-        kept = {} if before is None else {shown.layer.id: shown.accent for shown in before}
-        return [
-            ShownLayer(layer, pixels, kept.get(layer.id, now))
-            for (layer, pixels), now in zip(pairs, accents(pairs), strict=True)
-        ]
-
-    def _compose(self, region: Region) -> None:
-        """Compose the layers again in a region."""
-        if is_empty(region):
-            return
-        area = slices(region)
-        image, importance, at_least = compose(self._shown, self.current, region)
-        self.image[area] = image
-        is_same_importance = np.array_equal(self.importance[area], importance)
-        self.importance[area] = importance
-        if at_least is not None and self.painting.at_least is None:
-            self.painting = self.painting._replace(at_least=np.zeros(self.image.shape, bool))
-        if self.painting.at_least is not None:
-            self.painting.at_least[area] = False if at_least is None else at_least
-        self.live.update(area, with_importance=not is_same_importance)
+    def _follow(self, change: Change) -> None:
+        """Let the sums follow a change of the target."""
+        if not is_empty(change.region):
+            area = slices(change.region)
+            self.live.update(area, with_importance=change.with_importance)
 
     def drop(self) -> Region:
         """Drop the open strokes, and return their region."""
@@ -264,21 +264,6 @@ class Canvas:
             if not np.array_equal(image[beyond], self.layer(layer.id).part(region).image[beyond]):
                 raise PaintError(f"light beyond 0 to {MAX_LIGHT:g}")
         return Pixels(image.astype(np.float32), importance.astype(np.float32))
-
-
-def _patches_by_layer(steps: Sequence[Step], view: int) -> dict[int, list[Patch]]:
-    """Return the patches of a view, in order, by the layer that they change."""
-    patches: dict[int, list[Patch]] = {}
-    for patch in (patch for step in steps for patch in step.patches):
-        if patch.view == view:
-            patches.setdefault(patch.layer, []).append(patch)
-    return patches
-
-
-def _equal_count(first: Sequence[ShownLayer], second: Sequence[ShownLayer]) -> int:
-    """Return how many of the first layers are the same."""
-    pairs = enumerate(zip(first, second, strict=False))
-    return next((k for k, (one, other) in pairs if one != other), min(len(first), len(second)))
 
 
 def _with_marks(pixels: Pixels, before: Pixels) -> Pixels:

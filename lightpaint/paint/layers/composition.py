@@ -69,8 +69,16 @@ def compose(layers: Sequence[ShownLayer], current: Floats, region: Region) -> Pi
 
     layers: the visible ones, the lowest first. current: (h, w, 3) linear, the current look.
     """
-    light = np.array(current[slices(region)], np.float32)
-    result = Pixels(light, np.zeros(light.shape[:2], np.float32))
+    on_look = Pixels.unpainted(np.array(current[slices(region)], np.float32))
+    return compose_over(layers, on_look, region)
+
+
+def compose_over(layers: Sequence[ShownLayer], below: Pixels, region: Region) -> Pixels:
+    """Return the target of layers over the composition of those below them, in a region.
+
+    below: in that region; changed.
+    """
+    result = below
     for shown in layers:
         if is_empty(area := shared(shown.pixels.bounds, region)):
             continue
@@ -81,7 +89,8 @@ def compose(layers: Sequence[ShownLayer], current: Floats, region: Region) -> Pi
         result.image[slices(inner)] = composed.image
         result.importance[slices(inner)] = composed.importance
         if (marks := composed.at_least) is not None:
-            at_least = np.zeros(light.shape, bool) if result.at_least is None else result.at_least
+            at_least = result.at_least
+            at_least = np.zeros(result.image.shape, bool) if at_least is None else at_least
             at_least[slices(inner)] = marks
             result = result._replace(at_least=at_least)
     return result

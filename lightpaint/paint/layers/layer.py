@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from math import isfinite
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from lightpaint.arrays import RGB
 
@@ -40,6 +40,9 @@ class Layer:
     times: float = 1.0
 
     def __post_init__(self) -> None:
+        if self.kind not in get_args(LayerKind):
+            kinds = ", ".join(get_args(LayerKind))
+            raise ValueError(f"layer {self.id} of the kind {self.kind!r:.40}: expected {kinds}")
         if not 0 <= self.id < 2**53:
             raise ValueError(f"layer {self.id}: expected a number from 0, below 2**53")
         if len(self.name) > MAX_NAME_LENGTH:

@@ -1,6 +1,6 @@
 """The pixels of one layer in one view, in tiles that exist only where it has coverage."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +25,17 @@ class _Tile(NamedTuple):
     least: float
 
 
+class LayerSummary(NamedTuple):
+    """What a composition needs to know of a layer beside its pixels: as in `LayerPixels`.
+
+    least_coverage: of the view, up to 1.
+    """
+
+    bounds: Region
+    mean_coverage: float
+    least_coverage: float
+
+
 class LayerPixels:
     """Colour and coverage of a layer. Updated in place.
 
@@ -38,9 +49,9 @@ class LayerPixels:
 
     def __init__(self, size: tuple[int, int]) -> None:
         self.size, self.revision = size, 0
-        self._tiles: dict[tuple[int, int], _Tile] = {}
-        self._summary: tuple[float, float] | None = None
-        self._bounds: Region | None = None
+        self._loaded: dict[tuple[int, int], _Tile] | None = {}
+        self._load: Callable[[], dict[tuple[int, int], _Tile]] | None = None
+        self._summary: LayerSummary | None = None
 
     @classmethod
     def replayed(cls, size: tuple[int, int], patches: Sequence[Patch]) -> "LayerPixels":
@@ -54,22 +65,76 @@ class LayerPixels:
         layer.put(bounds, replay(patches, Pixels.unpainted(black), bounds))
         return layer
 
+    @classmethod
+    def stored(
+        cls,
+        size: tuple[int, int],
+        patches: Sequence[Patch],
+        summary: LayerSummary,
+        on_other: Callable[[], None],
+    ) -> "LayerPixels":
+        """Return a layer after its patches, which are read when its pixels are needed.
+
+        summary: of these pixels. on_other: called if they turn out to have another one.
+        """
+        layer = cls(size)
+
+        def load() -> dict[tuple[int, int], _Tile]:
+            replayed = cls.replayed(size, patches)
+            if replayed.summary != summary:
+                layer._summary = None
+                on_other()
+            return replayed._tiles
+
+        layer._loaded, layer._load, layer._summary = None, load, summary
+        return layer
+
+    @property
+    def _tiles(self) -> dict[tuple[int, int], _Tile]:
+        if self._loaded is None:
+            assert self._load is not None
+            self._loaded = self._load()
+            self._load = None
+        return self._loaded
+
+    @property
+    def is_loaded(self) -> bool:
+        """True if its pixels are in memory."""
+        return self._loaded is not None
+
+    def load(self) -> None:
+        """Read its pixels, if they are not in memory."""
+        _ = self._tiles
+
+    @property
+    def summary(self) -> LayerSummary:
+        """Bounds and coverage."""
+        if self._summary is None:
+            height, width = self.size
+            tiles = [self._tiles[key] for key in sorted(self._tiles)]  # sorted, for the same sum
+            count = -(-height // TILE_SIDE) * -(-width // TILE_SIDE)
+            least = min((tile.least for tile in tiles), default=0.0)
+            self._summary = LayerSummary(
+                enclosing([self._tile_region(key) for key in self._tiles]),
+                sum(tile.total for tile in tiles) / (height * width),
+                least if len(tiles) == count else 0.0,
+            )
+        return self._summary
+
     @property
     def bounds(self) -> Region:
         """The smallest region of whole tiles that contains all covered pixels."""
-        if self._bounds is None:
-            self._bounds = enclosing([self._tile_region(key) for key in self._tiles])
-        return self._bounds
+        return self.summary.bounds
 
     @property
     def mean_coverage(self) -> float:
         """Mean over the view of the coverage, or importance, up to 1."""
-        return self._totals()[0]
+        return self.summary.mean_coverage
 
     @property
     def covers_all(self) -> bool:
         """True if no pixel of the view is uncovered."""
-        return self._totals()[1] >= MIN_COVERAGE
+        return self.summary.least_coverage >= MIN_COVERAGE
 
     def part(self, region: Region) -> Pixels:
         """Return a copy of the pixels of a region."""
@@ -89,7 +154,8 @@ class LayerPixels:
 
     def put(self, region: Region, pixels: Pixels) -> None:
         """Replace the pixels of a region."""
-        self._summary = self._bounds = None
+        tiles = self._tiles  # before its summary is forgotten
+        self._summary = None
         self.revision += 1
         for key in self._keys(region):
             source, to = self._areas(key, region)
@@ -106,35 +172,25 @@ class LayerPixels:
                     if pixels.at_least is None
                     else pixels.at_least[source] & is_covered[..., None]
                 )
-            self._keep(key, Pixels(tile.image, tile.importance, marks))
+            self._keep(tiles, key, Pixels(tile.image, tile.importance, marks))
 
     def copy(self) -> "LayerPixels":
         """Return a copy that shares no mutable array."""
         copied = LayerPixels(self.size)
-        copied._tiles = dict(self._tiles)  # tiles are replaced, and never written to
+        copied._loaded = dict(self._tiles)  # tiles are replaced, and never written to
         return copied
 
-    def _keep(self, key: tuple[int, int], pixels: Pixels) -> None:
+    @staticmethod
+    def _keep(tiles: dict[tuple[int, int], _Tile], key: tuple[int, int], pixels: Pixels) -> None:
         """Replace a tile."""
         if not pixels.importance.any():
-            self._tiles.pop(key, None)
+            tiles.pop(key, None)
             return
         counted = np.minimum(pixels.importance, 1)
         total, least = float(counted.sum(dtype=np.float64)), float(counted.min())
         marks = pixels.at_least if pixels.at_least is not None and pixels.at_least.any() else None
         packed = Pixels(_packed(pixels.image), _packed(pixels.importance), marks)
-        self._tiles[key] = _Tile(packed, total, least)
-
-    def _totals(self) -> tuple[float, float]:
-        """Return mean and least coverage of the view."""
-        if self._summary is None:
-            height, width = self.size
-            tiles = [self._tiles[key] for key in sorted(self._tiles)]  # sorted, for the same sum
-            count = -(-height // TILE_SIDE) * -(-width // TILE_SIDE)
-            least = min((tile.least for tile in tiles), default=0.0)
-            mean = sum(tile.total for tile in tiles) / (height * width)
-            self._summary = mean, least if len(tiles) == count else 0.0
-        return self._summary
+        tiles[key] = _Tile(packed, total, least)
 
     def _keys(self, region: Region) -> Iterator[tuple[int, int]]:
         top, bottom, left, right = region

@@ -133,11 +133,12 @@ class LayerStack:
 
 def stack_after(steps: Sequence[Step]) -> LayerStack:
     """Return the layers after these steps."""
-    stack = LayerStack()
-    for step in steps:
-        if change := step.fields.get("stack"):
-            stack = stack.changed(change)
-    return stack
+    # All changes at once, since a stack is checked in a time that grows with its layers.
+    changes = [change for step in steps if (change := step.fields.get("stack"))]
+    orders = [change["order"] for change in changes if "order" in change]
+    pairs = {n: pair for change in changes for n, pair in change.get("layers", {}).items()}
+    change = {"layers": pairs, **({"order": orders[-1]} if orders else {})}
+    return LayerStack().changed(change) if changes else LayerStack()
 
 
 def next_layer_id(steps: Sequence[Step]) -> int:

@@ -81,6 +81,18 @@ def unpack_patch(
     return _from_bits(before_bits, *places[k]), _from_bits(before_bits ^ change_bits, *places[k])
 
 
+def pack_pixels(pixels: Pixels) -> bytes:
+    """Return the pixels of a region, packed."""
+    height, width = pixels.importance.shape
+    return pack(_to_bits(pixels, (0, height, 0, width), pixels.at_least is not None))
+
+
+def unpack_pixels(data: bytes, region: Region, *, marked: bool) -> Pixels:
+    """Return the pixels that `pack_pixels` packed. Raises PaintError for anything else."""
+    bits = unpack(data, "uint32", (_value_count(region, marked),))
+    return _from_bits(bits, region, marked)
+
+
 def _size(region: Region) -> tuple[int, int]:
     top, bottom, left, right = region
     return bottom - top, right - left

@@ -1,0 +1,188 @@
+"""The layers of one view with their pixels, and the target that they come to. Updated in place."""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from lightpaint.arrays import Floats
+from lightpaint.errors import PaintError
+from lightpaint.paint.layers.composition import ShownLayer, accents, compose, compose_over
+from lightpaint.paint.layers.layer_pixels import LayerPixels, LayerSummary, enclosing, is_empty
+from lightpaint.paint.layers.layer_stack import LayerStack
+from lightpaint.paint.layers.lower_layers import LowerLayers
+from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
+from lightpaint.paint.store.history_steps import Patch, Step
+from lightpaint.paint.store.stored_compositions import StoredComposition
+
+
+class Change(NamedTuple):
+    """A change of a target. region: where it was composed again. with_importance: whether its
+    importance changed there.
+    """
+
+    region: Region
+    with_importance: bool = False
+
+
+class ComposedLayers:
+    """The layers of one view, and the target composed of them.
+
+    Args:
+        view: Index of the view.
+        current: (h, w, 3) linear, the current look, on which they lie.
+        layers: Those after `steps`.
+        stored: Their composition on this current look, if it is known: then pixels of layers are
+            read when they are needed.
+
+    Attributes:
+        target: Light and importance; `at_least` is None while no pixel is marked.
+    """
+
+    def __init__(
+        self,
+        view: int,
+        current: Floats,
+        layers: LayerStack,
+        steps: Sequence[Step],
+        stored: StoredComposition | None = None,
+    ) -> None:
+        self._view, self._is_doubtful = view, False
+        self.current = np.asarray(current, np.float32)
+        height, width = self.current.shape[:2]
+        self.size = height, width
+        known: Mapping[int, LayerSummary] = {}
+        if stored is not None:
+            known = {number: LayerSummary(*values) for number, values in stored.layers.items()}
+        patches = _patches_by_layer(steps, view)
+        self._pixels = {
+            number: LayerPixels.stored(
+                self.size, patches.get(number, ()), known[number], self._doubt
+            )
+            if number in known
+            else LayerPixels.replayed(self.size, patches.get(number, ()))
+            for number in layers.ids
+        }
+        self._shown = self._with_accents(layers)
+        self._lower = LowerLayers(self.current)
+        self.target = (
+            compose(self._shown, self.current, self.full_region)
+            if stored is None
+            else stored.pixels.copy()
+        )
+
+    @property
+    def full_region(self) -> Region:
+        """Region of the whole view."""
+        return (0, self.size[0], 0, self.size[1])
+
+    def layer(self, number: int) -> LayerPixels:
+        """Return the pixels of a layer. Raises PaintError if there is none."""
+        if number not in self._pixels:
+            raise PaintError(f"there is no layer {number}")
+        return self._pixels[number]
+
+    def accent(self, number: int) -> float:
+        """Return the accent of a layer; 1 for a hidden one."""
+        return next((shown.accent for shown in self._shown if shown.layer.id == number), 1.0)
+
+    def composition(self) -> StoredComposition:
+        """Return a copy of the target, and what is known of the layers without their pixels."""
+        layers = {number: pixels.summary for number, pixels in self._pixels.items()}
+        return StoredComposition(layers, self.target.copy())
+
+    def replace_current(self, current: Floats) -> None:
+        """Compose the layers on another current look."""
+        self.current = np.asarray(current, np.float32)
+        self._lower = LowerLayers(self.current)
+        self.target = compose(self._shown, self.current, self.full_region)
+
+    def put(self, number: int, region: Region, pixels: Pixels) -> Change:
+        """Put pixels into a layer, and compose the layers there."""
+        self.layer(number).put(region, pixels)
+        numbers = [shown.layer.id for shown in self._shown]
+        return self._compose(region, numbers.index(number)) if number in numbers else Change(region)
+
+    def show(self, layers: LayerStack, steps: Sequence[Step], *, at_rest: bool) -> Change:
+        """Show other layers, or layers with other properties, and compose where that is seen.
+
+        steps, at_rest: as for `Canvas.show`.
+        """
+        missing = set(layers.ids) - set(self._pixels)
+        patches = _patches_by_layer(steps, self._view) if missing and steps else {}
+        for number in missing:
+            self._pixels[number] = LayerPixels.replayed(self.size, patches.get(number, ()))
+        before = self._shown
+        self._shown = self._with_accents(layers, None if at_rest else before)
+        same_below = _equal_count(before, self._shown)
+        same_above = _equal_count(before[same_below:][::-1], self._shown[same_below:][::-1])
+        changed = [
+            *before[same_below : len(before) - same_above],
+            *self._shown[same_below : len(self._shown) - same_above],
+        ]
+        region = enclosing([shown.pixels.bounds for shown in changed])
+        self._pixels = {number: self._pixels[number] for number in layers.ids}
+        return self._compose(region, same_below)
+
+    def _with_accents(
+        self, layers: LayerStack, before: Sequence[ShownLayer] | None = None
+    ) -> list[ShownLayer]:
+        """Return the layers that show. before: those whose accents are kept."""
+        pairs = [(layer, self._pixels[layer.id]) for layer in layers.shown()]
+        kept = {} if before is None else {shown.layer.id: shown.accent for shown in before}
+        return [
+            ShownLayer(layer, pixels, kept.get(layer.id, now))
+            for (layer, pixels), now in zip(pairs, accents(pairs), strict=True)
+        ]
+
+    def _compose(self, region: Region, start: int) -> Change:
+        """Compose the layers again in a region.
+
+        start: number of visible layers, the lowest ones, that have not changed.
+        """
+        if is_empty(region):
+            return Change(region)
+        below = self._lower.part(self._shown[:start], region)
+        image, importance, at_least = compose_over(self._shown[start:], below, region)
+        if self._is_doubtful:
+            region = self._load_all()
+            image, importance, at_least = compose(self._shown, self.current, region)
+        area, target = slices(region), self.target
+        with_importance = not np.array_equal(target.importance[area], importance)
+        target.image[area], target.importance[area] = image, importance
+        if at_least is not None and target.at_least is None:
+            self.target = target = target._replace(at_least=np.zeros(target.image.shape, bool))
+        if target.at_least is not None:
+            target.at_least[area] = False if at_least is None else at_least
+        return Change(region, with_importance)
+
+    def _doubt(self) -> None:
+        """Note that a layer was not as its stored composition had it."""
+        self._is_doubtful = True
+
+    def _load_all(self) -> Region:
+        """Read all layers, whose stored composition was wrong; return the whole region."""
+        for pixels in self._pixels.values():
+            pixels.load()
+        pairs = [(shown.layer, shown.pixels) for shown in self._shown]
+        self._shown = [
+            ShownLayer(layer, pixels, accent)
+            for (layer, pixels), accent in zip(pairs, accents(pairs), strict=True)
+        ]
+        self._is_doubtful = False
+        return self.full_region
+
+
+def _patches_by_layer(steps: Sequence[Step], view: int) -> dict[int, list[Patch]]:
+    """Return the patches of a view, in order, by the layer that they change."""
+    patches: dict[int, list[Patch]] = {}
+    for patch in (patch for step in steps for patch in step.patches):
+        if patch.view == view:
+            patches.setdefault(patch.layer, []).append(patch)
+    return patches
+
+
+def _equal_count(first: Sequence[ShownLayer], second: Sequence[ShownLayer]) -> int:
+    """Return how many of the first layers are the same."""
+    pairs = enumerate(zip(first, second, strict=False))
+    return next((k for k, (one, other) in pairs if one != other), min(len(first), len(second)))
