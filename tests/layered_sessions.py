@@ -1,6 +1,7 @@
 """A hand that works with layers at random, the same for the same seed."""
 
 import sys
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -196,11 +197,16 @@ class RandomEditor:
 
 
 def main() -> None:
-    """Work in a session file until somebody ends this process; say each step that is kept."""
+    """Work in a session file until somebody ends this process; say each step that is kept.
+
+    Now and then the file keeps what the layers come to.
+    """
     with Store.open(Path(sys.argv[1]), identity_of()) as store:
         hand = RandomEditor(7, store)
-        while True:
+        for k in count():
             hand.act(with_undo=False)
+            if k % 3 == 1 and (compositions := hand.session.compositions()) is not None:
+                store.put_compositions(*compositions)
             print(store.position, flush=True)
 
 

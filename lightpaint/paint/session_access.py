@@ -71,6 +71,13 @@ class SessionAccess:
             views = self.session.views
             return tuple(ViewLayers.of(view, views.layers) for view in views)
 
+    def keep_compositions(self) -> None:
+        """Write what the layers come to into the session file, so that it opens sooner."""
+        with self.lock:
+            compositions = self.session.compositions()
+        if compositions is not None:
+            self.session.store.put_compositions(*compositions)
+
     def snapshot_at_rest(self) -> SessionSnapshot | None:
         """Return the snapshot; None before there is a basis and while a stroke is open."""
         with self.lock:

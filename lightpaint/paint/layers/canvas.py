@@ -197,7 +197,7 @@ class Canvas:
         return change.region
 
     def _follow(self, change: Change) -> None:
-        """Let the sums follow a change of the target."""
+        """Update the sums after a change of the target."""
         if not is_empty(change.region):
             area = slices(change.region)
             self.live.update(area, with_importance=change.with_importance)

@@ -20,6 +20,7 @@ from lightpaint.paint.layers.layer_stack import (
 from lightpaint.paint.layers.selection import SELECTION_ID, put_selection
 from lightpaint.paint.store.canvas_pixels import Pixels, Region
 from lightpaint.paint.store.history_steps import Patch, Step
+from lightpaint.paint.store.stored_compositions import StoredComposition
 
 
 class Canvases:
@@ -33,12 +34,17 @@ class Canvases:
     """
 
     def __init__(
-        self, bases: Sequence[Basis], current_looks: Sequence[Floats], steps: Sequence[Step]
+        self,
+        bases: Sequence[Basis],
+        current_looks: Sequence[Floats],
+        steps: Sequence[Step],
+        stored: Sequence[StoredComposition] | None = None,
     ) -> None:
+        """Open the canvases after some steps. stored: their compositions, if they are known."""
         self.layers = self._layers_at_rest = stack_after(steps)
         self.next_layer = next_layer_id(steps)
         self._canvases = tuple(
-            Canvas(k, basis, current, self.layers, steps)
+            Canvas(k, basis, current, self.layers, steps, stored[k] if stored else None)
             for k, (basis, current) in enumerate(zip(bases, current_looks, strict=True))
         )
 
@@ -58,6 +64,12 @@ class Canvases:
         """Improve each canvas."""
         for view, basis, current in zip(self, bases, current_looks, strict=True):
             view.improve(basis, current)
+
+    def rebuild(self, steps: Sequence[Step]) -> None:
+        """Continue with the layers and pixels after these steps; what is open is dropped."""
+        self.layers = self._layers_at_rest = stack_after(steps)
+        for view in self:
+            view.rebuild(self.layers, steps)
 
     def replace_lights(self, bases: Sequence[Basis]) -> None:
         """Continue with bases of other lights."""
@@ -172,6 +184,11 @@ class Canvases:
             if not is_empty(region):
                 regions.append((view.view, region))
         return regions
+
+    def repeat(self, further: Sequence[Step], steps: Sequence[Step]) -> None:
+        """Go to the state after further steps. steps: all until then."""
+        self.move(stack_after(steps), [x for step in further for x in step.patches], steps)
+        self.next_layer = next_layer_id(steps)
 
     def replacement_patches(self, paintings: Mapping[int, Pixels]) -> tuple[Patch, ...]:
         """Return the patches that replace all layers by these paintings, by view.

@@ -26,7 +26,7 @@ class _Tile(NamedTuple):
 
 
 class LayerSummary(NamedTuple):
-    """What a composition needs to know of a layer beside its pixels: as in `LayerPixels`.
+    """Bounds and coverage of a layer, as in `LayerPixels`: all that others ask without its pixels.
 
     least_coverage: of the view, up to 1.
     """

@@ -30,6 +30,9 @@ LISTED_STEPS = 50
 #: Approximate pixels of the longer side of a step's picture.
 PICTURE_SIDE = 96
 
+#: Number of steps after stored compositions that are repeated on them; after more, all is composed.
+MAX_REPEATED_STEPS = 32
+
 #: Views, and the region of each that changed.
 Changes = Sequence[tuple[int, Region]]
 
@@ -185,4 +188,11 @@ def restore(
     states = [step.fields["after"] for step in applied if "after" in step.fields]
     requests = SessionRequests.of(states[-1]) if states else SessionRequests()
     requests.constraints()
-    return Canvases(bases, current_looks, applied), requests
+    stored = store.compositions(current_looks)
+    if stored is None or len(applied) - stored[0] > MAX_REPEATED_STEPS:
+        return Canvases(bases, current_looks, applied), requests
+    position, compositions = stored
+    views = Canvases(bases, current_looks, applied[:position], compositions)
+    if further := applied[position:]:  # of a process that ended early
+        views.repeat(further, applied)
+    return views, requests

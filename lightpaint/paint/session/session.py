@@ -39,6 +39,7 @@ from lightpaint.paint.session.request_changes import (
 from lightpaint.paint.session.session_edits import SessionEdits, Travel
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store.canvas_pixels import Pixels
+from lightpaint.paint.store.database import DamagedError
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.store import Store
 from lightpaint.pipeline.job.settings import Settings
@@ -60,6 +61,7 @@ class Session:
     Attributes:
         views: Canvas of each view.
         live_answer: Requests, and the last answer.
+        compositions: Returns what `Store.put_compositions` keeps; None if there is nothing new.
 
     Raises:
         PaintError: If the store is of something else.
@@ -87,6 +89,7 @@ class Session:
             plane_source=plane_source or NoPlaneSource(),
         )
         self.views, self.live_answer = self._edits.views, self._edits.live_answer
+        self.compositions = self._edits.compositions
 
     @property
     def version(self) -> int:
@@ -167,20 +170,21 @@ class Session:
         """Return the small picture of the answer after a step, (h, w, 3)."""
         return self._edits.history.picture(step)
 
-    # Requests and answers
-
     def handle(
         self, message: protocol.AnyRequest, arrays: Mapping[str, npt.NDArray[Any]]
     ) -> list[Message]:
         """Handle a request. Raises LightpaintError if refused; nothing has changed then.
 
-        A moving slider is reset before any other request, and if its last value is refused.
+        A moving slider is reset before any other request, and if its last value is refused. Of a
+        damaged file, the session continues with the readable part.
         """
         sliders = protocol.ConstrainLight | protocol.ConstrainLights | protocol.MoveLights
         if not isinstance(message, sliders):
             self._edits.reset_slider()
         try:
             return self._dispatch(message, arrays)
+        except DamagedError:
+            raise PaintError(self._edits.mend()) from None
         except LightpaintError:
             self._edits.reset_slider()
             raise
@@ -309,8 +313,6 @@ class Session:
         """Set requests, as a step."""
         self._edits.append_requests(label, requests)
         return self.answer_update(**self.edit_state)
-
-    # Answers
 
     def _answer_to_edit(self, *, is_final: bool) -> Message:
         """Return the answer to paint or a change of layers, with the steps once it is one."""

@@ -20,8 +20,10 @@ from lightpaint.paint.session.history import Changes, History, restore
 from lightpaint.paint.session.live_answer import LiveAnswer, weights_by_name
 from lightpaint.paint.session.moved_lights import MovedLights, Placed, PlaneSource
 from lightpaint.paint.store.canvas_pixels import Pixels
+from lightpaint.paint.store.database import DamagedError
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.store import Store
+from lightpaint.paint.store.stored_compositions import StoredComposition
 from lightpaint.pipeline.job.settings import Settings
 
 #: Requests to go to another state, earlier, later or new.
@@ -55,7 +57,7 @@ class SessionEdits:
         plane_source: PlaneSource,
     ) -> None:
         self.version, self.stroke = 0, -1
-        self._store, self._transform = store, transform
+        self._store, self._transform, self._kept_step = store, transform, 0
         self._pictured_step: int | None = None
         try:
             self.views, requests = restore(bases, current_looks, store)
@@ -252,6 +254,30 @@ class SessionEdits:
         if self.live_answer.reset_slider() or is_stroke:
             self._update_answer()
 
+    # The session file
+
+    def compositions(self) -> tuple[int, list[Floats], list[StoredComposition]] | None:
+        """Return what a session file keeps to open sooner, as `Store.put_compositions` takes it.
+
+        None while something is open, if that is kept already, or if there are no layers.
+        """
+        step = self._store.last_id
+        if self.is_open or self.views.layers == LayerStack() or step == self._kept_step:
+            return None
+        self._kept_step = step
+        return step, [x.current for x in self.views], [x.composition() for x in self.views]
+
+    def mend(self) -> str:
+        """Continue with the readable part of a file that turned out to be damaged.
+
+        Returns the losses in one line. Raises PaintError if recovery is impossible.
+        """
+        losses = self._store.recover()
+        self.views.rebuild(self._store.steps[: self._store.position])
+        self.live_answer.set_views(self.views.live)
+        self._update_answer()
+        return losses
+
     # Planes
 
     def improve(self, bases: Sequence[Basis], current_looks: Sequence[Floats]) -> None:
@@ -260,7 +286,11 @@ class SessionEdits:
         An open stroke stays open.
         """
         moved = self._moved_lights.improve(bases, self.live_answer.requests.placed)
-        self.views.improve(moved, current_looks)
+        try:
+            self.views.improve(moved, current_looks)
+        except DamagedError:  # the store remarks on it
+            self.mend()
+            self.views.improve(moved, current_looks)
         self.live_answer.set_views(self.views.live)
         self._update_answer()
 

@@ -13,6 +13,7 @@ history takes no memory.
 
 import json
 import sqlite3
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from threading import RLock
@@ -20,6 +21,7 @@ from threading import RLock
 import numpy as np
 import numpy.typing as npt
 
+from lightpaint.arrays import Floats
 from lightpaint.errors import OutputError, PaintError
 from lightpaint.paint.store.compression import pack, pack_patches
 from lightpaint.paint.store.damaged_rows import DAMAGE_ERRORS
@@ -43,6 +45,12 @@ from lightpaint.paint.store.session_rows import (
     to_json,
 )
 from lightpaint.paint.store.stored_arrays import StoredArrays
+from lightpaint.paint.store.stored_compositions import (
+    StoredComposition,
+    composition_rows,
+    read_compositions,
+    write_compositions,
+)
 from lightpaint.paint.store.write_queue import WriteJob, WriteQueue
 from lightpaint.storage.json_records import strict_json
 
@@ -218,6 +226,30 @@ class Store:
                 raise PaintError(f"no look {number}")
             self._arrays.drop_look(number)
             self._enqueue(partial(delete_look, number=number))
+
+    def put_compositions(
+        self,
+        step: int,
+        current_looks: Sequence[Floats],
+        compositions: Sequence[StoredComposition],
+    ) -> None:
+        """Keep the compositions of all views after the step of an id, if the file takes them."""
+        rows = composition_rows(step, current_looks, compositions)
+        with self._lock:
+            if self.has_file and self.flush() is None:
+                write_compositions(self._database, rows)
+
+    def compositions(
+        self, current_looks: Sequence[Floats]
+    ) -> tuple[int, list[StoredComposition]] | None:
+        """Return how many steps are done in the compositions that are kept, and these, by view.
+
+        None if there are none for these current looks, or they are not of steps that are done.
+        """
+        with self._lock:
+            found = read_compositions(self._database, current_looks)
+            ids = [0, *self._ids[: self.position]]
+            return (ids.index(found[0]), found[1]) if found and found[0] in ids else None
 
     def flush(self) -> str | None:
         """Write the steps that are in memory only. Returns why that is not possible, or None."""

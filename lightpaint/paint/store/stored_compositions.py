@@ -12,7 +12,6 @@ import sqlite3
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -35,6 +34,9 @@ CREATE TABLE IF NOT EXISTS composition
 #: Bounds, mean and least coverage of a layer.
 LayerValues = tuple[Region, float, float]
 
+#: View, id of the step, all but the pixels as JSON, packed pixels, and the digest of these.
+Row = tuple[int, int, str, bytes, bytes]
+
 
 @dataclass(frozen=True, eq=False)
 class StoredComposition:
@@ -47,23 +49,17 @@ class StoredComposition:
     pixels: Pixels
 
 
-def write_compositions(
-    database: sqlite3.Connection,
-    step: int,
-    current_looks: Sequence[Floats],
-    compositions: Sequence[StoredComposition],
-) -> bool:
-    """Replace the compositions of all views by those after a step. Returns whether that worked.
-
-    Nothing is lost if not.
-    """
-    rows = []
+def composition_rows(
+    step: int, current_looks: Sequence[Floats], compositions: Sequence[StoredComposition]
+) -> list[Row]:
+    """Return the rows of the compositions of all views after a step."""
+    rows: list[Row] = []
     for view, (look, composition) in enumerate(zip(current_looks, compositions, strict=True)):
         pixels = composition.pixels
         about = json.dumps(
             {
                 "version": COMPOSITION_VERSION,
-                "look": _digest(np.ascontiguousarray(look).data).hex(),
+                "look": _look_text(look),
                 "size": [*pixels.importance.shape],
                 "marked": pixels.at_least is not None,
                 "layers": {str(n): values for n, values in composition.layers.items()},
@@ -71,14 +67,15 @@ def write_compositions(
         )
         blob = pack_pixels(pixels)
         rows.append((view, step, about, blob, _digest(_text(view, step, about), blob)))
-    try:
-        with transaction(database):
-            database.execute(_TABLE)
-            database.execute("DELETE FROM composition")
-            database.executemany("INSERT INTO composition VALUES (?, ?, ?, ?, ?)", rows)
-    except sqlite3.Error:
-        return False
-    return True
+    return rows
+
+
+def write_compositions(database: sqlite3.Connection, rows: Sequence[Row]) -> None:
+    """Replace the compositions by those of all views. Where that fails, nothing is lost."""
+    with suppress(sqlite3.Error), transaction(database):
+        database.execute(_TABLE)
+        database.execute("DELETE FROM composition")
+        database.executemany("INSERT INTO composition VALUES (?, ?, ?, ?, ?)", rows)
 
 
 def read_compositions(
@@ -89,7 +86,7 @@ def read_compositions(
     """
     with suppress(PaintError, *DAMAGE_ERRORS):
         query = "SELECT view, step, about, pixels, digest FROM composition ORDER BY view"
-        rows = database.execute(query).fetchall()
+        rows: list[Row] = database.execute(query).fetchall()
         steps = {step for _, step, *_ in rows}
         if [view for view, *_ in rows] == list(range(len(current_looks))) and len(steps) == 1:
             pairs = zip(rows, current_looks, strict=True)
@@ -97,12 +94,12 @@ def read_compositions(
     return None
 
 
-def _read(row: Sequence[Any], look: Floats) -> StoredComposition:
+def _read(row: Row, look: Floats) -> StoredComposition:
     """Return the composition in a row. Raises PaintError or DAMAGE_ERRORS for any other."""
     view, step, text, blob, digest = row
     about = strict_json(text)
     is_own = about["version"] == COMPOSITION_VERSION and about["size"] == [*look.shape[:2]]
-    if not is_own or about["look"] != _digest(np.ascontiguousarray(look).data).hex():
+    if not is_own or about["look"] != _look_text(look):
         raise PaintError("a composition on another look")
     if digest != _digest(_text(view, step, text), blob):
         raise PaintError("a damaged composition")
@@ -113,6 +110,10 @@ def _read(row: Sequence[Any], look: Floats) -> StoredComposition:
     }
     pixels = unpack_pixels(blob, (0, height, 0, width), marked=bool(about["marked"]))
     return StoredComposition(layers, pixels)
+
+
+def _look_text(look: Floats) -> str:
+    return _digest(np.ascontiguousarray(look, np.float32).data).hex()
 
 
 def _text(view: int, step: int, about: str) -> bytes:

@@ -1,5 +1,6 @@
 """Exact answers of a session: found with their analysis whenever the brush rests."""
 
+import time
 from collections.abc import Callable
 from contextlib import suppress
 
@@ -13,6 +14,9 @@ from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import SessionAccess
 from lightpaint.progress import cancellable
+
+#: Seconds between two writes of the compositions of layers, which are as large as the pictures.
+KEEP_INTERVAL_S = 60.0
 
 
 class OutdatedError(Exception):
@@ -38,6 +42,7 @@ class ExactAnswers:
     ) -> None:
         self._access, self._publisher, self._solved = access, publisher, solved
         self._last: AnswerUpdate | None = None
+        self._keep_at = time.monotonic() + KEEP_INTERVAL_S
         self._loop = ExactSolveLoop(self._solve, publisher.publish)
         self.run, self.stop, self.notify = self._loop.run, self._loop.stop, self._loop.notify
 
@@ -69,6 +74,9 @@ class ExactAnswers:
             judgement = judge(analyse(solution), snapshot.painted_views)
             self._publish(lambda: session.accept_solution(snapshot, solution, judgement))
             self._solved(snapshot, solution)
+            if time.monotonic() >= self._keep_at:
+                self._keep_at = time.monotonic() + KEEP_INTERVAL_S
+                self._access.keep_compositions()
 
     def _publish(self, make: Callable[[], AnswerUpdate | None]) -> None:
         def remember() -> AnswerUpdate | None:

@@ -85,7 +85,11 @@ class SessionBases:
             if self._access.current is None:
                 self._access.open(*self._open_session(bases, current_looks))
             else:
+                remarks = self._access.current.store.remarks
+                known = len(remarks)
                 self._access.current.improve(bases, current_looks)
+                for remark in remarks[known:]:
+                    self._warn(remark, "warn")
             self._offer_pictures(bases, clean_planes, small_planes)
         self._on_new_bases()
 

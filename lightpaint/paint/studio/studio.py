@@ -155,6 +155,7 @@ class Studio:
                 # Everything is stored before any solve, so a pending answer can be dropped.
                 with suppress(OutdatedError), cancellable(raise_outdated):
                     self.session.client_left(with_stroke=True)
+                self._access.keep_compositions()
                 self.session.store.close()
 
     def wait(self) -> None:
