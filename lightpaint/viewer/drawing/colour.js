@@ -76,6 +76,13 @@ export function fromKelvin(kelvin, green = 0) {
   return mapChannels((c) => rgb[c] / maxChannel);
 }
 
+/** Return the linear light of a chromaticity, CIE 1931 (x, y), of luminance 1. Channels of colours
+ * outside of Rec.709 are below 0. @param {number} x @param {number} y @returns {RGB} */
+export function fromChromaticity(x, y) {
+  const [X, Z] = [x / y, (1 - x - y) / y];
+  return mapChannels((c) => FROM_XYZ[c][0] * X + FROM_XYZ[c][1] + FROM_XYZ[c][2] * Z);
+}
+
 /** Return the correlated temperature (Ohno 2013) and green of a colour; null for black, for colours
  * farther than 0.05 from the locus, and beyond its ends.
  * @param {ArrayLike<number>} rgb linear @returns {{kelvin: number, green: number} | null} */

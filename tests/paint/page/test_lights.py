@@ -349,7 +349,8 @@ def test_a_light_is_held_at_a_white(painter: Painter) -> None:
     kelvin = painter.page.locator(".held-colour").get_by_role("textbox", name="CCT")
     kelvin.fill("2700")
     kelvin.press("Enter")
-    lock = np.array(newest_constraints(painter)["lock"])
+    [request] = painter.requests("constrain_lights")
+    lock = np.array(request["constraints"]["key"]["lock"])
     luminance = [0.2126, 0.7152, 0.0722]
     assert lock @ luminance == pytest.approx(np.array(before) @ luminance)
     white = painter.page.evaluate(

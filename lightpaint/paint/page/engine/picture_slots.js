@@ -9,7 +9,7 @@ import { nameInView } from './message_frames.js';
  * which to show the solution and the other mix.
  * @typedef {Omit<import("../../../viewer/drawing/view.js").Params, 'live'> & {transform: string, clean: boolean,
  *   visibleLights: boolean[] | null, solutionWeights: RGB[] | null, otherWeights: RGB[] | null,
- *   lookPictures: (number | null)[] | null}} Display
+ *   lookPictures: (number | null)[] | null, master?: number}} Display
  */
 
 /** Number of looks that are compared at a time. Their pictures are planes behind those of lights. */

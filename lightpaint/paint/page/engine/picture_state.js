@@ -66,8 +66,9 @@ export class PictureState {
       visibleLights = null,
       solutionWeights = null,
       otherWeights = null,
+      master = 1,
     } = this.display ?? {};
-    const weights = this.forPlanes(solutionWeights?.flat() ?? this.weights);
+    const weights = this.forPlanes(solutionWeights?.flat() ?? this.outputWeights(master));
     const otherMix = otherWeights && this.forPlanes(otherWeights.flat());
     if (weights && visibleLights)
       weights.forEach(
@@ -76,6 +77,13 @@ export class PictureState {
     if (weights) view.setWeights(weights);
     if (otherMix) view.setWeights(otherMix, 'other');
     if (weights) this.checkPresent(weights);
+  }
+
+  /** Return the answer's weights under the master dimmer. @param {number} master a factor */
+  outputWeights(master) {
+    const { weights, state } = this;
+    const isFixed = (/** @type {number} */ i) => state?.lights[Math.floor(i / 3)]?.is_fixed;
+    return master === 1 ? weights : weights.map((x, i) => (isFixed(i) ? x : master * x));
   }
 
   /** Return weights for all planes of the view, from those of the lights and maybe of compared

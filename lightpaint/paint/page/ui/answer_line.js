@@ -15,6 +15,9 @@ import { exposureOf } from './ui_state.js';
 const DELTA_E_TIP =
   'Mean colour difference from the painting (ΔE 2000), and what it was with the current lighting. 1 is just visible, 5 is obvious.';
 
+const MASTER_TIP =
+  'The master dimmer changes the pictures and what is exported. The sentence describes the answer without it.';
+
 const STATE_TIPS = {
   live: 'A quick answer while you paint. The exact one follows.',
   analysing: 'The lights are solved. The sentence still describes the previous answer.',
@@ -50,6 +53,10 @@ export function AnswerLine({ ui, app }) {
           ui.deltaPresent !== null &&
           html`<span class="was">, was ${numberText(ui.deltaPresent, 2)}</span>`
         }</span>`
+      }
+      ${
+        ui.master !== 1 &&
+        html`<span class="faint" data-tip=${MASTER_TIP}>at 100 % of the master</span>`
       }
     </p>
     <${AdviceButton} ui=${ui} app=${app} />

@@ -44,6 +44,7 @@
  * @property {RGB[] | null} solutionWeights
  * @property {RGB[] | null} otherWeights
  * @property {(number | null)[] | null} lookPictures
+ * @property {number} master factor of the answer's weights, but for fixed lights
  */
 
 /** @typedef {"brush" | "eraser" | "weight" | "pick" | "fill" | "line" | "adjust"} Tool */

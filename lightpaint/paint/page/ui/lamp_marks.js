@@ -11,6 +11,7 @@ import {
   dragVertically,
   clampToBox,
 } from './lamp_geometry.js';
+import { pressLight } from './lamps/light_selection.js';
 import { showsElsewhere } from './look_comparison.js';
 import { toHex } from './paint_colour.js';
 import { atFullBrightness, luminance } from './paint_colour.js';
@@ -120,6 +121,7 @@ function Mark({ ui, app, light, place, pane, camera, position, isTwin }) {
   const rgb = ui.weights[light] ?? ui.lights[light].present;
   const isOn = luminance(rgb) > 0;
   const canDrag = place.immovable_reason === '' && place.position !== null;
+  const isSelected = ui.selectedLights.includes(light);
   const choose = () => app.store.set({ lamp: light });
   const tip = place.immovable_reason
     ? `${label} ${place.immovable_reason}: it stays where it is`
@@ -141,6 +143,7 @@ function Mark({ ui, app, light, place, pane, camera, position, isTwin }) {
     'lamp',
     position.isInside ? '' : 'is-outside',
     ui.lamp === light ? 'is-chosen' : '',
+    isSelected ? 'is-selected' : '',
     place.immovable_reason ? 'is-fixed' : '',
     isOn ? '' : 'is-off',
   ].join(' ')} style=${{
@@ -148,14 +151,21 @@ function Mark({ ui, app, light, place, pane, camera, position, isTwin }) {
     top: `${position.y}px`,
     '--lit': isOn ? toHex(atFullBrightness(rgb)) : 'transparent',
     '--outwards': `${position.angle}rad`,
-  }} aria-label=${label} aria-pressed=${String(ui.lamp === light)} tabindex=${isTwin ? -1 : 0}
-    aria-hidden=${isTwin ? 'true' : undefined} data-tip=${tip} data-lamp=${label} onClick=${choose}
+  }} aria-label=${isSelected ? `${label}, selected` : label} aria-pressed=${String(ui.lamp === light)} tabindex=${isTwin ? -1 : 0}
+    aria-hidden=${isTwin ? 'true' : undefined} data-tip=${tip} data-lamp=${label}
+    onClick=${(/** @type {MouseEvent} */ event) =>
+      hasControl(event) ? pressLight(app.store, light, event) : choose()}
     onPointerDown=${(/** @type {PointerEvent} */ event) => {
       if (ui.clickAction) return; // the click goes to the picture behind it
+      if (hasControl(event)) return event.stopPropagation(); // the click selects it
       choose();
       drag.down(event, light, place);
     }} onPointerMove=${drag.move} onPointerUp=${drag.up} onPointerCancel=${drag.up}></button>`;
 }
+
+/** Return whether a press on a mark selects it; Shift moves it up and down.
+ * @param {MouseEvent} event */
+const hasControl = ({ ctrlKey, metaKey }) => ctrlKey || metaKey;
 
 /**
  * @param {{ui: Ui, app: App, light: number, pane: Pane, camera: Camera, innerBox: Box,

@@ -1,11 +1,11 @@
 /** Controls for the constraints on one light. */
 
 import { html, useState } from '../vendor/preact.js';
-import { luminance, fromKelvin, toKelvin } from './paint_colour.js';
+import { luminance } from './paint_colour.js';
 import { ColourConstraint, colourKind } from './colour_constraint.js';
 import { Button, Choice, NumberField, Select } from './controls.js';
 import { numberText } from './format.js';
-import { KelvinSlider } from './kelvin_slider.js';
+import { LampColour } from './lamps/lamp_colour.js';
 import {
   DIMMER_MIN_STOPS,
   scaleToLevel,
@@ -26,7 +26,7 @@ const LEVEL_MODES = [
 
 /** @param {import("./light_row.js").Props} props */
 export function LightConstraints(props) {
-  const { k, light, app, constraints = {}, rgb, tie } = props;
+  const { k, light, app, constraints = {}, rgb, tie, ui } = props;
   const { session } = app;
   if (light.is_fixed) return html`<p class="asking-light faint">This light is not adjusted.</p>`;
   const mode = constraints.off
@@ -48,7 +48,12 @@ export function LightConstraints(props) {
     ${
       mode === 'held' &&
       html`<${LockedLevel} ...${props} />
-      ${!light.is_scalar && !tie && html`<${LockedColour} ...${props} />`}`
+      ${
+        !light.is_scalar &&
+        !tie &&
+        ui &&
+        html`<div class="held-colour"><${LampColour} ui=${ui} app=${app} lights=${[k]} /></div>`
+      }`
     }
     ${
       mode === 'free' &&
@@ -107,23 +112,6 @@ const unitsOf = (light) => [
   { value: 'share', label: '% of now' },
   { value: 'value', label: light.unit || 'value' },
 ];
-
-/** The white that a light is locked to, at its current brightness.
- * @param {import("./light_row.js").Props} props */
-function LockedColour({ k, app, rgb }) {
-  const level = luminance(rgb);
-  const [lastKelvin, setLastKelvin] = useState(/** @type {number | null} */ (null));
-  // If the light is off or not white, the slider keeps the last choice.
-  const kelvin = (level > 0 ? toKelvin(rgb)?.kelvin : null) ?? lastKelvin ?? 3200;
-  const change = (/** @type {number} */ newKelvin, /** @type {boolean} */ isFinal) => {
-    setLastKelvin(newKelvin);
-    const white = fromKelvin(newKelvin);
-    const factor = level / luminance(white);
-    app.session.lockLight(k, /** @type {RGB} */ (white.map((x) => x * factor)), isFinal);
-  };
-  return html`<div class="held-colour"><${KelvinSlider} value=${kelvin} disabled=${level <= 0}
-    change=${change} /></div>`;
-}
 
 /** @param {import("./light_row.js").Props} props */
 function LevelLimits({ k, light, app, constraints = {} }) {

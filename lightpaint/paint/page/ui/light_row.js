@@ -7,6 +7,7 @@ import { Button, Slider } from './controls.js';
 import { numberText, percentText, stopsText, whiteText } from './format.js';
 import { Icon } from './icons.js';
 import { LampFields } from './lamp_fields.js';
+import { isSelecting, pressLight } from './lamps/light_selection.js';
 import {
   DIMMER_MAX_STOPS,
   DIMMER_MIN_STOPS,
@@ -24,7 +25,7 @@ import { Thumbnail } from './thumbnail.js';
 /** @typedef {import("./shortcuts.js").App} App */
 /**
  * @typedef {{k: number, light: Light, app: App, rgb: RGB, answer?: LightAnswer, constraints?: Constraints,
- *   tie?: string[], isLive: boolean, isSolo: boolean, isMute: boolean, isOpen: boolean,
+ *   tie?: string[], isLive: boolean, isSelected: boolean, isSolo: boolean, isMute: boolean, isOpen: boolean,
  *   pointerShare?: number, hasSlider: boolean, picture: string, thumb?: number, allLights?: Light[],
  *   ui?: import("./ui_state.js").Ui}} Props
  */
@@ -54,20 +55,29 @@ export class LightRow extends Component {
 
   render() {
     const { k, light, app, isOpen, hasSlider, pointerShare, isMute, constraints, ui } = this.props;
+    const { isSelected } = this.props;
     const { store } = app;
     const dimClass = isMute || constraints?.off ? 'is-dim' : '';
+    const select = (/** @type {MouseEvent} */ event) => pressLight(store, k, event);
+    const press = (/** @type {MouseEvent} */ event) =>
+      isSelecting(event) ? select(event) : toggleRow(store, k);
     const hover = (/** @type {number | null} */ hoveredLight) => () => store.set({ hoveredLight });
-    return html`<div class=${`light ${dimClass} ${isOpen ? 'is-open' : ''}`} role="group"
+    return html`<div class=${`light ${dimClass} ${isOpen ? 'is-open' : ''} ${isSelected ? 'is-selected' : ''}`} role="group"
       aria-label=${light.label} data-light=${light.name}>
       <div class="light-thumb" onPointerEnter=${hover(k)} onPointerLeave=${hover(null)}>
         <${Thumbnail} name=${this.props.picture} generation=${this.props.thumb} app=${app} />
         <${Share} share=${this.props.answer?.share ?? 0} pointerShare=${pointerShare} />
         <${Badge} ...${this.props} />
+        <button type="button" class="pick" role="checkbox" aria-checked=${String(isSelected)}
+          aria-label=${`Select ${light.label}`} onClick=${select}
+          data-tip="Select, for one action on several lights; with Shift all from the last one">${
+            isSelected && html`<${Icon} name="check" />`
+          }</button>
       </div>
       <div class="light-main">
         <div class="light-head">
           <button type="button" class="light-name" aria-expanded=${String(isOpen)}
-            aria-label=${light.label} onClick=${() => toggleRow(store, k)} data-tip=${
+            aria-label=${light.label} onClick=${press} data-tip=${
               light.members.length > 1
                 ? `${light.label}: ${light.members.join(', ')}`
                 : `${light.label}, ${light.plugin}`

@@ -1,5 +1,6 @@
 /** Saving and loading of looks, and which look equals the current state. */
 
+import { outputWeights } from './lamps/lamp_state.js';
 import { isElsewhere, weightsIn } from './look_comparison.js';
 
 /** @typedef {import("./engine_interface.js").RGB} RGB */
@@ -18,6 +19,7 @@ export function saveLook(app) {
   const { session } = app;
   session.lookInProgress = session.lookInProgress
     .then(() => session.moveInProgress)
+    .then(() => session.many.inProgress)
     .then(() => sendLook(app));
   return session.lookInProgress;
 }
@@ -44,7 +46,8 @@ export async function loadLook({ session, store }, look) {
  * @param {Ui} ui @returns {number | null}
  */
 export function currentLook(ui) {
-  const { looks, lastLook, version, history, weights } = ui;
+  const { looks, lastLook, version, history } = ui;
+  const weights = outputWeights(ui);
   // A page that has just opened or reconnected knows no version.
   const isKnown = version >= 0 && lastLook?.version === version;
   if (lastLook && isKnown && looks.some(({ id }) => id === lastLook.look)) return lastLook.look;

@@ -10,6 +10,7 @@ export {
   toHex,
   toHsv,
   toKelvin,
+  warmer,
 } from '../../../viewer/drawing/colour.js';
 
 /** @typedef {import('./engine_interface.js').RGB} RGB */

@@ -6,7 +6,7 @@ import { nameInView } from '../engine/message_frames.js';
 import { html, useEffect, useLayoutEffect, useMemo, useRef, useState } from '../vendor/preact.js';
 import { toHex } from './paint_colour.js';
 import { reportProbe, refreshProbe, drawRings } from './brush_cursor.js';
-import { countText } from './format.js';
+import { countText, percentText } from './format.js';
 import { useStageInput } from './stage_input.js';
 import { comparedLooks, isPending, mixName } from './look_comparison.js';
 import { gainOf, paintOf, effectiveDisplay } from './ui_state.js';
@@ -17,6 +17,7 @@ import { ObjectOutline } from './object_outline.js';
 import { Pointer } from './pointer_input.js';
 import { firstHint, flowOf, updateDisplay } from './tools.js';
 import { LampMarks } from './lamp_marks.js';
+import { LampLasso } from './lamps/lamp_lasso.js';
 import { Legend } from './analysis_panel.js';
 import { ProgressBar } from './progress_bar.js';
 import { Button } from './controls.js';
@@ -53,6 +54,8 @@ function nameOf(ui, kind) {
   const gap = kind === 'solution' || kind === 'painting' ? missingText(ui, kind) : null;
   if (gap) return `${NAMES[kind]}: ${gap}`;
   if (isPartial(ui, kind)) return `${NAMES.solution}: ${visibleNames(ui)}`;
+  if (kind === 'solution' && !ui.mix && ui.master !== 1)
+    return `Answer, master ${percentText(ui.master)}`;
   if (kind === 'verified' && ui.verification?.isOld) return 'Render of an earlier answer';
   return NAMES[kind] ?? kind;
 }
@@ -122,6 +125,7 @@ export function Stage({ ui, app }) {
       ui.mix,
       ui.ready,
       ui.weights,
+      ui.master,
       ui.view,
       ui.places,
       ui.looks,
@@ -179,6 +183,7 @@ export function Stage({ ui, app }) {
       (pane, k) => html`<${Tag} key=${k} ui=${ui} app=${app} pane=${pane} panes=${panes} />`,
     )}
     ${ui.ready && html`<${LampMarks} ui=${ui} app=${app} panes=${panes} />`}
+    ${ui.ready && html`<${LampLasso} ui=${ui} app=${app} />`}
     ${ui.ready && html`<${Legend} ui=${ui} app=${app} panes=${panes} />`}
     ${ui.display.layout === 'wipe' && ui.ready && html`<${Wipe} ui=${ui} app=${app} />`}
     ${ui.hint && ui.ready && !ui.history.undo.length && html`<${Hint} panes=${panes} tool=${ui.tool} />`}

@@ -1,6 +1,7 @@
 /** Turns actions of a person into requests to the session. */
 
 import { LampMoves } from './lamp_moves.js';
+import { ManyLights } from './lamps/many_lights.js';
 import { SessionLink } from './session_link.js';
 import { lockedLights, lockingLight } from './tied_lights.js';
 
@@ -10,6 +11,7 @@ import { lockedLights, lockingLight } from './tied_lights.js';
 
 export class SessionController extends SessionLink {
   lampMoves = new LampMoves(this);
+  many = new ManyLights(this);
 
   /**
    * Set the constraints on a light.
@@ -43,13 +45,19 @@ export class SessionController extends SessionLink {
    * @param {number} light @param {RGB} emission @param {boolean} isFinal
    */
   lockLight(light, emission, isFinal) {
-    const { lights, constraints, weights } = this.store.value;
-    if (!this.unlockedConstraints.has(light)) {
-      this.unlockedConstraints.set(light, withoutLevel(constraints[lights[light].name] ?? {}));
-    }
+    const { weights } = this.store.value;
+    this.noteUnlocked(light);
     this.moves.set(light, { rgb: emission, isFinal });
     this.store.set({ weights: weights.map((rgb, k) => (k === light ? emission : rgb)) });
     this.moveInProgress ??= this.sendMoves();
+  }
+
+  /** Note the constraints of a light before it is locked, to restore them. @param {number} light */
+  noteUnlocked(light) {
+    const { lights, constraints } = this.store.value;
+    if (!this.unlockedConstraints.has(light)) {
+      this.unlockedConstraints.set(light, withoutLevel(constraints[lights[light].name] ?? {}));
+    }
   }
 
   async sendMoves() {
@@ -86,8 +94,13 @@ export class SessionController extends SessionLink {
 
   /** Unlock all lights in one step, and restore their earlier constraints. */
   unlockAll() {
+    const lights = lockedLights(this.store.value);
+    return this.unlockLights(lights, `unlock ${lights.length} lights`);
+  }
+
+  /** @param {number[]} lockedIndices of lights that are locked or off @param {string} label */
+  unlockLights(lockedIndices, label) {
     const { lights, constraints } = this.store.value;
-    const lockedIndices = lockedLights(this.store.value);
     const entries = lockedIndices.map((k) => [
       lights[k].name,
       this.unlockedConstraints.get(k) ?? withoutLevel(constraints[lights[k].name]),
@@ -96,17 +109,14 @@ export class SessionController extends SessionLink {
       this.moves.delete(k);
       this.unlockedConstraints.delete(k);
     }
-    return this.sendChange('constrain_lights', { constraints: Object.fromEntries(entries) });
+    return this.sendChange('constrain_lights', { constraints: Object.fromEntries(entries), label });
   }
 
   /** @param {number} light @param {boolean} isOff */
   switchLight(light, isOff) {
     if (!isOff) return this.unlockLight(light);
     this.moves.delete(light);
-    const { lights, constraints } = this.store.value;
-    if (!this.unlockedConstraints.has(light)) {
-      this.unlockedConstraints.set(light, withoutLevel(constraints[lights[light].name] ?? {}));
-    }
+    this.noteUnlocked(light);
     return this.constrainLight(light, { off: true });
   }
 
@@ -130,6 +140,17 @@ export class SessionController extends SessionLink {
   tieAll(ties) {
     this.store.set({ ties });
     return this.sendChange('tie', { ties });
+  }
+
+  /** Set the master dimmer. @param {number} level a factor @param {boolean} isFinal false while its
+   * slider moves, which the page alone shows */
+  async setMaster(level, isFinal) {
+    this.masterInHand = level;
+    this.store.set({ master: level });
+    if (!isFinal) return;
+    const reply = await this.send('set_master', { level });
+    if (this.masterInHand === level) this.masterInHand = null;
+    if (reply?.kind === 'failed') this.revert();
   }
 
   /** @param {string} key @param {any} value null for automatic */

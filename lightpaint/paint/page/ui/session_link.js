@@ -46,6 +46,15 @@ const EVENT_KINDS = [
   'silence',
 ];
 
+/** State that a refused request returns to. */
+const CONFIRMED_KEYS = /** @type {const} */ ([
+  'constraints',
+  'ties',
+  'settings',
+  'weights',
+  'master',
+]);
+
 export class SessionLink {
   /** @param {Host} host @param {import("./ui_state.js").UiStore} store */
   constructor(host, store) {
@@ -55,6 +64,10 @@ export class SessionLink {
     this.handledMessages = new WeakSet();
     /** Levels of lights whose dimmers move. @type {Map<number, {rgb: RGB, isFinal: boolean}>} */
     this.moves = new Map();
+    /** Levels of lights that move together. @type {Map<number, RGB>} */
+    this.groupMoves = new Map();
+    /** The level of the master dimmer, until the session has it. @type {number | null} */
+    this.masterInHand = null;
     /** Pending work: moves of dimmers, and looks to save.
      * @type {Promise<void> | null} */
     this.moveInProgress = null;
@@ -66,8 +79,8 @@ export class SessionLink {
     /** The number of previews so far. */
     this.previewCount = 0;
     /** The state that the session has confirmed, to return to when it refuses a request.
-     * @type {Pick<Ui, 'constraints' | 'ties' | 'settings' | 'weights'>} */
-    this.confirmedState = { constraints: {}, ties: [], settings: {}, weights: [] };
+     * @type {Pick<Ui, 'constraints' | 'ties' | 'settings' | 'weights' | 'master'>} */
+    this.confirmedState = { constraints: {}, ties: [], settings: {}, weights: [], master: 1 };
     for (const kind of EVENT_KINDS)
       host.on(kind, (message) => this.receive({ ...message, kind }, message));
   }
@@ -129,21 +142,23 @@ export class SessionLink {
       connection: (/** @type {HostEvents['connection']} */ m) => ({ connection: m.state }),
       silence: (/** @type {HostEvents['silence']} */ m) => ({ isSilent: m.isSilent }),
     })[message.kind]?.(message);
-    for (const key of /** @type {const} */ (['constraints', 'ties', 'settings', 'weights']))
-      if (changes?.[key]) Object.assign(this.confirmedState, { [key]: changes[key] });
+    for (const key of CONFIRMED_KEYS)
+      if (changes?.[key] !== undefined)
+        Object.assign(this.confirmedState, { [key]: changes[key] });
     if (changes?.weights) changes.weights = this.applyMoves(changes.weights);
+    if (changes?.master !== undefined) changes.master = this.masterInHand ?? changes.master;
     if (changes) this.store.set(changes);
     if (changes?.constraints) this.forgetUnlocked(changes.constraints);
   }
 
   /** Replace the weights of lights whose dimmers move. @param {RGB[]} weights @returns {RGB[]} */
   applyMoves(weights) {
-    return weights.map((rgb, k) => this.moves.get(k)?.rgb ?? rgb);
+    return weights.map((rgb, k) => this.moves.get(k)?.rgb ?? this.groupMoves.get(k) ?? rgb);
   }
 
   /** Show the confirmed state, with pending requests. */
   revert() {
-    const { constraints, ties, settings, weights } = this.confirmedState;
+    const { constraints, ties, settings, weights, master } = this.confirmedState;
     const { lights } = this.store.value;
     const pendingEntries = [...this.pendingConstraints].map(([light, pending]) => [
       lights[light].name,
@@ -153,6 +168,7 @@ export class SessionLink {
       constraints: { ...constraints, ...Object.fromEntries(pendingEntries) },
       ties,
       settings,
+      master,
       weights: this.applyMoves(weights),
     });
   }
@@ -162,7 +178,8 @@ export class SessionLink {
    * @param {Record<string, Constraints>} constraints */
   forgetUnlocked(constraints) {
     for (const light of this.unlockedConstraints.keys()) {
-      if (this.moves.has(light) || this.pendingConstraints.has(light)) continue;
+      if (this.moves.has(light) || this.groupMoves.has(light)) continue;
+      if (this.pendingConstraints.has(light)) continue;
       const current = constraints[this.store.value.lights[light]?.name] ?? {};
       if (current.lock === undefined && !current.off) this.unlockedConstraints.delete(light);
     }

@@ -138,13 +138,18 @@ export const SHORTCUTS = [
         symbols: ['Esc'],
         description: 'cancel the stroke',
         act: ({ engine, store }) => {
+          const { maskLayer, panel, clickAction, isLassoing } = store.value;
           const panelChange = engine.cancel() ? {} : { panel: null };
-          if (store.value.maskLayer !== null) engine.paintMask(null);
+          const isOther = maskLayer !== null || panel || clickAction || isLassoing;
+          const selectionChange = isOther || !('panel' in panelChange) ? {} : { selectedLights: [] };
+          if (maskLayer !== null) engine.paintMask(null);
           store.set({
             dragAdjustment: null,
             hoveredLight: null,
             clickAction: null,
+            isLassoing: false,
             ...panelChange,
+            ...selectionChange,
           });
         },
       },

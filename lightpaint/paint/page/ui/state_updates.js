@@ -49,6 +49,7 @@ export function stateUpdate(message, /** @type {import('./ui_state.js').Ui} */ p
     poses: message.poses ?? {},
     addedLights: message.added_lights ?? [],
     places: message.places ?? '',
+    master: message.master ?? 1,
     history: message.history,
     looks,
     resources: message.resources ?? {},
@@ -86,6 +87,8 @@ function renumberLights(previous, lights) {
     solo: renumber(previous.solo),
     mute: renumber(previous.mute),
     openLights: renumber(previous.openLights),
+    selectedLights: renumber(previous.selectedLights),
+    selectionAnchor: null,
     lamp: lamp < 0 ? null : lamp,
     hoveredLight: null,
     probe: null,
@@ -258,6 +261,7 @@ export function answerUpdate(message, ui) {
   ])) {
     if (message[key]) changes[key] = message[key];
   }
+  if (message.master !== undefined) changes.master = message.master ?? 1;
   if (message.effective_settings) changes.effectiveSettings = message.effective_settings;
   if (message.added_lights) changes.addedLights = message.added_lights;
   if (message.places !== undefined) changes.places = message.places ?? '';

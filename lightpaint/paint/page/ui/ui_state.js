@@ -1,5 +1,6 @@
 /** The state of the interface: data from the session, and settings of the page itself. */
 
+import { INITIAL_LAMPS } from './lamps/lamp_state.js';
 import { comparedDisplay } from './look_comparison.js';
 import { fromKelvin } from './paint_colour.js';
 
@@ -33,7 +34,9 @@ import { fromKelvin } from './paint_colour.js';
 /** @typedef {{id: number, text: string, tone: "info" | "warn"}} Toast */
 
 /**
- * @typedef {object} Ui
+ * @typedef {import("./lamps/lamp_state.js").LampState & BaseUi} Ui
+ *
+ * @typedef {object} BaseUi
  * @property {boolean} ready whether the session has said what there is
  * @property {string} waitReason why there is nothing yet, if something went wrong
  * @property {boolean} isExporting files
@@ -159,6 +162,7 @@ const DEFAULT_DISPLAY = {
   solutionWeights: null,
   otherWeights: null,
   lookPictures: null,
+  master: 1,
 };
 
 /** @returns {Ui} */
@@ -260,13 +264,14 @@ export function initialState() {
     search: '',
     sort: 'scene',
     openLights: [],
+    ...INITIAL_LAMPS,
   };
 }
 
 /** Return what is drawn: the chosen display with temporary changes.
  * @param {Ui} ui @returns {Display} */
 export function effectiveDisplay(ui) {
-  const display = { ...ui.display, overlay: overlayOf(ui) };
+  const display = { ...ui.display, overlay: overlayOf(ui), master: ui.master };
   const hasSolo = ui.solo.length > 0;
   if (hasSolo || ui.mute.length) {
     display.visibleLights = ui.lights.map((_, k) =>

@@ -137,6 +137,7 @@ export class FakeHost {
       constraints: this.constraints,
       ties: this.ties,
       settings: this.settings,
+      master: this.master ?? 1,
       effective_settings: { space: 'display', hold: 3, colors: 'gentle' },
       history: {
         undo: this.steps.map(({ label }) => label),
@@ -286,9 +287,19 @@ export class FakeHost {
     if (is_final) this.step('constraint');
     return this.answer(is_final);
   }
-  constrain_lights({ constraints }) {
+  constrain_lights({ constraints, label = 'constraint', is_final = true }) {
     this.constraints = { ...this.constraints, ...constraints };
-    this.step('constraint');
+    this.room.lights.forEach(({ name }, k) => {
+      const { lock, off } = constraints[name] ?? {};
+      if (Array.isArray(lock)) this.weights[k] = [...lock];
+      if (off) this.weights[k] = [0, 0, 0];
+    });
+    if (is_final) this.step(label);
+    return this.answer(is_final);
+  }
+  set_master({ level }) {
+    this.master = level;
+    this.step(`master ${Math.round(100 * level)} %`);
     return this.answer();
   }
   tie({ ties }) {

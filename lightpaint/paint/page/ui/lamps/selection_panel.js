@@ -1,0 +1,110 @@
+/** What is done to all selected lights, each time as one step. */
+
+import { Button } from '../controls.js';
+import { countText, signedText, stopsText } from '../format.js';
+import { gradient } from '../kelvin_slider.js';
+import { stopsOf } from '../level_field.js';
+import { fromKelvin } from '../paint_colour.js';
+import { findTie } from '../tied_lights.js';
+import { html, useState } from '../../vendor/preact.js';
+import { LampColour } from './lamp_colour.js';
+import { adjustableLights, colouredLights, isHeld } from './many_lights.js';
+import { RelativeSlider, parseMired, parseStops } from './relative_dimmer.js';
+
+/** @typedef {import("../shortcuts.js").App} App */
+/** @typedef {import("../ui_state.js").Ui} Ui */
+
+/** Ends of the sliders, in stops and in mireds. */
+const [DIM_RANGE, WARM_RANGE] = [4, 100];
+
+/** Cooler to warmer, as light around 4000 K looks. */
+const WARM_TRACK = gradient([9000, 5600, 4000, 3000, 2300].map((kelvin) => fromKelvin(kelvin)));
+
+/** A slider that dims lights by stops, and keeps their ratio.
+ * @param {{app: App, lights: number[], label: string, isPlain?: boolean, disabled?: boolean}} props */
+export function GroupDimmer({ app, lights, label, isPlain, disabled }) {
+  return html`<${RelativeSlider} label=${label} range=${DIM_RANGE} step=${0.1} isPlain=${isPlain}
+    disabled=${disabled} text=${(/** @type {number} */ stops) => `${signedText(stops)} st`} parse=${parseStops}
+    tip="Dims these lights together, which keeps their ratio, and locks them there"
+    hint="Type stops (-1), percent (50 %) or off." say=${(/** @type {string} */ text) => app.session.toast(text)}
+    change=${(/** @type {number} */ stops, /** @type {boolean} */ isFinal) =>
+      app.session.many.dim(lights, 2 ** stops, isFinal)} />`;
+}
+
+/** @param {{ui: Ui, app: App}} props */
+export function SelectionPanel({ ui, app }) {
+  const [hasColour, setHasColour] = useState(false);
+  const { selectedLights: lights } = ui;
+  if (!lights.length) return null;
+  const { many } = app.session;
+  const coloured = colouredLights(ui, lights);
+  const fixedCount = lights.length - adjustableLights(ui, lights).length;
+  return html`<section class="selection" aria-label="Selected lights">
+    <div class="row">
+      <strong role="status">${countText(lights.length, 'light')} selected</strong>
+      <span class="faint">${levelsText(ui, lights)}</span><span class="spring"></span>
+      <${Button} icon="close" tip="Select none" keys="Escape" act=${() => app.store.set({ selectedLights: [] })} />
+    </div>
+    <${GroupDimmer} app=${app} lights=${lights} label="Dim" disabled=${fixedCount === lights.length} />
+    <${RelativeSlider} label="Warm" range=${WARM_RANGE} step=${5} disabled=${!coloured.length} track=${WARM_TRACK}
+      text=${(/** @type {number} */ mired) => `${signedText(mired, 0)} mired`} parse=${parseMired}
+      tip="Warmer to the right, in mireds; levels stay" hint="Type mireds: 20 is warmer, -20 cooler."
+      say=${(/** @type {string} */ text) => app.session.toast(text)}
+      change=${(/** @type {number} */ mired, /** @type {boolean} */ isFinal) =>
+        many.warm(lights, mired, isFinal)} />
+    <${Actions} ui=${ui} app=${app} hasColour=${hasColour} showColour=${setHasColour} />
+    ${
+      hasColour &&
+      (coloured.length
+        ? html`<${LampColour} ui=${ui} app=${app} lights=${coloured} />`
+        : html`<p class="faint">Tied lights, and lights with one number for all channels, keep their
+            colours.</p>`)
+    }
+    ${fixedCount > 0 && html`<p class="faint">${countText(fixedCount, 'light')} of these cannot be set.</p>`}
+  </section>`;
+}
+
+/** @param {{ui: Ui, app: App, hasColour: boolean, showColour: (isShown: boolean) => void}} props */
+function Actions({ ui, app, hasColour, showColour }) {
+  const { selectedLights: lights, constraints, solo } = ui;
+  const { many } = app.session;
+  const adjustable = adjustableLights(ui, lights);
+  const areHeld = adjustable.length > 0 && adjustable.every((k) => isHeld(ui, k));
+  const areOff = adjustable.length > 0 && adjustable.every((k) => constraints[ui.lights[k].name]?.off);
+  const tie = findTie(ui, lights[0]);
+  const areTied = tie !== undefined && lights.every((k) => tie.includes(ui.lights[k].name));
+  const isSolo = lights.every((k) => solo.includes(k));
+  const toggleSolo = () =>
+    app.store.set({
+      solo: isSolo
+        ? solo.filter((k) => !lights.includes(k))
+        : [...new Set([...solo, ...lights])],
+    });
+  return html`<div class="row">
+    <${Button} label="Colour" pressed=${hasColour} tip="Set the colour of all: white, HSV, RGB, hex or gel"
+      act=${() => showColour(!hasColour)} />
+    <${Button} label=${areHeld ? 'Unlock' : 'Lock'} disabled=${!adjustable.length}
+      tip=${areHeld ? 'Let the solve set them again' : 'Lock all as they are in the answer'}
+      act=${() => void (areHeld ? many.unlock(lights) : many.lock(lights))} />
+    <${Button} label=${areOff ? 'On' : 'Off'} disabled=${!adjustable.length}
+      tip=${areOff ? 'Switch all on again' : 'Switch all off in every answer'}
+      act=${() => void (areOff ? many.unlock(lights) : many.switchOff(lights))} />
+    <${Button} label=${areTied ? 'Untie' : 'Tie'} disabled=${adjustable.length < 2}
+      tip=${areTied ? 'Give each its own dimmer' : 'Put all on one dimmer'}
+      act=${() => void (areTied ? many.untie(lights) : many.tie(lights))} />
+    <${Button} label="Solo" pressed=${isSolo} tip="Show these alone. The answer does not change."
+      act=${toggleSolo} />
+  </div>`;
+}
+
+/** Return the levels of lights, from the lowest to the highest. @param {Ui} ui
+ * @param {number[]} lights */
+export function levelsText(ui, lights) {
+  const levels = lights.map((k) => stopsOf(ui.weights[k] ?? ui.lights[k].present, ui.lights[k]));
+  const stops = levels.filter((level) => level !== null);
+  if (!stops.length) return 'off';
+  const [low, high] = [Math.min(...stops), Math.max(...stops)];
+  const isEqual = stopsText(low) === stopsText(high);
+  const text = isEqual ? stopsText(low) : `${signedText(low)} to ${signedText(high)} st`;
+  return stops.length < levels.length ? `${text}, some off` : text;
+}
