@@ -163,7 +163,8 @@ def test_asking_by_drag_says_how_much(run: Any):
     )
     assert requests == [{"stops": 1, "mired": 0}]
     np.testing.assert_allclose(colour, 0.5)
-    assert [fields.get("label") for _, fields in messages if fields.get("is_final")] == ["adjust"]
+    labels = [fields.get("label") for _, fields in messages if fields.get("is_final")]
+    assert labels == ["Spot on Wall, +1.0 stop"]
 
 
 def test_asking_by_numbers_line_fill_and_undo(run: Any):
@@ -187,7 +188,8 @@ def test_asking_by_numbers_line_fill_and_undo(run: Any):
     )
     assert (wall, floor, undone) == (0.125, 0.25, 0.125)
     assert line == [1, 1, 0.125]
-    assert [f["label"] for _, f in messages if f.get("is_final")] == ["adjust", "brush"]
+    labels = [fields["label"] for _, fields in messages if fields.get("is_final")]
+    assert labels == ["Wall, −1.0 stop", "brush"]
 
 
 def test_what_is_undone_while_the_painting_is_fetched_stays_undone(run: Any):

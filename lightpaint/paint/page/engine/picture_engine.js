@@ -243,7 +243,8 @@ class PictureEngine extends Emitter {
     const { stops, mired } = stroke.adjustment;
     if (stroke.settings.tool === 'adjust' && !stops && !mired) return void this.cancel();
     this.clearStroke();
-    place.strokes.end(LABELS[stroke.settings.tool], this.layers.end());
+    const layer = this.layers.end();
+    place.strokes.end(this.layers.stepName(stroke.settings.tool, stroke.start, layer), layer);
   }
 
   /** Cancel the stroke that has begun. @returns {boolean} whether one had begun */
@@ -290,7 +291,8 @@ class PictureEngine extends Emitter {
     if (!canvas) return;
     place.strokes.begin(canvas, () => this.layers.layer);
     this.drawChange([adjustArea(canvas, adjustment)]);
-    place.strokes.end(LABELS.adjust, this.layers.end());
+    const layer = this.layers.end();
+    place.strokes.end(layer?.name ?? LABELS.adjust, layer);
   }
 
   // Layers

@@ -8,11 +8,13 @@ import { adjustmentName, areaName, effectText, importanceName, strokesName } fro
 import { newLayer, PAINTING_ID, plainLayer, withLayers } from './layer_list.js';
 import { LayerCanvas } from './layer_canvas.js';
 import { TILE_SIDE } from './layer_pixels.js';
+import { LABELS } from '../stroke.js';
 
 /** @typedef {import("../brush.js").Point} Point */
 /** @typedef {import("../message_frames.js").Region} Region */
 /** @typedef {import("../messages.js").Layer} Layer */
 /** @typedef {import("../paint_canvas.js").PaintCanvas} PaintCanvas */
+/** @typedef {import("../stroke.js").Tool} Tool */
 /** @typedef {import("../stroke.js").ToolSettings} ToolSettings */
 /** @typedef {import("./layer_mirror.js").LayerMirror} LayerMirror */
 
@@ -220,6 +222,14 @@ export class LayerStrokes {
     this.mirror.show(withLayers(this.mirror.list, [layer]));
     this.mirror.listener.onChange();
     return plainLayer(layer);
+  }
+
+  /** Return the name of the step that a stroke makes: what it asks for, or where it paints.
+   * @param {Tool} tool @param {Point} start @param {Layer | null} layer */
+  stepName(tool, { x, y }, layer) {
+    if (layer?.name && this.maskId === null && ['adjust', 'fill'].includes(tool)) return layer.name;
+    const area = areaName(this.objectName(this.mirror.picture?.painting.objectAt(x, y) ?? -1));
+    return area ? `${LABELS[tool]} on ${area}` : LABELS[tool];
   }
 
   /** Cancel the stroke. @returns {Region | null} what has to be drawn */
