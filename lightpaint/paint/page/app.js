@@ -15,6 +15,8 @@ import { storedTool, storeChanges, storedFolds, storedBrushSize } from './ui/bro
 import { initialState } from './ui/ui_state.js';
 import { Banner, Tips, Toasts, RunningTasks } from './ui/notices.js';
 import { RoomPlan } from './ui/room_plan.js';
+import { SelectionFields } from './ui/selection/selection_fields.js';
+import { selectionUpdate } from './ui/selection/selection_settings.js';
 import { SessionController } from './ui/session_controller.js';
 import { SettingsPanel } from './ui/settings_panel.js';
 import { SkipLinks } from './ui/skip_links.js';
@@ -76,6 +78,7 @@ function listen(app) {
   engine.on('loading', (loadProgress) => store.set({ loadProgress }));
   engine.on('adjustment', (dragAdjustment) => store.set({ dragAdjustment }));
   engine.on('layers', () => store.set((ui) => layersUpdate(engine.layerState(), ui)));
+  engine.on('selection', () => store.set((ui) => selectionUpdate(engine, ui)));
   engine.on('view', ({ view }) => showView(app, view));
   engine.on('lost', ({ count, isStale }) => {
     if (isStale) store.set({ lostStrokes: count });
@@ -184,6 +187,10 @@ function Side({ ui, app }) {
   return html`<aside class="side" aria-label="Panels">
     ${renderFold('colour', 'Colour', html`<${ColourPanel} ui=${ui} app=${app} />`)}
     ${renderFold('ask', 'Adjust by numbers', html`<${AdjustPanel} ui=${ui} app=${app} />`)}
+    ${
+      (ui.tool === 'select' || ui.selection.current) &&
+      renderFold('select', 'Selection', html`<${SelectionFields} ui=${ui} app=${app} />`)
+    }
     ${renderFold(
       'layers',
       'Layers',

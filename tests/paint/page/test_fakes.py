@@ -32,9 +32,10 @@ ASKED = {
     "take_over": {},
 }
 
-#: Requests of a rig and of layers, which the session that tests make up does not have.
+#: Requests of a rig, layers, a selection and old steps, which the session that tests make up does
+#: not have.
 RIG = {"move", "point", "show_rig", "place", "add_light", "remove_light", "change_layers"}
-RIG.add("compare_looks")
+RIG |= {"compare_looks", "select", "go_to_step", "list_steps", "clear_painting", "start_over"}
 
 
 def check(message: dict[str, Any]) -> None:

@@ -263,6 +263,47 @@ def test_a_wish_is_changed_later_and_its_name_follows(wishes: Person) -> None:
     assert (copy.gain, copy.tint) == (original.gain, original.tint)
 
 
+@pytest.mark.long
+def test_strokes_and_adjustments_keep_to_what_is_selected_and_it_survives(me: Person) -> None:
+    session, selections = me.studio.session, f"{PAINTER}.engine.selections"
+    before = session.views[0].image.copy()
+    me.press("m").drag((9.5, 9.5), (39.5, 29.5))
+    mask = np.zeros((H, W), bool)
+    mask[10:30, 10:40] = True
+    np.testing.assert_array_equal(session.views[0].selection.part((0, H, 0, W)).importance, mask)
+    me.press("b").drag((5, 12), (60, 12))
+    me.press("a").drag((70, 45), (71, 40))  # beside the selection, which is what it is about
+    image, importance = session.views[0].image, session.views[0].importance
+    np.testing.assert_array_equal(image[~mask], before[~mask])
+    np.testing.assert_array_equal(importance > 0, mask)
+    assert me.names[0].startswith("Selection, +")
+    me.page.reload()
+    me.page.wait_for_selector(".lightpaint .layer", timeout=60_000)
+    me.page.evaluate(COUNT)
+    me.still()
+    state = f"[...({selections}.current?.mask ?? [])].reduce((a, b) => a + b, 0)"
+    assert me.page.evaluate(f"() => {state}") == 255 * mask.sum()
+    for total in (255 * mask.sum(), 255 * mask.sum(), 0):
+        me.press("Control+z")
+        assert me.page.evaluate(f"() => {state}") == total
+    me.press("Control+Shift+Z")
+    me.page.wait_for_function(f"() => {state} > 0")
+    # What a light lights, and what is bright in the answer as it is shown.
+    view = session.views[0]
+    me.page.evaluate(f"() => {selections}.select({{ kind: 'light', light: 0 }})")
+    me.still()
+    share = view.selection.part(view.full_region).importance
+    assert share[:, : W // 2].mean() > 1.5 * share[:, W // 2 :].mean() > 0
+    bright = "{ kind: 'brightness', picture: 'solution', low: 55, high: 100 }"
+    me.page.evaluate(f"() => {selections}.select({bright})")
+    me.still()
+    light = np.clip(view.basis.mix(session.weights), 0, 1) @ [0.2126, 0.7152, 0.0722]
+    share, lightness = view.selection.part(view.full_region).importance, 116 * np.cbrt(light) - 16
+    assert (share[lightness > 56] == 1).all()
+    assert not share[lightness < 51].any()
+    assert 0.1 < share.mean() < 0.9
+
+
 # What the panel is made of, over a session that is made up
 
 

@@ -92,11 +92,12 @@ export function fill(canvas, object, flow) {
   return region;
 }
 
-/** Cover everything. @param {PaintCanvas} canvas @returns {Region} */
+/** Cover everything, or all that is selected. @param {PaintCanvas} canvas @returns {Region} */
 export function flood(canvas) {
-  canvas.cover(canvas.wholeRegion, () => 1);
+  const region = canvas.selection?.bounds ?? canvas.wholeRegion;
+  canvas.cover(region, () => 1);
   canvas.setFullyCovered();
-  return canvas.wholeRegion;
+  return region;
 }
 
 /** Return the bounding box of an object. @param {Int16Array} objects @param {number} width

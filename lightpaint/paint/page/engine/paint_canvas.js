@@ -5,11 +5,13 @@
  * coverage, so a stroke in progress can change (a line, an adjusting drag) or be cancelled. Tiles
  * keep the old values where the stroke has been.
  */
+import { FULL } from './selection/polygon_mask.js';
 import { pixelChange } from './stroke_effects.js';
 import { VALUES, toFloats } from '../../../viewer/drawing/half_floats.js';
 import { union } from '../../../viewer/drawing/cpu_picture.js';
 
 /** @typedef {import("./message_frames.js").Region} Region */
+/** @typedef {import("./selection/selection_mirror.js").Selection} Selection */
 /** @typedef {import("./stroke_effects.js").Effect} Effect */
 
 /** Pixels before a stroke, (s, s, 3) and (s, s), and the stroke's coverage.
@@ -57,6 +59,8 @@ export class PaintCanvas {
     this.strokeImportance = 1;
     /** Factor on the importance of earlier paint. */
     this.importanceFactor = 1;
+    /** What strokes keep to; null for everything. @type {Selection | null} */
+    this.selection = null;
   }
 
   /** @returns {Region} */
@@ -129,13 +133,19 @@ export class PaintCanvas {
     const change = pixelChange(this, effect);
     const { importance, image, present } = this;
     this.visitTiles(region, false, (tile, q, p) => {
-      const coverage = tile.coverage[q];
+      const coverage = this.selectedPart(tile.coverage[q], p);
       if (coverage <= 0) return;
       change(tile, q, p, coverage);
       if (importance[p] < MIN_IMPORTANCE) importance[p] = 0;
       for (let i = 3 * p; i < 3 * p + 3; i++)
         image[i] = importance[p] ? Math.min(MAX_HALF, Math.max(0, image[i])) : VALUES[present[i]];
     });
+  }
+
+  /** Return the part of a stroke's coverage within the selection. @param {number} coverage
+   * @param {number} p the pixel */
+  selectedPart(coverage, p) {
+    return this.selection ? (coverage * this.selection.mask[p]) / FULL : coverage;
   }
 
   /** Finish the stroke. @returns {Region | null} where it was */

@@ -15,6 +15,7 @@ import { Screen } from './picture_canvas.js';
 import { hitTest, zoomAround } from '../../../viewer/drawing/view.js';
 import { plainLayer } from './layers/layer_list.js';
 import { LayerStrokes } from './layers/layer_strokes.js';
+import { Selections } from './selection/selections.js';
 import { SessionMirror } from './session_mirror.js';
 
 /** @typedef {import("./brush.js").Point} Point */
@@ -61,6 +62,9 @@ class PictureEngine extends Emitter {
       (object) => this.mirror.state?.objects?.[object] ?? null,
     );
     this.on('layers', () => this.layers.followList());
+    this.selections = new Selections(this.mirror, (kind, event) => this.emit(kind, event));
+    this.mirror.selections = this.selections;
+    this.on('selection', () => (this.layers.selection = this.selections.current));
     /** A stroke from before the pixels of the layers have arrived.
      * @type {{points: Point[], isEnded: boolean} | null} */
     this.earlyStroke = null;
@@ -203,7 +207,7 @@ class PictureEngine extends Emitter {
   begin(point) {
     if (this.stroke) this.end();
     const { place } = this;
-    if (!place || place.strokes.isSessionLost || this.tool.tool === 'pick') return;
+    if (!place || place.strokes.isSessionLost || ['pick', 'select'].includes(this.tool.tool)) return;
     if (this.mirror.layers.isLoading) return this.beginLate(point);
     const canvas = this.layers.begin(this.tool, point);
     if (!canvas) return;

@@ -58,22 +58,30 @@ export class PictureState {
     this.screen.view?.setLut(lut);
   }
 
-  /** Tell the view which weights are shown. */
-  showWeights() {
-    const { view } = this.screen;
-    if (!view || !this.state) return;
+  /** Return the weights that a mix of all planes is shown with; null for none.
+   * @param {'solution' | 'other'} kind */
+  weightsOf(kind) {
     const {
       visibleLights = null,
       solutionWeights = null,
       otherWeights = null,
       master = 1,
     } = this.display ?? {};
+    if (kind === 'other') return otherWeights && this.forPlanes(otherWeights.flat());
     const weights = this.forPlanes(solutionWeights?.flat() ?? this.outputWeights(master));
-    const otherMix = otherWeights && this.forPlanes(otherWeights.flat());
     if (weights && visibleLights)
       weights.forEach(
         (weight, i) => (weights[i] = visibleLights[Math.floor(i / 3)] ?? true ? weight : 0),
       );
+    return weights;
+  }
+
+  /** Tell the view which weights are shown. */
+  showWeights() {
+    const { view } = this.screen;
+    if (!view || !this.state) return;
+    const weights = this.weightsOf('solution');
+    const otherMix = this.weightsOf('other');
     if (weights) view.setWeights(weights);
     if (otherMix) view.setWeights(otherMix, 'other');
     if (weights) this.checkPresent(weights);

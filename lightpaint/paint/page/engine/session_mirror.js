@@ -41,6 +41,8 @@ export class SessionMirror extends PictureState {
       onChange: () => this.announceLayers(),
       onError: (text) => this.emit('trouble', { text }),
     });
+    /** @type {import("./selection/selections.js").Selections | null} */
+    this.selections = null;
     /** Revision of the session in its last message. */
     this.version = -1;
     /** Number of times that the session has sent the canvas. */
@@ -120,6 +122,7 @@ export class SessionMirror extends PictureState {
     }
     this.strokes.paintOn(this.canvas, view);
     this.layers.open(this.canvas, view);
+    this.selections?.mirror.open([height, width], view);
     this.isReady = false;
     this.knowsPresent = false;
     this.loader.forget();

@@ -32,7 +32,10 @@ import { VERSION, encodeFrame, pictureOf, decodeFrame } from './message_frames.j
  *   silence: {kind: 'silence', isSilent: boolean}}} HostEvents */
 
 /** Requests that do not wait for pending strokes. */
-export const UNQUEUED = ['paint', 'drop_stroke', 'change_layers', 'hello', 'take_over', 'fetch'];
+export const UNQUEUED = [
+  ...['paint', 'drop_stroke', 'change_layers', 'select'],
+  ...['hello', 'take_over', 'fetch'],
+];
 
 /** Listeners by message kind: the part that all hosts share. */
 export class Emitter {

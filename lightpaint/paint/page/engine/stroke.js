@@ -8,14 +8,14 @@ import { wholeAdjustment } from './whole_adjustment.js';
 /** @typedef {import("./paint_canvas.js").PaintCanvas} PaintCanvas */
 /** @typedef {import("./message_frames.js").Region} Region */
 /** @typedef {import("./message_frames.js").RGB} RGB */
-/** @typedef {'brush' | 'eraser' | 'weight' | 'pick' | 'fill' | 'line' | 'adjust'} Tool */
+/** @typedef {'brush' | 'eraser' | 'weight' | 'pick' | 'fill' | 'line' | 'adjust' | 'select'} Tool */
 
 /**
  * rgb: linear light of the paint. size: diameter in pixels of the picture. importance: factor of
- * the importance brush. adjustedArea: whether a drag adjusts a soft spot of that size (the default) or the
- * object under it.
+ * the importance brush. adjustedArea: whether a drag adjusts a soft spot of that size (the default), the
+ * object under it, or all that is selected.
  * @typedef {{tool: Tool, rgb: RGB, paintMode: 'light' | 'colour', size: number, hardness: number,
- *   flow: number, importance: number, adjustedArea?: 'spot' | 'object'}} ToolSettings */
+ *   flow: number, importance: number, adjustedArea?: 'spot' | 'object' | 'selection'}} ToolSettings */
 
 /** Screen pixels of a drag per stop and per mired. */
 const DRAG_PIXELS = { stop: 80, mired: 1 };
@@ -43,6 +43,7 @@ export const LABELS = {
   fill: 'fill',
   line: 'line',
   adjust: 'adjust',
+  select: 'select',
 };
 
 /** Return the effect that changes brightness and warmth. @param {number} stops
@@ -77,7 +78,8 @@ export class Stroke {
     }
     if (settings.tool !== 'adjust') return this.apply(this.path.moveTo(start));
     const object = canvas.objectAt(start.x, start.y);
-    if (settings.adjustedArea === 'object' && object >= 0) fill(canvas, object, 1);
+    if (settings.adjustedArea === 'selection' && canvas.selection) flood(canvas);
+    else if (settings.adjustedArea === 'object' && object >= 0) fill(canvas, object, 1);
     else
       stamp(canvas, { ...start, pressure: 1 }, { size: 2 * settings.size, hardness: 0, flow: 1 });
     return [];

@@ -14,16 +14,19 @@ import { plainLayer } from './layers/layer_list.js';
 
 /** @typedef {import("./messages.js").Layer} Layer */
 /** @typedef {import("./messages.js").ChangeLayers} ChangeLayers */
+/** @typedef {import("./messages.js").Select} Select */
 
 /** The stroke in progress. canvas: the pixels that it paints. layerOf: returns their layer; null for
  * the painting that is always there. dirty: region not sent yet. wholeRegion: region of the stroke.
  * @typedef {{stroke: number, view: number, canvas: PaintCanvas, layerOf: () => Layer | null,
  *   dirty: Region | null, wholeRegion: Region | null, isKnown: boolean}} CurrentStroke */
-/** A finished or cancelled stroke, or a change of layers, without an answer yet. cutRegion: region
- * to send.
+/** A finished or cancelled stroke, or a change of layers or of the selection, without an answer yet.
+ * cutRegion: region to send.
  * @typedef {{stroke: number, view: number, cutRegion: Region, wholeRegion: Region, arrays: Arrays,
  *   label: string, layer: Layer | null} | {stroke: number, isDropped: true} |
- *   {change: ChangeLayers, isSent: boolean}} PendingStroke */
+ *   {change: ChangeLayers, isSent: boolean} | PendingSelection} PendingStroke */
+/** onAnswer: hears whether the session has taken it.
+ * @typedef {{select: Select, arrays: Arrays, onAnswer: (isTaken: boolean) => void}} PendingSelection */
 
 export class StrokeSender {
   /** @param {import("./socket_host.js").Host} host
@@ -92,6 +95,7 @@ export class StrokeSender {
   dropUnsent(isStale = false) {
     const count =
       this.pendingStrokes.filter(isLoss).length + (this.currentStroke?.wholeRegion ? 1 : 0);
+    for (const pending of this.pendingStrokes) if ('select' in pending) pending.onAnswer(false);
     this.pendingStrokes = [];
     this.currentStroke = null;
     this.isSliding = false;
@@ -116,6 +120,8 @@ export class StrokeSender {
         this.host.send('paint', paintFields(pending), cutArrays(pending)).catch(() => {});
       else if ('change' in pending && !pending.isSent && isLoss(pending))
         this.host.send('change_layers', pending.change).catch(() => {});
+      else if ('select' in pending)
+        this.host.send('select', pending.select, pending.arrays).catch(() => {});
     }
   }
 
@@ -158,6 +164,13 @@ export class StrokeSender {
     // While a slider moves, only its newest place is sent.
     if (last && 'change' in last && !last.isSent && !isLoss(last)) this.pendingStrokes.pop();
     this.pendingStrokes.push({ change, isSent: false });
+    this.pump();
+  }
+
+  /** Send what is selected, in the order of the strokes. @param {Select} select
+   * @param {Arrays} arrays its mask @param {(isTaken: boolean) => void} onAnswer */
+  select(select, arrays, onAnswer) {
+    this.pendingStrokes.push({ select, arrays, onAnswer });
     this.pump();
   }
 
@@ -223,7 +236,8 @@ export class StrokeSender {
     else if (next && 'change' in next) {
       next.isSent = true;
       this.send('change_layers', next.change, {}, next);
-    } else if (next) this.send('paint', paintFields(next), cutArrays(next), next);
+    } else if (next && 'select' in next) this.send('select', next.select, next.arrays, next);
+    else if (next) this.send('paint', paintFields(next), cutArrays(next), next);
     else if (this.currentStroke?.dirty) {
       const { stroke, view, dirty, canvas, layerOf } = this.currentStroke;
       this.currentStroke.dirty = null;
@@ -233,7 +247,7 @@ export class StrokeSender {
     }
   }
 
-  /** @template {"paint" | "drop_stroke" | "change_layers"} K @param {K} kind
+  /** @template {"paint" | "drop_stroke" | "change_layers" | "select"} K @param {K} kind
    * @param {import("./messages.js").Requests[K]} fields @param {Arrays} arrays
    * @param {PendingStroke | null} pending what is answered with it */
   async send(kind, fields, arrays, pending) {
@@ -243,7 +257,9 @@ export class StrokeSender {
       const reply = await this.host.send(kind, fields, arrays);
       if (pending && reply.kind !== 'closed')
         this.pendingStrokes = this.pendingStrokes.filter((stroke) => stroke !== pending);
-      if (pending && reply.kind === 'failed') this.onRefusal();
+      if (pending && 'select' in pending && reply.kind !== 'closed')
+        pending.onAnswer(reply.kind !== 'failed');
+      else if (pending && reply.kind === 'failed') this.onRefusal();
     } catch {
       // Pause after a lost connection, until `connected` is called.
       this.isOpen = false;

@@ -47,7 +47,7 @@
  * @property {number} master factor of the answer's weights, but for fixed lights
  */
 
-/** @typedef {"brush" | "eraser" | "weight" | "pick" | "fill" | "line" | "adjust"} Tool */
+/** @typedef {"brush" | "eraser" | "weight" | "pick" | "fill" | "line" | "adjust" | "select"} Tool */
 
 /**
  * The tool in the hand. `rgb`: linear light of the colour, including its stops. `size`: diameter in
@@ -60,7 +60,7 @@
  * @property {number} hardness
  * @property {number} flow
  * @property {number} importance
- * @property {"spot" | "object"} adjustedArea what a drag adjusts
+ * @property {"spot" | "object" | "selection"} adjustedArea what a drag adjusts
  */
 
 /** In pixels of the picture. @typedef {{x: number, y: number, pressure: number}} Point */
@@ -107,13 +107,15 @@
  *   layer, or a group, covers each pixel
  * @property {(id: number, width: number, height: number) => Uint8ClampedArray<ArrayBuffer>}
  *   layerThumbnail RGBA
+ * @property {Pick<import("../engine/selection/selections.js").Selections,
+ *   'current' | 'width' | 'summary' | 'select' | 'change'>} selections what strokes keep to
  * @property {() => void} onMaskChange called when a stroke changes a mask
  * @property {() => number} maxImportance the greatest painted importance, at least 1
  * @property {(rgb: RGB, stops: number) => number[]} codes that light is shown with, at an exposure
  * @property {(name: string, listener: (event: any) => void) => void} on "message": an answer to a
  *   stroke; "loading": {done, total, isFirst} pictures, where some of
  *   the lights have none yet; "adjustment": {stops, mired} of a drag;
- *   "layers": {} when `layerState` has changed; "view": {view} in which something was undone; "lost": {count, isStale} strokes that are not
+ *   "layers": {} when `layerState` has changed; "selection": {} when another part is selected; "view": {view} in which something was undone; "lost": {count, isStale} strokes that are not
  *   sent any more, since another page has painted meanwhile, or the session is there no more; "trouble": {text}
  * @property {() => void} close
  */

@@ -15,6 +15,7 @@ import { LayerMask } from './layers/layer_mask.js';
 import { MaskNote } from './layers/layer_panel.js';
 import { ObjectOutline } from './object_outline.js';
 import { Pointer } from './pointer_input.js';
+import { SelectionOutline } from './selection/selection_outline.js';
 import { firstHint, flowOf, updateDisplay } from './tools.js';
 import { LampMarks } from './lamp_marks.js';
 import { LampLasso } from './lamps/lamp_lasso.js';
@@ -174,6 +175,7 @@ export function Stage({ ui, app }) {
   return html`<div class=${`stage is-${ui.tool} ${ui.dragAdjustment ? 'is-asking' : ''} ${ui.clickAction ? 'is-pointing' : ''}`} ref=${frame} tabindex="0" role="application"
     aria-label="Pictures. Arrow keys move the brush, Enter paints, Shift Enter a line." aria-describedby="lp-status">
     ${ui.ready && html`<${ObjectOutline} ui=${ui} engine=${engine} panes=${panes} />`}
+    ${ui.ready && html`<${SelectionOutline} ui=${ui} engine=${engine} panes=${panes} />`}
     ${ui.ready && html`<${LayerMask} ui=${ui} engine=${engine} panes=${panes} />`}
     ${ui.ready && html`<${MaskNote} ui=${ui} app=${app} />`}
     <div class="rings" ref=${rings} hidden aria-hidden="true">

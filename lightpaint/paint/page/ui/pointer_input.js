@@ -4,6 +4,7 @@
  * One finger paints, two pan and zoom. Space or the middle button pan; Ctrl and the wheel zoom.
  */
 
+import { SelectDrag } from './selection/select_drag.js';
 import { updateDisplay, rememberPaint, pickPaint } from './tools.js';
 
 /** @typedef {import("./engine_interface.js").Engine} Engine */
@@ -23,7 +24,8 @@ export class Pointer {
     this.say = say;
     /** @type {Map<number, {x: number, y: number}>} */
     this.fingers = new Map();
-    /** @type {null | "stroke" | "pan" | "pinch"} */
+    this.selecting = new SelectDrag(engine, store);
+    /** @type {null | "stroke" | "select" | "pan" | "pinch"} */
     this.gesture = null;
     this.startTime = 0;
     this.pathLength = 0;
@@ -76,6 +78,10 @@ export class Pointer {
     const point = this.point(event);
     const { tool } = this.store.value;
     if (!point) return;
+    if (tool === 'select') {
+      if (this.selecting.begin(point, event)) this.gesture = 'select';
+      return;
+    }
     if (event.altKey || tool === 'pick') {
       pickPaint(this.store, this.engine.paintAt(point.kind, point.x, point.y));
       this.pane = null;
@@ -108,10 +114,11 @@ export class Pointer {
     if (!this.isAdjusting) this.onMove(place.x, place.y);
     if (this.gesture === 'pan' && previous) {
       this.pan(place.x - previous.x, place.y - previous.y);
-    } else if (this.gesture === 'stroke' && previous) {
+    } else if ((this.gesture === 'stroke' || this.gesture === 'select') && previous) {
       const events = event.getCoalescedEvents?.() ?? [];
       const points = (events.length ? events : [event]).map((sample) => this.point(sample));
       const validPoints = /** @type {Point[]} */ (points.filter(Boolean));
+      if (this.gesture === 'select') return this.selecting.move(validPoints, event);
       this.pathLength += Math.hypot(place.x - previous.x, place.y - previous.y);
       if (validPoints.length) this.lastPoint = validPoints[validPoints.length - 1];
       this.engine.move(validPoints);
@@ -123,7 +130,9 @@ export class Pointer {
     this.fingers.delete(event.pointerId);
     if (this.gesture === 'stroke' && event.type === 'pointercancel') this.engine.cancel();
     else if (this.gesture === 'stroke') this.engine.end();
-    if (this.gesture === 'stroke' || this.fingers.size === 0) {
+    if (this.gesture === 'select' && event.type === 'pointercancel') this.selecting.cancel();
+    else if (this.gesture === 'select') this.selecting.end();
+    if (this.gesture === 'stroke' || this.gesture === 'select' || this.fingers.size === 0) {
       this.gesture = null;
       this.pane = null;
       this.store.set({ dragAdjustment: null });
@@ -151,6 +160,7 @@ export class Pointer {
     const point = { x: (x - pane.left) / pane.scale, y: (y - pane.top) / pane.scale, pressure: 1 };
     if (tool === 'pick')
       return pickPaint(this.store, this.engine.paintAt(pane.kind, point.x, point.y));
+    if (tool === 'select') return this.selecting.press({ ...point, kind: pane.kind }, isLine);
     if (tool === 'adjust')
       return this.say(
         'Adjust needs a drag. To type values instead, press By numbers above the pictures.',
@@ -174,6 +184,7 @@ export class Pointer {
       if (event.timeStamp - this.startTime < ms || this.pathLength < px) this.engine.cancel();
       else this.engine.end();
     }
+    this.selecting.cancel();
     this.pane = null;
     this.isAdjusting = false;
     this.store.set({ dragAdjustment: null });

@@ -28,6 +28,7 @@ const EVENT_KINDS = [
   'waiting',
   'answer',
   'patch',
+  'selected',
   'renewed',
   'rig',
   'trial',
@@ -118,6 +119,7 @@ export class SessionLink {
       }),
       answer: (/** @type {HostEvents['answer']} */ m) => answerUpdate(m, this.store.value),
       patch: (/** @type {HostEvents['patch']} */ m) => answerUpdate(m, this.store.value),
+      selected: (/** @type {HostEvents['selected']} */ m) => (m.history ? { history: m.history } : {}),
       renewed: (/** @type {HostEvents['renewed']} */ m) => ({
         resources: { ...this.store.value.resources, ...m.resources },
       }),

@@ -1,6 +1,7 @@
 /** The table of keyboard shortcuts, for the keyboard and for the dialog that lists them. */
 
 import { saveLook } from './look_actions.js';
+import { chooseSelect, updateSelection } from './selection/selection_settings.js';
 import { showNextView } from './view_tabs.js';
 import {
   chooseTool,
@@ -55,7 +56,7 @@ export const SHORTCUTS = [
       keys: keys.toLowerCase(),
       symbols: [keys],
       description: label,
-      act: ({ store }) => chooseTool(store, tool),
+      act: ({ store }) => (tool === 'select' ? chooseSelect(store) : chooseTool(store, tool)),
     })),
   },
   {
@@ -138,6 +139,8 @@ export const SHORTCUTS = [
         symbols: ['Esc'],
         description: 'cancel the stroke',
         act: ({ engine, store }) => {
+          const { draft } = store.value.selection;
+          if (draft) return updateSelection(store, { draft: null });
           const { maskLayer, panel, clickAction, isLassoing } = store.value;
           const panelChange = engine.cancel() ? {} : { panel: null };
           const isOther = maskLayer !== null || panel || clickAction || isLassoing;
@@ -169,6 +172,32 @@ export const SHORTCUTS = [
         description: 'redo',
         act: ({ session }) => void session.send('redo'),
       },
+    ],
+  },
+  {
+    title: 'Selection',
+    keys: [
+      {
+        keys: 'mod+a',
+        symbols: ['Ctrl', 'A'],
+        description: 'select all',
+        act: ({ engine }) => void engine.selections.select({ kind: 'all' }),
+      },
+      {
+        keys: 'mod+d',
+        symbols: ['Ctrl', 'D'],
+        description: 'select nothing',
+        act: ({ engine }) => engine.selections.change({ kind: 'none' }),
+      },
+      {
+        keys: 'mod+shift+i',
+        symbols: ['Ctrl', 'Shift', 'I'],
+        description: 'invert the selection',
+        act: ({ engine }) => engine.selections.change({ kind: 'invert' }),
+      },
+      { keys: '', symbols: ['Shift', 'drag'], description: 'add to the selection' },
+      { keys: '', symbols: ['Alt', 'drag'], description: 'subtract from it' },
+      { keys: '', symbols: ['Shift', 'Alt', 'drag'], description: 'intersect with it' },
     ],
   },
   {

@@ -6,6 +6,8 @@ import { toHex } from './paint_colour.js';
 import { displayColour } from './colour_panel.js';
 import { Button, Choice, NumberField, Select, Slider, reveal } from './controls.js';
 import { signedText } from './format.js';
+import { SelectOptions } from './selection/select_options.js';
+import { chooseSelect } from './selection/selection_settings.js';
 import {
   chooseTool,
   flowOf,
@@ -35,6 +37,13 @@ const AREAS = [
   { value: 'spot', label: 'Spot', tip: 'A soft spot where the drag begins' },
   { value: 'object', label: 'Object', tip: 'The whole object under the pointer' },
 ];
+const SELECTED = { value: 'selection', label: 'Selection', tip: 'All that is selected' };
+
+/** Return the areas that a drag may adjust. @param {Ui} ui */
+const areasOf = ({ state, selection }) => [
+  ...(selection.current ? [SELECTED] : []),
+  ...AREAS.filter(({ value }) => value === 'spot' || state?.objects?.length > 0),
+];
 const PAINT_MODES = [
   {
     value: 'light',
@@ -57,7 +66,8 @@ export function ToolBar({ ui, app }) {
   return html`<nav class="tools" aria-label="Tools">
     ${TOOLS.map(
       ({ tool, icon, keys, tip }) => html`<${Button} key=${tool} icon=${icon} tip=${tip}
-      keys=${keys} pressed=${ui.tool === tool} act=${() => chooseTool(store, tool)}
+      keys=${keys} pressed=${ui.tool === tool}
+      act=${() => (tool === 'select' ? chooseSelect(store) : chooseTool(store, tool))}
       disabled=${tool === 'fill' && !ui.state?.objects?.length} />`,
     )}
     <div class="spring"></div>
@@ -96,11 +106,11 @@ export function ToolOptions({ ui, app }) {
       tip="How many times as much the area counts: above 1 the answer matches better there"
       change=${(/** @type {number} */ importance) => store.set({ importance })} />`
     }
+    ${ui.tool === 'select' && html`<${SelectOptions} ui=${ui} app=${app} />`}
     ${
       ui.tool === 'adjust' &&
-      ui.state?.objects?.length > 0 &&
-      html`<${Choice} label="Area"
-      value=${ui.adjustedArea} choices=${AREAS} change=${(/** @type {any} */ adjustedArea) =>
+      (ui.state?.objects?.length > 0 || ui.selection.current) &&
+      html`<${Choice} label="Area" value=${ui.adjustedArea} choices=${areasOf(ui)} change=${(/** @type {any} */ adjustedArea) =>
         store.set({ adjustedArea })} />`
     }
     ${
@@ -145,7 +155,7 @@ export function AdjustPanel({ ui, app }) {
   // By its name, since another view numbers its objects differently and may not show this one.
   const isMissing = object !== null && !objects.includes(object);
   const choices = [
-    { value: WHOLE_PICTURE, label: 'Whole picture' },
+    { value: WHOLE_PICTURE, label: ui.selection.current ? 'Selection' : 'Whole picture' },
     ...(isMissing ? [{ value: object, label: `${object}: not in this view` }] : []),
     ...[...objects]
       .sort((a, b) => a.localeCompare(b))

@@ -40,6 +40,13 @@ export const TOOLS = [
     keys: 'A',
     tip: 'Adjust: drag up for brighter, right for warmer',
   },
+  {
+    tool: 'select',
+    label: 'Select',
+    icon: 'marquee',
+    keys: 'M',
+    tip: 'Select: paint and adjust only there. Again for the next shape.',
+  },
 ];
 
 const HINTS = /** @type {Record<Tool, string>} */ ({
@@ -50,6 +57,7 @@ const HINTS = /** @type {Record<Tool, string>} */ ({
   fill: 'Click an object to paint all of it.',
   line: 'Drag from one end of the line to the other.',
   adjust: 'Drag on a picture: up brighter, down darker, right warmer, left cooler.',
+  select: 'Drag, or click, on a picture. Shift adds, Alt subtracts, both together intersect.',
 });
 
 /** Hints on touch screens. @type {Partial<Record<Tool, string>>} */
@@ -81,6 +89,10 @@ const FIRST_HINTS = {
   fill: {
     title: PAINT_HINT.title,
     text: 'Choose a colour, then click an object in this picture. The other one shows what the lights can do.',
+  },
+  select: {
+    title: 'Select a part of the picture',
+    text: 'Then paint it, fill it or adjust it: everything else stays as it is.',
   },
   adjust: {
     title: 'Adjust how it should look',

@@ -3,6 +3,7 @@
 import { INITIAL_LAMPS } from './lamps/lamp_state.js';
 import { comparedDisplay } from './look_comparison.js';
 import { fromKelvin } from './paint_colour.js';
+import { initialSelection } from './selection/selection_settings.js';
 
 /** @typedef {import("./engine_interface.js").RGB} RGB */
 /** @typedef {import("./engine_interface.js").Display} Display */
@@ -118,7 +119,8 @@ import { fromKelvin } from './paint_colour.js';
  * @property {number} fillFlow that of Fill
  * @property {number} importance
  * @property {"light" | "colour"} paintMode
- * @property {"spot" | "object"} adjustedArea what a drag adjusts
+ * @property {"spot" | "object" | "selection"} adjustedArea what a drag adjusts
+ * @property {import("./selection/selection_settings.js").SelectionUi} selection
  * @property {RGB} colour linear, its largest channel at most 1
  * @property {number} stops brightness of the paint over `colour`
  * @property {import("./tools.js").Paint} second
@@ -243,6 +245,7 @@ export function initialState() {
     importance: 4,
     paintMode: 'light',
     adjustedArea: 'spot',
+    selection: initialSelection(),
     colour: fromKelvin(3200),
     stops: 0,
     second: { colour: fromKelvin(12000), stops: 0 },

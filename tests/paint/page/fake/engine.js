@@ -128,6 +128,32 @@ export class FakeEngine {
     return new Uint8ClampedArray(4 * width * height).fill(180);
   }
 
+  /** What is selected: whole rectangles alone. */
+  selections = {
+    current: null,
+    width: 0,
+    revision: 0,
+    summary: () => this.selections.current && { revision: this.selections.revision, ...this.selections.about },
+    select: async (part, options = {}) => {
+      this.calls.push(['select', part, options]);
+      const { w, h } = this.room;
+      const mask = new Uint8Array(w * h);
+      const [[x0, y0], [x1, y1]] = part.kind === 'rectangle' ? part.corners : [[0, 0], [w, h]];
+      for (let y = y0; y < Math.min(h, y1); y += 1) mask.fill(255, y * w + x0, y * w + Math.min(w, x1));
+      const bounds = [y0, Math.min(h, y1), x0, Math.min(w, x1)];
+      this.setSelection({ mask, bounds }, { bounds, share: 0.25, isFaint: false });
+    },
+    change: (change) => {
+      this.calls.push(['changeSelection', change]);
+      if (change.kind === 'none') this.setSelection(null);
+    },
+  };
+  setSelection(current, about = {}) {
+    Object.assign(this.selections, { current, about, width: this.room.w });
+    this.selections.revision += 1;
+    this.tell('selection', {});
+  }
+
   zoomAt(x, y, factor) {
     const { zoom, pan } = this.shown;
     const pane =

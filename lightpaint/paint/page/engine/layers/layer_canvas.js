@@ -54,7 +54,7 @@ export class LayerCanvas extends PaintCanvas {
     const change = this.isMask ? this.maskChange(effect) : this.paintChange(effect);
     const { image, importance } = this;
     this.visitTiles(region, false, (tile, q, p) => {
-      const covered = tile.coverage[q];
+      const covered = this.selectedPart(tile.coverage[q], p);
       if (covered <= 0) return;
       change(tile, q, p, covered);
       if (importance[p] >= MIN_COVERAGE) return;

@@ -40,6 +40,8 @@ export class LayerStrokes {
     this.previous = { activeId: PAINTING_ID, isWishDone: false };
     /** The canvas of the last stroke on a layer, for the next one. @type {LayerCanvas | null} */
     this.lastCanvas = null;
+    /** What strokes keep to; null for everything. @type {import("../paint_canvas.js").Selection | null} */
+    this.selection = null;
   }
 
   /** Make a layer active, for the brush to paint. @param {number} id */
@@ -85,6 +87,7 @@ export class LayerStrokes {
     this.isNew = !this.mirror.layer(found.id);
     if (this.isNew) this.mirror.change({ layers: [found] });
     this.canvas = found.id === PAINTING_ID ? picture.painting : this.canvasOf(found);
+    this.canvas.selection = this.selection;
     return this.canvas;
   }
 
@@ -111,8 +114,11 @@ export class LayerStrokes {
     const area = areaName(this.objectName(object ?? painting.objectAt(x, y)));
     if (tool === 'adjust') {
       const spot = area ? `Spot on ${area}` : 'Spot';
+      const whole = this.selection ? 'Selection' : 'Whole picture';
+      const isSelection = adjustedArea === 'selection' && this.selection !== null;
       const isSpot = object === undefined && (adjustedArea !== 'object' || !area);
-      return this.layerNew('adjust', { name: isSpot ? spot : area || 'Whole picture' });
+      const name = isSelection ? whole : isSpot ? spot : area || whole;
+      return this.layerNew('adjust', { name });
     }
     if (tool === 'fill') return this.layerNew('paint', { name: area || 'Fill' });
     if (tool === 'weight') return this.weighing(importance);

@@ -1,0 +1,126 @@
+/** The settings of selecting, and what happens to them when something is selected. */
+
+/** @typedef {import("../engine_interface.js").Engine} Engine */
+/** @typedef {import("../engine_interface.js").Kind} Kind */
+/** @typedef {import("../ui_state.js").Ui} Ui */
+/** @typedef {import("../ui_state.js").UiStore} UiStore */
+/** @typedef {import("../../engine/selection/mask_operations.js").Mode} Mode */
+/** @typedef {import("../../engine/selection/polygon_mask.js").Corner} Corner */
+/** @typedef {import("../../engine/selection/selections.js").Part} Part */
+
+/** What a press on the pictures selects.
+ * @typedef {"rectangle" | "ellipse" | "lasso" | "object" | "colour"} Shape */
+/** What is selected by numbers, and from lists.
+ * @typedef {"rectangle" | "ellipse" | "object" | "light" | "brightness"} TypedKind */
+
+/**
+ * @typedef {object} SelectionUi
+ * @property {import("../../engine/selection/selections.js").Summary | null} current null while
+ *   everything can be painted
+ * @property {Shape} shape
+ * @property {Mode} mode how a new part joins what is selected
+ * @property {number} feather width of a new part's soft edge, in pixels
+ * @property {number} tolerance of a selection by colour, in ΔE
+ * @property {"ants" | "tint"} show
+ * @property {{shape: Shape, corners: Corner[], mode: Mode} | null} draft a shape that is being drawn
+ * @property {TypedKind} kind of the panel
+ * @property {{x: number, y: number, width: number, height: number}} box
+ * @property {string} object name of that in the panel, "" for none
+ * @property {string} light
+ * @property {"painting" | "solution"} picture whose brightness counts
+ * @property {[low: number, high: number]} brightness
+ * @property {number} pixels by which the selection grows, shrinks or fades
+ * @property {Ui["adjustedArea"]} areaBefore what a drag adjusted before something was selected
+ */
+
+/** @type {{shape: Shape, label: string, icon: string, hint: string}[]} */
+export const SHAPES = [
+  { shape: 'rectangle', label: 'Rectangle', icon: 'rectangle', hint: 'Drag from corner to corner.' },
+  { shape: 'ellipse', label: 'Ellipse', icon: 'ellipse', hint: 'Drag from corner to corner.' },
+  { shape: 'lasso', label: 'Lasso', icon: 'lasso', hint: 'Drag around what you want.' },
+  { shape: 'object', label: 'Object', icon: 'object', hint: 'Click an object.' },
+  { shape: 'colour', label: 'Colour', icon: 'wand', hint: 'Click a colour in a picture.' },
+];
+
+/** @type {{value: Mode, label: string, icon: string, tip: string}[]} */
+export const MODES = [
+  { value: 'replace', label: 'New', icon: 'join-replace', tip: 'Select only the new part' },
+  { value: 'add', label: 'Add', icon: 'join-add', tip: 'Add to the selection (Shift)' },
+  { value: 'subtract', label: 'Subtract', icon: 'join-subtract', tip: 'Take from it (Alt)' },
+  {
+    value: 'intersect',
+    label: 'Intersect',
+    icon: 'join-intersect',
+    tip: 'Keep what is in both (Shift Alt)',
+  },
+];
+
+/** @returns {SelectionUi} */
+export function initialSelection() {
+  return {
+    current: null,
+    shape: 'rectangle',
+    mode: 'replace',
+    feather: 0,
+    tolerance: 12,
+    show: 'ants',
+    draft: null,
+    kind: 'rectangle',
+    box: { x: 0, y: 0, width: 100, height: 100 },
+    object: '',
+    light: '',
+    picture: 'painting',
+    brightness: [60, 100],
+    pixels: 8,
+    areaBefore: 'spot',
+  };
+}
+
+/** @param {UiStore} store @param {Partial<SelectionUi>} changes */
+export function updateSelection(store, changes) {
+  store.set((ui) => ({ selection: { ...ui.selection, ...changes } }));
+}
+
+/** Choose the tool that selects; if it is chosen already, its next shape. @param {UiStore} store */
+export function chooseSelect(store) {
+  const { tool, selection, state } = store.value;
+  const hasObjects = state?.objects?.length > 0;
+  const shapes = SHAPES.map(({ shape }) => shape).filter((x) => x !== 'object' || hasObjects);
+  const next = shapes[(shapes.indexOf(selection.shape) + 1) % shapes.length];
+  if (tool === 'select') updateSelection(store, { shape: next });
+  else store.set({ tool: 'select' });
+}
+
+/** Take what the engine has selected. Adjustments apply to it until nothing is selected any more.
+ * @param {Engine} engine @param {Ui} ui @returns {Partial<Ui>} */
+export function selectionUpdate(engine, ui) {
+  const { selection, adjustedArea } = ui;
+  const current = engine.selections.summary();
+  const isNew = current !== null && selection.current === null;
+  const isLost = current === null && adjustedArea === 'selection';
+  return {
+    selection: {
+      ...selection,
+      current,
+      areaBefore: isNew && adjustedArea !== 'selection' ? adjustedArea : selection.areaBefore,
+    },
+    ...(isNew ? { adjustedArea: 'selection' } : {}),
+    ...(isLost ? { adjustedArea: selection.areaBefore } : {}),
+  };
+}
+
+/** Return how a part joins the selection, with Shift and Alt as in other paint programs.
+ * @param {{shiftKey: boolean, altKey: boolean}} event @param {Mode} mode @returns {Mode} */
+export function modeOf({ shiftKey, altKey }, mode) {
+  if (shiftKey && altKey) return 'intersect';
+  if (shiftKey) return 'add';
+  return altKey ? 'subtract' : mode;
+}
+
+/** Return how much is selected, in words. @param {SelectionUi} selection */
+export function selectedText({ current }) {
+  if (!current) return 'Nothing is selected: paint goes everywhere.';
+  const percent = 100 * current.share;
+  const share = percent < 0.1 ? 'Less than 0.1' : percent.toFixed(percent < 10 ? 1 : 0);
+  return `${share} % of the picture is selected.`;
+}
