@@ -61,6 +61,8 @@ export class PaintCanvas {
     this.importanceFactor = 1;
     /** What strokes keep to; null for everything. @type {Selection | null} */
     this.selection = null;
+    /** A number that grows with every change. */
+    this.revision = 0;
   }
 
   /** @returns {Region} */
@@ -119,6 +121,7 @@ export class PaintCanvas {
   /** Clear the coverage and restore all pixels. @returns {Region | null} what has changed */
   uncover() {
     const { region } = this;
+    this.revision += 1;
     if (region)
       this.visitTiles(region, false, (tile, q, p) => {
         this.restorePixel(tile, q, p);
@@ -130,6 +133,7 @@ export class PaintCanvas {
   /** Apply the stroke's effect to the pixels.
    * @param {Region} region @param {Effect} effect */
   apply(region, effect) {
+    this.revision += 1;
     const change = pixelChange(this, effect);
     const { importance, image, present } = this;
     this.visitTiles(region, false, (tile, q, p) => {
@@ -166,6 +170,7 @@ export class PaintCanvas {
    * @param {Float32Array} importance */
   set([top, bottom, left, right], image, importance) {
     const width = right - left;
+    this.revision += 1;
     for (let y = top, source = 0; y < bottom; y++, source += width) {
       const destination = y * this.width + left;
       this.image.set(image.subarray(3 * source, 3 * (source + width)), 3 * destination);
@@ -182,6 +187,7 @@ export class PaintCanvas {
    * @param {Uint16Array} present */
   setPresent(present) {
     this.present = present;
+    this.revision += 1;
     for (let p = 0; p < this.importance.length; p++)
       if (!this.importance[p])
         for (let i = 3 * p; i < 3 * p + 3; i++) this.image[i] = VALUES[present[i]];

@@ -82,7 +82,7 @@ export class LayerMirror {
       for (const { id, revision } of known.layers)
         if (id === PAINTING_ID || picture.pixels.has(id)) this.revisions.set(id, revision);
     const changed = this.show(known.layers.map(plainLayer));
-    if (picture && !isOther) this.redraw(picture.compose(picture.boundsOf(changed)));
+    if (picture && !isOther) this.redraw(picture.compose(picture.boundsOf(changed), changed));
     if (picture?.isPlain) {
       // A patch has, or will have, the pixels of a painting that is alone.
       const painting = known.layers.find(({ id }) => id === PAINTING_ID);
@@ -120,7 +120,7 @@ export class LayerMirror {
     if (picture && order && !order.includes(PAINTING_ID)) clear(picture.painting);
     const changed = this.show(withLayers(this.list, layers, order));
     if (order && !order.includes(PAINTING_ID)) changed.push(PAINTING_ID);
-    if (picture) this.redraw(picture.compose(picture.boundsOf(changed)));
+    if (picture) this.redraw(picture.compose(picture.boundsOf(changed), changed));
     this.listener.onChange();
   }
 
@@ -244,6 +244,7 @@ export class LayerMirror {
     const { picture } = this;
     if (!picture) return;
     picture.ground = ground;
+    picture.groundRevision += 1;
     picture.isPartial = !picture.isPlain;
     if (!this.isLoading && !this.missing().length) this.redraw(picture.complete());
   }

@@ -3,6 +3,7 @@ import { VALUES } from '../../../../viewer/drawing/half_floats.js';
 import { applyLayer } from './layer_composition.js';
 import { isPlain, PAINTING_ID } from './layer_list.js';
 import { enclosing, tileKeys, tileRegion } from './layer_pixels.js';
+import { LowerLayers } from './lower_layers.js';
 
 /** @typedef {import("../message_frames.js").Region} Region */
 /** @typedef {import("../messages.js").Layer} Layer */
@@ -24,17 +25,23 @@ export class LayerPicture {
     this.shown = [];
     /** The present look in float32, (h, w, 3). @type {Float32Array | null} */
     this.ground = null;
+    /** How often it was set. */
+    this.groundRevision = 0;
     /** Light and importance that are drawn: the painting's own while it is alone. */
     this.image = painting.image;
     this.importance = painting.importance;
     /** Whether parts are not composed yet. */
     this.isPartial = false;
+    this.lower = new LowerLayers();
+    /** Each shown layer as text. @type {string[]} */
+    this.texts = [];
   }
 
   /** Show other layers. The caller composes what has changed.
    * @param {ShownLayer[]} shown @param {Layer[]} list */
   show(shown, list) {
     this.shown = shown;
+    this.texts = shown.map((layer) => JSON.stringify(layer));
     const { painting } = this;
     const isOwn = this.image !== painting.image;
     if (isPlain(shown, list)) {
@@ -65,12 +72,16 @@ export class LayerPicture {
   }
 
   /** Compose the layers again in a region. @param {Region | null} region
+   * @param {number[]} [changed] ids of the layers that have changed; all may have, if not given
    * @returns {Region | null} the region that may have changed */
-  compose(region) {
+  compose(region, changed = []) {
     if (!region || this.isPlain) return region;
     const keys = tileKeys(this.size, region);
+    const places = changed.map((id) => this.placeOf(id));
+    const start = places.length ? Math.min(...places) : 0;
+    const state = this.stateBelow(start);
     for (const key of keys) {
-      const { light, counts } = this.tile(key);
+      const { light, counts } = this.tile(key, null, start, state);
       this.set(tileRegion(this.size, key), light, counts);
     }
     return enclosing(keys.map((key) => tileRegion(this.size, key)));
@@ -110,13 +121,43 @@ export class LayerPicture {
     return { colour: tile?.image ? [r, g, b] : null, coverage: tile?.coverage[q] ?? 0 };
   }
 
+  /** Return how many shown layers lie below one; 0 for a layer that is not shown.
+   * @param {number} id */
+  placeOf(id) {
+    return Math.max(0, this.shown.findIndex((layer) => layer.id === id));
+  }
+
   /** Return light and importance of a tile. @param {number} key
-   * @param {number | null} [without] id of a layer to leave out @returns {Composed} */
-  tile(key, without = null) {
+   * @param {number | null} [without] id of a layer to leave out
+   * @param {number} [start] how many of the lowest layers to keep for the next time
+   * @param {string} [state] what these depend on
+   * @returns {Composed} */
+  tile(key, without = null, start = 0, state = this.stateBelow(start)) {
+    const { shown } = this;
+    const composed = start
+      ? this.lower.tile(state, key, () => this.apply(key, shown.slice(0, start)))
+      : undefined;
+    const upper = shown.slice(start).filter(({ id }) => id !== without);
+    return this.apply(key, upper, composed);
+  }
+
+  /** Return what the composition of the lowest layers depends on. @param {number} count */
+  stateBelow(count) {
+    const { painting, pixels, shown, texts } = this;
+    const revisions = shown
+      .slice(0, count)
+      .map(({ id }) => (id === PAINTING_ID ? painting : pixels.get(id))?.revision ?? 0);
+    const look = this.ground ? this.groundRevision : `${painting.revision} of halves`;
+    return [look, ...revisions, ...texts.slice(0, count)].join();
+  }
+
+  /** Apply layers, the lowest first. @param {number} key @param {ShownLayer[]} layers
+   * @param {Composed} [composed] what lies below, which is changed; the present look if not given
+   * @returns {Composed} */
+  apply(key, layers, composed) {
     const area = tileRegion(this.size, key);
-    const composed = { light: this.groundOf(area), counts: new Float32Array(pixelCount(area)) };
-    for (const layer of this.shown) {
-      if (layer.id === without) continue;
+    composed ??= { light: this.groundOf(area), counts: new Float32Array(pixelCount(area)) };
+    for (const layer of layers) {
       const tile =
         layer.id === PAINTING_ID ? this.paintingTile(area) : this.pixels.get(layer.id)?.tiles.get(key);
       if (tile) applyLayer(layer, tile, composed);

@@ -213,7 +213,8 @@ export class LayerStrokes {
         this.mirror.show(withLayers(list, [layer]));
       canvas.pixels.put(region, { image: canvas.image, coverage: canvas.importance });
     }
-    return picture.compose(region) ?? region;
+    const changed = canvas instanceof LayerCanvas ? canvas.layer.id : PAINTING_ID;
+    return picture.compose(region, [changed]) ?? region;
   }
 
   /** Finish the stroke. @returns {Layer | null} the properties of its layer; null for the painting
@@ -272,10 +273,11 @@ export class LayerStrokes {
       [0, 0, 0],
       [0, 0, 0],
     ];
+    const start = picture?.placeOf(id) ?? 0;
     const step = Math.max(1, Math.floor(all.length / LOOKED_AT));
     for (let k = 0; picture && k < all.length; k += step) {
       const [key, { coverage }] = all[k];
-      const [without, whole] = [picture.tile(key, id).light, picture.tile(key).light];
+      const [without, whole] = [id, null].map((left) => picture.tile(key, left, start).light);
       for (let p = 0; p < coverage.length; p += 3)
         for (let c = 0; c < 3; c++) {
           before[c] += coverage[p] * without[3 * p + c];
