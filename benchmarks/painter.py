@@ -20,8 +20,8 @@ With --moves, the processor's time of Python for each answer while a light of th
 at 960x540: its plane along frozen paths, the lights solved around it, and the picture that the page
 fetches.
 
-With --layers, the same for the brush on the topmost of N layers, every fifth of which covers the
-whole picture, beside that on one.
+With --layers, the same for the brush on the topmost of N layers, in turns with that on one, and
+what layers cost at the start of a session; with --session, its part of a stroke alone.
 
 With --answers, how long a small answer over a connection that is kept takes, beside what it takes
 where the system may wait for more before it sends (Nagle).
@@ -114,6 +114,7 @@ def main() -> None:
     parser.add_argument("--start", metavar="SCENE")
     parser.add_argument("--times", type=int, default=5)
     parser.add_argument("--layers", type=int, metavar="N")
+    parser.add_argument("--session", action="store_true", help="with --layers: without pages")
     parser.add_argument("--answers", action="store_true")
     parser.add_argument("--moves", metavar="SCENE")
     options = parser.parse_args()
@@ -128,7 +129,14 @@ def main() -> None:
         return
     cases = [tuple(map(int, case.split("x"))) for case in options.cases]
     if options.layers:
-        print_layers(cases[0], options.layers, options.strokes, options.view)
+        import painter_layers
+
+        basis = made_up(cases[0][0], cases[0][2], cases[0][1])
+        painter_layers.print_session(basis, options.layers, options.strokes)
+        if not options.session:
+            painter_layers.print_opening(cases[0])
+            opened = partial(Opened, view=options.view)
+            painter_layers.print_pages(opened, cases[0], options.layers, options.strokes)
         return
     print_session(cases[0])
     print("\nthrough the page, ms from pointer to screen")
@@ -249,42 +257,6 @@ def trim() -> None:
     gc.collect()
     with suppress(AttributeError, OSError):
         ctypes.CDLL(None).malloc_trim(0)
-
-
-#: Makes layers, as adjustments of the whole picture and as strokes of their own.
-LAYERS = """async (count) => {
-  const { engine } = document.getElementById('lightpaint').painter;
-  const [height, width] = engine.screen.size, { mirror } = engine;
-  for (let k = 0; k < count; k++) {
-    if (k % 5 === 0) engine.adjust({ stops: 0.05, mired: 5, object: null });
-    else {
-      engine.layers.isWishDone = true;
-      engine.begin({ x: 0.2 * width, y: (0.1 + 0.04 * k) * height, pressure: 1 });
-      engine.move([{ x: 0.8 * width, y: (0.1 + 0.04 * k) * height, pressure: 1 }]);
-      engine.end();
-    }
-    while (mirror.strokes.isPending) await new Promise((done) => setTimeout(done, 10));
-  }
-  engine.layers.isWishDone = true;
-}"""
-
-
-def print_layers(case: tuple[int, ...], count: int, strokes: int, view: str | None) -> None:
-    """Print times under the brush on one layer and on the topmost of several, and their ratio."""
-    n, width, height = case
-    print(f"{n} lights at {width}x{height}, ms from pointer to screen")
-    print(f"{'layers':>8s} {'median':>7s} {'99 %':>6s} {'answers':>8s}")
-    ratio = np.ones(2)
-    for layers in (1, count):
-        with Opened(case, {}, view=view) as opened:
-            opened.page.evaluate(LAYERS, layers - 1)
-            opened.page.wait_for_timeout(3000)
-            opened.page.evaluate("() => { window.times.length = 0; }")
-            _, times = opened.painted(strokes)
-        middle, worst = np.percentile(times, [50, 99])
-        ratio = np.array([middle, worst]) / ratio
-        print(f"{layers:8d} {middle:7.0f} {worst:6.0f} {len(times):8d}", flush=True)
-    print(f"{'ratio':>8s} {ratio[0]:7.2f} {ratio[1]:6.2f}")
 
 
 class Opened:

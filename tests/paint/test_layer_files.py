@@ -32,6 +32,7 @@ from lightpaint.paint.layers.layer_files import (
     write_layers_exr,
     write_layers_openraster,
 )
+from lightpaint.paint.layers.layer_pixels import LayerPixels
 from lightpaint.paint.layers.layer_stack import LayerStack
 from lightpaint.paint.layers.layered_paintings import LayeredPaintings
 from lightpaint.paint.layers.view_layers import ViewLayers
@@ -77,13 +78,19 @@ def without_ids(session: Session) -> list[dict[str, Any]]:
     ]
 
 
+def put_on(layer: LayerPixels, pixels: Pixels) -> LayerPixels:
+    height, width = layer.size
+    layer.put((0, height, 0, width), pixels)
+    return layer
+
+
 def layered(*layers: tuple[Layer, Any, Any], group: Layer | None = None) -> ViewLayers:
     """Layers with a colour and a coverage, and a group without."""
     pixels = {}
     for layer, colour, coverage in layers:
         image = np.broadcast_to(np.asarray(colour, np.float32), (*SIZE, 3)).astype(np.float32)
         mask = np.broadcast_to(np.float32(coverage), SIZE).astype(np.float32)
-        pixels[layer.id] = WHOLE, Pixels(image, mask)
+        pixels[layer.id] = put_on(LayerPixels(SIZE), Pixels(image, mask))
     groups = [] if group is None else [group]
     return ViewLayers(LayerStack.of([*(x for x, *_ in layers), *groups]), pixels, CURRENT)
 
@@ -151,7 +158,7 @@ def test_an_openraster_file_shows_the_target(tmp_path: Path, seed: int) -> None:
     below = Pixels.unpainted(CURRENT)
     for layer in view.layers.shown():
         if layer.id in view.pixels:
-            below = compose_layer(layer, view.pixels[layer.id][1], below)
+            below = compose_layer(layer, view.pixels[layer.id].part(WHOLE), below)
     path = tmp_path / "layers.ora"
     write_layers_openraster(path, view, below.image, TRANSFORM)
     size, items = read_openraster(path)
@@ -243,7 +250,7 @@ def test_damaged_files_are_refused_or_read(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     pixels = Pixels(*(rng.random(shape, np.float32) for shape in ((6, 5, 3), (6, 5))))
     layers = [Layer(1, "paint", group=2), Layer(2, "group", "Night"), Layer(3, "pixels")]
-    named = dict.fromkeys((1, 3), ((0, 6, 0, 5), pixels))
+    named = dict.fromkeys((1, 3), put_on(LayerPixels((6, 5)), pixels))
     view = ViewLayers(LayerStack.of(layers), named, CURRENT[:6, :5])
     exr, openraster = tmp_path / "layers.exr", tmp_path / "layers.ora"
     write_layers_exr(exr, view, "eye")

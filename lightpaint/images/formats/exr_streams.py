@@ -29,6 +29,10 @@ PLAIN_HEAD_BYTES = 2048
 PLAIN, ZIPPED, LEVEL = 0, 3, 4
 
 
+#: Returns all channels of a part from one row to another.
+Rows = Callable[[int, int], Channels]
+
+
 @dataclass(frozen=True)
 class PartHead:
     """The header of a part.
@@ -103,16 +107,18 @@ class PartHead:
         ]
         return b"".join([*entries, b"\0"])
 
-    def packed(self, channels: Channels) -> Iterator[tuple[int, bytes]]:
+    def packed(self, channels: "Channels | Rows") -> Iterator[tuple[int, bytes]]:
         """Yield the first line and the bytes of each chunk of pixels."""
         for first in range(0, self.size[0], self.lines):
-            rows = slice(first, first + self.lines)
+            last = min(first + self.lines, self.size[0])
+            if callable(channels):
+                chunk = channels(first, last)
+            else:
+                chunk = {name: pixels[first:last] for name, pixels in channels.items()}
             # A line stores its channels one after the other.
             parts = [
-                np.ascontiguousarray(channels[name][rows])
-                .view(np.uint8)
-                .reshape(-1, self._bytes(n))
-                for name, n in ((name, self.channels[name].itemsize) for name in sorted(channels))
+                np.ascontiguousarray(chunk[name]).view(np.uint8).reshape(last - first, -1)
+                for name in sorted(self.channels)
             ]
             data = np.concatenate(parts, axis=1).tobytes()
             if self.is_packed:
@@ -120,13 +126,10 @@ class PartHead:
                 data = small if len(small) < len(data) else data
             yield first, data
 
-    def _bytes(self, itemsize: int) -> int:
-        return self.size[1] * itemsize
-
 
 def write_streamed(
     path: Path,
-    parts: Iterable[tuple[PartHead, Channels]],
+    parts: Iterable[tuple[PartHead, Channels | Rows]],
     *,
     room: int,
     texts: Callable[[], Mapping[str, str]] = dict,
@@ -135,10 +138,11 @@ def write_streamed(
 
     Pixels are written as they arrive, after space reserved for the headers.
 
-    parts: the header of each and its channels, of the types and size in it; all have the same
-    display window. room: largest size of all headers in bytes, the sum of `room_for`. texts:
-    returns attributes of the first header, which also records the version of lightpaint; called
-    after all parts. Raises OutputError for every refusal of the system.
+    parts: the header of each and its channels, of the types and size in it, or what returns rows of
+    them, which is called with the first row and the end; all have the same display window. room:
+    largest size of all headers in bytes, the sum of `room_for`. texts: returns attributes of the
+    first header, which also records the version of lightpaint; called after all parts. Raises
+    OutputError for every refusal of the system.
     """
     with replacing(path) as temporary, temporary.open("wb") as file:
         file.seek(room)

@@ -7,7 +7,7 @@ thumbnail of it.
 
 import tempfile
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
@@ -53,19 +53,20 @@ class RasterLayer:
 
 @dataclass(frozen=True, eq=False)
 class RasterGroup:
-    """Layers, the lowest first, with a name and an eye of their own."""
+    """Layers, the lowest first, with a name and an eye of their own. They are written in one go."""
 
     name: str
-    layers: Sequence[RasterLayer]
+    layers: Iterable[RasterLayer]
     is_visible: bool = True
 
 
 def write_openraster(
-    path: Path, layers: Sequence[RasterLayer | RasterGroup], merged: Floats, texts: dict[str, str]
+    path: Path, layers: Iterable[RasterLayer | RasterGroup], merged: Floats, texts: dict[str, str]
 ) -> None:
     """Write layers, the lowest first, as an OpenRaster file, atomically.
 
-    merged: (h, w, 3), display values of what they come to. texts: to store in its PNG.
+    layers: one is in memory at a time, if they are made as they are asked for. merged: (h, w, 3),
+    display values of what they come to. texts: to store in its PNG.
     """
     height, width = merged.shape[:2]
     image = ElementTree.Element("image", version=VERSION, w=str(width), h=str(height))
@@ -78,7 +79,7 @@ def write_openraster(
             archive.writestr("mimetype", MEDIA_TYPE)
             for parent, layer in _placed(root, layers):
                 source = f"data/layer{next(numbers)}.png"
-                parent.append(_element(layer, source))
+                parent.insert(0, _element(layer, source))
                 write_png_16(picture, layer.display, profile=profile)
                 archive.write(picture, source)
             write_png_16(picture, merged, texts=texts)
@@ -179,18 +180,19 @@ def _check_size(height: int, width: int) -> None:
 
 
 def _placed(
-    root: ElementTree.Element, layers: Sequence[RasterLayer | RasterGroup]
+    root: ElementTree.Element, layers: Iterable[RasterLayer | RasterGroup]
 ) -> Iterator[tuple[ElementTree.Element, RasterLayer]]:
-    """Yield each layer with the element that holds it, the topmost first."""
-    for item in reversed(layers):
+    """Yield each layer with the element that holds it, the lowest first."""
+    for item in layers:
         if isinstance(item, RasterLayer):
             yield root, item
             continue
-        inner = ElementTree.SubElement(
-            root, "stack", name=_xml_text(item.name), opacity="1.0", visibility=_eye(item)
+        inner = ElementTree.Element(
+            "stack", name=_xml_text(item.name), opacity="1.0", visibility=_eye(item)
         )
         inner.set("composite-op", OVER)
-        for layer in reversed(item.layers):
+        root.insert(0, inner)
+        for layer in item.layers:
             yield inner, layer
 
 

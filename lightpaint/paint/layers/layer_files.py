@@ -5,19 +5,21 @@ look like: each layer as the light that it comes to, through the view transform 
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.images.formats.exr import ExrPart, write_parts
+from lightpaint.images.formats.exr_streams import PartHead, write_streamed
 from lightpaint.images.formats.openraster_stack import RasterGroup, RasterLayer, write_openraster
 from lightpaint.images.formats.png import TRANSFORM_KEY
 from lightpaint.paint.layers.layer import Layer
-from lightpaint.paint.layers.layer_pixels import is_empty
+from lightpaint.paint.layers.layer_pixels import is_empty, relative
 from lightpaint.paint.layers.view_layers import LayerPicture, ViewLayers
 from lightpaint.paint.store.canvas_pixels import Region, slices
 
@@ -30,33 +32,62 @@ LOOK_NAME = "Unpainted"
 #: Channels with the importance of a layer of strokes, and with its marks "this or brighter".
 IMPORTANCE, MARKS = "W", ("at_least_R", "at_least_G", "at_least_B")
 
+#: Bytes before the pixels of a file beside its headers.
+ROOM_BYTES = 256
+
+_Plane = npt.NDArray[np.float32]
+
 
 def write_layers_exr(path: Path, view: ViewLayers, sensor: str) -> None:
-    """Write the layers of a view as an EXR, in linear light, atomically.
+    """Write the layers of a view as an EXR, in linear light, atomically and some rows at a time.
 
     The first part has a picture for each layer, colour multiplied by alpha. The second part, which
     paint programs ignore, has the importance of strokes and their marks.
     """
     names = exr_names(view.layers.layers)
     look = _numbered(len(view.layers) + 1, LOOK_NAME, len(view.layers))
-    pictures = _shown_channels(look, view.current, np.ones(view.size, np.float32))
-    numbers: dict[str, npt.NDArray[np.float32]] = {}
-    for picture in view.pictures():
-        if is_empty(picture.region):
-            continue
-        name, pixels, kind = names[picture.layer.id], picture.pixels, picture.layer.kind
-        light = pixels.image if kind in ("pixels", "paint") else picture.light
-        alpha = _spread(picture.coverage, picture.region, view.size)
-        pictures |= _shown_channels(name, _spread(light, picture.region, view.size), alpha)
-        if kind == "pixels":
-            numbers[f"{name}.{IMPORTANCE}"] = _spread(pixels.importance, picture.region, view.size)
-        if pixels.at_least is not None:
-            marks = _spread(pixels.at_least.astype(np.float32), picture.region, view.size)
-            numbers |= {f"{name}.{MARKS[k]}": _plane(marks, k) for k in range(3)}
+
+    def shown(top: int, bottom: int) -> dict[str, _Plane]:
+        size = bottom - top, view.size[1]
+        rows = _shown_channels(look, view.current[top:bottom], np.ones(size, np.float32))
+        for picture in view.pictures((top, bottom)):
+            layer = picture.layer
+            if layer.id in view.pixels:
+                is_painted = layer.kind in ("pixels", "paint")
+                light = picture.pixels.image if is_painted else picture.light
+                inner = relative(picture.region, (top, bottom, 0, size[1]))
+                alpha = _spread(picture.coverage, inner, size)
+                rows |= _shown_channels(names[layer.id], _spread(light, inner, size), alpha)
+        return rows
+
+    def numbers(top: int, bottom: int) -> dict[str, _Plane]:
+        rows: dict[str, _Plane] = {}
+        for number in weighted:
+            pixels = view.pixels[number].part((top, bottom, 0, view.size[1]))
+            rows[f"{names[number]}.{IMPORTANCE}"] = pixels.importance
+            if number in marked:
+                none = np.zeros(pixels.image.shape, bool)
+                marks = none if pixels.at_least is None else pixels.at_least
+                rows |= {
+                    f"{names[number]}.{channel}": marks[..., k].astype(np.float32)
+                    for k, channel in enumerate(MARKS)
+                }
+        return rows
+
+    weighted = [x.id for x in view.layers if x.kind == "pixels" and x.id in view.pixels]
+    marked = {number for number in weighted if view.pixels[number].is_marked}
     layers = [layer.as_json() | {"layer": names[layer.id]} for layer in view.layers]
     text = json.dumps({"format": FORMAT, "sensor": sensor, "layers": layers}, ensure_ascii=True)
-    parts = [ExrPart("layers", pictures, {KEY: text})]
-    write_parts(path, [*parts, ExrPart("importance", numbers)] if numbers else parts)
+    texts = {KEY: text}
+    parts = [(PartHead("layers", view.size, _kinds(shown(0, 1)), texts), shown)]
+    if weighted:
+        parts.append((PartHead("importance", view.size, _kinds(numbers(0, 1))), numbers))
+    room = sum(len(head.encoded()) + 8 * head.chunks for head, _ in parts) + ROOM_BYTES
+    write_streamed(path, parts, room=room)
+
+
+def _kinds(rows: Mapping[str, _Plane]) -> dict[str, np.dtype[Any]]:
+    return {name: pixels.dtype for name, pixels in rows.items()}
 
 
 def exr_names(layers: Sequence[Layer]) -> dict[int, str]:
@@ -81,21 +112,34 @@ def write_layers_openraster(
 
     merged: (h, w, 3) linear, the target that they come to.
     """
-    groups: dict[int, list[RasterLayer]] = {
-        layer.id: [] for layer in view.layers if layer.kind == "group"
-    }
-    opaque = np.ones((*view.size, 1), np.float32)
-    display = np.concatenate([transform.encode(view.current), opaque], axis=-1)
-    items: list[RasterLayer | RasterGroup] = [RasterLayer(LOOK_NAME, display)]
-    for picture in view.pictures():
-        layer = picture.layer
-        if layer.kind == "group":
-            items.append(RasterGroup(layer.name, groups[layer.id], layer.is_visible))
-        elif not is_empty(picture.region) and layer.kind != "weigh":  # importance has no look
-            siblings = items if layer.group is None else groups[layer.group]
-            siblings.append(_raster_layer(picture, transform))
     texts = {TRANSFORM_KEY: f"{transform.name} {transform.stops!r}"}
+    items = _raster_items(view, transform)
     write_openraster(path, items, transform.encode(merged), texts)
+
+
+def _raster_items(
+    view: ViewLayers, transform: ViewTransform
+) -> Iterator[RasterLayer | RasterGroup]:
+    """Yield what an OpenRaster file shows, the lowest first, one picture after the other."""
+    opaque = np.ones((*view.size, 1), np.float32)
+    yield RasterLayer(LOOK_NAME, np.concatenate([transform.encode(view.current), opaque], axis=-1))
+
+    def group_of(picture: LayerPicture) -> int | None:
+        return picture.layer.id if picture.layer.kind == "group" else picture.layer.group
+
+    # The layers of a group follow each other, and lie directly below it.
+    for number, pictures in groupby(view.pictures(), group_of):
+        layers = (
+            _raster_layer(picture, transform)
+            for picture in pictures
+            # Importance has no look.
+            if picture.layer.kind not in ("group", "weigh") and not is_empty(picture.region)
+        )
+        if number is None:
+            yield from layers
+        else:
+            group = view.layers[number]
+            yield RasterGroup(group.name, layers, group.is_visible)
 
 
 def _numbered(number: int, name: str, count: int) -> str:

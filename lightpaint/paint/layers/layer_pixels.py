@@ -136,6 +136,11 @@ class LayerPixels:
         """True if no pixel of the view is uncovered."""
         return self.summary.least_coverage >= MIN_COVERAGE
 
+    @property
+    def is_marked(self) -> bool:
+        """True if any pixel has an "at least" mark."""
+        return any(tile.pixels.at_least is not None for tile in self._tiles.values())
+
     def part(self, region: Region) -> Pixels:
         """Return a copy of the pixels of a region."""
         top, bottom, left, right = region

@@ -10,7 +10,7 @@ from lightpaint.arrays import Floats
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.composition import MAX_LIGHT, adjusted, compose_layer
 from lightpaint.paint.layers.layer import MAX_STRENGTH, Layer
-from lightpaint.paint.layers.layer_pixels import is_empty
+from lightpaint.paint.layers.layer_pixels import LayerPixels, is_empty, relative, shared
 from lightpaint.paint.layers.layer_stack import LayerStack
 from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
 
@@ -37,19 +37,20 @@ class LayerPicture:
 
 @dataclass(frozen=True, eq=False)
 class ViewLayers:
-    """The layers of one view. pixels: of each, by id, in its region. current: the look below."""
+    """The layers of one view. pixels: of each, by id. current: the look below."""
 
     layers: LayerStack
-    pixels: Mapping[int, tuple[Region, Pixels]]
+    pixels: Mapping[int, LayerPixels]
     current: Floats
 
     @classmethod
     def of(cls, canvas: Canvas, layers: LayerStack) -> "ViewLayers":
-        """Return a copy of the layers of a canvas."""
-        pixels = {}
-        for number in layers.ids:
-            if not is_empty(bounds := canvas.layer(number).bounds):
-                pixels[number] = bounds, canvas.layer(number).part(bounds)
+        """Return a copy of the layers of a canvas, which shares the memory of their pixels."""
+        pixels = {
+            number: canvas.layer(number).copy()
+            for number in layers.ids
+            if not is_empty(canvas.layer(number).bounds)
+        }
         return cls(layers, pixels, canvas.current)
 
     @property
@@ -57,24 +58,33 @@ class ViewLayers:
         """(height, width) of the view."""
         return self.current.shape[0], self.current.shape[1]
 
-    def pictures(self) -> Iterator[LayerPicture]:
-        """Yield each layer, the lowest first; the layers of a group come before it."""
+    def pictures(self, rows: tuple[int, int] | None = None) -> Iterator[LayerPicture]:
+        """Yield each layer, the lowest first; the layers of a group come before it.
+
+        rows: the first row and the end of the part of the view in which to show them; None for all.
+        Each picture is made when it is asked for, and used before the next.
+        """
+        top, bottom = rows or (0, self.size[0])
+        part = top, bottom, 0, self.size[1]
         groups = {layer.id: layer for layer in self.layers if layer.kind == "group"}
-        empty = (0, 0, 0, 0), Pixels.unpainted(np.zeros((0, 0, 3), np.float32))
-        below = Pixels.unpainted(np.array(self.current, np.float32))
+        below = Pixels.unpainted(np.array(self.current[top:bottom], np.float32))
         for layer in self.layers:
-            region, pixels = self.pixels.get(layer.id, empty)
+            own = self.pixels.get(layer.id, LayerPixels(self.size))
+            region = shared(own.bounds, part)
+            region = (top, top, 0, 0) if is_empty(region) else region
+            pixels = own.part(region)
             group = groups.get(layer.id if layer.group is None else layer.group)
             strength, is_shown = layer.strength, layer.is_visible
             if group is not None and group is not layer:
                 strength = min(MAX_STRENGTH, strength * group.strength)
                 is_shown &= group.is_visible
             effective = replace(layer, strength=strength)
-            area = below.part(region)
+            inner = relative(region, part)
+            area = below.part(inner)
             light, coverage, opacity = _appearance(effective, pixels, area.image)
             yield LayerPicture(layer, region, pixels, light, coverage, opacity)
             if is_shown and strength > 0 and not is_empty(region):
-                below.image[slices(region)] = compose_layer(effective, pixels, area).image
+                below.image[slices(inner)] = compose_layer(effective, pixels, area).image
 
 
 def _appearance(layer: Layer, pixels: Pixels, below: _Array) -> tuple[_Array, _Array, float]:

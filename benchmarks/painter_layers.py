@@ -1,0 +1,200 @@
+"""Layers of a painting: what they cost under the brush, at the start and in memory.
+
+Run by `benchmarks/painter.py --layers N`. One layer and N are measured in turns, stroke by stroke,
+so that what else runs on the machine meets both; every fifth layer covers the whole picture.
+"""
+
+import hashlib
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import lightpaint as lp
+from lightpaint.paint import protocol
+from lightpaint.paint.layers.layer import Layer
+from lightpaint.paint.session.session import Session
+from lightpaint.paint.store.history_steps import Identity
+from lightpaint.paint.store.store import MemoryStore, Store
+from lightpaint.pipeline.job.settings import Settings
+
+#: Makes layers, as adjustments of the whole picture and as strokes of their own.
+LAYERS = """async (count) => {
+  const { engine } = document.getElementById('lightpaint').painter;
+  const [height, width] = engine.screen.size, { mirror } = engine;
+  for (let k = 0; k < count; k++) {
+    if (k % 5 === 0) engine.adjust({ stops: 0.05, mired: 5, object: null });
+    else {
+      engine.layers.isWishDone = true;
+      engine.begin({ x: 0.2 * width, y: (0.1 + 0.04 * k) * height, pressure: 1 });
+      engine.move([{ x: 0.8 * width, y: (0.1 + 0.04 * k) * height, pressure: 1 }]);
+      engine.end();
+    }
+    while (mirror.strokes.isPending) await new Promise((done) => setTimeout(done, 10));
+  }
+  engine.layers.isWishDone = true;
+}"""
+
+
+def made_session(basis: lp.Basis, count: int, store: Store) -> Session:
+    """A session with so many layers."""
+    height, width = basis.size
+    session = Session(
+        [basis], [basis.current_look], store, settings=Settings(), transform=lp.ViewTransform()
+    )
+    rng = np.random.default_rng(0)
+    for k in range(count):
+        if k % 5 == 0:
+            layer = Layer(k + 1, "adjust", f"Whole {k}", gain=1.03, tint=(1.01, 1.0, 0.99))
+            region, arrays = (0, height, 0, width), {"importance": np.ones(basis.size, np.float32)}
+        else:
+            layer = Layer(k + 1, "paint", f"1 stroke {k}")
+            y = int((0.1 + 0.8 * rng.random()) * height)
+            region = (max(0, y - 20), min(height, y + 20), int(0.2 * width), int(0.8 * width))
+            rows, columns = region[1] - region[0], region[3] - region[2]
+            soft = np.clip(1.2 - np.abs(np.arange(rows) - rows / 2) / 20, 0, 1)
+            look = basis.current_look[region[0] : region[1], region[2] : region[3]]
+            arrays = {
+                "image": (1.2 * look).astype(np.float32),
+                "importance": np.repeat(soft[:, None], columns, 1).astype(np.float32),
+            }
+        session.handle(protocol.Paint(k + 1, region, True, layer=k + 1, properties=layer), arrays)
+    return session
+
+
+def print_session(basis: lp.Basis, count: int, strokes: int) -> None:
+    """Print the processor's time of the session for a piece of a stroke, on one layer and on the
+    topmost and the lowest of several.
+    """
+    sessions = {
+        "the only layer": (made_session(basis, 1, _memory(basis)), 2),
+        f"the topmost of {count}": (made_session(basis, count - 1, _memory(basis)), count),
+        f"the second of {count}": (made_session(basis, count, _memory(basis)), 2),
+    }
+    height, width = basis.size
+    times: dict[str, list[float]] = {name: [] for name in sessions}
+    for stroke in range(strokes):
+        y = int((0.1 + 0.8 * (stroke * 0.37 % 1)) * height)
+        for k in range(30):
+            x = int((0.1 + 0.75 * k / 30) * width)
+            region = (max(0, y - 32), min(height, y + 32), x, x + 64)
+            shape = (region[1] - region[0], 64)
+            arrays = {
+                "image": np.full((*shape, 3), 0.3, np.float32),
+                "importance": np.full(shape, 0.7, np.float32),
+            }
+            for name, (session, number) in sessions.items():
+                known = number in session.views.layers.ids
+                layer = session.views.layers[number] if known else Layer(number, "paint")
+                request = protocol.Paint(
+                    1000 + stroke, region, k == 29, layer=number, properties=layer
+                )
+                start = time.process_time()
+                session.handle(request, arrays)
+                times[name].append(1e3 * (time.process_time() - start))
+    print("Python's part of a piece of a stroke, 64 x 64 pixels, ms of the processor")
+    base = np.percentile(times["the only layer"], [50, 99])
+    for name, values in times.items():
+        middle, worst = np.percentile(values, [50, 99])
+        print(
+            f"{name:20s} median {middle:6.1f} ({middle / base[0]:.2f}x)"
+            f"   99 % {worst:6.1f} ({worst / base[1]:.2f}x)",
+            flush=True,
+        )
+
+
+def print_pages(opened: Any, case: tuple[int, ...], count: int, strokes: int) -> None:
+    """Print times from pointer to screen through two pages in turns, and their ratios.
+
+    opened: returns an open painter of a case, as a context.
+    """
+    print(f"through the page, {case[0]} lights at {case[1]}x{case[2]}, in turns")
+    print(
+        f"{'layers':>8s} {'median':>7s} {'99 %':>6s} {'answers':>8s} {'server, ms CPU each':>20s}"
+    )
+    with opened(case, {}) as one, opened(case, {}) as many:
+        for page, layers in ((one, 1), (many, count)):
+            page.page.evaluate(LAYERS, layers - 1)
+            page.page.wait_for_timeout(3000)
+            page.page.evaluate("() => { window.times.length = 0; }")
+        spent = {id(page): 0.0 for page in (one, many)}
+        for number in range(strokes):
+            for page in (one, many):
+                before = _cpu_s(page.server.pid)
+                page.stroke(number)
+                spent[id(page)] += _cpu_s(page.server.pid) - before
+                page.page.wait_for_timeout(1500)
+        ratio = np.ones(3)
+        for page, layers in ((one, 1), (many, count)):
+            times = page.page.evaluate("() => window.times")
+            middle, worst = np.percentile(times, [50, 99])
+            each = 1e3 * spent[id(page)] / len(times)
+            ratio = np.array([middle, worst, each]) / ratio
+            print(
+                f"{layers:8d} {middle:7.0f} {worst:6.0f} {len(times):8d} {each:20.1f}", flush=True
+            )
+    print(f"{'ratio':>8s} {ratio[0]:7.2f} {ratio[1]:6.2f} {'':8s} {ratio[2]:20.2f}")
+
+
+def print_opening(case: tuple[int, ...], counts: tuple[int, ...] = (1, 200)) -> None:
+    """Print what opening a session with so many layers takes, each in a process of its own."""
+    print(f"opening a session of {case[0]} lights at {case[1]}x{case[2]}")
+    with tempfile.TemporaryDirectory() as folder:
+        for count in counts:
+            for way in ("make", "afresh", "open", "open"):
+                path = Path(folder) / f"{count}.lightpaint"
+                words = [way, str(path), str(count), "x".join(map(str, case))]
+                subprocess.run([sys.executable, __file__, *words], check=True)
+
+
+def open_session(way: str, path: Path, count: int, case: tuple[int, ...]) -> None:
+    """Make a session file, or open it and print what that takes."""
+    from painter import made_up, trim
+
+    basis = made_up(case[0], case[2], case[1])
+    look = basis.current_look
+    if way == "make":
+        with Store.open(path, Identity.of([basis])) as store:
+            made_session(basis, count, store)
+        return
+    before, start, clock = _memory_mb(), time.process_time(), time.perf_counter()
+    with Store.open(path, Identity.of([basis])) as store:
+        session = Session([basis], [look], store, settings=Settings(), transform=lp.ViewTransform())
+        cpu, wall = time.process_time() - start, time.perf_counter() - clock
+        trim()
+        digest = hashlib.sha256(session.views[0].image.tobytes()).hexdigest()[:8]
+        print(
+            f"{count:4d} layers, {'built afresh' if way == 'afresh' else 'opened again'}:"
+            f" {1e3 * cpu:5.0f} ms of the processor, {1e3 * wall:5.0f} of the clock,"
+            f" {_memory_mb() - before:+4.0f} MB, target {digest},"
+            f" file {path.stat().st_size / 1e6:.1f} MB",
+            flush=True,
+        )
+        if (compositions := session.compositions()) is not None:
+            store.put_compositions(*compositions)
+
+
+def _memory(basis: lp.Basis) -> Store:
+    return MemoryStore(Identity.of([basis]))
+
+
+def _memory_mb() -> float:
+    pages = Path("/proc/self/statm").read_text().split()[1]
+    return int(pages) * resource.getpagesize() / 1e6
+
+
+def _cpu_s(process: int) -> float:
+    ticks = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[11:13]
+    return sum(map(int, ticks)) / os.sysconf("SC_CLK_TCK")
+
+
+if __name__ == "__main__":
+    open_session(
+        sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]), tuple(map(int, sys.argv[4].split("x")))
+    )
