@@ -16,9 +16,8 @@ waiting for it. With --minutes, how the memory of page and server grows while so
 With --start, how soon `lightpaint paint SCENE` can be used: a first time with nothing kept, then
 with what that has kept, from the start of its process. The browser is open already.
 
-With --moves, the processor's time of Python for each answer while a light of the scene is dragged
-at 960x540: its plane along frozen paths, the lights solved around it, and the picture that the page
-fetches.
+With --moves, the same while a light of the scene is dragged at 960x540, from the move of the
+pointer until its picture is drawn: its plane along frozen paths, the lights solved around it.
 
 With --layers, the same for the brush on the topmost of N layers, in turns with that on one, and
 what layers cost at the start of a session; with --session, its part of a stroke alone.
@@ -57,7 +56,6 @@ from lightpaint.basis.origin import Origin
 from lightpaint.lighting.fit import resolve_fit
 from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
-from lightpaint.paint import protocol
 from lightpaint.paint.launch import low_latency
 from lightpaint.paint.server.server import Server
 from lightpaint.paint.store.store import Store
@@ -98,7 +96,7 @@ WATCH = """() => {
 CLEAN = """() => {
   const { loader } = document.getElementById('lightpaint').painter.engine.mirror;
   const clean = Object.entries(loader.resources).filter(([name]) => name.startsWith('clean/'));
-  return clean.length && clean.every(([, count]) => count > 1) && !loader.missingSlots().length;
+  return clean.length && clean.every(([, count]) => count > 0) && !loader.missingSlots().length;
 }"""
 
 
@@ -135,8 +133,8 @@ def main() -> None:
         painter_layers.print_session(basis, options.layers, options.strokes)
         if not options.session:
             painter_layers.print_opening(cases[0])
-            opened = partial(Opened, view=options.view)
-            painter_layers.print_pages(opened, cases[0], options.layers, options.strokes)
+            opened = partial(Opened, made_up_painter(cases[0], {}), view=options.view)
+            painter_layers.print_pages(opened, options.layers, options.strokes)
         return
     print_session(cases[0])
     print("\nthrough the page, ms from pointer to screen")
@@ -149,7 +147,9 @@ def main() -> None:
                 constraints = {"light 0": {"lock": True}}
                 constraints |= {f"light {k}": {"limits": {"min": 0.2, "max": 0.7}} for k in (1, 2)}
             space = "linear" if name == "linear" else ""
-            with Opened((n, width, height), constraints, space=space, view=options.view) as session:
+            with Opened(
+                made_up_painter((n, width, height), constraints, space), view=options.view
+            ) as session:
                 view, times = session.painted(options.strokes)
             p50, p95, p99 = np.percentile(times, [50, 95, 99])
             case = f"{n} at {width}x{height}"
@@ -159,7 +159,7 @@ def main() -> None:
             )
             constraints = {}
     if options.minutes:
-        with Opened(cases[0], {}, view=options.view) as session:
+        with Opened(made_up_painter(cases[0], {}), view=options.view) as session:
             session.print_growth(options.minutes)
 
 
@@ -259,20 +259,18 @@ def trim() -> None:
         ctypes.CDLL(None).malloc_trim(0)
 
 
+def made_up_painter(case: tuple[int, ...], constraints: Any, space: str = "") -> Sequence[str]:
+    """Words that serve a painter of a made-up basis."""
+    return "--serve", "x".join(map(str, case)), json.dumps(constraints), space
+
+
 class Opened:
     """A painter that is served by a process of its own, and a page of it."""
 
-    def __init__(
-        self, case: tuple[int, ...], constraints: Any, *, space: str = "", view: str | None = None
-    ) -> None:
-        words = [
-            sys.executable,
-            __file__,
-            "--serve",
-            "x".join(map(str, case)),
-            json.dumps(constraints),
-        ]
-        self.server = subprocess.Popen([*words, space], stdout=subprocess.PIPE, text=True)
+    def __init__(self, words: Sequence[str], *, view: str | None = None) -> None:
+        self.server = subprocess.Popen(
+            [sys.executable, __file__, *words], stdout=subprocess.PIPE, text=True
+        )
         assert self.server.stdout is not None
         self.url, self.view = self.server.stdout.readline().strip(), view
 
@@ -286,9 +284,8 @@ class Opened:
             "() => document.getElementById('lightpaint').painter?.engine.mirror.isReady",
             timeout=120_000,
         )
-        # Clean planes of 64 lights take a minute, and both processors.
+        wait_until_idle(self.server.pid)  # clean planes of 64 lights take a minute
         self.page.wait_for_function(CLEAN, timeout=300_000)
-        time.sleep(3)
         self.page.evaluate(WATCH)
         return self
 
@@ -399,46 +396,101 @@ def print_answers(count: int = 50) -> None:
         studio.close()
 
 
-def print_moves(path: str, moves: int = 30) -> None:
-    """Print the processor's time for each answer while a spot is dragged."""
+#: Watches a page whose lights are dragged: the time from the move of the pointer that an answer
+#: knows of until its picture of the light is drawn.
+WATCH_DRAGS = """() => {
+  const { host, engine } = document.getElementById('lightpaint').painter;
+  const { screen, mirror } = engine;
+  const times = [], send = host.send.bind(host), draw = screen.drawNow.bind(screen);
+  const take = mirror.takePicture.bind(mirror);
+  let moved = 0, answered = 0, shown = 0;
+  for (const kind of ['pointermove', 'pointerdown'])
+    addEventListener(kind, (event) => { moved = event.timeStamp; }, true);
+  host.send = async (kind, fields, arrays) => {
+    const at = moved;
+    const reply = await send(kind, fields, arrays);
+    if ((kind === 'move' || kind === 'point') && !fields.is_final) answered = at;
+    return reply;
+  };
+  mirror.takePicture = (slot, name, picture) => {
+    take(slot, name, picture);
+    if (slot.startsWith('plane ') && answered) [shown, answered] = [answered, 0];
+  };
+  screen.drawNow = () => {
+    draw();
+    if (shown) times.push(performance.now() - shown);
+    shown = 0;
+  };
+  window.times = times;
+}"""
+
+
+def serve_scene(path: str, space: str) -> None:
+    """Serve a painter of a scene at 960x540, until it is ended, and print its address."""
     from lightpaint.scene.scene_reader import load_scene
 
     scene = load_scene(path, parameters={"width": 960, "height": 540})
-    name = next(light.name for light in scene.lights if light.plugin == "spot")
-    place = np.array(scene.light(name).members[0].site.position)
+    with tempfile.TemporaryDirectory() as folder:
+        settings = Settings(spp=2, space=space or None)  # type: ignore[arg-type]
+        subject = Subject("moves", Path(folder), scene=scene, settings=settings)
+        studio = Studio([subject], partial(Store.open, None))
+        server = Server(studio, port=0)
+        studio.start()
+        print(server.url, flush=True)
+        with low_latency():
+            server.run()
+
+
+def print_moves(path: str, drags: int = 4, moves: int = 90) -> None:
+    """Print how soon a dragged light's picture is seen, and the processor's time of an answer."""
+    print(f"{path} at 960x540, a spot is dragged in the page")
+    heads = ("", "median", "99 %", "ms; answers", "a second", "processor of Python, ms an answer")
+    print("{:8s} {:>7s} {:>6s} {:>11s} {:>9s} {:>11s}".format(*heads))
     for space in ("display", "linear"):
-        with tempfile.TemporaryDirectory() as folder:
-            settings = Settings(spp=2, use_cache=False, space=space)
-            subject = Subject("moves", Path(folder), scene=scene, settings=settings)
-            studio = Studio([subject], lambda subject_: Store.open(None, subject_))
-            studio.start()
-            while studio.store is None or studio._threads._threads[0].is_alive():
-                time.sleep(0.2)
-            height, width = scene.size
-            region = (height // 4, height // 2, width // 4, width // 2)
-            shape = region[1] - region[0], region[3] - region[2]
-            image = np.full((*shape, 3), 0.4, np.float32)
-            importance = np.ones(shape, np.float32)
-            studio.handle(
-                protocol.Paint(0, region, True), {"image": image, "importance": importance}
-            )
-            time.sleep(2)
-            k, parts = studio.session.basis.names.index(name), []
-            for step in range(moves):
-                start = time.process_time(), time.perf_counter()
-                pose = {"position": (place + np.array([0.01 * step, 0, 0])).tolist()}
-                studio.handle(protocol.MoveLights({name: pose}, is_final=False), {})
-                studio.resource(f"clean/{k}").tobytes()
-                ended = time.process_time(), time.perf_counter()
-                parts.append([b - a for a, b in zip(start, ended, strict=True)])
-            cpu, wall = np.median(parts[5:], axis=0)
-            lights = len(scene.lights)
-            print(
-                f"{lights} lights at {width}x{height}, {space}: {1000 * cpu:.0f} ms of processor "
-                f"for each answer, {1000 * wall:.0f} ms of the clock"
-            )
-            studio.close()
-            studio.wait()
+        with Opened(("--serve-scene", path, space)) as opened:
+            page, pid = opened.page, opened.server.pid
+            opened.stroke(0)
+            page.keyboard.press("d")
+            page.wait_for_selector(".lamp", timeout=300_000)
+            wait_until_idle(pid)
+            page.evaluate(WATCH_DRAGS)
+            box = page.locator('[data-lamp^="spot_"]').first.bounding_box()
+            assert box is not None
+            x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+            page.mouse.move(x, y)
+            seconds, cpu = 0.0, 0.0
+            for _ in range(drags):
+                page.mouse.down()
+                begin, cpu_begin = time.perf_counter(), cpu_seconds(pid)
+                for k in range(1, moves + 1):
+                    page.mouse.move(x + 60 * np.sin(k / 14), y + 8 * np.sin(k / 9))
+                    time.sleep(max(0, begin + k / 60 - time.perf_counter()))
+                seconds += time.perf_counter() - begin
+                cpu += cpu_seconds(pid) - cpu_begin
+                page.mouse.move(x, y)
+                page.mouse.up()
+                wait_until_idle(pid)
+            times = page.evaluate("() => window.times")
+        p50, p99 = np.percentile(times, [50, 99])
+        rate, each = len(times) / seconds, 1e3 * cpu / len(times)
+        print(f"{space:8s} {p50:7.0f} {p99:6.0f} {len(times):11d} {rate:9.1f} {each:11.0f}")
+
+
+def cpu_seconds(pid: int) -> float:
+    """Seconds of processor that a process has taken."""
+    ticks = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[11:13]
+    return sum(map(int, ticks)) / os.sysconf("SC_CLK_TCK")
+
+
+def wait_until_idle(pid: int) -> None:
+    """Wait until a process takes less than a twentieth of a processor."""
+    before = cpu_seconds(pid)
+    while True:
+        time.sleep(1)
+        now = cpu_seconds(pid)
+        if now - before < 0.05:
+            return
+        before = now
 
 
 def answer_of(asking: HTTPConnection, path: str, key: str) -> bytes:
@@ -507,8 +559,7 @@ def started(
     page.wait_for_function(f"() => {PAINTER}.engine.mirror.strokes.count && {PAINTER}.engine.mirror"
                            ".strokes.isPending === false", timeout=60_000)  # fmt: skip
     times.append(time.perf_counter() - begin)
-    cpu_ticks = Path(f"/proc/{painter.pid}/stat").read_text().rpartition(")")[2].split()[11:13]
-    times.append(sum(map(int, cpu_ticks)) / os.sysconf("SC_CLK_TCK"))
+    times.append(cpu_seconds(painter.pid))
     if is_first:
         until = time.monotonic() + 600
         while not list(Path(folder).glob("*.clean.npz")) and time.monotonic() < until:
@@ -522,5 +573,7 @@ def started(
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--serve"]:
         serve(*sys.argv[2:])
+    elif sys.argv[1:2] == ["--serve-scene"]:
+        serve_scene(*sys.argv[2:])
     else:
         main()

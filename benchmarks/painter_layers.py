@@ -109,16 +109,16 @@ def print_session(basis: lp.Basis, count: int, strokes: int) -> None:
         )
 
 
-def print_pages(opened: Any, case: tuple[int, ...], count: int, strokes: int) -> None:
+def print_pages(opened: Any, count: int, strokes: int) -> None:
     """Print times from pointer to screen through two pages in turns, and their ratios.
 
-    opened: returns an open painter of a case, as a context.
+    opened: returns an open painter, as a context.
     """
-    print(f"through the page, {case[0]} lights at {case[1]}x{case[2]}, in turns")
+    print("through the page, in turns")
     print(
         f"{'layers':>8s} {'median':>7s} {'99 %':>6s} {'answers':>8s} {'server, ms CPU each':>20s}"
     )
-    with opened(case, {}) as one, opened(case, {}) as many:
+    with opened() as one, opened() as many:
         for page, layers in ((one, 1), (many, count)):
             page.page.evaluate(LAYERS, layers - 1)
             page.page.wait_for_timeout(3000)

@@ -56,7 +56,7 @@ class Canvases:
 
     def __getitem__(self, view: int) -> Canvas:
         """Return the canvas of a view. Raises PaintError if there is none."""
-        if view >= len(self):
+        if not 0 <= view < len(self):
             raise PaintError(f"no view {view}: there are {len(self)}")
         return self._canvases[view]
 

@@ -163,6 +163,21 @@ class PictureUpdate(Message, kind="renewed"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class DraggedPlane(Message, kind="dragged"):
+    """The picture of a light that is dragged, so that it need not be fetched. Unasked, before the
+    answer.
+
+    light: its index. view: the one that the request named. resources: numbers of its pictures, all
+    of which are this one. data: (h, w, 3) float16, divided by the light's `scale`.
+    """
+
+    light: int
+    view: int
+    resources: Mapping[str, int]
+    data: npt.NDArray[np.float16]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class PictureData(Message, kind="fetched"):
     """A picture, as the array `data`: the answer to `fetch`."""
 
@@ -252,6 +267,7 @@ EVENTS: Mapping[str, type[Any]] = {
         CanvasPatch,
         SelectionUpdate,
         PictureUpdate,
+        DraggedPlane,
         PictureData,
         StepList,
         LookList,

@@ -52,11 +52,13 @@ class MoveLights(Message, kind="move"):
 
     poses: changed fields of `lightpaint.Pose`: position, target, cutoff and beam; an empty object
     restores a light's place from the scene. is_final: whether it becomes a step; false while a
-    light is dragged.
+    light is dragged. view: index of the view whose pictures of dragged lights are sent at once, as
+    `dragged`.
     """
 
     poses: Mapping[str, Mapping[str, Any]]
     is_final: bool = True
+    view: int = 0
 
 
 @dataclass(frozen=True)

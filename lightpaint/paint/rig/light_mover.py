@@ -19,6 +19,7 @@ from lightpaint.paint.background_threads import BackgroundThreads, LatestWork, S
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.protocol import (
     AddLight,
+    DraggedPlane,
     Message,
     MoveLights,
     Notice,
@@ -101,7 +102,7 @@ class LightMover:
             session.basis.names[request.light] if request.light < len(session.basis.names) else ""
         )
         pose = pose_change(self.rig, request, name, session.requests.placed.get(name, {}))
-        return MoveLights({name: pose}, request.is_final)
+        return MoveLights({name: pose}, request.is_final, request.view)
 
     def hang(self, request: AddLight) -> tuple[str, dict[str, Any]]:
         """Return name and values of the light that a request adds. Raises PaintError."""
@@ -117,11 +118,11 @@ class LightMover:
         )
         return name, values_of(with_level(emitter, alone, current))
 
-    def follow(self, send: Callable[[Message], None]) -> bool:
+    def follow(self, send: Callable[[Message], None], view: int = 0) -> bool:
         """Show the planes of newly moved lights, and render them once they rest.
 
-        send: receives the messages about them. Returns whether lights were added or removed, so
-        that pages need the whole state.
+        send: receives the messages about them. view: the one in which a page shows a light that is
+        dragged. Returns whether lights were added or removed, so that pages need the whole state.
         """
         session = self._access.session
         placed, shown = session.requests.placed, self._shown
@@ -139,7 +140,8 @@ class LightMover:
             session, sorted(names & {*session.basis.names}), is_dragged=is_dragged
         )
         if not is_other:  # the whole state has these
-            for message in (offered, *self.rig_messages()):
+            dragged = self._dragged_planes(session, view) if is_dragged else []
+            for message in (*dragged, offered, *self.rig_messages()):
                 send(message)
         if not is_dragged:
             for warning in _unlit_warnings(session, names & {*placed}):
@@ -225,6 +227,18 @@ class LightMover:
                     offered.append(full)
         resources = {name: pictures.generations[name] for name in offered}
         return PictureUpdate(resources=resources)
+
+    def _dragged_planes(self, session: Session, number: int) -> list[DraggedPlane]:
+        """Return the pictures of dragged lights in a view."""
+        pictures, basis = self._publisher.pictures, session.views[number].basis
+        messages = []
+        for k in sorted(basis.names.index(name) for name in self._dragged):
+            names = [name_in_view(f"{plain}/{k}", number) for plain in ("clean", "plane")]
+            picture = pictures[names[0]]
+            pictures.keep(names[1], picture)
+            resources = {name: pictures.generations[name] for name in names}
+            messages.append(DraggedPlane(light=k, view=number, resources=resources, data=picture))
+        return messages
 
     def _denoise(self, name: str) -> None:
         """Replace the picture of a rendered plane by a denoised one."""

@@ -13,6 +13,7 @@ from lightpaint.paint.protocol import (
     AnswerUpdate,
     AnyRequest,
     Closing,
+    DraggedPlane,
     EditState,
     Failure,
     Hello,
@@ -273,6 +274,8 @@ def _replacement_key(message: Message) -> tuple[Any, ...] | None:
     """Return a key for events of which only the newest counts; None for others."""
     if isinstance(message, ProgressReport):
         return "progress", message.task
+    if isinstance(message, DraggedPlane):
+        return message.kind, message.light, message.view
     is_newest = isinstance(message, AnswerUpdate | PictureUpdate | LookList | SessionState)
     return (message.kind,) if is_newest else None
 

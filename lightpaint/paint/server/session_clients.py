@@ -23,6 +23,7 @@ from lightpaint.paint.protocol import (
     AnyRequest,
     Closing,
     ConstrainLight,
+    DraggedPlane,
     Failure,
     Message,
     MoveLights,
@@ -219,7 +220,7 @@ class Connections:
 
     def _update_generations(self, message: Message) -> None:
         """Store the generation numbers of the pictures in a message."""
-        if isinstance(message, SessionState | PictureUpdate):
+        if isinstance(message, SessionState | PictureUpdate | DraggedPlane):
             # A state may arrive after a message about a newer picture.
             newest = self.generations | {
                 name: max(generation, self.generations.get(name, generation))

@@ -54,6 +54,10 @@ class PictureTable:
         """Add a picture that is already made."""
         self.offer(name, lambda: picture)
 
+    def keep(self, name: str, picture: Picture) -> None:
+        """Keep a picture that its maker would make."""
+        self._made[name] = picture
+
     def withdraw(self, name: str) -> None:
         """Remove a picture."""
         self.generations.pop(name, None)

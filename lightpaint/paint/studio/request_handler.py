@@ -100,6 +100,9 @@ class RequestHandler:
             return [PictureData(name=message.name, data=self.resource(message.name))]
         with self._access.lock:
             session, looks = self._access.session, self._access.looks
+            view = 0
+            if isinstance(message, protocol.MoveLights | protocol.PointLight):
+                view = session.views[message.view].view  # before anything has moved
             match message:
                 case protocol.SaveLook() | protocol.RenameLook() | protocol.CopyLook():
                     return [looks.handle(message)]
@@ -126,19 +129,23 @@ class RequestHandler:
                     messages = looks.load(message)
                 case _:
                     messages = session.handle(message, arrays)
-            messages = self._show_moves(messages)
+            messages = self._show_moves(messages, view=view)
         self._exact_answers.notify()
         return messages
 
     def _show_moves(
-        self, messages: list[Message], send: Callable[[Message], None] | None = None
+        self,
+        messages: list[Message],
+        send: Callable[[Message], None] | None = None,
+        *,
+        view: int = 0,
     ) -> list[Message]:
         """Show the lights that a request has moved, and return its answers.
 
         These are the whole state if lights were added or removed. send: receives messages about
-        moved lights; by default they are published at once.
+        moved lights; by default they are published at once. view: as in `LightMover.follow`.
         """
-        has_others = self._mover.follow(send or self._publisher.publish)
+        has_others = self._mover.follow(send or self._publisher.publish, view)
         return [self.state(), *self._mover.rig_messages()] if has_others else messages
 
     def _hang_lights(self, label: str, placed: Placed, before: Placed) -> bool:

@@ -466,6 +466,22 @@ export interface PictureUpdate {
 }
 
 /**
+ * The picture of a light that is dragged, so that it need not be fetched. Unasked, before the
+ * answer.
+ *
+ * light: its index. view: the one that the request named. resources: numbers of its pictures, all
+ * of which are this one. data: (h, w, 3) float16, divided by the light's `scale`.
+ */
+export interface DraggedPlane {
+  kind: 'dragged';
+  reply?: number;
+  light: number;
+  view: number;
+  resources: Record<string, number>;
+  arrays: { data: Picture };
+}
+
+/**
  * A picture, as the array `data`: the answer to `fetch`.
  */
 export interface PictureData {
@@ -830,11 +846,13 @@ export interface SetMaster {
  *
  * poses: changed fields of `lightpaint.Pose`: position, target, cutoff and beam; an empty object
  * restores a light's place from the scene. is_final: whether it becomes a step; false while a
- * light is dragged.
+ * light is dragged. view: index of the view whose pictures of dragged lights are sent at once, as
+ * `dragged`.
  */
 export interface MoveLights {
   poses: Record<string, Record<string, any>>;
   is_final?: boolean;
+  view?: number;
 }
 
 /**
@@ -1059,6 +1077,7 @@ export interface Events {
   patch: CanvasPatch;
   selected: SelectionUpdate;
   renewed: PictureUpdate;
+  dragged: DraggedPlane;
   fetched: PictureData;
   steps: StepList;
   looks: LookList;

@@ -15,7 +15,8 @@ const RETRY_MS = 2000;
 
 export class PictureLoader {
   /** @param {import("./socket_host.js").Host} host
-   * @param {(slot: string, name: string, picture: Picture) => void} use a picture for its slot
+   * @param {(slot: string, name: string, picture: Picture, isLive?: boolean) => void} use a picture
+   *   for its slot; isLive: the next one follows at once
    * @param {(done: number, total: number, isFirst: boolean) => void} onProgress isFirst: some light has no
    *   picture yet */
   constructor(host, use, onProgress) {
@@ -39,6 +40,17 @@ export class PictureLoader {
   /** Existing pictures by name. @param {Record<string, number>} resources */
   addResources(resources) {
     this.resources = { ...this.resources, ...resources };
+    this.pump();
+  }
+
+  /** Take the newest picture of a slot, which came unasked. @param {string} slot
+   * @param {Record<string, number>} resources its names @param {Picture} picture */
+  take(slot, resources, picture) {
+    this.resources = { ...this.resources, ...resources };
+    const name = this.wantedNames.get(slot);
+    if (name === undefined || !(name in resources)) return this.pump();
+    this.loadedVersions.set(slot, this.versionOf(name));
+    this.use(slot, name, picture, true);
     this.pump();
   }
 

@@ -27,7 +27,7 @@ export class SessionMirror extends PictureState {
     this.emit = emit;
     this.loader = new PictureLoader(
       host,
-      (slot, name, picture) => this.takePicture(slot, name, picture),
+      (slot, name, picture, isLive) => this.takePicture(slot, name, picture, isLive),
       (done, total, isFirst) => emit('loading', { done, total, isFirst }),
     );
     /** The last state from the session, of all views. @type {Message | null} */
@@ -63,6 +63,11 @@ export class SessionMirror extends PictureState {
     host.on('renewed', ({ resources }) => {
       this.loader.addResources(resources);
       this.requestPictures();
+    });
+    host.on('dragged', ({ light, view: picturedView, resources, arrays }) => {
+      const isShown = picturedView === this.view && this.loader.wantedNames.has(`plane ${light}`);
+      if (isShown) this.loader.take(`plane ${light}`, resources, arrays.data);
+      else this.loader.addResources(resources);
     });
     host.on('verified', ({ view = 0 }) => this.loader.renew(nameInView('verified', view)));
     host.on('explained', ({ view = 0 }) => this.loader.renew(nameInView('beyond', view)));
@@ -235,8 +240,9 @@ export class SessionMirror extends PictureState {
     if ((display?.transform ?? 'srgb') === 'srgb') this.setLut(SRGB);
   }
 
-  /** @param {string} slot @param {string} name @param {Picture} picture */
-  takePicture(slot, name, picture) {
+  /** @param {string} slot @param {string} name @param {Picture} picture @param {boolean} [isLive]
+   * whether the next picture follows at once */
+  takePicture(slot, name, picture, isLive = false) {
     const { view } = this.screen;
     const { canvas, state } = this;
     if (!view || !canvas || !state) return;
@@ -255,7 +261,7 @@ export class SessionMirror extends PictureState {
     else if (slot === 'objects') canvas.objects = /** @type {Int16Array} */ (data);
     else if (slot === 'verified') view.setPicture('verified', /** @type {Uint16Array} */ (data));
     else if (slot === 'beyond') view.setBeyond(/** @type {Uint8Array} */ (data));
-    this.screen.requestDraw();
+    this.screen.requestDraw(isLive);
   }
 
   /** @param {Uint16Array} present */

@@ -165,7 +165,7 @@ export class SocketHost extends Emitter {
   /** @param {Message} message */
   receive(message) {
     const { kind, reply } = message;
-    if (kind === 'state' || kind === 'renewed')
+    if (kind === 'state' || kind === 'renewed' || kind === 'dragged')
       this.generations = { ...this.generations, ...message.resources };
     const isAlive = kind === 'state' || kind === 'waiting';
     if (isAlive) this.retryDelay = RETRY_DELAYS_MS.first;

@@ -32,7 +32,11 @@ export class LampMoves {
       const { kind, ...fields } = request;
       const reply =
         kind === 'move'
-          ? await this.session.send('move', { poses: { [name]: request.pose }, is_final: isFinal })
+          ? await this.session.send('move', {
+              poses: { [name]: request.pose },
+              is_final: isFinal,
+              view: this.session.store.value.view,
+            })
           : await this.session.send(
               'point',
               /** @type {any} */ ({ light, ...fields, is_final: isFinal }),
