@@ -15,11 +15,12 @@ from lightpaint.paint.layers.layer_stack import LayerStack
 from lightpaint.paint.session import milestones
 from lightpaint.paint.session.milestones import find_milestones
 from lightpaint.paint.store.history_steps import Step
+from lightpaint.paint.store.step_answers import StepAnswer
 from lightpaint.paint.store.store import Store
 
 
 def listed(session: Any, count: int = 100) -> protocol.StepList:
-    steps = session.list_steps(count)
+    steps = session.history.list_steps(count)
     assert isinstance(steps, protocol.StepList)
     return steps
 
@@ -74,20 +75,46 @@ def test_the_picture_of_a_step_shows_its_answer_and_is_there_after_reopening(
     path = tmp_path / "session.db"
     with Store.open(path, identity_of()) as store:
         session = RandomEditor(1, store).session
-        beginning = session.step_picture(0)
+        beginning = session.history.picture(0)
         session.handle(protocol.ConstrainLights({"a": {"off": True}, "b": {"off": True}}), {})
-        dark = session.step_picture(store.last_id)
+        dark = session.history.picture(store.last_id)
         session.handle(protocol.Undo(), {})
     assert beginning.any()
     assert not dark.any()
     assert dark.shape == beginning.shape
     with Store.open(path, identity_of()) as store:
         reopened = open_session(store)
-        np.testing.assert_array_equal(reopened.step_picture(0), beginning)
-        np.testing.assert_array_equal(reopened.step_picture(store.step_ids[0]), dark)
+        np.testing.assert_array_equal(reopened.history.picture(0), beginning)
+        np.testing.assert_array_equal(reopened.history.picture(store.step_ids[0]), dark)
         # A new step in its place must not show the picture of the other.
         reopened.handle(protocol.SetMaster(0.5), {})
-        assert not np.array_equal(reopened.step_picture(store.last_id), dark)
+        assert not np.array_equal(reopened.history.picture(store.last_id), dark)
+
+
+def test_the_answer_before_the_last_step_is_known_unless_lights_have_moved(tmp_path: Path) -> None:
+    path = tmp_path / "session.db"
+    with Store.open(path, identity_of()) as store:
+        session = RandomEditor(1, store).session
+        with pytest.raises(PaintError, match="no step before"):
+            session.history.previous_weights()
+        before = session.weights.copy()
+        session.handle(protocol.ConstrainLights({"a": {"lock": 2.0}}), {})
+        locked = session.weights.copy()
+        np.testing.assert_array_equal(session.history.previous_weights(), before)
+        session.handle(protocol.SetMaster(0.5), {})
+        session.handle(protocol.ConstrainLights({"a": {"off": True}}), {})
+    with Store.open(path, identity_of()) as store:
+        session = open_session(store)
+        np.testing.assert_allclose(session.history.previous_weights(), 0.5 * locked, rtol=1e-12)
+        session.handle(protocol.Undo(), {})
+        np.testing.assert_array_equal(session.history.previous_weights(), locked)
+        # As after a step that moves a light: the answer before it hangs elsewhere.
+        answer = store.answer(store.last_id)
+        assert answer is not None
+        store.put_answer(StepAnswer(answer.weights, "elsewhere", answer.picture))
+        session.handle(protocol.ConstrainLights({"b": {"off": True}}), {})
+        with pytest.raises(PaintError, match="moved lights"):
+            session.history.previous_weights()
 
 
 def test_a_session_without_pictures_of_steps_opens_and_gets_them(tmp_path: Path) -> None:
@@ -95,12 +122,12 @@ def test_a_session_without_pictures_of_steps_opens_and_gets_them(tmp_path: Path)
     path = tmp_path / "session.db"
     with Store.open(path, identity_of()) as store:
         RandomEditor(1, store).act(with_undo=False)
-        store._database.execute("DROP TABLE step_picture")
+        store._database.execute("DROP TABLE step_answer")
         store._queue._pending.clear()
     with Store.open(path, identity_of()) as store:
         session = open_session(store)
-        assert session.step_picture(store.last_id).any()
-        assert session.step_picture(0).shape == (1, 1, 3)
+        assert session.history.picture(store.last_id).any()
+        assert session.history.picture(0).shape == (1, 1, 3)
 
 
 def test_a_cleared_painting_keeps_what_is_asked_of_lights_and_a_new_start_keeps_nothing() -> None:

@@ -199,6 +199,16 @@ class StepList(Message, kind="steps"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class PreviousAnswer(Message, kind="previous"):
+    """The answer before the last step, under the master dimmer: the answer to `show_previous`.
+
+    weights: (lights, 3) float64, in the order of the state.
+    """
+
+    weights: Doubles
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class LookList(Message, kind="looks"):
     """The kept looks, and all pictures: the answer to requests about looks, and unasked when an
     observer has proposed one.
@@ -270,6 +280,7 @@ EVENTS: Mapping[str, type[Any]] = {
         DraggedPlane,
         PictureData,
         StepList,
+        PreviousAnswer,
         LookList,
         ProgressReport,
         TaskStarted,

@@ -114,6 +114,11 @@ class GoToStep(Message, kind="go_to_step"):
 
 
 @dataclass(frozen=True)
+class ShowPrevious(Message, kind="show_previous"):
+    """A request for the answer before the last step, to compare with. Answered by `previous`."""
+
+
+@dataclass(frozen=True)
 class ClearPainting(Message, kind="clear_painting"):
     """Delete all layers and all paint, in all views: one step. Answered by `patch`."""
 

@@ -40,6 +40,7 @@ from lightpaint.paint.protocol.painting_requests import (
     RenameLook,
     SaveLook,
     Select,
+    ShowPrevious,
     StartOver,
     Undo,
 )
@@ -153,6 +154,7 @@ AnyRequest = (
     | Redo
     | ListSteps
     | GoToStep
+    | ShowPrevious
     | ClearPainting
     | StartOver
     | ConstrainLight

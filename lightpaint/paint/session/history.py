@@ -22,6 +22,7 @@ from lightpaint.paint.store.canvas_pixels import Region
 from lightpaint.paint.store.database import DamagedError
 from lightpaint.paint.store.history_steps import Patch, Step
 from lightpaint.paint.store.session_requests import SessionRequests
+from lightpaint.paint.store.step_answers import StepAnswer
 from lightpaint.paint.store.store import Store
 
 #: Number of steps listed to a page, backwards and forwards.
@@ -139,19 +140,37 @@ class History:
 
     def picture(self, step_id: int) -> npt.NDArray[np.uint8]:
         """Return the small picture of the answer after a step, (h, w, 3); black if it has none."""
-        picture = self._store.step_picture(step_id)
-        return np.zeros((1, 1, 3), np.uint8) if picture is None else picture
+        answer = self._store.answer(step_id)
+        return np.zeros((1, 1, 3), np.uint8) if answer is None else answer.picture
 
-    def keep_picture(self, weights: Doubles, transform: ViewTransform) -> None:
-        """Keep a small picture of a lighting with the last step, of the view that it changed.
+    def keep_answer(self, weights: Doubles, transform: ViewTransform) -> None:
+        """Keep a lighting with the last step, and a small picture of the view that it changed.
 
-        weights: (n, 3). transform: to show it through.
+        weights: (n, 3), as shown. transform: to show them through.
         """
         position = self._store.position
         patches = self._store.steps[position - 1].patches if position else ()
         view = self._views[patches[0].view if patches else 0]
         light = view.live.small_picture(weights)
-        self._store.put_step_picture(display_thumbnail(light, transform, side=PICTURE_SIDE))
+        by_name = dict(zip(view.basis.names, map(tuple, weights.tolist()), strict=True))
+        picture = display_thumbnail(light, transform, side=PICTURE_SIDE)
+        places = self._live_answer.requests_at_rest.place_key
+        self._store.put_answer(StepAnswer(by_name, places, picture))
+
+    def previous_weights(self) -> Doubles:
+        """Return the weights (n, 3) of the answer before the last step, as shown.
+
+        Raises PaintError if there is no such step, or if lights have moved since.
+        """
+        position, ids = self._store.position, (0, *self._store.step_ids)
+        if not position:
+            raise NothingToUndoError("There is no step before.")
+        answer = self._store.answer(ids[position - 1])
+        if answer is None:
+            raise PaintError("The answer before the last step is not known. Undo shows it.")
+        if answer.places != self._live_answer.requests_at_rest.place_key:
+            raise PaintError("The last step moved lights. Undo shows how it was before.")
+        return answer.weights_of(self._views[0].basis.names)
 
     def list_steps(self, count: int) -> StepList:
         """Return the last `count` steps, including undone ones."""

@@ -14,7 +14,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
@@ -28,7 +27,7 @@ from lightpaint.paint.layers.layered_paintings import LayeredPaintings
 from lightpaint.paint.protocol import AnswerUpdate, Message
 from lightpaint.paint.session.answer_messages import Judgement, answer_findings
 from lightpaint.paint.session.edit_messages import canvas_patches, edit_state, unpainted_headline
-from lightpaint.paint.session.history import Changes
+from lightpaint.paint.session.history import Changes, History
 from lightpaint.paint.session.moved_lights import NoPlaneSource, Placed, PlaneSource
 from lightpaint.paint.session.request_changes import (
     RequestChange,
@@ -162,13 +161,12 @@ class Session:
         self.live_answer.check(requests)
         return requests
 
-    def list_steps(self, count: int) -> protocol.StepList:
-        """Return the last `count` steps of the history."""
-        return self._edits.history.list_steps(count)
+    @property
+    def history(self) -> History:
+        """Its steps, to list and to compare with."""
+        return self._edits.history
 
-    def step_picture(self, step: int) -> npt.NDArray[np.uint8]:
-        """Return the small picture of the answer after a step, (h, w, 3)."""
-        return self._edits.history.picture(step)
+    # Requests and answers
 
     def handle(
         self, message: protocol.AnyRequest, arrays: Mapping[str, npt.NDArray[Any]]
@@ -231,7 +229,7 @@ class Session:
             return None
         if solution is not None:
             self.live_answer.weights = solution.weights
-            self._edits.keep_picture()
+            self._edits.keep_answer()
         findings = self.findings
         if judgement is not None:
             findings = judgement.complete(findings)

@@ -58,7 +58,7 @@ class SessionEdits:
     ) -> None:
         self.version, self.stroke = 0, -1
         self._store, self._transform, self._kept_step = store, transform, 0
-        self._pictured_step: int | None = None
+        self._answered_step: int | None = None
         try:
             self.views, requests = restore(bases, current_looks, store)
         except (LightpaintError, ArithmeticError, LookupError, TypeError, ValueError):
@@ -180,13 +180,13 @@ class SessionEdits:
         empty = LayeredPaintings(LayerStack(), {})
         return self.replace_all({}, requests, label, layers=empty)
 
-    def keep_picture(self) -> None:
-        """Keep a small picture of the answer with the last step, for the list of steps."""
-        self._pictured_step = self._store.last_id
+    def keep_answer(self) -> None:
+        """Keep the answer with the last step, for the list of steps."""
+        self._answered_step = self._store.last_id
         shown = self.live_answer.requests_at_rest.output(
             self.live_answer.weights, self.live_answer.basis.is_fixed
         )
-        self.history.keep_picture(shown, self._transform)
+        self.history.keep_answer(shown, self._transform)
 
     def append_requests(self, label: str, requests: SessionRequests) -> None:
         """Set requests, as a step. The answer stays if only the master dimmer has changed."""
@@ -195,6 +195,7 @@ class SessionEdits:
         self.history.append_requests(label, requests)
         if is_answered:
             self.version += 1
+            self.keep_answer()
         else:
             self._update_answer()
 
@@ -305,5 +306,5 @@ class SessionEdits:
         self.version += 1
         self._moved_lights.follow(self.live_answer.requests.placed, self.views, self.live_answer)
         self.live_answer.solve()
-        if not self.is_open and self._pictured_step != self._store.last_id:
-            self.keep_picture()
+        if not self.is_open and self._answered_step != self._store.last_id:
+            self.keep_answer()

@@ -35,9 +35,9 @@ CREATE TABLE look (id INTEGER PRIMARY KEY, fields TEXT);
 CREATE TABLE look_array (look INTEGER, name TEXT, dtype TEXT, shape TEXT, data BLOB);
 """
 
-#: Small pictures of the answers after steps. A session can do without, so files may lack it.
-PICTURE_TABLE = """
-CREATE TABLE IF NOT EXISTS step_picture (step INTEGER PRIMARY KEY, shape TEXT, data BLOB)
+#: Answers after steps, with small pictures. A session can do without, so files may lack it.
+ANSWER_TABLE = """
+CREATE TABLE IF NOT EXISTS step_answer (step INTEGER PRIMARY KEY, fields TEXT, picture BLOB)
 """
 
 _DAMAGED = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
@@ -76,8 +76,8 @@ def _prepare(database: sqlite3.Connection, path: Path | None, identity: Identity
     with transaction(database):
         [(application,)] = database.execute("PRAGMA application_id")
         [(version,)] = database.execute("PRAGMA user_version")
-        [(tables, has_pictures)] = database.execute(
-            "SELECT count(*), sum(name = 'step_picture') FROM sqlite_schema"
+        [(tables, has_answers)] = database.execute(
+            "SELECT count(*), sum(name = 'step_answer') FROM sqlite_schema"
         )
         if not tables:
             for statement in filter(str.strip, TABLES.split(";")):
@@ -91,8 +91,8 @@ def _prepare(database: sqlite3.Connection, path: Path | None, identity: Identity
                 f"{path} was written by another version of lightpaint (format {version}, not "
                 f"{VERSION}): {START_AFRESH}"
             )
-        if not has_pictures:
-            database.execute(PICTURE_TABLE)
+        if not has_answers:
+            database.execute(ANSWER_TABLE)
         if identity is not None:
             _check_identity(database, path, identity)
             _store_identity(database, json.dumps(asdict(identity)))

@@ -29,7 +29,7 @@ def insert_step(
     """
     database.execute("DELETE FROM step WHERE id > ?", (last_kept,))
     database.execute("DELETE FROM pixels WHERE step > ?", (last_kept,))
-    database.execute("DELETE FROM step_picture WHERE step > ?", (last_kept,))
+    database.execute("DELETE FROM step_answer WHERE step > ?", (last_kept,))
     database.execute("INSERT INTO step VALUES (?, ?, ?, ?, ?)", row)
     if blobs is not None:
         database.execute("INSERT INTO pixels VALUES (?, ?, ?)", (row[0], *blobs))
@@ -48,18 +48,18 @@ def pixels_row(database: sqlite3.Connection, step: int) -> tuple[bytes, bytes] |
     return row
 
 
-def insert_picture(database: sqlite3.Connection, *, step: int, shape: str, data: bytes) -> None:
-    """Write the small picture of a step in the place of an earlier one, unless it was cut off."""
+def insert_answer(database: sqlite3.Connection, *, step: int, fields: str, picture: bytes) -> None:
+    """Write the answer after a step in the place of an earlier one, unless the step was cut off."""
     database.execute(
-        "INSERT OR REPLACE INTO step_picture SELECT ?, ?, ? WHERE ? = 0 OR EXISTS "
+        "INSERT OR REPLACE INTO step_answer SELECT ?, ?, ? WHERE ? = 0 OR EXISTS "
         "(SELECT 1 FROM step WHERE id = ?)",
-        (step, shape, data, step, step),
+        (step, fields, picture, step, step),
     )
 
 
-def picture_row(database: sqlite3.Connection, step: int) -> tuple[str, bytes] | None:
-    """Return shape, as JSON, and data of the small picture of a step; None if there is none."""
-    query = "SELECT shape, data FROM step_picture WHERE step = ?"
+def answer_row(database: sqlite3.Connection, step: int) -> tuple[str, bytes] | None:
+    """Return the answer after a step, fields as JSON and picture; None if there is none."""
+    query = "SELECT fields, picture FROM step_answer WHERE step = ?"
     row: tuple[str, bytes] | None = database.execute(query, (step,)).fetchone()
     return row
 

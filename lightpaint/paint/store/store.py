@@ -11,19 +11,15 @@ Pixels are stored packed (`compression.py`) and read when they are needed, so th
 history takes no memory.
 """
 
-import json
 import sqlite3
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from threading import RLock
 
-import numpy as np
-import numpy.typing as npt
-
 from lightpaint.arrays import Floats
 from lightpaint.errors import OutputError, PaintError
-from lightpaint.paint.store.compression import pack, pack_patches
+from lightpaint.paint.store.compression import pack_patches
 from lightpaint.paint.store.damaged_rows import DAMAGE_ERRORS
 from lightpaint.paint.store.database import (
     DamagedError,
@@ -35,8 +31,8 @@ from lightpaint.paint.store.history_steps import Identity, Step, StoredLook
 from lightpaint.paint.store.lazy_arrays import LookArrays, pack_arrays
 from lightpaint.paint.store.session_rows import (
     delete_look,
+    insert_answer,
     insert_look,
-    insert_picture,
     insert_step,
     look_rows,
     places_json,
@@ -44,6 +40,7 @@ from lightpaint.paint.store.session_rows import (
     step_rows,
     to_json,
 )
+from lightpaint.paint.store.step_answers import StepAnswer
 from lightpaint.paint.store.stored_arrays import StoredArrays
 from lightpaint.paint.store.stored_compositions import (
     StoredComposition,
@@ -183,20 +180,21 @@ class Store:
         """Id of the last step that is done; 0 before the first."""
         return self._ids[self.position - 1] if self.position else 0
 
-    def put_step_picture(self, picture: npt.NDArray[np.uint8]) -> None:
-        """Keep a small picture (h, w, 3) of the state after the last step that is done.
+    def put_answer(self, answer: StepAnswer) -> None:
+        """Keep the answer after the last step that is done.
 
-        It is written with what is written next: a session that ends before that lacks a picture.
+        It is written with what is written next: a session that ends before that lacks it.
         """
         with self._lock:
-            step, shape = self.last_id, json.dumps(picture.shape)
-            self._arrays.keep_picture(step, picture)
-            data = pack(np.ascontiguousarray(picture))
-            self._queue.add(partial(insert_picture, step=step, shape=shape, data=data))
+            self._arrays.keep_answer(self.last_id, answer)
+            fields, picture = answer.packed()
+            self._queue.add(
+                partial(insert_answer, step=self.last_id, fields=fields, picture=picture)
+            )
 
-    def step_picture(self, step: int) -> npt.NDArray[np.uint8] | None:
-        """Return the small picture of a step by its id, 0 for the beginning; None without one."""
-        return self._arrays.picture(step)
+    def answer(self, step: int) -> StepAnswer | None:
+        """Return the answer after a step by its id, 0 for the beginning; None without one."""
+        return self._arrays.answer(step)
 
     @property
     def has_file(self) -> bool:

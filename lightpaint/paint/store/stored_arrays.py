@@ -7,22 +7,20 @@ from functools import partial
 from pathlib import Path
 from threading import RLock
 
-import numpy as np
-import numpy.typing as npt
-
 from lightpaint.errors import PaintError
 from lightpaint.paint.store.canvas_pixels import Pixels, Region
-from lightpaint.paint.store.compression import unpack, unpack_patch
+from lightpaint.paint.store.compression import unpack_patch
 from lightpaint.paint.store.damaged_rows import DAMAGE_ERRORS
 from lightpaint.paint.store.database import damaged_error
 from lightpaint.paint.store.lazy_arrays import PackedArray, PackedArrays, StoredPatch
 from lightpaint.paint.store.session_rows import (
+    answer_row,
     array_names,
     array_row,
     parse_place,
-    picture_row,
     pixels_row,
 )
+from lightpaint.paint.store.step_answers import StepAnswer
 from lightpaint.storage.json_records import strict_json
 
 
@@ -38,7 +36,7 @@ class StoredArrays:
         self._path, self._lock, self._database = path, lock, database
         self._unwritten_pixels: dict[int, tuple[bytes, bytes]] = {}  # by step
         self._unwritten_looks: dict[int, PackedArrays] = {}
-        self._unwritten_pictures: dict[int, npt.NDArray[np.uint8]] = {}  # by step
+        self._unwritten_answers: dict[int, StepAnswer] = {}  # by step
 
     def keep_pixels(self, step: int, blobs: tuple[bytes, bytes]) -> None:
         """Keep the pixels before a step, and their change, until they are written."""
@@ -52,15 +50,15 @@ class StoredArrays:
         """Forget the arrays of a look that are not written."""
         self._unwritten_looks.pop(number, None)
 
-    def keep_picture(self, step: int, picture: npt.NDArray[np.uint8]) -> None:
-        """Keep the small picture of a step until it is written."""
-        self._unwritten_pictures[step] = picture
+    def keep_answer(self, step: int, answer: StepAnswer) -> None:
+        """Keep the answer after a step until it is written."""
+        self._unwritten_answers[step] = answer
 
     def release_written(self) -> None:
         """Free the memory, since all is written."""
         self._unwritten_pixels.clear()
         self._unwritten_looks.clear()
-        self._unwritten_pictures.clear()
+        self._unwritten_answers.clear()
 
     def patches(self, step: int, stored_places: str) -> tuple[StoredPatch, ...]:
         """Return the patches of a step, whose pixels are read when they are needed.
@@ -95,15 +93,14 @@ class StoredArrays:
             raise KeyError(name)
         return row
 
-    def picture(self, step: int) -> npt.NDArray[np.uint8] | None:
-        """Return the small picture of a step, (h, w, 3); None without a readable one."""
+    def answer(self, step: int) -> StepAnswer | None:
+        """Return the answer after a step; None without a readable one."""
         with self._lock:
-            if step in self._unwritten_pictures:
-                return self._unwritten_pictures[step]
+            if step in self._unwritten_answers:
+                return self._unwritten_answers[step]
             with suppress(PaintError, *DAMAGE_ERRORS):
-                if (row := picture_row(self._database(), step)) is not None:
-                    shape, data = row
-                    return np.asarray(unpack(data, "uint8", tuple(map(int, strict_json(shape)))))
+                if (row := answer_row(self._database(), step)) is not None:
+                    return StepAnswer.unpacked(*row)
         return None
 
     def _read_pixels(

@@ -11,6 +11,7 @@ from lightpaint.paint.background_threads import BackgroundThreads
 from lightpaint.paint.protocol import (
     Message,
     PictureData,
+    PreviousAnswer,
     SessionPending,
     SessionState,
 )
@@ -109,7 +110,9 @@ class RequestHandler:
                 case protocol.MixLooks() | protocol.DropLook() | protocol.Propose():
                     return [looks.handle(message)]
                 case protocol.ListSteps():
-                    return [session.list_steps(message.count)]
+                    return [session.history.list_steps(message.count)]
+                case protocol.ShowPrevious():
+                    return [PreviousAnswer(weights=session.history.previous_weights())]
                 case protocol.CompareLooks():
                     return self._comparison.handle(message)
                 case protocol.Export() | protocol.Verify() | protocol.Explain():

@@ -134,7 +134,7 @@ class SessionBases:
             offer_view(pictures, view, basis, session.transform, clean, small)
         offer_transforms(pictures, offered_transforms(session))
         offer_layers(pictures, session.views)
-        offer_steps(pictures, session.step_picture)
+        offer_steps(pictures, session.history.picture)
         self._mover.offer_all(session)
 
     def denoise(self) -> None:

@@ -91,3 +91,30 @@ def test_nothing_in_the_history_is_cut_or_unnamed(painter: Painter, size: tuple[
       return parts.filter((part) => right(part) > side + 0.5).length;
     }"""
     assert painter.page.evaluate(overflow) == 0
+
+
+@pytest.mark.parametrize("by", ["key", "button", "focus"])
+def test_the_answer_before_the_last_step_shows_while_a_key_or_button_is_held(
+    painter: Painter, by: str
+) -> None:
+    page, name = painter.page, "Answer before the last step"
+    button = painter.button("Hold: the answer before the last step")
+    shown = page.locator(".tag", has_text=name)
+    painter.still()
+    if by == "key":
+        page.locator(".stage").focus()
+        press, release = lambda: page.keyboard.down("q"), lambda: page.keyboard.up("q")
+    elif by == "focus":
+        button.focus()
+        press, release = lambda: page.keyboard.down("Space"), lambda: page.keyboard.up("Space")
+    else:
+        button.hover()
+        press, release = page.mouse.down, page.mouse.up
+    press()
+    shown.wait_for()
+    dark = "() => window.engine.shown.solutionWeights?.flat().every((x) => x === 0)"
+    page.wait_for_function(dark)
+    release()
+    shown.wait_for(state="detached")
+    page.wait_for_function("() => window.engine.shown.solutionWeights === null")
+    assert len(painter.requests("show_previous")) == 1

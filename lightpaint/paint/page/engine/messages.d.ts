@@ -507,6 +507,17 @@ export interface StepList {
 }
 
 /**
+ * The answer before the last step, under the master dimmer: the answer to `show_previous`.
+ *
+ * weights: (lights, 3) float64, in the order of the state.
+ */
+export interface PreviousAnswer {
+  kind: 'previous';
+  reply?: number;
+  arrays: { weights: Picture };
+}
+
+/**
  * The kept looks, and all pictures: the answer to requests about looks, and unasked when an
  * observer has proposed one.
  */
@@ -791,6 +802,12 @@ export interface ListSteps {
  */
 export interface GoToStep {
   step: number;
+}
+
+/**
+ * A request for the answer before the last step, to compare with. Answered by `previous`.
+ */
+export interface ShowPrevious {
 }
 
 /**
@@ -1080,6 +1097,7 @@ export interface Events {
   dragged: DraggedPlane;
   fetched: PictureData;
   steps: StepList;
+  previous: PreviousAnswer;
   looks: LookList;
   progress: ProgressReport;
   started: TaskStarted;
@@ -1108,6 +1126,7 @@ export interface Requests {
   redo: Redo;
   list_steps: ListSteps;
   go_to_step: GoToStep;
+  show_previous: ShowPrevious;
   clear_painting: ClearPainting;
   start_over: StartOver;
   constrain_light: ConstrainLight;

@@ -52,6 +52,7 @@ function nameOf(ui, kind) {
     const look = comparedLooks(ui, ui.mix)?.[0];
     return look ? lookText(ui, look) : NAMES.solution;
   }
+  if (kind === 'solution' && ui.previousWeights) return 'Answer before the last step';
   const gap = kind === 'solution' || kind === 'painting' ? missingText(ui, kind) : null;
   if (gap) return `${NAMES[kind]}: ${gap}`;
   if (isPartial(ui, kind)) return `${NAMES.solution}: ${visibleNames(ui)}`;
@@ -124,6 +125,7 @@ export function Stage({ ui, app }) {
       ui.mute,
       ui.hoveredLight,
       ui.mix,
+      ui.previousWeights,
       ui.ready,
       ui.weights,
       ui.master,

@@ -1,6 +1,7 @@
 /** The table of keyboard shortcuts, for the keyboard and for the dialog that lists them. */
 
 import { saveLook } from './look_actions.js';
+import { PREVIOUS_KEY, showPrevious } from './previous_answer.js';
 import { chooseSelect, updateSelection } from './selection/selection_settings.js';
 import { showNextView } from './view_tabs.js';
 import {
@@ -236,6 +237,13 @@ export const SHORTCUTS = [
             layout: 'blink',
             blink: store.value.display.blink === 'left' ? 'right' : 'left',
           }),
+      },
+      {
+        keys: PREVIOUS_KEY,
+        symbols: ['Q'],
+        description: 'hold: the answer before the last step',
+        act: (app) => void showPrevious(app),
+        isOnce: true,
       },
       {
         keys: ',',

@@ -3,6 +3,7 @@
 import { html } from '../vendor/preact.js';
 import { Button, Checkbox, Choice, Select, Slider, TruncatedText } from './controls.js';
 import { signedText } from './format.js';
+import { PreviousButton } from './previous_answer.js';
 import { showPixels } from './shortcuts.js';
 import { togglePanels, updateDisplay } from './tools.js';
 
@@ -29,6 +30,7 @@ export function TopBar({ ui, app }) {
         disabled=${!undo} act=${() => session.send('undo')} />
       <${Button} icon="redo" tip=${redo ? `Redo: ${redo}` : 'Redo'} keys="Control+Shift+Z"
         disabled=${!redo} act=${() => session.send('redo')} />
+      <${PreviousButton} ui=${ui} app=${app} />
     </div>
     <div class="spring"></div>
     <${Choice} label="Layout" icons value=${display.layout} choices=${LAYOUTS}

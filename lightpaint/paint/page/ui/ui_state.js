@@ -82,6 +82,8 @@ import { initialSelection } from './selection/selection_settings.js';
  * @property {Record<string, any>} settings
  * @property {Record<string, any>} effectiveSettings
  * @property {{undo: string[], redo: string[], count?: number}} history labels of steps, and their count
+ * @property {boolean} isPreviousHeld whether the answer before the last step is asked for
+ * @property {RGB[] | null} previousWeights that answer, while it is shown
  * @property {Look[]} looks
  * @property {{look: number, version: number, steps: number} | null} lastLook last saved or loaded, with
  *   the version and the number of steps then
@@ -210,6 +212,8 @@ export function initialState() {
     settings: {},
     effectiveSettings: {},
     history: { undo: [], redo: [] },
+    isPreviousHeld: false,
+    previousWeights: null,
     looks: [],
     lastLook: null,
     basis: null,
@@ -282,6 +286,10 @@ export function effectiveDisplay(ui) {
     );
   }
   Object.assign(display, comparedDisplay(ui));
+  if (ui.previousWeights && !ui.mix) {
+    display.solutionWeights = ui.previousWeights;
+    if (display.left !== 'solution') display.right = 'solution';
+  }
   const k = ui.hoveredLight;
   if (k !== null) {
     const gain = gainOf(ui, k);

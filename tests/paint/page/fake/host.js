@@ -265,6 +265,9 @@ export class FakeHost {
       done: this.steps.at(-1)?.id ?? 0,
     };
   }
+  show_previous() {
+    return { kind: 'previous', arrays: flat(this.weights.map(() => [0, 0, 0])) };
+  }
   go_to_step({ step }) {
     const all = [...this.steps, ...this.undone.toReversed()];
     const count = all.findIndex(({ id }) => id === step) + 1;
