@@ -267,7 +267,10 @@ def made_up_painter(case: tuple[int, ...], constraints: Any, space: str = "") ->
 class Opened:
     """A painter that is served by a process of its own, and a page of it."""
 
-    def __init__(self, words: Sequence[str], *, view: str | None = None) -> None:
+    def __init__(
+        self, words: Sequence[str], *, view: str | None = None, beside: "Opened | None" = None
+    ) -> None:
+        self.beside = beside
         self.server = subprocess.Popen(
             [sys.executable, __file__, *words], stdout=subprocess.PIPE, text=True
         )
@@ -275,7 +278,9 @@ class Opened:
         self.url, self.view = self.server.stdout.readline().strip(), view
 
     def __enter__(self) -> "Opened":
-        self.playwright = sync_playwright().start()
+        self.playwright = (
+            sync_playwright().start() if self.beside is None else self.beside.playwright
+        )
         path = shutil.which("chromium")
         self.browser = self.playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
         self.page: Page = self.browser.new_page(viewport={"width": 1600, "height": 900})
@@ -291,7 +296,8 @@ class Opened:
 
     def __exit__(self, *_: object) -> None:
         self.browser.close()
-        self.playwright.stop()
+        if self.beside is None:
+            self.playwright.stop()
         self.server.terminate()
         self.server.wait()
 

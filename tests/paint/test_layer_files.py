@@ -40,6 +40,7 @@ from lightpaint.paint.protocol import Message
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.store import MemoryStore
+from lightpaint.paint.studio.layer_imports import begin_with_layers
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.paint.subject_factory import make_subjects
@@ -411,6 +412,78 @@ def test_exported_layers_open_in_another_session(
         np.testing.assert_allclose(found.weights, expected.weights, rtol=precision)
         studio.handle(protocol.Undo(), {})
         assert not studio.session.views.is_painted
+
+
+def test_a_session_begins_with_a_file_once(tmp_path: Path) -> None:
+    path = tmp_path / "layers.exr"
+    write_layers_exr(path, layered((Layer(1, "paint", "Lamp"), 0.5, 0.5)), "eye")
+    session = loaded(LayeredPaintings(LayerStack(), {}))
+    assert begin_with_layers(session, path)
+    session.handle(protocol.ChangeLayers(layers=(Layer(1, "paint", "Dim", strength=0.2),)), {})
+    again = open_session(session.store, 1)
+    assert not begin_with_layers(again, path)
+    assert [layer.name for layer in again.views.layers] == ["Painting", "Dim"]
+    write_layers_exr(path, layered((Layer(1, "paint", "Other"), 0.5, 0.5)), "eye")
+    assert begin_with_layers(again, path)
+    assert [layer.name for layer in again.views.layers] == ["Painting", "Other"]
+
+
+def test_a_page_imports_a_file_in_parts(tmp_path: Path) -> None:
+    group = Layer(3, "group", "Night")
+    write_layers_exr(
+        tmp_path / "layers.exr",
+        layered(
+            (Layer(1, "paint", "Lamp", group=3), 0.5, 0.5),
+            (Layer(0, "pixels", "Painting"), 0.3, 1.0),
+            group=group,
+        ),
+        "eye",
+    )
+    content = (tmp_path / "layers.exr").read_bytes()
+
+    def send(studio: Studio, content: bytes, **options: Any) -> None:
+        middle, size = len(content) // 2, len(content)
+        for start, end in ((0, middle), (middle, size)):
+            part = np.frombuffer(content[start:end], np.uint8)
+            request = protocol.ImportLayers("wall.exr", size, start, **options)
+            assert studio.handle(request, {"part": part})[0].fields["task"] == "import"
+
+    [basis] = bases_of(1)
+    with opened(Subject("room", tmp_path, basis=basis)) as (studio, messages):
+        views = studio.session.views
+        studio.handle(
+            protocol.Paint(1, WHOLE, True, layer=1, properties=Layer(1, "adjust", "Own", gain=0.5)),
+            {"importance": np.ones(SIZE, np.float32)},
+        )
+        image = views[0].image.copy()
+        for replaces, names in (
+            (False, ["Painting", "Own", "Painting", "Lamp", "Night"]),
+            (True, ["Painting", "Lamp", "Night"]),
+        ):
+            del messages[:]
+            send(studio, content, replaces=replaces)
+            text = wait_for(messages, "notice").fields["text"]
+            assert text.startswith("Imported ")
+            assert text.endswith(" of wall.exr; undo leads back.")
+            patches = [message for message in messages if message.kind == "patch"]
+            assert [x["name"] for x in patches[0].fields["layers"]["layers"]] == names
+            assert [layer.name for layer in views.layers] == names
+            studio.handle(protocol.Undo(), {})
+            np.testing.assert_array_equal(views[0].image, image)
+        del messages[:]
+        send(studio, content[:-200])
+        text = wait_for(messages, "notice").fields["text"]
+        assert text.startswith("wall.exr is cut off or damaged")
+        for request, part, error in (
+            (protocol.ImportLayers("wall.exr", 10, 5), np.zeros(5, np.uint8), "in order"),
+            (protocol.ImportLayers("wall.exr", 10, 0), np.zeros(11, np.uint8), "in order"),
+            (protocol.ImportLayers("wall.exr", 10, 0, view=3), np.zeros(5, np.uint8), "no view 3"),
+            (protocol.ImportLayers("wall.exr", 2**40, 0), np.zeros(5, np.uint8), "1099.5 GB"),
+            (protocol.ImportLayers("wall.exr", 10, 0), None, "without its bytes"),
+        ):
+            with pytest.raises(PaintError, match=error):
+                studio.handle(request, {} if part is None else {"part": part})
+        assert [layer.name for layer in views.layers] == ["Painting", "Own"]
 
 
 def test_a_session_of_another_size_says_why_it_does_not_open(tmp_path: Path) -> None:

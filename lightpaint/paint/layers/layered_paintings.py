@@ -18,10 +18,16 @@ from lightpaint.paint.store.history_steps import Patch, name_in_view
 
 @dataclass(frozen=True, eq=False)
 class LayeredPaintings:
-    """A stack of layers, and the pixels of each by view and id, in its region."""
+    """A stack of layers, and the pixels of each by view and id, in its region.
+
+    view: index of the view on whose layers they are to lie, if they are of one view; None to
+    replace all layers. source: digest of the file that they are from; "" for none.
+    """
 
     layers: LayerStack
     pixels: Mapping[tuple[int, int], tuple[Region, Pixels]]
+    view: int | None = None
+    source: str = ""
 
     @classmethod
     def of(cls, views: Canvases) -> "LayeredPaintings":
@@ -36,6 +42,8 @@ class LayeredPaintings:
 
     def patches(self, views: Canvases) -> tuple[LayerStack, tuple[Patch, ...]]:
         """Return the layers under new ids in `views`, and the patches that create them."""
+        if self.view is not None:
+            return self._patches_on_top(views, self.view)
         stack, ids = self.layers, {PAINTING_ID: PAINTING_ID}
         for layer in stack:
             ids.setdefault(layer.id, views.next_layer - 1 + len(ids))
@@ -45,8 +53,7 @@ class LayeredPaintings:
         patches = []
         for (view, number), (region, pixels) in self.pixels.items():
             if number != PAINTING_ID and view < len(views):
-                before = Pixels.unpainted(np.zeros((*pixels.importance.shape, 3), np.float32))
-                patches.append(Patch(region, before, pixels, view, ids[number]))
+                patches.append(Patch(region, _no_pixels(pixels), pixels, view, ids[number]))
         for canvas in views:
             # The layer of paint without an id exists already, with other pixels.
             painting, after = canvas.layer(PAINTING_ID), LayerPixels(canvas.size)
@@ -57,6 +64,20 @@ class LayeredPaintings:
                 before, then = painting.part(bounds), after.part(bounds)
                 patches.append(Patch(bounds, before, then, canvas.view))
         return LayerStack.of(renamed), tuple(patches)
+
+    def _patches_on_top(self, views: Canvases, view: int) -> tuple[LayerStack, tuple[Patch, ...]]:
+        """Return all layers of `views` with these on top, and the patches that create them."""
+        numbers = {number for _, number in self.pixels}
+        added = [x for x in self.layers if x.id != PAINTING_ID or x.id in numbers]
+        ids = {layer.id: views.next_layer + k for k, layer in enumerate(added)}
+        renamed = [
+            replace(x, id=ids[x.id], group=None if x.group is None else ids[x.group]) for x in added
+        ]
+        patches = [
+            Patch(region, _no_pixels(pixels), pixels, view, ids[number])
+            for (_, number), (region, pixels) in self.pixels.items()
+        ]
+        return LayerStack.of([*views.layers, *renamed]), tuple(patches)
 
     def as_fields(self) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:
         """Return JSON and arrays, which `from_fields` reads."""
@@ -97,3 +118,8 @@ class LayeredPaintings:
         except (LookupError, TypeError, ValueError) as error:
             raise PaintError(f"damaged layers: {error}") from None
         return cls(layers, pixels)
+
+
+def _no_pixels(pixels: Pixels) -> Pixels:
+    """Return pixels of the same size without coverage."""
+    return Pixels.unpainted(np.zeros((*pixels.importance.shape, 3), np.float32))

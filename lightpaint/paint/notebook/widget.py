@@ -68,6 +68,8 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         store: The file of the session; an existing session continues. A painter of this kernel that
             has the file open is closed. Without a file the session ends with the kernel.
         folder: Receives exports.
+        layers: A file of layers that replaces those of the session when it first begins with it:
+            `layers.exr` of an export, or an `.ora` of any program.
         height: Height of the painter in screen pixels, at least 240.
         layout: The layout of the widget, as for every ipywidget.
         settings: Fields of `lp.Settings`, by name.
@@ -113,6 +115,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         transform: ViewTransform | TransformChoice | None = None,
         store: str | Path | None = None,
         folder: str | Path | None = None,
+        layers: str | Path | None = None,
         height: int = 720,
         layout: Mapping[str, Any] | ipywidgets.Layout | None = None,
         **settings: Unpack[SettingsByName],
@@ -124,6 +127,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         subjects = widget_arguments.widget_subjects(
             scene,
             folder=folder,
+            layers=layers,
             settings=widget_arguments.read_settings(settings, ARGUMENT_NAMES),
             constraints=constraints,
             transform=transform or widget_arguments.transform_of_targets(target),

@@ -220,6 +220,7 @@ def widget_subjects(
     value: Paintable | Sequence[Paintable],
     *,
     folder: str | Path | None,
+    layers: str | Path | None,
     settings: Settings,
     constraints: Constraints | None,
     transform: ViewTransform | TransformChoice | None,
@@ -229,6 +230,8 @@ def widget_subjects(
     Raises LightpaintError if one cannot be painted.
     """
     _check_types(constraints=constraints, transform=transform)
+    if not isinstance(layers, str | Path | None):
+        raise PaintError(f"layers is {layers!r}: expected the path of a file, like 'layers.ora'")
     sources = list(value) if isinstance(value, list | tuple) else [value]
     if not sources:
         raise PaintError("lp.Painter paints at least one view: give a basis, or a scene")
@@ -238,6 +241,7 @@ def widget_subjects(
         settings=settings,
         constraints=constraints,
         choice=TransformChoice.of(transform),
+        layers=None if layers is None else Path(layers),
     )
 
 

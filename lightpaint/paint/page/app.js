@@ -8,6 +8,7 @@ import { PreviewDialog } from './ui/advice.js';
 import { countText } from './ui/format.js';
 import { HistoryPanel } from './ui/history_panel.js';
 import { handleKey, listenWithin } from './ui/keyboard.js';
+import { LayerDropFrame, LayerImportDialog } from './ui/layers/layer_import.js';
 import { LayerCount, LayerPanel, hasLayers } from './ui/layers/layer_panel.js';
 import { LightList, LightListActions } from './ui/light_list.js';
 import { LookStrip } from './ui/look_strip.js';
@@ -169,6 +170,8 @@ function Painter({ app, root }) {
     }
     <${Dialogs} ui=${ui} app=${app} />
     <${PreviewDialog} ui=${ui} app=${app} />
+    <${LayerImportDialog} ui=${ui} app=${app} />
+    <${LayerDropFrame} app=${app} root=${root} />
     <${Tips} root=${root} />`;
 }
 

@@ -77,6 +77,26 @@ class Select(Message, kind="select"):
 
 
 @dataclass(frozen=True)
+class ImportLayers(Message, kind="import_layers"):
+    """A part of a file of layers, `.ora` or the painter's EXR; with array `part`, its bytes.
+    Answered by `started`. After the last part follow `patch` messages, as a step was made, and a
+    `notice`; or a `notice` that says why not.
+
+    name: of the file. size: of the whole file in bytes. start: position of the part, which arrive
+    in order. view: index of the view that the layers are of. replaces: whether they replace all
+    layers, which needs a session of one view; otherwise they lie on top.
+    """
+
+    request_buffers: ClassVar[Mapping[str, str]] = {"part": "bytes, uint8 of any shape"}
+
+    name: str
+    size: int
+    start: int
+    view: int = 0
+    replaces: bool = False
+
+
+@dataclass(frozen=True)
 class DropStroke(Message, kind="drop_stroke"):
     """Cancel the unfinished stroke. Answered by `patch`."""
 

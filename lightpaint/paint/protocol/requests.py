@@ -31,6 +31,7 @@ from lightpaint.paint.protocol.painting_requests import (
     DropLook,
     DropStroke,
     GoToStep,
+    ImportLayers,
     ListSteps,
     LoadLook,
     MixLooks,
@@ -150,6 +151,7 @@ AnyRequest = (
     | ChangeLayers
     | Select
     | DropStroke
+    | ImportLayers
     | Undo
     | Redo
     | ListSteps

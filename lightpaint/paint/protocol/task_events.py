@@ -42,7 +42,9 @@ class VerificationResult(Message, kind="verified"):
 class TaskStarted(Message, kind="started"):
     """Notice that a long task has started. task: the request, or `stop`."""
 
-    task: Literal["export", "verify", "explain", "preview", "rig", "place", "compare", "stop"]
+    task: Literal[
+        "export", "verify", "explain", "preview", "rig", "place", "compare", "import", "stop"
+    ]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -76,15 +76,24 @@ class History:
         self._live_answer.set_requests(requests)
 
     def replace_all(
-        self, layers: LayerStack, patches: Sequence[Patch], requests: SessionRequests, label: str
+        self,
+        layers: LayerStack,
+        patches: Sequence[Patch],
+        requests: SessionRequests,
+        label: str,
+        source: str = "",
     ) -> Changes:
-        """Replace the layers, their pixels and the requests, as one step. Returns the changes."""
+        """Replace the layers, their pixels and the requests, as one step. Returns the changes.
+
+        source: digest of the file that they are from, if any.
+        """
         replaced_requests, change = self._live_answer.requests, self._views.layers.change_to(layers)
         fields: dict[str, Any] = {
             "before": replaced_requests.as_json(),
             "after": requests.as_json(),
         }
         fields |= {"stack": change} if change else {}
+        fields |= {"source": source} if source else {}
         self._append("look_loaded", label, fields, patches)
         changes = self._views.move(layers, patches, self._done_steps)
         self._live_answer.set_requests(requests)

@@ -227,7 +227,8 @@ class SessionEdits:
             stack, patches = LayerStack(), self.views.replacement_patches(paintings)
         else:
             stack, patches = self.views.layers, ()
-        changes = self.history.replace_all(stack, patches, requests, label)
+        source = "" if layers is None else layers.source
+        changes = self.history.replace_all(stack, patches, requests, label, source)
         self._update_answer()
         if weights is not None:
             lights = self.views[0].basis.lights

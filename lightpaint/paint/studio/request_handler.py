@@ -27,6 +27,7 @@ from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.studio.background_jobs import BackgroundJobs
 from lightpaint.paint.studio.exact_answers import ExactAnswers
+from lightpaint.paint.studio.layer_imports import LayerImports
 
 
 class RequestHandler:
@@ -56,6 +57,7 @@ class RequestHandler:
         self._mover, self._jobs, self._exact_answers = mover, jobs, exact_answers
         self._comparison = comparison
         self._subjects = mover.rig.subjects
+        self._imports = LayerImports(access, publisher, threads, exact_answers.notify)
         self._placer = LightPlacer(access, publisher, mover.rig, threads, self._hang_lights)
 
     def state(self) -> SessionState | SessionPending:
@@ -117,6 +119,8 @@ class RequestHandler:
                     return self._comparison.handle(message)
                 case protocol.Export() | protocol.Verify() | protocol.Explain():
                     return self._jobs.handle(message)
+                case protocol.ImportLayers():
+                    return self._imports.handle(message, arrays)
                 case protocol.Preview():
                     return self._jobs.start_preview(message, session.preview_requests(message))
                 case protocol.ShowRig():

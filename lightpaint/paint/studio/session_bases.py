@@ -7,7 +7,6 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.denoised_planes import DenoisedPlanes
 from lightpaint.files import one_line
 from lightpaint.paint.background_threads import StoppedError
-from lightpaint.paint.layers.layer_file_reading import read_layers
 from lightpaint.paint.protocol import ProgressReport, Tone
 from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.rig.light_mover import LightMover
@@ -23,6 +22,7 @@ from lightpaint.paint.session.view_pictures import (
 from lightpaint.paint.session_access import SessionAccess
 from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.store import Store
+from lightpaint.paint.studio.layer_imports import begin_with_layers
 from lightpaint.paint.studio.plane_denoiser import PlaneDenoiser
 from lightpaint.paint.subject import Subject, obtain_bases, painting_transform
 from lightpaint.scene.runtime.render_lock import MITSUBA
@@ -109,10 +109,9 @@ class SessionBases:
                 constraints=first.constraints,
                 plane_source=None if first.scene is None else self._mover.rig,
             )
-            if first.layers is not None:
-                layered = read_layers(first.layers, bases[0].size, session.transform)
-                label = f"layers of {one_line(first.layers.name)}"
-                session.load({}, session.requests, label, layers=layered)
+            if first.layers is not None and not begin_with_layers(session, first.layers):
+                name = one_line(first.layers.name)
+                self._warn(f"this session has begun with {name} already: it goes on", "info")
             looks = LookLibrary(session, self._publisher.pictures)
             for remark in store.remarks:
                 self._warn(remark, "warn")

@@ -551,7 +551,7 @@ export interface ProgressReport {
 export interface TaskStarted {
   kind: 'started';
   reply?: number;
-  task: 'export' | 'verify' | 'explain' | 'preview' | 'rig' | 'place' | 'compare' | 'stop';
+  task: 'export' | 'verify' | 'explain' | 'preview' | 'rig' | 'place' | 'compare' | 'import' | 'stop';
   arrays: {  };
 }
 
@@ -775,6 +775,23 @@ export interface Select {
  */
 export interface DropStroke {
   stroke: number;
+}
+
+/**
+ * A part of a file of layers, `.ora` or the painter's EXR; with array `part`, its bytes.
+ * Answered by `started`. After the last part follow `patch` messages, as a step was made, and a
+ * `notice`; or a `notice` that says why not.
+ *
+ * name: of the file. size: of the whole file in bytes. start: position of the part, which arrive
+ * in order. view: index of the view that the layers are of. replaces: whether they replace all
+ * layers, which needs a session of one view; otherwise they lie on top.
+ */
+export interface ImportLayers {
+  name: string;
+  size: number;
+  start: number;
+  view?: number;
+  replaces?: boolean;
 }
 
 /**
@@ -1122,6 +1139,7 @@ export interface Requests {
   change_layers: ChangeLayers;
   select: Select;
   drop_stroke: DropStroke;
+  import_layers: ImportLayers;
   undo: Undo;
   redo: Redo;
   list_steps: ListSteps;

@@ -111,6 +111,7 @@ import { initialSelection } from './selection/selection_settings.js';
  * @property {boolean} isPaintingEmpty whether nothing is on the layer that is always there
  * @property {number[]} selectedLayers ids of several layers for one action
  * @property {number | null} hoveredLayer id of the layer whose mask is shown
+ * @property {File | null} layerFile that somebody imports, while it is asked where to
  * @property {string} layerNote what has happened to a layer by key, for screen readers
  * @property {Record<string, number>} resources
  * @property {boolean} hint whether somebody still has to be told what to do
@@ -238,6 +239,7 @@ export function initialState() {
     isPaintingEmpty: true,
     selectedLayers: [],
     hoveredLayer: null,
+    layerFile: null,
     layerNote: '',
     resources: {},
     hint: false,

@@ -3,6 +3,7 @@
 import { html } from '../../vendor/preact.js';
 import { Button } from '../controls.js';
 import { LayerRow } from './layer_row.js';
+import { LayerImportButton } from './layer_import.js';
 import { dragLayer } from './layer_drag.js';
 import { rowsOf } from './layer_order.js';
 
@@ -26,7 +27,8 @@ function seenRows(ui) {
 /** @param {{ui: Ui, app: App}} props */
 export function LayerPanel({ ui, app }) {
   if (!hasLayers(ui))
-    return html`<p class="faint layers-none">Adjustments and fills become layers here.</p>`;
+    return html`<p class="faint layers-none">Adjustments and fills become layers here.</p>
+      <${LayerImportButton} app=${app} />`;
   const rows = seenRows(ui);
   const leave = () => app.store.set({ hoveredLayer: null });
   return html`<ul class="layers" aria-label="Layers, the topmost first"
@@ -38,6 +40,7 @@ export function LayerPanel({ ui, app }) {
         isUnfolded=${layer.id === ui.openLayer} isChosen=${ui.selectedLayers.includes(layer.id)} />`,
     )}
   </ul>
+  <${LayerImportButton} app=${app} />
   <span class="only-read" role="status">${ui.layerNote}</span>`;
 }
 
