@@ -17,7 +17,13 @@ from painter_page import Painter
 
 import lightpaint as lp
 from lightpaint.images.object_map import Objects
+from lightpaint.paint.layers.layer import Layer
+from lightpaint.paint.layers.layer_files import write_layers_openraster
+from lightpaint.paint.layers.layer_pixels import LayerPixels
+from lightpaint.paint.layers.layer_stack import LayerStack
+from lightpaint.paint.layers.view_layers import ViewLayers
 from lightpaint.paint.server.server import Server
+from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject_factory import make_subject
@@ -345,3 +351,45 @@ def test_arrows_go_through_the_list_and_delete_deletes(new_painter: Any) -> None
     start = time.monotonic()
     while not rows.nth(1).evaluate("(row) => row === document.activeElement"):
         assert time.monotonic() < start + 5
+
+
+@pytest.mark.long
+def test_layers_are_imported_by_dialog_and_by_drop(me: Person, tmp_path: Path) -> None:
+    layer = LayerPixels((H, W))
+    pixels = Pixels(np.full((H, 9, 3), 0.5, np.float32), np.ones((H, 9), np.float32))
+    layer.put((0, H, 4, 13), pixels)
+    look = me.studio.session.views[0].current
+    view = ViewLayers(LayerStack.of([Layer(1, "paint", "Strip")]), {1: layer}, look)
+    path = tmp_path / "strip.ora"
+    write_layers_openraster(path, view, look, me.studio.session.transform)
+    page = me.page
+
+    def choose() -> None:
+        with page.expect_file_chooser() as chooser:
+            page.get_by_role("button", name="Import layers …").click()
+        chooser.value.set_files(path)
+
+    page.locator(".fold.is-layers .fold-head").first.click()
+    choose()
+    page.get_by_text("Imported 1 layer of strip.ora; undo leads back.").wait_for()
+    assert me.still().names == ["Strip"]
+    me.drag((60, 20), (80, 30))
+    choose()
+    page.get_by_role("button", name="Put them on top").click()
+    page.locator(".layer-name").nth(2).wait_for()
+    assert [name.split(",")[0] for name in me.still().names] == ["Strip", "1 stroke", "Strip"]
+    # Dropped, the file replaces all.
+    data = page.evaluate_handle(
+        """([bytes, name]) => { const data = new DataTransfer();
+            data.items.add(new File([new Uint8Array(bytes)], name)); return data; }""",
+        [list(path.read_bytes()), "Other.ORA"],
+    )
+    page.locator(".lightpaint").dispatch_event("dragover", {"dataTransfer": data})
+    page.get_by_text("Drop to import layers").wait_for()
+    page.locator(".lightpaint").dispatch_event("drop", {"dataTransfer": data})
+    page.get_by_role("button", name="Replace all layers").click()
+    page.get_by_text("Imported 1 layer of Other.ORA").wait_for()
+    assert me.still().names == ["Strip"]
+    assert page.get_by_text("Drop to import layers").count() == 0
+    me.press("Control+z")
+    assert len(me.names) == 3

@@ -38,6 +38,8 @@ export class LayerStrokes {
     this.isNew = false;
     /** What was active before it. */
     this.previous = { activeId: PAINTING_ID, isWishDone: false };
+    /** Ids of all layers, as they were last. @type {Set<number>} */
+    this.ids = new Set();
     /** The canvas of the last stroke on a layer, for the next one. @type {LayerCanvas | null} */
     this.lastCanvas = null;
     /** What strokes keep to; null for everything. @type {import("../paint_canvas.js").Selection | null} */
@@ -59,9 +61,17 @@ export class LayerStrokes {
     this.mirror.listener.onChange();
   }
 
-  /** Choose another layer if the active one is gone. */
+  /** Choose another layer if the active one is gone, or if others were put over it, as from a file:
+   * the brush would paint below them. */
   followList() {
     const { list } = this.mirror;
+    const top = list[list.length - 1];
+    const isOther = !this.ids.has(top.id) && top.id !== this.activeId && !this.canvas;
+    if (this.ids.size && isOther && (top.kind === 'paint' || top.kind === 'pixels')) {
+      this.activeId = top.id;
+      this.isWishDone = true;
+    }
+    this.ids = new Set(list.map(({ id }) => id));
     if (!this.mirror.layer(this.activeId)) {
       this.activeId = list[list.length - 1].id;
       this.isWishDone = this.activeId !== PAINTING_ID;
