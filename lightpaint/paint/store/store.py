@@ -235,7 +235,7 @@ class Store:
         rows = composition_rows(step, current_looks, compositions)
         with self._lock:
             if self.has_file and self.flush() is None:
-                write_compositions(self._database, rows)
+                write_compositions(self._database, rows=rows)
 
     def compositions(
         self, current_looks: Sequence[Floats]
