@@ -9,6 +9,7 @@ writes beside itself
     painter.jpg     the painter when that is done
     painter-views.jpg   the stage, painted from the balcony and from a box
     painter-layers.jpg  the gallery with wishes as layers, one of them unfolded
+    painter-lamps.jpg   spots dimmed together, two of them with a gel, under a master
     lights.webp     somebody drags a spot, and aims it by a click
     painter-lights.jpg  the painter when that is done
     places.webp     somebody paints, and lets the lights move
@@ -193,6 +194,32 @@ def layered(hand: Hand) -> None:
     hand.wait()
 
 
+def many_lamps(hand: Hand) -> None:
+    """Spots that are dimmed by a stop together, two of them with a gel, under a master of 70 %."""
+    page = hand.page
+    page.get_by_role("button", name="Colour", exact=True).first.click()  # folds the paint's
+    page.get_by_role("searchbox", name="Search lights").fill("spot_*")
+    page.keyboard.press("Enter")
+    _type(page, "Dim by", "-1")
+    page.get_by_role("button", name="Select none").click()
+    for name in ("spot_knot", "spot_figure"):
+        page.get_by_role("checkbox", name=f"Select {name}").click()
+    panel = page.get_by_role("region", name="Selected lights")
+    panel.get_by_role("button", name="Colour", exact=True).click()
+    panel.get_by_role("button", name="Gel", exact=True).click()
+    _type(page, "Filter", "201")
+    _type(page, "Filter", "20")
+    _type(page, "Master", "70")
+    page.mouse.move(5, 5)
+    hand.wait()
+
+
+def _type(page: Page, label: str, text: str) -> None:
+    field = page.get_by_role("textbox", name=label, exact=True).first
+    field.fill(text)
+    field.press("Enter")
+
+
 def moving_lights(hand: Hand) -> None:
     """A spot that is dragged, and aimed by a click."""
     on, page = hand.of_painting, hand.page
@@ -291,7 +318,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--spp", type=int, default=64)
     parser.add_argument("--port", type=int, default=8431)
-    parser.add_argument("--only", choices=("painting", "views", "layers", "lights", "places"))
+    pictures = ("painting", "views", "layers", "lamps", "lights", "places")
+    parser.add_argument("--only", choices=pictures)
     asked = parser.parse_args()
     if asked.only in (None, "lights"):
         with painter("gallery", asked.spp, asked.port) as url, using(url) as hand:
@@ -307,6 +335,10 @@ def main() -> None:
         with painter("stage", asked.spp, asked.port, *seats) as url, using(url) as hand:
             from_two_seats(hand)
             hand.page.screenshot(path=HERE / "painter-views.jpg", type="jpeg", quality=88)
+    if asked.only in (None, "lamps"):
+        with painter("gallery", asked.spp, asked.port) as url, using(url) as hand:
+            many_lamps(hand)
+            hand.page.screenshot(path=HERE / "painter-lamps.jpg", type="jpeg", quality=88)
     if asked.only in (None, "layers"):
         with painter("gallery", asked.spp, asked.port) as url, using(url) as hand:
             layered(hand)

@@ -32,7 +32,7 @@ from lightpaint.report.basis_memo import cached_clean_planes, make_once, page_re
 from lightpaint.report.page.figures import CLEAN_REDUCTION, data_uri
 from lightpaint.report.page.lights_table import most_visible_lights
 from lightpaint.threads import parallel_map
-from lightpaint.viewer.bundle import bundled, styles
+from lightpaint.viewer.bundle import bundled, compact_script, styles
 
 #: Colour temperatures of the sliders, in kelvin, evenly in mireds; and the distance from Planck's
 #: locus up to which a colour is one.
@@ -92,7 +92,8 @@ def mixer_html(
 
 def mixer_assets() -> str:
     """Return style and script of all mixers of a page."""
-    style, script = styles("viewer/mixer/mixer.css"), bundled("viewer/mixer/mixer.js")
+    style = styles("viewer/mixer/mixer.css")
+    script = compact_script(bundled("viewer/mixer/mixer.js"))
     return f'<style>\n{style}</style><script type="module">\n{script}</script>'
 
 

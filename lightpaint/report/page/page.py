@@ -4,9 +4,10 @@ page.html.in is the frame of the page; the other modules here fill it in. Pictur
 the page loads nothing from anywhere, which its own content policy forbids.
 """
 
+import re
 import shlex
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import cache, partial
 from html import escape
 from importlib import resources
 from pathlib import Path
@@ -48,7 +49,7 @@ from lightpaint.report.rig.hung_lights import HungLights
 from lightpaint.report.verdict import verdict
 from lightpaint.report.visible_emitters import emitter_remarks
 from lightpaint.target.target import Target
-from lightpaint.viewer.bundle import unindented
+from lightpaint.viewer.bundle import compact_script, compact_styles, unindented
 
 
 def report_page(
@@ -119,8 +120,7 @@ def report_page(
     parts = dict(zip(makers, results, strict=True))
     parts["missed"] += parts.pop("constraints") + colors_section(color_choices)
     parts["mixer"] += mixer_assets()
-    template = resources.files("lightpaint.report.page").joinpath("page.html.in")
-    return Template(unindented(template.read_text(encoding="utf-8"))).substitute(
+    return Template(_frame()).substitute(
         **parts,
         **_texts(basis, target, solution, predicted, verification, appearance),
         exposure=_exposure(transform, predicted.image, looks.denoiser),
@@ -134,6 +134,18 @@ def report_page(
         ),
         sure=sure_section(basis, solution, uncertainty),
         command=escape(command or "(made from Python, without a command line)"),
+    )
+
+
+@cache
+def _frame() -> str:
+    """Return the frame of a page, without space that has no meaning."""
+    template = resources.files("lightpaint.report.page").joinpath("page.html.in")
+    text = unindented(template.read_text(encoding="utf-8"))
+    head, style, body, script, end = re.split("</?(?:style|script)>", text)
+    return (
+        f"{head}<style>{compact_styles(style)}</style>{body}"
+        f"<script>{compact_script(script)}</script>{end}"
     )
 
 

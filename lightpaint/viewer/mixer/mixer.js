@@ -8,6 +8,7 @@ import { Mix } from '../drawing/mix.js';
 import { canvasOfSize, contextOf, drawLight } from './mixer_canvas.js';
 import { lutOf, unpackMixer } from './mixer_data.js';
 import { Row, kelvinTable, luminance } from './mixer_light.js';
+import { Selection } from './mixer_selection.js';
 import { createElement, createSlider, followDrag } from './page_elements.js';
 
 /** @typedef {import("./mixer_data.js").Data} Data */
@@ -55,8 +56,9 @@ class Mixer {
       restRow.plane = this.rows.length;
       this.rows.push(restRow);
     }
+    this.selection = new Selection(this.rows, redraw);
     const view = this.createStage();
-    view.append(...this.createButtons());
+    view.append(this.selection.element, ...this.createButtons());
     const list = createElement('div', 'mixer-lights');
     list.append(...this.rows.map((row) => row.element));
     root.append(view, list);
@@ -73,7 +75,7 @@ class Mixer {
     createStage.style.aspectRatio = `${width} / ${height}`;
     this.picture.className = 'mixer-mix';
     this.picture.setAttribute('role', 'img');
-    this.picture.setAttribute('aria-label', 'The mix of the lights');
+    this.picture.ariaLabel = 'The mix of the lights';
     createStage.append(this.picture);
     view.append(createStage);
     if (!painting) return view;
@@ -127,7 +129,7 @@ class Mixer {
     this.text = createElement('textarea', 'mixer-text');
     this.text.readOnly = true;
     this.text.hidden = true;
-    this.text.setAttribute('aria-label', 'To copy by hand');
+    this.text.ariaLabel = 'To copy by hand';
     return [createButtons, this.status, this.text];
   }
 
@@ -136,7 +138,12 @@ class Mixer {
     this.look = look;
     if (this.status) this.status.textContent = ''; // from an earlier look
     for (const row of this.rows) row.reset(look);
-    this.draw();
+    this.selection.reset();
+  }
+
+  /** Return an emission under the master. @param {RGB} rgb @returns {RGB} */
+  dimmed(rgb) {
+    return /** @type {RGB} */ (rgb.map((x) => this.selection.master * x));
   }
 
   /** Weights of all planes, (n, 3), under solo and mute. */
@@ -145,12 +152,12 @@ class Mixer {
     const currentWeights = new Float64Array(3 * this.planes.length);
     if (!isSolo)
       for (const k of this.hiddenLights())
-        currentWeights.set(this.data.lights[k][this.look], 3 * k);
+        currentWeights.set(this.dimmed(this.data.lights[k][this.look]), 3 * k);
     for (const row of this.rows) {
       const isOn = isSolo ? row.isSolo : !row.isMute;
       // The rest has a plane per look; the last reset chose it.
       const plane = row.light.isRest && this.look === 'present' ? row.plane + 1 : row.plane;
-      if (isOn) currentWeights.set(row.rgb, 3 * plane);
+      if (isOn) currentWeights.set(row.light.isFixed ? row.rgb : this.dimmed(row.rgb), 3 * plane);
     }
     return currentWeights;
   }
@@ -197,7 +204,8 @@ class Mixer {
     const file = structuredClone(this.data.lighting);
     /** @param {string} name @param {RGB} rgb */
     const add = (name, rgb) => {
-      Object.assign(file.lights[name], { emission: [...rgb], weight: [...rgb] });
+      const emission = this.dimmed(rgb);
+      Object.assign(file.lights[name], { emission, weight: [...emission] });
     };
     for (const k of this.hiddenLights()) {
       const light = this.data.lights[k];
@@ -209,7 +217,9 @@ class Mixer {
         for (const [name, emission] of Object.entries(this.data.rest[this.look]))
           add(name, /** @type {RGB} */ (emission.map((x, c) => x * rgb[c])));
     }
-    for (const { light } of this.rows) if (light.isFixed) add(light.name, [1, 1, 1]);
+    for (const { light } of this.rows)
+      if (light.isFixed)
+        Object.assign(file.lights[light.name], { emission: [1, 1, 1], weight: [1, 1, 1] });
     return JSON.stringify(file, null, 2) + '\n';
   }
 

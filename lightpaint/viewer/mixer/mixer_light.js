@@ -1,5 +1,6 @@
 /** One light of the mixer: its row with its sliders. */
 
+import { decodeSrgb, encodeSrgb } from '../drawing/view_transform.js';
 import { slideByTouch } from '../touch_sliders.js';
 import { createElement, createSlider } from './page_elements.js';
 
@@ -57,7 +58,13 @@ export class Row {
     const { name } = light;
     this.element = createElement('div', 'mixer-light');
     this.thumb = document.createElement('canvas');
-    this.swatch = createElement('i', 'mixer-swatch');
+    this.swatch = createElement('input', 'mixer-swatch');
+    this.swatch.type = 'color';
+    this.swatch.disabled = light.isFixed || light.isScalar;
+    this.swatch.ariaLabel = `${name}: colour`;
+    this.checkbox = createElement('input');
+    this.checkbox.type = 'checkbox';
+    this.checkbox.ariaLabel = `Select ${name}`;
     this.solo = this.toggle('S', `Solo: show ${name} alone`, () => (this.isSolo = !this.isSolo));
     this.mute = this.toggle('M', `Mute: show all but ${name}`, () => (this.isMute = !this.isMute));
     this.dimmerSlider = createSlider(`${name}: stops from now`, this.minStops, this.maxStops);
@@ -74,13 +81,14 @@ export class Row {
   build() {
     const { light, kelvins } = this;
     this.element.setAttribute('role', 'group');
-    this.element.setAttribute('aria-label', light.name);
+    this.element.ariaLabel = light.name;
     this.thumb.setAttribute('aria-hidden', 'true');
     const head = createElement('div', 'mixer-head');
     const name = createElement('span', 'mixer-name', light.name);
     name.title = light.name;
     const toggles = createElement('span', 'mixer-hear');
     toggles.append(this.solo, this.mute);
+    if (!light.isFixed) head.append(this.checkbox);
     head.append(this.swatch, name, toggles);
     const body = createElement('div', 'mixer-sliders');
     this.element.append(this.thumb, head, body);
@@ -94,6 +102,7 @@ export class Row {
     slideByTouch(this.dimmerSlider, (stops) => this.dim(stops), restore);
     this.dimmerSlider.addEventListener('dblclick', () => this.dim(0));
     if (light.isScalar) return;
+    this.swatch.addEventListener('input', () => this.setColour(this.swatch.value));
     this.temperatureSlider.classList.add('is-white');
     this.temperatureSlider.style.setProperty('--track', trackOf(kelvins));
     body.append(this.temperatureSlider, this.temperatureOutput);
@@ -108,7 +117,7 @@ export class Row {
     const button = createElement('button', '', text);
     button.type = 'button';
     button.title = label;
-    button.setAttribute('aria-label', label);
+    button.ariaLabel = label;
     button.addEventListener('click', () => {
       act();
       this.show();
@@ -126,14 +135,23 @@ export class Row {
 
   /** @param {number} mired */
   setTemperature(mired) {
-    const hue = this.kelvins.rgb(mired);
-    const presentLevel = luminance(this.rgb);
-    if (presentLevel > 0)
-      this.set(/** @type {RGB} */ (hue.map((x) => x * presentLevel)), 1e6 / mired);
-    else {
-      this.hue = hue;
-      this.set(this.rgb, 1e6 / mired);
-    }
+    const { coolest, warmest } = this.kelvins;
+    const clamped = Math.min(warmest, Math.max(coolest, mired));
+    this.setHue(this.kelvins.rgb(clamped), 1e6 / clamped);
+  }
+
+  /** @param {string} hex a colour; black has none */
+  setColour(hex) {
+    const codes = [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16) / 255);
+    const rgb = /** @type {RGB} */ (codes.map(decodeSrgb));
+    if (luminance(rgb) > 0) this.setHue(rgb, null);
+  }
+
+  /** Give the light a colour at its present level. @param {RGB} hue @param {number | null} kelvin */
+  setHue(hue, kelvin) {
+    const factor = luminance(this.rgb) / luminance(hue);
+    if (!factor) this.hue = hue;
+    this.set(/** @type {RGB} */ (hue.map((x) => x * factor)), kelvin);
   }
 
   /** @param {'answer' | 'present'} look */
@@ -173,7 +191,7 @@ export class Row {
     const stopsText =
       presentLevel > 0 ? `${stops < -0.005 ? '\u2212' : '+'}${Math.abs(stops).toFixed(2)}` : 'off';
     dimmerSlider.value = String(stops);
-    dimmerSlider.setAttribute('aria-valuetext', presentLevel > 0 ? `${stopsText} stops` : 'off');
+    dimmerSlider.ariaValueText = presentLevel > 0 ? `${stopsText} stops` : 'off';
     dimmerOutput.textContent = stopsText;
     const { kelvin } = this;
     const temperature = kelvin === null ? 'own colour' : `${Math.round(kelvin / 10) * 10} K`;
@@ -181,12 +199,12 @@ export class Row {
     const mired = kelvin === null ? (coolest + warmest) / 2 : 1e6 / kelvin;
     temperatureSlider.value = String(mired);
     temperatureSlider.classList.toggle('is-none', kelvin === null);
-    temperatureSlider.setAttribute('aria-valuetext', temperature);
+    temperatureSlider.ariaValueText = temperature;
     temperatureOutput.textContent = kelvin === null ? 'colour' : temperature;
-    swatch.style.background = presentLevel > 0 ? hexOf(this.rgb) : 'none';
+    swatch.value = hexOf(presentLevel > 0 ? this.rgb : this.hue);
     swatch.classList.toggle('is-off', !(presentLevel > 0));
-    solo.setAttribute('aria-pressed', String(this.isSolo));
-    mute.setAttribute('aria-pressed', String(this.isMute));
+    solo.ariaPressed = String(this.isSolo);
+    mute.ariaPressed = String(this.isMute);
     row.classList.toggle('is-mute', this.isMute);
   }
 }
@@ -194,12 +212,8 @@ export class Row {
 /** Return the display colour of a light, its brightest channel at full. @param {RGB} rgb */
 function hexOf(rgb) {
   const maxChannel = Math.max(...rgb) || 1;
-  const codes = rgb.map((x) => {
-    const light = x / maxChannel;
-    const display = light <= 0.0031308 ? 12.92 * light : 1.055 * light ** (1 / 2.4) - 0.055;
-    return Math.round(255 * display);
-  });
-  return `rgb(${codes.join(' ')})`;
+  const codes = rgb.map((x) => Math.round(255 * encodeSrgb(x / maxChannel)));
+  return `#${codes.map((code) => code.toString(16).padStart(2, '0')).join('')}`;
 }
 
 /** @param {Kelvins} kelvins */

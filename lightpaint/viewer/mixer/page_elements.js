@@ -13,7 +13,7 @@ export function createElement(tag, className = '', text = '') {
 export function createSlider(label, min, max) {
   const input = createElement('input');
   Object.assign(input, { type: 'range', min, max, step: 'any' });
-  input.setAttribute('aria-label', label);
+  input.ariaLabel = label;
   return input;
 }
 

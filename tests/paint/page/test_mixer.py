@@ -156,6 +156,35 @@ def test_sliders_solo_and_mute_show_the_sum_of_the_planes(make_basis: Any, open_
     check(page, codes(basis, answer, transform))
 
 
+def test_selected_lights_are_dimmed_together_and_the_master_dims_all(
+    make_basis: Any, open_file: Any
+) -> None:
+    basis = light_basis(make_basis, 3, names=("spot_a", "spot_b", "sky"))
+    transform, answer = transform_of_report(basis), solve_painting(basis)[1].weights
+    page = open_file(report(basis))
+    page.get_by_role("searchbox", name="Select lights by a pattern").fill("SPOT_?")
+    page.get_by_text("2 selected").wait_for()
+    drag = """(slider, values) => values.forEach(([value, kind]) => {
+        slider.value = value; slider.dispatchEvent(new Event(kind)) })"""
+    dim = page.get_by_role("slider", name="Dim selected")
+    dim.evaluate(drag, [[-3, "input"], [-1, "input"], [-1, "change"]])
+    assert dim.input_value() == "0"
+    weights = answer * np.array([0.5, 0.5, 1])[:, None]
+    check(page, codes(basis, weights, transform))
+    page.get_by_role("slider", name="Master").evaluate(drag, [[70, "input"]])
+    check(page, codes(basis, 0.7 * weights, transform))
+    # With Shift all from the last one; a colour keeps the level.
+    page.get_by_role("searchbox").fill("")
+    page.get_by_role("checkbox", name="Select spot_a").click()
+    page.get_by_role("checkbox", name="Select sky").click(modifiers=["Shift"])
+    page.get_by_text("3 selected").wait_for()
+    page.get_by_label("sky: colour", exact=True).evaluate(drag, [["#ff0000", "input"]])
+    weights[2] = [weights[2] @ [0.2126, 0.7152, 0.0722] / 0.2126, 0, 0]
+    check(page, codes(basis, 0.7 * weights, transform))
+    page.get_by_text("Reset to answer").click()
+    check(page, codes(basis, answer, transform))
+
+
 def test_kelvin_turns_the_colour_and_keeps_the_luminance(make_basis: Any, open_file: Any) -> None:
     basis = light_basis(make_basis, 2)
     transform, answer = transform_of_report(basis), solve_painting(basis)[1].weights

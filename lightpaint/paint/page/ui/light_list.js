@@ -43,7 +43,7 @@ export function LightList({ ui, app }) {
   return html`<div class=${`lights ${isAnswerHidden(ui) ? 'is-unseen' : ''}`}>
     ${ui.lights.length > 1 && html`<${MasterDimmer} ui=${ui} app=${app} />`}
     ${
-      ui.lights.length > 5 &&
+      ui.lights.length > 1 &&
       html`<div class="lights-tools">
       <label class="field search"><span class="only-read">Search lights</span>
         <${Icon} name="search" /><input type="search" value=${ui.search} placeholder="Search"
@@ -71,7 +71,7 @@ export function LightList({ ui, app }) {
 /** @param {Ui} ui @param {number[]} indices that the list shows @param {boolean} areSelected */
 function selectionTip({ search }, indices, areSelected) {
   const which = search.trim() ? `the ${indices.length} found` : 'all';
-  return areSelected ? 'Select none' : `Select ${which}`;
+  return `${areSelected ? 'Deselect' : 'Select'} ${which}`;
 }
 
 /** @param {{ui: Ui, app: App}} props */
