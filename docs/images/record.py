@@ -208,7 +208,7 @@ def many_lamps(hand: Hand) -> None:
     panel.get_by_role("button", name="Colour", exact=True).click()
     panel.get_by_role("button", name="Gel", exact=True).click()
     _type(page, "Filter", "201")
-    _type(page, "Filter", "20")
+    page.get_by_role("textbox", name="Filter", exact=True).fill("")  # lists all
     _type(page, "Master", "70")
     page.mouse.move(5, 5)
     hand.wait()

@@ -259,7 +259,7 @@ def test_the_master_dims_pictures_and_no_level(painter: Painter) -> None:
     np.testing.assert_allclose(weights(painter), before)
     assert painter.page.evaluate("() => engine.shown.master") == 0.7
     assert painter.page.get_by_text("Answer, master 70 %").count() == 1
-    assert painter.page.get_by_text("at 100 % of the master").count() == 1
+    assert painter.page.get_by_text("before the master").count() == 1
     painter.page.get_by_role("button", name="Master to 100 %").click()
     painter.still()
     assert painter.ui("master") == 1

@@ -56,7 +56,7 @@ export function AnswerLine({ ui, app }) {
       }
       ${
         ui.master !== 1 &&
-        html`<span class="faint" data-tip=${MASTER_TIP}>at 100 % of the master</span>`
+        html`<span class="faint" data-tip=${MASTER_TIP}>before the master</span>`
       }
     </p>
     <${AdviceButton} ui=${ui} app=${app} />
@@ -78,6 +78,12 @@ export function AnswerLine({ ui, app }) {
 export function PointerStatus({ ui }) {
   if (ui.clickAction) {
     const text = pointingHint(ui.clickAction, ui.lights);
+    return html`<p class="here" id="lp-status" role="status"><strong>${text}</strong></p>`;
+  }
+  if (ui.isLassoing) {
+    const text = ui.rig
+      ? 'Draw around the marks of the lights to select them. Escape ends it.'
+      : 'Looking where the lights hang …';
     return html`<p class="here" id="lp-status" role="status"><strong>${text}</strong></p>`;
   }
   if (!ui.probe) {

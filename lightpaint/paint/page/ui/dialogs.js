@@ -3,7 +3,7 @@
 import { html, useState } from '../vendor/preact.js';
 import { ProgressBar } from './progress_bar.js';
 import { Button, Checkbox, Dialog } from './controls.js';
-import { progressText, relativePath } from './format.js';
+import { percentText, progressText, relativePath } from './format.js';
 import { SHORTCUTS, MOD } from './shortcuts.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
@@ -79,6 +79,11 @@ function ExportDialog({ ui, app, close }) {
       ) => setOutputs(on ? [...outputs, key] : outputs.filter((output) => output !== key))} />
       <span class="faint">${description}</span></div>`,
     )}
+    ${
+      ui.master !== 1 &&
+      html`<p>The master is at ${percentText(ui.master)}: picture, lighting and relit scene are dimmed;
+        painting, report and the command are not.</p>`
+    }
     <div class="row"><span class="faint folder">to ${folder}</span>
       <${CopyButton} text=${folder} tip="Copy the folder's path" app=${app} />
       <${Button} label=${isBusy ? 'Exporting …' : 'Export'} primary disabled=${isBusy || !outputs.length}
