@@ -99,7 +99,7 @@ def test_a_drag_of_the_dimmer_begins_at_the_answer_and_is_one_step(painter: Pain
     before = weights(painter)
     painter.page.evaluate(
         """async () => {
-          const slider = document.querySelector('.selection input[aria-label="Dim"]');
+          const slider = document.querySelector('.lamp-selection input[aria-label="Dim"]');
           for (const [value, kind] of [[-0.5, 'input'], [-3, 'input'], [-2, 'change']]) {
             slider.value = value;
             slider.dispatchEvent(new Event(kind, { bubbles: true }));

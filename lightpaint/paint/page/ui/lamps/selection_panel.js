@@ -39,7 +39,7 @@ export function SelectionPanel({ ui, app }) {
   const { many } = app.session;
   const coloured = colouredLights(ui, lights);
   const fixedCount = lights.length - adjustableLights(ui, lights).length;
-  return html`<section class="selection" aria-label="Selected lights">
+  return html`<section class="lamp-selection" aria-label="Selected lights">
     <div class="row">
       <strong role="status">${countText(lights.length, 'light')} selected</strong>
       <span class="faint">${levelsText(ui, lights)}</span><span class="spring"></span>
