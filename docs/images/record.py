@@ -10,9 +10,9 @@ writes beside itself
     painter-views.jpg   the stage, painted from the balcony and from a box
     painter-layers.jpg  the gallery with wishes as layers, one of them unfolded
     painter-lamps.jpg   spots dimmed together, two of them with a gel, under a master
-    lights.webp     somebody drags a spot, and aims it by a click
+    lights.webp     somebody drags a spot, aims it by a click, paints, and lets the lights move;
+                    it also prints the answers a second of the drag
     painter-lights.jpg  the painter when that is done
-    places.webp     somebody paints, and lets the lights move
 
 The painter's own server, with new sessions in folders that are removed, and headless Chromium.
 A basis is rendered once, and kept where all bases are. Nothing is sped up but the waiting.
@@ -46,6 +46,21 @@ FRAME = 90
 #: Looks in a row at which nothing is being solved, before an answer counts as final: on a busy
 #: machine a drag begins to be solved only after a while.
 CALM = 4
+
+#: Milliseconds between looks at a search for places of lights.
+SEARCH_PAUSE_MS = 1500
+
+#: Counts answers to moves of lights.
+COUNT_ANSWERS = """() => {
+  const { host } = document.getElementById('lightpaint').painter;
+  const send = host.send.bind(host);
+  window.answerCount = 0;
+  host.send = async (kind, fields, arrays) => {
+    const reply = await send(kind, fields, arrays);
+    if (kind === 'move') window.answerCount += 1;
+    return reply;
+  };
+}"""
 
 #: An arrow whose tip is its first point.
 POINTER = ((0, 0), (0, 19), (5, 15), (8, 22), (12, 20), (9, 14), (15, 14))
@@ -101,12 +116,12 @@ class Hand:
 
         Raises RuntimeError where the page warns of something.
         """
-        until, calm = time.time() + 120, 0
+        until, calm = time.time() + 600, 0
         while calm < CALM:
             if warnings := self.page.locator(".toast.is-warn").all_inner_texts():
                 raise RuntimeError(warnings[0])
             if time.time() > until:
-                raise TimeoutError("the painter has been solving for two minutes")
+                raise TimeoutError("the painter has been solving for ten minutes")
             time.sleep(0.4)
             calm = calm + 1 if self.is_calm() else 0
         time.sleep(0.8)  # a toast, a sharp picture
@@ -221,7 +236,7 @@ def _type(page: Page, label: str, text: str) -> None:
 
 
 def moving_lights(hand: Hand) -> None:
-    """A spot that is dragged, and aimed by a click."""
+    """A spot that is dragged, and aimed by a click; a wish that lights answer by moving."""
     on, page = hand.of_painting, hand.page
     page.keyboard.press("d")
     page.locator(".lamp").first.wait_for(timeout=120_000)
@@ -229,7 +244,11 @@ def moving_lights(hand: Hand) -> None:
     box = page.locator('.lamp[data-lamp="spot_figure"]').first.bounding_box()
     assert box is not None
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.evaluate(COUNT_ANSWERS)
+    start = time.perf_counter()
     hand.drag((x, y), (x + 60, y - 4), (x + 110, y + 2), moves=10)
+    answers = page.evaluate("() => window.answerCount") / (time.perf_counter() - start)
+    print(f"{answers:.1f} answers a second, while pictures of the page were taken")
     hand.wait()
     row = page.locator('[data-light="spot_figure"]')
     row.get_by_role("button", name="spot_figure", exact=True).first.click()
@@ -242,19 +261,16 @@ def moving_lights(hand: Hand) -> None:
     page.mouse.click(*hand.at)
     while page.locator(".lamp-aim").first.get_attribute("style") == before:
         page.wait_for_timeout(200)
-    hand.wait(24)
-
-
-def placed_lights(hand: Hand) -> None:
-    """A wish that lights answer by moving."""
-    on, page = hand.of_painting, hand.page
-    page.keyboard.press("d")
-    page.locator(".lamp").first.wait_for(timeout=120_000)
+    hand.wait(16)
+    # A wish that lights answer by moving.
     hand.drag(on(0.03, 0.27), on(0.13, 0.34), on(0.25, 0.41), on(0.1, 0.37))
     hand.wait()
-    page.get_by_role("button", name="Let lights move").first.click()
-    hand.see(8)
-    page.locator(".working").filter(has_text="Placing").wait_for(state="detached", timeout=600_000)
+    hand.press("Let lights move")
+    working = page.locator(".working").filter(has_text="Placing")
+    working.wait_for(timeout=60_000)
+    while working.count():
+        hand.see(2)
+        page.wait_for_timeout(SEARCH_PAUSE_MS)
     hand.wait(24)
 
 
@@ -318,7 +334,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--spp", type=int, default=64)
     parser.add_argument("--port", type=int, default=8431)
-    pictures = ("painting", "views", "layers", "lamps", "lights", "places")
+    pictures = ("painting", "views", "layers", "lamps", "lights")
     parser.add_argument("--only", choices=pictures)
     asked = parser.parse_args()
     if asked.only in (None, "lights"):
@@ -326,10 +342,6 @@ def main() -> None:
             moving_lights(hand)
             hand.page.screenshot(path=HERE / "painter-lights.jpg", type="jpeg", quality=88)
         _write(hand, HERE / "lights.webp")
-    if asked.only in (None, "places"):
-        with painter("gallery", asked.spp, asked.port) as url, using(url) as hand:
-            placed_lights(hand)
-        _write(hand, HERE / "places.webp")
     if asked.only in (None, "views"):
         seats = ("--sensor=balcony", "--sensor=box", "--resolution=1/2")
         with painter("stage", asked.spp, asked.port, *seats) as url, using(url) as hand:
