@@ -62,11 +62,12 @@ def short_repr(value: Any) -> str:
     """Return the repr of a dataclass on one screen: arrays by their shapes, long values cut."""
     names = [field.name for field in fields(value) if field.repr]
     room = MAX_LIST_LENGTH // len(names)
-    texts = (f"{name}={_brief(getattr(value, name), room - len(name))}" for name in names)
+    texts = (f"{name}={brief(getattr(value, name), room - len(name))}" for name in names)
     return f"{type(value).__name__}({', '.join(texts)})"
 
 
-def _brief(value: Any, room: int) -> str:
+def brief(value: Any, room: int = 60) -> str:
+    """Return the repr of a value in one line of about `room` characters."""
     if hasattr(value, "dtype") and hasattr(value, "shape"):
         return f"{value.dtype} {value.shape}"
     text = f"{value:.4g}" if isinstance(value, float) else " ".join(repr(value).split())

@@ -70,6 +70,19 @@ class ComposedPlanes(RowPlanes):
                     composed[i] = rows[pick[1]]
         return composed
 
+    def pixels(self, where: slice | Indices) -> Floats:
+        """Return some pixels of all planes, (n, p, 3). Few of them are read alone."""
+        if isinstance(where, slice):
+            return super().pixels(where)
+        composed = np.zeros((self.count, len(where), 3), np.float32)
+        sources = {id(pick[0]): pick[0] for pick in self._picks if pick is not None}
+        for key, source in sources.items():
+            pixels = source.pixels(where)
+            for i, pick in enumerate(self._picks):
+                if pick is not None and id(pick[0]) == key:
+                    composed[i] = pixels[pick[1]]
+        return composed
+
 
 def block_means(planes: Planes, weight: Doubles, side: int) -> Planes:
     """Return weighted means over blocks of side × side pixels, as planes with one pixel per block.

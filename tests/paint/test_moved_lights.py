@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import shlex
 import time
 from collections.abc import Iterator
@@ -12,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from moving import MovingStudio, exact_answer, opened_rig, pixel_of, place_lights, stroke
-from renderer import LIGHTS
+from renderer import LIGHTS, write_room
 
 import lightpaint as lp
 from lightpaint.cli import main
@@ -143,6 +144,55 @@ def test_poses_that_no_light_can_have(
     assert text in str(refusal.value)
     assert "\n" not in str(refusal.value)
     assert (moving.studio.session.version, moving.studio.session.requests.poses) == (version, {})
+
+
+def test_hostile_places_are_refused_in_one_line(moving: MovingStudio) -> None:
+    """In one studio: none of them changes anything, as none of a valid place does after them."""
+    moves: list[Any] = [
+        protocol.MoveLights({"bulb": {"position": place}})
+        for place in ([10**400, 0, 0], [1e300, 0, 0], [math.inf, 0, 0], [[1], 2, 3])
+    ]
+    beam_place = list(moving.scene.light("beam").members[0].site.position)
+    moves += [protocol.MoveLights({"beam": x}) for x in ({"cutoff": 10**400}, {"cutoff": 0})]
+    moves += [
+        protocol.MoveLights({"beam": {"target": beam_place}}),
+        protocol.MoveLights({"bulb": {"position": POSITION}}, view=7),
+        protocol.MoveLights({"bulb": {"position": POSITION}}, is_final=False, view=-1),
+        protocol.PointLight(99, "aim", (12.0, 12.0)),
+        protocol.PointLight(-1, "aim", (12.0, 12.0)),
+        protocol.AddLight("panel", position=(1e30, 0.0, 0.0)),
+    ]
+    version = moving.studio.session.version
+    for move in moves:
+        with pytest.raises(LightpaintError) as refusal:
+            moving.send(move)
+        assert "\n" not in str(refusal.value)
+        assert len(str(refusal.value)) < 160
+    assert (moving.studio.session.version, moving.studio.session.requests.placed) == (version, {})
+
+
+def test_a_camera_that_sees_nothing_still_lets_lights_move(tmp_path: Path) -> None:
+    """Their planes are black, and a search ends in one line."""
+    path = write_room(tmp_path)
+    text = re.sub(
+        r'(<lookat origin=)"[^"]*" (target=)"[^"]*"',
+        r'\1"0 60 0" \2"0 90 1"',
+        path.read_text(),
+        count=1,
+    )
+    path.write_text(text)
+    moving = MovingStudio(tmp_path)
+    try:
+        stroke(moving)
+        opened_rig(moving)
+        moving.send(protocol.AddLight("spot", position=(0.0, 1.0, 0.0)))
+        moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}))
+        assert not moving.plane("bulb").any()
+        assert not moving.plane("spot_1").any()
+        moving.send(protocol.PlaceLights())
+        assert "sees nothing that light falls on" in place_lights(moving)["text"]
+    finally:
+        moving.close()
 
 
 def test_the_rig_says_where_lights_hang_and_what_cannot_move(moving: MovingStudio) -> None:

@@ -17,6 +17,7 @@ from lightpaint.arrays import Floats, Position
 from lightpaint.errors import SceneError
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.placement.paths.frozen_paths import FrozenPaths, PanelSite
+from lightpaint.placement.paths.path_sums import PathSums
 from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.scene.lights.new_emitter import NewEmitter
 from lightpaint.scene.properties.pose import Site
@@ -53,6 +54,25 @@ def test_columns_are_the_planes_of_a_basis(room: Scene) -> None:
     for plane, column in zip(planes, columns, strict=True):
         assert column.mean() == pytest.approx(plane.mean(), rel=0.02)  # noise
         assert np.square(column - plane).sum() < 0.03 * np.square(plane).sum()  # noise
+
+
+@pytest.mark.parametrize("first_hits", [1, 9])
+def test_sums_of_one_light_are_its_column(room: Scene, first_hits: int) -> None:
+    """One kernel with the cone of a spot, and vertices that are cached and summed by NumPy."""
+    panel = PanelSite((0.2, 1.5, 0.3), (0.0, -1.0, 0.0), side=0.3)
+    placed = [*sites(room), panel, Site((0.1, 1.2, 0.4), (0.0, -1.0, 0.2), cutoff=30.0, beam=30.0)]
+
+    def compare(paths: FrozenPaths) -> None:
+        assert paths.indirect is not None
+        direct, indirect = (PathSums(paths, x) for x in (paths.direct, paths.indirect))
+        for site, column in zip(placed, paths.columns(placed), strict=True):
+            image = np.array(direct(site)) + np.array(indirect(site))
+            paths.add_panel(image.reshape(-1, 3), site)
+            assert image.any()
+            scale = column.max()  # float32, and arccos near the axis of a spot
+            np.testing.assert_allclose(image.reshape(column.shape), column, atol=1e-5 * scale)
+
+    along_paths(room, compare, first_hits=first_hits, bounces=4)
 
 
 def test_vertices_of_all_paths_share_kernels(room: Scene) -> None:

@@ -1,6 +1,6 @@
 """The rays of a camera, with which a page draws lamps, and their first hits."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -97,7 +97,7 @@ def _listed(vector: Doubles) -> Place:
     return tuple(map(float, vector))
 
 
-def up_axis(cameras: list[Camera | None]) -> int:
+def up_axis(cameras: Sequence[Camera | None]) -> int:
     """Return the axis nearest to upwards in these views; y without a camera."""
     ups = [-np.array(camera.y_axis) for camera in cameras if camera is not None]
     total = (

@@ -14,13 +14,14 @@ from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import Lights
 from lightpaint.errors import PaintError, SceneError
+from lightpaint.paint.protocol import Camera, LightPlace
 from lightpaint.paint.rig.added_lights import (
     POSE_KEYS,
     light_of_new,
     new_emitter,
     site_of_new,
 )
-from lightpaint.paint.rig.cameras import in_this_thread
+from lightpaint.paint.rig.cameras import camera_of, in_this_thread
 from lightpaint.paint.rig.moved_bases import one_light_basis, with_planes_of
 from lightpaint.paint.rig.quick_planes import QuickPlanes
 from lightpaint.paint.session.moved_lights import Placed, added_names
@@ -60,6 +61,7 @@ class LampRig:
         subjects: The views to be painted.
         views: The views of the loaded scene; None before it is loaded.
         bounds: Corners of a box around the visible scene; None if unknown.
+        known_places: Places that were found for poses of lights.
     """
 
     def __init__(self, subjects: Sequence[Subject]) -> None:
@@ -68,6 +70,7 @@ class LampRig:
         self.views: tuple[RigView, ...] | None = None
         self._rendered = OrderedDict[PoseKey, list[Basis]]()
         self.bounds: tuple[Doubles, Doubles] | None = None
+        self.known_places: dict[PoseKey, LightPlace] = {}
         self._freedoms: Mapping[str, Freedom] | None = None
 
     @property
@@ -93,6 +96,13 @@ class LampRig:
     def surfaces(self) -> tuple[str, ...]:
         """Names of rails, surfaces and shapes that new lights may hang on."""
         return surfaces_of(self.rigging, self.scene)
+
+    @cached_property
+    def cameras(self) -> tuple[Camera | None, ...]:
+        """The camera of each view; None for one that is no pinhole. The rig is open."""
+        assert self.views is not None
+        with in_this_thread():
+            return tuple(camera_of(view.scene, view.loaded) for view in self.views)
 
     @property
     def extent(self) -> float:
@@ -195,7 +205,7 @@ class LampRig:
 
     def _planes(self, bases: Sequence[Basis], name: str, values: Mapping[str, Any]) -> list[Basis]:
         """Return the plane of a light with a pose in each view."""
-        key = _key(name, values)
+        key = pose_key(name, values)
         with self._lock:
             if (rendered := self._rendered.get(key)) is not None:
                 self._rendered.move_to_end(key)
@@ -221,7 +231,7 @@ class LampRig:
         return light_bases
 
     def _is_rendered(self, name: str, values: Mapping[str, Any]) -> bool:
-        return _key(name, values) in self._rendered
+        return pose_key(name, values) in self._rendered
 
     def unrendered(self, placed: Placed) -> list[str]:
         """Return the moved lights that have only quick planes."""
@@ -258,7 +268,7 @@ class LampRig:
                     )
                 )
         with self._lock:
-            self._rendered[_key(name, values)] = light_bases
+            self._rendered[pose_key(name, values)] = light_bases
             while len(self._rendered) > MAX_RENDERED:
                 self._rendered.popitem(last=False)
 
@@ -282,5 +292,6 @@ def _pose(name: str, values: Mapping[str, Any]) -> Pose:
         raise PaintError(f"{name}: {error}") from None
 
 
-def _key(name: str, values: Mapping[str, Any]) -> PoseKey:
+def pose_key(name: str, values: Mapping[str, Any]) -> PoseKey:
+    """Return a light and its pose as a key."""
     return name, json.dumps(values, sort_keys=True)

@@ -14,7 +14,7 @@ from lightpaint.basis.cache.denoised_planes import (
     denoise_to_halves,
 )
 from lightpaint.colour.color import LUMINANCE
-from lightpaint.errors import LightpaintError
+from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.paint.background_threads import BackgroundThreads, LatestWork, StoppedError
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.protocol import (
@@ -98,9 +98,10 @@ class LightMover:
         """Return the move that a pointing request implies. Raises LightpaintError."""
         session = self._access.session
         self.rig.open(session.bases)
-        name = (
-            session.basis.names[request.light] if request.light < len(session.basis.names) else ""
-        )
+        names = session.basis.names
+        if not 0 <= request.light < len(names):
+            raise PaintError(f"no light {request.light}: there are {len(names)}")
+        name = names[request.light]
         pose = pose_change(self.rig, request, name, session.requests.placed.get(name, {}))
         return MoveLights({name: pose}, request.is_final, request.view)
 

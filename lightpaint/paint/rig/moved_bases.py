@@ -11,7 +11,6 @@ from lightpaint.basis.derived_planes import PlaneReference, compose_planes
 from lightpaint.basis.file.basis_file import is_large
 from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.planes import IndirectLight, MemoryPlanes, Planes
-from lightpaint.images.estimate import Estimate
 
 
 def one_light_basis(basis: Basis, light: BasisLight, plane: Floats) -> Basis:
@@ -59,7 +58,7 @@ def with_planes_of(basis: Basis, moved: Mapping[int, Basis], *, in_memory: bool)
         emitters_seen=np.any(
             [basis.emitters_seen, *(x.emitters_seen for x in moved.values())], axis=0
         ),
-        former=Estimate(basis.current_look, basis.current_noise),
+        former=basis.former or basis.predict(basis.current_weights),  # which it keeps
         guide_table=None,
         sums=None,
         origin=replace(basis.origin, is_composed=True),

@@ -13,11 +13,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Floats
+from lightpaint.arrays import Floats, aligned
 from lightpaint.images.denoiser import DARKEST, Features
+from lightpaint.images.surface_filter import SurfaceFilter
 from lightpaint.placement.paths.frozen_paths import FrozenPaths
+from lightpaint.placement.paths.path_sums import PathSums
 from lightpaint.scene.properties.film import reduction_to
 from lightpaint.scene.properties.pose import Site
+from lightpaint.scene.runtime.render_lock import tracing
 from lightpaint.scene.scene import Scene
 
 #: Approximate number of first hits in the picture, and the largest number per pixel.
@@ -46,19 +49,25 @@ class QuickPlanes:
         self.size = scene.size
         hits = isqrt(min(max(FIRST_HITS // prod(scene.size), 1), MOST_PER_PIXEL)) ** 2
         paths = min(max(PATHS // prod(small.size), 1), MOST_PER_PIXEL)
-        self._direct = FrozenPaths(scene, loaded, first_hits=hits, bounces=0)
+        direct = FrozenPaths(scene, loaded, first_hits=hits, bounces=0)
+        self._direct = PathSums(direct, direct.direct)
         scattered = FrozenPaths(small, loaded, first_hits=1, bounces=paths)
-        self._indirect = scattered.filtered_along(cells)
+        self._cell_size, self._filter = small.size, SurfaceFilter(cells)
+        later = scattered.indirect
+        self._indirect = None if later is None else PathSums(scattered, later)
         self._spread = _Spreading(features, cells)
-        self._cell_albedo = np.maximum(cells.albedo, DARKEST).reshape(-1, 3)
-        self._albedo = np.maximum(features.albedo, DARKEST).reshape(-1, 3)
+        self._add_panel = direct.add_panel
 
     def plane(self, site: Site) -> npt.NDArray[np.float32]:
         """Return the image of a light at unit intensity, (h, w, 3) linear Rec.709."""
-        plane_image = self._direct.direct_images([site])[0]
-        indirect = self._indirect.indirect_images([site])[0].reshape(-1, 3)
-        plane_image += self._spread(indirect / self._cell_albedo) * self._albedo
-        return np.asarray(plane_image.reshape(*self.size, 3), np.float32)
+        direct = self._direct(site)
+        if self._indirect is None:
+            plane = np.array(direct, np.float32)
+        else:
+            cells = np.array(self._indirect(site), np.float32).reshape(*self._cell_size, 3)
+            plane = self._spread(self._filter(cells), direct)
+        self._add_panel(plane.reshape(-1, 3), site)
+        return plane.reshape(*self.size, 3)
 
 
 def _sampled(features: Features, size: tuple[int, int]) -> Features:
@@ -74,38 +83,56 @@ def _sampled(features: Features, size: tuple[int, int]) -> Features:
 
 
 class _Spreading:
-    """Interpolation of light from cells to pixels, by similarity of the four cells around each.
-
-    Attributes:
-        cells, weights: (4, pixels), indices of cells, and their shares.
-    """
+    """Interpolation of light from cells to pixels, by similarity of the four cells around each."""
 
     def __init__(self, features: Features, cells: Features) -> None:
+        import drjit as dr
+        import mitsuba as mi
+
         assert features.position is not None
         assert cells.position is not None
         (height, width), (rows, columns) = features.size, cells.size
         y, along_y = _between(height, rows)
         x, along_x = _between(width, columns)
         spacing = _spacing(cells.position)
-        self.cells = np.empty((4, height * width), np.int32)
-        self.weights = np.empty((4, height * width, 1), np.float32)
+        indices = np.empty((4, height * width), np.uint32)
+        weights = np.empty((4, height * width), np.float32)
         for k, (a, b) in enumerate(product(range(2), repeat=2)):
             where = np.ix_(y[a], x[b])
             normal, position = cells.normal[where], cells.position[where]
             off = np.abs(((features.position - position) * normal).sum(axis=-1))
             alike = np.clip((features.normal * normal).sum(axis=-1), 0, 1) ** NORMAL_POWER
             alike *= np.exp(-off / (NEAR_PLANE * spacing))
-            self.cells[k] = np.add.outer(y[a] * columns, x[b]).ravel()
-            weight = np.outer(along_y[a], along_x[b]) * (alike + LEAST_WEIGHT)
-            self.weights[k] = weight.reshape(-1, 1)
-        self.weights /= np.maximum(self.weights.sum(axis=0), 1e-30)
+            indices[k] = np.add.outer(y[a] * columns, x[b]).ravel()
+            weights[k] = (np.outer(along_y[a], along_x[b]) * (alike + LEAST_WEIGHT)).ravel()
+        weights /= np.maximum(weights.sum(axis=0), 1e-30)
+        albedo = np.maximum(features.albedo, DARKEST).reshape(-1, 3)
+        self._cell_albedo = np.maximum(cells.albedo, DARKEST).reshape(-1, 3)
+        with tracing():
+            self._cells = [mi.UInt32(aligned(3 * row, np.uint32)) for row in indices]
+            self._weights = [mi.Float(aligned(row, np.float32)) for row in weights]
+            self._albedo = [mi.Float(aligned(row, np.float32)) for row in albedo.T]
+            dr.make_opaque(self._cells, self._weights, self._albedo)
 
-    def __call__(self, light: Floats) -> npt.NDArray[np.float32]:
-        """Return light of cells, (cells, 3), in pixels, (pixels, 3)."""
-        spread = np.zeros((self.cells.shape[1], 3), np.float32)
-        for cells, weights in zip(self.cells, self.weights, strict=True):
-            spread += np.take(light, cells, axis=0) * weights
-        return spread
+    def __call__(self, indirect: Floats, direct: Any) -> npt.NDArray[np.float32]:
+        """Return the light of pixels, (3 · pixels,): the direct light and that of the cells around.
+
+        indirect: of the cells, (rows, columns, 3). direct: of the pixels, as Dr.Jit has it.
+        """
+        import drjit as dr
+        import mitsuba as mi
+
+        light = indirect.reshape(-1, 3) / self._cell_albedo
+        with tracing():
+            table = mi.Float(aligned(light.ravel(), np.float32))
+            mode = dr.ReduceMode.NoConflicts
+            pixel = 3 * dr.arange(mi.UInt32, dr.width(self._weights[0]))
+            for channel in range(3):
+                spread = dr.zeros(mi.Float, 1)
+                for cells, weights in zip(self._cells, self._weights, strict=True):
+                    spread = dr.fma(dr.gather(mi.Float, table, cells + channel), weights, spread)
+                dr.scatter_add(direct, spread * self._albedo[channel], pixel + channel, mode=mode)
+            return np.array(direct, np.float32)
 
 
 def _between(count: int, cells: int) -> tuple[Sequence[npt.NDArray[np.intp]], Sequence[Floats]]:

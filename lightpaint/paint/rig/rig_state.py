@@ -7,31 +7,42 @@ import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.paint.protocol import LightPlace, Place, Rig
-from lightpaint.paint.rig.cameras import camera_of, free_length, in_this_thread, up_axis
-from lightpaint.paint.rig.lamp_rig import LampRig
+from lightpaint.paint.rig.cameras import free_length, in_this_thread, up_axis
+from lightpaint.paint.rig.lamp_rig import LampRig, pose_key
 from lightpaint.paint.session.moved_lights import Placed, added_names
 from lightpaint.scene.properties.pose import Site
+
+#: Number of places that are kept, which grows with each step of a drag.
+MAX_KNOWN = 1024
 
 
 def rig_state(rig: LampRig, placed: Placed) -> Rig:
     """Return the places of all lights, for pages. The rig is open."""
-    views = rig.views
-    assert views is not None
-    with in_this_thread():
-        names = (*(light.name for light in rig.scene.lights), *added_names(placed))
-        places = tuple(_place(rig, name, placed.get(name, {})) for name in names)
-        cameras = [camera_of(view.scene, view.loaded) for view in views]
+    names = (*(light.name for light in rig.scene.lights), *added_names(placed))
+    places = tuple(_known_place(rig, name, placed.get(name, {})) for name in names)
+    cameras = rig.cameras
     hung = [np.array(place.position) for place in places if place.position is not None]
     low, high = rig.bounds or (np.zeros(3), np.ones(3))
     low, high = np.min([low, *hung], axis=0), np.max([high, *hung], axis=0)
     return Rig(
         lights=places,
-        cameras=tuple(cameras),
+        cameras=cameras,
         up=up_axis(cameras),
         low=tuple(map(float, low)),
         high=tuple(map(float, high)),
         surfaces=rig.surfaces,
     )
+
+
+def _known_place(rig: LampRig, name: str, values: Mapping[str, Any]) -> LightPlace:
+    """Return the place of a light, which is found once for each pose: its target takes a ray."""
+    key = pose_key(name, values)
+    if key not in rig.known_places:
+        if len(rig.known_places) >= MAX_KNOWN:
+            rig.known_places.clear()
+        with in_this_thread():
+            rig.known_places[key] = _place(rig, name, values)
+    return rig.known_places[key]
 
 
 def _place(rig: LampRig, name: str, values: Mapping[str, Any]) -> LightPlace:

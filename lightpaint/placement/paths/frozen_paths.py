@@ -12,7 +12,7 @@ indirect light is smooth, and is averaged along surfaces (images/surface_filter.
 
 import math
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -48,7 +48,7 @@ KEPT_VALUES = 2**24
 SHADOW_EPSILON = 1e-3
 
 #: Values of an origin that a launch reads: position, axis, two half sides of a panel, kind.
-_ROW = 13
+ORIGIN_VALUES = 13
 _POINT, _SUN, _PANEL = 0.0, 1.0, 2.0
 
 #: Steps of the sequence that spreads points over a panel: the reciprocals of the plastic number.
@@ -63,7 +63,7 @@ class PanelSite(Site):
 
 
 @dataclass(frozen=True)
-class _Origin:
+class LightOrigin:
     """The parameters of a shadow ray: the origin of light, without the cone of a spot."""
 
     position: tuple[float, ...]
@@ -72,7 +72,7 @@ class _Origin:
     kind: float
 
     @classmethod
-    def of(cls, site: Site) -> "_Origin":
+    def of(cls, site: Site) -> "LightOrigin":
         if site.position is None:
             return cls((0, 0, 0), site.direction or (0, 0, 1), 0, _SUN)
         if isinstance(site, PanelSite):
@@ -105,7 +105,7 @@ class FrozenPaths:
     ) -> None:
         if scene.has_media:
             raise SceneError(f"{scene.path} has fog or the like: lights cannot be moved in it")
-        self.size, self._scene = scene.size, loaded
+        self.size, self.loaded = scene.size, loaded
         self.hides_panels = scene.integrator.hide_emitters
         self._side = side = math.isqrt(first_hits)
         if side**2 != first_hits:
@@ -121,7 +121,7 @@ class FrozenPaths:
             )
         self._shift = rng.random(2)
         self._filter: SurfaceFilter | None = None
-        self._kept: OrderedDict[tuple[int, _Origin], _Shone] = OrderedDict()
+        self._kept: OrderedDict[tuple[int, LightOrigin], _Shone] = OrderedDict()
 
     def filtered_along(self, features: Features) -> "FrozenPaths":
         """Make `columns` average indirect light along surfaces. features: of the film's pixels."""
@@ -143,17 +143,21 @@ class FrozenPaths:
         """Return the images of direct light alone, (k, h · w, 3) float32; see `columns`."""
         images = self._sums(self.direct, sites)
         for image, site in zip(images, sites, strict=True):
-            if isinstance(site, PanelSite) and site.position and not self.hides_panels:
-                lines = self.sight_lines.near(site.position, site.side / math.sqrt(2))
-                axis = np.array([site.direction or (0.0, 0.0, 1.0)])
-                shares = lines.covered(site.position, axis, site.side)[0]
-                np.add.at(image, lines.pixels, shares[:, None])
+            self.add_panel(image, site)
         return images
+
+    def add_panel(self, image: Floats, site: Site) -> None:
+        """Add a panel at unit radiance to an image (h · w, 3) in which it is seen itself."""
+        if isinstance(site, PanelSite) and site.position and not self.hides_panels:
+            lines = self.sight_lines.near(site.position, site.side / math.sqrt(2))
+            axis = np.array([site.direction or (0.0, 0.0, 1.0)])
+            shares = lines.covered(site.position, axis, site.side)[0]
+            np.add.at(image, lines.pixels, shares[:, None])
 
     @cached_property
     def sight_lines(self) -> SightLines:
         """The lines of sight along which the camera sees panels."""
-        return SightLines.of(self._scene, self._camera, self.size, self._side)
+        return SightLines.of(self.loaded, self._camera, self.size, self._side)
 
     def indirect_images(self, sites: Sequence[Site]) -> Floats:
         """Return the images of indirect light alone, (k, h, w, 3) float32; see `columns`."""
@@ -167,7 +171,7 @@ class FrozenPaths:
 
     def contributions(self, vertices: Vertices, site: Site) -> Floats:
         """Return contributions of `site` at the vertices, (v, 3); for a spot, without its cone."""
-        return self._shone(vertices, [_Origin.of(site)])[0].light.T
+        return self._shone(vertices, [LightOrigin.of(site)])[0].light.T
 
     def points(self, vertices: Vertices) -> Floats:
         """Return the places of vertices, (v, 3)."""
@@ -176,9 +180,9 @@ class FrozenPaths:
     def _sums(self, vertices: Vertices, sites: Sequence[Site]) -> Floats:
         """Return the images of lights from their contributions at vertices, (k, h · w, 3)."""
         sums = np.empty((len(sites), self.size[0] * self.size[1], 3), np.float32)
-        origins = [_Origin.of(site) for site in sites]
+        origins = [LightOrigin.of(site) for site in sites]
         # Sites of one origin, like the directions of a spot, share its shadow rays.
-        by_origin: dict[_Origin, list[int]] = {}
+        by_origin: dict[LightOrigin, list[int]] = {}
         for k, origin in enumerate(origins):
             by_origin.setdefault(origin, []).append(k)
         distinct = [*by_origin]
@@ -198,7 +202,7 @@ class FrozenPaths:
             sums[..., pixels] = np.add.reduceat(light, starts, axis=-1)
         return sums
 
-    def _shone(self, vertices: Vertices, origins: Sequence[_Origin]) -> "list[_Shone]":
+    def _shone(self, vertices: Vertices, origins: Sequence[LightOrigin]) -> "list[_Shone]":
         """Return contributions of origins at vertices; recent ones are cached."""
         number = 0 if vertices is self.direct else 1
         cached = {x: self._kept[number, x] for x in origins if (number, x) in self._kept}
@@ -215,17 +219,24 @@ class FrozenPaths:
             self._kept.popitem(last=False)
         return [cached[origin] for origin in origins]
 
+    def panel_points(self, count: int) -> tuple[Any, Any]:
+        """Return the points of a panel that vertices sample, two coordinates from -1 to 1."""
+        import mitsuba as mi
+
+        start = np.arange(count)[:, None] * _SPREAD + self._shift
+        u, v = (mi.Float(aligned(x, np.float32)) for x in (2 * (start % 1) - 1).T)
+        return u, v
+
     def _launch(self, vertices: Vertices, rows: Floats) -> Floats:
-        """Return the light of origins at vertices, (k, 3, v). rows: (k, _ROW)."""
+        """Return the light of origins at vertices, (k, 3, v). rows: (k, ORIGIN_VALUES)."""
         import drjit as dr
         import mitsuba as mi
 
         count, lights = len(vertices), len(rows)
         if not count:
             return np.zeros((lights, 3, 0), np.float32)
-        start = np.arange(count)[:, None] * _SPREAD + self._shift
         with tracing():
-            u, v = (mi.Float(aligned(x, np.float32)) for x in (2 * (start % 1) - 1).T)
+            u, v = self.panel_points(count)
             table = mi.Float(np.ascontiguousarray(rows, np.float32).ravel())
             sums = dr.zeros(mi.Float, 3 * count * lights)
             dr.make_opaque(sums, table, u, v)
@@ -233,8 +244,11 @@ class FrozenPaths:
             last = dr.opaque(mi.UInt32, lights)
 
             def add(light: Any) -> tuple[Any]:
-                row = [dr.gather(mi.Float, table, light * _ROW + k) for k in range(_ROW)]
-                added = _added(self._scene, vertices, row, (u, v))
+                row = [
+                    dr.gather(mi.Float, table, light * ORIGIN_VALUES + k)
+                    for k in range(ORIGIN_VALUES)
+                ]
+                added = added_light(self.loaded, vertices, row, (u, v))
                 for channel in range(3):
                     dr.scatter(sums, added[channel], (light * 3 + channel) * width + lane)
                 return (light + 1,)
@@ -250,7 +264,7 @@ class _Shone:
 
     light: Floats
     vertices: Vertices
-    origin: _Origin
+    origin: LightOrigin
 
     def towards(self, site: Site) -> Floats:
         """Return the part of it within the cone of a spot, (3, v); all of it for other lights."""
@@ -266,10 +280,18 @@ class _Shone:
         return away_from(self.origin.position, self.vertices.points)
 
 
-def _added(loaded: Any, vertices: Vertices, row: Sequence[Any], at: tuple[Any, Any]) -> Any:
+def added_light(
+    loaded: Any,
+    vertices: Vertices,
+    row: Sequence[Any],
+    at: tuple[Any, Any],
+    share_towards: Callable[[Any], Any] | None = None,
+) -> Any:
     """Return contributions of origins at vertices, as a color of Mitsuba. row: the values of one.
 
     Each vertex samples its own point of a panel. at: that point, two coordinates from -1 to 1.
+    share_towards: returns the share of its light that a spot sends in directions; where there is
+    none, no ray is traced.
     """
     import drjit as dr
     import mitsuba as mi
@@ -286,8 +308,11 @@ def _added(loaded: Any, vertices: Vertices, row: Sequence[Any], at: tuple[Any, A
     area = 4 * dr.norm(sides[0]) * dr.norm(sides[1])
     power = dr.select(is_panel, area * dr.maximum(dr.dot(-towards, axis), 0), 1) / squared
     power = dr.select(is_sun, 1.0, power)
-    reflected = si.bsdf().eval(mi.BSDFContext(), si, si.to_local(towards))
-    is_lit = (power > 0) & (dr.max(reflected) > 0)
+    if share_towards is not None:
+        power *= share_towards(-towards)
+    is_lit = power > 0
+    reflected = si.bsdf().eval(mi.BSDFContext(), si, si.to_local(towards), is_lit)
+    is_lit &= dr.max(reflected) > 0
     ray = si.spawn_ray(towards)
     ray.maxt = dr.select(is_sun, dr.inf, dr.sqrt(squared) * (1 - SHADOW_EPSILON))
     is_lit &= ~loaded.ray_test(ray, is_lit)

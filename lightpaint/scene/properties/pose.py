@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Doubles, Position
+from lightpaint.display_text import brief
 from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
 from lightpaint.scene.checks.tokens import tag
@@ -287,8 +288,8 @@ def _texts(values: Doubles) -> list[str]:
 def _point(name: str, value: Any) -> Position:
     try:
         x, y, z = (float(v) for v in value)
-    except (TypeError, ValueError):
-        raise SceneError(f"{name} is {value!r}: expected three numbers, x, y and z") from None
+    except (OverflowError, TypeError, ValueError):
+        raise SceneError(f"{name} is {brief(value)}: expected three numbers, x, y and z") from None
     if not max(abs(x), abs(y), abs(z)) <= FARTHEST:
         raise SceneError(f"{name} is {(x, y, z)}: expected numbers of at most {FARTHEST:g}")
     return x, y, z
@@ -297,10 +298,10 @@ def _point(name: str, value: Any) -> Position:
 def _angle(name: str, value: Any) -> float:
     try:
         angle = float(value)
-    except (TypeError, ValueError):
+    except (OverflowError, TypeError, ValueError):
         angle = math.nan
     if not 0 < angle < 90:
-        raise SceneError(f"{name} is {value!r}: expected degrees between 0 and 90")
+        raise SceneError(f"{name} is {brief(value)}: expected degrees between 0 and 90")
     return angle
 
 

@@ -1,0 +1,86 @@
+"""The image of one light as a sum over frozen paths, with the cone of a spot, in one kernel.
+
+`FrozenPaths.columns` caches the light at each vertex for many directions of a spot. Here a light is
+at a new place each time, so nothing is cached: the kernel adds to the pixels itself, and traces no
+rays outside the cone of a spot.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from lightpaint.arrays import Floats, aligned
+from lightpaint.placement.paths.camera_paths import Vertices
+from lightpaint.placement.paths.frozen_paths import (
+    ORIGIN_VALUES,
+    FrozenPaths,
+    LightOrigin,
+    added_light,
+)
+from lightpaint.scene.properties.site import Site
+from lightpaint.scene.runtime.render_lock import tracing
+
+
+class PathSums:
+    """Sums of the light of one site at a time over the vertices of each pixel.
+
+    paths: have these vertices, and stay loaded.
+    """
+
+    def __init__(self, paths: FrozenPaths, vertices: Vertices) -> None:
+        import drjit as dr
+        import mitsuba as mi
+
+        self._loaded, self._vertices = paths.loaded, vertices
+        self._values = 3 * paths.size[0] * paths.size[1]
+        is_one_each = len(np.unique(vertices.pixels)) == len(vertices)
+        self._mode = dr.ReduceMode.NoConflicts if is_one_each else dr.ReduceMode.Auto
+        with tracing():
+            self._panel_points = paths.panel_points(len(vertices))
+            self._first = mi.UInt32(aligned(3 * vertices.pixels, np.uint32))
+            dr.make_opaque(self._panel_points, self._first)
+
+    def __call__(self, site: Site) -> Any:
+        """Return the sums as an array of Dr.Jit, three values for each pixel."""
+        import drjit as dr
+        import mitsuba as mi
+
+        with tracing():
+            sums = dr.zeros(mi.Float, self._values)
+            row = mi.Float(_row(site))
+            dr.make_opaque(sums, row)
+            if not len(self._vertices):
+                return sums
+            values = [dr.gather(mi.Float, row, k) for k in range(ORIGIN_VALUES + _CONE_VALUES)]
+            origin, cone = values[:ORIGIN_VALUES], values[ORIGIN_VALUES:]
+
+            def share_towards(direction: Any) -> Any:
+                angle = dr.acos(dr.clip(dr.dot(direction, mi.Vector3f(*cone[:3])), -1, 1))
+                return dr.clip((cone[3] - angle) * cone[4], 0, 1)
+
+            light = added_light(
+                self._loaded, self._vertices, origin, self._panel_points, share_towards
+            )
+            for channel in range(3):
+                dr.scatter_add(sums, light[channel], self._first + channel, mode=self._mode)
+            dr.eval(sums)
+        return sums
+
+
+#: Values of a cone that a kernel reads: axis, cutoff, and the reciprocal of its width outside the
+#: beam.
+_CONE_VALUES = 5
+
+#: Cutoff of a light that shines in all directions, beyond any angle.
+_NO_CUTOFF = 10.0
+
+
+def _row(site: Site) -> Floats:
+    """Return the origin of a site and its cone for a kernel, angles in radians."""
+    axis, cutoff, beam = site.direction or (0.0, 0.0, 1.0), _NO_CUTOFF, _NO_CUTOFF - 1
+    if site.position is not None and site.cutoff is not None:
+        cutoff = math.radians(site.cutoff)
+        beam = cutoff if site.beam is None else min(math.radians(site.beam), cutoff)
+    slope = 1 / max(cutoff - beam, math.radians(1e-6))
+    return np.array([*LightOrigin.of(site).row, *axis, cutoff, slope], np.float32)
