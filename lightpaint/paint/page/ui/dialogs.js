@@ -4,6 +4,7 @@ import { html, useState } from '../vendor/preact.js';
 import { ProgressBar } from './progress_bar.js';
 import { Button, Checkbox, Dialog } from './controls.js';
 import { percentText, progressText, relativePath } from './format.js';
+import { LooksDialog } from './looks_dialog.js';
 import { SHORTCUTS, MOD } from './shortcuts.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
@@ -14,6 +15,7 @@ export function Dialogs({ ui, app }) {
   const close = () => app.store.set({ dialog: null });
   if (ui.dialog === 'keys') return html`<${ShortcutsDialog} close=${close} />`;
   if (ui.dialog === 'export') return html`<${ExportDialog} ui=${ui} app=${app} close=${close} />`;
+  if (ui.dialog === 'looks') return html`<${LooksDialog} ui=${ui} app=${app} close=${close} />`;
   return null;
 }
 

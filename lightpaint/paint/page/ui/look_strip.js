@@ -48,6 +48,11 @@ export function LookStrip({ ui, app }) {
       ui.ready &&
       html`<p class="faint">No looks yet: <kbd>${MOD} S</kbd> saves painting and answer as a look.</p>`
     }
+    ${
+      looks.length > 1 &&
+      html`<${Button} icon="sheet" class="all-looks" tip="All looks: pictures and lamps"
+        act=${() => app.store.set({ dialog: 'looks' })} />`
+    }
     ${looks.length > 1 && html`<${LookCrossfade} ui=${ui} app=${app} />`}
   </div></section>`;
 }
