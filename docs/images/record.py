@@ -212,7 +212,7 @@ def layered(hand: Hand) -> None:
 def many_lamps(hand: Hand) -> None:
     """Spots that are dimmed by a stop together, two of them with a gel, under a master of 70 %."""
     page = hand.page
-    page.get_by_role("button", name="Colour", exact=True).first.click()  # folds the paint's
+    page.locator(".is-colour .fold-head button").first.click()
     page.get_by_role("searchbox", name="Search lights").fill("spot_*")
     page.keyboard.press("Enter")
     _type(page, "Dim by", "-1")

@@ -139,6 +139,15 @@ def test_every_look_can_be_mixed_from_planes_that_are_there_once(page: Any, batc
             page.wait_for_timeout(100)
         assert difference.max() <= 2  # a code of rounding of the planes, and of their sum
         page.get_by_role("tab", name="Looks").click()
+    page.get_by_role("tab", name="Mixer").click()
+    page.get_by_role("searchbox", name="Select lights by a pattern").fill("*")
+    gel = page.get_by_label("Gel of the selected lights")
+    gel.fill("201")
+    gel.press("Enter")
+    page.get_by_text("Lee 201, \u22121.").wait_for()
+    for swatch in page.locator(".mixer:not([hidden]) .mixer-swatch").all():
+        code = swatch.input_value()
+        assert int(code[1:3], 16) < int(code[5:7], 16) == 255  # bluer than the lamp's own white
 
 
 def test_of_many_lights_those_that_do_most_have_sliders(page: Any, tmp_path: Path) -> None:

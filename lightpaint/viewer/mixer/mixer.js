@@ -254,12 +254,14 @@ function createButton(text, title, act) {
 
 /** Start a mixer from its answer or a look, or say why there is none.
  * @param {HTMLElement} root @param {Look} [look]
- * @param {() => boolean} [isWanted] whether it is still wanted once it is unpacked */
-export async function begin(root, look, isWanted = () => true) {
+ * @param {() => boolean} [isWanted] whether it is still wanted once it is unpacked
+ * @param {(selection: Selection) => void} [extend] adds controls for the selected lights */
+export async function begin(root, look, isWanted = () => true, extend) {
   root.dataset.ready = '';
   const body = createElement('div', 'mixer-body');
   try {
-    await buildMixer(body, root, look);
+    const { selection } = await buildMixer(body, root, look);
+    extend?.(selection);
   } catch (error) {
     body.append(createElement('p', 'mixer-said', failureText(error)));
   }
@@ -281,7 +283,7 @@ async function buildMixer(body, root, look) {
     const lighting = { ...data.lighting, target: `${look.name}-mix` };
     data = { ...data, lights, lighting, transform: look.transform };
   }
-  new Mixer(body, data, planes, await lutOf(data.transform));
+  return new Mixer(body, data, planes, await lutOf(data.transform));
 }
 
 /** @param {unknown} error */

@@ -294,3 +294,51 @@ def test_the_controls_of_a_selection_fit_and_have_names(
         assert control.evaluate("(one) => one.scrollWidth <= one.clientWidth + 1")
     page.evaluate(axe)
     assert violations(page, ".is-lights") == []
+
+
+def test_a_lasso_selects_the_marks_that_it_encloses(new_painter: Any) -> None:
+    painter = new_painter("lights=12")
+    page = painter.page
+    page.evaluate(
+        """() => {
+          const { store } = painter;
+          const place = (x, y) => ({ position: [x, y, 5], direction: null, target: null,
+            cutoff: null, beam: null, rail: null, immovable_reason: '' });
+          const camera = { origin: [0, 0, 0], x_axis: [1, 0, 0], y_axis: [0, 1, 0],
+            forward: [0, 0, 1], is_parallel: true };
+          const lights = store.value.lights.map((_, k) => place(4 + 3.5 * k, 5 + 17 * (k % 2)));
+          store.set({ areLampsMarked: true,
+            rig: { kind: 'rig', lights, cameras: [camera], up: 1, low: [0, 0, 0], high: [48, 27, 9],
+              surfaces: [] } });
+        }"""
+    )
+    marks = page.locator(".lamp[data-lamp]")
+    marks.first.wait_for()
+
+    def centre(name: str) -> tuple[float, float]:
+        box = page.locator(f'.lamp[data-lamp="{name}"]').first.bounding_box()
+        return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+    def draw(first: str, last: str) -> None:
+        """Draw around a row of marks."""
+        painter.button("Lasso").click()
+        (x0, y), (x1, _) = centre(first), centre(last)
+        page.mouse.move(x0 - 15, y - 15)
+        page.mouse.down()
+        for x, dy in ((x1 + 15, -15), (x1 + 15, 15), (x0 - 15, 15)):
+            page.mouse.move(x, y + dy, steps=3)
+        page.mouse.up()
+        painter.still()
+
+    draw("key", "sconce")  # every other light hangs in the lower row
+    assert selection(painter) == ["key", "pendant", "sconce"]
+    assert not painter.calls("begin")
+    page.locator('.lamp[data-lamp="cove"]').first.click(modifiers=["Control"])
+    assert selection(painter) == ["key", "pendant", "sconce", "cove"]
+    assert page.get_by_role("button", name="cove, selected").count() == 1
+    draw("window left", "window left")
+    assert selection(painter) == ["window left"]
+    painter.button("Lasso").click()
+    page.keyboard.press("Escape")
+    assert painter.ui("isLassoing") is False
+    assert selection(painter) == ["window left"]

@@ -33,12 +33,12 @@ export function GelPicker({ white, gel, choose }) {
         data-typed=${text ? 'yes' : 'no'} data-tip="Number or name; Enter takes the first of the list"
         onInput=${(/** @type {any} */ event) => setText(event.currentTarget.value)}
         onKeyDown=${press} /></label>
-    <select size="6" aria-label="Filters" data-tip="Stops that each costs on this lamp"
+    <select size="6" value=${gel?.code ?? ''} aria-label="Filters" data-tip="Stops that each costs on this lamp"
       onChange=${(/** @type {any} */ event) =>
         choose(gels.find(({ code }) => code === event.currentTarget.value) ?? null)}>
-      ${!text && html`<option value="" selected=${gel === null}>No filter</option>`}
+      ${!text && html`<option value="">No filter</option>`}
       ${gels.map(
-        (one) => html`<option key=${one.code} value=${one.code} selected=${one.code === gel?.code}
+        (one) => html`<option key=${one.code} value=${one.code}
           style=${{ '--gel': toHex(atFullBrightness(filtered(one, white))) }}>${label(one)}</option>`,
       )}
     </select>

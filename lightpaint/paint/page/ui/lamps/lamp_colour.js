@@ -5,7 +5,7 @@ import { Hex, Hsv, MIXERS, Rgb, White } from '../colour_mixers.js';
 import { Choice } from '../controls.js';
 import { signedText } from '../format.js';
 import { atFullBrightness, luminance } from '../paint_colour.js';
-import { html, useState } from '../../vendor/preact.js';
+import { html } from '../../vendor/preact.js';
 import { GelPicker } from './gel_picker.js';
 import { ownWhite } from './lamp_colours.js';
 
@@ -18,7 +18,7 @@ const LAMP_MIXERS = [...MIXERS, { value: 'gel', label: 'Gel', tip: 'Colour filte
 /** Controls for the colour of some lamps, which keep their levels; they begin at that of the first.
  * @param {{ui: Ui, app: App, lights: number[]}} props */
 export function LampColour({ ui, app, lights }) {
-  const [mixer, setMixer] = useState('white');
+  const { lampMixer: mixer } = ui;
   const [first] = lights;
   const light = ui.lights[first];
   const rgb = ui.weights[first];
@@ -32,7 +32,8 @@ export function LampColour({ ui, app, lights }) {
   return html`<div class="lamp-colour colour" role="group" aria-label="Colour">
     <div class="colour-row">
       <${Hex} colour=${colour} set=${set} />
-      <${Choice} label="Colour model" value=${mixer} choices=${LAMP_MIXERS} change=${setMixer} />
+      <${Choice} label="Colour model" value=${mixer} choices=${LAMP_MIXERS}
+        change=${(/** @type {Ui["lampMixer"]} */ lampMixer) => app.store.set({ lampMixer })} />
     </div>
     ${mixer === 'white' && html`<${White} colour=${colour} set=${set} isPure />`}
     ${mixer === 'hsv' && html`<${Hsv} colour=${colour} set=${set} hasValue=${false} />`}

@@ -6,6 +6,7 @@
  * @property {number | null} selectionAnchor the light from which Shift selects a range
  * @property {boolean} isLassoing whether a drag over the pictures selects marked lights
  * @property {Record<string, string>} gelCodes codes of the filters put on lights here, by name
+ * @property {"white" | "hsv" | "rgb" | "gel"} lampMixer how the colour of lamps is set
  * @property {number} master factor of all lights but fixed ones
  */
 
@@ -15,6 +16,7 @@ export const INITIAL_LAMPS = {
   selectionAnchor: null,
   isLassoing: false,
   gelCodes: {},
+  lampMixer: 'white',
   master: 1,
 };
 
