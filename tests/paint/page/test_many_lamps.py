@@ -284,7 +284,8 @@ def test_the_controls_of_a_selection_fit_and_have_names(
     painter = new_painter("lights=12", viewport={"width": size[0], "height": size[1]})
     page = painter.page
     page.evaluate("() => painter.store.set({ side: true, open: { lights: true } })")
-    select(painter, "key", "sun")
+    painter.type("sun, level", "-3")
+    select(painter, "key", "sun", "cove")  # at several levels, and one off
     panel = page.get_by_role("region", name="Selected lights")
     panel.get_by_role("button", name="Colour", exact=True).click()
     panel.get_by_role("button", name="Gel", exact=True).click()
