@@ -105,7 +105,9 @@ class Hand:
 
     def press(self, name: str) -> None:
         """Click on what has that label."""
-        box = self.page.get_by_role("button", name=name, exact=True).first.bounding_box()
+        button = self.page.get_by_role("button", name=name, exact=True).first
+        button.scroll_into_view_if_needed()
+        box = button.bounding_box()
         assert box is not None, name
         self.go((box["x"] + box["width"] / 2, box["y"] + box["height"] / 2))
         self.page.mouse.click(*self.at)
@@ -239,7 +241,7 @@ def moving_lights(hand: Hand) -> None:
     """A spot that is dragged, and aimed by a click; a wish that lights answer by moving."""
     on, page = hand.of_painting, hand.page
     page.keyboard.press("d")
-    page.locator(".lamp").first.wait_for(timeout=120_000)
+    page.locator(".lamp").first.wait_for(timeout=900_000)
     hand.see(10)
     box = page.locator('.lamp[data-lamp="spot_figure"]').first.bounding_box()
     assert box is not None
@@ -266,8 +268,8 @@ def moving_lights(hand: Hand) -> None:
     hand.drag(on(0.03, 0.27), on(0.13, 0.34), on(0.25, 0.41), on(0.1, 0.37))
     hand.wait()
     hand.press("Let lights move")
-    working = page.locator(".working").filter(has_text="Placing")
-    working.wait_for(timeout=60_000)
+    working = page.get_by_role("button", name="Stop, move nothing")
+    working.wait_for(timeout=300_000)
     while working.count():
         hand.see(2)
         page.wait_for_timeout(SEARCH_PAUSE_MS)

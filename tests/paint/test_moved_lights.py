@@ -52,6 +52,24 @@ def test_a_moved_light_has_the_plane_of_its_place(moving: MovingStudio) -> None:
     assert np.array_equal(session.basis.current_look, look)
 
 
+def test_a_panel_of_the_scene_is_dragged_as_a_square_of_its_size(moving: MovingStudio) -> None:
+    """On release its plane is rendered with its shape, which its place in the file follows."""
+    site = moving.scene.light("panel").members[0].site
+    assert site.position is not None
+    position = np.add(site.position, [0.4, -0.3, 0.2]).tolist()
+    moving.send(protocol.MoveLights({"panel": {"position": position}}, is_final=False))
+    quick = moving.plane("panel")
+    moving.send(protocol.MoveLights({"panel": {"position": position}}))
+    moving.rendered()
+    rendered = moving.plane("panel")
+    # The panel itself is seen, and brighter than all that it lights.
+    assert np.square(quick - rendered).sum() < 0.1 * np.square(rendered).sum()
+    lit = rendered < 0.5
+    assert quick[lit].mean() == pytest.approx(rendered[lit].mean(), rel=0.15)  # few samples
+    scene = moving.studio.rig.moved_scene(moving.studio.session.requests.placed)
+    assert scene.light("panel").members[0].site.position == pytest.approx(position)
+
+
 def test_a_receiver_with_a_lock_may_change_the_session_while_it_is_sent_planes(
     moving: MovingStudio,
 ) -> None:
@@ -131,7 +149,7 @@ def test_exports_and_verification_have_the_new_places(moving: MovingStudio) -> N
         ("bulb", {"target": [0, 0, 0]}, "points nowhere"),
         ("beam", {"cutoff": 120}, "cutoff is 120"),
         ("sun", {"position": [0, 1, 0]}, "infinitely far away"),
-        ("panel", {"position": [0, 1, 0]}, "is of the kind area"),
+        ("sky", {"position": [0, 1, 0]}, "is of the kind constant"),
         ("ghost", {"position": [0, 1, 0]}, "no light is called 'ghost'"),
     ],
 )
@@ -201,7 +219,8 @@ def test_the_rig_says_where_lights_hang_and_what_cannot_move(moving: MovingStudi
     assert places["bulb"].position == pytest.approx((-0.5, 1, 0.5))
     assert math.dist(places["beam"].target, BALL) == pytest.approx(0.3, abs=0.01)
     assert places["sky"].immovable_reason
-    assert places["panel"].immovable_reason
+    assert not places["panel"].immovable_reason
+    assert places["sky"].immovable_reason
     assert rig.up == 1
     moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}))
     last = moving.wait(lambda: [m for m in moving.messages if m.kind == "rig"][1:])[-1]
@@ -270,7 +289,7 @@ def test_a_shadow_ends_on_the_line_through_its_edge(moving: MovingStudio) -> Non
         ("beam", "aim", (-3.0, 0.5), "outside the picture"),
         ("beam", "aim", (math.nan, 0.5), "outside the picture"),
         ("beam", "shadow", (12.0, 12.0), "a shadow needs two places"),
-        ("panel", "highlight", (12.0, 12.0), "is of the kind area"),
+        ("sky", "highlight", (12.0, 12.0), "is of the kind constant"),
     ],
 )
 def test_clicks_that_point_no_light(

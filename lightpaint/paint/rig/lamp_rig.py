@@ -17,8 +17,10 @@ from lightpaint.errors import PaintError, SceneError
 from lightpaint.paint.protocol import Camera, LightPlace
 from lightpaint.paint.rig.added_lights import (
     POSE_KEYS,
+    is_panel,
     light_of_new,
     new_emitter,
+    panel_site,
     site_of_new,
 )
 from lightpaint.paint.rig.cameras import camera_of, in_this_thread
@@ -161,7 +163,10 @@ class LampRig:
         scene = self.scene
         if scene.has_media:
             return "stands in a scene with fog or the like"
-        return "" if values and "kind" in values else why_not_searched(scene.light(name))
+        if values and "kind" in values:
+            return ""
+        light = scene.light(name)
+        return "" if is_panel(light) else why_not_searched(light)
 
     def site(self, name: str, values: Mapping[str, Any]) -> Site:
         """Return the place of a light in a pose. Raises LightpaintError for an impossible one."""
@@ -173,9 +178,9 @@ class LampRig:
         if reason := self.why_not(name):
             raise PaintError(f"{name} {reason}: it cannot be moved here")
         site = light.members[0].site
-        if not values:
-            return site
-        return motion_of(name, light.plugin, site, _pose(name, values)).site
+        if values:
+            site = motion_of(name, light.plugin, site, _pose(name, values)).site
+        return panel_site(light, site) if is_panel(light) else site
 
     def moved_scene(self, placed: Placed, view: int = 0) -> Scene:
         """Return the scene of a view with lights moved and added."""

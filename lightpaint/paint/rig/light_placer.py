@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from lightpaint.errors import LightpaintError, PaintError
+from lightpaint.lighting.solution import Solution
 from lightpaint.paint.background_threads import BackgroundThreads, StoppedError
 from lightpaint.paint.protocol import (
     Message,
@@ -118,13 +119,13 @@ class LightPlacer:
 
         try:
             with cancellable(check), MITSUBA.low_priority():
-                snapshot, placement = self._searched(request, check)
+                snapshot, solution, placement = self._searched(request, check)
                 placed = {
                     move.name: pose_values(move, snapshot.requests.poses.get(move.name, {}))
                     for move in placement.moves
                 }
                 placed |= {light.name: values_of(light.emitter) for light in placement.additions}
-                current_delta_e, placed_delta_e = self._differences(snapshot, placed)
+                current_delta_e, placed_delta_e = self._differences(snapshot, solution, placed)
                 check()
         except StoppedError:
             if self._request is None:  # otherwise a page would wait for the next one
@@ -153,8 +154,10 @@ class LightPlacer:
         summary = "; ".join(map(str, (*placement.moves, *placement.additions)))
         self._publish(summary[0].upper() + summary[1:] + ".", tuple(placed))
 
-    def _differences(self, snapshot: SessionSnapshot, placed: Placed) -> tuple[float, float]:
-        """Return the ΔE of the exact answer now, and of that with these lights moved and added."""
+    def _differences(
+        self, snapshot: SessionSnapshot, solution: Solution, placed: Placed
+    ) -> tuple[float, float]:
+        """Return the ΔE of the exact answer, and of that with these lights moved and added."""
         if not placed:
             return 0.0, 0.0
         added = snapshot.requests.added
@@ -162,20 +165,18 @@ class LightPlacer:
         new = {name: x for name, x in placed.items() if name not in moves}
         requests = snapshot.requests.with_poses(moves).with_added(new)
         bases = self._rig.bases(self._access.session.bases, requests.placed)
-        differences = []
-        for state in (snapshot, replace(snapshot, bases=tuple(bases))):
-            solution = state.solution()
-            assert solution is not None
-            differences.append(state.delta_e(solution))
-        return differences[0], differences[1]
+        state = replace(snapshot, bases=tuple(bases))
+        placed_solution = state.solution()
+        assert placed_solution is not None
+        return snapshot.delta_e(solution), state.delta_e(placed_solution)
 
     def _publish(self, text: str, names: tuple[str, ...] = ()) -> None:
         self._publisher.publish(PlacingResult(text=text, names=names))
 
     def _searched(
         self, request: PlaceLights, check: Callable[[], None]
-    ) -> tuple[SessionSnapshot, Placement]:
-        """Return the paintings of the search, and its result."""
+    ) -> tuple[SessionSnapshot, Solution, Placement]:
+        """Return the paintings of the search, their exact answer, and the result of the search."""
 
         def report(label: str, done: int, total: int, unit: str = "passes") -> None:
             del label, unit
@@ -211,7 +212,7 @@ class LightPlacer:
         placement = place(
             scenes, moved.bases, solution, freedoms, new=new, progress=report, watch=watch
         )
-        return snapshot, placement
+        return snapshot, solution, placement
 
 
 def _trial(sites: Mapping[str, Site]) -> TrialPlaces:
