@@ -1,6 +1,7 @@
 """A hand that works with layers at random, the same for the same seed."""
 
 import sys
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -11,8 +12,9 @@ import numpy.typing as npt
 import lightpaint as lp
 from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.origin import Origin
+from lightpaint.images.denoiser import Features
 from lightpaint.paint import protocol
-from lightpaint.paint.layers.layer import Layer, LayerKind
+from lightpaint.paint.layers.layer import Gradient, Layer, LayerKind
 from lightpaint.paint.layers.selection import selection_mask
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.history_steps import Identity
@@ -33,8 +35,16 @@ def bases_of(views: int = 2) -> list[lp.Basis]:
             BasisLight(name, "point", "intensity", "W/sr", (0.5, 0.5, 0.5)) for name in "ab"
         )
         origin = Origin("made", "made", f"view {k}", 0, "separate", (0, 0), (0, 0))
-        bases.append(lp.Basis(lights, images, np.zeros_like(images), np.zeros(size, bool), origin))
+        basis = lp.Basis(lights, images, np.zeros_like(images), np.zeros(size, bool), origin)
+        bases.append(replace(basis, features=random_surfaces(rng, size)))
     return bases
+
+
+def random_surfaces(rng: np.random.Generator, size: tuple[int, int]) -> Features:
+    """Surfaces of any albedo, some of them without diffuse reflection."""
+    albedo = rng.uniform(0, 1, (*size, 3)).astype(np.float32)
+    albedo[rng.random(size) < 0.2] = 0
+    return Features(albedo, np.zeros_like(albedo))
 
 
 def identity_of(views: int = 2) -> Identity:
@@ -55,6 +65,21 @@ def random_mask(rng: np.random.Generator, size: tuple[int, int]) -> npt.NDArray[
     mask = np.clip(rng.normal(0, 1, size), 0, 1)
     mask[:, int(rng.integers(1, size[1])) :] = 0
     return mask.astype(np.float32)
+
+
+def random_gradient(rng: np.random.Generator, size: tuple[int, int]) -> Gradient:
+    """Light that fades out or becomes other light, or an adjustment, in any direction."""
+    start, end = rng.uniform(-5, max(size), (2, 2)).round(int(rng.integers(3))).tolist()
+    light, end_light = rng.uniform(0, 2, (2, 3)).tolist()
+    has_light, has_end = bool(rng.random() < 0.7), bool(rng.random() < 0.5)
+    return Gradient(
+        ("linear", "radial")[int(rng.integers(2))],
+        (start[0], start[1]),
+        (end[0], end[1]) if rng.random() < 0.9 else (start[0], start[1]),
+        (light[0], light[1], light[2]) if has_light else None,
+        (end_light[0], end_light[1], end_light[2]) if has_light and has_end else None,
+        is_incident=bool(rng.random() < 0.5),
+    )
 
 
 class RandomEditor:
@@ -88,7 +113,7 @@ class RandomEditor:
         action = choices[self.rng.integers(len(choices))]
         number = int(self.rng.choice(ids)) if ids else 0
         if action == "add":
-            self.add(("paint", "adjust", "weigh")[self.rng.integers(3)])
+            self.add(("paint", "adjust", "weigh", "gradient")[self.rng.integers(4)])
         elif action == "paint":
             self.paint(self.session.views.layers[number])
         elif action == "drop":
@@ -119,6 +144,8 @@ class RandomEditor:
                 "importance": float(self.rng.choice([0.5, 1.0, 3.0])),
             }
             changed = Layer(**{**vars(layer), **values})
+            if layer.gradient is not None:
+                changed = replace(changed, gradient=random_gradient(self.rng, SIZES[0]))
             if action == "drag":
                 half = Layer(**{**vars(layer), "strength": 0.5})
                 self.change(layers=(half,), is_final=False)
@@ -154,6 +181,7 @@ class RandomEditor:
             gain=float(2 ** self.rng.uniform(-2, 2)),
             tint=(1.1, 1.0, 0.9),
             times=3.0,
+            gradient=random_gradient(self.rng, SIZES[0]) if kind == "gradient" else None,
         )
         if self.rng.random() < 0.5:
             self.paint(properties, is_final=False)

@@ -15,8 +15,15 @@ from renderer import REPOSITORY
 import lightpaint as lp
 from lightpaint.errors import PaintError
 from lightpaint.paint import protocol
-from lightpaint.paint.layers.composition import ShownLayer, accent, accents, adjusted, compose
-from lightpaint.paint.layers.layer import PAINTING, Layer
+from lightpaint.paint.layers.composition import (
+    ShownLayer,
+    accent,
+    accents,
+    adjusted,
+    compose,
+    with_effect,
+)
+from lightpaint.paint.layers.layer import PAINTING, Gradient, Layer
 from lightpaint.paint.layers.layer_pixels import LayerPixels
 from lightpaint.paint.layers.layer_stack import LayerStack, stack_after
 from lightpaint.paint.session.look_library import LookLibrary
@@ -146,6 +153,53 @@ def test_any_partition_of_the_picture_gives_the_same_bits(seed: int) -> None:
             assert target_of(*layers, region=region).equals(target.part(region))
 
 
+def test_light_falls_off_from_place_to_place_and_counts_by_how_far_it_covers() -> None:
+    places = {"start": (10.0, 6.0), "end": (50.0, 6.0)}
+    albedo = np.full((*SIZE, 3), 0.5, np.float32)
+    albedo[:, :5] = 0
+
+    def target(**fields: Any) -> Pixels:
+        layer = Layer(1, "gradient", gain=4.0, gradient=Gradient(**{**places, **fields}))
+        shown_pair = with_effect(layer, pixels_of(1), lambda: albedo)
+        return compose([ShownLayer(*shown_pair, 1.0)], CURRENT, WHOLE)
+
+    x = np.arange(SIZE[1]) + 0.5
+    t = np.clip((x - 10) / 40, 0, 1)
+    fade = 1 - t * t * (3 - 2 * t)
+    fade[fade < 1e-3] = 0  # uncovered
+    light = np.float32([1.0, 0.5, 0.25])
+    fading = target(shape="linear", light=tuple(light))
+    np.testing.assert_allclose(
+        fading.image, CURRENT + fade[:, None] * (light - CURRENT), rtol=2e-6, atol=1e-6
+    )
+    np.testing.assert_allclose(fading.importance[0], fade, atol=1e-6)
+    both = target(shape="linear", light=tuple(light), end_light=(0.0, 0.0, 2.0), is_incident=True)
+    expected = 0.5 * (light + (t * t * (3 - 2 * t))[:, None] * (np.float32([0, 0, 2]) - light))
+    np.testing.assert_allclose(both.image[0, 5:], expected[5:], rtol=1e-5, atol=1e-6)
+    np.testing.assert_array_equal(both.image[:, :5], CURRENT[:, :5])  # no diffuse reflection
+    around = target(shape="radial", light=None)
+    y = np.arange(SIZE[0])[:, None] + 0.5
+    t = np.clip(np.hypot(x - 10, y - 6) / 40, 0, 1)
+    gain = 1 + 3 * (1 - t * t * (3 - 2 * t))
+    np.testing.assert_allclose(around.image, CURRENT * gain[..., None], rtol=4e-3)
+
+
+@pytest.mark.parametrize(
+    ("fields", "text"),
+    [
+        ({"start": (1e7, 0)}, "beyond 1e"),
+        ({"end": (float("nan"), 0)}, "beyond 1e"),
+        ({"light": (-1, 0, 0)}, "expected 0 to"),
+        ({"end_light": (1, 0, 0)}, "at its end alone"),
+    ],
+)
+def test_what_no_gradient_can_be_is_refused(fields: Any, text: str) -> None:
+    with pytest.raises(ValueError, match=text):
+        Gradient("linear", **{"start": (0, 0), "end": (1, 1), **fields})
+    with pytest.raises(ValueError, match="its gradient is None"):
+        Layer(1, "gradient")
+
+
 # A session
 
 
@@ -160,8 +214,10 @@ def test_whatever_the_hand_did_the_target_is_that_of_the_layers_built_afresh(see
         pairs = [(layer, LayerPixels(view.size)) for layer in session.views.layers.shown()]
         for layer, pixels in pairs:
             pixels.put(view.full_region, view.layer(layer.id).part(view.full_region))
+        shown_pairs = [with_effect(*pair, lambda view=view: view.albedo) for pair in pairs]
         shown_layers = [
-            ShownLayer(*pair, weight) for pair, weight in zip(pairs, accents(pairs), strict=True)
+            ShownLayer(*pair, weight)
+            for pair, weight in zip(shown_pairs, accents(shown_pairs), strict=True)
         ]
         assert view.painting.equals(compose(shown_layers, view.current, view.full_region))
     # Opened again it is the same, and undo and redo lead through all of it.

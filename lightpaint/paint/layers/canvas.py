@@ -1,6 +1,7 @@
 """The painting of one view: its pixels, and the open stroke."""
 
 from collections.abc import Collection, Mapping, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -8,10 +9,12 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.cache.denoised_planes import as_halves
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import PaintError
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.paint.layers.composed_layers import Change, ComposedLayers
+from lightpaint.paint.layers.composition import AlbedoSource
 from lightpaint.paint.layers.layer import Layer
 from lightpaint.paint.layers.layer_pixels import LayerPixels, enclosing, is_empty
 from lightpaint.paint.layers.layer_stack import LayerStack
@@ -66,13 +69,14 @@ class Canvas:
             if patch.layer == SELECTION_ID and patch.view == self.view
         ]
         self.selection = LayerPixels.replayed(self.basis.size, masks)
-        self._layers = ComposedLayers(self.view, current, layers, steps, stored)
+        albedo = _albedo_source(self.basis)
+        self._layers = ComposedLayers(self.view, current, layers, steps, stored, albedo)
         self.live = LiveView(self.basis, self.image, self.importance)
 
     def improve(self, basis: Basis, current: Floats) -> None:
         """Replace the basis by one of more samples; open strokes stay open."""
         self.basis = basis
-        self._layers.replace_current(current)
+        self._layers.replace_current(current, _albedo_source(basis))
         self.live = LiveView(basis, self.image, self.importance)
 
     def rebuild(self, layers: LayerStack, steps: Sequence[Step]) -> None:
@@ -97,6 +101,11 @@ class Canvas:
     def current(self) -> Floats:
         """(h, w, 3) linear, the current look, denoised: it shows where nothing is painted."""
         return self._layers.current
+
+    @property
+    def albedo(self) -> Floats | None:
+        """(h, w, 3), that of the surfaces, as pages have it; None where it is unknown."""
+        return self._layers.albedo()
 
     @property
     def painting(self) -> Pixels:
@@ -264,6 +273,17 @@ class Canvas:
             if not np.array_equal(image[beyond], self.layer(layer.id).part(region).image[beyond]):
                 raise PaintError(f"light beyond 0 to {MAX_LIGHT:g}")
         return Pixels(image.astype(np.float32), importance.astype(np.float32))
+
+
+def _albedo_source(basis: Basis) -> AlbedoSource:
+    """Return what gives the albedo of a view, rounded to halves as pages have it, when asked."""
+
+    @cache
+    def albedo() -> Floats | None:
+        features = basis.features
+        return None if features is None else as_halves(features.albedo).astype(np.float32)
+
+    return albedo
 
 
 def _with_marks(pixels: Pixels, before: Pixels) -> Pixels:

@@ -7,7 +7,14 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.errors import PaintError
-from lightpaint.paint.layers.composition import ShownLayer, accents, compose, compose_over
+from lightpaint.paint.layers.composition import (
+    AlbedoSource,
+    ShownLayer,
+    accents,
+    compose,
+    compose_over,
+    with_effect,
+)
 from lightpaint.paint.layers.layer_pixels import LayerPixels, LayerSummary, enclosing, is_empty
 from lightpaint.paint.layers.layer_stack import LayerStack
 from lightpaint.paint.layers.lower_layers import LowerLayers
@@ -34,9 +41,11 @@ class ComposedLayers:
         layers: Those after `steps`.
         stored: Their composition on this current look, if it is known: then pixels of layers are
             read when they are needed.
+        albedo: That of the view, for gradients of light on surfaces.
 
     Attributes:
         target: Light and importance; `at_least` is None while no pixel is marked.
+        albedo: Returns that of the view.
     """
 
     def __init__(
@@ -46,8 +55,10 @@ class ComposedLayers:
         layers: LayerStack,
         steps: Sequence[Step],
         stored: StoredComposition | None = None,
+        albedo: AlbedoSource = lambda: None,
     ) -> None:
         self._view, self._is_doubtful = view, False
+        self._stack, self.albedo = layers, albedo
         self.current = np.asarray(current, np.float32)
         height, width = self.current.shape[:2]
         self.size = height, width
@@ -91,9 +102,11 @@ class ComposedLayers:
         layers = {number: pixels.summary for number, pixels in self._pixels.items()}
         return StoredComposition(layers, self.target.copy())
 
-    def replace_current(self, current: Floats) -> None:
+    def replace_current(self, current: Floats, albedo: AlbedoSource) -> None:
         """Compose the layers on another current look."""
         self.current = np.asarray(current, np.float32)
+        self.albedo = albedo
+        self._shown = self._with_accents(self._stack, self._shown)
         self._lower = LowerLayers(self.current)
         self.target = compose(self._shown, self.current, self.full_region)
 
@@ -113,6 +126,7 @@ class ComposedLayers:
         for number in missing:
             self._pixels[number] = LayerPixels.replayed(self.size, patches.get(number, ()))
         before = self._shown
+        self._stack = layers
         self._shown = self._with_accents(layers, None if at_rest else before)
         same_below = _equal_count(before, self._shown)
         same_above = _equal_count(before[same_below:][::-1], self._shown[same_below:][::-1])
@@ -128,7 +142,9 @@ class ComposedLayers:
         self, layers: LayerStack, before: Sequence[ShownLayer] | None = None
     ) -> list[ShownLayer]:
         """Return the layers that show. before: those whose accents are kept."""
-        pairs = [(layer, self._pixels[layer.id]) for layer in layers.shown()]
+        pairs = [
+            with_effect(layer, self._pixels[layer.id], self.albedo) for layer in layers.shown()
+        ]
         kept = {} if before is None else {shown.layer.id: shown.accent for shown in before}
         return [
             ShownLayer(layer, pixels, kept.get(layer.id, now))

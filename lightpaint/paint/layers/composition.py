@@ -6,7 +6,9 @@ picture is painted (darkened as a whole, say), a layer over a small part counts 
 so that it has the same effect as over a picture whose rest is held.
 """
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +16,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import RGB, Bools, Floats
 from lightpaint.colour.color import LUMINANCE
-from lightpaint.paint.layers.layer import Layer
+from lightpaint.paint.layers.layer import Gradient, Layer, LayerKind
 from lightpaint.paint.layers.layer_pixels import (
     MIN_COVERAGE,
     LayerPixels,
@@ -31,18 +33,96 @@ REST_SHARE, MAX_ACCENT = 4.0, 10.0
 #: Lower and upper bound of importance under repeated weighing.
 MIN_WEIGHED, MAX_WEIGHED = 0.01, 1000.0
 
+#: Square of the shortest gradient, in pixels; a shorter one has not begun to fall off.
+MIN_GRADIENT = 1e-6
+
 #: Brightest light that a layer makes: the largest half float, so that both views can show it.
 MAX_LIGHT = 65504.0
 
 _Array = npt.NDArray[np.float32]
 
 
+#: Returns the albedo of a view, (h, w, 3) float32; None where there is none.
+AlbedoSource = Callable[[], Floats | None]
+
+
+class GradientPixels:
+    """The pixels of a gradient within its mask, which `compose` uses as those of a layer."""
+
+    def __init__(self, gradient: Gradient, mask: LayerPixels, albedo: AlbedoSource) -> None:
+        self._values = gradient, mask, albedo
+        self._summary: tuple[int, float, bool] | None = None
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, GradientPixels) and self._values == other._values
+
+    def __hash__(self) -> int:
+        return hash(self._values)
+
+    @property
+    def bounds(self) -> Region:
+        """Those of the mask."""
+        return self._values[1].bounds
+
+    @property
+    def revision(self) -> int:
+        """That of the mask."""
+        return self._values[1].revision
+
+    @property
+    def mean_coverage(self) -> float:
+        """Mean coverage of the view."""
+        return self._totals()[0]
+
+    @property
+    def covers_all(self) -> bool:
+        """True if no pixel of the view is uncovered."""
+        return self._totals()[1]
+
+    def part(self, region: Region) -> Pixels:
+        """Return the pixels of a region."""
+        gradient, mask, albedo = self._values
+        surface = albedo() if gradient.is_incident else None
+        return gradient_pixels(gradient, mask.part(region).importance, region, surface)
+
+    def _totals(self) -> tuple[float, bool]:
+        gradient, mask, _ = self._values
+        if self._summary is None or self._summary[0] != mask.revision:
+            share = mask.part(mask.bounds).importance
+            coverage = gradient_pixels(gradient, share, mask.bounds, None).importance
+            height, width = mask.size
+            least = coverage.min() if coverage.size == height * width else 0
+            total = float(np.minimum(coverage, 1).sum(dtype=np.float64))
+            mean = total / (height * width)
+            self._summary = mask.revision, mean, bool(least >= MIN_COVERAGE)
+        return self._summary[1:]
+
+
 class ShownLayer(NamedTuple):
-    """A visible layer, with its pixels and accent in one view."""
+    """A visible layer, with its pixels and accent in one view. A gradient is one of `paint` or
+    `adjust`, by what it does.
+    """
 
     layer: Layer
-    pixels: LayerPixels
+    pixels: LayerPixels | GradientPixels
     accent: float
+
+
+def with_effect(
+    layer: Layer, pixels: LayerPixels, albedo: AlbedoSource
+) -> tuple[Layer, LayerPixels | GradientPixels]:
+    """Return a layer and its pixels as `compose` takes them: a gradient as what it does."""
+    if layer.gradient is None:
+        return layer, pixels
+    return effect_of(layer), GradientPixels(layer.gradient, pixels, albedo)
+
+
+def effect_of(layer: Layer) -> Layer:
+    """Return a gradient as a layer of paint, or as an adjustment; others as they are."""
+    if layer.gradient is None:
+        return layer
+    kind: LayerKind = "adjust" if layer.gradient.light is None else "paint"
+    return replace(layer, kind=kind, gradient=None)
 
 
 def accent(part: float) -> float:
@@ -52,7 +132,7 @@ def accent(part: float) -> float:
     return min(MAX_ACCENT, max(1.0, (1 - part) / (REST_SHARE * part)))
 
 
-def accents(layers: Sequence[tuple[Layer, LayerPixels]]) -> list[float]:
+def accents(layers: Sequence[tuple[Layer, LayerPixels | GradientPixels]]) -> list[float]:
     """Return the accent of each visible layer, in one view.
 
     It depends on their coverage alone, and not on when they were made.
@@ -134,6 +214,50 @@ def _replace(layer: Layer, pixels: Pixels, below: Pixels, factor: np.float32) ->
         marks = own if marks is None else marks | own
     counts = np.where(painted, pixels.importance * factor, below.importance)
     return Pixels(np.where(painted[..., None], image, below.image), counts, marks)
+
+
+def gradient_pixels(
+    gradient: Gradient, mask: _Array, region: Region, albedo: Floats | None
+) -> Pixels:
+    """Return colour and coverage of a gradient in a region.
+
+    mask: (rows, columns), where it applies. albedo: (h, w, 3), of the view.
+    """
+    share = _ramp(gradient, region)
+    fades = gradient.end_light is None
+    coverage = mask * (np.float32(1) - share) if fades else mask
+    if gradient.light is None:
+        return Pixels(np.broadcast_to(np.float32(0), (*mask.shape, 3)), coverage)
+    first, last = (
+        np.array(x or gradient.light, np.float32) for x in (gradient.light, gradient.end_light)
+    )
+    light = first + share[..., None] * (last - first)
+    if gradient.is_incident and albedo is not None:
+        surface = np.asarray(albedo[slices(region)], np.float32)
+        light = light * surface
+        # Surfaces without diffuse reflection ignore light.
+        coverage = np.where(surface.any(axis=-1), coverage, np.float32(0))
+    return Pixels(light, coverage)
+
+
+def _ramp(gradient: Gradient, region: Region) -> _Array:
+    """Return 0 at the start of a gradient to 1 at its end, smoothly, at each pixel of a region."""
+    top, bottom, left, right = region
+    dx, dy = (end - start for start, end in zip(gradient.start, gradient.end, strict=True))
+    square = dx * dx + dy * dy
+    if square < MIN_GRADIENT:
+        return np.zeros((bottom - top, right - left), np.float32)
+    half, (x, y) = np.float32(0.5), np.array(gradient.start, np.float32)
+    across = np.arange(left, right, dtype=np.float32) + half - x
+    down = np.arange(top, bottom, dtype=np.float32) + half - y
+    if gradient.shape == "linear":
+        along = (across * np.float32(dx))[None] + (down * np.float32(dy))[:, None]
+        place = along * np.float32(1 / square)
+    else:
+        distance = np.sqrt((across * across)[None] + (down * down)[:, None])
+        place = distance * np.float32(1 / math.sqrt(square))
+    place = np.minimum(np.maximum(place, np.float32(0)), np.float32(1))
+    return np.asarray(place * place * (np.float32(3) - np.float32(2) * place), np.float32)
 
 
 def adjusted(light: Floats, gain: float, tint: RGB) -> _Array:

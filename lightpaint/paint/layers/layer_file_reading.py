@@ -89,8 +89,9 @@ def _exr_pixels(layer: Layer, name: str, channels: _Channels) -> Pixels:
     """Return the pixels of a layer. Raises LookupError or ValueError."""
     alpha = np.asarray(channels[f"{name}.A"], np.float32)
     coverage, most = alpha, 1.0
-    if layer.kind == "pixels":
-        coverage, most = np.asarray(channels[f"{name}.{IMPORTANCE}"], np.float32), MAX_IMPORTANCE
+    if layer.kind in ("pixels", "gradient"):
+        coverage = np.asarray(channels[f"{name}.{IMPORTANCE}"], np.float32)
+        most = MAX_IMPORTANCE if layer.kind == "pixels" else 1.0
     image = np.zeros((*alpha.shape, 3), np.float32)
     if not layer.is_mask:
         planes = [np.asarray(channels[f"{name}.{c}"], np.float32) for c in "RGB"]

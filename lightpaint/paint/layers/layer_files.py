@@ -74,7 +74,8 @@ def write_layers_exr(path: Path, view: ViewLayers, sensor: str) -> None:
                 }
         return rows
 
-    weighted = [x.id for x in view.layers if x.kind == "pixels" and x.id in view.pixels]
+    kinds = ("pixels", "gradient")
+    weighted = [x.id for x in view.layers if x.kind in kinds and x.id in view.pixels]
     marked = {number for number in weighted if view.pixels[number].is_marked}
     layers = [layer.as_json() | {"layer": names[layer.id]} for layer in view.layers]
     text = json.dumps({"format": FORMAT, "sensor": sensor, "layers": layers}, ensure_ascii=True)

@@ -8,7 +8,13 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Floats
 from lightpaint.paint.layers.canvas import Canvas
-from lightpaint.paint.layers.composition import MAX_LIGHT, adjusted, compose_layer
+from lightpaint.paint.layers.composition import (
+    MAX_LIGHT,
+    adjusted,
+    compose_layer,
+    effect_of,
+    gradient_pixels,
+)
 from lightpaint.paint.layers.layer import MAX_STRENGTH, Layer
 from lightpaint.paint.layers.layer_pixels import LayerPixels, is_empty, relative, shared
 from lightpaint.paint.layers.layer_stack import LayerStack
@@ -37,11 +43,14 @@ class LayerPicture:
 
 @dataclass(frozen=True, eq=False)
 class ViewLayers:
-    """The layers of one view. pixels: of each, by id. current: the look below."""
+    """The layers of one view. pixels: of each, by id. current: the look below. albedo: of the
+    surfaces, for gradients.
+    """
 
     layers: LayerStack
     pixels: Mapping[int, LayerPixels]
     current: Floats
+    albedo: Floats | None = None
 
     @classmethod
     def of(cls, canvas: Canvas, layers: LayerStack) -> "ViewLayers":
@@ -51,7 +60,8 @@ class ViewLayers:
             for number in layers.ids
             if not is_empty(canvas.layer(number).bounds)
         }
-        return cls(layers, pixels, canvas.current)
+        has_gradient = any(layer.gradient is not None for layer in layers)
+        return cls(layers, pixels, canvas.current, canvas.albedo if has_gradient else None)
 
     @property
     def size(self) -> tuple[int, int]:
@@ -78,13 +88,15 @@ class ViewLayers:
             if group is not None and group is not layer:
                 strength = min(MAX_STRENGTH, strength * group.strength)
                 is_shown &= group.is_visible
-            effective = replace(layer, strength=strength)
+            effective = replace(effect_of(layer), strength=strength)
             inner = relative(region, part)
-            area = below.part(inner)
-            light, coverage, opacity = _appearance(effective, pixels, area.image)
+            shown, area = pixels, below.part(inner)
+            if layer.gradient is not None:
+                shown = gradient_pixels(layer.gradient, pixels.importance, region, self.albedo)
+            light, coverage, opacity = _appearance(effective, shown, area.image)
             yield LayerPicture(layer, region, pixels, light, coverage, opacity)
             if is_shown and strength > 0 and not is_empty(region):
-                below.image[slices(inner)] = compose_layer(effective, pixels, area).image
+                below.image[slices(inner)] = compose_layer(effective, shown, area).image
 
 
 def _appearance(layer: Layer, pixels: Pixels, below: _Array) -> tuple[_Array, _Array, float]:

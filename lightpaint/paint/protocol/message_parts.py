@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from lightpaint.arrays import RGB
-from lightpaint.paint.layers.layer import Layer
+from lightpaint.paint.layers.layer import Gradient, Layer
 from lightpaint.paint.protocol.base import OPTIONAL
 from lightpaint.paint.store.canvas_pixels import Region
 
@@ -84,6 +84,10 @@ class ViewInfo:
     size: tuple[int, int]
     objects: tuple[str, ...]
     scales: tuple[float, ...]
+
+
+#: Records of layers, which messages have as they are.
+LAYER_RECORDS = (Layer, Gradient)
 
 
 @dataclass(frozen=True, kw_only=True)

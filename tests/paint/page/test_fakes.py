@@ -39,7 +39,7 @@ ASKED = {
 
 #: Requests of a rig, layers and a selection, which the session that tests make up does not have.
 RIG = {"move", "point", "show_rig", "place", "add_light", "remove_light", "change_layers", "select"}
-RIG.add("compare_looks")
+RIG |= {"compare_looks", "import_layers"}
 
 
 def check(message: dict[str, Any]) -> None:

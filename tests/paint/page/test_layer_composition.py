@@ -1,13 +1,14 @@
 """The page composes layers as the session does, to the bit."""
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 import pytest
-from layered_sessions import random_mask
+from layered_sessions import random_gradient, random_mask, random_surfaces
 
-from lightpaint.paint.layers.composition import ShownLayer, accents, compose
-from lightpaint.paint.layers.layer import Layer
+from lightpaint.paint.layers.composition import ShownLayer, accents, compose, with_effect
+from lightpaint.paint.layers.layer import Layer, LayerKind
 from lightpaint.paint.layers.layer_pixels import LayerPixels
 from lightpaint.paint.layers.layer_stack import LayerStack
 from lightpaint.paint.store.canvas_pixels import Pixels
@@ -25,6 +26,7 @@ COMPOSE = """async ([layers, accents, region]) => {
   const ground = (await array('ground')).data;
   const [h, w] = (await array('ground')).shape;
   const painting = new PaintCanvas([h, w], new Uint16Array(3 * h * w));
+  painting.albedo = (await array('albedo')).data;
   const picture = new LayerPicture(painting);
   for (const layer of layers) {
     if (layer.kind === 'group') continue;
@@ -49,10 +51,11 @@ def random_layers(rng: np.random.Generator) -> LayerStack:
     """A painting and seven layers, of which some are hidden, weak, grouped or count more."""
     layers = [Layer(0, "pixels", "Painting", strength=float(rng.choice([1, 1, 0.4])))]
     for k in range(1, 7):
+        kind: LayerKind = ("paint", "adjust", "weigh", "gradient")[int(rng.integers(4))]
         layers.append(
             Layer(
                 k,
-                ("paint", "adjust", "weigh")[int(rng.integers(3))],
+                kind,
                 is_visible=bool(rng.random() < 0.8),
                 strength=float(rng.choice([1.0, rng.uniform(0, 2)])),
                 importance=float(rng.choice([1.0, 3.0])),
@@ -60,6 +63,7 @@ def random_layers(rng: np.random.Generator) -> LayerStack:
                 gain=float(2 ** rng.uniform(-3, 3)),
                 tint=(float(rng.uniform(0.7, 1.4)), 1.0, float(rng.uniform(0.7, 1.4))),
                 times=float(rng.choice([0.3, 4.0])),
+                gradient=random_gradient(rng, (H, W)) if kind == "gradient" else None,
             )
         )
     group = Layer(7, "group", strength=0.7, importance=2.0)
@@ -82,12 +86,17 @@ def test_the_page_draws_the_bits_of_the_session(page: Any, site: Any, seed: int)
         kept = pixels[layer.id].part(WHOLE)
         site.arrays[f"image/{layer.id}"] = kept.image
         site.arrays[f"coverage/{layer.id}"] = kept.importance
-    pairs = [(layer, pixels[layer.id]) for layer in stack.shown()]
+    albedo = random_surfaces(rng, (H, W)).albedo.astype(np.float16)
+    site.arrays["albedo"] = albedo
+    pairs = [
+        with_effect(layer, pixels[layer.id], lambda: albedo.astype(np.float32))
+        for layer in stack.shown()
+    ]
     by = accents(pairs)
     shown = [ShownLayer(*pair, accent) for pair, accent in zip(pairs, by, strict=True)]
     expected = compose(shown, present, WHOLE)
     accent_of = {str(layer.id): accent for (layer, _), accent in zip(pairs, by, strict=True)}
-    given = [[vars(layer) for layer in stack], accent_of, [3, 66, 10, 80]]
+    given = [[asdict(layer) for layer in stack], accent_of, [3, 66, 10, 80]]
     image, importance = page.evaluate(COMPOSE, given)
     np.testing.assert_array_equal(np.float32(image).reshape(H, W, 3), expected.image)
     np.testing.assert_array_equal(np.float32(importance).reshape(H, W), expected.importance)

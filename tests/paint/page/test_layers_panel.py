@@ -310,6 +310,41 @@ def test_strokes_and_adjustments_keep_to_what_is_selected_and_it_survives(me: Pe
     assert 0.1 < share.mean() < 0.9
 
 
+@pytest.mark.long
+def test_a_gradient_falls_off_within_the_selection_and_its_ends_are_moved_later(
+    me: Person,
+) -> None:
+    session = me.studio.session
+    me.press("m").drag((9.5, 9.5), (79.5, 29.5))
+    me.press("r").drag((15, 20), (60, 20))
+    [_, layer] = session.views.layers
+    assert layer.gradient is not None
+    assert layer.gradient.end == pytest.approx((60.5, 20.5), abs=0.2)
+    importance = session.views[0].importance.copy()
+    assert importance[15, 12] == 1
+    assert 0.2 < importance[15, 40] < 0.8
+    assert not importance[15, 64:].any()
+    assert not importance[:10].any()
+    steps = len(session.store.steps)
+    handle = me.page.get_by_role("button", name="End of the gradient")
+    handle.focus()
+    handle.press("Shift+ArrowLeft")
+    me.still()
+    assert session.views.layers[1].gradient.end == pytest.approx((50.5, 20.5), abs=0.2)
+    assert session.views[0].importance[15, 40] < importance[15, 40]
+    assert len(session.store.steps) == steps + 1
+    me.press("Control+z")
+    assert session.views.layers[1] == layer
+    # A click makes none, and another one adjusts.
+    me.drag((20, 20), (20, 20))
+    assert len(session.views.layers) == 2
+    me.button("Adjust")
+    me.button("Radial").drag((30, 20), (40, 20))
+    *_, last = session.views.layers
+    assert last.gain == 2
+    assert me.names[0].startswith("Gradient, +1.0 stop")
+
+
 # What the panel is made of, over a session that is made up
 
 

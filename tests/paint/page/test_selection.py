@@ -158,7 +158,7 @@ def test_the_panel_selects_by_numbers_and_nothing_of_it_is_cut(
 
 
 ANTS = """() => {
-  const canvas = document.querySelector('canvas.selection');
+  const canvas = document.querySelector('canvas.ants');
   const context = new OffscreenCanvas(canvas.width, canvas.height).getContext('2d');
   context.drawImage(canvas, 0, 0);
   return [...context.getImageData(0, 0, canvas.width, canvas.height).data];
@@ -182,3 +182,87 @@ def test_ants_march_unless_motion_is_unwanted(new_painter: Any, motion: str) -> 
     assert {*shown[shown[:, 3] > 0][:, 0].tolist()} == codes
     # The line is one pixel wide, around the same place in both pictures.
     assert (np.reshape(second, (-1, 4))[:, 3] == shown[:, 3]).all()
+
+
+# Gradients
+
+
+def add_gradient(painter: Painter) -> None:
+    """Have one between two colours, and make it active."""
+    painter.page.evaluate(
+        """async () => {
+          const { newLayer } = await import('/engine/layers/layer_list.js');
+          const gradient = { shape: 'linear', start: [10, 5], end: [30, 15], light: [1, 0.5, 0.2],
+            end_light: [0, 0, 1], is_incident: true };
+          const layers = [newLayer(1, 'gradient', { name: 'Gradient', gradient })];
+          engine.changeLayers({ layers });
+          engine.chooseLayer(1);
+        }"""
+    )
+    painter.still()
+
+
+def test_a_gradient_is_drawn_by_key_and_its_ends_are_moved(painter: Painter) -> None:
+    painter.page.keyboard.press("r")
+    assert painter.ui("tool") == "gradient"
+    painter.page.get_by_role("button", name="Radial", exact=True).click()
+    painter.page.get_by_role("button", name="To 2nd colour").click()
+    painter.still()
+    settings = painter.page.evaluate("() => engine.tool.gradient")
+    assert (settings["shape"], settings["hasEnd"], settings["isAdjusting"]) == (
+        "radial",
+        True,
+        False,
+    )
+    stage = painter.page.locator(".stage")
+    stage.focus()
+    for key in ("ArrowRight", "Enter", "ArrowRight", "ArrowDown", "Enter"):
+        stage.press(key)
+    [(_, start, end)] = painter.calls("line")
+    assert end["x"] > start["x"]
+    assert end["y"] > start["y"]
+    add_gradient(painter)
+    painter.still()
+    handle = painter.page.get_by_role("button", name="End of the gradient")
+    handle.focus()
+    handle.press("ArrowRight")
+    handle.press("Shift+ArrowDown")
+    box = painter.page.get_by_role("button", name="Start of the gradient").bounding_box()
+    scale = painter.page.evaluate("() => engine.panes()[0].scale")
+    painter.page.mouse.move(box["x"] + 12, box["y"] + 12)
+    painter.page.mouse.down()
+    painter.page.mouse.move(box["x"] + 12 + 4 * scale, box["y"] + 12, steps=3)
+    painter.page.mouse.up()
+    changes = [change for _, change in painter.calls("changeLayers")]
+    assert changes[1]["layers"][0]["gradient"]["end"] == [31, 15]
+    assert changes[2]["layers"][0]["gradient"]["end"] == [31, 25]
+    last = changes[-1]
+    assert last["layers"][0]["gradient"]["start"] == pytest.approx([14, 5], abs=0.2)
+    assert last["is_final"] is False  # the engine ends it
+    assert painter.calls("begin") == []
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (820, 1180)])
+def test_a_gradient_is_changed_in_numbers_and_nothing_of_it_is_cut(
+    new_painter: Any, axe: str, size: Any
+) -> None:
+    painter: Painter = new_painter(init=axe, viewport={"width": size[0], "height": size[1]})
+    add_gradient(painter)
+    shown = "{ side: true, openLayer: 1, tool: 'gradient', open: { layers: true } }"
+    painter.page.evaluate(f"() => painter.store.set({shown})")
+    painter.type("To x", "40")
+    painter.page.get_by_role("button", name="Fade out").click()
+    painter.page.get_by_role("button", name="Start in current colour").click()
+    painter.still()
+    gradients = [change["layers"][0]["gradient"] for _, change in painter.calls("changeLayers")[1:]]
+    assert gradients[0]["end"] == [40, 15]
+    assert gradients[1]["end_light"] is None
+    assert gradients[2]["light"] != [1, 0.5, 0.2]
+    assert violations(painter.page, ".lightpaint") == []
+    cut = painter.page.evaluate(
+        """async () => {
+          const { cutOff } = await import('/cut.js');
+          return ['.is-layers', '.options'].flatMap((part) => cutOff(document.querySelector(part)));
+        }"""
+    )
+    assert cut == []

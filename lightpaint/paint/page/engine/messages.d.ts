@@ -10,17 +10,35 @@ export type RGB = [number, number, number];
 export type Region = [top: number, bottom: number, left: number, right: number];
 
 /**
+ * Light, or an adjustment, that falls off from one place of a picture to another.
+ *
+ * shape: `linear`, across the line between them; `radial`, around `start` as far as `end`. start,
+ * end: (x, y) in pixels. light: at `start`, linear; null for an adjustment by the layer's `gain`
+ * and `tint`. end_light: at `end`; null to fade out. is_incident: whether it is light that arrives
+ * at surfaces, which their albedo reflects.
+ */
+export interface Gradient {
+  shape: 'linear' | 'radial';
+  start: [number, number];
+  end: [number, number];
+  light: RGB | null;
+  end_light: RGB | null;
+  is_incident: boolean;
+}
+
+/**
  * A layer of a painting, without its pixels. Ids are never used twice in a session.
  *
  * kind: `pixels` replaces the light below, with its own importance; `paint` mixes a colour over it
  * by its coverage; `adjust` scales its luminance by `gain` and its colour by `tint`, and `weigh`
- * its importance by `times`, where the layer's mask covers; `group` has no pixels, and holds the
- * layers whose `group` is its id. strength: 0 to 2; `adjust` and `weigh` take it as a power, so
- * that 2 is twice the stops. importance: factor of its importance.
+ * its importance by `times`, where the layer's mask covers; `gradient` does what `gradient` says,
+ * within its mask; `group` has no pixels, and holds the layers whose `group` is its id. strength:
+ * 0 to 2; adjustments and `weigh` take it as a power, so that 2 is twice the stops. importance:
+ * factor of its importance.
  */
 export interface Layer {
   id: number;
-  kind: 'pixels' | 'paint' | 'adjust' | 'weigh' | 'group';
+  kind: 'pixels' | 'paint' | 'adjust' | 'weigh' | 'gradient' | 'group';
   name: string;
   is_visible: boolean;
   strength: number;
@@ -29,6 +47,7 @@ export interface Layer {
   gain: number;
   tint: RGB;
   times: number;
+  gradient: Gradient | null;
 }
 
 /**
@@ -107,7 +126,7 @@ export interface ViewInfo {
  */
 export interface LayerInfo {
   id: number;
-  kind: 'pixels' | 'paint' | 'adjust' | 'weigh' | 'group';
+  kind: 'pixels' | 'paint' | 'adjust' | 'weigh' | 'gradient' | 'group';
   name: string;
   is_visible: boolean;
   strength: number;
@@ -116,6 +135,7 @@ export interface LayerInfo {
   gain: number;
   tint: RGB;
   times: number;
+  gradient: Gradient | null;
   regions: Region[];
   accents: number[];
   revision: number;

@@ -238,14 +238,14 @@ class PictureEngine extends Emitter {
     if (!this.stroke) return;
     this.drawChange(this.stroke.move(points));
     if (this.stroke.settings.tool === 'adjust') this.emit('adjustment', this.stroke.adjustment);
+    if (this.stroke.settings.tool === 'gradient') this.emit('layers', {}); // its ends follow
   }
 
   end() {
     const { stroke, place } = this;
     if (this.earlyStroke) this.earlyStroke.isEnded = true;
     if (!stroke || !place) return;
-    const { stops, mired } = stroke.adjustment;
-    if (stroke.settings.tool === 'adjust' && !stops && !mired) return void this.cancel();
+    if (stroke.isVoid) return void this.cancel();
     this.clearStroke();
     const layer = this.layers.end();
     place.strokes.end(this.layers.stepName(stroke.settings.tool, stroke.start, layer), layer);
@@ -353,6 +353,11 @@ class PictureEngine extends Emitter {
     return rgba;
   }
 
+  /** Whether a layer has pixels in the current view. @param {number} id */
+  isLayerHere(id) {
+    return Boolean(this.mirror.layers.picture?.pixels.get(id)?.bounds);
+  }
+
   /** Return how far a layer, or a group, covers each pixel. @param {number} id */
   coverage(id) {
     const [height, width] = this.screen.size;
@@ -364,7 +369,10 @@ class PictureEngine extends Emitter {
     const region = regions.reduce((a, b) => /** @type {Region} */ (union(a, b)), regions[0]);
     if (!region) return;
     this.mirror.redraw([this.layers.takeChange(region)]);
-    this.mirror.strokes?.touch(region);
+    const { strokes } = this.mirror;
+    // While its end moves, a gradient has the same pixels.
+    if (this.stroke?.length) strokes?.touchLayer();
+    else strokes?.touch(region);
     if (this.layers.maskId !== null) this.onMaskChange();
   }
 

@@ -1,5 +1,6 @@
 /** A stroke of a tool on the canvas, from its first point to its last. */
 import { Path, fill, flood, stamp } from './brush.js';
+import { LayerCanvas } from './layers/layer_canvas.js';
 import { warmer } from '../../../viewer/drawing/colour.js';
 import { wholeAdjustment } from './whole_adjustment.js';
 
@@ -8,14 +9,14 @@ import { wholeAdjustment } from './whole_adjustment.js';
 /** @typedef {import("./paint_canvas.js").PaintCanvas} PaintCanvas */
 /** @typedef {import("./message_frames.js").Region} Region */
 /** @typedef {import("./message_frames.js").RGB} RGB */
-/** @typedef {'brush' | 'eraser' | 'weight' | 'pick' | 'fill' | 'line' | 'adjust' | 'select'} Tool */
+/** @typedef {'brush' | 'eraser' | 'weight' | 'pick' | 'fill' | 'line' | 'adjust' | 'select' | 'gradient'} Tool */
 
 /**
  * rgb: linear light of the paint. size: diameter in pixels of the picture. importance: factor of
  * the importance brush. adjustedArea: whether a drag adjusts a soft spot of that size (the default), the
  * object under it, or all that is selected.
  * @typedef {{tool: Tool, rgb: RGB, paintMode: 'light' | 'colour', size: number, hardness: number,
- *   flow: number, importance: number, adjustedArea?: 'spot' | 'object' | 'selection'}} ToolSettings */
+ *   flow: number, importance: number, gradient?: import("./layers/gradient.js").GradientSettings, adjustedArea?: 'spot' | 'object' | 'selection'}} ToolSettings */
 
 /** Screen pixels of a drag per stop and per mired. */
 const DRAG_PIXELS = { stop: 80, mired: 1 };
@@ -44,7 +45,11 @@ export const LABELS = {
   line: 'line',
   adjust: 'adjust',
   select: 'select',
+  gradient: 'gradient',
 };
+
+/** Pixels of the picture below which a gradient is a click. */
+const MIN_GRADIENT_LENGTH = 2;
 
 /** Return the effect that changes brightness and warmth. @param {number} stops
  * @param {number} mired
@@ -65,6 +70,8 @@ export class Stroke {
     canvas.begin();
     this.effect = effectOf(canvas, settings);
     this.path = new Path(canvas, settings);
+    /** Length of a gradient. */
+    this.length = 0;
     /** The change that the drag asks for. */
     this.adjustment = { stops: 0, mired: 0 };
   }
@@ -76,6 +83,7 @@ export class Stroke {
       const object = canvas.objectAt(start.x, start.y);
       return this.apply([fill(canvas, object, settings.flow)]);
     }
+    if (settings.tool === 'gradient') return this.apply([flood(canvas)]);
     if (settings.tool !== 'adjust') return this.apply(this.path.moveTo(start));
     const object = canvas.objectAt(start.x, start.y);
     if (settings.adjustedArea === 'selection' && canvas.selection) flood(canvas);
@@ -92,7 +100,24 @@ export class Stroke {
     if (!last || tool === 'fill') return [];
     if (tool === 'adjust') return this.adjust(last);
     if (tool === 'line') return this.line(last);
+    if (tool === 'gradient') return this.pullTo(last);
     return this.apply(points.flatMap((point) => this.path.moveTo(point)));
+  }
+
+  /** Move the end of a gradient. @param {Point} end @returns {Region[]} */
+  pullTo({ x, y }) {
+    const { canvas } = this;
+    this.length = Math.hypot(x - this.start.x, y - this.start.y);
+    if (canvas instanceof LayerCanvas && canvas.layer.gradient)
+      canvas.layer = { ...canvas.layer, gradient: { ...canvas.layer.gradient, end: [x, y] } };
+    return canvas.region ? [canvas.region] : [];
+  }
+
+  /** Whether nothing has come of it: a drag that adjusts nothing, or a click of a gradient. */
+  get isVoid() {
+    const { tool } = this.settings;
+    if (tool === 'gradient') return this.length < MIN_GRADIENT_LENGTH;
+    return tool === 'adjust' && !this.adjustment.stops && !this.adjustment.mired;
   }
 
   /** Draw a straight line from the start. @param {Point} end @returns {Region[]} */
@@ -141,6 +166,8 @@ function effectOf(canvas, settings) {
   if (settings.tool === 'eraser') return { kind: 'erase', ground: wholeAdjustment(canvas) };
   if (settings.tool === 'weight') return { kind: 'weigh', factor: settings.importance };
   if (settings.tool === 'adjust') return adjustEffect(0, 0);
+  // Of a mask.
+  if (settings.tool === 'gradient') return { kind: 'weigh', factor: 1 };
   return { kind: 'paint', rgb: settings.rgb, paintMode: settings.paintMode };
 }
 

@@ -182,6 +182,15 @@ export class StrokeSender {
     this.pump();
   }
 
+  /** Send the properties of the stroke's layer, which have changed without its pixels. */
+  touchLayer() {
+    const { currentStroke } = this;
+    if (!currentStroke?.wholeRegion) return;
+    const [top, , left] = currentStroke.wholeRegion;
+    currentStroke.dirty ??= [top, top, left, left];
+    this.pump();
+  }
+
   /** Finish the stroke. @param {string} label what undo calls it
    * @param {Layer | null} [layer] of its pixels */
   end(label, layer = null) {

@@ -47,7 +47,7 @@
  * @property {number} master factor of the answer's weights, but for fixed lights
  */
 
-/** @typedef {"brush" | "eraser" | "weight" | "pick" | "fill" | "line" | "adjust" | "select"} Tool */
+/** @typedef {"brush" | "eraser" | "weight" | "pick" | "fill" | "line" | "adjust" | "select" | "gradient"} Tool */
 
 /**
  * The tool in the hand. `rgb`: linear light of the colour, including its stops. `size`: diameter in
@@ -61,6 +61,7 @@
  * @property {number} flow
  * @property {number} importance
  * @property {"spot" | "object" | "selection"} adjustedArea what a drag adjusts
+ * @property {import("../engine/layers/gradient.js").GradientSettings} gradient
  */
 
 /** In pixels of the picture. @typedef {{x: number, y: number, pressure: number}} Point */
@@ -103,6 +104,7 @@
  * @property {(id: number | null) => void} paintMask of a layer from now on; for null none
  * @property {() => Pick<import("./ui_state.js").Ui, 'layers' | 'nextLayer' | 'layer' | 'maskLayer'
  *   | 'layerRevisions' | 'isPaintingEmpty'>} layerState
+ * @property {(id: number) => boolean} isLayerHere whether a layer has pixels in the current view
  * @property {(id: number) => {data: Float32Array, width: number, height: number}} coverage how far a
  *   layer, or a group, covers each pixel
  * @property {(id: number, width: number, height: number) => Uint8ClampedArray<ArrayBuffer>}

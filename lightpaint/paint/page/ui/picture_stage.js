@@ -15,6 +15,8 @@ import { LayerMask } from './layers/layer_mask.js';
 import { MaskNote } from './layers/layer_panel.js';
 import { ObjectOutline } from './object_outline.js';
 import { Pointer } from './pointer_input.js';
+import { GradientHandles } from './selection/gradient_handles.js';
+import { gradientOf } from './selection/gradient_options.js';
 import { SelectionOutline } from './selection/selection_outline.js';
 import { firstHint, flowOf, updateDisplay } from './tools.js';
 import { LampMarks } from './lamp_marks.js';
@@ -148,6 +150,7 @@ export function Stage({ ui, app }) {
         flow: flowOf(ui),
         importance: ui.importance,
         adjustedArea: ui.adjustedArea,
+        gradient: gradientOf(ui),
       }),
     [
       ui.tool,
@@ -159,6 +162,8 @@ export function Stage({ ui, app }) {
       flowOf(ui),
       ui.importance,
       ui.adjustedArea,
+      ui.gradient,
+      ui.second,
       hasAlbedo,
     ],
   );
@@ -186,6 +191,7 @@ export function Stage({ ui, app }) {
     ${panes.map(
       (pane, k) => html`<${Tag} key=${k} ui=${ui} app=${app} pane=${pane} panes=${panes} />`,
     )}
+    ${ui.ready && html`<${GradientHandles} ui=${ui} app=${app} panes=${panes} />`}
     ${ui.ready && html`<${LampMarks} ui=${ui} app=${app} panes=${panes} />`}
     ${ui.ready && html`<${LampLasso} ui=${ui} app=${app} />`}
     ${ui.ready && html`<${Legend} ui=${ui} app=${app} panes=${panes} />`}

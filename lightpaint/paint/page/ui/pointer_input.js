@@ -31,6 +31,8 @@ export class Pointer {
     this.pathLength = 0;
     /** @type {Point | null} */
     this.lastPoint = null;
+    /** Start of a gradient that is drawn by key. @type {Point | null} */
+    this.gradientStart = null;
     this.isSpaceDown = false;
     /** Whether a drag adjusts light: its label stays at the place that it started from. */
     this.isAdjusting = false;
@@ -90,7 +92,7 @@ export class Pointer {
     if (!this.canPaint()) return;
     rememberPaint(this.store);
     this.store.set({ hint: false });
-    if (event.shiftKey && this.lastPoint && tool !== 'adjust') {
+    if (event.shiftKey && this.lastPoint && !['adjust', 'gradient'].includes(tool)) {
       this.engine.line(this.lastPoint, point);
       this.lastPoint = point;
       return;
@@ -168,12 +170,21 @@ export class Pointer {
     if (!this.canPaint()) return;
     rememberPaint(this.store);
     this.store.set({ hint: false });
+    if (tool === 'gradient') return this.dabGradient(point);
     if (isLine && this.lastPoint) this.engine.line(this.lastPoint, point);
     else {
       this.engine.begin(point);
       this.engine.end();
     }
     this.lastPoint = point;
+  }
+
+  /** Draw a gradient by key: Enter sets its start, then its end. @param {Point} point */
+  dabGradient(point) {
+    const { gradientStart } = this;
+    this.gradientStart = gradientStart ? null : point;
+    if (gradientStart) this.engine.line(gradientStart, point);
+    else this.say('It begins here. Move to where it ends, and press Enter again.');
   }
 
   /** Handle a second finger: cancel what the first began, or end it if it is a stroke already.

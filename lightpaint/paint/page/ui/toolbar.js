@@ -6,6 +6,7 @@ import { toHex } from './paint_colour.js';
 import { displayColour } from './colour_panel.js';
 import { Button, Choice, NumberField, Select, Slider, reveal } from './controls.js';
 import { signedText } from './format.js';
+import { GradientOptions } from './selection/gradient_options.js';
 import { SelectOptions } from './selection/select_options.js';
 import { chooseSelect } from './selection/selection_settings.js';
 import {
@@ -87,7 +88,9 @@ export function ToolOptions({ ui, app }) {
   const { store } = app;
   const label = TOOLS.find(({ tool }) => tool === ui.tool)?.label ?? '';
   const isStrokeTool = ['brush', 'eraser', 'weight', 'line'].includes(ui.tool);
-  const isPaintTool = ['brush', 'fill', 'line'].includes(ui.tool);
+  const isPaintTool =
+    ['brush', 'fill', 'line'].includes(ui.tool) ||
+    (ui.tool === 'gradient' && !ui.gradient.isAdjusting);
   const isPanelOpen = ui.side && !ui.panel && Boolean(ui.open.ask);
   const togglePanel = () =>
     store.set({ side: true, panel: null, open: { ...ui.open, ask: !isPanelOpen } });
@@ -106,6 +109,7 @@ export function ToolOptions({ ui, app }) {
       tip="How many times as much the area counts: above 1 the answer matches better there"
       change=${(/** @type {number} */ importance) => store.set({ importance })} />`
     }
+    ${ui.tool === 'gradient' && html`<${GradientOptions} ui=${ui} app=${app} />`}
     ${ui.tool === 'select' && html`<${SelectOptions} ui=${ui} app=${app} />`}
     ${
       ui.tool === 'adjust' &&

@@ -41,6 +41,13 @@ export const TOOLS = [
     tip: 'Adjust: drag up for brighter, right for warmer',
   },
   {
+    tool: 'gradient',
+    label: 'Gradient',
+    icon: 'gradient',
+    keys: 'R',
+    tip: 'Gradient: light that falls off from one place to another',
+  },
+  {
     tool: 'select',
     label: 'Select',
     icon: 'marquee',
@@ -57,6 +64,7 @@ const HINTS = /** @type {Record<Tool, string>} */ ({
   fill: 'Click an object to paint all of it.',
   line: 'Drag from one end of the line to the other.',
   adjust: 'Drag on a picture: up brighter, down darker, right warmer, left cooler.',
+  gradient: 'Drag from where it begins to where it ends. Its ends can be moved later.',
   select: 'Drag, or click, on a picture. Shift adds, Alt subtracts, both together intersect.',
 });
 
@@ -145,7 +153,7 @@ export function pickPaint(store, light) {
 /** Remember the paint that was used. @param {UiStore} store */
 export function rememberPaint(store) {
   const { colour, stops, recent, tool } = store.value;
-  if (!['brush', 'fill', 'line'].includes(tool)) return;
+  if (!['brush', 'fill', 'line', 'gradient'].includes(tool)) return;
   if (recent.length && isSame({ colour, stops }, recent[0])) return;
   store.set({ recent: distinctPaints([{ colour, stops }, ...recent]) });
 }

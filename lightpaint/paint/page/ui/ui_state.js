@@ -3,6 +3,7 @@
 import { INITIAL_LAMPS } from './lamps/lamp_state.js';
 import { comparedDisplay } from './look_comparison.js';
 import { fromKelvin } from './paint_colour.js';
+import { initialGradient } from './selection/gradient_settings.js';
 import { initialSelection } from './selection/selection_settings.js';
 
 /** @typedef {import("./engine_interface.js").RGB} RGB */
@@ -124,6 +125,7 @@ import { initialSelection } from './selection/selection_settings.js';
  * @property {"light" | "colour"} paintMode
  * @property {"spot" | "object" | "selection"} adjustedArea what a drag adjusts
  * @property {import("./selection/selection_settings.js").SelectionUi} selection
+ * @property {import("./selection/gradient_settings.js").GradientUi} gradient
  * @property {RGB} colour linear, its largest channel at most 1
  * @property {number} stops brightness of the paint over `colour`
  * @property {import("./tools.js").Paint} second
@@ -252,6 +254,7 @@ export function initialState() {
     paintMode: 'light',
     adjustedArea: 'spot',
     selection: initialSelection(),
+    gradient: initialGradient(),
     colour: fromKelvin(3200),
     stops: 0,
     second: { colour: fromKelvin(12000), stops: 0 },

@@ -120,6 +120,9 @@ export class FakeEngine {
     this.maskLayer = id;
     this.tell('layers', {});
   }
+  isLayerHere() {
+    return true;
+  }
   coverage() {
     const { w: width, h: height } = this.room;
     return { data: Float32Array.from({ length: width * height }, (_, p) => p % 2), width, height };

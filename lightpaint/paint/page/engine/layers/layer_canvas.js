@@ -27,7 +27,7 @@ export class LayerCanvas extends PaintCanvas {
   }
 
   get isMask() {
-    return this.layer.kind === 'adjust' || this.layer.kind === 'weigh';
+    return ['adjust', 'weigh', 'gradient'].includes(this.layer.kind);
   }
 
   /** @override */

@@ -26,6 +26,7 @@ export function newLayer(id, kind, properties = {}) {
     gain: 1,
     tint: [1, 1, 1],
     times: 1,
+    gradient: null,
     ...properties,
   };
 }
@@ -36,9 +37,9 @@ export const PAINTING = newLayer(PAINTING_ID, 'pixels', { name: 'Painting' });
 /** Return the properties of a layer alone, as requests have them. @param {Layer} layer
  * @returns {Layer} */
 export function plainLayer(layer) {
-  const { id, kind, is_visible, strength, importance, group, gain, tint, times } = layer;
+  const { id, kind, is_visible, strength, importance, group, gain, tint, times, gradient } = layer;
   const name = layer.name.slice(0, MAX_NAME_LENGTH);
-  return { id, kind, name, is_visible, strength, importance, group, gain, tint, times };
+  return { id, kind, name, is_visible, strength, importance, group, gain, tint, times, gradient };
 }
 
 /** Put the layers of each group directly below it, and the painting below all if it is missing.

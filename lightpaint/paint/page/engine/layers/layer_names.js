@@ -34,7 +34,8 @@ export function renamed(before, after) {
   const made = `, ${adjustmentText(before)}`;
   if (before.kind === 'weigh' && before.name === importanceName(before.times))
     return importanceName(after.times);
-  if (before.kind !== 'adjust' || !before.name.endsWith(made)) return after.name;
+  const isAdjustment = before.kind === 'adjust' || before.kind === 'gradient';
+  if (!isAdjustment || !before.name.endsWith(made)) return after.name;
   return adjustmentName(before.name.slice(0, -made.length), after);
 }
 

@@ -1,5 +1,6 @@
 /** The painting as its layers make it: composed tile by tile, where something has changed. */
 import { VALUES } from '../../../../viewer/drawing/half_floats.js';
+import { effectOf, gradientTile } from './gradient.js';
 import { applyLayer } from './layer_composition.js';
 import { isPlain, PAINTING_ID } from './layer_list.js';
 import { enclosing, tileKeys, tileRegion } from './layer_pixels.js';
@@ -114,7 +115,9 @@ export class LayerPicture {
       return { colour: [r, g, b], coverage: painting.importance[p] };
     }
     const [key] = tileKeys(size, [y, y + 1, x, x + 1]);
-    const tile = pixels.get(id)?.tiles.get(key);
+    const mask = pixels.get(id)?.tiles.get(key);
+    const layer = this.shown.find((one) => one.id === id);
+    const tile = mask && layer ? this.effectTile(layer, mask, tileRegion(size, key)) : mask;
     const [top, , left, right] = tileRegion(size, key);
     const q = (y - top) * (right - left) + x - left;
     const [r, g, b] = tile?.image?.subarray(3 * q, 3 * q + 3) ?? [];
@@ -160,9 +163,15 @@ export class LayerPicture {
     for (const layer of layers) {
       const tile =
         layer.id === PAINTING_ID ? this.paintingTile(area) : this.pixels.get(layer.id)?.tiles.get(key);
-      if (tile) applyLayer(layer, tile, composed);
+      if (tile) applyLayer(effectOf(layer), this.effectTile(layer, tile, area), composed);
     }
     return composed;
+  }
+
+  /** Return the pixels that a layer is composed of: of a gradient, what it comes to in its mask.
+   * @param {Layer} layer @param {Tile} tile @param {Region} area @returns {Tile} */
+  effectTile({ gradient }, tile, area) {
+    return gradient ? gradientTile(gradient, tile, area, this.painting.albedo, this.size[1]) : tile;
   }
 
   /** @param {Region} area @returns {Float32Array} */

@@ -4,6 +4,7 @@
  * Adjustments and fills are new layers. The brush paints the active layer if that is painted, else a
  * new one. The eraser takes from the layer that lies at its first point.
  */
+import { gradientLayer } from './gradient.js';
 import { adjustmentName, areaName, effectText, importanceName, strokesName } from './layer_names.js';
 import { newLayer, PAINTING_ID, plainLayer, withLayers } from './layer_list.js';
 import { LayerCanvas } from './layer_canvas.js';
@@ -88,7 +89,7 @@ export class LayerStrokes {
     this.previous = { activeId: this.activeId, isWishDone: this.isWishDone };
     const found = this.layerFor(tool, point, object);
     if (!found) return null;
-    const isWish = tool.tool === 'adjust' || tool.tool === 'fill';
+    const isWish = ['adjust', 'fill', 'gradient'].includes(tool.tool);
     // Importance lies over what is painted, and the brush goes on below it.
     if (tool.tool !== 'weight') {
       this.activeId = found.id;
@@ -114,10 +115,13 @@ export class LayerStrokes {
   }
 
   /** Return the layer that a stroke paints, which may be new; null for none.
-   * @param {ToolSettings} tool @param {Point} point @param {number | undefined} object
+   * @param {ToolSettings} settings @param {Point} place @param {number | undefined} object
    * @returns {Layer | null} */
-  layerFor({ tool, importance, adjustedArea }, { x, y }, object) {
+  layerFor(settings, place, object) {
+    const { tool, importance, adjustedArea } = settings;
+    const { x, y } = place;
     const { mirror } = this;
+    if (tool === 'gradient') return this.layerNew('gradient', gradientLayer(settings, place));
     const masked = this.maskId === null ? undefined : mirror.layer(this.maskId);
     if (masked && tool !== 'adjust' && tool !== 'fill') return masked;
     const { painting } = /** @type {import("./layer_picture.js").LayerPicture} */ (mirror.picture);
@@ -269,7 +273,10 @@ export class LayerStrokes {
 
   /** @param {Layer} layer @param {boolean} isNew @returns {string} */
   nameOf(layer, isNew) {
-    if (layer.kind === 'adjust') return isNew ? adjustmentName(layer.name, layer) : layer.name;
+    const isAdjustment = layer.kind === 'adjust' || (layer.gradient && !layer.gradient.light);
+    if (isAdjustment) return isNew ? adjustmentName(layer.name, layer) : layer.name;
+    if (layer.gradient && isNew)
+      return [layer.name, this.effectOf(layer)].filter(Boolean).join(', ');
     if (layer.kind !== 'paint' || this.maskId !== null) return layer.name;
     if (!isNew || !layer.name) return strokesName(layer.name, this.effectOf(layer), isNew);
     return [layer.name, this.effectOf(layer) || 'filled'].join(', ');

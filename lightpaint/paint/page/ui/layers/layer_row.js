@@ -4,6 +4,7 @@ import { html, useLayoutEffect, useRef } from '../../vendor/preact.js';
 import { renamed } from '../../engine/layers/layer_names.js';
 import { warmer } from '../../../../viewer/drawing/colour.js';
 import { Button, NumberField, Slider, useDraft } from '../controls.js';
+import { GradientFields } from '../selection/gradient_fields.js';
 import { Icon } from '../icons.js';
 import { chooseTool } from '../tools.js';
 import {
@@ -121,7 +122,8 @@ function LayerControls({ ui, app, layer }) {
       change=${(/** @type {number} */ importance, /** @type {boolean} */ done) =>
         set({ importance }, 'importance', done)} />`
     }
-    ${kind === 'adjust' && html`<${Adjustment} layer=${layer} set=${set} />`}
+    ${layer.gradient && html`<${GradientFields} ui=${ui} gradient=${layer.gradient} set=${set} />`}
+    ${(kind === 'adjust' || (layer.gradient && !layer.gradient.light)) && html`<${Adjustment} layer=${layer} set=${set} />`}
     ${
       kind === 'weigh' &&
       html`<${NumberField} label="Weight" value=${layer.times} min=${0.01} max=${100} step=${0.5}
@@ -130,7 +132,7 @@ function LayerControls({ ui, app, layer }) {
     <${LayerName} layer=${layer} set=${set} />
     <div class="layer-acts" role="group" aria-label=${`Actions for ${layer.name}`}>
       ${
-        (kind === 'adjust' || kind === 'weigh') &&
+        ['adjust', 'weigh', 'gradient'].includes(kind) &&
         html`<${Button} label="Mask" pressed=${isMasked} act=${mask}
         tip="Paint where this layer applies: the brush adds, the eraser removes" />`
       }

@@ -49,7 +49,7 @@ export function SelectionOutline({ ui, engine, panes }) {
     const timer = setInterval(() => !document.hidden && draw(), STEP_MS);
     return () => clearInterval(timer);
   }, [current?.revision, isTinted, ui.view, places]);
-  return html`<canvas class="selection" ref=${ref} hidden=${!current} aria-hidden="true"></canvas>
+  return html`<canvas class="ants" ref=${ref} hidden=${!current} aria-hidden="true"></canvas>
     ${draft && html`<${Draft} draft=${draft} panes=${distinct(panes)} />`}`;
 }
 
@@ -68,7 +68,7 @@ function Draft({ draft, panes }) {
     shape === 'lasso'
       ? corners
       : (shape === 'ellipse' ? ellipse : rectangle)(first, second ?? first);
-  return html`<svg class="selection-draft" aria-hidden="true">
+  return html`<svg class="select-draft" aria-hidden="true">
     ${panes.map((pane, k) => {
       const points = path
         .map(([x, y]) => `${pane.left + x * pane.scale},${pane.top + y * pane.scale}`)
