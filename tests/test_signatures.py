@@ -18,7 +18,10 @@ def _writers() -> Iterator[tuple[str, list[str]]]:
     """Name and positional parameters of every function that writes something."""
     # What the command line writes goes to the terminal.
     for file in sorted(set(PACKAGE.rglob("*.py")) - set(PACKAGE.glob("cli/**/*.py"))):
-        for node in ast.parse(file.read_text(encoding="utf-8")).body:
+        source = file.read_text(encoding="utf-8")
+        if "\ndef write_" not in source:
+            continue  # every worker of the tests comes by here
+        for node in ast.parse(source).body:
             if isinstance(node, ast.FunctionDef) and node.name.startswith("write_"):
                 place = f"{file.relative_to(PACKAGE)}:{node.name}"
                 yield place, [argument.arg for argument in node.args.args]
