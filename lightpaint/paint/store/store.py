@@ -46,7 +46,7 @@ from lightpaint.paint.store.stored_compositions import (
     StoredComposition,
     composition_rows,
     read_compositions,
-    write_compositions,
+    store_compositions,
 )
 from lightpaint.paint.store.write_queue import WriteJob, WriteQueue
 from lightpaint.storage.json_records import strict_json
@@ -235,7 +235,7 @@ class Store:
         rows = composition_rows(step, current_looks, compositions)
         with self._lock:
             if self.has_file and self.flush() is None:
-                write_compositions(self._database, rows=rows)
+                store_compositions(self._database, rows=rows)
 
     def compositions(
         self, current_looks: Sequence[Floats]

@@ -70,7 +70,7 @@ def composition_rows(
     return rows
 
 
-def write_compositions(database: sqlite3.Connection, *, rows: Sequence[Row]) -> None:
+def store_compositions(database: sqlite3.Connection, *, rows: Sequence[Row]) -> None:
     """Replace the compositions by those of all views. Where that fails, nothing is lost."""
     with suppress(sqlite3.Error), transaction(database):
         database.execute(_TABLE)
