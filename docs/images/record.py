@@ -9,6 +9,7 @@ writes beside itself
     painter.jpg     the painter when that is done
     painter-views.jpg   the stage, painted from the balcony and from a box
     painter-layers.jpg  the gallery with wishes as layers, one of them unfolded
+    painter-selection.jpg  a warm gradient on the wall of the window, which is selected
     painter-lamps.jpg   spots dimmed together, two of them with a gel, under a master
     lights.webp     somebody drags a spot, aims it by a click, paints, and lets the lights move;
                     it also prints the answers a second of the drag
@@ -237,6 +238,32 @@ def _type(page: Page, label: str, text: str) -> None:
     field.press("Enter")
 
 
+def selected(hand: Hand) -> None:
+    """A stop more on what a spot lights, and a gradient on a wall within a soft lasso."""
+    on, page = hand.of_painting, hand.page
+    for _ in range(3):
+        page.keyboard.press("m")
+    page.get_by_role("button", name="More", exact=True).click()
+    panel = page.locator(".select-panel")
+    panel.get_by_role("combobox", name="Select").select_option("light")
+    panel.get_by_role("combobox", name="Light").last.select_option("spot_knot")
+    panel.get_by_role("button", name="Select", exact=True).click()
+    page.wait_for_timeout(1000)
+    page.keyboard.press("a")
+    x, y = on(0.5, 0.5)
+    hand.drag((x, y), (x, y - 80))
+    hand.wait()
+    page.keyboard.press("m")
+    hand.drag(on(0.856, 0.15), on(0.856, 0.7), on(0.995, 0.84), on(0.995, 0.03), on(0.86, 0.14))
+    panel.get_by_role("button", name="Feather", exact=True).click()
+    page.get_by_role("button", name="Colour", exact=True).first.click()
+    page.keyboard.press("r")
+    hand.drag(on(0.985, 0.1), on(0.87, 0.72))
+    hand.wait()
+    page.mouse.move(5, 5)
+    hand.wait()
+
+
 def moving_lights(hand: Hand) -> None:
     """A spot that is dragged, and aimed by a click; a wish that lights answer by moving."""
     on, page = hand.of_painting, hand.page
@@ -336,7 +363,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--spp", type=int, default=64)
     parser.add_argument("--port", type=int, default=8431)
-    pictures = ("painting", "views", "layers", "lamps", "lights")
+    pictures = ("painting", "views", "layers", "selection", "lamps", "lights")
     parser.add_argument("--only", choices=pictures)
     asked = parser.parse_args()
     if asked.only in (None, "lights"):
@@ -357,6 +384,10 @@ def main() -> None:
         with painter("gallery", asked.spp, asked.port) as url, using(url) as hand:
             layered(hand)
             hand.page.screenshot(path=HERE / "painter-layers.jpg", type="jpeg", quality=88)
+    if asked.only in (None, "selection"):
+        with painter("gallery", asked.spp, asked.port) as url, using(url) as hand:
+            selected(hand)
+            hand.page.screenshot(path=HERE / "painter-selection.jpg", type="jpeg", quality=88)
     if asked.only in (None, "painting"):
         with painter("gallery", asked.spp, asked.port) as url, using(url) as hand:
             session(hand)
