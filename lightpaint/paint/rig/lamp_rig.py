@@ -3,7 +3,7 @@
 import json
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from threading import RLock
 from typing import Any
@@ -25,7 +25,7 @@ from lightpaint.paint.rig.added_lights import (
 )
 from lightpaint.paint.rig.cameras import camera_of, in_this_thread
 from lightpaint.paint.rig.moved_bases import one_light_basis, with_planes_of
-from lightpaint.paint.rig.quick_planes import QuickPlanes
+from lightpaint.paint.rig.rig_view import RigView, open_view
 from lightpaint.paint.session.moved_lights import Placed, added_names
 from lightpaint.paint.subject import Subject
 from lightpaint.placement.freedom import Freedom
@@ -35,22 +35,12 @@ from lightpaint.placement.rigging.rigging import Rigging, rigging_of
 from lightpaint.scene.properties.pose import Pose, Site, motion_of
 from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.scene.scene import Scene
-from lightpaint.scene.surfaces import render_features
 
 #: Number of rendered planes, each of all views, that are cached for undo.
 MAX_RENDERED = 32
 
 #: A light and its pose, as text.
 PoseKey = tuple[str, str]
-
-
-@dataclass(frozen=True)
-class RigView:
-    """A view of the loaded scene. quick: makes planes at any place; None if impossible."""
-
-    scene: Scene
-    loaded: Any
-    quick: QuickPlanes | None
 
 
 class LampRig:
@@ -62,7 +52,6 @@ class LampRig:
     Attributes:
         subjects: The views to be painted.
         views: The views of the loaded scene; None before it is loaded.
-        bounds: Corners of a box around the visible scene; None if unknown.
         known_places: Places that were found for poses of lights.
     """
 
@@ -71,7 +60,6 @@ class LampRig:
         self._lock = RLock()
         self.views: tuple[RigView, ...] | None = None
         self._rendered = OrderedDict[PoseKey, list[Basis]]()
-        self.bounds: tuple[Doubles, Doubles] | None = None
         self.known_places: dict[PoseKey, LightPlace] = {}
         self._freedoms: Mapping[str, Freedom] | None = None
 
@@ -106,42 +94,44 @@ class LampRig:
         with in_this_thread():
             return tuple(camera_of(view.scene, view.loaded) for view in self.views)
 
+    @cached_property
+    def bounds(self) -> tuple[Doubles, Doubles] | None:
+        """Corners of a box around all that the views see; None if they see nothing."""
+        assert self.views is not None
+        seen = [view.seen_points for view in self.views if len(view.seen_points)]
+        if not seen:
+            return None
+        low, high = (
+            np.min([x.min(axis=0) for x in seen], axis=0),
+            np.max([x.max(axis=0) for x in seen], axis=0),
+        )
+        return low.astype(float), high.astype(float)
+
     @property
     def extent(self) -> float:
         """Diagonal of the visible scene; 1 before the rig is open."""
-        low, high = self.bounds or (np.zeros(3), np.ones(3) / 3**0.5)
+        low, high = (self.bounds if self.is_open else None) or (np.zeros(3), np.ones(3) / 3**0.5)
         return float(np.linalg.norm(high - low))
 
     @property
     def is_open(self) -> bool:
-        """True if scene and paths are loaded."""
+        """True if the scene is loaded."""
         return self.views is not None
 
     def open(self, bases: Sequence[Basis]) -> None:
-        """Load scene and paths, unless they are loaded."""
+        """Load the scene, unless it is loaded."""
         with self._lock:
             if self.views is None:
                 with in_this_thread():
-                    self.views = tuple(map(self._open_view, self.subjects, bases))
+                    self.views = tuple(map(open_view, self.subjects, bases))
 
-    def _open_view(self, subject: Subject, basis: Basis) -> RigView:
-        scene = subject.loaded_scene
-        loaded = scene.load()
-        features = basis.features
-        if features is None or features.position is None:
-            features = render_features(scene)
-        assert features.position is not None
-        seen = features.position[features.normal.any(axis=-1)]
-        if len(seen):
-            corners = [seen.min(axis=0), seen.max(axis=0)]
-            if self.bounds is not None:
-                corners = [
-                    np.minimum(corners[0], self.bounds[0]),
-                    np.maximum(corners[1], self.bounds[1]),
-                ]
-            self.bounds = corners[0].astype(float), corners[1].astype(float)
-        quick = None if scene.has_media else QuickPlanes(scene, loaded, features)
-        return RigView(scene, loaded, quick)
+    def trace_paths(self) -> None:
+        """Trace the paths of quick planes of the open rig, before the first light is dragged."""
+        assert self.views is not None
+        if not self.scene.has_media:
+            for view in self.views:
+                with self._lock:
+                    view.quick  # noqa: B018 (it is cached)
 
     # Poses
 
@@ -225,13 +215,14 @@ class LampRig:
         assert self.views is not None
         site, light_bases = self.site(name, values), []
         for view, basis in zip(self.views, bases, strict=True):
-            assert view.quick is not None
+            with self._lock:
+                quick = view.quick
             if "kind" in values:
                 light = light_of_new(new_emitter(name, values))
             else:
                 light = replace(basis.lights[basis.names.index(name)], identity="")
             with in_this_thread():
-                plane = view.quick.plane(site)
+                plane = quick.plane(site)
             light_bases.append(one_light_basis(basis, light, plane))
         return light_bases
 

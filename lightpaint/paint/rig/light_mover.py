@@ -83,6 +83,7 @@ class LightMover:
     def _open_rig(self) -> None:
         self.rig.open(self._access.session.bases)
         self._publish_rig()
+        self.rig.trace_paths()
 
     def _publish_rig(self) -> None:
         for message in self.rig_messages():
