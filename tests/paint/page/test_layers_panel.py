@@ -438,3 +438,36 @@ def test_layers_are_imported_by_dialog_and_by_drop(me: Person, tmp_path: Path) -
     assert page.get_by_text("Drop to import layers").count() == 0
     me.press("Control+z")
     assert len(me.names) == 3
+
+
+@pytest.mark.long
+def test_a_page_opens_without_the_pixels_of_layers_and_fetches_them_when_needed(
+    wishes: Person,
+) -> None:
+    me, head = wishes, ".fold.is-layers .fold-head button"
+    me.page.locator(head).first.click()  # the list shows small pictures of layers
+    me.page.reload()
+    me.page.wait_for_selector(".lightpaint .tag", timeout=60_000)
+    me.page.evaluate(COUNT)
+
+    def fetched() -> int:
+        return int(me.page.evaluate(f"() => {PAINTER}.engine.mirror.layers.picture.pixels.size"))
+
+    me.still()
+    assert fetched() == 0
+    me.press("b").drag((30, 40), (50, 44)).drag((30, 30), (50, 34))
+    assert fetched() == 1  # the new layer
+    me.press("Control+z").press("Control+z").press("Control+Shift+z").drag((8, 30), (20, 34))
+    assert fetched() == 2  # what was redone is a wish of its own
+    me.page.evaluate(f"() => {PAINTER}.engine.adjust({{ stops: 0.5, mired: 40, object: null }})")
+    me.still().press("b").drag((30, 10), (50, 12))
+    assert fetched() == 4
+    me.page.locator(head).first.click()
+    me.row("Whole picture").wait_for()
+    me.page.wait_for_function(f"() => {PAINTER}.engine.mirror.layers.picture.pixels.size > 4")
+    me.still()
+    me.page.reload()
+    me.page.wait_for_selector(".lightpaint .tag", timeout=60_000)
+    me.page.evaluate(COUNT)
+    me.page.get_by_role("button", name="Hide Floor").click()
+    me.still().press("Control+z").press("e").drag((60, 40), (70, 44))

@@ -208,6 +208,7 @@ class PictureEngine extends Emitter {
     if (this.stroke) this.end();
     const { place } = this;
     if (!place || place.strokes.isSessionLost || ['pick', 'select'].includes(this.tool.tool)) return;
+    if (!this.layers.isReadyFor(this.tool, point)) this.mirror.layers.needPixels();
     if (this.mirror.layers.isLoading) return this.beginLate(point);
     const canvas = this.layers.begin(this.tool, point);
     if (!canvas) return;
@@ -355,12 +356,22 @@ class PictureEngine extends Emitter {
 
   /** Whether a layer has pixels in the current view. @param {number} id */
   isLayerHere(id) {
-    return Boolean(this.mirror.layers.picture?.pixels.get(id)?.bounds);
+    const { layers } = this.mirror;
+    const isAbsent = layers.absent().some((layer) => layer.id === id);
+    return isAbsent || Boolean(layers.picture?.pixels.get(id)?.bounds);
+  }
+
+  /** Fetch the pixels of a layer, or of those in a group, if they are not here. @param {number} id */
+  lookAtLayer(id) {
+    const { layers } = this.mirror;
+    for (const layer of layers.list)
+      if (layer.id === id || layer.group === id) void layers.look(layer.id);
   }
 
   /** Return how far a layer, or a group, covers each pixel. @param {number} id */
   coverage(id) {
     const [height, width] = this.screen.size;
+    this.lookAtLayer(id);
     return { data: this.mirror.layers.coverage(id), width, height };
   }
 

@@ -43,7 +43,7 @@ const EXPORTS = [
   {
     key: 'layers',
     label: 'Layers',
-    description: 'layers.exr and layers.ora, for Krita, GIMP and others',
+    description: 'layers.exr and layers.ora, for Krita and others',
   },
   { key: 'picture', label: 'Picture', description: 'answer.png: the answer as a picture' },
   {

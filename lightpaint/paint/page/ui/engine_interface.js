@@ -109,6 +109,7 @@
  *   layer, or a group, covers each pixel
  * @property {(id: number, width: number, height: number) => Uint8ClampedArray<ArrayBuffer>}
  *   layerThumbnail RGBA
+ * @property {(id: number) => void} lookAtLayer fetches its pixels, if they are not here
  * @property {Pick<import("../engine/selection/selections.js").Selections,
  *   'current' | 'width' | 'summary' | 'select' | 'change'>} selections what strokes keep to
  * @property {() => void} onMaskChange called when a stroke changes a mask

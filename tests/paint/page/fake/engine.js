@@ -127,6 +127,7 @@ export class FakeEngine {
     const { w: width, h: height } = this.room;
     return { data: Float32Array.from({ length: width * height }, (_, p) => p % 2), width, height };
   }
+  lookAtLayer() {}
   layerThumbnail(id, width, height) {
     return new Uint8ClampedArray(4 * width * height).fill(180);
   }

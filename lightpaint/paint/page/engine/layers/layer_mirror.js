@@ -5,7 +5,7 @@
 import { nameInView } from '../message_frames.js';
 import { changedLayers, PAINTING, PAINTING_ID, plainLayer, shownLayers, withLayers } from './layer_list.js';
 import { LayerPicture } from './layer_picture.js';
-import { LayerPixels } from './layer_pixels.js';
+import { LayerPixels, splitPixels } from './layer_pixels.js';
 
 /** @typedef {import("../message_frames.js").Region} Region */
 /** @typedef {import("../messages.js").Layer} Layer */
@@ -43,6 +43,10 @@ export class LayerMirror {
     this.paintings = 0;
     /** Whether pixels may differ from the session's, since it has refused something. */
     this.isDoubtful = false;
+    /** Whether the pixels of all layers are needed, and not only of those that were. */
+    this.needsAll = false;
+    /** Ids of layers that are fetched to be looked at. @type {Set<number>} */
+    this.looked = new Set();
     /** @type {(() => void)[]} */
     this.waiters = [];
   }
@@ -52,6 +56,7 @@ export class LayerMirror {
   open(painting, view) {
     this.view = view;
     this.revisions.clear();
+    this.needsAll = false;
     this.picture = new LayerPicture(painting);
     this.accents = this.knownAccents();
     this.show(this.list);
@@ -75,6 +80,7 @@ export class LayerMirror {
     const { known, picture } = this;
     if (!known) return;
     if (this.isDoubtful) this.revisions.clear();
+    this.needsAll ||= this.isDoubtful;
     isOther ||= this.isDoubtful;
     this.isDoubtful = false;
     this.accents = this.knownAccents();
@@ -82,7 +88,7 @@ export class LayerMirror {
       for (const { id, revision } of known.layers)
         if (id === PAINTING_ID || picture.pixels.has(id)) this.revisions.set(id, revision);
     const changed = this.show(known.layers.map(plainLayer));
-    if (picture && !isOther) this.redraw(picture.compose(picture.boundsOf(changed), changed));
+    if (!isOther) this.composeChanged(changed);
     if (picture?.isPlain) {
       // A patch has, or will have, the pixels of a painting that is alone.
       const painting = known.layers.find(({ id }) => id === PAINTING_ID);
@@ -91,6 +97,38 @@ export class LayerMirror {
     this.paintings += 1;
     this.listener.onChange();
     if (picture && !picture.isPlain) void this.load();
+  }
+
+  /** Compose where layers have changed, as soon as the pixels are there. @param {number[]} changed */
+  composeChanged(changed) {
+    const { picture } = this;
+    const region = picture?.boundsOf(changed);
+    if (!picture || (!region && this.canCompose())) return;
+    if (this.canCompose()) this.redraw(picture.compose(region ?? null, changed));
+    else if (changed.length) this.needPixels();
+  }
+
+  /** Whether the pixels of all layers are here, or what those come to whose are not. */
+  canCompose() {
+    return !this.absent().length || Boolean(this.picture?.isBaseCurrent);
+  }
+
+  /** Fetch the pixels of all layers, then draw them. */
+  needPixels() {
+    this.needsAll = true;
+    if (this.picture && !this.picture.isPlain) this.picture.isPartial = true;
+    void this.load();
+  }
+
+  /** Fetch the pixels of a layer that somebody looks at. @param {number} id */
+  async look(id) {
+    const { picture } = this;
+    const layer = this.absent().find((one) => one.id === id);
+    if (!picture || !layer || this.looked.has(id)) return;
+    this.looked.add(id);
+    await this.fetch(layer, picture).catch(() => {});
+    this.looked.delete(id);
+    this.listener.onChange();
   }
 
   knownAccents() {
@@ -120,7 +158,7 @@ export class LayerMirror {
     if (picture && order && !order.includes(PAINTING_ID)) clear(picture.painting);
     const changed = this.show(withLayers(this.list, layers, order));
     if (order && !order.includes(PAINTING_ID)) changed.push(PAINTING_ID);
-    if (picture) this.redraw(picture.compose(picture.boundsOf(changed), changed));
+    this.composeChanged(changed);
     this.listener.onChange();
   }
 
@@ -137,7 +175,7 @@ export class LayerMirror {
 
   /** Whether nothing is on the layer that is always there. */
   get isPaintingEmpty() {
-    return !this.picture?.painting.importance.some((x) => x > 0);
+    return !this.absent().some(({ id }) => id === PAINTING_ID) && !this.picture?.painting.importance.some((x) => x > 0);
   }
 
   /** @param {number} id @returns {Layer | undefined} */
@@ -180,7 +218,22 @@ export class LayerMirror {
     );
   }
 
-  /** Fetch the pixels that are missing, then draw them. */
+  /** Return the layers of whose pixels the page has none. @returns {LayerInfo[]} */
+  absent() {
+    return this.missing().filter(({ id, regions }) => {
+      const [top, bottom] = regions[this.view] ?? [0, 0];
+      return bottom > top && !this.revisions.has(id) && !this.picture?.pixels.has(id);
+    });
+  }
+
+  /** Return the layers whose pixels are to be fetched: those that changed, or all.
+   * @returns {LayerInfo[]} */
+  needed() {
+    const absent = this.needsAll ? [] : this.absent();
+    return this.missing().filter((layer) => !absent.includes(layer));
+  }
+
+  /** Fetch the pixels that are needed, then draw them. */
   async load() {
     const { picture } = this;
     if (this.isLoading || !picture) return;
@@ -188,7 +241,7 @@ export class LayerMirror {
     /** @type {number[]} */
     const loaded = [];
     try {
-      for (let missing = this.missing(); missing.length; missing = this.missing()) {
+      for (let missing = this.needed(); missing.length; missing = this.needed()) {
         const some = missing.slice(0, MAX_FETCHES);
         await Promise.all(some.map((layer) => this.fetch(layer, picture)));
         if (picture !== this.picture) break;
@@ -199,9 +252,11 @@ export class LayerMirror {
     }
     this.isLoading = false;
     if (picture !== this.picture) return void this.load();
-    this.redraw(
-      (picture.ground && picture.complete()) ?? picture.compose(picture.boundsOf(loaded)),
-    );
+    if (!this.absent().length) {
+      picture.base = null;
+      const whole = picture.ground && picture.complete();
+      this.redraw(whole ?? picture.compose(picture.boundsOf(loaded)));
+    }
     for (const resolve of this.waiters.splice(0)) resolve();
     if (loaded.length) this.listener.onChange();
   }
@@ -227,16 +282,18 @@ export class LayerMirror {
     const depth = hasColour(layer) ? 4 : 1;
     // If it has changed meanwhile, a newer revision follows.
     if (data.length !== depth * count) return;
-    const pixels = split(/** @type {Float32Array} */ (data), depth);
-    if (id === PAINTING_ID) {
-      clear(picture.painting);
-      picture.painting.set(region, /** @type {Float32Array} */ (pixels.image), pixels.coverage);
-      picture.painting.setPresent(picture.painting.present);
-    } else {
-      const made = new LayerPixels(picture.size, depth === 4);
-      made.put(region, pixels, region);
-      picture.pixels.set(id, made);
-    }
+    const pixels = splitPixels(/** @type {Float32Array} */ (data), depth);
+    picture.keepingBase(() => {
+      if (id === PAINTING_ID) {
+        clear(picture.painting);
+        picture.painting.set(region, /** @type {Float32Array} */ (pixels.image), pixels.coverage);
+        picture.painting.setPresent(picture.painting.present);
+      } else {
+        const made = new LayerPixels(picture.size, depth === 4);
+        made.put(region, pixels, region);
+        picture.pixels.set(id, made);
+      }
+    });
   }
 
   /** @param {Float32Array} ground the present look */
@@ -264,17 +321,4 @@ const hasColour = ({ kind }) => kind === 'paint' || kind === 'pixels';
 function clear(painting) {
   painting.importance.fill(0);
   painting.setPresent(painting.present);
-}
-
-/** Part the pixels of a layer's picture into colour and coverage. @param {Float32Array} data
- * @param {number} depth @returns {{image: Float32Array | null, coverage: Float32Array}} */
-function split(data, depth) {
-  if (depth === 1) return { image: null, coverage: data };
-  const coverage = new Float32Array(data.length / 4);
-  const image = new Float32Array(3 * coverage.length);
-  for (let p = 0; p < coverage.length; p++) {
-    image.set(data.subarray(4 * p, 4 * p + 3), 3 * p);
-    coverage[p] = data[4 * p + 3];
-  }
-  return { image, coverage };
 }

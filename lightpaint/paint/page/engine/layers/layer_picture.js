@@ -13,6 +13,10 @@ import { LowerLayers } from './lower_layers.js';
 /** @typedef {import("./layer_composition.js").Composed} Composed */
 /** @typedef {import("./layer_pixels.js").LayerPixels} LayerPixels */
 /** @typedef {import("./layer_pixels.js").Tile} Tile */
+/** The composition of the lowest layers, and what it depends on.
+ * @typedef {{image: Float32Array, importance: Float32Array, count: number, state: string}} Base */
+/** How many of the lowest layers are in a captured composition, or are kept tile by tile.
+ * @typedef {{start: number, state: string, base: Base | null}} KnownBelow */
 
 export class LayerPicture {
   /** @param {PaintCanvas} painting pixels of the layer that is always there */
@@ -34,6 +38,8 @@ export class LayerPicture {
     /** Whether parts are not composed yet. */
     this.isPartial = false;
     this.lower = new LowerLayers();
+    /** What the lowest layers come to, captured while their pixels are not here. @type {Base | null} */
+    this.base = null;
     /** Each shown layer as text. @type {string[]} */
     this.texts = [];
   }
@@ -78,11 +84,9 @@ export class LayerPicture {
   compose(region, changed = []) {
     if (!region || this.isPlain) return region;
     const keys = tileKeys(this.size, region);
-    const places = changed.map((id) => this.placeOf(id));
-    const start = places.length ? Math.min(...places) : 0;
-    const state = this.stateBelow(start);
+    const known = this.knownBelow(changed);
     for (const key of keys) {
-      const { light, counts } = this.tile(key, null, start, state);
+      const { light, counts } = this.tile(key, null, known);
       this.set(tileRegion(this.size, key), light, counts);
     }
     return enclosing(keys.map((key) => tileRegion(this.size, key)));
@@ -124,24 +128,64 @@ export class LayerPicture {
     return { colour: tile?.image ? [r, g, b] : null, coverage: tile?.coverage[q] ?? 0 };
   }
 
-  /** Return how many shown layers lie below one; 0 for a layer that is not shown.
-   * @param {number} id */
-  placeOf(id) {
-    return Math.max(0, this.shown.findIndex((layer) => layer.id === id));
+  /** Take what is drawn as the composition of all layers that show, so that those above can be
+   * painted without the pixels of these. */
+  capture() {
+    const count = this.shown.length;
+    const state = this.stateBelow(count);
+    this.base = { image: this.image.slice(), importance: this.importance.slice(), count, state };
+  }
+
+  /** Whether the captured composition is still that of the lowest layers. */
+  get isBaseCurrent() {
+    return this.base !== null && this.stateBelow(this.base.count) === this.base.state;
+  }
+
+  /** Do something that adds pixels which the captured composition has already.
+   * @param {() => void} act */
+  keepingBase(act) {
+    const isCurrent = this.isBaseCurrent;
+    act();
+    if (this.base && isCurrent) this.base.state = this.stateBelow(this.base.count);
+  }
+
+  /** Return how many of the lowest layers are composed, or to be kept for the next time.
+   * @param {number[]} changed ids of the layers that change; none for all
+   * @returns {KnownBelow} */
+  knownBelow(changed) {
+    if (this.base && this.isBaseCurrent) return { start: this.base.count, state: '', base: this.base };
+    const places = changed.map((id) => this.shown.findIndex((layer) => layer.id === id));
+    const start = places.length ? Math.max(0, Math.min(...places)) : 0;
+    return { start, state: this.stateBelow(start), base: null };
   }
 
   /** Return light and importance of a tile. @param {number} key
    * @param {number | null} [without] id of a layer to leave out
-   * @param {number} [start] how many of the lowest layers to keep for the next time
-   * @param {string} [state] what these depend on
-   * @returns {Composed} */
-  tile(key, without = null, start = 0, state = this.stateBelow(start)) {
+   * @param {KnownBelow} [known] @returns {Composed} */
+  tile(key, without = null, { start, state, base } = this.knownBelow([])) {
     const { shown } = this;
-    const composed = start
-      ? this.lower.tile(state, key, () => this.apply(key, shown.slice(0, start)))
-      : undefined;
+    /** @type {Composed | undefined} */
+    let composed;
+    if (base) composed = this.baseTile(key, base);
+    else if (start)
+      composed = this.lower.tile(state, key, () => this.apply(key, shown.slice(0, start)));
     const upper = shown.slice(start).filter(({ id }) => id !== without);
     return this.apply(key, upper, composed);
+  }
+
+  /** @param {number} key @param {Base} base @returns {Composed} */
+  baseTile(key, { image, importance }) {
+    const [top, bottom, left, right] = tileRegion(this.size, key);
+    const [, across] = this.size;
+    const width = right - left;
+    const light = new Float32Array(3 * (bottom - top) * width);
+    const counts = new Float32Array((bottom - top) * width);
+    for (let y = top, to = 0; y < bottom; y++, to += width) {
+      const from = y * across + left;
+      light.set(image.subarray(3 * from, 3 * (from + width)), 3 * to);
+      counts.set(importance.subarray(from, from + width), to);
+    }
+    return { light, counts };
   }
 
   /** Return what the composition of the lowest layers depends on. @param {number} count */

@@ -160,3 +160,16 @@ export function enclosing(regions) {
   }
   return made;
 }
+
+/** Part the pixels of a layer's picture into colour and coverage. @param {Float32Array} data
+ * @param {number} depth @returns {{image: Float32Array | null, coverage: Float32Array}} */
+export function splitPixels(data, depth) {
+  if (depth === 1) return { image: null, coverage: data };
+  const coverage = new Float32Array(data.length / 4);
+  const image = new Float32Array(3 * coverage.length);
+  for (let p = 0; p < coverage.length; p++) {
+    image.set(data.subarray(4 * p, 4 * p + 3), 3 * p);
+    coverage[p] = data[4 * p + 3];
+  }
+  return { image, coverage };
+}

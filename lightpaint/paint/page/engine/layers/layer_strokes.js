@@ -47,6 +47,21 @@ export class LayerStrokes {
     this.selection = null;
   }
 
+  /** Whether the page has all pixels that a stroke needs. @param {ToolSettings} tool
+   * @param {Point} point where it begins */
+  isReadyFor(tool, point) {
+    const { mirror } = this;
+    if (!mirror.absent().length || !mirror.picture) return true;
+    if (tool.tool === 'eraser') return false;
+    const found = this.layerFor(tool, point, undefined);
+    if (!found) return true;
+    // A new layer lies over what is drawn; another one has to be the page's own.
+    if (!mirror.layer(found.id)) return true;
+    return mirror.canCompose() && mirror.picture.shown.slice(mirror.picture.base?.count).some(
+      ({ id }) => id === found.id,
+    );
+  }
+
   /** Make a layer active, for the brush to paint. @param {number} id */
   choose(id) {
     this.activeId = id;
@@ -62,13 +77,13 @@ export class LayerStrokes {
     this.mirror.listener.onChange();
   }
 
-  /** Choose another layer if the active one is gone, or if others were put over it, as from a file:
-   * the brush would paint below them. */
+  /** Choose another layer if the active one is gone, or if others lie over it, as from a file or when
+   * a session is opened again: the brush would paint below them. */
   followList() {
     const { list } = this.mirror;
     const top = list[list.length - 1];
     const isOther = !this.ids.has(top.id) && top.id !== this.activeId && !this.canvas;
-    if (this.ids.size && isOther && (top.kind === 'paint' || top.kind === 'pixels')) {
+    if (isOther && (!this.ids.size || top.kind === 'paint' || top.kind === 'pixels')) {
       this.activeId = top.id;
       this.isWishDone = true;
     }
@@ -96,6 +111,7 @@ export class LayerStrokes {
       this.isWishDone = isWish && this.maskId === null;
     }
     this.isNew = !this.mirror.layer(found.id);
+    if (this.isNew && this.mirror.absent().length) picture.capture();
     if (this.isNew) this.mirror.change({ layers: [found] });
     this.canvas = found.id === PAINTING_ID ? picture.painting : this.canvasOf(found);
     this.canvas.selection = this.selection;
@@ -261,7 +277,7 @@ export class LayerStrokes {
     this.canvas = null;
     Object.assign(this, this.previous);
     if (!picture || !canvas) return region;
-    if (!(canvas instanceof LayerCanvas)) return picture.compose(region);
+    if (!(canvas instanceof LayerCanvas)) return picture.compose(region, [PAINTING_ID]);
     if (region) canvas.pixels.put(region, { image: canvas.image, coverage: canvas.importance });
     if (isNew) {
       mirror.show(mirror.list.filter(({ id }) => id !== canvas.layer.id));
@@ -290,11 +306,11 @@ export class LayerStrokes {
       [0, 0, 0],
       [0, 0, 0],
     ];
-    const start = picture?.placeOf(id) ?? 0;
+    const known = picture?.knownBelow([id]);
     const step = Math.max(1, Math.floor(all.length / LOOKED_AT));
     for (let k = 0; picture && k < all.length; k += step) {
       const [key, { coverage }] = all[k];
-      const [without, whole] = [id, null].map((left) => picture.tile(key, left, start).light);
+      const [without, whole] = [id, null].map((left) => picture.tile(key, left, known).light);
       for (let p = 0; p < coverage.length; p += 3)
         for (let c = 0; c < 3; c++) {
           before[c] += coverage[p] * without[3 * p + c];

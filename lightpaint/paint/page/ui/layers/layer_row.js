@@ -88,6 +88,14 @@ function LayerThumbnail({ ui, app, id }) {
     image.data.set(app.engine.layerThumbnail(id, width, height));
     context.putImageData(image, 0, 0);
   }, [id, ui.layerRevisions[id], ui.view]);
+  useLayoutEffect(() => {
+    // Of many layers, the pixels of those are fetched that somebody sees in the list.
+    const observer = new IntersectionObserver((entries) => {
+      if (entries.some(({ isIntersecting }) => isIntersecting)) app.engine.lookAtLayer(id);
+    });
+    if (ref.current) observer.observe(ref.current);
+    return () => observer.disconnect();
+  }, [id]);
   return html`<canvas class="layer-thumb" ref=${ref} width=${width} height=${height}
     aria-hidden="true"></canvas>`;
 }
