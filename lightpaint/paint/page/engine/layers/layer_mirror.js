@@ -86,7 +86,7 @@ export class LayerMirror {
     this.accents = this.knownAccents();
     if (picture && !isOther)
       for (const { id, revision } of known.layers)
-        if (id === PAINTING_ID || picture.pixels.has(id)) this.revisions.set(id, revision);
+        if (this.revisions.has(id) || picture.pixels.has(id)) this.revisions.set(id, revision);
     const changed = this.show(known.layers.map(plainLayer));
     if (!isOther) this.composeChanged(changed);
     if (picture?.isPlain) {

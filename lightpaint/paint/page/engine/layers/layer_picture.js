@@ -194,8 +194,11 @@ export class LayerPicture {
     const revisions = shown
       .slice(0, count)
       .map(({ id }) => (id === PAINTING_ID ? painting : pixels.get(id))?.revision ?? 0);
-    const look = this.ground ? this.groundRevision : `${painting.revision} of halves`;
-    return [look, ...revisions, ...texts.slice(0, count)].join();
+    const look = [
+      this.ground ? this.groundRevision : `${painting.revision} of halves`,
+      painting.albedo !== null, // which gradients of light need
+    ];
+    return [...look, ...revisions, ...texts.slice(0, count)].join();
   }
 
   /** Apply layers, the lowest first. @param {number} key @param {ShownLayer[]} layers
