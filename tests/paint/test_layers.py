@@ -135,6 +135,25 @@ def test_a_group_takes_its_layers_along() -> None:
     assert stack.with_layers([], [0, 9, 1, 2]).ids == (0, 1, 9, 2)
 
 
+@settings(max_examples=15)
+@given(st.integers(0, 10**6))
+def test_a_wish_stays_relative_to_what_lies_below_it(seed: int) -> None:
+    """Whatever comes to lie below later: the wish multiplies the luminance of that."""
+    rng = np.random.default_rng(seed)
+    gain, strength = float(2 ** rng.uniform(-2, 2)), float(rng.uniform(0.1, 2))
+    mask = random_mask(rng, SIZE)
+    wish = (Layer(9, "adjust", gain=gain, strength=strength), pixels_of(mask))
+    below = []
+    for number in range(1, int(rng.integers(2, 6))):
+        layer = Layer(number, ("paint", "adjust", "pixels")[rng.integers(3)], gain=1.5)
+        below.append((layer, pixels_of(random_mask(rng, SIZE), rng.random((*SIZE, 3)))))
+    luminance = np.array([0.2126, 0.7152, 0.0722])
+    before = target_of(*below).image @ luminance
+    factor = np.where(mask >= 1e-3, 1 + mask * (gain**strength - 1), 1)
+    after = target_of(*below, wish).image @ luminance
+    np.testing.assert_allclose(after, factor * before, rtol=2e-5, atol=1e-6)
+
+
 @given(st.integers(0, 10**6))
 def test_any_partition_of_the_picture_gives_the_same_bits(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -1,5 +1,0 @@
-(define (try path)
-  (let* ((image (car (gimp-file-load RUN-NONINTERACTIVE path path)))
-         (layers (gimp-image-get-layers image)))
-    (gimp-message (string-append path ": " (number->string (car layers)) " layers"))
-    (for-each (lambda (l) (gimp-message (string-append (car (gimp-item-get-name l)) " visible " (number->string (car (gimp-item-get-visible l))) " opacity " (number->string (car (gimp-layer-get-opacity l)))))) (vector->list (cadr layers)))))
