@@ -293,15 +293,19 @@ def test_strokes_and_adjustments_keep_to_what_is_selected_and_it_survives(me: Pe
     np.testing.assert_array_equal(image[~mask], before[~mask])
     np.testing.assert_array_equal(importance > 0, mask)
     assert me.names[0].startswith("Selection, +")
+    me.press("g").drag((70, 45), (70, 45))
+    np.testing.assert_array_equal(session.views[0].layer(2).part((0, H, 0, W)).importance, mask)
+    assert me.names[0].startswith("Selection, ")
+    me.press("Control+z")
     me.page.reload()
     me.page.wait_for_selector(".lightpaint .layer", timeout=60_000)
     me.page.evaluate(COUNT)
     me.still()
     state = f"[...({selections}.current?.mask ?? [])].reduce((a, b) => a + b, 0)"
-    assert me.page.evaluate(f"() => {state}") == 255 * mask.sum()
+    me.page.wait_for_function(f"() => {state} === {255 * mask.sum()}")
     for total in (255 * mask.sum(), 255 * mask.sum(), 0):
         me.press("Control+z")
-        assert me.page.evaluate(f"() => {state}") == total
+        me.page.wait_for_function(f"() => {state} === {total}")
     me.press("Control+Shift+Z")
     me.page.wait_for_function(f"() => {state} > 0")
     # What a light lights, and what is bright in the answer as it is shown.

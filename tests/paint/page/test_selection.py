@@ -102,6 +102,9 @@ def test_adjustments_apply_to_what_is_selected_until_nothing_is(painter: Painter
     area = painter.page.get_by_role("group", name="Area")
     chosen = area.get_by_role("button", name="Selection", exact=True)
     assert chosen.get_attribute("aria-pressed") == "true"
+    painter.page.keyboard.press("g")
+    assert chosen.get_attribute("aria-pressed") == "true"
+    painter.page.keyboard.press("a")
     painter.button("By numbers", exact=True).click()
     whole = painter.page.get_by_role("combobox", name="Area").locator("option").first
     assert whole.inner_text() == "Selection"

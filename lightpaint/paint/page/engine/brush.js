@@ -92,10 +92,11 @@ export function fill(canvas, object, flow) {
   return region;
 }
 
-/** Cover everything, or all that is selected. @param {PaintCanvas} canvas @returns {Region} */
-export function flood(canvas) {
+/** Cover everything, or all that is selected. @param {PaintCanvas} canvas @param {number} [flow]
+ * @returns {Region} */
+export function flood(canvas, flow = 1) {
   const region = canvas.selection?.bounds ?? canvas.wholeRegion;
-  canvas.cover(region, () => 1);
+  canvas.cover(region, (x, y, coverage) => coverage + flow * (1 - coverage));
   canvas.setFullyCovered();
   return region;
 }

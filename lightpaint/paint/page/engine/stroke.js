@@ -13,7 +13,7 @@ import { wholeAdjustment } from './whole_adjustment.js';
 
 /**
  * rgb: linear light of the paint. size: diameter in pixels of the picture. importance: factor of
- * the importance brush. adjustedArea: whether a drag adjusts a soft spot of that size (the default), the
+ * the importance brush. adjustedArea: whether a drag adjusts, or a click fills, a soft spot of that size (the default), the
  * object under it, or all that is selected.
  * @typedef {{tool: Tool, rgb: RGB, paintMode: 'light' | 'colour', size: number, hardness: number,
  *   flow: number, importance: number, gradient?: import("./layers/gradient.js").GradientSettings, adjustedArea?: 'spot' | 'object' | 'selection'}} ToolSettings */
@@ -79,6 +79,8 @@ export class Stroke {
   /** @returns {Region[]} */
   begin() {
     const { canvas, settings, start } = this;
+    const isSelection = settings.adjustedArea === 'selection' && canvas.selection !== null;
+    if (settings.tool === 'fill' && isSelection) return this.apply([flood(canvas, settings.flow)]);
     if (settings.tool === 'fill') {
       const object = canvas.objectAt(start.x, start.y);
       return this.apply([fill(canvas, object, settings.flow)]);
@@ -86,7 +88,7 @@ export class Stroke {
     if (settings.tool === 'gradient') return this.apply([flood(canvas)]);
     if (settings.tool !== 'adjust') return this.apply(this.path.moveTo(start));
     const object = canvas.objectAt(start.x, start.y);
-    if (settings.adjustedArea === 'selection' && canvas.selection) flood(canvas);
+    if (isSelection) flood(canvas);
     else if (settings.adjustedArea === 'object' && object >= 0) fill(canvas, object, 1);
     else
       stamp(canvas, { ...start, pressure: 1 }, { size: 2 * settings.size, hardness: 0, flow: 1 });

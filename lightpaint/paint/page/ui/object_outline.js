@@ -16,7 +16,9 @@ const [INSIDE_COLOUR, OUTSIDE_COLOUR] = [
 /** Index of the object that a press affects or would affect; null for none. @param {Ui} ui */
 function objectOf({ tool, adjustedArea, probe, selection }) {
   if (!probe) return null;
-  if (tool === 'fill' || (tool === 'select' && selection.shape === 'object')) return probe.index;
+  const isSelection = adjustedArea === 'selection' && selection.current !== null;
+  if (tool === 'fill') return isSelection ? null : probe.index;
+  if (tool === 'select' && selection.shape === 'object') return probe.index;
   return tool === 'adjust' && adjustedArea === 'object' && probe.index >= 0 ? probe.index : null;
 }
 

@@ -69,7 +69,7 @@ export function ToolBar({ ui, app }) {
       ({ tool, icon, keys, tip }) => html`<${Button} key=${tool} icon=${icon} tip=${tip}
       keys=${keys} pressed=${ui.tool === tool}
       act=${() => (tool === 'select' ? chooseSelect(store) : chooseTool(store, tool))}
-      disabled=${tool === 'fill' && !ui.state?.objects?.length} />`,
+      disabled=${tool === 'fill' && !ui.state?.objects?.length && !ui.selection.current} />`,
     )}
     <div class="spring"></div>
     ${
@@ -128,6 +128,13 @@ export function ToolOptions({ ui, app }) {
       html`<${Slider} label="Hardness" value=${100 * ui.hardness} min=${0} max=${100} unit="%"
         keys="Shift [ ]" tip="Hardness of the edge"
         change=${(/** @type {number} */ percent) => store.set({ hardness: percent / 100 })} />`
+    }
+    ${
+      ui.tool === 'fill' &&
+      ui.selection.current &&
+      html`<${Choice} label="Area" value=${ui.adjustedArea === 'selection' ? 'selection' : 'object'}
+        choices=${areasOf(ui).filter(({ value }) => value !== 'spot')}
+        change=${(/** @type {any} */ adjustedArea) => store.set({ adjustedArea })} />`
     }
     ${
       (isStrokeTool || ui.tool === 'fill') &&

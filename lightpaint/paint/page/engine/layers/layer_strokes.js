@@ -142,15 +142,16 @@ export class LayerStrokes {
     if (masked && tool !== 'adjust' && tool !== 'fill') return masked;
     const { painting } = /** @type {import("./layer_picture.js").LayerPicture} */ (mirror.picture);
     const area = areaName(this.objectName(object ?? painting.objectAt(x, y)));
+    const isSelection = adjustedArea === 'selection' && this.selection !== null;
     if (tool === 'adjust') {
       const spot = area ? `Spot on ${area}` : 'Spot';
       const whole = this.selection ? 'Selection' : 'Whole picture';
-      const isSelection = adjustedArea === 'selection' && this.selection !== null;
       const isSpot = object === undefined && (adjustedArea !== 'object' || !area);
       const name = isSelection ? whole : isSpot ? spot : area || whole;
       return this.layerNew('adjust', { name });
     }
-    if (tool === 'fill') return this.layerNew('paint', { name: area || 'Fill' });
+    if (tool === 'fill')
+      return this.layerNew('paint', { name: isSelection ? 'Selection' : area || 'Fill' });
     if (tool === 'weight') return this.weighing(importance);
     return tool === 'eraser' ? this.erased(x, y) : this.painted();
   }

@@ -72,7 +72,8 @@ export class SelectionMirror {
     try {
       const { data } = await this.host.fetch(`selection/${view}`);
       // A newer one is on its way, or here already.
-      if (known !== this.known || view !== this.view || this.pendingCount) return;
+      const isCurrent = known.revision === this.known?.revision && view === this.view;
+      if (!isCurrent || this.pendingCount) return;
       const [top, bottom, left, right] = region;
       if (data.length !== (bottom - top) * (right - left)) return;
       const mask = new Uint8Array(size[0] * size[1]);

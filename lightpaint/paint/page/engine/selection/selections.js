@@ -76,7 +76,15 @@ export class Selections {
     const mask = await this.maskOf(part);
     if (!mask || view !== this.mirror.view || count !== this.count) return;
     const soft = feathered(mask, this.mirror.size, feather);
-    this.put(joined(this.current?.mask ?? null, soft, mode), 'select');
+    this.put(joined(this.current?.mask ?? null, soft, mode), `select ${this.nameOf(part)}`);
+  }
+
+  /** Return what a step calls a part. @param {Part} part */
+  nameOf(part) {
+    const { state } = this.session;
+    if (part.kind === 'object') return state?.objects?.[part.object] ?? 'background';
+    if (part.kind === 'light') return `what ${state?.lights[part.light]?.name} lights`;
+    return part.kind === 'brightness' || part.kind === 'colour' ? `by ${part.kind}` : part.kind;
   }
 
   /** Change what is selected. @param {Change} change */
