@@ -18,6 +18,7 @@ import { Banner, Tips, Toasts, RunningTasks } from './ui/notices.js';
 import { RoomPlan } from './ui/room_plan.js';
 import { SelectionFields } from './ui/selection/selection_fields.js';
 import { selectionUpdate } from './ui/selection/selection_settings.js';
+import { PresetsButton } from './ui/presets_dialog.js';
 import { SessionController } from './ui/session_controller.js';
 import { SettingsPanel } from './ui/settings_panel.js';
 import { SkipLinks } from './ui/skip_links.js';
@@ -198,7 +199,7 @@ function Side({ ui, app }) {
       'layers',
       'Layers',
       html`<${LayerPanel} ui=${ui} app=${app} />`,
-      html`<${LayerCount} ui=${ui} />`,
+      html`<${LayerCount} ui=${ui} /><${PresetsButton} app=${app} />`,
       ui.open.layers ?? hasLayers(ui),
     )}
     ${renderFold('history', 'History', html`<${HistoryPanel} ui=${ui} app=${app} />`)}

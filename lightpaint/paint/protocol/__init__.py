@@ -54,6 +54,7 @@ from lightpaint.paint.protocol.message_parts import (
     LightPlace,
     LookInfo,
     Place,
+    PresetInfo,
     ResolvedFit,
     SampleCount,
     SelectionInfo,
@@ -64,6 +65,7 @@ from lightpaint.paint.protocol.message_parts import (
     ViewInfo,
 )
 from lightpaint.paint.protocol.painting_requests import (
+    ApplyPreset,
     ChangeLayers,
     ClearPainting,
     CompareLooks,
@@ -120,6 +122,7 @@ __all__ = [
     "Advice",
     "AnswerUpdate",
     "AnyRequest",
+    "ApplyPreset",
     "Camera",
     "CanvasPatch",
     "ChangeLayers",
@@ -167,6 +170,7 @@ __all__ = [
     "PlaceLights",
     "PlacingResult",
     "PointLight",
+    "PresetInfo",
     "Preview",
     "PreviewResult",
     "PreviousAnswer",

@@ -20,6 +20,7 @@ from lightpaint.paint.protocol.message_parts import (
     LightPlace,
     LookInfo,
     Place,
+    PresetInfo,
     SampleCount,
     StepInfo,
     TableInfo,
@@ -83,6 +84,7 @@ class SessionState(EditState, Message, kind="state"):
     lut: TableInfo
     resources: Mapping[str, int]
     looks: tuple[LookInfo, ...]
+    presets: tuple[PresetInfo, ...]
     basis: SampleCount
     verifications: tuple[VerificationResult, ...]
     is_new: bool

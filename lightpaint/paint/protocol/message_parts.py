@@ -191,6 +191,19 @@ class StepInfo:
 
 
 @dataclass(frozen=True)
+class PresetInfo:
+    """A preset: a request for a whole scene. Its picture is `preset/NAME`.
+
+    has_subject: whether it is about one object.
+    """
+
+    name: str
+    title: str
+    description: str
+    has_subject: bool
+
+
+@dataclass(frozen=True)
 class ResolvedFit:
     """The resolved values of all settings, as in `lightpaint.Fit`."""
 

@@ -139,6 +139,19 @@ class ShowPrevious(Message, kind="show_previous"):
 
 
 @dataclass(frozen=True)
+class ApplyPreset(Message, kind="apply_preset"):
+    """Put the layers of a preset on top, in all views and within what is selected: one step.
+    Answered by `patch`.
+
+    preset: its name, as in `state`. subject: name of the object that it is about; null to take the
+    most central one.
+    """
+
+    preset: str
+    subject: str | None = None
+
+
+@dataclass(frozen=True)
 class ClearPainting(Message, kind="clear_painting"):
     """Delete all layers and all paint, in all views: one step. Answered by `patch`."""
 

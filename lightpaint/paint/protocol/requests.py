@@ -24,6 +24,7 @@ from lightpaint.paint.protocol.light_requests import (
     TieLights,
 )
 from lightpaint.paint.protocol.painting_requests import (
+    ApplyPreset,
     ChangeLayers,
     ClearPainting,
     CompareLooks,
@@ -156,6 +157,7 @@ AnyRequest = (
     | Redo
     | ListSteps
     | GoToStep
+    | ApplyPreset
     | ShowPrevious
     | ClearPainting
     | StartOver

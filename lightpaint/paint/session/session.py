@@ -27,7 +27,7 @@ from lightpaint.paint.layers.layered_paintings import LayeredPaintings
 from lightpaint.paint.protocol import AnswerUpdate, Message
 from lightpaint.paint.session.answer_messages import Judgement, answer_findings
 from lightpaint.paint.session.edit_messages import canvas_patches, edit_state, unpainted_headline
-from lightpaint.paint.session.history import Changes, History
+from lightpaint.paint.session.history import Changes
 from lightpaint.paint.session.moved_lights import NoPlaneSource, Placed, PlaneSource
 from lightpaint.paint.session.request_changes import (
     RequestChange,
@@ -60,6 +60,8 @@ class Session:
     Attributes:
         views: Canvas of each view.
         live_answer: Requests, and the last answer.
+        bases_at: Returns the bases of all views with lights at other places, rendered or estimated.
+        history: Its steps, to list and to compare with.
         compositions: Returns what `Store.put_compositions` keeps; None if there is nothing new.
 
     Raises:
@@ -88,7 +90,8 @@ class Session:
             plane_source=plane_source or NoPlaneSource(),
         )
         self.views, self.live_answer = self._edits.views, self._edits.live_answer
-        self.compositions = self._edits.compositions
+        self.bases_at = self._edits.bases_at
+        self.history, self.compositions = self._edits.history, self._edits.compositions
 
     @property
     def version(self) -> int:
@@ -104,10 +107,6 @@ class Session:
     def bases(self) -> tuple[Basis, ...]:
         """Bases of all views, with every light at its place in the scene."""
         return self._edits.bases
-
-    def bases_at(self, placed: Placed) -> Sequence[Basis]:
-        """Bases of all views with lights at other places, rendered or estimated."""
-        return self._edits.bases_at(placed)
 
     @property
     def requests(self) -> SessionRequests:
@@ -160,11 +159,6 @@ class Session:
         requests = previewed_requests(self.requests, self.basis.lights, change)
         self.live_answer.check(requests)
         return requests
-
-    @property
-    def history(self) -> History:
-        """Its steps, to list and to compare with."""
-        return self._edits.history
 
     # Requests and answers
 

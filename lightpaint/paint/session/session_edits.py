@@ -16,6 +16,8 @@ from lightpaint.paint.layers.layer import PAINTING_ID
 from lightpaint.paint.layers.layer_stack import LayerStack
 from lightpaint.paint.layers.layered_paintings import LayeredPaintings
 from lightpaint.paint.layers.selection import selection_patch
+from lightpaint.paint.presets.preset_masks import open_preset
+from lightpaint.paint.presets.presets import PRESETS
 from lightpaint.paint.session.history import Changes, History, restore
 from lightpaint.paint.session.live_answer import LiveAnswer, weights_by_name
 from lightpaint.paint.session.moved_lights import MovedLights, Placed, PlaneSource
@@ -28,7 +30,12 @@ from lightpaint.pipeline.job.settings import Settings
 
 #: Requests to go to another state, earlier, later or new.
 Travel = (
-    protocol.Undo | protocol.Redo | protocol.GoToStep | protocol.ClearPainting | protocol.StartOver
+    protocol.Undo
+    | protocol.Redo
+    | protocol.GoToStep
+    | protocol.ClearPainting
+    | protocol.StartOver
+    | protocol.ApplyPreset
 )
 
 
@@ -170,6 +177,9 @@ class SessionEdits:
                 changes = self.history.go_to(request.step)
             case protocol.ClearPainting() | protocol.StartOver():
                 return self._clear(keep_requests=isinstance(request, protocol.ClearPainting))
+            case protocol.ApplyPreset():
+                changes = open_preset(self.views, request.preset, request.subject)
+                self.history.close_stroke(PRESETS[request.preset].title)
         self._update_answer()
         return changes
 

@@ -3,7 +3,8 @@
 from typing import Any
 
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.paint.protocol import SampleCount, TableInfo, TransformInfo
+from lightpaint.paint.presets.presets import PRESETS
+from lightpaint.paint.protocol import PresetInfo, SampleCount, TableInfo, TransformInfo
 from lightpaint.paint.session import picture_table
 from lightpaint.paint.session.answer_messages import light_info
 from lightpaint.paint.session.look_library import LookLibrary
@@ -31,6 +32,9 @@ def state_fields(
         "lut": TableInfo(picture_table.LUT_SIDE, picture_table.LUT_LOW, picture_table.LUT_HIGH),
         "resources": pictures.stable_generations(),
         "looks": looks.infos(),
+        "presets": tuple(
+            PresetInfo(x.name, x.title, x.description, x.has_subject) for x in PRESETS.values()
+        ),
         "basis": SampleCount(
             spp=basis.origin.spp,
             target_spp=target_spp or basis.origin.spp,

@@ -13,6 +13,8 @@ from lightpaint.errors import PaintError
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.layers.selection import selection_mask
+from lightpaint.paint.presets.preset_masks import requested_look
+from lightpaint.paint.presets.presets import find_preset
 from lightpaint.paint.protocol import ViewInfo
 from lightpaint.paint.session import picture_table
 from lightpaint.paint.session.edit_messages import layer_picture
@@ -74,6 +76,17 @@ def offer_layers(table: PictureTable, views: Canvases) -> None:
     """Offer the pixels of the layers, as `layer/3`, and what is selected, as `selection/0`."""
     table.offer_family("layer", partial(_layer, views))
     table.offer_family("selection", partial(_selection, views))
+
+
+def offer_presets(table: PictureTable, view: Canvas, transform: ViewTransform) -> None:
+    """Offer a small picture of what each preset asks of a view, as `preset/noir`."""
+    side = picture_table.THUMBNAIL_SIDE
+
+    def picture(name: str) -> Picture:
+        light = requested_look(find_preset(name), view, side)
+        return picture_table.display_thumbnail(light, transform)
+
+    table.offer_family("preset", picture)
 
 
 def offer_steps(table: PictureTable, picture_of: Callable[[int], Picture]) -> None:

@@ -15,6 +15,7 @@ from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.session_state import offered_transforms
 from lightpaint.paint.session.view_pictures import (
     offer_layers,
+    offer_presets,
     offer_steps,
     offer_transforms,
     offer_view,
@@ -133,6 +134,7 @@ class SessionBases:
             offer_view(pictures, view, basis, session.transform, clean, small)
         offer_transforms(pictures, offered_transforms(session))
         offer_layers(pictures, session.views)
+        offer_presets(pictures, session.views[0], session.transform)
         offer_steps(pictures, session.history.picture)
         self._mover.offer_all(session)
 

@@ -30,6 +30,7 @@ ASKED = {
     "go_to_step": {"step": 1},
     "show_previous": {},
     "clear_painting": {},
+    "apply_preset": {"preset": "moonlight"},
     "start_over": {},
     "export": {"outputs": ["target", "lighting"]},
     "verify": {"run": True},

@@ -226,6 +226,18 @@ export interface StepInfo {
 }
 
 /**
+ * A preset: a request for a whole scene. Its picture is `preset/NAME`.
+ *
+ * has_subject: whether it is about one object.
+ */
+export interface PresetInfo {
+  name: string;
+  title: string;
+  description: string;
+  has_subject: boolean;
+}
+
+/**
  * The resolved values of all settings, as in `lightpaint.Fit`.
  */
 export interface ResolvedFit {
@@ -359,6 +371,7 @@ export interface SessionState {
   lut: TableInfo;
   resources: Record<string, number>;
   looks: LookInfo[];
+  presets: PresetInfo[];
   basis: SampleCount;
   verifications: Omit<VerificationResult, 'kind' | 'arrays'>[];
   is_new: boolean;
@@ -842,6 +855,18 @@ export interface GoToStep {
 }
 
 /**
+ * Put the layers of a preset on top, in all views and within what is selected: one step.
+ * Answered by `patch`.
+ *
+ * preset: its name, as in `state`. subject: name of the object that it is about; null to take the
+ * most central one.
+ */
+export interface ApplyPreset {
+  preset: string;
+  subject?: string | null;
+}
+
+/**
  * A request for the answer before the last step, to compare with. Answered by `previous`.
  */
 export interface ShowPrevious {
@@ -1164,6 +1189,7 @@ export interface Requests {
   redo: Redo;
   list_steps: ListSteps;
   go_to_step: GoToStep;
+  apply_preset: ApplyPreset;
   show_previous: ShowPrevious;
   clear_painting: ClearPainting;
   start_over: StartOver;

@@ -5,6 +5,7 @@ import { ProgressBar } from './progress_bar.js';
 import { Button, Checkbox, Dialog } from './controls.js';
 import { percentText, progressText, relativePath } from './format.js';
 import { LooksDialog } from './looks_dialog.js';
+import { PresetsDialog } from './presets_dialog.js';
 import { SHORTCUTS, MOD } from './shortcuts.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
@@ -16,6 +17,8 @@ export function Dialogs({ ui, app }) {
   if (ui.dialog === 'keys') return html`<${ShortcutsDialog} close=${close} />`;
   if (ui.dialog === 'export') return html`<${ExportDialog} ui=${ui} app=${app} close=${close} />`;
   if (ui.dialog === 'looks') return html`<${LooksDialog} ui=${ui} app=${app} close=${close} />`;
+  if (ui.dialog === 'presets')
+    return html`<${PresetsDialog} ui=${ui} app=${app} close=${close} />`;
   return null;
 }
 

@@ -144,7 +144,7 @@ import { initialSelection } from './selection/selection_settings.js';
  * @property {Record<string, boolean>} open what is unfolded
  * @property {boolean} side whether the panels are there
  * @property {null | "settings"} panel what lies over the panels
- * @property {null | "keys" | "export" | "looks"} dialog
+ * @property {null | "keys" | "export" | "looks" | "presets"} dialog
  * @property {string} search
  * @property {"scene" | "name" | "share" | "change"} sort
  * @property {number[]} openLights lights whose controls are open

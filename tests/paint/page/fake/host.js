@@ -121,6 +121,15 @@ export class FakeHost {
       can_render: true,
       stroke: 0,
       looks: this.looks,
+      presets: [
+        ['moonlight', 'Moonlight', false],
+        ['only_object', 'Only this object', true],
+      ].map(([name, title, has_subject]) => ({
+        name,
+        title,
+        description: 'What it asks for',
+        has_subject,
+      })),
       basis: this.isFirst
         ? { spp: 4, target_spp: 64, is_complete: false }
         : { spp: 64, target_spp: 64, is_complete: true },
@@ -273,6 +282,10 @@ export class FakeHost {
     const count = all.findIndex(({ id }) => id === step) + 1;
     this.steps = all.slice(0, count);
     this.undone = all.slice(count).toReversed();
+    return this.patch();
+  }
+  apply_preset({ preset }) {
+    this.step(preset);
     return this.patch();
   }
   clear_painting() {

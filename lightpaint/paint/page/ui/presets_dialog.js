@@ -1,0 +1,53 @@
+/** The presets: requests for the whole scene, each with a picture of what it asks for. */
+
+import { html, useState } from '../vendor/preact.js';
+import { Button, Dialog, Select } from './controls.js';
+import { Thumbnail } from './thumbnail.js';
+
+/** @typedef {import("./ui_state.js").Ui} Ui */
+/** @typedef {import("./shortcuts.js").App} App */
+
+/** Value of the choice that leaves the subject to the painter. */
+const CENTRAL = '';
+
+/** @param {{ui: Ui, app: App, close: () => void}} props */
+export function PresetsDialog({ ui, app, close }) {
+  const [subject, setSubject] = useState(CENTRAL);
+  const objects = [...new Set(/** @type {string[]} */ (ui.state?.objects ?? []))];
+  const choices = [
+    { value: CENTRAL, label: 'The most central object' },
+    ...objects.map((name) => ({ value: name, label: name })),
+  ];
+  const apply = (/** @type {string} */ preset, /** @type {boolean} */ hasSubject) => {
+    close();
+    app.engine.cancel();
+    app.store.set((state) => ({ open: { ...state.open, layers: true } }));
+    void app.session.send('apply_preset', {
+      preset,
+      subject: hasSubject && subject !== CENTRAL ? subject : null,
+    });
+  };
+  return html`<${Dialog} title="Presets" close=${close} class="looks-dialog">
+    <p>A preset asks for light, and the lamps come as close as they can. It becomes a group of layers,
+      whose strength you can change later.</p>
+    ${
+      objects.length > 0 &&
+      html`<div class="row"><${Select} label="Subject" value=${subject} choices=${choices}
+        tip="For presets about one object" change=${setSubject} /></div>`
+    }
+    <ul class="sheet">${(ui.state?.presets ?? []).map(
+      (/** @type {import("../engine/messages.js").PresetInfo} */ preset) => html`
+      <li key=${preset.name}><button type="button"
+        onClick=${() => apply(preset.name, preset.has_subject)}>
+        <${Thumbnail} name=${`preset/${preset.name}`} generation=${0} app=${app} />
+        <span><strong>${preset.title}</strong></span><span class="faint">${preset.description}</span>
+      </button></li>`,
+    )}</ul>
+  </${Dialog}>`;
+}
+
+/** @param {{app: App}} props */
+export function PresetsButton({ app }) {
+  return html`<${Button} label="Presets" class="is-small" tip="Moonlight, noir, gallery and others"
+    act=${() => app.store.set({ dialog: 'presets' })} />`;
+}

@@ -1,0 +1,1 @@
+"""Presets: requests for a whole scene, made as layers that fit any scene."""

@@ -1,0 +1,94 @@
+"""Presets on the views of a session: the masks of their layers, and what they ask for."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from lightpaint.arrays import Floats
+from lightpaint.errors import PaintError
+from lightpaint.images.object_map import Objects
+from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.paint.layers.canvas import Canvas
+from lightpaint.paint.layers.canvases import Canvases
+from lightpaint.paint.layers.composition import compose_layer
+from lightpaint.paint.layers.layer import MAX_NAME_LENGTH
+from lightpaint.paint.layers.selection import FULL, selection_mask
+from lightpaint.paint.presets.presets import Preset, find_preset, layers_of
+from lightpaint.paint.presets.view_areas import Mask, ViewAreas
+from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
+
+
+def preset_masks(preset: Preset, canvas: Canvas, subject: str | None) -> list[Mask]:
+    """Return the mask (h, w) of each of a preset's layers in a view, within its selection.
+
+    subject: name of the object that it is about; None to take the most central one.
+    """
+    basis = canvas.basis
+    areas = ViewAreas(canvas.current, basis.emitters_seen, basis.features, basis.objects, subject)
+    selected = _selected(canvas)
+    return [adjustment.mask(areas) * selected for adjustment in preset.adjustments]
+
+
+def check_subject(canvases: Sequence[Canvas], subject: str | None) -> None:
+    """Raise PaintError for an object that no view sees."""
+    if subject is None:
+        return
+    for canvas in canvases:
+        objects = canvas.basis.objects
+        if objects is not None and subject in objects.names:
+            return
+    raise PaintError(f"no view sees an object called {subject!r:.40}")
+
+
+def open_preset(canvases: Canvases, name: str, subject: str | None) -> list[tuple[int, Region]]:
+    """Put the layers of the preset of a name on top, as an open change; return what changes.
+
+    subject: name of the object that it is about; None to take the most central one. Raises
+    PaintError for an unknown preset, and for an object that no view sees.
+    """
+    preset = find_preset(name)
+    check_subject(list(canvases), subject)
+    title = preset.title if subject is None else f"{preset.title}: {subject}"
+    layers = layers_of(preset, canvases.next_layer, title[:MAX_NAME_LENGTH])
+    canvases.open_layers(canvases.layers.with_layers(layers))
+    for view, canvas in enumerate(canvases):
+        masks = preset_masks(preset, canvas, subject)
+        for layer, mask in zip(layers[:-1], masks, strict=True):
+            no_colour = np.broadcast_to(np.float32(0), (*mask.shape, 3))
+            canvases.paint(view, layer.id, canvas.full_region, Pixels(no_colour, mask))
+    return [(view, canvas.full_region) for view, canvas in enumerate(canvases)]
+
+
+def _selected(canvas: Canvas) -> Mask | np.float32:
+    """Return the mask of what is selected in a view; 1 if nothing is."""
+    bounds = canvas.selection.bounds
+    mask = selection_mask(canvas.selection)
+    if not mask.any():
+        return np.float32(1)
+    selected = np.zeros(canvas.size, np.float32)
+    selected[slices(bounds)] = mask / np.float32(FULL)
+    return selected
+
+
+def requested_look(preset: Preset, canvas: Canvas, side: int) -> Floats:
+    """Return what a preset asks of the current look of a view, (h, w, 3) linear, reduced.
+
+    side: approximate pixels of its longer side.
+    """
+    factor = max(1, round(max(canvas.size) / side))
+    basis = canvas.basis
+    look = np.asarray(block_mean(canvas.current, factor), np.float32)
+    height, width = look.shape[:2]
+    sample = slice(0, factor * height, factor), slice(0, factor * width, factor)
+    features, objects = basis.features, basis.objects
+    areas = ViewAreas(
+        look,
+        basis.emitters_seen[sample],
+        None if features is None else features.reduced(factor),
+        None if objects is None else Objects(objects.index[sample], objects.names),
+    )
+    pixels = Pixels.unpainted(look)
+    for layer, adjustment in zip(layers_of(preset, 1, "")[:-1], preset.adjustments, strict=True):
+        mask = Pixels(np.zeros_like(look), adjustment.mask(areas))
+        pixels = compose_layer(layer, mask, pixels)
+    return pixels.image

@@ -1,0 +1,191 @@
+"""Areas of a view that a preset is about: its shadows, its lit parts, an object, the rest."""
+
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image
+
+from lightpaint.arrays import Bools, Floats
+from lightpaint.colour.color import luminance
+from lightpaint.images.denoiser import Features
+from lightpaint.images.object_map import Objects
+
+Mask = npt.NDArray[np.float32]
+
+#: Stops from the median illumination over which a pixel becomes part of the shadows, or of the lit
+#: parts.
+RANGE_STOPS = 2.0
+
+#: Pixels of the longer side of the picture in which illumination is told from surfaces: what is
+#: smaller is a surface's pattern.
+SMOOTH_SIDE = 48
+
+#: Least albedo that illumination is divided by; darker surfaces tell nothing.
+MIN_ALBEDO = 0.05
+
+#: Least share of the picture that an object in it covers which a preset is about, and the largest,
+#: above which it is a wall or a floor.
+OBJECT_SHARES = (0.003, 0.12)
+
+
+class ViewAreas:
+    """Soft masks (h, w) of areas in one view, 0 to 1.
+
+    Args:
+        look: (h, w, 3) linear, the current look.
+        emitters_seen: (h, w), pixels in which an emitter is seen; they belong to no area.
+        features: Of the surfaces, if known.
+        objects: That are seen, if known.
+        chosen: Name of the object that the preset is about; None to take the most central one.
+    """
+
+    def __init__(
+        self,
+        look: Floats,
+        emitters_seen: Bools,
+        features: Features | None = None,
+        objects: Objects | None = None,
+        chosen: str | None = None,
+    ) -> None:
+        self._look, self._emitters_seen = look, emitters_seen
+        self._features, self._objects, self._chosen = features, objects, chosen
+
+    @property
+    def whole(self) -> Mask:
+        """All of the picture."""
+        return self._usable(np.ones(self._look.shape[:2], np.float32))
+
+    @property
+    def shadows(self) -> Mask:
+        """The darker half, more of it the darker it is."""
+        return self._usable(np.clip(-self._level / RANGE_STOPS, 0, 1))
+
+    @property
+    def lit(self) -> Mask:
+        """The brighter half, more of it the brighter it is."""
+        return self._usable(np.clip(self._level / RANGE_STOPS, 0, 1))
+
+    @property
+    def subject(self) -> Mask:
+        """The chosen object; the middle of the picture where there are no objects."""
+        name = self.subject_name
+        if self._objects is None or name is None:
+            return self._usable(self._middle)
+        return self._usable(np.asarray(self._objects.mask(name), np.float32))
+
+    @property
+    def rest(self) -> Mask:
+        """All but the subject."""
+        return self._usable(1 - self.subject)
+
+    @property
+    def subject_left(self) -> Mask:
+        """The subject, fading out from its left to its right."""
+        return self._across(self.subject)
+
+    @property
+    def subject_right(self) -> Mask:
+        """The subject, fading out from its right to its left."""
+        subject = self.subject
+        return subject - self._across(subject)
+
+    @property
+    def exhibits(self) -> Mask:
+        """Objects that are neither walls nor floors; the middle of the picture without objects."""
+        if self._objects is None:
+            return self._usable(self._middle)
+        index = self._objects.index
+        exhibits = [k for k, _ in self._shares() if k >= 0]
+        return self._usable(np.isin(index, exhibits).astype(np.float32))
+
+    @property
+    def surroundings(self) -> Mask:
+        """All but the exhibits."""
+        return self._usable(1 - self.exhibits)
+
+    @property
+    def around_subject(self) -> Mask:
+        """A soft pool around the subject."""
+        return self._usable(self._pool(self.subject))
+
+    @cached_property
+    def subject_name(self) -> str | None:
+        """Name of the chosen object, or of the most central one of its size; None without one."""
+        if self._objects is None:
+            return None
+        if self._chosen is not None:
+            return self._chosen if self._chosen in self._objects.names else None
+        height, width = self._objects.index.shape
+        y, x = np.mgrid[:height, :width]
+        distance = np.hypot((y + 0.5) / height - 0.5, (x + 0.5) / width - 0.5)
+        nearest = min(
+            ((float(distance[self._objects.index == k].mean()), k) for k, _ in self._shares()),
+            default=None,
+        )
+        return None if nearest is None else self._objects.names[nearest[1]]
+
+    def _shares(self) -> list[tuple[int, float]]:
+        """Return objects of the size of an exhibit, and the share of the picture of each."""
+        assert self._objects is not None
+        index = self._objects.index
+        counts = np.bincount(index[index >= 0], minlength=len(self._objects.names))
+        low, high = OBJECT_SHARES
+        shares = counts / index.size
+        return [(k, float(s)) for k, s in enumerate(shares) if low <= s <= high]
+
+    @cached_property
+    def _level(self) -> Mask:
+        """Illumination in stops from its median, without the surfaces' patterns."""
+        light = np.asarray(luminance(self._look), np.float32)
+        if self._features is not None:
+            albedo = np.asarray(luminance(self._features.albedo), np.float32)
+            light = np.asarray(light / np.maximum(albedo, MIN_ALBEDO), np.float32)
+        known = ~self._emitters_seen & (light > 0)
+        if not known.any():
+            return np.zeros_like(light)
+        median = np.median(light[known])
+        stops = np.log2(np.where(known, light, median) / median)
+        return _smoothed(np.clip(stops, -8, 8).astype(np.float32))
+
+    @property
+    def _middle(self) -> Mask:
+        height, width = self._look.shape[:2]
+        y, x = np.mgrid[:height, :width]
+        distance = np.hypot((y + 0.5) / height - 0.55, (x + 0.5) / width - 0.5)
+        return np.asarray(np.clip(1.5 - 4 * distance, 0, 1), np.float32)
+
+    def _across(self, mask: Mask) -> Mask:
+        """Return a mask that fades out from its left end to its right."""
+        columns = np.flatnonzero(mask.any(axis=0))
+        if not columns.size:
+            return mask
+        first, last = int(columns[0]), int(columns[-1])
+        ramp = 1 - (np.arange(mask.shape[1]) - first + 0.5) / (last - first + 1)
+        return np.asarray(mask * np.clip(ramp, 0, 1).astype(np.float32), np.float32)
+
+    def _pool(self, mask: Mask) -> Mask:
+        """Return a soft ellipse around a mask, twice as wide and high."""
+        rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+        if not rows.size:
+            return mask
+        y, x = np.mgrid[: mask.shape[0], : mask.shape[1]]
+        radii = [max(2.0, side[-1] - side[0] + 1.0) for side in (rows, columns)]
+        distance = np.hypot(
+            (y - (rows[0] + rows[-1]) / 2) / radii[0],
+            (x - (columns[0] + columns[-1]) / 2) / radii[1],
+        )
+        return np.asarray(np.clip(2 - 2 * distance, 0, 1), np.float32)
+
+    def _usable(self, mask: npt.NDArray[np.floating]) -> Mask:
+        """Return a mask without pixels in which an emitter is seen."""
+        return np.where(self._emitters_seen, np.float32(0), mask.astype(np.float32))
+
+
+def _smoothed(values: Mask) -> Mask:
+    """Return values (h, w) without detail smaller than that of a small picture."""
+    height, width = values.shape
+    factor = min(1.0, SMOOTH_SIDE / max(height, width))
+    small = max(1, round(width * factor)), max(1, round(height * factor))
+    picture = Image.fromarray(values).resize(small, Image.Resampling.BOX)
+    return np.asarray(picture.resize((width, height), Image.Resampling.BICUBIC), np.float32)
