@@ -147,12 +147,8 @@ class Session:
         live_answer, bases = self.live_answer, tuple(view.basis for view in self.views)
         effective = requests or live_answer.requests
         targets = tuple(self.target(k) for k in range(len(bases)))
-        options = (
-            live_answer.settings(effective),
-            live_answer.constraints(effective),
-            self.transform,
-        )
-        return SessionSnapshot(self.version, bases, targets, effective, *options)
+        options = live_answer.settings(effective), live_answer.constraints(effective)
+        return SessionSnapshot(self.version, bases, targets, effective, *options, self.transform)
 
     def preview_requests(self, change: protocol.Preview) -> SessionRequests:
         """Return the requests after a change. Raises LightpaintError if it is impossible."""

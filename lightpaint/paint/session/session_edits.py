@@ -187,8 +187,7 @@ class SessionEdits:
         """Delete all layers and paint, and the requests too if not kept: one step."""
         requests = self.live_answer.requests_at_rest if keep_requests else SessionRequests()
         label = "clear painting" if keep_requests else "start over"
-        empty = LayeredPaintings(LayerStack(), {})
-        return self.replace_all({}, requests, label, layers=empty)
+        return self.replace_all({}, requests, label, layers=LayeredPaintings(LayerStack(), {}))
 
     def keep_answer(self) -> None:
         """Keep the answer with the last step, for the list of steps."""
