@@ -61,12 +61,12 @@ class GradientPixels:
 
     @property
     def bounds(self) -> Region:
-        """Those of the mask."""
+        """Bounds of the mask."""
         return self._values[1].bounds
 
     @property
     def revision(self) -> int:
-        """That of the mask."""
+        """Revision of the mask."""
         return self._values[1].revision
 
     @property

@@ -17,7 +17,7 @@ NEUTRAL_MIRED, MIRED_RANGE = 200.0, (1e6 / 15000, 500.0)
 
 @dataclass(frozen=True)
 class Adjustment:
-    """One layer of a preset. stops: brighter. mired: warmer. mask: of its area in a view."""
+    """A layer of a preset. stops: brighter. mired: warmer. mask: of its area in a view."""
 
     name: str
     stops: float

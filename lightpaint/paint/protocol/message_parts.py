@@ -113,7 +113,7 @@ class LayerList:
 
 @dataclass(frozen=True)
 class SelectionInfo:
-    """What is selected: the picture `selection/VIEW`, (rows, columns) uint8, in each view.
+    """The selected parts: the picture `selection/VIEW`, (rows, columns) uint8, in each view.
 
     regions: of that picture, by view; empty without a selection. revision: grows when one changes.
     """

@@ -65,8 +65,8 @@ class Select(Message, kind="select"):
     """The selection of a view: a mask that clients multiply what they paint by; one step. With an
     array `mask` (rows, columns) uint8, 255 for a fully selected pixel. Answered by `selected`.
 
-    region: of the mask; nothing is selected outside it. An empty one, or a mask of zeros, is no
-    selection: then everything can be painted. label: its name for undo. view: index of the view.
+    region: of the mask; nothing is selected outside it. With an empty one, or a mask of zeros,
+    everything can be painted. label: its name for undo. view: index of the view.
     """
 
     request_buffers: ClassVar[Mapping[str, str]] = {"mask": "(rows, columns) uint8"}

@@ -150,7 +150,7 @@ export interface LayerList {
 }
 
 /**
- * What is selected: the picture `selection/VIEW`, (rows, columns) uint8, in each view.
+ * The selected parts: the picture `selection/VIEW`, (rows, columns) uint8, in each view.
  *
  * regions: of that picture, by view; empty without a selection. revision: grows when one changes.
  */
@@ -794,8 +794,8 @@ export interface ChangeLayers {
  * The selection of a view: a mask that clients multiply what they paint by; one step. With an
  * array `mask` (rows, columns) uint8, 255 for a fully selected pixel. Answered by `selected`.
  *
- * region: of the mask; nothing is selected outside it. An empty one, or a mask of zeros, is no
- * selection: then everything can be painted. label: its name for undo. view: index of the view.
+ * region: of the mask; nothing is selected outside it. With an empty one, or a mask of zeros,
+ * everything can be painted. label: its name for undo. view: index of the view.
  */
 export interface Select {
   region: Region;
