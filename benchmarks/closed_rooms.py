@@ -66,6 +66,11 @@ class ClosedRoom:
             if place[2] < front and not is_inside and not is_near:
                 return np.asarray(place)
 
+    def some_target(self) -> tuple[float, float, float]:
+        """Return a random point near the floor or the furniture."""
+        x, y, z = self._rng.uniform([-2.5, 0, -2.3], [2, 1.5, 2.3])
+        return float(x), float(y), float(z)
+
     def points(self, count: int) -> list[str]:
         """Return the elements of random point lights."""
         lamps, places = [], []
@@ -82,7 +87,7 @@ class ClosedRoom:
         for k in range(count):
             place = self.free_place(*places)
             places.append(place)
-            target = self._rng.uniform([-2.5, 0, -2.3], [2, 1.5, 2.3])
+            target = np.array(self.some_target())
             cutoff = self._rng.uniform(18, 40)
             beam = cutoff * self._rng.uniform(0.4, 0.8)
             colour = 14 * self._rng.uniform(0.6, 1, 3)

@@ -8,7 +8,8 @@ panels). Missed shares are Σ (Ψ − picture)² / Σ Ψ²: of the room as it is
 was found by an independent plain render, and between two plain renders of the truth, which is the
 noise floor. A room counts as found if the render of what was found misses less than FOUND above the
 floor, and each true light has a found one within NEAR of it. Seconds are of the processor, all
-threads. `--rivals` adds Adam through Mitsuba's differentiable path integrator from random starts.
+threads. `--rivals` adds a choice among fixed random candidates, and Adam through Mitsuba's
+differentiable path integrator from random starts; both are told how many lights there are.
 """
 
 import argparse
@@ -20,7 +21,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from closed_rooms import ClosedRoom
+from closed_rooms import ClosedRoom, point
+from placement_rivals import CANDIDATES, STARTS, adam, chosen_candidates
 from scipy.optimize import nnls
 
 import lightpaint as lp
@@ -36,9 +38,6 @@ FOUND, NEAR = 0.005, 0.15
 
 #: Samples of paintings and verifications, of bases, and size of the pictures.
 SPP, BASIS_SPP, SIZE = 256, 64, (160, 90)
-
-#: Steps and starts of the rival.
-STEPS, STARTS = 60, 2
 
 
 def main() -> None:
@@ -98,7 +97,7 @@ def one_room(folder: Path, kind: str, seed: int, *, with_rivals: bool) -> tuple[
         flush=True,
     )
     if with_rivals:
-        show_rival(scene, placement, painted, seed)
+        show_rivals(room, scene, placement, solution, folder)
     return verified - floor < FOUND and max(position_errors) < NEAR, seconds
 
 
@@ -142,56 +141,30 @@ def distances(truth: Scene, placement: lp.Placement) -> tuple[list[float], list[
     return position_errors, angle_errors
 
 
-def show_rival(scene: Scene, placement: lp.Placement, painted: Floats, seed: int) -> None:
-    """Print what Adam leaves of the same room."""
-    kinds = {light.emitter.kind for light in placement.additions}
-    if kinds <= {"point", "spot"} and kinds:
-        best, seconds = adam(scene, kinds.pop(), len(placement.additions), painted, seed)
-        print(f"         Adam, {STARTS} starts: {best:.4f} in {seconds:.1f} s", flush=True)
-
-
-def adam(scene: Scene, kind: Any, count: int, painted: Floats, seed: int) -> tuple[float, float]:
-    """Return what the best of some starts misses, and seconds. The number of lights is given."""
-    import drjit as dr
-    import mitsuba as mi
-
-    rng, best, start = np.random.default_rng(seed), math.inf, cpu_s()
-    target = mi.TensorXf(painted)
-    for _ in range(STARTS):
-        lights = []
-        for k in range(count):
-            place = tuple(rng.uniform((-2, 0.5, -2), (2, 2.5, 3)))
-            pose = lp.Pose(position=place, target=tuple(rng.uniform((-2, 0, -2), (2, 1.5, 2))))
-            lights.append(lp.NewEmitter(f"guess_{k}", kind, pose, emission=(3, 3, 3)))
-        loaded = scene.with_new_emitters(lights).load()
-        parameters = mi.traverse(loaded)
-        optimiser = mi.ad.Adam(lr=0.05)
-        chosen = [key for key, _ in parameters if key.startswith("guess_")]
-        chosen = [key for key in chosen if key.endswith(("position", "intensity.value"))]
-        for key in chosen:
-            optimiser[key] = parameters[key]
-        parameters.update(optimiser)
-        integrator = mi.load_dict({"type": "path", "max_depth": 6})
-        for step in range(STEPS):
-            image = mi.render(loaded, parameters, integrator=integrator, spp=4, seed=step)
-            loss = dr.sum(dr.square(image - target)) / dr.sum(dr.square(target))
-            dr.backward(loss)
-            optimiser.step()
-            for key in chosen:
-                if key.endswith("value"):
-                    optimiser[key] = dr.maximum(optimiser[key], 0)
-            parameters.update(optimiser)
-        image = np.array(mi.render(loaded, spp=64, seed=99))[..., :3]
-        best = min(best, missed(image, painted))
-    return best, cpu_s() - start
+def show_rivals(
+    room: ClosedRoom, scene: Scene, placement: lp.Placement, solution: lp.Solution, folder: Path
+) -> None:
+    """Print what rivals leave of the same room. They are told the kind and number of lights."""
+    if not placement.additions:
+        return
+    kind, count = placement.additions[0].emitter.kind, len(placement.additions)
+    painted = solution.problem.views.targets[0].image
+    start = cpu_s()
+    lights = chosen_candidates(room, scene, kind, count, painted)
+    seconds = cpu_s() - start
+    left = missed(verification(scene.with_new_emitters(lights), solution, folder), painted)
+    print(f"         {CANDIDATES} fixed candidates: {left:.4f} in {seconds:.1f} s", flush=True)
+    if kind != "panel":
+        start = cpu_s()
+        left = adam(room, scene, kind, count, painted)
+        seconds = cpu_s() - start
+        print(f"         Adam, {STARTS} starts: {left:.4f} in {seconds:.1f} s", flush=True)
 
 
 def show_behind() -> None:
     """Print where a light behind the camera is found by one view, and by two."""
     room = ClosedRoom(7)
     true = np.array([0.6, 2.0, 4.3])
-    from closed_rooms import point
-
     lights = [point("true_0", true, np.full(3, 4.0))]
     with tempfile.TemporaryDirectory() as folder:
         paths = [
