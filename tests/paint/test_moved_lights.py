@@ -6,6 +6,7 @@ import re
 import shlex
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from threading import RLock
 from typing import Any
@@ -20,6 +21,7 @@ from lightpaint.cli import main
 from lightpaint.cli.commands.paint_command import command_for_paintings
 from lightpaint.errors import LightpaintError
 from lightpaint.paint import protocol
+from lightpaint.paint.rig import lamp_rig
 from lightpaint.paint.rig.rig_state import rig_state
 from lightpaint.scene.properties.pose import Site
 from lightpaint.scene.scene_reader import load_scene
@@ -115,6 +117,26 @@ def test_undo_looks_and_the_file_know_places(moving: MovingStudio) -> None:
         assert np.allclose(reopened.plane("bulb"), moved_plane)
     finally:
         reopened.close()
+
+
+def test_the_scene_is_read_before_the_renderer_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A painter of a kept basis has read no scene before, so that Mitsuba has no variant."""
+    order = list[str]()
+
+    class UnreadSubject:
+        @property
+        def loaded_scene(self) -> None:
+            order.append("scene")
+
+    @contextmanager
+    def rendering() -> Iterator[None]:
+        order.append("renderer")
+        yield
+
+    monkeypatch.setattr(lamp_rig, "in_this_thread", rendering)
+    monkeypatch.setattr(lamp_rig, "open_view", lambda *_: order.append("view"))
+    lamp_rig.LampRig([UnreadSubject()]).open([None])  # type: ignore[list-item]
+    assert order == ["scene", "renderer", "view"]
 
 
 def test_a_drag_that_is_given_up_moves_nothing(moving: MovingStudio) -> None:

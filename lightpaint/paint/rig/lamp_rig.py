@@ -122,6 +122,9 @@ class LampRig:
         """Load the scene, unless it is loaded."""
         with self._lock:
             if self.views is None:
+                # With a kept basis no scene has been read yet, and Mitsuba has no variant.
+                for subject in self.subjects:
+                    subject.loaded_scene  # noqa: B018 (it is cached)
                 with in_this_thread():
                     self.views = tuple(map(open_view, self.subjects, bases))
 
