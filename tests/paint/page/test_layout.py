@@ -392,3 +392,14 @@ def test_a_picture_at_the_right_edge_is_named_on_one_line(painter: Painter) -> N
     boxes = [tag.bounding_box() for tag in painter.page.locator(".tag").all()]
     left, right = sorted(boxes, key=lambda box: box["x"])
     assert right["height"] == left["height"]
+
+
+def test_every_comparison_shows_the_two_pictures_that_it_names(new_painter: Any) -> None:
+    painter = new_painter("lights=5")
+    choice = painter.page.get_by_role("combobox", name="Compare", exact=True)
+    names = choice.locator("option").all_inner_texts()
+    assert len(names) == 3
+    for name in names:
+        choice.select_option(label=name)
+        painter.still()
+        assert painter.page.locator(".stage .tag").all_inner_texts() == name.split(" | ")

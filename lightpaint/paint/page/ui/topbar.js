@@ -101,7 +101,7 @@ function ComparisonChoice({ ui, app }) {
   const choices = [
     { value: 'painting solution', label: 'Painting | Answer' },
     { value: 'present solution', label: 'Now | Answer' },
-    { value: 'current painting', label: 'Now | Painting' },
+    { value: 'present painting', label: 'Now | Painting' },
     ...(ui.verification ? [{ value: 'solution verified', label: 'Answer | Render' }] : []),
     ...(ui.mix ? [{ value: 'looks', label: 'Two looks' }] : []),
   ];
