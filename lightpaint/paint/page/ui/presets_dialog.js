@@ -48,6 +48,6 @@ export function PresetsDialog({ ui, app, close }) {
 
 /** @param {{app: App}} props */
 export function PresetsButton({ app }) {
-  return html`<${Button} label="Presets" class="is-small" tip="Moonlight, noir, gallery and others"
+  return html`<${Button} label="Presets" class="in-head" tip="Moonlight, noir, gallery and others"
     act=${() => app.store.set({ dialog: 'presets' })} />`;
 }
