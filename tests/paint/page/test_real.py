@@ -4,6 +4,7 @@ What is shown is read back from the pixels that are truly on the canvas. No test
 or a warning on a console.
 """
 
+import re
 import shlex
 import subprocess
 import sys
@@ -72,9 +73,9 @@ class ServedPainter:
 
     @property
     def steps(self) -> list[str]:
-        """What is done and not undone."""
+        """What is done and not undone, without its place."""
         store = self.studio.session.store
-        return [step.label for step in store.steps[: store.position]]
+        return [re.split(" on |, ", step.label)[0] for step in store.steps[: store.position]]
 
     def close(self) -> None:
         self.server.stop()
@@ -302,7 +303,7 @@ def test_what_is_painted_and_answered_is_on_the_screen(
     box = user.page.locator(".wipe").bounding_box()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     # The wipe paints nothing.
-    user.drag((x, y), (x - 150, y)).still("brush", "fill", "adjust")
+    user.drag((x, y), (x - 150, y)).still("brush", "Floor", "Spot")
     assert user.look("return screen.panes().map((pane) => pane.kind)") == ["solution", "painting"]
     np.testing.assert_allclose(user.seen(5, 50, 1), user.code(user.paint), atol=1)
     np.testing.assert_allclose(user.seen(90, 50, 0), user.answered(90, 50), atol=1)
@@ -311,7 +312,7 @@ def test_what_is_painted_and_answered_is_on_the_screen(
 def fill_and_ask(user: PainterUser) -> None:
     """Fill the floor; then, by a drag, ask for a place of the wall to be two stops darker."""
     wall = user.seen(10, H // 2 - 1)
-    user.press("g").stroke((50, 40)).still("brush", "fill")
+    user.press("g").stroke((50, 40)).still("brush", "Floor")
     np.testing.assert_allclose(user.seen(3, H // 2), user.code(user.paint), atol=1)
     assert user.seen(10, H // 2 - 1) == wall
     light = user.served.studio.session.views[0].image[15, 80] / 4
@@ -320,7 +321,7 @@ def fill_and_ask(user: PainterUser) -> None:
     user.drag((x, y), (x, y + 160), hold=True)
     assert user.page.get_by_text("2.0 stops darker").is_visible()
     user.page.mouse.up()
-    user.still("brush", "fill", "adjust")
+    user.still("brush", "Floor", "Spot")
     np.testing.assert_allclose(user.seen(80, 15), user.code(light), atol=2)
 
 
@@ -632,7 +633,7 @@ def test_two_views_are_painted_and_have_one_answer(
     np.testing.assert_allclose(user.seen(10, 30, 1), user.answered(10, 30, 1), atol=1)
     assert not views[0].importance[30].any()
     # Fill takes the object of this view.
-    user.press("g").stroke((40, 40)).still("brush", "brush", "fill")
+    user.press("g").stroke((40, 40)).still("brush", "brush", "Floor")
     np.testing.assert_allclose(user.seen(3, 40), user.code(paint), atol=1)
     user.page.reload()
     user.ready()
