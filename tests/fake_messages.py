@@ -49,6 +49,7 @@ def fake_state(resources: dict[str, int], **fields: Any) -> SessionState:
         "lut": TableInfo(2, 0.0, 1.0),
         "resources": resources,
         "looks": (),
+        "presets": (),
         "basis": SampleCount(1, 1, True),
         "verifications": (),
         "is_new": True,

@@ -13,12 +13,12 @@ from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.layers.composition import compose_layer
 from lightpaint.paint.layers.layer import MAX_NAME_LENGTH
 from lightpaint.paint.layers.selection import FULL, selection_mask
-from lightpaint.paint.presets.presets import Preset, find_preset, layers_of
+from lightpaint.paint.presets.presets import LightingPreset, find_preset, layers_of
 from lightpaint.paint.presets.view_areas import Mask, ViewAreas
 from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
 
 
-def preset_masks(preset: Preset, canvas: Canvas, subject: str | None) -> list[Mask]:
+def preset_masks(preset: LightingPreset, canvas: Canvas, subject: str | None) -> list[Mask]:
     """Return the mask (h, w) of each of a preset's layers in a view, within its selection.
 
     subject: name of the object that it is about; None to take the most central one.
@@ -70,7 +70,7 @@ def _selected(canvas: Canvas) -> Mask | np.float32:
     return selected
 
 
-def requested_look(preset: Preset, canvas: Canvas, side: int) -> Floats:
+def requested_look(preset: LightingPreset, canvas: Canvas, side: int) -> Floats:
     """Return what a preset asks of the current look of a view, (h, w, 3) linear, reduced.
 
     side: approximate pixels of its longer side.

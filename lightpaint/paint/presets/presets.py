@@ -26,7 +26,7 @@ class Adjustment:
 
 
 @dataclass(frozen=True)
-class Preset:
+class LightingPreset:
     """A request for a whole scene. description: what it does, for people.
 
     adjustments: the lowest first. has_subject: whether it is about one object.
@@ -52,31 +52,31 @@ def _lit(stops: float, mired: float = 0.0) -> Adjustment:
 
 
 _ALL = (
-    Preset(
+    LightingPreset(
         "moonlight",
         "Moonlight",
         "Dark and blue, with deep shadows",
         (_whole(-1.6, -110), _shadows(-0.8, -20)),
     ),
-    Preset(
+    LightingPreset(
         "golden_hour",
         "Golden hour",
         "Low warm sun: lit parts bright and golden, shadows cool",
         (_whole(-0.2, 50), _lit(0.6, 40), _shadows(-0.4, -50)),
     ),
-    Preset(
+    LightingPreset(
         "overcast",
         "Overcast",
         "Soft and even, hardly any shadow",
         (_whole(-0.1, -15), _shadows(0.8), _lit(-0.8)),
     ),
-    Preset(
+    LightingPreset(
         "noir",
         "Noir",
         "Hard contrast: little light, and much darkness",
         (_whole(-0.8), _shadows(-2.6), _lit(0.8)),
     ),
-    Preset(
+    LightingPreset(
         "candle",
         "Candlelight",
         "A warm pool around the subject in a dark room",
@@ -86,7 +86,7 @@ _ALL = (
         ),
         has_subject=True,
     ),
-    Preset(
+    LightingPreset(
         "gallery",
         "Gallery",
         "Objects stand out from quiet walls",
@@ -95,7 +95,7 @@ _ALL = (
             Adjustment("Exhibits", 0.7, 10, lambda view: view.exhibits),
         ),
     ),
-    Preset(
+    LightingPreset(
         "shop_window",
         "Shop window",
         "The subject brilliant, its surroundings half as bright",
@@ -105,7 +105,7 @@ _ALL = (
         ),
         has_subject=True,
     ),
-    Preset(
+    LightingPreset(
         "three_point",
         "Three-point",
         "Key from the left, fill from the right, a quiet background",
@@ -116,7 +116,7 @@ _ALL = (
         ),
         has_subject=True,
     ),
-    Preset(
+    LightingPreset(
         "only_object",
         "Only this object",
         "The subject as it is, all else nearly dark",
@@ -126,7 +126,7 @@ _ALL = (
         ),
         has_subject=True,
     ),
-    Preset(
+    LightingPreset(
         "night",
         "Day to night",
         "Dusk at half strength, night at full: dark and blue, lit parts warm",
@@ -135,17 +135,17 @@ _ALL = (
 )
 
 #: The presets by name, in the order in which people see them.
-PRESETS: Mapping[str, Preset] = {preset.name: preset for preset in _ALL}
+PRESETS: Mapping[str, LightingPreset] = {preset.name: preset for preset in _ALL}
 
 
-def find_preset(name: str) -> Preset:
+def find_preset(name: str) -> LightingPreset:
     """Return the preset of a name. Raises PaintError if there is none."""
     if name not in PRESETS:
         raise PaintError(f"there is no preset {name!r:.40}: expected {', '.join(PRESETS)}")
     return PRESETS[name]
 
 
-def layers_of(preset: Preset, first_id: int, title: str) -> tuple[Layer, ...]:
+def layers_of(preset: LightingPreset, first_id: int, title: str) -> tuple[Layer, ...]:
     """Return the layers of a preset, and last the group that holds them, with ids from `first_id`.
 
     title: name of the group.

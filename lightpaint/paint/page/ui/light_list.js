@@ -25,10 +25,10 @@ import { LightRow } from './light_row.js';
 /** @typedef {import("./shortcuts.js").App} App */
 
 const SORTS = [
-  { value: 'scene', label: 'Scene order' },
+  { value: 'scene', label: 'Scene' },
   { value: 'name', label: 'Name' },
-  { value: 'share', label: 'Largest share' },
-  { value: 'change', label: 'Most changed' },
+  { value: 'share', label: 'Share' },
+  { value: 'change', label: 'Change' },
 ];
 
 /** @param {{ui: Ui, app: App}} props */
