@@ -1,4 +1,4 @@
-"""What is selected is a step of the session, and the mask of a view to the bit."""
+"""A selection is a step of the session, and keeps its mask to the bit."""
 
 from functools import partial
 from typing import Any

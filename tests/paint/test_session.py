@@ -362,7 +362,7 @@ OTHERS: list[tuple[str, Callable[[Session], object]]] = [
 
 
 def what(step: Step) -> dict[str, Any]:
-    """What a step changes, without its time."""
+    """Return the fields of a step, except for its time."""
     return {key: value for key, value in step.fields.items() if key != "stamp"}
 
 

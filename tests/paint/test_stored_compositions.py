@@ -191,7 +191,7 @@ def test_pixels_that_turn_out_to_be_damaged_are_named_and_the_rest_goes_on(tmp_p
 
 
 def test_other_bits_of_a_composition_need_another_version() -> None:
-    """Whoever changes what layers come to raises COMPOSITION_VERSION, and takes the new digest."""
+    """Compare a composition with its digest: other bits need another COMPOSITION_VERSION."""
     rng = np.random.default_rng(0)  # without libraries whose last bits differ between machines
     target = Pixels.unpainted(rng.random((40, 30, 3), np.float32))
     for layer in (

@@ -73,7 +73,7 @@ class ServedPainter:
 
     @property
     def steps(self) -> list[str]:
-        """What is done and not undone, without its place."""
+        """Names of the steps that are done, without the place of each."""
         store = self.studio.session.store
         return [re.split(" on |, ", step.label)[0] for step in store.steps[: store.position]]
 

@@ -17,7 +17,7 @@ MODULES = """
 
 
 def run(page: Any, script: str, given: Any = None) -> Any:
-    """What a script that has the modules and `given` returns."""
+    """Run a script with the modules and `given` in scope, and return its result."""
     return page.evaluate(
         f"async ([H, W, given]) => {{ {MODULES} const size = [H, W]; {script} }}", [H, W, given]
     )
