@@ -350,7 +350,9 @@ def using(url: str) -> Iterator[Hand]:
     with sync_playwright() as playwright:
         path = shutil.which("chromium") or playwright.chromium.executable_path
         browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
-        page = browser.new_page(viewport={"width": WINDOW[0], "height": WINDOW[1]})
+        page = browser.new_page(
+            viewport={"width": WINDOW[0], "height": WINDOW[1]}, color_scheme="dark"
+        )
         page.goto(url)
         page.locator("[data-light]").first.wait_for(timeout=600_000)
         load(page)

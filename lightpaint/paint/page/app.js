@@ -12,7 +12,13 @@ import { LayerDropFrame, LayerImportDialog } from './ui/layers/layer_import.js';
 import { LayerCount, LayerPanel, hasLayers } from './ui/layers/layer_panel.js';
 import { LightList, LightListActions } from './ui/light_list.js';
 import { LookStrip } from './ui/look_strip.js';
-import { storedTool, storeChanges, storedFolds, storedBrushSize } from './ui/browser_storage.js';
+import {
+  storedTool,
+  storeChanges,
+  storedFolds,
+  storedBrushSize,
+  storedPreferences,
+} from './ui/browser_storage.js';
 import { initialState } from './ui/ui_state.js';
 import { Banner, Tips, Toasts, RunningTasks } from './ui/notices.js';
 import { RoomPlan } from './ui/room_plan.js';
@@ -25,6 +31,7 @@ import { SkipLinks } from './ui/skip_links.js';
 import { Stage } from './ui/picture_stage.js';
 import { Store } from './ui/ui_store.js';
 import { AdjustPanel, ToolBar, ToolOptions } from './ui/toolbar.js';
+import { followTheme } from './ui/theme.js';
 import { TopBar } from './ui/topbar.js';
 import { AnalysisPanel } from './ui/analysis_panel.js';
 import { AnswerLine, PointerStatus } from './ui/answer_line.js';
@@ -46,10 +53,11 @@ import { ViewTabs, showView } from './ui/view_tabs.js';
  */
 export async function mount(element, host, { global = false, engine }) {
   const open = { ...initialState().open, ...storedFolds() };
-  const store = new Store({ ...initialState(), ...storedTool(), open });
+  const store = new Store({ ...initialState(), ...storedTool(), ...storedPreferences(), open });
   const root = document.createElement('div');
   root.className = 'lightpaint';
   root.dataset.lmSuppressShortcuts = 'true'; // JupyterLab's, which receive keys before the painter
+  const stopTheme = followTheme(root, store);
   element.append(root);
   const session = new SessionController(host, store);
   const app = { store, session, engine };
@@ -65,6 +73,7 @@ export async function mount(element, host, { global = false, engine }) {
     controller.abort();
     observer.disconnect();
     stopStoring();
+    stopTheme();
     render(null, root);
     engine.close();
     host.close();

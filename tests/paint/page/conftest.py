@@ -22,6 +22,9 @@ KINDS = {".js": "text/javascript", ".html": "text/html; charset=utf-8", ".css": 
 #: Of painters whose test does not ask for another.
 VIEWPORT = {"width": 1280, "height": 720}
 
+#: Of the system, where a test does not ask for the other.
+THEME = "dark"
+
 
 @pytest.fixture(scope="session")
 def axe() -> str:
@@ -122,7 +125,7 @@ class Tabs:
     def take(self, viewport: dict[str, int]) -> Any:
         """Return a tab of that size which nobody else has."""
         if not self.idle:
-            return self.browser.new_context(viewport=viewport).new_page()
+            return self.browser.new_context(viewport=viewport, color_scheme=THEME).new_page()
         tab = self.idle.pop()
         if tab.viewport_size != viewport:
             tab.set_viewport_size(viewport)
@@ -184,6 +187,7 @@ def new_painter(tabs: Tabs) -> Iterator[Any]:
         **options: Any,
     ) -> Painter:
         if is_fresh or init or options:
+            options = {"color_scheme": THEME, **options}
             page = tabs.browser.new_context(viewport=viewport, **options).new_page()
             pages_in_use.append((page, True))
         else:

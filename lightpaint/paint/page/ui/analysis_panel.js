@@ -5,7 +5,7 @@ import { ProgressBar } from './progress_bar.js';
 import { Button, Choice } from './controls.js';
 import { numberText, progressText, joinUnits } from './format.js';
 import { Icon } from './icons.js';
-import { overlayOf } from './ui_state.js';
+import { overlayOf } from './display_state.js';
 import { updateDisplay } from './tools.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */

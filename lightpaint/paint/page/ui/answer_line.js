@@ -7,7 +7,7 @@ import { lightText, numberText, shortenName } from './format.js';
 import { pointingHint } from './lamp_fields.js';
 import { isAnswerHidden, saveLook } from './look_actions.js';
 import { toolHint } from './tools.js';
-import { exposureOf } from './ui_state.js';
+import { exposureOf } from './display_state.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */

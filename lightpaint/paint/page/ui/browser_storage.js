@@ -1,5 +1,6 @@
-/** Interface state that the browser stores between visits: open panels and tool settings. */
+/** Interface state that the browser stores between visits: open panels, tool settings, preferences. */
 
+import { PREFERENCE_FIELDS, validPreferences } from './preferences.js';
 import { MIN_BRUSH_SIZE, MAX_BRUSH_SIZE, distinctPaints } from './tools.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
@@ -8,7 +9,11 @@ import { MIN_BRUSH_SIZE, MAX_BRUSH_SIZE, distinctPaints } from './tools.js';
 /** @typedef {import("./engine_interface.js").RGB} RGB */
 
 /** Storage key. Values of an older page, or of other code, are validated before use. */
-const [FOLDS_KEY, TOOL_KEY] = ['lightpaint.open', 'lightpaint.hand'];
+const [FOLDS_KEY, TOOL_KEY, PREFERENCES_KEY] = [
+  'lightpaint.open',
+  'lightpaint.hand',
+  'lightpaint.preferences',
+];
 
 /** @param {string} key @returns {Record<string, unknown>} */
 function read(key) {
@@ -34,6 +39,9 @@ export function storedFolds() {
   const folds = Object.entries(read(FOLDS_KEY)).filter(([, value]) => typeof value === 'boolean');
   return /** @type {Record<string, boolean>} */ (Object.fromEntries(folds));
 }
+
+/** Return the valid preferences of the last time. */
+export const storedPreferences = () => validPreferences(read(PREFERENCES_KEY));
 
 /** Return the valid tool settings of the last time.
  * @returns {Partial<Ui>} the size as it is kept: as a part of the picture's height, in `share` */
@@ -87,6 +95,11 @@ export function storeChanges(store) {
     const previous = latest;
     latest = store.value;
     if (latest.open !== previous.open) write(FOLDS_KEY, latest.open);
+    if (PREFERENCE_FIELDS.some((key) => latest[key] !== previous[key]))
+      write(
+        PREFERENCES_KEY,
+        Object.fromEntries(PREFERENCE_FIELDS.map((key) => [key, latest[key]])),
+      );
     // A page starts with the tool that was read, maybe long before the scene is loaded.
     if (!latest.state || !previous.state) return;
     if (STORED_FIELDS.some((key) => latest[key] !== previous[key]))

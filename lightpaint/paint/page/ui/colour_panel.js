@@ -5,7 +5,7 @@ import { fromHex, fromKelvin, toHex } from './paint_colour.js';
 import { Hex, Hsv, MIXERS, Rgb, White } from './colour_mixers.js';
 import { Choice, Slider } from './controls.js';
 import { signedText } from './format.js';
-import { paintOf } from './ui_state.js';
+import { paintOf } from './display_state.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./ui_state.js").RGB} RGB */

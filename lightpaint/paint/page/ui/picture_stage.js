@@ -9,7 +9,7 @@ import { reportProbe, refreshProbe, drawRings } from './brush_cursor.js';
 import { countText, percentText } from './format.js';
 import { useStageInput } from './stage_input.js';
 import { comparedLooks, isPending, mixName } from './look_comparison.js';
-import { gainOf, paintOf, effectiveDisplay } from './ui_state.js';
+import { gainOf, paintOf, effectiveDisplay } from './display_state.js';
 import { PointerLabel } from './pointer_label.js';
 import { LayerMask } from './layers/layer_mask.js';
 import { MaskNote } from './layers/layer_panel.js';

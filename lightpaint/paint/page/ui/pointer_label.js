@@ -3,7 +3,7 @@
 import { html, useLayoutEffect, useRef } from '../vendor/preact.js';
 import { toHex } from './paint_colour.js';
 import { paintText } from './format.js';
-import { exposureOf } from './ui_state.js';
+import { exposureOf } from './display_state.js';
 import { paneAt } from './pointer_input.js';
 
 /** @typedef {import("./engine_interface.js").Engine} Engine */

@@ -1,5 +1,6 @@
 /**
- * The solve settings: a panel over the side panels, so that the pictures show the effect of each.
+ * The settings of the solve and of the page: a panel over the side panels, so that the pictures show
+ * the effect of each.
  */
 
 import { html, useLayoutEffect, useRef } from '../vendor/preact.js';
@@ -30,6 +31,11 @@ const HOLDS = [
 const PAINT_READINGS = [
   { value: false, label: 'Sketch', tip: 'Strokes show what should change' },
   { value: true, label: 'Literal', tip: 'Each stroke is the exact light you want' },
+];
+const THEMES = [
+  { value: 'system', label: 'System', tip: 'As the system, or the notebook around it' },
+  { value: 'dark', label: 'Dark' },
+  { value: 'light', label: 'Light' },
 ];
 const MINOR_LIGHTS = [
   { value: false, label: 'May change', tip: 'Every change that brings the answer closer' },
@@ -113,7 +119,17 @@ export function SettingsPanel({ ui, app }) {
       <${NumberField} label="At most" value=${settings.sparse ?? null} min=${1} digits=${0}
         max=${ui.lights.length || 1} placeholder="all" unit="lights"
         tip="Empty: no limit" change=${set('sparse')} /></${Row}>
+    <${PageSettings} ui=${ui} app=${app} />
   </${Panel}>`;
+}
+
+/** Settings of this page that change no answer. @param {{ui: Ui, app: App}} props */
+function PageSettings({ ui, app }) {
+  return html`<div class="panel-head is-page"><h2>This page</h2></div>
+    <${Row} title="Theme" description="The grey around the pictures is the same in both">
+      <${Choice} label="Theme" value=${ui.theme} choices=${THEMES}
+        change=${(/** @type {import("./theme.js").Theme} */ theme) => app.store.set({ theme })} />
+    </${Row}>`;
 }
 
 /**

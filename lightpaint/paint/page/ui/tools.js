@@ -1,7 +1,7 @@
 /** The tools, their hints, and changes of their settings. */
 
 import { toHex } from './paint_colour.js';
-import { exposureOf } from './ui_state.js';
+import { exposureOf } from './display_state.js';
 
 /** @typedef {import("./engine_interface.js").Tool} Tool */
 /** @typedef {import("./engine_interface.js").RGB} RGB */

@@ -3,7 +3,7 @@
 import { html } from '../../vendor/preact.js';
 import { Button, Choice, NumberField } from '../controls.js';
 import { toHex } from '../paint_colour.js';
-import { exposureOf, paintOf } from '../ui_state.js';
+import { exposureOf, paintOf } from '../display_state.js';
 import { GRADIENT_SHAPES } from './gradient_options.js';
 
 /** @typedef {import("../ui_state.js").Ui} Ui */

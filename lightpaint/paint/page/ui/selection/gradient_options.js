@@ -3,7 +3,7 @@
 import { warmer } from '../../../../viewer/drawing/colour.js';
 import { html } from '../../vendor/preact.js';
 import { Choice, NumberField } from '../controls.js';
-import { paintOf } from '../ui_state.js';
+import { paintOf } from '../display_state.js';
 
 /** @typedef {import("../ui_state.js").Ui} Ui */
 /** @typedef {import("../shortcuts.js").App} App */
