@@ -165,7 +165,8 @@ def test_the_focus_is_seen(new_painter: Any, theme: str) -> None:
             const ring = document.createElement('i');
             ring.style.color = 'var(--focus)';
             element.append(ring);
-            const pair = [getComputedStyle(ring).color, ground(element.parentElement)].map(luminance);
+            const colours = [getComputedStyle(ring).color, ground(element.parentElement)];
+            const pair = colours.map(luminance);
             ring.remove();
             return (Math.max(...pair) + 0.05) / (Math.min(...pair) + 0.05);
           });
