@@ -17,6 +17,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.paint.lazy_scene import LazyScene
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.pipeline.job.settings import Settings
+from lightpaint.placement.rigging.rigging import rigging_of
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.quality_presets import samples
 from lightpaint.scene.scene import Scene
@@ -64,6 +65,14 @@ class Subject:
     def record(self) -> SceneFacts | None:
         """Cached facts of a scene that need not be loaded for them."""
         return self.scene.record if isinstance(self.scene, LazyScene) else None
+
+    @property
+    def lets_lights_move(self) -> bool:
+        """True if the lights file lets lights move, so that a solve searches for their places."""
+        if self.scene is None:
+            return False
+        record = self.record
+        return bool(rigging_of((record.lights if record else self.loaded_scene).requests))
 
     @property
     def sensor(self) -> str:

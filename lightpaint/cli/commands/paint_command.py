@@ -62,7 +62,10 @@ def paint(
     from lightpaint.cli.output.vocabulary import from_any_folder
 
     def command(paintings: Mapping[str, str], requests: "SessionRequests") -> str:
-        return from_any_folder(command_for_paintings(sources[0].path, paintings, options, requests))
+        # In the painter no light moves unless somebody moves it.
+        is_still = subjects[0].lets_lights_move and not requests.placed
+        words = (*options, *["--no-move"] * is_still)
+        return from_any_folder(command_for_paintings(sources[0].path, paintings, words, requests))
 
     subjects = make_subjects(
         sources,

@@ -116,7 +116,8 @@ def _write_report(
 ) -> list[Path]:
     """Run `solve` on the current paintings; return the reports."""
     answer = subjects[0].folder / ANSWER_FOLDER
-    settings = replace(snapshot.settings, force=True)
+    # In the painter no light moves unless somebody moves it.
+    settings = replace(snapshot.settings, force=True, move_lights=False)
     painted_subjects = [subjects[k] for k in snapshot.painted_views]
     scenes = tuple(
         subject.loaded_scene for subject in painted_subjects if subject.scene is not None
