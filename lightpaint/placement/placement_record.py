@@ -68,7 +68,7 @@ def record_of(
 
 def read_placement(path: Path) -> PlacementRecord:
     """Read a record that `to_json` made. Raises SceneError for anything else."""
-    text = read_text(path, "places of lights", SceneError, limit=MAX_BYTES)
+    text = read_text(path, "file of places", SceneError, limit=MAX_BYTES)
     try:
         data = strict_json(text)
         for light in data["additions"]:
@@ -77,4 +77,7 @@ def read_placement(path: Path) -> PlacementRecord:
         return read_record(PlacementRecord, data, required=("format",), is_exact=True)
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         reason = " ".join(str(error).split())
-        raise SceneError(f"{path} has no places of lights: {reason}; delete it") from None
+        raise SceneError(
+            f"{path} has no places of lights: {reason}; export it again from the painter, or "
+            "leave placement=... out"
+        ) from None

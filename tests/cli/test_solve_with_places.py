@@ -100,3 +100,43 @@ def test_lights_hang_as_the_file_says(work_folder: Path) -> None:
     assert completed.returncode == 0, completed.stderr
     assert place_of(work_folder / "hung" / "lighting.json", "bulb") == pytest.approx(POSITION)
     assert "turned by" not in completed.stdout + completed.stderr
+
+
+def run_refused(folder: Path, *words: str) -> str:
+    """The one line that a command ends in."""
+    completed = run(folder, "solve", *words)
+    assert completed.returncode == 2
+    [line] = [x for x in completed.stderr.splitlines() if x.startswith("lightpaint solve: ")]
+    return line.removeprefix("lightpaint solve: ")
+
+
+def test_a_basis_without_its_scene_has_its_lights_where_they_were(work_folder: Path) -> None:
+    line = run_refused(work_folder, "room.basis.exr", "p.exr", "-o", "b", "--places", "places.json")
+    assert line == (
+        "lights can only hang elsewhere in their scene: give the scene, or leave --places out"
+    )
+    assert not (work_folder / "b").exists()
+
+
+def test_places_are_not_overwritten_by_the_answer(work_folder: Path) -> None:
+    """Not even by force: somebody hung these lights."""
+    (work_folder / "out").mkdir(exist_ok=True)
+    text = (work_folder / "places.json").read_text()
+    places = work_folder / "out" / "report.json"
+    places.write_text(text)
+    line = run_refused(
+        work_folder, "room.xml", "p.exr", "-o", "out", "--force", "--places", "out/report.json"
+    )
+    assert line.startswith("out/report.json is an input of this command, which would overwrite")
+    assert places.read_text() == text
+
+
+@pytest.mark.parametrize("text", ["{}", '{"format": "lightpaint-places 1"', "[1]"])
+def test_damaged_places_are_not_to_be_deleted(work_folder: Path, text: str) -> None:
+    (work_folder / "damaged.json").write_text(text)
+    line = run_refused(
+        work_folder, "room.xml", "p.exr", "-o", "c", "--places", "damaged.json", *QUICK
+    )
+    assert line.startswith("damaged.json has no places of lights: ")
+    assert line.endswith("; export it again from the painter, or leave --places out")
+    assert not (work_folder / "c").exists()

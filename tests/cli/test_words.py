@@ -114,6 +114,7 @@ def test_every_word_of_the_table_is_an_argument_of_the_library() -> None:
     keywords |= {*inspect.signature(lightpaint.load_scene).parameters}
     keywords |= {*inspect.signature(lightpaint.read_light_groups).parameters}
     keywords |= {*inspect.signature(lightpaint.paint_with_light).parameters}
+    keywords |= {*inspect.signature(lightpaint.Job).parameters}
     keywords |= {*inspect.signature(paint_in_browser).parameters}
     keywords |= {*inspect.signature(Source).parameters, *inspect.signature(RunOptions).parameters}
     assert {*NOT_IN_GROUPS, *LOADING} <= set(OPTIONS)

@@ -27,6 +27,7 @@ OPTIONS = {
     "paint": "--paint",
     "parameters": "-D",
     "pattern": "--pattern",
+    "placement": "--places",
     "port": "--port",
     "quality": "--quality",
     "refine": "--refine",

@@ -153,9 +153,12 @@ class Job:
         if scenes and basis is not None:
             check_same_view(scenes[0], basis)
         if self.placement is not None and not scenes:
-            raise LightpaintError("lights can only hang in their scene: give it, too")
+            raise LightpaintError(
+                "lights can only hang elsewhere in their scene: give the scene, or leave "
+                "placement=... out"
+            )
         # Reports impossible constraints before rendering.
-        reduce_to(all_constraints, basis.lights if basis is not None else self._lights(scenes))
+        reduce_to(all_constraints, self._lights(scenes, basis))
         if self.settings.suggest:
             check_suggestible(scenes[0])
         all_rigging = rigging_for(self.rigging, scenes, self.settings)
@@ -170,11 +173,11 @@ class Job:
         self._set(all_rigging=all_rigging)
         self._set(remarks=tuple(self._remarks(targets, scenes)))
 
-    def _lights(self, scenes: Sequence[Scene]) -> Lights:
-        """Return the lights of the answer: those of the scene, and those of given places."""
-        if self.placement is None:
-            return basis_lights(scenes[0])
-        return basis_lights(content(self.placement).hung_in(scenes).scene)
+    def _lights(self, scenes: Sequence[Scene], basis: Basis | None) -> Lights:
+        """Return the lights of the answer: those of scene or basis, and those of given places."""
+        if self.placement is not None:
+            return basis_lights(content(self.placement).hung_in(scenes).scene)
+        return basis_lights(scenes[0]) if basis is None else basis.lights
 
     @property
     def groups(self) -> LightGroups | None:
@@ -252,8 +255,8 @@ class Job:
             files += [view.folder / name for name in (VIEW_RESULTS if scenes else SOLVE_RESULTS)]
         reads = [file for target in targets for file in target.files]
         reads += [file for scene in scenes for file in scene.read_files]
-        if isinstance(self.basis, BasisFile):
-            reads.append(Path(self.basis.path))
+        others = (self.basis, self.placement)
+        reads += [Path(x.path) for x in others if isinstance(x, BasisFile | PlacementFile)]
         if self.groups is not None:
             reads += self.groups.files
         return ResultFolder(

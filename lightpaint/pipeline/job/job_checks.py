@@ -78,7 +78,7 @@ def rigging_for(rigging: Rigging, scenes: Sequence[Scene], settings: Settings) -
     """Return the rigging of the scene. Raises for lights that cannot move, before rendering."""
     if not scenes:
         if rigging:
-            raise LightpaintError("lights can only move in their scene: give it, too")
+            raise LightpaintError("lights can only move in their scene: give the scene")
         return Rigging()
     all_rigging = rigging_of(scenes[0].requests).and_then(rigging)
     if not settings.move_lights:
