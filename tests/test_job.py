@@ -230,7 +230,6 @@ def test_what_cannot_be_done_with_a_scene_is_said_before_it_renders(
 ):
     monkeypatch.setattr("lightpaint.pipeline.job_bases.obtain_basis", None)
     scene = load_scene(room)
-    side = load_scene(room, sensor="side")
     (height, width) = scene.size
     image = np.ones((height, width, 3), np.float32)
     target = Target("t", image, image[..., 0], everything=True)
@@ -252,9 +251,6 @@ def test_what_cannot_be_done_with_a_scene_is_said_before_it_renders(
     check_refusal(SceneError, "given twice", [scene, scene], [target, target])
     check_refusal(
         TargetError, "template of the sensor side, not of", scene, replace(target, sensor="side")
-    )
-    check_refusal(
-        LightpaintError, "suggested for one view only", [scene, side], [target, target], suggest=1
     )
     check_refusal(
         SceneError,

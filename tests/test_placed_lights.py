@@ -204,13 +204,16 @@ def test_a_missing_lamp_is_added_with_its_constraint_and_written_behind_the_user
     assert second.light("new_point").emission == pytest.approx(setting.emission)
 
 
+#: A second camera of the room.
+SIDE = """<sensor type="perspective" id="side"><float name="fov" value="60"/>
+    <transform name="to_world"><lookat origin="2.5 1.2 1.5" target="0 0.5 0" up="0 1 0"/>
+    </transform><sampler type="independent"/>
+    <film type="hdrfilm"><integer name="width" value="24"/>
+    <integer name="height" value="20"/></film></sensor>"""
+
+
 def test_two_views_place_a_light_together(tmp_path: Path) -> None:
-    second = """<sensor type="perspective" id="side"><float name="fov" value="60"/>
-        <transform name="to_world"><lookat origin="2.5 1.2 1.5" target="0 0.5 0" up="0 1 0"/>
-        </transform><sampler type="independent"/>
-        <film type="hdrfilm"><integer name="width" value="24"/>
-        <integer name="height" value="20"/></film></sensor>"""
-    path = write_room(tmp_path, sensors=second)
+    path = write_room(tmp_path, sensors=SIDE)
     scenes = [load_scene(path, sensor=name) for name in ("camera", "side")]
     moved_scenes = [scene.moved({"beam": AIMED}) for scene in scenes]
     targets = [lp.Target.of(lp.render_basis(x, spp=128, seed=2).current_look) for x in moved_scenes]
@@ -272,6 +275,31 @@ def test_a_suggestion_is_a_turn_with_its_picture_and_the_line_to_paste(
     page = (tmp_path / "answer" / "report.html").read_text()
     assert html.escape(turn.toml) in page
     assert json.loads((tmp_path / "answer" / "report.json").read_text())["turn"]["name"] == "beam"
+
+
+def test_all_views_count_in_what_is_suggested(tmp_path: Path) -> None:
+    """The first view is as painted already; the second has its spot turned."""
+    path = write_room(tmp_path, sensors=SIDE)
+    scenes = [load_scene(path, sensor=name) for name in ("camera", "side")]
+    goals = [scenes[0], scenes[1].moved({"beam": AIMED})]
+    targets = [lp.Target.of(lp.render_basis(x, spp=128, seed=2).current_look) for x in goals]
+    options = {"spp": 128, "space": "linear", "hold": 0, "verify": False, "suggest": 1}
+    looks = lp.paint_with_light(scenes, targets, tmp_path / "both", **options)
+    assert looks[0].suggestions == looks[1].suggestions
+    turns = {look.move_suggestion for look in looks}
+    assert len(turns) == 1
+    [turn] = turns
+    assert turn is not None
+    assert turn.name == "beam"
+    # The pictures are of the first view, which a turn spoils.
+    losses = [float(np.square(x - targets[0].image).sum()) for x in (turn.without, turn.with_it)]
+    assert losses[1] > losses[0]
+    for name in ("camera", "side"):
+        page = (tmp_path / "both" / name / "report.html").read_text()
+        assert "All painted views count; the small pictures show camera." in page
+    alone = lp.paint_with_light(scenes[0], targets[0], tmp_path / "alone", **options)
+    assert alone.move_suggestion is None
+    assert "All painted views" not in (tmp_path / "alone" / "report.html").read_text()
 
 
 def test_sums_alone_are_refused_where_lights_may_move(tmp_path: Path) -> None:

@@ -1,10 +1,10 @@
 """Suggestions to turn an existing spot, for lights that miss the painting from where they hang."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.errors import SceneError
 from lightpaint.images.estimate import Estimate
@@ -12,7 +12,7 @@ from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
-from lightpaint.pipeline.job.job import Job, PaintedView
+from lightpaint.pipeline.job.job import Job
 from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.lights_to_place import free_light
 from lightpaint.placement.place import place
@@ -31,20 +31,20 @@ PIXELS, SAMPLES, MAX_SPP = 2**14, 2**19, 512
 NOTHING_MISSED = 0.01
 
 
-def suggest_move(
-    job: Job, view: PaintedView, solution: Solution, listen: Listener
-) -> MoveSuggestion | None:
-    """Return the turn of one spot that helps most; None if none surely does."""
-    scene, basis = view.scene, solution.basis
-    assert scene is not None
-    freedoms = _turns(scene)
+def suggest_move(job: Job, solution: Solution, listen: Listener) -> MoveSuggestion | None:
+    """Return the turn of one spot that helps most in all views; None if none surely does.
+
+    Its pictures are of the first view.
+    """
+    scenes = [view.scene for view in job.views if view.scene is not None]
+    freedoms = _turns(scenes[0])
     norm2 = float(solution.norm2.sum())
     if not freedoms or sum(solution.certificate.objective) <= NOTHING_MISSED**2 * norm2:
         return None
     try:
         placement = place(
-            scene,
-            basis,
+            scenes,
+            solution.problem.views.bases,
             solution,
             freedoms,
             seed=job.settings.seed,
@@ -55,9 +55,8 @@ def suggest_move(
     if not placement.moves:
         return None
     best = placement.moves[0]
-    picture_without, picture_with = _pictures(
-        job, view, solution, scene.moved({best.name: best.pose}), basis
-    )
+    moved_scenes = [scene.moved({best.name: best.pose}) for scene in scenes]
+    picture_without, picture_with = _pictures(job, solution, moved_scenes)
     aim = 5 * math.ceil((best.turn + MARGIN) / 5)
     return MoveSuggestion(best.name, best.turn, best.gain_share, aim, picture_without, picture_with)
 
@@ -76,21 +75,23 @@ def _turns(scene: Scene) -> dict[str, Freedom]:
     return freedoms
 
 
-def _pictures(
-    job: Job, view: PaintedView, solution: Solution, moved_scene: Scene, basis: Basis
-) -> tuple[Floats, Floats]:
-    """Return the picture as solved, and after the move, on a small film."""
-    small_scene = on_small_film(moved_scene, basis, PIXELS)
-    factor = basis.size[0] // small_scene.size[0]
-    picture_before = block_mean(basis.predict(solution.weights).image, factor)
-    look = block_mean(basis.current_look, factor), block_mean(basis.current_noise, factor)
-    spp = min(MAX_SPP, SAMPLES // (small_scene.size[0] * small_scene.size[1]))
-    small_basis = render_basis(small_scene, spp=spp, seed=job.settings.seed)
-    small_basis = replace(small_basis, former=Estimate(*look))
-    height, width = (factor * n for n in small_scene.size)
-    target = view.target.cropped(height, width).reduced(factor)
-    problem = Problem.of(small_basis, target, constraints=job.all_constraints, fit=job.fit)
+def _pictures(job: Job, solution: Solution, moved_scenes: Sequence[Scene]) -> tuple[Floats, Floats]:
+    """Return the first view as solved, and after the move, on a small film."""
+    bases, targets, before = [], [], []
+    for view, scene, basis in zip(
+        job.views, moved_scenes, solution.problem.views.bases, strict=True
+    ):
+        small_scene = on_small_film(scene, basis, PIXELS // len(moved_scenes))
+        height, width = small_scene.size
+        factor = basis.size[0] // height
+        look = block_mean(basis.current_look, factor), block_mean(basis.current_noise, factor)
+        spp = min(MAX_SPP, SAMPLES // (len(moved_scenes) * height * width))
+        small_basis = render_basis(small_scene, spp=spp, seed=job.settings.seed)
+        bases.append(replace(small_basis, former=Estimate(*look)))
+        targets.append(view.target.cropped(factor * height, factor * width).reduced(factor))
+        picture = block_mean(basis.predict(solution.weights).image, factor)
+        before.append(picture[:height, :width])
+    problem = Problem.of(bases, targets, constraints=job.all_constraints, fit=job.fit)
     solution_with_turn = solution_of(problem)
-    return picture_before[: small_scene.size[0], : small_scene.size[1]], small_basis.mix(
-        solution_with_turn.weights
-    )
+    first = solution_with_turn.problem.views.bases[0]
+    return before[0], first.mix(solution_with_turn.weights)

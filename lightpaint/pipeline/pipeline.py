@@ -1,7 +1,7 @@
 """The pipeline: obtain bases → solve → improve → analyse → relight → predict, verify, report."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -76,12 +76,22 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
     analyses = analyse(solution)
     solution.problem.squares.release()
     lighting, scene = with_findings(solution, analyses).lighting, job.views[0].scene
+    rig = _suggest(job, solution, placement, listen)
     with new_answer(job.results, lighting, scene=scene, groups=job.groups) as answer:
         looks = [
-            _finish_view(job, answer, view, analysis, placement, view_listener(job, view, listen))
+            _finish_view(job, answer, view, analysis, rig, view_listener(job, view, listen))
             for view, analysis in zip(job.views, analyses, strict=True)
         ]
     return [_reloaded(look) for look in looks] if answer.has_moved_paths else looks
+
+
+@dataclass(frozen=True)
+class _RigFindings:
+    """The places found for lights, and suggestions of others; all views count in them."""
+
+    placement: Placement | None
+    suggestions: tuple[Suggestion, ...] | None = None
+    move: MoveSuggestion | None = None
 
 
 def _reduce_noise(job: Job, solution: Solution, listen: Listener) -> Solution:
@@ -114,7 +124,7 @@ def _finish_view(
     answer: AnswerFolder,
     view: PaintedView,
     analysis: Analysis,
-    placement: Placement | None,
+    rig: _RigFindings,
     listen: Listener,
 ) -> Look:
     """Predict, verify and report a view; return its look."""
@@ -124,7 +134,7 @@ def _finish_view(
     folder = answer.path / view.folder.relative_to(job.folder)
     folder.mkdir(exist_ok=True)
     predicted = basis.predict(solution.weights)
-    verification, suggestions, turn, budget, relit = None, None, None, None, None
+    verification, budget, relit = None, None, None
     if scene is not None:
         relit = answer.seen_through(scene.sensor)
         budget = _budget(settings, basis, relit)
@@ -134,8 +144,6 @@ def _finish_view(
     if budget is not None and settings.verify:
         verification = _verify(settings, predicted, budget, solution, listen)
         write_estimate(folder / "verified.exr", verification.verified, {})
-    if settings.suggest and scene is not None:
-        suggestions, turn = _suggest(job, view, scene, solution, listen)
     look = Look(
         target=view.target,
         basis=basis,
@@ -144,9 +152,9 @@ def _finish_view(
         relit=None if relit is None else relit.relocated(answer.path, job.folder),
         verification=verification,
         analysis=analysis,
-        suggestions=suggestions,
-        placement=placement,
-        move_suggestion=turn,
+        suggestions=rig.suggestions,
+        placement=rig.placement,
+        move_suggestion=rig.move,
     )
     write_report(folder, look, command=settings.command, is_shown=settings.report)
     listen.note("report written")
@@ -178,16 +186,24 @@ def _remark_on_parameters(relit: Scene, listen: Listener) -> None:
 
 
 def _suggest(
-    job: Job, view: PaintedView, scene: Scene, solution: Solution, listen: Listener
-) -> tuple[tuple[Suggestion, ...], MoveSuggestion | None]:
+    job: Job, solution: Solution, placement: Placement | None, listen: Listener
+) -> _RigFindings:
     """Suggest lights to add, and a move unless the job has searched for moves itself."""
     settings = job.settings
+    scenes = [view.scene for view in job.views if view.scene is not None]
+    if not settings.suggest or not scenes:
+        return _RigFindings(placement)
     suggestions = suggest_lights(
-        scene, solution.basis, solution, count=settings.suggest, seed=settings.seed, progress=listen
+        scenes,
+        solution.problem.views.bases,
+        solution,
+        count=settings.suggest,
+        seed=settings.seed,
+        progress=listen,
     )
-    move = None if job.all_rigging else suggest_move(job, view, solution, listen)
+    move = None if job.all_rigging else suggest_move(job, solution, listen)
     listen.note("lights suggested")
-    return suggestions, move
+    return _RigFindings(placement, suggestions, move)
 
 
 def _verify(

@@ -120,6 +120,9 @@ def _show(job: Job, looks: Sequence[Look], table: Table) -> None:
             terminal.write("")
             terminal.write(f"{look.basis.origin.sensor}:")
         show_look(look, view.folder, table=table)
+        if look is not looks[-1]:
+            continue
+        # Suggestions are of all views together.
         if look.move_suggestion is not None:
             text = spoken_turn(look.move_suggestion)
             option = f"--aim {quote(f'{look.move_suggestion.name}={look.move_suggestion.aim}')}"

@@ -34,8 +34,6 @@ def check_inputs(
     has_several_views = len(targets) > 1 or len(scenes) > 1
     if has_several_views and basis is not None:
         raise BasisError("a basis has only one view: give the scene to solve for several")
-    if has_several_views and settings.suggest:
-        raise LightpaintError("lights can be suggested for one view only: leave out the others")
     if scenes and len(targets) != len(scenes):
         raise TargetError(
             f"{len(targets)} targets for {len(scenes)} views: give one for each; "

@@ -57,7 +57,7 @@ class Settings(Fit):
             equations; None if the noise is known, unless `literal`.
         refine: Rounds of rendering the solved scene, with as many samples as the basis, and
             improving the answer; needs a scene.
-        suggest: Maximum number of point lights to suggest; needs a scene and a single view.
+        suggest: Maximum number of point lights to suggest; needs a scene. All views count.
         move_lights: Whether to move the lights that may move.
         cd_per_unit: cd/m² that a radiance of 1 stands for, for luminous quantities in the results.
         verify: Whether to render the relit scene and compare it with the prediction, with at most

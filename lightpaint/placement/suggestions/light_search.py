@@ -30,8 +30,8 @@ NOTHING_MISSED = 0.01
 
 @keywords()
 def suggest_lights(
-    scene: Scene,
-    basis: Basis,
+    scenes: Scene | Sequence[Scene],
+    bases: Basis | Sequence[Basis],
     solution: Solution,
     *,
     count: int = SUGGESTED,
@@ -43,9 +43,10 @@ def suggest_lights(
     This is `lp.place` with new points in all free space, while the lights of the scene stay.
 
     Args:
-        scene: The scene of `basis`, on the same film or a larger one.
-        basis: The basis of the solution, of that one view.
-        solution: The solution to improve.
+        scenes: The scene of `bases`, on the same film or a larger one; through the sensor of each
+            view if there are several, which all count.
+        bases: The basis of each view of the solution.
+        solution: The solution to improve. Pictures of suggestions show its first view.
         count: Maximum number of suggestions; none if no light reliably removes 1 % of the error.
         seed: Of the paths and the trial places.
         progress: Receives progress.
@@ -59,13 +60,14 @@ def suggest_lights(
     """
     if count < 1:
         raise SceneError(f"{count} lights cannot be suggested: ask for one or more")
+    scene = scenes if isinstance(scenes, Scene) else scenes[0]
     check_suggestible(scene)
     norm2 = float(solution.norm2.sum())
     if sum(solution.certificate.objective) <= NOTHING_MISSED**2 * norm2:
         return ()
     new = NewLights("point", count=count, name=NAME)
     try:
-        placement = place(scene, basis, solution, new=[new], seed=seed, progress=progress)
+        placement = place(scenes, bases, solution, new=[new], seed=seed, progress=progress)
     except NoPlaceError:
         return ()
     names = free_names(NAME, len(placement.additions), [x.name for x in scene.emitters])

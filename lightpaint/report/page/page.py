@@ -128,6 +128,7 @@ def report_page(
         suggestions=suggestion_section(
             suggestions,
             turn=turn,
+            shown_view=_first_view(solution),
             transform=transform,
             cd_per_unit=solution.lighting.cd_per_unit,
             is_clean=looks.is_clean,
@@ -135,6 +136,12 @@ def report_page(
         sure=sure_section(basis, solution, uncertainty),
         command=escape(command or "(made from Python, without a command line)"),
     )
+
+
+def _first_view(solution: Solution) -> str:
+    """Return the sensor of the first of several views; "" if there is only one."""
+    whole = solution.whole
+    return "" if whole is None else whole.problem.views.bases[0].origin.sensor
 
 
 @cache

@@ -46,12 +46,14 @@ def suggestion_section(
     *,
     transform: ViewTransform,
     turn: MoveSuggestion | None = None,
+    shown_view: str = "",
     cd_per_unit: float | None = None,
     is_clean: bool = False,
 ) -> str:
     """Return each suggested light: the picture without and with it, its place, and its XML.
 
     Without any the section is empty. turn: the turn of an existing light, which comes first.
+    shown_view: the sensor of the small pictures, if there are several painted views.
     is_clean: whether to denoise the pictures.
     """
     if suggestions is None:
@@ -73,10 +75,17 @@ def suggestion_section(
         for k, x in enumerate(suggestions)
     )
     return (
-        f"<section><h2>Lights that would help</h2>"
+        f"<section><h2>Lights that would help</h2>{_views_html(shown_view)}"
         f"{_turn_html(turn, transform=transform, is_clean=is_clean)}"
         f"<p>{escape(spoken_suggestions(suggestions))}</p>{method}{shown}</section>"
     )
+
+
+def _views_html(shown_view: str) -> str:
+    """Return the remark on views, if there are several."""
+    if not shown_view:
+        return ""
+    return f"<p>All painted views count; the small pictures show {escape(shown_view)}.</p>"
 
 
 def spoken_turn(turn: MoveSuggestion) -> str:
