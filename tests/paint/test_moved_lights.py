@@ -489,3 +489,18 @@ def test_exported_places_give_the_same_lamps_in_the_terminal(moving: MovingStudi
     assert here["bulb"] == pytest.approx([0.5, 0.6, 0.7])
     for name, emission in here.items():
         assert there[name] == pytest.approx(emission, rel=3e-3, abs=1e-3), name
+
+
+def test_a_report_searches_for_no_places(tmp_path: Path) -> None:
+    """In the painter no light moves unless somebody moves it, whatever the lights file permits."""
+    (tmp_path / "room.lights.toml").write_text("[light.beam]\naim = true\n")
+    moving = MovingStudio(tmp_path)
+    try:
+        stroke(moving)
+        moving.send(protocol.Export(("report",)))
+        moving.wait(lambda: next((m for m in moving.messages if m.kind == "exported"), None))
+    finally:
+        moving.close()
+    numbers = json.loads((tmp_path / "answer" / "report.json").read_text())
+    assert moving.studio.rig.freedoms
+    assert not numbers.get("placement")
