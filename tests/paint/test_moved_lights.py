@@ -54,6 +54,37 @@ def test_a_moved_light_has_the_plane_of_its_place(moving: MovingStudio) -> None:
     assert np.array_equal(session.basis.current_look, look)
 
 
+def test_a_drag_computes_every_few_pixels_of_a_light_and_all_of_them_once_asked(
+    moving: MovingStudio,
+) -> None:
+    """A draft has the very pixels of the whole plane, repeated; the page gets them without."""
+    pictures: list[protocol.DraggedPlane] = []
+
+    def receive(message: protocol.Message) -> None:
+        if isinstance(message, protocol.DraggedPlane):
+            pictures.append(message)
+
+    def drag(position: list[float], step: int) -> np.ndarray:
+        moving.send(
+            protocol.MoveLights({"bulb": {"position": position}}, is_final=False, step=step)
+        )
+        return np.array(moving.plane("bulb"))
+
+    moving.studio.on_message = receive
+    whole = drag(POSITION, 1)
+    drag([0.0, 1.0, 0.0], 3)
+    draft = drag(POSITION, 3)
+    parts = whole[::3, ::3]
+    repeated = np.repeat(np.repeat(parts, 3, axis=0), 3, axis=1)[: len(whole), : whole.shape[1]]
+    scale = whole.max()
+    assert np.abs(draft - repeated).max() < 1e-5 * scale  # precision
+    assert pictures[-1].step == 3
+    assert pictures[-1].data.shape == parts.shape
+    sent = pictures[-1].data.astype(np.float64)
+    assert np.abs(sent / sent.max() - parts / parts.max()).max() < 2e-3  # of halves
+    assert np.abs(drag(POSITION, 1) - whole).max() < 1e-5 * scale
+
+
 def test_a_panel_of_the_scene_is_dragged_as_a_square_of_its_size(moving: MovingStudio) -> None:
     """On release its plane is rendered with its shape, which its place in the file follows."""
     site = moving.scene.light("panel").members[0].site

@@ -170,11 +170,13 @@ class DraggedPlane(Message, kind="dragged"):
     answer.
 
     light: its index. view: the one that the request named. resources: numbers of its pictures, all
-    of which are this one. data: (h, w, 3) float16, divided by the light's `scale`.
+    of which are this one. step: as the request had it. data: (h, w, 3) float16, divided by the
+    light's `scale`; every step-th pixel of every step-th row.
     """
 
     light: int
     view: int
+    step: int
     resources: Mapping[str, int]
     data: npt.NDArray[np.float16]
 

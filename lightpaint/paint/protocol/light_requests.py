@@ -46,6 +46,15 @@ class SetMaster(Message, kind="set_master"):
     level: float
 
 
+#: Largest step between the pixels of a dragged light's picture.
+MAX_STEP = 8
+
+
+def _check_step(step: int) -> None:
+    if not 1 <= step <= MAX_STEP:
+        raise ValueError(f"step is 1 to {MAX_STEP}")
+
+
 @dataclass(frozen=True)
 class MoveLights(Message, kind="move"):
     """New places, targets and cones of lights, by name. Answered by `answer`; `rig` follows.
@@ -53,12 +62,17 @@ class MoveLights(Message, kind="move"):
     poses: changed fields of `lightpaint.Pose`: position, target, cutoff and beam; an empty object
     restores a light's place from the scene. is_final: whether it becomes a step; false while a
     light is dragged. view: index of the view whose pictures of dragged lights are sent at once, as
-    `dragged`.
+    `dragged`. step: while a light is dragged, its picture is computed at every step-th pixel of
+    every step-th row, 1 to 8: what the page draws in time.
     """
 
     poses: Mapping[str, Mapping[str, Any]]
     is_final: bool = True
     view: int = 0
+    step: int = 1
+
+    def __post_init__(self) -> None:
+        _check_step(self.step)
 
 
 @dataclass(frozen=True)
@@ -67,7 +81,7 @@ class PointLight(Message, kind="point"):
 
     mode: `aim` points it there; `highlight` hangs it so that its reflection appears there; `shadow`
     hangs it so that the shadow of the surface at `edge` ends there. pixel, edge: column and row in
-    pixels. view: index of the view. is_final: as in `move`.
+    pixels. view: index of the view. is_final, step: as in `move`.
     """
 
     light: int
@@ -76,6 +90,10 @@ class PointLight(Message, kind="point"):
     edge: tuple[float, float] | None = None
     view: int = 0
     is_final: bool = True
+    step: int = 1
+
+    def __post_init__(self) -> None:
+        _check_step(self.step)
 
 
 @dataclass(frozen=True)

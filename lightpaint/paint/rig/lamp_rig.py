@@ -2,7 +2,7 @@
 
 import json
 from collections import OrderedDict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from threading import RLock
@@ -53,6 +53,8 @@ class LampRig:
         subjects: The views to be painted.
         views: The views of the loaded scene; None before it is loaded.
         known_places: Places that were found for poses of lights.
+        step: While lights are dragged, their quick planes have every step-th pixel of every
+            step-th row, repeated.
     """
 
     def __init__(self, subjects: Sequence[Subject]) -> None:
@@ -61,6 +63,7 @@ class LampRig:
         self.views: tuple[RigView, ...] | None = None
         self._rendered = OrderedDict[PoseKey, list[Basis]]()
         self.known_places: dict[PoseKey, LightPlace] = {}
+        self.step, self._drafts = 1, set[str]()
         self._freedoms: Mapping[str, Freedom] | None = None
 
     @property
@@ -208,7 +211,16 @@ class LampRig:
             if (rendered := self._rendered.get(key)) is not None:
                 self._rendered.move_to_end(key)
                 return rendered
+        if self.step > 1:
+            self._drafts.add(name)
+        else:
+            self._drafts.discard(name)
         return self.quick_planes(bases, name, values)
+
+    @property
+    def outdated(self) -> Collection[str]:
+        """Lights whose last planes have repeated pixels, which need not be repeated any more."""
+        return self._drafts if self.step == 1 else ()
 
     def quick_planes(
         self, bases: Sequence[Basis], name: str, values: Mapping[str, Any]
@@ -225,7 +237,7 @@ class LampRig:
             else:
                 light = replace(basis.lights[basis.names.index(name)], identity="")
             with in_this_thread():
-                plane = quick.plane(site)
+                plane = quick.plane(site, self.step)
             light_bases.append(one_light_basis(basis, light, plane))
         return light_bases
 

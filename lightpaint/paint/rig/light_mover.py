@@ -104,7 +104,7 @@ class LightMover:
             raise PaintError(f"no light {request.light}: there are {len(names)}")
         name = names[request.light]
         pose = pose_change(self.rig, request, name, session.requests.placed.get(name, {}))
-        return MoveLights({name: pose}, request.is_final, request.view)
+        return MoveLights({name: pose}, request.is_final, request.view, request.step)
 
     def hang(self, request: AddLight) -> tuple[str, dict[str, Any]]:
         """Return name and values of the light that a request adds. Raises PaintError."""
@@ -233,13 +233,19 @@ class LightMover:
     def _dragged_planes(self, session: Session, number: int) -> list[DraggedPlane]:
         """Return the pictures of dragged lights in a view."""
         pictures, basis = self._publisher.pictures, session.views[number].basis
-        messages = []
+        messages, step = [], self.rig.step
         for k in sorted(basis.names.index(name) for name in self._dragged):
             names = [name_in_view(f"{plain}/{k}", number) for plain in ("clean", "plane")]
-            picture = pictures[names[0]]
-            pictures.keep(names[1], picture)
+            if step == 1:
+                picture = pictures[names[0]]
+                pictures.keep(names[1], picture)
+            else:  # the whole picture is made only if it is fetched
+                plane = basis.planes.plane(k)[::step, ::step]
+                picture = as_halves(plane, plane_scale(session.bases[number], k))
             resources = {name: pictures.generations[name] for name in names}
-            messages.append(DraggedPlane(light=k, view=number, resources=resources, data=picture))
+            messages.append(
+                DraggedPlane(light=k, view=number, step=step, resources=resources, data=picture)
+            )
         return messages
 
     def _denoise(self, name: str) -> None:

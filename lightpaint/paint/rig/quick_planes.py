@@ -6,6 +6,8 @@ around it, weighted by the similarity of their surfaces to its own.
 """
 
 from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass
 from itertools import product
 from math import isqrt, prod
 from typing import Any
@@ -46,28 +48,38 @@ class QuickPlanes:
     def __init__(self, scene: Scene, loaded: Any, features: Features) -> None:
         small = scene.reduced(f"1/{reduction_to(scene.film, CELLS)}")
         cells = _sampled(features, small.size)
-        self.size = scene.size
+        self.size, self._grids = scene.size, dict[int, _PixelGrid]()
         hits = isqrt(min(max(FIRST_HITS // prod(scene.size), 1), MOST_PER_PIXEL)) ** 2
         paths = min(max(PATHS // prod(small.size), 1), MOST_PER_PIXEL)
         direct = FrozenPaths(scene, loaded, first_hits=hits, bounces=0)
-        self._direct = PathSums(direct, direct.direct)
+        self._paths = direct
         scattered = FrozenPaths(small, loaded, first_hits=1, bounces=paths)
         self._cell_size, self._filter = small.size, SurfaceFilter(cells)
         later = scattered.indirect
         self._indirect = None if later is None else PathSums(scattered, later)
         self._spread = _Spreading(features, cells)
-        self._add_panel = direct.add_panel
 
-    def plane(self, site: Site) -> npt.NDArray[np.float32]:
-        """Return the image of a light at unit intensity, (h, w, 3) linear Rec.709."""
-        direct = self._direct(site)
+    def plane(self, site: Site, step: int = 1) -> npt.NDArray[np.float32]:
+        """Return the image of a light at unit intensity, (h, w, 3) linear Rec.709.
+
+        step: compute only every step-th pixel of every step-th row, and repeat it.
+        """
+        grid = self._grid(step)
+        direct = grid.direct(site)
         if self._indirect is None:
             plane = np.array(direct, np.float32)
         else:
             cells = np.array(self._indirect(site), np.float32).reshape(*self._cell_size, 3)
-            plane = self._spread(self._filter(cells), direct)
-        self._add_panel(plane.reshape(-1, 3), site)
-        return plane.reshape(*self.size, 3)
+            plane = grid.spread(self._filter(cells), direct)
+        plane = repeated(plane.reshape(*grid.size, 3), step, self.size)
+        self._paths.add_panel(plane.reshape(-1, 3), site)
+        return plane
+
+    def _grid(self, step: int) -> "_PixelGrid":
+        """Return every step-th pixel of every step-th row; it is kept."""
+        if (grid := self._grids.get(step)) is None:
+            grid = self._grids[step] = _PixelGrid.of(self._paths, self._spread, self.size, step)
+        return grid
 
 
 def _sampled(features: Features, size: tuple[int, int]) -> Features:
@@ -80,6 +92,41 @@ def _sampled(features: Features, size: tuple[int, int]) -> Features:
         )
     )
     return Features(features.albedo[where], features.normal[where], features.position[where])
+
+
+def repeated(plane: Floats, step: int, size: tuple[int, int]) -> npt.NDArray[np.float32]:
+    """Return every pixel of a plane (h, w, 3) as a square of so many, cut to a size."""
+    if step == 1:
+        return np.asarray(plane, np.float32)
+    wide = np.repeat(plane, step, axis=1)[:, : size[1]]
+    return np.ascontiguousarray(np.repeat(wide, step, axis=0)[: size[0]], np.float32)
+
+
+@dataclass(frozen=True)
+class _PixelGrid:
+    """Every few pixels of every few rows of a picture: their direct light, and what spreads the
+    indirect one to them.
+    """
+
+    size: tuple[int, int]
+    direct: PathSums
+    spread: "_Spreading"
+
+    @classmethod
+    def of(
+        cls, paths: FrozenPaths, spread: "_Spreading", size: tuple[int, int], step: int
+    ) -> "_PixelGrid":
+        """Return every step-th pixel of every step-th row of a picture."""
+        vertices = paths.direct
+        if step == 1:
+            return cls(size, PathSums(paths, vertices), spread)
+        height, width = (-(-n // step) for n in size)
+        rows, columns = np.divmod(vertices.pixels, size[1])
+        here = np.flatnonzero((rows % step == 0) & (columns % step == 0))
+        pixels = rows[here] // step * width + columns[here] // step
+        direct = PathSums(paths, vertices.at(here, pixels), height * width)
+        all_pixels = np.arange(size[0] * size[1]).reshape(size)[::step, ::step]
+        return cls((height, width), direct, spread.at(all_pixels.ravel()))
 
 
 class _Spreading:
@@ -113,6 +160,20 @@ class _Spreading:
             self._weights = [mi.Float(aligned(row, np.float32)) for row in weights]
             self._albedo = [mi.Float(aligned(row, np.float32)) for row in albedo.T]
             dr.make_opaque(self._cells, self._weights, self._albedo)
+
+    def at(self, pixels: npt.NDArray[np.intp]) -> "_Spreading":
+        """Return the interpolation to these pixels alone."""
+        import drjit as dr
+        import mitsuba as mi
+
+        others = copy(self)
+        with tracing():
+            where = mi.UInt32(aligned(pixels, np.uint32))
+            others._cells = [dr.gather(mi.UInt32, x, where) for x in self._cells]
+            others._weights = [dr.gather(mi.Float, x, where) for x in self._weights]
+            others._albedo = [dr.gather(mi.Float, x, where) for x in self._albedo]
+            dr.make_opaque(others._cells, others._weights, others._albedo)
+        return others
 
     def __call__(self, indirect: Floats, direct: Any) -> npt.NDArray[np.float32]:
         """Return the light of pixels, (3 · pixels,): the direct light and that of the cells around.

@@ -1,6 +1,6 @@
 """Lights that a session moves or adds; their planes come from a source that has the renderer."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -23,6 +23,10 @@ def added_names(placed: Placed) -> list[str]:
 class PlaneSource(Protocol):
     """The planes of moved and added lights."""
 
+    @property
+    def outdated(self) -> Collection[str]:
+        """Lights whose last planes were drafts, and can be better now."""
+
     def check(self, placed: Placed) -> None:
         """Raise LightpaintError for places that these lights cannot have."""
 
@@ -35,6 +39,8 @@ class PlaneSource(Protocol):
 
 class NoPlaneSource:
     """The source of sessions without a scene, whose lights have no places."""
+
+    outdated = ()
 
     def check(self, placed: Placed) -> None:
         """Raise PaintError for any place."""
@@ -89,7 +95,11 @@ class MovedLights:
             self._placed = dict(placed)
             return
         names = {*placed, *self._placed}
-        changed = [name for name in names if placed.get(name) != self._placed.get(name)]
+        changed = [
+            name
+            for name in names
+            if placed.get(name) != self._placed.get(name) or name in self._source.outdated
+        ]
         self.renew(changed, placed, views, live_answer)
 
     def renew(

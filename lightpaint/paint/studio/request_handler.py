@@ -87,6 +87,7 @@ class RequestHandler:
         with self._access.lock:
             session = self._access.current
             if session is not None and session.is_open:
+                self._mover.rig.step = 1
                 session.client_left(with_stroke=not is_back)
                 self._mover.follow(self._publisher.publish)
                 self._exact_answers.notify()
@@ -103,9 +104,10 @@ class RequestHandler:
             return [PictureData(name=message.name, data=self.resource(message.name))]
         with self._access.lock:
             session, looks = self._access.session, self._access.looks
-            view = 0
+            view, self._mover.rig.step = 0, 1
             if isinstance(message, protocol.MoveLights | protocol.PointLight):
                 view = session.views[message.view].view  # before anything has moved
+                self._mover.rig.step = 1 if message.is_final else message.step
             match message:
                 case protocol.SaveLook() | protocol.RenameLook() | protocol.CopyLook():
                     return [looks.handle(message)]

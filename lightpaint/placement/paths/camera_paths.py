@@ -36,6 +36,19 @@ class Vertices:
         """Pixels that have vertices, and the index of the first vertex of each."""
         return np.unique(self.pixels, return_index=True)
 
+    def at(self, indices: npt.NDArray[np.intp], pixels: npt.NDArray[np.int64]) -> "Vertices":
+        """Return those with these indices, with other numbers for their pixels."""
+        import drjit as dr
+        import mitsuba as mi
+
+        if not len(indices):
+            return Vertices(self.interaction, self.throughput, pixels)
+        where = mi.UInt32(aligned(indices, np.uint32))
+        interaction = dr.gather(type(self.interaction), self.interaction, where)
+        throughput = dr.gather(type(self.throughput), self.throughput, where)
+        dr.make_opaque(interaction, throughput)
+        return Vertices(interaction, throughput, pixels)
+
     @cached_property
     def points(self) -> Floats:
         """Their places, (v, 3) float32."""

@@ -25,15 +25,18 @@ from lightpaint.scene.runtime.render_lock import tracing
 class PathSums:
     """Sums of the light of one site at a time over the vertices of each pixel.
 
-    paths: have these vertices, and stay loaded.
+    paths: have these vertices, and stay loaded. pixel_count: of the picture that the vertices'
+    pixels are indices into; by default that of the paths.
     """
 
-    def __init__(self, paths: FrozenPaths, vertices: Vertices) -> None:
+    def __init__(
+        self, paths: FrozenPaths, vertices: Vertices, pixel_count: int | None = None
+    ) -> None:
         import drjit as dr
         import mitsuba as mi
 
         self._loaded, self._vertices = paths.loaded, vertices
-        self._values = 3 * paths.size[0] * paths.size[1]
+        self._values = 3 * (pixel_count or paths.size[0] * paths.size[1])
         is_one_each = len(np.unique(vertices.pixels)) == len(vertices)
         self._mode = dr.ReduceMode.NoConflicts if is_one_each else dr.ReduceMode.Auto
         with tracing():

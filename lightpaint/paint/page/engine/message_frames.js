@@ -15,6 +15,30 @@ export const VERSION = 3;
 /** @typedef {import("../../../viewer/drawing/view.js").Region} Region */
 /** @typedef {import("../../../viewer/drawing/colour.js").RGB} RGB */
 
+/**
+ * Return halves with every pixel repeated as a square, cut to the size of a picture.
+ * @param {Picture} picture every step-th pixel of every step-th row, three halves each
+ * @param {number} step @param {[height: number, width: number]} size
+ */
+export function repeatPixels({ data }, step, [height, width]) {
+  const halves = /** @type {Uint16Array} */ (data);
+  if (step === 1) return halves;
+  const rowLength = 3 * Math.ceil(width / step);
+  const whole = new Uint16Array(3 * width * height);
+  for (let y = 0; y < height; y += step) {
+    const start = 3 * width * y;
+    for (let x = 0, to = start, row = (y / step) * rowLength; x < width; x++, to += 3) {
+      const from = row + 3 * Math.floor(x / step);
+      whole[to] = halves[from];
+      whole[to + 1] = halves[from + 1];
+      whole[to + 2] = halves[from + 2];
+    }
+    for (let k = 1; k < step && y + k < height; k++)
+      whole.copyWithin(start + 3 * width * k, start, start + 3 * width);
+  }
+  return whole;
+}
+
 /** A received message: its fields together with its arrays.
  * @typedef {{kind: string, seq?: number, reply?: number, arrays: Arrays, [field: string]: any}}
  * Message */

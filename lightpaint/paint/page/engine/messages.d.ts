@@ -503,13 +503,15 @@ export interface PictureUpdate {
  * answer.
  *
  * light: its index. view: the one that the request named. resources: numbers of its pictures, all
- * of which are this one. data: (h, w, 3) float16, divided by the light's `scale`.
+ * of which are this one. step: as the request had it. data: (h, w, 3) float16, divided by the
+ * light's `scale`; every step-th pixel of every step-th row.
  */
 export interface DraggedPlane {
   kind: 'dragged';
   reply?: number;
   light: number;
   view: number;
+  step: number;
   resources: Record<string, number>;
   arrays: { data: Picture };
 }
@@ -926,12 +928,14 @@ export interface SetMaster {
  * poses: changed fields of `lightpaint.Pose`: position, target, cutoff and beam; an empty object
  * restores a light's place from the scene. is_final: whether it becomes a step; false while a
  * light is dragged. view: index of the view whose pictures of dragged lights are sent at once, as
- * `dragged`.
+ * `dragged`. step: while a light is dragged, its picture is computed at every step-th pixel of
+ * every step-th row, 1 to 8: what the page draws in time.
  */
 export interface MoveLights {
   poses: Record<string, Record<string, any>>;
   is_final?: boolean;
   view?: number;
+  step?: number;
 }
 
 /**
@@ -939,7 +943,7 @@ export interface MoveLights {
  *
  * mode: `aim` points it there; `highlight` hangs it so that its reflection appears there; `shadow`
  * hangs it so that the shadow of the surface at `edge` ends there. pixel, edge: column and row in
- * pixels. view: index of the view. is_final: as in `move`.
+ * pixels. view: index of the view. is_final, step: as in `move`.
  */
 export interface PointLight {
   light: number;
@@ -948,6 +952,7 @@ export interface PointLight {
   edge?: [number, number] | null;
   view?: number;
   is_final?: boolean;
+  step?: number;
 }
 
 /**

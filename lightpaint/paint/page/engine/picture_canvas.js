@@ -32,6 +32,8 @@ export class Screen {
     this.isLive = false;
     /** Whether a brush is down; slow work waits until it is lifted. */
     this.isBrushDown = false;
+    /** Whether a light is being dragged; its pictures are drafts until it rests. */
+    this.isLightDragged = false;
     /** Whether the solution equals the current look. */
     this.isPresent = false;
     /** @type {ReturnType<typeof setTimeout> | undefined} */
@@ -131,7 +133,7 @@ export class Screen {
   scheduleSharpDraw() {
     clearTimeout(this.pauseTimer);
     this.pauseTimer = setTimeout(() => {
-      if (this.isBrushDown) return this.scheduleSharpDraw();
+      if (this.isBrushDown || this.isLightDragged) return this.scheduleSharpDraw();
       this.isLive = false;
       this.requestDraw();
     }, DRAFT_PAUSE_MS);

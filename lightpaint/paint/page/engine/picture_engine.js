@@ -8,6 +8,7 @@ import { luminance } from '../../../viewer/drawing/colour.js';
 import { VALUES } from '../../../viewer/drawing/half_floats.js';
 import { DEFAULT_TOOL, LABELS, Stroke, adjustArea } from './stroke.js';
 import { Emitter, SocketHost } from './socket_host.js';
+import { CpuView } from '../../../viewer/drawing/cpu.js';
 import { union } from '../../../viewer/drawing/cpu_picture.js';
 import { Encoder } from '../../../viewer/drawing/view_transform.js';
 import { maxImportance } from '../../../viewer/drawing/overlay.js';
@@ -182,6 +183,18 @@ class PictureEngine extends Emitter {
     const [height, width] = this.screen.size;
     const [column, row] = [Math.floor(x), Math.floor(y)];
     return column >= 0 && row >= 0 && column < width && row < height ? [column, row] : null;
+  }
+
+  /** Note whether a light is being dragged: its pictures are drafts until it rests.
+   * @param {boolean} isDragged */
+  dragLight(isDragged) {
+    this.screen.isLightDragged = isDragged;
+  }
+
+  /** The step between the pixels and rows that a draft shows. */
+  get draftStep() {
+    const { view } = this.screen;
+    return view instanceof CpuView ? view.liveStep() : 1;
   }
 
   /** Switch to another view of the session. @param {number} view */

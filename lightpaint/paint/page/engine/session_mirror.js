@@ -6,7 +6,7 @@ import { PaintCanvas } from './paint_canvas.js';
 import { PictureLoader } from './picture_loader.js';
 import { PictureState } from './picture_state.js';
 import { SRGB, lutOf } from '../../../viewer/drawing/view_transform.js';
-import { VERSION, nameInView, stateOfView } from './message_frames.js';
+import { VERSION, nameInView, repeatPixels, stateOfView } from './message_frames.js';
 import { COMPARED_COUNT, showsPresent, sizesText, wantedPictures } from './picture_slots.js';
 import { StrokeSender } from './stroke_sender.js';
 
@@ -64,10 +64,12 @@ export class SessionMirror extends PictureState {
       this.loader.addResources(resources);
       this.requestPictures();
     });
-    host.on('dragged', ({ light, view: picturedView, resources, arrays }) => {
+    host.on('dragged', ({ light, view: picturedView, step, resources, arrays }) => {
       const isShown = picturedView === this.view && this.loader.wantedNames.has(`plane ${light}`);
-      if (isShown) this.loader.take(`plane ${light}`, resources, arrays.data);
-      else this.loader.addResources(resources);
+      if (isShown) {
+        const data = repeatPixels(arrays.data, step, this.screen.size);
+        this.loader.take(`plane ${light}`, resources, { ...arrays.data, data });
+      } else this.loader.addResources(resources);
     });
     host.on('verified', ({ view = 0 }) => this.loader.renew(nameInView('verified', view)));
     host.on('explained', ({ view = 0 }) => this.loader.renew(nameInView('beyond', view)));

@@ -84,6 +84,8 @@
  * @property {(settings: ToolSettings) => void} setTool
  * @property {() => Pane[]} panes
  * @property {(view: number) => void} showView another view: what is shown, and painted
+ * @property {(isDragged: boolean) => void} dragLight whether a light is being dragged
+ * @property {number} draftStep between the pixels and rows that the pictures of a dragged light show
  * @property {(x: number, y: number, factor: number) => {zoom: number, pan: [number, number]}} zoomAt
  * @property {(point: Point) => void} begin a stroke of the tool in the hand
  * @property {(points: Point[]) => void} move

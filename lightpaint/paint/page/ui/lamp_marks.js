@@ -302,15 +302,17 @@ function useDrag(app, pane, resolveDrag) {
     );
     if (!result) return;
     drag.isMoved = true;
+    app.engine.dragLight(true);
     drag.lastRequest = result.request;
     app.store.set({ drag: { light: drag.light, place: result.place, aimPixel: result.aimPixel } });
-    app.session.lampMoves.queue(drag.light, result.request, false);
+    app.session.lampMoves.queue(drag.light, result.request, false, app.engine.draftStep);
   };
   const up = (/** @type {PointerEvent} */ event) => {
     const drag = start.current;
     if (!drag) return;
     event.stopPropagation();
     start.current = null;
+    app.engine.dragLight(false);
     if (drag.isMoved && drag.lastRequest)
       app.session.lampMoves.queue(drag.light, drag.lastRequest, true);
     app.store.set({ drag: null });
