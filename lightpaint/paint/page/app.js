@@ -5,7 +5,6 @@ import { ColourPanel } from './ui/colour_panel.js';
 import { Fold } from './ui/controls.js';
 import { Dialogs } from './ui/dialogs.js';
 import { PreviewDialog } from './ui/advice.js';
-import { countText } from './ui/format.js';
 import { HistoryPanel } from './ui/history_panel.js';
 import { handleKey, listenWithin } from './ui/keyboard.js';
 import { LayerDropFrame, LayerImportDialog } from './ui/layers/layer_import.js';
@@ -36,6 +35,7 @@ import { TopBar } from './ui/topbar.js';
 import { AnalysisPanel } from './ui/analysis_panel.js';
 import { AnswerLine, PointerStatus } from './ui/answer_line.js';
 import { ViewTabs, showView } from './ui/view_tabs.js';
+import { fillCount, language, words } from './language/language.js';
 
 /** @typedef {import("./ui/engine_interface.js").Host} Host */
 /** @typedef {import("./ui/engine_interface.js").Engine} Engine */
@@ -56,6 +56,7 @@ export async function mount(element, host, { global = false, engine }) {
   const store = new Store({ ...initialState(), ...storedTool(), ...storedPreferences(), open });
   const root = document.createElement('div');
   root.className = 'lightpaint';
+  root.lang = language;
   root.dataset.lmSuppressShortcuts = 'true'; // JupyterLab's, which receive keys before the painter
   const stopTheme = followTheme(root, store);
   element.append(root);
@@ -145,10 +146,7 @@ function foldWhenNarrow(root, store) {
 
 /** @param {number} count */
 function droppedText(count) {
-  const [strokes, subject] =
-    count === 1 ? ['A stroke', 'It is'] : [countText(count, 'stroke'), 'They are'];
-  return `${strokes} in this tab had not been sent when another tab took over. ${subject} dropped, so as
-    not to cover what was painted there.`.replace(/\s+/g, ' ');
+  return fillCount(words.app.droppedStrokes, count);
 }
 
 /** @param {{app: App, root: () => HTMLElement}} props */
@@ -163,7 +161,7 @@ function Painter({ app, root }) {
     <${SkipLinks} app=${app} />
     <${TopBar} ui=${ui} app=${app} />
     <${ToolBar} ui=${ui} app=${app} />
-    <main class=${`middle ${ui.side || ui.panel ? '' : 'is-wide'}`} aria-label="Painter">
+    <main class=${`middle ${ui.side || ui.panel ? '' : 'is-wide'}`} aria-label=${words.app.painter}>
       <${ToolOptions} ui=${ui} app=${app} />
       <${ViewTabs} ui=${ui} app=${app} />
       <div class="view"><${Stage} ui=${ui} app=${app} />
@@ -197,28 +195,28 @@ function Side({ ui, app }) {
   ) =>
     html`<${Fold} title=${title} class=${`is-${name}`} open=${isOpen} extra=${extra}
       toggle=${() => store.set({ open: { ...ui.open, [name]: !isOpen } })}>${content}</${Fold}>`;
-  return html`<aside class="side" aria-label="Panels">
-    ${renderFold('colour', 'Colour', html`<${ColourPanel} ui=${ui} app=${app} />`)}
-    ${renderFold('ask', 'Adjust by numbers', html`<${AdjustPanel} ui=${ui} app=${app} />`)}
+  return html`<aside class="side" aria-label=${words.app.panels}>
+    ${renderFold('colour', words.app.colour, html`<${ColourPanel} ui=${ui} app=${app} />`)}
+    ${renderFold('ask', words.app.adjustByNumbers, html`<${AdjustPanel} ui=${ui} app=${app} />`)}
     ${
       (ui.tool === 'select' || ui.selection.current) &&
-      renderFold('select', 'Selection', html`<${SelectionFields} ui=${ui} app=${app} />`)
+      renderFold('select', words.app.selection, html`<${SelectionFields} ui=${ui} app=${app} />`)
     }
     ${renderFold(
       'layers',
-      'Layers',
+      words.app.layers,
       html`<${LayerPanel} ui=${ui} app=${app} />`,
       html`<${LayerCount} ui=${ui} /><${PresetsButton} app=${app} />`,
       ui.open.layers ?? hasLayers(ui),
     )}
-    ${renderFold('history', 'History', html`<${HistoryPanel} ui=${ui} app=${app} />`)}
+    ${renderFold('history', words.app.history, html`<${HistoryPanel} ui=${ui} app=${app} />`)}
     ${renderFold(
       'lights',
-      'Lights',
+      words.app.lights,
       html`<${LightList} ui=${ui} app=${app} />`,
       html`<${LightListActions} ui=${ui} app=${app} />`,
     )}
-    ${ui.areLampsMarked && renderFold('plan', 'Plan', html`<${RoomPlan} ui=${ui} app=${app} />`)}
-    ${renderFold('truth', 'Analysis', html`<${AnalysisPanel} ui=${ui} app=${app} />`)}
+    ${ui.areLampsMarked && renderFold('plan', words.app.plan, html`<${RoomPlan} ui=${ui} app=${app} />`)}
+    ${renderFold('truth', words.app.analysis, html`<${AnalysisPanel} ui=${ui} app=${app} />`)}
   </aside>`;
 }

@@ -1,7 +1,7 @@
 """One tab for all tests of the page, and a site that serves its modules and arrays."""
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -166,6 +166,7 @@ def new_painter(tabs: Tabs) -> Iterator[Any]:
 
     is_fresh: in a context of its own, for a test that changes what cannot be changed back, such as
     a clock. So is every painter with a script that runs first, or options beside the viewport.
+    prepare: what is done with the context before the page opens.
     """
     pages_in_use: list[tuple[Any, bool]] = []
     errors: list[str] = []
@@ -183,10 +184,11 @@ def new_painter(tabs: Tabs) -> Iterator[Any]:
         until: str = ".lightpaint .tag",
         *,
         is_fresh: bool = False,
+        prepare: Callable[[Any], None] | None = None,
         viewport: dict[str, int] = VIEWPORT,
         **options: Any,
     ) -> Painter:
-        if is_fresh or init or options:
+        if is_fresh or init or prepare or options:
             options = {"color_scheme": THEME, **options}
             page = tabs.browser.new_context(viewport=viewport, **options).new_page()
             pages_in_use.append((page, True))
@@ -197,6 +199,8 @@ def new_painter(tabs: Tabs) -> Iterator[Any]:
         page.on("console", note_console)
         if init:
             page.add_init_script(init)
+        if prepare:
+            prepare(page.context)
         page.goto(f"{tabs.site.url}/fake/index.html?{query}&size=48x27")
         page.wait_for_selector(until)
         return Painter(page)

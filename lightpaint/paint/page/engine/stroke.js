@@ -3,6 +3,7 @@ import { Path, fill, flood, stamp } from './brush.js';
 import { LayerCanvas } from './layers/layer_canvas.js';
 import { warmer } from '../../../viewer/drawing/colour.js';
 import { wholeAdjustment } from './whole_adjustment.js';
+import { words } from '../language/language.js';
 
 /** @typedef {import("./brush.js").Point} Point */
 /** @typedef {import("./stroke_effects.js").Effect} Effect */
@@ -36,17 +37,7 @@ export const DEFAULT_TOOL = {
 };
 
 /** Name of a stroke in the undo history. @type {Record<Tool, string>} */
-export const LABELS = {
-  brush: 'brush',
-  eraser: 'eraser',
-  weight: 'importance',
-  pick: 'pick',
-  fill: 'fill',
-  line: 'line',
-  adjust: 'adjust',
-  select: 'select',
-  gradient: 'gradient',
-};
+export const LABELS = words.stroke;
 
 /** Pixels of the picture below which a gradient is a click. */
 const MIN_GRADIENT_LENGTH = 2;

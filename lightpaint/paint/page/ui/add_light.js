@@ -2,15 +2,16 @@
 
 import { html } from '../vendor/preact.js';
 import { Button, NumberField, Select } from './controls.js';
+import { fill, words } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
 /** @typedef {import("./ui_state.js").NewKind} NewKind */
 
 const KINDS = [
-  { value: 'spot', label: 'Spot' },
-  { value: 'point', label: 'Point' },
-  { value: 'panel', label: 'Panel' },
+  { value: 'spot', label: words.addLight.spot },
+  { value: 'point', label: words.addLight.point },
+  { value: 'panel', label: words.addLight.panel },
 ];
 
 /** Where a new light may hang, besides names of rails, surfaces and shapes. */
@@ -29,9 +30,12 @@ export function AddLight({ ui, app }) {
   const set = (/** @type {Partial<Ui["newLight"]>} */ changes) =>
     store.set({ newLight: { ...newLight, ...changes }, clickAction: null });
   const places = [
-    { value: CLICK, label: 'where I click' },
-    { value: ANYWHERE, label: 'anywhere free' },
-    ...(rig?.surfaces ?? []).map((name) => ({ value: name, label: `on ${name}` })),
+    { value: CLICK, label: words.addLight.whereIClick },
+    { value: ANYWHERE, label: words.addLight.anywhereFree },
+    ...(rig?.surfaces ?? []).map((name) => ({
+      value: name,
+      label: fill(words.addLight.on, { name }),
+    })),
   ];
   const addOrSearch = () =>
     isClick
@@ -40,23 +44,23 @@ export function AddLight({ ui, app }) {
           clickAction: isClicking ? null : { mode: 'hang', type: newLight.type },
         })
       : session.findLights(newLight);
-  return html`<div class="add-light" role="group" aria-label="Add a light">
-    <${Select} label="New light" value=${newLight.type} choices=${KINDS}
+  return html`<div class="add-light" role="group" aria-label=${words.addLight.addALight}>
+    <${Select} label=${words.addLight.newLight} value=${newLight.type} choices=${KINDS}
       change=${(/** @type {NewKind} */ type) => set({ type })} />
-    <${Select} label="It hangs" value=${newLight.surface} choices=${places}
-      tip="Click its place, or let a search find the places that come closest to the painting"
+    <${Select} label=${words.addLight.itHangs} value=${newLight.surface} choices=${places}
+      tip=${words.addLight.clickItsPlaceOrLetA}
       change=${(/** @type {string} */ surface) => set({ surface })} />
     ${
       !isClick &&
-      html`<${NumberField} label="At most" value=${newLight.count} min=${1} max=${MAX_NEW_LIGHTS}
+      html`<${NumberField} label=${words.addLight.atMost} value=${newLight.count} min=${1} max=${MAX_NEW_LIGHTS}
         step=${1} digits=${0} change=${(/** @type {number} */ count) => set({ count })} />`
     }
-    <${Button} label=${isClick ? 'Add a light' : 'Find places'} icon="plus" pressed=${isClick && isClicking}
+    <${Button} label=${isClick ? words.addLight.addALight : words.addLight.findPlaces} icon="plus" pressed=${isClick && isClicking}
       disabled=${ui.placementProgress !== null}
       tip=${
         isClick
-          ? 'Then click the surface that it hangs on, or its place in the plan'
-          : 'Adds only lights that surely come closer to the painting. One step that undo takes back.'
+          ? words.addLight.thenClickTheSurfaceThatIt
+          : words.addLight.addsOnlyLightsThatSurelyCome
       } act=${addOrSearch} />
   </div>`;
 }

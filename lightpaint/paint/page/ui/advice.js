@@ -5,6 +5,7 @@ import { Button, Dialog } from './controls.js';
 import { numberText, shortenName } from './format.js';
 import { Icon } from './icons.js';
 import { drawPicture } from './thumbnail.js';
+import { fill, words } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./ui_state.js").Advice} Cause */
@@ -21,19 +22,19 @@ const CONSTRAINT_KEYS = {
 
 /** Button text for one light and for several. @type {Record<string, [string, string]>} */
 const BUTTON_WORDS = {
-  off: ['Turn on', 'Turn on'],
-  lock: ['Unlock', 'Unlock'],
-  limits: ['Remove the limit of', 'Remove the limits of'],
-  colour: ['Any colour for', 'Any colour for'],
-  tie: ['Untie', 'Untie'],
+  off: [words.advice.turnOn, words.advice.turnOn],
+  lock: [words.advice.unlock, words.advice.unlock],
+  limits: [words.advice.removeTheLimitOf, words.advice.removeTheLimitsOf],
+  colour: [words.advice.anyColourFor, words.advice.anyColourFor],
+  tie: [words.advice.untie, words.advice.untie],
 };
 
 /** Button text for advice on all lights. @type {Record<string, string>} */
 const ALL_LIGHTS_WORDS = {
-  hold: 'Loosen',
-  colors: 'Any colour',
-  sparse: 'More lights',
-  prefer_current: 'Let lights change',
+  hold: words.advice.loosen,
+  colors: words.advice.anyColour,
+  sparse: words.advice.moreLights,
+  prefer_current: words.advice.letLightsChange,
 };
 
 /** Characters of a light's name on a button, which shares its line with a sentence. */
@@ -43,14 +44,19 @@ const BUTTON_NAME_MAX_LENGTH = 14;
  * @param {number} [maxLength] characters of a light's name */
 function nameOf({ kind, names }, maxLength = Infinity) {
   if (kind in ALL_LIGHTS_WORDS) return ALL_LIGHTS_WORDS[kind];
-  const lights = names.length === 1 ? shortenName(names[0], maxLength) : `${names.length} lights`;
+  const lights =
+    names.length === 1
+      ? shortenName(names[0], maxLength)
+      : fill(words.advice.lights, { count: names.length });
   return `${BUTTON_WORDS[kind][names.length === 1 ? 0 : 1]} ${lights}`;
 }
 
 /** Return the title of the preview. @param {Cause} cause @param {string} name */
 function titleOf({ kind, hold }, name) {
   if (kind !== 'hold') return name;
-  return hold ? `Loosen the hold to ${numberText(hold, 2)}` : 'Ignore unpainted parts';
+  return hold
+    ? fill(words.advice.loosenTheHoldTo, { number: numberText(hold, 2) })
+    : words.advice.ignoreUnpaintedParts;
 }
 
 /** Return the request that removes the obstacle; null if this page did not set it, or it is gone
@@ -95,9 +101,10 @@ export function AdviceButton({ ui, app }) {
   const change = advice && changeOf(advice, ui, app.session);
   if (!advice || !change) return null;
   const name = nameOf(advice);
-  const gain = advice.gain === null ? '' : `: ${Math.round(100 * advice.gain)} % closer`;
+  const gain =
+    advice.gain === null ? '' : fill(words.advice.closer, { value: Math.round(100 * advice.gain) });
   return html`<${Button} label=${`${nameOf(advice, BUTTON_NAME_MAX_LENGTH)}${gain}`} class="help"
-    tip=${`${name}${gain}. Shows a preview first.`}
+    tip=${fill(words.advice.showsAPreviewFirst, { name, gain })}
     act=${() => app.session.preview(titleOf(advice, name), change)} />`;
 }
 
@@ -105,8 +112,8 @@ export function AdviceButton({ ui, app }) {
  * @param {{ui: Ui, app: App}} props */
 export function MoveButton({ ui, app }) {
   if (!ui.state?.can_render || ui.placementProgress) return null;
-  return html`<${Button} label="Let lights move" class="help"
-    tip="Search for places and directions of the lights that come closer. One step that undo takes back."
+  return html`<${Button} label=${words.advice.letLightsMove} class="help"
+    tip=${words.advice.searchForPlacesAndDirectionsOf}
     act=${() => app.session.placeLights()} />`;
 }
 
@@ -123,9 +130,9 @@ export function PreviewDialog({ ui, app }) {
     </div>
     <p class=${isAtCost ? 'is-bad' : ''} role="status">
       ${isAtCost && html`<${Icon} name="warn" />`}
-      <span>${text || 'Computing the preview …'}</span></p>
-    <div class="row"><${Button} label="Cancel" act=${close} />
-      <${Button} label="Apply" primary disabled=${!text} act=${() => app.session.makeChange()} />
+      <span>${text || words.advice.computingThePreview}</span></p>
+    <div class="row"><${Button} label=${words.advice.cancel} act=${close} />
+      <${Button} label=${words.advice.apply} primary disabled=${!text} act=${() => app.session.makeChange()} />
     </div>
   </${Dialog}>`;
 }
@@ -137,6 +144,6 @@ function PreviewPicture({ picture, caption }) {
     if (picture && ref.current) drawPicture(ref.current, picture);
   }, [picture]);
   return html`<figure><canvas ref=${ref} width="16" height="9" role="img"
-    aria-label=${caption === 'Before' ? 'The answer before the change' : 'The answer after it'}></canvas>
+    aria-label=${caption === 'Before' ? words.advice.theAnswerBeforeTheChange : words.advice.theAnswerAfterIt}></canvas>
     <figcaption>${caption}</figcaption></figure>`;
 }

@@ -7,27 +7,44 @@ import { numberText, progressText, joinUnits } from './format.js';
 import { Icon } from './icons.js';
 import { overlayOf } from './display_state.js';
 import { updateDisplay } from './tools.js';
+import { fill, words } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
 /** @typedef {import("./engine_interface.js").Pane} Pane */
 
 const OVERLAYS = [
-  { value: null, label: 'None' },
-  { value: 'missed', label: 'Difference', tip: 'Where the answer differs from the painting' },
-  { value: 'beyond', label: 'Out of reach', tip: 'What no setting of these lights can do' },
-  { value: 'falsecolor', label: 'False colour', tip: 'Brightness in stops' },
-  { value: 'importance', label: 'Importance', tip: 'What is painted, and how much it counts' },
+  { value: null, label: words.analysisPanel.none },
+  {
+    value: 'missed',
+    label: words.analysisPanel.difference,
+    tip: words.analysisPanel.whereTheAnswerDiffersFromThe,
+  },
+  {
+    value: 'beyond',
+    label: words.analysisPanel.outOfReach,
+    tip: words.analysisPanel.whatNoSettingOfTheseLights,
+  },
+  {
+    value: 'falsecolor',
+    label: words.analysisPanel.falseColour,
+    tip: words.analysisPanel.brightnessInStops,
+  },
+  {
+    value: 'importance',
+    label: words.analysisPanel.importance,
+    tip: words.analysisPanel.whatIsPaintedAndHowMuch,
+  },
 ];
 
-const PAINTED_LABEL = 'painted';
+const PAINTED_LABEL = words.analysisPanel.painted;
 
 /** Legends of the overlays: colours and hatches. @type {Record<string, string[]>} */
 const LEGEND_TEXTS = {
-  missed: ['too dark', 'matches', 'too bright'],
-  beyond: ['in reach', 'out of reach'],
-  falsecolor: ['−6 stops', 'grey', '+6'],
-  importance: ['unpainted', PAINTED_LABEL],
+  missed: [words.analysisPanel.tooDark, words.analysisPanel.matches, words.analysisPanel.tooBright],
+  beyond: [words.analysisPanel.inReach, words.analysisPanel.outOfReach2],
+  falsecolor: [words.analysisPanel.n6Stops, words.analysisPanel.grey, '+6'],
+  importance: [words.analysisPanel.unpainted, PAINTED_LABEL],
 };
 
 /** @param {{ui: Ui, app: App}} props */
@@ -45,14 +62,14 @@ export function AnalysisPanel({ ui, app }) {
     (text) => text !== ui.headline,
   );
   return html`<div class="truth" ref=${frame}>
-    <${Choice} label="Overlay" value=${ui.display.overlay} choices=${OVERLAYS}
+    <${Choice} label=${words.analysisPanel.overlay} value=${ui.display.overlay} choices=${OVERLAYS}
       change=${choose} />
     ${sentences.map((text) => html`<p key=${text}>${joinUnits(text)}</p>`)}
     <div class="row">
-      <${Button} label=${ui.isExplaining ? 'Finding reasons …' : 'Why not closer?'}
+      <${Button} label=${ui.isExplaining ? words.analysisPanel.findingReasons : words.analysisPanel.whyNotCloser}
         disabled=${ui.isExplaining} act=${() => session.explain()}
-        tip="What keeps the answer from matching the painting" />
-      ${ui.isExplaining && html`<${ProgressBar} progress=${{ done: 0, total: 0 }} label="Finding reasons" />`}
+        tip=${words.analysisPanel.whatKeepsTheAnswerFromMatching} />
+      ${ui.isExplaining && html`<${ProgressBar} progress=${{ done: 0, total: 0 }} label=${words.analysisPanel.findingReasons2} />`}
       ${ui.state?.can_render && html`<${VerifyButton} ui=${ui} app=${app} />`}
     </div>
     ${ui.verification && html`<${VerificationResult} ui=${ui} app=${app} />`}
@@ -111,14 +128,16 @@ export function Legend({ ui, app, panes }) {
   const { label } = OVERLAYS.find(({ value }) => value === overlay) ?? OVERLAYS[0];
   const isOld = overlay === 'beyond' && !ui.reasons.length;
   const { left, top, isLow } = placeLegend(pane, ui.state.size);
-  const words = LEGEND_TEXTS[overlay].map((text) =>
-    text === PAINTED_LABEL && maxWeight > 1 ? `weight ${numberText(maxWeight, 2)} ×` : text,
+  const texts = LEGEND_TEXTS[overlay].map((text) =>
+    text === PAINTED_LABEL && maxWeight > 1
+      ? fill(words.analysisPanel.weight, { number: numberText(maxWeight, 2) })
+      : text,
   );
   return html`<div class=${`legend ${isLow ? 'is-low' : ''}`}
     style=${{ top: `${top}px`, left: `${left}px` }}>
-    <b>${label}${isOld && ui.deltaE !== null ? ': computing …' : ''}</b>
+    <b>${label}${isOld && ui.deltaE !== null ? words.analysisPanel.computing : ''}</b>
     <i class=${`is-${overlay}`}></i>
-    ${words.map((text, k) => html`<span key=${k}>${text}</span>`)}
+    ${texts.map((text, k) => html`<span key=${k}>${text}</span>`)}
   </div>`;
 }
 
@@ -128,11 +147,11 @@ function VerifyButton({ ui, app }) {
   if (!ui.verificationProgress) {
     // Ignore the second click of a double click on "Analysis", under which the button appears.
     const begin = (/** @type {MouseEvent} */ { detail }) => detail < 2 && session.verify();
-    return html`<${Button} label="Verify" icon="camera" act=${begin}
-      tip="Render the scene with this lighting, and compare" />`;
+    return html`<${Button} label=${words.analysisPanel.verify} icon="camera" act=${begin}
+      tip=${words.analysisPanel.renderTheSceneWithThisLighting} />`;
   }
-  return html`<${Button} label="Stop" icon="close" act=${() => session.verify(false)} />
-    <${ProgressBar} progress=${ui.verificationProgress} label="Verifying" />
+  return html`<${Button} label=${words.analysisPanel.stop} icon="close" act=${() => session.verify(false)} />
+    <${ProgressBar} progress=${ui.verificationProgress} label=${words.analysisPanel.verifying} />
     <span class="faint">${progressText(ui.verificationProgress)}</span>`;
 }
 
@@ -155,8 +174,8 @@ function VerificationResult({ ui, app }) {
   };
   return html`<div ref=${frame} class=${`verified ${verification.agrees ? 'is-good' : 'is-bad'}`}>
     <p><${Icon} name=${verification.agrees ? 'check' : 'warn'} /><span>${verification.text}${
-      verification.isOld ? ' (of an earlier answer)' : ''
+      verification.isOld ? words.analysisPanel.ofAnEarlierAnswer : ''
     }</span></p>
-    <${Button} label="Answer | Render" icon="wipe" pressed=${isShown} act=${compare} />
+    <${Button} label=${words.analysisPanel.answerRender} icon="wipe" pressed=${isShown} act=${compare} />
   </div>`;
 }

@@ -8,32 +8,38 @@ import { pointingHint } from './lamp_fields.js';
 import { isAnswerHidden, saveLook } from './look_actions.js';
 import { toolHint } from './tools.js';
 import { exposureOf } from './display_state.js';
+import { fill, words } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
 
-const DELTA_E_TIP =
-  'Mean colour difference from the painting (ΔE 2000), and what it was with the current lighting. 1 is just visible, 5 is obvious.';
+const DELTA_E_TIP = words.answerLine.meanColourDifferenceFromThe;
 
-const MASTER_TIP =
-  'The master dimmer changes the pictures and what is exported. The sentence describes the answer without it.';
+const MASTER_TIP = words.answerLine.theMasterDimmerChangesThe;
+
+/** States of the sentence. */
+const STATES = {
+  live: words.answerLine.live,
+  analysing: words.answerLine.analysing,
+  hidden: words.answerLine.answerNotShown,
+};
 
 const STATE_TIPS = {
-  live: 'A quick answer while you paint. The exact one follows.',
-  analysing: 'The lights are solved. The sentence still describes the previous answer.',
-  'answer not shown': 'The sentence describes the answer, which is neither of the looks compared.',
+  live: words.answerLine.aQuickAnswerWhileYouPaint,
+  analysing: words.answerLine.theLightsAreSolvedTheSentence,
+  hidden: words.answerLine.theSentenceDescribesTheAnswer,
 };
 
 /** One sentence below the pictures: how close the answer is.
  * @param {{ui: Ui, app: App}} props */
 export function AnswerLine({ ui, app }) {
   const { store } = app;
-  const text = ui.headline || (ui.ready ? 'Solving …' : '');
+  const text = ui.headline || (ui.ready ? words.answerLine.solving : '');
   const isOpen = ui.side && !ui.panel && ui.open.truth;
   const isOld = ui.headline !== '' && !ui.isJudgementCurrent;
   const progressState = ui.isLive ? 'live' : isOld ? 'analysing' : null;
   const isHidden = isAnswerHidden(ui);
-  const state = isHidden && text ? 'answer not shown' : progressState;
+  const state = isHidden && text ? 'hidden' : progressState;
   const toggleAnalysis = (/** @type {MouseEvent} */ event) => {
     const button = /** @type {HTMLElement} */ (event.currentTarget);
     store.set({ side: true, panel: null, open: { ...ui.open, truth: !isOpen } });
@@ -44,31 +50,33 @@ export function AnswerLine({ ui, app }) {
       <${TruncatedText} class="said" text=${text} maxLength=${100} />
       ${
         // Always in the same place, so that the sentence does not rewrap.
-        state && html`<span class="live" data-tip=${STATE_TIPS[state]}><b>${state}</b></span>`
+        state &&
+        html`<span class="live" data-tip=${STATE_TIPS[state]}><b>${STATES[state]}</b></span>`
       }
       ${
         !state &&
         ui.deltaE !== null &&
-        html`<span class="faint" data-tip=${DELTA_E_TIP}>ΔE ${numberText(ui.deltaE, 2)}${
+        html`<span class="faint" data-tip=${DELTA_E_TIP}>${words.answerLine.deltae} ${numberText(ui.deltaE, 2)}${
           ui.deltaPresent !== null &&
-          html`<span class="was">, was ${numberText(ui.deltaPresent, 2)}</span>`
+          html`<span class="was">${fill(words.answerLine.was, { number: numberText(ui.deltaPresent, 2) })}</span>`
         }</span>`
       }
       ${
         ui.master !== 1 &&
-        html`<span class="faint" data-tip=${MASTER_TIP}>before the master</span>`
+        html`<span class="faint" data-tip=${MASTER_TIP}>${words.answerLine.beforeTheMaster}</span>`
       }
     </p>
     <${AdviceButton} ui=${ui} app=${app} />
     ${
       ui.ready &&
-      html`<${Button} label="Save look" icon="plus" keys="Control+S"
-      tip="Save painting and answer as a look"
+      html`<${Button} label=${words.answerLine.saveLook} icon="plus" keys="Control+S"
+      tip=${words.answerLine.savePaintingAndAnswerAsA}
       act=${() => saveLook(app)} />`
     }
     ${
       // The button keeps its place when pressed, so that nothing else slides under the pointer.
-      ui.ready && html`<${Button} label="Analysis" pressed=${isOpen} act=${toggleAnalysis} />`
+      ui.ready &&
+      html`<${Button} label=${words.answerLine.analysis} pressed=${isOpen} act=${toggleAnalysis} />`
     }
   </div>`;
 }
@@ -82,8 +90,8 @@ export function PointerStatus({ ui }) {
   }
   if (ui.isLassoing) {
     const text = ui.rig
-      ? 'Draw around the marks of the lights to select them. Escape ends it.'
-      : 'Looking where the lights hang …';
+      ? words.answerLine.drawAroundTheMarksOfThe
+      : words.answerLine.lookingWhereTheLightsHang;
     return html`<p class="here" id="lp-status" role="status"><strong>${text}</strong></p>`;
   }
   if (!ui.probe) {

@@ -3,15 +3,16 @@
 import { html } from '../vendor/preact.js';
 import { Button, NumberField, Select, useDraft } from './controls.js';
 import { atFullBrightness, toHex, toKelvin } from './paint_colour.js';
+import { words } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Constraints} Constraints */
 /** @typedef {import("./engine_interface.js").RGB} RGB */
 
 const COLOURS = [
-  { value: 'any', label: 'Any colour' },
-  { value: 'color', label: 'One colour' },
-  { value: 'kelvin', label: 'White range' },
-  { value: 'primaries', label: 'LED mix' },
+  { value: 'any', label: words.colourConstraint.anyColour },
+  { value: 'color', label: words.colourConstraint.oneColour },
+  { value: 'kelvin', label: words.colourConstraint.whiteRange },
+  { value: 'primaries', label: words.colourConstraint.ledMix },
 ];
 
 /** Return the kind of colour constraint of a light. @param {Constraints} constraints */
@@ -33,12 +34,12 @@ export function ColourConstraint(props) {
     app.session.constrainLight(k, { ...otherConstraints, ...constraint });
   };
   return html`<div class="ask-row">
-      <${Select} label="Colour" value=${kind} choices=${COLOURS} change=${change} /></div>
+      <${Select} label=${words.colourConstraint.colour} value=${kind} choices=${COLOURS} change=${change} /></div>
     ${kind === 'color' && html`<${SingleColour} ...${props} otherConstraints=${otherConstraints} />`}
     ${kind === 'kelvin' && html`<${WhiteRange} ...${props} otherConstraints=${otherConstraints} />`}
     ${
       kind === 'primaries' &&
-      html`<${TextField} label="LEDs" value=${[...primaries].join(', ')}
+      html`<${TextField} label=${words.colourConstraint.leds} value=${[...primaries].join(', ')}
       take=${(/** @type {string} */ text) =>
         app.session.constrainLight(k, {
           ...otherConstraints,
@@ -54,12 +55,12 @@ function SingleColour({ k, app, constraints, otherConstraints, rgb }) {
     : String(constraints.color);
   const white = toKelvin(rgb);
   return html`<div class="ask-row">
-    <${TextField} label="Hex or kelvin" value=${text}
+    <${TextField} label=${words.colourConstraint.hexOrKelvin} value=${text}
       take=${(/** @type {string} */ color) => app.session.constrainLight(k, { ...otherConstraints, color })} />
     ${
       white &&
       html`<${Button} label=${`${Math.round(white.kelvin / 50) * 50}K`}
-      tip="The white nearest to its colour in the answer" act=${() =>
+      tip=${words.colourConstraint.theWhiteNearestToItsColour} act=${() =>
         app.session.constrainLight(k, {
           ...otherConstraints,
           color: `${Math.round(white.kelvin / 50) * 50}K`,
@@ -80,12 +81,12 @@ function WhiteRange({ k, app, constraints, otherConstraints }) {
     });
   const duv = constraints.duv ?? 0;
   return html`<div class="ask-fields">
-    <${NumberField} label="From" value=${low} min=${1000} max=${25000} step=${100} digits=${0}
-      unit="K" change=${(/** @type {number} */ kelvin) => set(kelvin, high, duv)} />
-    <${NumberField} label="To" value=${high} min=${1000} max=${25000} step=${100} digits=${0}
-      unit="K" change=${(/** @type {number} */ kelvin) => set(low, kelvin, duv)} />
-    <${NumberField} label="Tint" value=${1000 * duv} min=${-20} max=${20} digits=${1}
-      tip="Duv × 1000: above 0 green, below 0 magenta"
+    <${NumberField} label=${words.colourConstraint.from} value=${low} min=${1000} max=${25000} step=${100} digits=${0}
+      unit=${words.colourConstraint.k} change=${(/** @type {number} */ kelvin) => set(kelvin, high, duv)} />
+    <${NumberField} label=${words.colourConstraint.to} value=${high} min=${1000} max=${25000} step=${100} digits=${0}
+      unit=${words.colourConstraint.k} change=${(/** @type {number} */ kelvin) => set(low, kelvin, duv)} />
+    <${NumberField} label=${words.colourConstraint.tint} value=${1000 * duv} min=${-20} max=${20} digits=${1}
+      tip=${words.colourConstraint.duv1000Above0GreenBelow}
       change=${(/** @type {number} */ tint) => set(low, high, tint / 1000)} />
   </div>`;
 }

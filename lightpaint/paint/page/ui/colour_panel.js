@@ -6,6 +6,7 @@ import { Hex, Hsv, MIXERS, Rgb, White } from './colour_mixers.js';
 import { Choice, Slider } from './controls.js';
 import { signedText } from './format.js';
 import { paintOf } from './display_state.js';
+import { fill, words } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./ui_state.js").RGB} RGB */
@@ -14,13 +15,13 @@ import { paintOf } from './display_state.js';
 /** Warm is right, as on the sliders and in an adjusting drag. */
 const WHITES = [9000, 6500, 5600, 4300, 3200, 2700, 1900];
 const GELS = [
-  ['Red', '#ff2a1a'],
-  ['Amber', '#ff9a1f'],
-  ['Green', '#35d04a'],
-  ['Cyan', '#2fd6e0'],
-  ['Blue', '#2a55ff'],
-  ['Magenta', '#e02fd0'],
-  ['Black', '#000000'],
+  [words.colourPanel.red, '#ff2a1a'],
+  [words.colourPanel.amber, '#ff9a1f'],
+  [words.colourPanel.green, '#35d04a'],
+  [words.colourPanel.cyan, '#2fd6e0'],
+  [words.colourPanel.blue, '#2a55ff'],
+  [words.colourPanel.magenta, '#e02fd0'],
+  [words.colourPanel.black, '#000000'],
 ];
 
 /** @param {{ui: Ui, app: App}} props */
@@ -30,15 +31,15 @@ export function ColourPanel({ ui, app }) {
   const Mixer = { white: White, hsv: Hsv, rgb: Rgb }[ui.mixer];
   return html`<div class="colour">
     <div class="colour-row">
-      <span class="patch" data-tip="Left: the colour. Right: how the display shows it at this brightness."
+      <span class="patch" data-tip=${words.colourPanel.leftTheColourRightHowThe}
         style=${{ '--colour': toHex(ui.colour), '--shown': displayColour(ui, app) }}></span>
       <${Hex} colour=${ui.colour} set=${set} />
-      <${Choice} label="Colour model" value=${ui.mixer} choices=${MIXERS}
+      <${Choice} label=${words.colourPanel.colourModel} value=${ui.mixer} choices=${MIXERS}
         change=${(/** @type {any} */ mixer) => store.set({ mixer })} />
     </div>
     <${Mixer} colour=${ui.colour} set=${set} />
-    <${Slider} label="Brightness" value=${ui.stops} min=${-8} max=${8} step=${0.1} digits=${1}
-      unit="st" resetValue=${0} tip="Stops above display white. Paint can be brighter than white."
+    <${Slider} label=${words.colourPanel.brightness} value=${ui.stops} min=${-8} max=${8} step=${0.1} digits=${1}
+      unit=${words.colourPanel.st} resetValue=${0} tip=${words.colourPanel.stopsAboveDisplayWhitePaintCan}
       change=${(/** @type {number} */ stops) => store.set({ stops })} />
     <${Swatches} ui=${ui} app=${app} />
   </div>`;
@@ -56,17 +57,17 @@ function Swatches({ ui, app }) {
     html`<${Swatch} key=${tip} rgb=${rgb} tip=${tip}
       act=${() => store.set({ colour: rgb, stops })} />`;
   const gels = GELS.map(([name, hex]) => ({ name, rgb: /** @type {RGB} */ (fromHex(hex)) }));
-  return html`<div class="swatches" role="group" aria-label="Swatches">
-    ${WHITES.map((kelvin) => swatch(fromKelvin(kelvin), `${kelvin} K`, ui.stops))}
+  return html`<div class="swatches" role="group" aria-label=${words.colourPanel.swatches}>
+    ${WHITES.map((kelvin) => swatch(fromKelvin(kelvin), fill(words.colourPanel.k, { kelvin }), ui.stops))}
     ${gels.map(({ name, rgb }) => swatch(rgb, name, ui.stops))}
   </div>
-  <div class="swatches is-recent" role="group" aria-label="Recent colours">
-    ${!ui.recent.length && html`<span class="faint">Recent colours</span>`}
+  <div class="swatches is-recent" role="group" aria-label=${words.colourPanel.recentColours}>
+    ${!ui.recent.length && html`<span class="faint">${words.colourPanel.recentColours}</span>`}
     ${ui.recent.map(({ colour, stops }, k) => {
       const stopsLabel = signedText(stops, Math.abs(stops - Math.round(stops)) < 0.05 ? 0 : 1);
-      const brightness = stopsLabel === '0' ? '' : `, ${stopsLabel} stops`;
+      const brightness = stopsLabel === '0' ? '' : fill(words.colourPanel.stops, { stopsLabel });
       return html`<${Swatch} key=${k} rgb=${colour} stops=${brightness && stopsLabel}
-        tip=${`Recent ${k + 1}: ${toHex(colour)}${brightness}`}
+        tip=${fill(words.colourPanel.recent, { k: k + 1, colour: toHex(colour), brightness })}
         act=${() => store.set({ colour, stops })} />`;
     })}
   </div>`;

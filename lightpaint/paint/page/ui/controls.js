@@ -4,6 +4,7 @@ import { slideByTouch } from '../../../viewer/touch_sliders.js';
 import { html, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
 import { cleanNumberText } from './format.js';
 import { Icon } from './icons.js';
+import { words } from '../language/language.js';
 
 /** The text being typed in a field, null if none, as state and as a ref. Event handlers read the
  * ref before the next render, so that text cancelled by Escape is not taken when the field loses
@@ -287,7 +288,7 @@ export function Dialog({ title, close, children, class: name }) {
     onClose=${close} onClick=${(/** @type {any} */ event) => event.target === ref.current && close()}>
     <div class="dialog-head">
       <h2 id=${id}>${title}</h2>
-      <${Button} icon="close" tip="Close" act=${close} />
+      <${Button} icon="close" tip=${words.controls.close} act=${close} />
     </div>
     <div class="dialog-body">${children}</div>
   </dialog>`;

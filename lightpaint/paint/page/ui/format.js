@@ -1,6 +1,7 @@
 /** Numbers as text: a true minus sign, few digits, units behind. */
 
 import { luminance, toKelvin } from './paint_colour.js';
+import { fill, fillCount, words } from '../language/language.js';
 
 const MINUS = '\u2212';
 
@@ -29,7 +30,9 @@ export function signedText(value, digits = 1) {
 /** @param {number | null | undefined} stops @returns {string} */
 export function stopsText(stops) {
   if (stops === null || stops === undefined || !Number.isFinite(stops)) return '';
-  return Math.abs(stops) < 0.05 ? 'as now' : `${signedText(stops)} st`;
+  return Math.abs(stops) < 0.05
+    ? words.format.asNow
+    : fill(words.format.st, { signed: signedText(stops) });
 }
 
 /** Return progress and remaining time as text, in one form for all tasks.
@@ -37,15 +40,19 @@ export function stopsText(stops) {
 export function progressText({ done, total, remainingSeconds: remaining }) {
   if (!total) return '';
   const share = `${Math.floor((100 * Math.min(done, total)) / total)} %`;
-  return remaining === undefined ? share : `${share}, ${timeText(remaining)} left`;
+  return remaining === undefined
+    ? share
+    : fill(words.format.left, { share, time: timeText(remaining) });
 }
 
 /** Rounded to the precision of the estimate. @param {number} seconds */
 function timeText(seconds) {
   if (seconds < 60)
-    return `${Math.max(1, seconds < 10 ? Math.round(seconds) : 5 * Math.round(seconds / 5))} s`;
-  if (seconds < 3600) return `${Math.round(seconds / 60)} min`;
-  return `${(seconds / 3600).toFixed(1)} h`;
+    return fill(words.format.s, {
+      value: Math.max(1, seconds < 10 ? Math.round(seconds) : 5 * Math.round(seconds / 5)),
+    });
+  if (seconds < 3600) return fill(words.format.min, { value: Math.round(seconds / 60) });
+  return fill(words.format.h, { value: (seconds / 3600).toFixed(1) });
 }
 
 /** @param {number} share 0 to 1 @returns {string} */
@@ -58,7 +65,7 @@ export function percentText(share) {
 /** Rounded to what an eye can distinguish. @param {number} kelvin @returns {string} */
 const kelvinText = (kelvin) => {
   const step = kelvin < 4000 ? 10 : kelvin < 8000 ? 50 : 500;
-  return `${Math.round(kelvin / step) * step} K`;
+  return fill(words.format.k, { step: Math.round(kelvin / step) * step });
 };
 
 /** Distance from Planck's locus, in thousandths, beyond which a white looks green or pink. Lamps
@@ -68,7 +75,9 @@ const MIN_TINT_DUV = 6;
 /** Return a white as kelvin, with its tint if it has one. @param {number} kelvin
  * @param {number} green as of `toKelvin` */
 export const whiteText = (kelvin, green) =>
-  kelvinText(kelvin) + (Math.abs(green) < MIN_TINT_DUV ? '' : green > 0 ? ' green' : ' pink');
+  Math.abs(green) < MIN_TINT_DUV
+    ? kelvinText(kelvin)
+    : fill(green > 0 ? words.format.kGreen : words.format.kPink, { kelvin: kelvinText(kelvin) });
 
 /** Distance from Planck's locus, in thousandths of (u, v), up to which light has a colour
  * temperature. */
@@ -87,7 +96,8 @@ function describeLight(rgb, level) {
   if (!(level > 0)) return '';
   const white = toKelvin(rgb);
   const isWhite = white && Math.abs(white.green) <= MAX_WHITE_DUV;
-  return `${signedText(Math.log2(level))} st${isWhite ? ` · ${whiteText(white.kelvin, white.green)}` : ''}`;
+  const stops = fill(words.format.st, { signed: signedText(Math.log2(level)) });
+  return isWhite ? `${stops} · ${whiteText(white.kelvin, white.green)}` : stops;
 }
 
 /** Return a name shortened in the middle, since names of many lights differ at their ends.
@@ -98,9 +108,8 @@ export function shortenName(name, maxLength) {
   return `${name.slice(0, maxLength - 1 - end)}…${name.slice(-end)}`;
 }
 
-/** @param {number} count @param {string} singular @param {string} [plural] @returns {string} */
-export const countText = (count, singular, plural = `${singular}s`) =>
-  `${count} ${count === 1 ? singular : plural}`;
+/** @param {number} count of lights @returns {string} */
+export const lightCountText = (count) => fillCount(words.format.lights, count);
 
 /** Return the name of a file without its folder. @param {string} file @param {string} folder */
 export function relativePath(file, folder) {

@@ -4,6 +4,7 @@ import { html, useEffect, useLayoutEffect, useRef, useState } from '../vendor/pr
 import { Button, Checkbox } from './controls.js';
 import { clockText, dateText } from './format.js';
 import { Thumbnail } from './thumbnail.js';
+import { fill, words } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
@@ -17,7 +18,7 @@ const LISTED_COUNT = 100;
 const MIN_FILTERED_COUNT = 12;
 
 /** The state before all steps. @type {Step} */
-const BEGINNING = { id: 0, label: 'Beginning', stamp: null, is_milestone: true };
+const BEGINNING = { id: 0, label: words.historyPanel.beginning, stamp: null, is_milestone: true };
 
 /** @param {string} label */
 const capitalized = (label) => label.charAt(0).toUpperCase() + label.slice(1);
@@ -56,25 +57,24 @@ export function HistoryPanel({ ui, app }) {
     element.current?.querySelector('[aria-current]')?.scrollIntoView({ block: 'nearest' });
   }, [done, list === null]);
   if (!ui.history.count && !ui.history.redo.length)
-    return html`<p class="faint panel-note">Every step is listed here, with its picture. Click one to go back
-      to it.</p>`;
-  return html`<ul class="steps" ref=${element} aria-label="Steps, the last on top">
+    return html`<p class="faint panel-note">${words.historyPanel.everyStepIsListedHereWith}</p>`;
+  return html`<ul class="steps" ref=${element} aria-label=${words.historyPanel.stepsTheLastOnTop}>
       ${rows.map(
         ({ step, isUndone, isCurrent }) => html`<${StepRow} key=${step.id} step=${step} ui=${ui}
           app=${app} isUndone=${isUndone} isCurrent=${isCurrent} />`,
       )}
       ${
         earlier > 0 &&
-        html`<li><${Button} label=${`Earlier steps (${earlier})`} class="is-flat"
+        html`<li><${Button} label=${fill(words.historyPanel.earlierSteps, { earlier })} class="is-flat"
           act=${() => setCount(count + LISTED_COUNT)} /></li>`
       }
     </ul>
     <div class="history-actions">
       ${
         (hasMilestonesOnly || all.length > MIN_FILTERED_COUNT) &&
-        html`<${Checkbox} label="Milestones only" checked=${hasMilestonesOnly}
+        html`<${Checkbox} label=${words.historyPanel.milestonesOnly} checked=${hasMilestonesOnly}
           change=${setMilestonesOnly}
-          tip="The steps before a pause or a new start, and every twentieth" />`
+          tip=${words.historyPanel.theStepsBeforeAPauseOr} />`
       }
       <${NewStart} ui=${ui} app=${app} />
     </div>`;
@@ -88,10 +88,10 @@ function NewStart({ ui, app }) {
     engine.cancel();
     void session.send(kind);
   };
-  return html`<${Button} label="Clear painting" disabled=${!hasPaint} act=${() => send('clear_painting')}
-      tip="Delete all paint and layers. Lights keep what you asked of them." />
-    <${Button} label="Start over" disabled=${!ui.history.count} act=${() => send('start_over')}
-      tip="Back to the scene as it was. Looks stay, and undo goes back." />`;
+  return html`<${Button} label=${words.historyPanel.clearPainting} disabled=${!hasPaint} act=${() => send('clear_painting')}
+      tip=${words.historyPanel.deleteAllPaintAndLayersLights} />
+    <${Button} label=${words.historyPanel.startOver} disabled=${!ui.history.count} act=${() => send('start_over')}
+      tip=${words.historyPanel.backToTheSceneAsIt} />`;
 }
 
 /** @param {{step: Step, ui: Ui, app: App, isUndone: boolean, isCurrent: boolean}} props */
@@ -111,7 +111,7 @@ function StepRow({ step, ui, app, isUndone, isCurrent }) {
       data-tip=${stamp === null ? undefined : `${text}, ${dateText(stamp)}`}>
     <${Thumbnail} name=${`step/${id}`} generation=${generation} app=${app} />
     <span class=${`step-label ${isMilestone ? 'is-milestone' : ''}`}>${text}</span>
-    ${isUndone && html`<span class="only-read">, undone</span>`}
+    ${isUndone && html`<span class="only-read">${words.historyPanel.undone}</span>`}
     <span class="faint">${stamp === null ? '' : clockText(stamp)}</span>
   </button></li>`;
 }

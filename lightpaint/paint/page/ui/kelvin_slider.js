@@ -3,6 +3,7 @@
 import { html } from '../vendor/preact.js';
 import { fromKelvin, toHex } from './paint_colour.js';
 import { Slider } from './controls.js';
+import { words } from '../language/language.js';
 
 /** @typedef {import("./engine_interface.js").RGB} RGB */
 
@@ -29,8 +30,8 @@ export const clampKelvin = (kelvin) => Math.min(MAX_KELVIN, Math.max(MIN_KELVIN,
 
 /** @param {{value: number, change: (kelvin: number, isFinal: boolean) => void, label?: string,
  *   disabled?: boolean}} props */
-export function KelvinSlider({ value, change, label = 'CCT', disabled }) {
+export function KelvinSlider({ value, change, label = words.kelvinSlider.cct, disabled }) {
   return html`<${Slider} label=${label} value=${clampKelvin(value)} min=${MIN_KELVIN}
-    max=${MAX_KELVIN} step=${100} unit="K" curve=${MIRED_CURVE} track=${TRACK} disabled=${disabled}
-    tip="Correlated colour temperature: warmer to the right" change=${change} />`;
+    max=${MAX_KELVIN} step=${100} unit=${words.kelvinSlider.k} curve=${MIRED_CURVE} track=${TRACK} disabled=${disabled}
+    tip=${words.kelvinSlider.correlatedColourTemperature} change=${change} />`;
 }

@@ -3,20 +3,21 @@
 import { html } from '../vendor/preact.js';
 import { Button, NumberField } from './controls.js';
 import { placeOf } from './lamp_marks.js';
+import { fill, words } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
 
 /** Labels of what the next click does to a light. */
 const CLICK_MODES = /** @type {const} */ ({
-  aim: { label: 'Aim here', tip: 'Click a surface: the light points there' },
+  aim: { label: words.lampFields.aimHere, tip: words.lampFields.clickASurfaceTheLightPoints },
   highlight: {
-    label: 'Highlight here',
-    tip: 'Click a shiny surface: the light hangs where its reflection is seen there',
+    label: words.lampFields.highlightHere,
+    tip: words.lampFields.clickAShinySurfaceTheLight,
   },
   shadow: {
-    label: 'Shadow edge here',
-    tip: 'Click the edge that casts it, then where its shadow ends',
+    label: words.lampFields.shadowEdgeHere,
+    tip: words.lampFields.clickTheEdgeThatCastsIt,
   },
 });
 
@@ -24,15 +25,14 @@ const CLICK_MODES = /** @type {const} */ ({
  * @param {Ui["lights"]} lights */
 export function pointingHint(action, lights) {
   if (action.mode === 'hang')
-    return `Click the surface that the new ${action.type} hangs on, or its place in the plan. Esc cancels.`;
+    return fill(words.lampFields.clickTheSurfaceThatTheNew, { type: action.type });
   const { mode, edge } = action;
   const name = lights[action.light]?.label ?? '';
-  if (mode === 'aim') return `Click what ${name} is to point at. Esc cancels.`;
-  if (mode === 'highlight')
-    return `Click where the highlight of ${name} is to be seen. Esc cancels.`;
+  if (mode === 'aim') return fill(words.lampFields.clickWhatIsToPointAt, { name });
+  if (mode === 'highlight') return fill(words.lampFields.clickWhereTheHighlightOfIs, { name });
   return edge
-    ? 'Now click where that shadow is to end. Esc cancels.'
-    : `Click the edge of what casts the shadow of ${name}. Esc cancels.`;
+    ? words.lampFields.nowClickWhereThatShadowIs
+    : fill(words.lampFields.clickTheEdgeOfWhatCasts, { name });
 }
 
 /** Handle a click on a picture that a click action waits for. @param {App} app
@@ -61,20 +61,20 @@ export function LampFields({ k, ui, app }) {
   const { session, store } = app;
   if (!ui.state?.can_render) return null;
   if (!ui.rig?.lights[k])
-    return html`<div class="lamp-fields"><${Button} label="Place and aim" class="wide"
-      tip="Mark the lights in the pictures, and move them" act=${() => session.toggleLamps()} /></div>`;
+    return html`<div class="lamp-fields"><${Button} label=${words.lampFields.placeAndAim} class="wide"
+      tip=${words.lampFields.markTheLightsInThePictures} act=${() => session.toggleLamps()} /></div>`;
   const place = placeOf(ui, k);
   const { name, label } = ui.lights[k];
   const isAdded = ui.addedLights.includes(name);
   if (place.immovable_reason)
-    return html`<p class="faint lamp-fields">${label} ${place.immovable_reason}: it stays where it is.</p>`;
+    return html`<p class="faint lamp-fields">${fill(words.lampFields.itStaysWhereItIs, { label, immovable_reason: place.immovable_reason })}</p>`;
   const vectorFields = (
     /** @type {"position" | "target"} */ key,
     /** @type {string} */ title,
     /** @type {number[] | null} */ value,
   ) =>
     value &&
-    html`<div class="lamp-vector" role="group" aria-label=${`${title} of ${label}`}>
+    html`<div class="lamp-vector" role="group" aria-label=${fill(words.lampFields.of, { title, label })}>
       <span class="name">${title}</span>
       ${['x', 'y', 'z'].map(
         (
@@ -98,24 +98,24 @@ export function LampFields({ k, ui, app }) {
         })} />`;
   };
   return html`<div class="lamp-fields" data-numbers>
-    <h3>Place</h3>
-    ${vectorFields('position', 'Position', place.position)}
-    ${place.position && place.direction && vectorFields('target', 'Target', place.target)}
+    <h3>${words.lampFields.place}</h3>
+    ${vectorFields('position', words.lampFields.position, place.position)}
+    ${place.position && place.direction && vectorFields('target', words.lampFields.target, place.target)}
     ${
       place.cutoff !== null &&
       html`<div class="ask-fields is-pair">
-        <${NumberField} label="Cone" unit="°" value=${place.cutoff} min=${1} max=${89} step=${1}
+        <${NumberField} label=${words.lampFields.cone} unit="°" value=${place.cutoff} min=${1} max=${89} step=${1}
           digits=${1} change=${(/** @type {number} */ x) =>
             session.moveLamp(k, { cutoff: x, beam: Math.min(x, place.beam ?? x) })} />
-        <${NumberField} label="Beam" unit="°" value=${place.beam} min=${0.5} max=${place.cutoff}
+        <${NumberField} label=${words.lampFields.beam} unit="°" value=${place.beam} min=${0.5} max=${place.cutoff}
           step=${1} digits=${1} change=${(/** @type {number} */ x) =>
             session.moveLamp(k, { beam: x, cutoff: place.cutoff })} />
       </div>`
     }
-    <div class="lamp-ways" role="group" aria-label=${`Point ${label} by a click`}>
+    <div class="lamp-ways" role="group" aria-label=${fill(words.lampFields.pointByAClick, { label })}>
       ${place.position && place.direction && pointButton('aim')}
       ${pointButton('highlight')}${pointButton('shadow')}
-      ${name in ui.poses && html`<${Button} label="Put back" tip=${`Back to where ${isAdded ? 'you hung it' : 'the scene has it'}`} act=${() => session.resetPlace(k)} />`}
-      ${isAdded && html`<${Button} label="Remove" icon="trash" tip=${`Remove ${label}. Undo brings it back.`} act=${() => session.removeLight(name)} />`}
+      ${name in ui.poses && html`<${Button} label=${words.lampFields.putBack} tip=${isAdded ? words.lampFields.backToWhereYouHungIt : words.lampFields.backToWhereTheSceneHasIt} act=${() => session.resetPlace(k)} />`}
+      ${isAdded && html`<${Button} label=${words.lampFields.remove} icon="trash" tip=${fill(words.lampFields.removeUndoBringsItBack, { label })} act=${() => session.removeLight(name)} />`}
     </div></div>`;
 }

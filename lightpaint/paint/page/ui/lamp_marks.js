@@ -15,6 +15,7 @@ import { pressLight } from './lamps/light_selection.js';
 import { showsElsewhere } from './look_comparison.js';
 import { toHex } from './paint_colour.js';
 import { atFullBrightness, luminance } from './paint_colour.js';
+import { fill, words } from '../language/language.js';
 
 /** @typedef {import("./engine_interface.js").Pane} Pane */
 /** @typedef {import("./ui_state.js").Ui} Ui */
@@ -124,8 +125,8 @@ function Mark({ ui, app, light, place, pane, camera, position, isTwin }) {
   const isSelected = ui.selectedLights.includes(light);
   const choose = () => app.store.set({ lamp: light });
   const tip = place.immovable_reason
-    ? `${label} ${place.immovable_reason}: it stays where it is`
-    : `${label}: drag to move it, with Shift up and down`;
+    ? fill(words.lampMarks.itStaysWhereItIs, { label, immovable_reason: place.immovable_reason })
+    : fill(words.lampMarks.dragToMoveItWithShift, { label });
   const drag = useDrag(app, pane, (x, y, isShift, start) => {
     if (!canDrag || !place.position || !ui.rig) return null;
     const startPosition = /** @type {number[]} */ (start.place.position);
@@ -151,7 +152,7 @@ function Mark({ ui, app, light, place, pane, camera, position, isTwin }) {
     top: `${position.y}px`,
     '--lit': isOn ? toHex(atFullBrightness(rgb)) : 'transparent',
     '--outwards': `${position.angle}rad`,
-  }} aria-label=${isSelected ? `${label}, selected` : label} aria-pressed=${String(ui.lamp === light)} tabindex=${isTwin ? -1 : 0}
+  }} aria-label=${isSelected ? fill(words.lampMarks.selected, { label }) : label} aria-pressed=${String(ui.lamp === light)} tabindex=${isTwin ? -1 : 0}
     aria-hidden=${isTwin ? 'true' : undefined} data-tip=${tip} data-lamp=${label}
     onClick=${(/** @type {MouseEvent} */ event) =>
       hasControl(event) ? pressLight(app.store, light, event) : choose()}
@@ -187,8 +188,8 @@ function AimHandle({ ui, app, light, pane, camera, innerBox, toPage, isTwin }) {
   const { label } = ui.lights[light];
   return html`<button type="button" class=${`lamp-aim ${position.isInside ? '' : 'is-outside'}`}
     style=${{ left: `${position.x}px`, top: `${position.y}px` }} tabindex=${isTwin ? -1 : 0}
-    aria-hidden=${isTwin ? 'true' : undefined} aria-label=${`Aim of ${label}`}
-    data-tip=${`Drag what ${label} points at`}
+    aria-hidden=${isTwin ? 'true' : undefined} aria-label=${fill(words.lampMarks.aimOf, { label })}
+    data-tip=${fill(words.lampMarks.dragWhatPointsAt, { label })}
     onPointerDown=${(/** @type {PointerEvent} */ event) =>
       ui.clickAction ? undefined : drag.down(event, light, place)}
     onPointerMove=${drag.move} onPointerUp=${drag.up} onPointerCancel=${drag.up}></button>`;

@@ -3,6 +3,7 @@
 import { html } from '../vendor/preact.js';
 import { signedText, whiteText } from './format.js';
 import { atFullBrightness, luminance, toHex, toKelvin } from './paint_colour.js';
+import { fill, words } from '../language/language.js';
 
 /** @typedef {import("./engine_interface.js").RGB} RGB */
 /** @typedef {import("./ui_state.js").Ui} Ui */
@@ -17,23 +18,25 @@ const [MIN_STOPS, MIN_MIRED] = [0.05, 3];
 export function LampTable({ ui, first, second }) {
   const rows = rowsOf(ui, first, second);
   const presents = new Map(ui.lights.map(({ name, present }) => [name, present]));
-  return html`<div class="lamp-table" tabindex="0" role="group" aria-label="Lamps of two looks"><table>
-    <thead><tr><th scope="col">Lamp</th><th scope="col">${first.name}</th>
-      <th scope="col">${second.name}</th><th scope="col">Difference</th></tr></thead>
+  return html`<div class="lamp-table" tabindex="0" role="group" aria-label=${words.lampTable.lampsOfTwoLooks}><table>
+    <thead><tr><th scope="col">${words.lampTable.lamp}</th><th scope="col">${first.name}</th>
+      <th scope="col">${second.name}</th><th scope="col">${words.lampTable.difference}</th></tr></thead>
     <tbody>${rows.map(
       ({ name, label, emissions, text }) => html`<tr key=${name} class=${text ? '' : 'is-equal'}>
         <th scope="row">${label}</th>
         ${emissions.map(
           (emission) => html`<td>${lampText(emission, presents.get(name) ?? null)}</td>`,
         )}
-        <td>${text || 'equal'}</td></tr>`,
+        <td>${text || words.lampTable.equal}</td></tr>`,
     )}</tbody>
   </table></div>`;
 }
 
 /** @param {Ui} ui @param {Look} first @param {Look} second @returns {Row[]} */
 export function rowsOf({ lights }, first, second) {
-  const names = [...new Set([...lights.map(({ name }) => name), ...first.lights, ...second.lights])];
+  const names = [
+    ...new Set([...lights.map(({ name }) => name), ...first.lights, ...second.lights]),
+  ];
   const emission = (/** @type {Look} */ look, /** @type {string} */ name) => {
     const k = look.lights.indexOf(name);
     return k < 0 ? null : look.weights[k];
@@ -51,19 +54,27 @@ export function rowsOf({ lights }, first, second) {
 export function differenceOf([first, second]) {
   if (!first && !second) return { difference: 0, text: '' };
   if (!first || !second)
-    return { difference: Infinity, text: first ? 'is not there' : 'is new' };
+    return {
+      difference: Infinity,
+      text: first ? words.lampTable.isNotThere : words.lampTable.isNew,
+    };
   const [before, after] = [luminance(first), luminance(second)];
   if (!(before > 0) && !(after > 0)) return { difference: 0, text: '' };
   if (!(before > 0) || !(after > 0))
-    return { difference: Number.MAX_VALUE, text: after > 0 ? 'on' : 'off' };
+    return {
+      difference: Number.MAX_VALUE,
+      text: after > 0 ? words.lampTable.on : words.lampTable.off,
+    };
   const stops = Math.log2(after / before);
-  const parts = Math.abs(stops) < MIN_STOPS ? [] : [`${signedText(stops)} st`];
+  const parts =
+    Math.abs(stops) < MIN_STOPS ? [] : [fill(words.lampTable.st, { signed: signedText(stops) })];
   const whites = [toKelvin(first), toKelvin(second)];
   const chroma = Math.max(...[0, 1, 2].map((c) => Math.abs(first[c] / before - second[c] / after)));
   if (whites[0] && whites[1]) {
     const mired = 1e6 / whites[1].kelvin - 1e6 / whites[0].kelvin;
-    if (Math.abs(mired) >= MIN_MIRED) parts.push(`${signedText(mired, 0)} mired`);
-  } else if (chroma > 0.02) parts.push('other colour');
+    if (Math.abs(mired) >= MIN_MIRED)
+      parts.push(fill(words.lampTable.mired, { signed: signedText(mired, 0) }));
+  } else if (chroma > 0.02) parts.push(words.lampTable.otherColour);
   return { difference: parts.length ? Math.abs(stops) + chroma : 0, text: parts.join(', ') };
 }
 
@@ -71,11 +82,12 @@ export function differenceOf([first, second]) {
 function lampText(emission, present) {
   if (!emission) return '–';
   const level = luminance(emission);
-  if (!(level > 0)) return 'off';
+  if (!(level > 0)) return words.lampTable.off;
   const scene = present ? luminance(present) : 0;
   const white = toKelvin(emission);
   const hex = toHex(atFullBrightness(emission));
   const colour = white ? whiteText(white.kelvin, white.green) : hex;
-  const stops = scene > 0 ? `${signedText(Math.log2(level / scene))} st, ` : '';
+  const stops =
+    scene > 0 ? fill(words.lampTable.st2, { signed: signedText(Math.log2(level / scene)) }) : '';
   return html`<i style=${{ background: hex }}></i> ${stops}${colour}`;
 }

@@ -4,6 +4,7 @@ import { html } from '../vendor/preact.js';
 import { luminance } from './paint_colour.js';
 import { useDraft } from './controls.js';
 import { cleanNumberText, stopsText } from './format.js';
+import { fill, words } from '../language/language.js';
 
 /** @typedef {import("./engine_interface.js").RGB} RGB */
 /** @typedef {import("./ui_state.js").Light} Light */
@@ -65,10 +66,10 @@ const [MAX_TYPED_STOPS, MAX_UNITLESS_STOPS] = [20, 8];
 function refusalText(text, light) {
   const cleanText = text.trim();
   if (!isOnAtPresent(light))
-    return `${cleanText} is not a level. ${light.label} is off now: type stops (+1.5 st) or off.`;
+    return fill(words.levelField.isNotALevelIsOff, { cleanText, label: light.label });
   if (Number.isFinite(Number(cleanNumberText(cleanText))))
-    return `${cleanText} could be stops or percent: add the unit (12 st, 80 %).`;
-  return `${cleanText} is not a level. Type stops from now (+1.5), percent (80 %), as now, or off.`;
+    return fill(words.levelField.couldBeStopsOrPercentAdd, { cleanText });
+  return fill(words.levelField.isNotALevelTypeStops, { cleanText });
 }
 
 /**
@@ -95,11 +96,16 @@ export function LevelField({ light, rgb, disabled, change, say }) {
     if (stops === null && step < 0) return; // nothing is below off
     const newStops = (stops ?? DIMMER_MIN_STOPS) + step * (event.shiftKey ? 10 : 1);
     take(
-      `${Math.min(MAX_TYPED_STOPS, Math.max(-MAX_TYPED_STOPS, Number(newStops.toFixed(1))))} st`,
+      fill(words.levelField.st, {
+        MAX_TYPED_STOPS: Math.min(
+          MAX_TYPED_STOPS,
+          Math.max(-MAX_TYPED_STOPS, Number(newStops.toFixed(1))),
+        ),
+      }),
     );
   };
   return html`<input class="level" type="text" data-typed=${draft === null ? 'no' : 'yes'} autocomplete="off" spellcheck=${false}
-    aria-label=${`${light.label}, level`} data-tip="Stops from now. Type +1.5, 80 % or off."
+    aria-label=${fill(words.levelField.level, { label: light.label })} data-tip=${words.levelField.stopsFromNowType15}
     value=${draft ?? (stops === null ? 'off' : stopsText(stops))} disabled=${disabled}
     onFocus=${(/** @type {any} */ event) => event.currentTarget.select()}
     onInput=${(/** @type {any} */ event) => setDraft(event.currentTarget.value)}

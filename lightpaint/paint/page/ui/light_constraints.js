@@ -13,22 +13,36 @@ import {
   presentLevel,
   stopsOf,
 } from './level_field.js';
+import { fill, words } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Constraints} Constraints */
 /** @typedef {import("./engine_interface.js").RGB} RGB */
 
 const LEVEL_MODES = [
-  { value: 'free', label: 'Free', tip: 'The solve sets it' },
-  { value: 'held', label: 'Locked', tip: 'Locked at a level that you set' },
-  { value: 'present', label: 'As now', tip: 'It stays as it is in the scene' },
-  { value: 'off', label: 'Off', tip: 'Switched off in every answer' },
+  { value: 'free', label: words.lightConstraints.free, tip: words.lightConstraints.theSolveSetsIt },
+  {
+    value: 'held',
+    label: words.lightConstraints.locked,
+    tip: words.lightConstraints.lockedAtALevelThatYou,
+  },
+  {
+    value: 'present',
+    label: words.lightConstraints.asNow,
+    tip: words.lightConstraints.itStaysAsItIsIn,
+  },
+  {
+    value: 'off',
+    label: words.lightConstraints.off,
+    tip: words.lightConstraints.switchedOffInEveryAnswer,
+  },
 ];
 
 /** @param {import("./light_row.js").Props} props */
 export function LightConstraints(props) {
   const { k, light, app, constraints = {}, rgb, tie, ui } = props;
   const { session } = app;
-  if (light.is_fixed) return html`<p class="asking-light faint">This light is not adjusted.</p>`;
+  if (light.is_fixed)
+    return html`<p class="asking-light faint">${words.lightConstraints.thisLightIsNotAdjusted}</p>`;
   const mode = constraints.off
     ? 'off'
     : constraints.lock === true
@@ -42,9 +56,9 @@ export function LightConstraints(props) {
     if (newMode === 'present') session.constrainLight(k, { lock: true });
     if (newMode === 'off') session.switchLight(k, true);
   };
-  return html`<div class="asking-light" role="group" aria-label=${`Constraints on ${light.label}`}>
-    <h3>Constraints</h3>
-    <${Choice} label="Level" value=${mode} choices=${LEVEL_MODES} change=${change} />
+  return html`<div class="asking-light" role="group" aria-label=${fill(words.lightConstraints.constraintsOn, { label: light.label })}>
+    <h3>${words.lightConstraints.constraints}</h3>
+    <${Choice} label=${words.lightConstraints.level} value=${mode} choices=${LEVEL_MODES} change=${change} />
     ${
       mode === 'held' &&
       html`<${LockedLevel} ...${props} />
@@ -60,7 +74,7 @@ export function LightConstraints(props) {
       html`<${LevelLimits} ...${props} />
       ${
         tie && colourKind(constraints) === 'any'
-          ? html`<p class="faint">Tied lights keep their current colours.</p>`
+          ? html`<p class="faint">${words.lightConstraints.tiedLightsKeepTheirCurrent}</p>`
           : !light.is_scalar && html`<${ColourConstraint} ...${props} />`
       }`
     }
@@ -90,15 +104,15 @@ function LockedLevel({ k, light, app, rgb }) {
     },
     value: { value: level, min: 0, step: 0.1, toLevel: (/** @type {number} */ x) => x },
   }[/** @type {'stops' | 'share' | 'value'} */ (unit)];
-  const units = [{ value: 'stops', label: 'st from now' }, ...unitsOf(light)];
+  const units = [{ value: 'stops', label: words.lightConstraints.stFromNow }, ...unitsOf(light)];
   return html`<div class="ask-fields is-pair">
-    <${NumberField} label="Locked at" value=${value} min=${min} max=${unit === 'stops' ? 20 : undefined}
+    <${NumberField} label=${words.lightConstraints.lockedAt} value=${value} min=${min} max=${unit === 'stops' ? 20 : undefined}
       figures=${unit === 'stops' ? undefined : SIGNIFICANT_DIGITS} step=${step} start=${DIMMER_MIN_STOPS}
       placeholder=${unit === 'stops' ? 'off' : undefined}
       change=${(/** @type {number | null} */ newLevel) => lockAt(newLevel === null ? 0 : toLevel(newLevel))} />
     ${
       isOnAtPresent(light) &&
-      html`<${Select} label="Unit" value=${unit} choices=${units} change=${setUnit} />`
+      html`<${Select} label=${words.lightConstraints.unit} value=${unit} choices=${units} change=${setUnit} />`
     }
   </div>`;
 }
@@ -109,7 +123,7 @@ const SIGNIFICANT_DIGITS = 6;
 /** Return the units that a light's level can be given in.
  * @param {import("./ui_state.js").Light} light */
 const unitsOf = (light) => [
-  { value: 'share', label: '% of now' },
+  { value: 'share', label: words.lightConstraints.ofNow },
   { value: 'value', label: light.unit || 'value' },
 ];
 
@@ -134,9 +148,7 @@ function LevelLimits({ k, light, app, constraints = {} }) {
       const limitText = (/** @type {number} */ x) =>
         unit === 'share' ? `${x} %` : numberText(x, SIGNIFICANT_DIGITS);
       const [low, high] = [min, max].map(limitText);
-      app.session.toast(
-        `The minimum (${low}) is above the maximum (${high}). The limits have not changed.`,
-      );
+      app.session.toast(fill(words.lightConstraints.theMinimumIsAboveTheMaximum, { low, high }));
       return;
     }
     const { limits: _, ...otherConstraints } = constraints;
@@ -157,13 +169,13 @@ function LevelLimits({ k, light, app, constraints = {} }) {
     app.session.constrainLight(k, { ...constraints, limits: Object.fromEntries(convertedLimits) });
   };
   return html`<div class="ask-fields is-levels">
-    <${NumberField} label="Min" value=${limitValue(limits.min)} min=${0} placeholder="–" step=${5}
+    <${NumberField} label=${words.lightConstraints.min} value=${limitValue(limits.min)} min=${0} placeholder="–" step=${5}
       change=${(/** @type {number | null} */ value) => set('min', value)} figures=${SIGNIFICANT_DIGITS} />
-    <${NumberField} label="Max" value=${limitValue(limits.max)} min=${0} placeholder="–" step=${5}
+    <${NumberField} label=${words.lightConstraints.max} value=${limitValue(limits.max)} min=${0} placeholder="–" step=${5}
       change=${(/** @type {number | null} */ value) => set('max', value)} figures=${SIGNIFICANT_DIGITS} />
     ${
       canShare &&
-      html`<${Select} label="Unit" value=${unit} choices=${unitsOf(light)} change=${convert} />`
+      html`<${Select} label=${words.lightConstraints.unit} value=${unit} choices=${unitsOf(light)} change=${convert} />`
     }
   </div>`;
 }
@@ -188,18 +200,20 @@ function TieFields({ light, app, tie, allLights = [] }) {
   const label = (/** @type {string} */ name) =>
     allLights.find((other) => other.name === name)?.label ?? name;
   const choices = [
-    { value: '', label: 'no light' },
+    { value: '', label: words.lightConstraints.noLight },
     ...candidates.map((other) => ({ value: other.name, label: other.label })),
   ];
   return html`<div class="ask-row">
     ${
       tie &&
-      html`<span>Tied to ${tie
-        .filter((name) => name !== light.name)
-        .map(label)
-        .join(', ')}</span><${Button} label="Untie" act=${() => app.session.untie(light.name)} />`
+      html`<span>${fill(words.lightConstraints.tiedTo, {
+        value: tie
+          .filter((name) => name !== light.name)
+          .map(label)
+          .join(', '),
+      })}</span><${Button} label=${words.lightConstraints.untie} act=${() => app.session.untie(light.name)} />`
     }
-    <${Select} label=${tie ? 'Also tie to' : 'Tie to'} value="" choices=${choices}
+    <${Select} label=${tie ? words.lightConstraints.alsoTieTo : words.lightConstraints.tieTo} value="" choices=${choices}
       change=${(/** @type {string} */ name) => name && app.session.tie(light.name, name)} />
   </div>`;
 }

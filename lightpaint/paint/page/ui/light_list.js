@@ -15,20 +15,21 @@ import {
 import { MasterDimmer } from './lamps/master_dimmer.js';
 import { GroupDimmer, SelectionPanel, levelsText } from './lamps/selection_panel.js';
 import { constraintsOf, lockedLights, findTie } from './tied_lights.js';
-import { countText, percentText } from './format.js';
+import { lightCountText, percentText } from './format.js';
 import { Icon } from './icons.js';
 import { comparedAnswer, isAnswerHidden } from './look_actions.js';
 import { LightRow } from './light_row.js';
+import { fill, words } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./ui_state.js").UiStore} UiStore */
 /** @typedef {import("./shortcuts.js").App} App */
 
 const SORTS = [
-  { value: 'scene', label: 'Scene' },
-  { value: 'name', label: 'Name' },
-  { value: 'share', label: 'Share' },
-  { value: 'change', label: 'Change' },
+  { value: 'scene', label: words.lightList.scene },
+  { value: 'name', label: words.lightList.name },
+  { value: 'share', label: words.lightList.share },
+  { value: 'change', label: words.lightList.change },
 ];
 
 /** @param {{ui: Ui, app: App}} props */
@@ -45,12 +46,12 @@ export function LightList({ ui, app }) {
     ${
       ui.lights.length > 1 &&
       html`<div class="lights-tools">
-      <label class="field search"><span class="only-read">Search lights</span>
-        <${Icon} name="search" /><input type="search" value=${ui.search} placeholder="Search"
-          data-tip="Words, or patterns such as spot_*; Enter selects what is found" onKeyDown=${selectFound}
+      <label class="field search"><span class="only-read">${words.lightList.searchLights}</span>
+        <${Icon} name="search" /><input type="search" value=${ui.search} placeholder=${words.lightList.search}
+          data-tip=${words.lightList.wordsOrPatternsSuchAsSpot} onKeyDown=${selectFound}
           onInput=${(/** @type {any} */ event) =>
             store.set({ search: event.currentTarget.value })} /></label>
-      <${Select} label="Sort by" hidden value=${ui.sort} choices=${SORTS} tip="Sort by"
+      <${Select} label=${words.lightList.sortBy} hidden value=${ui.sort} choices=${SORTS} tip=${words.lightList.sortBy}
         change=${(/** @type {any} */ sort) => store.set({ sort })} />
       <${Button} icon="select" pressed=${areSelected} tip=${selectionTip(ui, indices, areSelected)}
         act=${() => toggleLights(store, indices)} />
@@ -58,7 +59,7 @@ export function LightList({ ui, app }) {
     </div>`
     }
     <${SelectionPanel} ui=${ui} app=${app} />
-    ${ui.ready && !indices.length && html`<p class="faint">No light has this name.</p>`}
+    ${ui.ready && !indices.length && html`<p class="faint">${words.lightList.noLightHasThisName}</p>`}
     ${groups.map(({ name, members }) =>
       name === null
         ? members.map((k) => renderRow(ui, app, k, isMany))
@@ -70,8 +71,9 @@ export function LightList({ ui, app }) {
 
 /** @param {Ui} ui @param {number[]} indices that the list shows @param {boolean} areSelected */
 function selectionTip({ search }, indices, areSelected) {
-  const which = search.trim() ? `the ${indices.length} found` : 'all';
-  return `${areSelected ? 'Deselect' : 'Select'} ${which}`;
+  if (!search.trim()) return areSelected ? words.lightList.deselectAll : words.lightList.selectAll;
+  const text = areSelected ? words.lightList.deselectFound : words.lightList.selectFound;
+  return fill(text, { count: indices.length });
 }
 
 /** @param {{ui: Ui, app: App}} props */
@@ -82,7 +84,7 @@ function LassoButton({ ui, app }) {
     app.store.set({ isLassoing: !isLassoing, clickAction: null });
   };
   return html`<${Button} icon="lasso" pressed=${isLassoing} act=${toggle}
-    tip="Lasso: select lights by drawing around their marks; with Shift also those" />`;
+    tip=${words.lightList.lassoSelectLightsByDrawingAround} />`;
 }
 
 /** A note beside the title, where it moves no row: that lights are hidden, which of two looks they
@@ -90,17 +92,17 @@ function LassoButton({ ui, app }) {
 export function LightListActions({ ui, app }) {
   const hasHidden = ui.solo.length > 0 || ui.mute.length > 0;
   if (ui.mix && !hasHidden) {
-    const look = comparedAnswer(ui)?.name ?? 'the answer (not shown)';
-    return html`<${TruncatedText} class="whose" text=${`of ${look}`} maxLength=${20} />`;
+    const look = comparedAnswer(ui)?.name ?? words.lightList.theAnswerNotShown;
+    return html`<${TruncatedText} class="whose" text=${fill(words.lightList.of, { look })} maxLength=${20} />`;
   }
   const lockedCount = lockedLights(ui).length;
   if (!hasHidden && lockedCount < 2) return null;
   if (!hasHidden) {
-    return html`<${Button} label="Unlock all" class="of-all" act=${() => app.session.unlockAll()}
-      tip=${`${lockedCount} lights are locked or off. Let the solve set them again.`} />`;
+    return html`<${Button} label=${words.lightList.unlockAll} class="of-all" act=${() => app.session.unlockAll()}
+      tip=${fill(words.lightList.lightsAreLockedOrOffLet, { lockedCount })} />`;
   }
-  return html`<${Button} label="Show all" class="of-all"
-    tip="Solo or mute hides some lights. The answer has them all."
+  return html`<${Button} label=${words.lightList.showAll} class="of-all"
+    tip=${words.lightList.soloOrMuteHidesSomeLights}
     act=${() => app.store.set({ solo: [], mute: [] })} />`;
 }
 
@@ -129,14 +131,14 @@ function Group({ name, ui, app, members, isMany }) {
       <button type="button" class="group-name" aria-expanded=${String(open)} data-tip=${name}
         onClick=${() => store.set({ open: { ...ui.open, [groupKey(name)]: !open } })}>
         <${Icon} name="fold" /><strong>${name}</strong>
-        <span class="faint">${countText(members.length, 'light')} · ${percentText(share)}</span></button>
-      <${Button} icon="select" class="letter" pressed=${areSelected} tip=${`Select ${name}`}
+        <span class="faint">${lightCountText(members.length)} · ${percentText(share)}</span></button>
+      <${Button} icon="select" class="letter" pressed=${areSelected} tip=${fill(words.lightList.select2, { name })}
         act=${() => toggleLights(store, members)} />
-      <${Button} label="S" class="letter" pressed=${isSolo} tip=${`Show ${name} alone`}
+      <${Button} label=${words.lightList.s} class="letter" pressed=${isSolo} tip=${fill(words.lightList.showAlone, { name })}
         act=${() => store.set({ solo: isSolo ? solo : [...solo, ...members] })} />
     </div>
     <div class="group-dimmer">
-      <${GroupDimmer} app=${app} lights=${members} label=${`${name}, dim`} isPlain />
+      <${GroupDimmer} app=${app} lights=${members} label=${fill(words.lightList.dim, { name })} isPlain />
       <span class="stops">${levelsText(ui, members)}</span>
     </div>
     ${open && members.map((k) => renderRow(ui, app, k, isMany))}

@@ -17,6 +17,7 @@ import {
   stopsOf,
 } from './level_field.js';
 import { Thumbnail } from './thumbnail.js';
+import { fill, words } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Light} Light */
 /** @typedef {import("./ui_state.js").LightAnswer} LightAnswer */
@@ -69,8 +70,8 @@ export class LightRow extends Component {
         <${Share} share=${this.props.answer?.share ?? 0} pointerShare=${pointerShare} />
         <${Badge} ...${this.props} />
         <button type="button" class="pick" role="checkbox" aria-checked=${String(isSelected)}
-          aria-label=${`Select ${light.label}`} onClick=${select}
-          data-tip="Select, for one action on several lights; with Shift all from the last one">${
+          aria-label=${fill(words.lightRow.select, { label: light.label })} onClick=${select}
+          data-tip=${words.lightRow.selectForOneActionOnSeveral}>${
             isSelected && html`<${Icon} name="check" />`
           }</button>
       </div>
@@ -102,20 +103,20 @@ export class LightRow extends Component {
     const isLocked = constraints.lock !== undefined || Boolean(constraints.off);
     const lock = () =>
       isLocked ? session.unlockLight(k) : session.lockLight(k, this.props.rgb, true);
-    return html`<span class="marks" role="group" aria-label="Display">
-      <${Button} label="S" class="letter" pressed=${isSolo} act=${() => toggleDisplay('solo', isSolo)}
-        tip=${`Solo: show ${light.label} alone. The answer does not change.`} />
-      <${Button} label="M" class="letter" pressed=${isMute} act=${() => toggleDisplay('mute', isMute)}
-        tip=${`Mute: show the picture without ${light.label}. The answer does not change.`} />
+    return html`<span class="marks" role="group" aria-label=${words.lightRow.display}>
+      <${Button} label=${words.lightRow.s} class="letter" pressed=${isSolo} act=${() => toggleDisplay('solo', isSolo)}
+        tip=${fill(words.lightRow.soloShowAloneTheAnswerDoes, { label: light.label })} />
+      <${Button} label=${words.lightRow.m} class="letter" pressed=${isMute} act=${() => toggleDisplay('mute', isMute)}
+        tip=${fill(words.lightRow.muteShowThePictureWithoutThe, { label: light.label })} />
     </span>
     ${
       !light.is_fixed &&
       html`<span class="marks is-solve" role="group"
-      aria-label="Solve">
+      aria-label=${words.lightRow.solve}>
       <${Button} icon="lock" pressed=${isLocked} act=${lock} tip=${
         isLocked
-          ? `Unlock ${light.label}: the solve sets it again`
-          : `Lock ${light.label} as it is in the answer`
+          ? fill(words.lightRow.unlockTheSolveSetsItAgain, { label: light.label })
+          : fill(words.lightRow.lockAsItIsInThe, { label: light.label })
       } />
     </span>`
     }`;
@@ -135,7 +136,7 @@ export class LightRow extends Component {
       <span class=${`dot ${level > 0 ? '' : 'is-off'}`} aria-hidden="true"
         style=${{ background: level > 0 ? toHex(atFullBrightness(rgb)) : 'none' }}></span>
       <span class="values" data-tip=${level > 0 ? fullText : undefined}
-        >${level > 0 ? value : 'off'}</span>
+        >${level > 0 ? value : words.lightRow.off}</span>
       <span class=${`error ${isLive ? 'is-old' : ''}`} aria-hidden=${isLive ? 'true' : undefined}
         >${level > 0 || !this.props.hasSlider ? error : ''}</span>
       ${!this.props.hasSlider && html`<span class="stops">${stopsText(stopsOf(rgb, light))}</span>`}
@@ -150,9 +151,9 @@ export class LightRow extends Component {
       app.session.lockLight(k, scaleToStops(this.dragStartColour, light, newStops), isFinal);
       if (isFinal) this.dragStartColour = null;
     };
-    const text = luminance(rgb) > 0 ? stopsText(stops) : 'off';
+    const text = luminance(rgb) > 0 ? stopsText(stops) : words.lightRow.off;
     return html`<div class=${`dimmer ${constraints?.lock !== undefined ? 'is-held' : ''}`}>
-      <${Slider} plain label=${`${light.label}, stops from now`} value=${clamp(stops)}
+      <${Slider} plain label=${fill(words.lightRow.stopsFromNow, { label: light.label })} value=${clamp(stops)}
         min=${DIMMER_MIN_STOPS} max=${DIMMER_MAX_STOPS} step=${0.05} resetValue=${0} text=${text}
         disabled=${Boolean(constraints?.off)} change=${move} />
       <${LevelField} light=${light} rgb=${rgb} disabled=${Boolean(constraints?.off)}
@@ -185,7 +186,7 @@ function Share({ share, pointerShare }) {
   const isAtPointer = pointerShare !== undefined;
   const value = isAtPointer ? pointerShare : share;
   return html`<span class=${`share ${isAtPointer ? 'is-here' : ''}`}
-    data-tip=${isAtPointer ? 'Share of the light here' : "Share of the picture's light"}>
+    data-tip=${isAtPointer ? words.lightRow.shareOfTheLightHere : words.lightRow.shareOfThePicturesLight}>
     <i style=${{ '--share': String(value) }}></i><span>${percentText(value)}</span></span>`;
 }
 
@@ -202,11 +203,11 @@ function Badge(props) {
     hasConstraint &&
     constraints.lock === undefined &&
     !constraints.off;
-  const words = remarks.map(([, text]) => `${text}.`);
-  if (isHeldBack) words.push('This keeps it from what the painting asks for.');
+  const sentences = remarks.map(([, text]) => `${text}.`);
+  if (isHeldBack) sentences.push(words.lightRow.thisKeepsItFromWhatThe);
   const moreText = remarks.length > 1 ? ` +${remarks.length - 1}` : '';
-  return html`<span class=${`badge ${isHeldBack ? 'is-back' : ''}`} data-tip=${words.join(' ')}
-    >${isHeldBack ? 'held back' : `${remarks[0][0]}${moreText}`}</span>`;
+  return html`<span class=${`badge ${isHeldBack ? 'is-back' : ''}`} data-tip=${sentences.join(' ')}
+    >${isHeldBack ? words.lightRow.heldBack : `${remarks[0][0]}${moreText}`}</span>`;
 }
 
 /** @param {import("./ui_state.js").UiStore} store @param {number} k */
@@ -227,15 +228,21 @@ const colourConstraint = ({ color, kelvin, primaries }) => color ?? kelvin ?? pr
 function listRemarks({ light, answer, constraints = {}, tie }) {
   /** @type {[unknown, string, string][]} */
   const remarks = [
-    [light.is_fixed, 'fixed', 'It stays as it is in the scene'],
-    [constraints.off, 'off', 'You switched it off'],
-    [constraints.lock !== undefined, 'locked', 'You locked it at this level'],
-    [constraints.limits, 'limits', 'You limited its level'],
-    [colourConstraint(constraints), 'colour', 'You limited its colour'],
-    [tie, 'tied', `It is tied to ${tie?.filter((name) => name !== light.name).join(', ')}`],
-    [answer?.is_unreached, 'unseen', 'None of its light reaches the picture'],
+    [light.is_fixed, words.lightRow.fixed, words.lightRow.itStaysAsItIsIn],
+    [constraints.off, words.lightRow.off, words.lightRow.youSwitchedItOff],
+    [constraints.lock !== undefined, words.lightRow.locked, words.lightRow.youLockedItAtThisLevel],
+    [constraints.limits, words.lightRow.limits, words.lightRow.youLimitedItsLevel],
+    [colourConstraint(constraints), words.lightRow.colour, words.lightRow.youLimitedItsColour],
+    [
+      tie,
+      words.lightRow.tied,
+      fill(words.lightRow.itIsTiedTo, {
+        value: tie?.filter((name) => name !== light.name).join(', '),
+      }),
+    ],
+    [answer?.is_unreached, words.lightRow.unseen, words.lightRow.noneOfItsLightReachesThe],
   ];
-  return remarks.filter(([applies]) => applies).map(([, ...words]) => words);
+  return remarks.filter(([applies]) => applies).map(([, ...texts]) => texts);
 }
 
 /** @param {number} stops */

@@ -2,6 +2,7 @@
 
 import { outputWeights } from './lamps/lamp_state.js';
 import { isElsewhere, weightsIn } from './look_comparison.js';
+import { fill, words } from '../language/language.js';
 
 /** @typedef {import("./engine_interface.js").RGB} RGB */
 /** @typedef {import("./ui_state.js").Ui} Ui */
@@ -93,8 +94,8 @@ const idOf = ({ id }) => id;
 /** @param {Look[]} looks */
 function unusedName(looks) {
   let count = looks.length + 1;
-  while (looks.some(({ name }) => name === `Look ${count}`)) count += 1;
-  return `Look ${count}`;
+  while (looks.some(({ name }) => name === fill(words.lookActions.look, { count }))) count += 1;
+  return fill(words.lookActions.look, { count });
 }
 
 /** @param {RGB[]} weights @param {RGB[]} otherWeights */

@@ -7,7 +7,7 @@ import { nameInView } from '../engine/message_frames.js';
 import { html, useEffect, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
 import { Button, Select, Slider } from './controls.js';
 import { currentLook, loadLook } from './look_actions.js';
-import { MOD } from './shortcuts.js';
+import { MOD } from './key_names.js';
 import {
   looksElsewhere,
   mixName,
@@ -18,6 +18,7 @@ import {
 } from './look_comparison.js';
 import { Thumbnail } from './thumbnail.js';
 import { updateDisplay } from './tools.js';
+import { fill, words } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./ui_state.js").Look} Look */
@@ -35,7 +36,7 @@ export function LookStrip({ ui, app }) {
   }, [looks.length, ui.ready]);
   const current = currentLook(ui);
   const kind = !looks.length ? 'is-empty' : ui.mix ? 'is-comparing' : '';
-  return html`<section class=${`looks ${kind}`} aria-label="Looks"><div class="looks-row">
+  return html`<section class=${`looks ${kind}`} aria-label=${words.lookStrip.looks}><div class="looks-row">
     ${
       looks.length > 0 &&
       html`<ul ref=${list}>${looks.map(
@@ -46,11 +47,11 @@ export function LookStrip({ ui, app }) {
     ${
       !looks.length &&
       ui.ready &&
-      html`<p class="faint">No looks yet: <kbd>${MOD} S</kbd> saves painting and answer as a look.</p>`
+      html`<p class="faint">${words.lookStrip.noLooksYet} <kbd>${fill(words.lookStrip.s, { MOD })}</kbd> ${words.lookStrip.savesPaintingAndAnswerAsA}</p>`
     }
     ${
       looks.length > 1 &&
-      html`<${Button} icon="sheet" class="all-looks" tip="All looks: pictures and lamps"
+      html`<${Button} icon="sheet" class="all-looks" tip=${words.lookStrip.allLooksPicturesAndLamps}
         act=${() => app.store.set({ dialog: 'looks' })} />`
     }
     ${looks.length > 1 && html`<${LookCrossfade} ui=${ui} app=${app} />`}
@@ -66,10 +67,12 @@ function LookItem({ look, isCurrent, ui, app }) {
     isConfirming ? session.send('drop_look', { look: look.id }) : setConfirming(true);
   const viewPicture = nameInView(look.thumbnail, ui.view);
   const picture = viewPicture in ui.resources ? viewPicture : look.thumbnail;
-  const tip = isCurrent ? 'Painting and answer equal this look' : 'Load this look. Undo goes back.';
+  const tip = isCurrent
+    ? words.lookStrip.paintingAndAnswerEqualThisLook
+    : words.lookStrip.loadThisLookUndoGoesBack;
   return html`<li class=${`look ${isCurrent ? 'is-current' : ''}`}
     onPointerLeave=${() => setConfirming(false)}>
-    <button type="button" class="look-picture" aria-label=${`Load ${look.name}`}
+    <button type="button" class="look-picture" aria-label=${fill(words.lookStrip.load, { name: look.name })}
       aria-current=${isCurrent ? 'true' : undefined} data-tip=${tip}
       onClick=${() => loadLook(app, look.id)}>
       <${Thumbnail} name=${picture} generation=${ui.resources[picture] ?? 0} app=${app} />
@@ -77,14 +80,14 @@ function LookItem({ look, isCurrent, ui, app }) {
     ${
       isNaming
         ? html`<${LookNameField} look=${look} app=${app} done=${() => setNaming(false)} />`
-        : html`<button type="button" class="look-name" data-tip=${`Rename ${look.name}`}
+        : html`<button type="button" class="look-name" data-tip=${fill(words.lookStrip.rename, { name: look.name })}
           onClick=${() => setNaming(true)}>${look.name}</button>`
     }
     <span class="look-tools">
-      <${Button} icon="copy" tip=${`Duplicate ${look.name}`}
+      <${Button} icon="copy" tip=${fill(words.lookStrip.duplicate, { name: look.name })}
         act=${() => session.send('copy_look', { look: look.id })} />
       <${Button} icon=${isConfirming ? 'check' : 'trash'} class=${isConfirming ? 'is-sure' : ''}
-        tip=${isConfirming ? `Delete ${look.name}: press again to confirm` : `Delete ${look.name}`} act=${drop} />
+        tip=${isConfirming ? fill(words.lookStrip.deletePressAgainToConfirm, { name: look.name }) : fill(words.lookStrip.delete, { name: look.name })} act=${drop} />
     </span>
   </li>`;
 }
@@ -102,7 +105,7 @@ function LookNameField({ look, app, done }) {
     if (event.key === 'Enter') commit();
     if (event.key === 'Escape') done();
   };
-  return html`<input class="naming" ref=${ref} type="text" aria-label=${`Name of ${look.name}`}
+  return html`<input class="naming" ref=${ref} type="text" aria-label=${fill(words.lookStrip.nameOf, { name: look.name })}
     defaultValue=${look.name} value=${look.name} maxlength="60" onBlur=${commit} onKeyDown=${press} />`;
 }
 
@@ -152,27 +155,27 @@ function LookCrossfade({ ui, app }) {
       part: comparison.share,
       name: mixName(ui.looks, comparison),
     });
-  return html`<div class="mix" role="group" aria-label="Compare two looks">
+  return html`<div class="mix" role="group" aria-label=${words.lookStrip.compareTwoLooks}>
     ${
       ui.mix &&
-      html`<${Select} label="First look" hidden value=${String(comparison.a)} choices=${choices}
-        tip=${`From ${describe(comparison.a)}`}
+      html`<${Select} label=${words.lookStrip.firstLook} hidden value=${String(comparison.a)} choices=${choices}
+        tip=${fill(words.lookStrip.from, { a: describe(comparison.a) })}
         change=${(/** @type {string} */ id) => set({ a: Number(id) })} />
-      <${Slider} label="Crossfade" value=${100 * comparison.share} min=${0} max=${100} unit="%"
-        tip=${`Crossfade from ${nameOf(comparison.a)} to ${nameOf(comparison.b)}`}
+      <${Slider} label=${words.lookStrip.crossfade} value=${100 * comparison.share} min=${0} max=${100} unit="%"
+        tip=${fill(words.lookStrip.crossfadeFromTo, { a: nameOf(comparison.a), b: nameOf(comparison.b) })}
         change=${(/** @type {number} */ share) => set({ share: share / 100 })} />
-      <${Select} label="Second look" hidden value=${String(comparison.b)} choices=${choices}
-        tip=${`To ${describe(comparison.b)}`}
+      <${Select} label=${words.lookStrip.secondLook} hidden value=${String(comparison.b)} choices=${choices}
+        tip=${fill(words.lookStrip.to, { b: describe(comparison.b) })}
         change=${(/** @type {string} */ id) => set({ b: Number(id) })} />
       ${
         refusal
-          ? html`<span class="faint keep" tabindex="0" data-tip=${refusal}>Places differ</span>`
-          : html`<${Button} icon="plus" label="Save as look" class="keep" act=${keep}
-        tip=${`Save ${mixName(ui.looks, comparison)}`} />`
+          ? html`<span class="faint keep" tabindex="0" data-tip=${refusal}>${words.lookStrip.placesDiffer}</span>`
+          : html`<${Button} icon="plus" label=${words.lookStrip.saveAsLook} class="keep" act=${keep}
+        tip=${fill(words.lookStrip.save, { looks: mixName(ui.looks, comparison) })} />`
       }`
     }
-    <${Button} icon="side" label=${ui.mix ? 'Back to the painting' : 'Compare looks'} class="compare"
-      tip=${ui.mix ? 'Show painting and answer again' : 'Two looks side by side, and a crossfade between them'}
+    <${Button} icon="side" label=${ui.mix ? words.lookStrip.backToThePainting : words.lookStrip.compareLooks} class="compare"
+      tip=${ui.mix ? words.lookStrip.showPaintingAndAnswerAgain : words.lookStrip.twoLooksSideBySideAnd}
       pressed=${Boolean(ui.mix)} act=${() => (ui.mix ? store.set(resetMix) : set({}))} />
   </div>`;
 }

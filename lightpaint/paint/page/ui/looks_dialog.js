@@ -6,21 +6,22 @@ import { Button, Choice, Dialog, Select } from './controls.js';
 import { LampTable } from './lamp_table.js';
 import { currentLook, loadLook } from './look_actions.js';
 import { Thumbnail } from './thumbnail.js';
+import { fill, words } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./ui_state.js").Look} Look */
 /** @typedef {import("./shortcuts.js").App} App */
 
 const PARTS = [
-  { value: 'pictures', label: 'Pictures' },
-  { value: 'lamps', label: 'Lamps' },
+  { value: 'pictures', label: words.looksDialog.pictures },
+  { value: 'lamps', label: words.looksDialog.lamps },
 ];
 
 /** @param {{ui: Ui, app: App, close: () => void}} props */
 export function LooksDialog({ ui, app, close }) {
   const [part, setPart] = useState('pictures');
-  return html`<${Dialog} title="Looks" close=${close} class="looks-dialog">
-    <${Choice} label="What to show of the looks" value=${part} choices=${PARTS} change=${setPart} />
+  return html`<${Dialog} title=${words.looksDialog.looks} close=${close} class="looks-dialog">
+    <${Choice} label=${words.looksDialog.whatToShowOfTheLooks} value=${part} choices=${PARTS} change=${setPart} />
     ${
       part === 'pictures'
         ? html`<${ContactSheet} ui=${ui} app=${app} close=${close} />`
@@ -45,13 +46,13 @@ function ContactSheet({ ui, app, close }) {
       ${ui.looks.map((look) => {
         const picture = pictureOf(look);
         return html`<li key=${look.id}><button type="button" onClick=${() => load(look.id)}
-          aria-current=${look.id === current ? 'true' : undefined} aria-label=${`Load ${look.name}`}>
+          aria-current=${look.id === current ? 'true' : undefined} aria-label=${fill(words.looksDialog.load, { name: look.name })}>
           <${Thumbnail} name=${picture} generation=${ui.resources[picture] ?? 0} app=${app} />
           <span>${look.name}</span></button></li>`;
       })}
     </ul>
     <div class="row"><span class="spring"></span>
-      <${Button} icon="export" label="Save as a picture"
+      <${Button} icon="export" label=${words.looksDialog.saveAsAPicture}
         act=${() => sheet.current && saveSheet(sheet.current, ui.looks)} /></div>`;
 }
 
@@ -97,10 +98,11 @@ function LampComparison({ ui }) {
   const choices = looks.map(({ id, name }) => ({ value: String(id), label: name }));
   const choose = (/** @type {number} */ which) => (/** @type {string} */ id) =>
     setIds(ids.map((other, k) => (k === which ? Number(id) : other)));
-  if (!first || !second) return html`<p class="faint">Save two looks to compare their lamps.</p>`;
+  if (!first || !second)
+    return html`<p class="faint">${words.looksDialog.saveTwoLooksToCompareTheir}</p>`;
   return html`<div class="row compared">
-      <${Select} label="Lamps of" value=${String(first.id)} choices=${choices} change=${choose(0)} />
-      <${Select} label="against" value=${String(second.id)} choices=${choices} change=${choose(1)} />
+      <${Select} label=${words.looksDialog.lampsOf} value=${String(first.id)} choices=${choices} change=${choose(0)} />
+      <${Select} label=${words.looksDialog.against} value=${String(second.id)} choices=${choices} change=${choose(1)} />
     </div>
     <${LampTable} ui=${ui} first=${first} second=${second} />`;
 }

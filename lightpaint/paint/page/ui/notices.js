@@ -2,36 +2,34 @@
 
 import { html, useEffect, useRef, useState } from '../vendor/preact.js';
 import { Button } from './controls.js';
-import { countText, progressText } from './format.js';
+import { progressText } from './format.js';
 import { Icon } from './icons.js';
+import { keysText } from './key_names.js';
 import { ProgressBar } from './progress_bar.js';
+import { fill, fillCount, words } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
 
 /** @param {{ui: Ui, app: App}} props */
 export function Toasts({ ui, app }) {
-  return html`<div class="toasts" role="log" aria-live="polite" aria-label="Messages">
+  return html`<div class="toasts" role="log" aria-live="polite" aria-label=${words.notices.messages}>
     ${ui.toasts.map(
       ({ id, text, tone }) => html`<div class=${`toast is-${tone}`} key=${id}>
       ${tone === 'warn' && html`<${Icon} name="warn" />`}<span>${text}</span>
-      <${Button} icon="close" tip="Dismiss" act=${() => app.session.dismiss(id)} /></div>`,
+      <${Button} icon="close" tip=${words.notices.dismiss} act=${() => app.session.dismiss(id)} /></div>`,
     )}
   </div>`;
 }
 
-const SILENT_TEXT =
-  'The kernel has not answered for 10 s. If it is busy, your strokes arrive when it is free. If it was restarted, run the cell again.';
+const SILENT_TEXT = words.notices.theKernelHasNotAnsweredFor;
 
-const LOST_TEXT =
-  'The connection is lost; reconnecting … Finished strokes are kept. What you paint now is sent if the same painter comes back.';
+const LOST_TEXT = words.notices.theConnectionIsLostReconnecting;
 
 /** @param {number} lostStrokes */
 function staleText(lostStrokes) {
-  const lossText = lostStrokes
-    ? ` ${countText(lostStrokes, 'stroke')} painted here could not be sent, and ${lostStrokes === 1 ? 'is' : 'are'} lost.`
-    : '';
-  return `This page belongs to a painter that has ended. Open the address that the terminal shows now.${lossText}`;
+  const loss = lostStrokes ? ` ${fillCount(words.notices.lostStrokes, lostStrokes)}` : '';
+  return words.notices.thisPageBelongsToAPainter + loss;
 }
 
 /** A banner over the pictures; centred if there are none. @param {{ui: Ui, app: App}} props */
@@ -53,11 +51,11 @@ export function Banner({ ui, app }) {
 function ReconnectButton({ ui, app }) {
   const reason = ui.closure?.reason;
   if (reason === 'taken') {
-    return html`<${Button} label="Take over" primary tip="Continue here instead of in the other tab"
+    return html`<${Button} label=${words.notices.takeOver} primary tip=${words.notices.continueHereInsteadOfInThe}
       act=${() => app.session.send('take_over')} />`;
   }
   if (reason !== 'version') return null;
-  return html`<${Button} label="Reload the page" primary act=${() => location.reload()} />`;
+  return html`<${Button} label=${words.notices.reloadThePage} primary act=${() => location.reload()} />`;
 }
 
 /**
@@ -75,7 +73,7 @@ export function RunningTasks({ ui, app }) {
       ${
         stop &&
         html`<${Button} icon=${stopText ? undefined : 'close'} label=${stopText}
-        tip=${stopTip ?? `Stop: ${name.toLowerCase()}`} act=${stop} />`
+        tip=${stopTip ?? fill(words.notices.stop, { value: name.toLowerCase() })} act=${stop} />`
       }</div>`;
   })}`;
 }
@@ -94,32 +92,36 @@ function runningTasks(ui, { session }) {
   const tasks = [];
   if ((ui.isExporting || exportProgress) && ui.dialog !== 'export')
     tasks.push({
-      name: 'Exporting files',
+      name: words.notices.exportingFiles,
       progress: exportProgress ?? unknownProgress,
       stop: () => void session.exportFiles([]),
     });
   if (verificationProgress && !isOpen)
     tasks.push({
-      name: 'Verifying',
+      name: words.notices.verifying,
       progress: verificationProgress,
       stop: () => void session.verify(false),
     });
   if (ui.placementProgress)
     tasks.push({
-      name: 'Searching for places',
+      name: words.notices.searchingForPlaces,
       progress: ui.placementProgress,
-      stopText: 'Stop, move nothing',
-      stopTip: 'Stop the search: every light stays where it is',
+      stopText: words.notices.stopMoveNothing,
+      stopTip: words.notices.stopTheSearchEveryLightStays,
       stop: () => void session.placeLights(false),
     });
   if (ui.isExplaining && !isOpen)
-    tasks.push({ name: 'Finding reasons', progress: unknownProgress });
+    tasks.push({ name: words.notices.findingReasons, progress: unknownProgress });
   if (basis)
-    tasks.push({ name: 'Rendering the lights', progress: basis, text: 'You can paint already.' });
+    tasks.push({
+      name: words.notices.renderingTheLights,
+      progress: basis,
+      text: words.notices.youCanPaintAlready,
+    });
   else if (loadProgress && loadProgress.done < loadProgress.total)
-    tasks.push({ name: 'Loading the images of the lights', progress: loadProgress });
+    tasks.push({ name: words.notices.loadingTheImagesOfTheLights, progress: loadProgress });
   else if (ui.samplingProgress)
-    tasks.push({ name: 'Adding samples where you painted', progress: ui.samplingProgress });
+    tasks.push({ name: words.notices.addingSamplesWhereYouPainted, progress: ui.samplingProgress });
   return tasks;
 }
 
@@ -161,7 +163,7 @@ export function Tips({ root }) {
   if (!tip) return null;
   return html`<div class=${`tip ${tip.isAbove ? 'is-above' : ''}`} ref=${ref} aria-hidden="true"
     style=${{ left: `${tip.x}px`, top: `${tip.y}px` }}><span>${tip.text}</span>
-    ${tip.keys && html`<kbd>${tip.keys.replace('Control', 'Ctrl').replaceAll('+', ' ')}</kbd>`}</div>`;
+    ${tip.keys && html`<kbd>${keysText(tip.keys)}</kbd>`}</div>`;
 }
 
 /** @param {HTMLElement} owner @param {HTMLElement} root */

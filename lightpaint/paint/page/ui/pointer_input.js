@@ -6,6 +6,7 @@
 
 import { SelectDrag } from './selection/select_drag.js';
 import { updateDisplay, rememberPaint, pickPaint } from './tools.js';
+import { words } from '../language/language.js';
 
 /** @typedef {import("./engine_interface.js").Engine} Engine */
 /** @typedef {import("./engine_interface.js").Point} Point */
@@ -148,8 +149,8 @@ export class Pointer {
     const { mix, display } = this.store.value;
     const { left, right } = display;
     const isShown = left === 'painting' || right === 'painting';
-    const remedy = mix ? 'press Back to the painting' : 'compare Painting | Answer';
-    if (!isShown) this.say(`The painting is not shown: ${remedy} to paint.`);
+    if (!isShown)
+      this.say(mix ? words.pointerInput.hiddenByLooks : words.pointerInput.hiddenByOthers);
     return isShown;
   }
 
@@ -163,10 +164,7 @@ export class Pointer {
     if (tool === 'pick')
       return pickPaint(this.store, this.engine.paintAt(pane.kind, point.x, point.y));
     if (tool === 'select') return this.selecting.press({ ...point, kind: pane.kind }, isLine);
-    if (tool === 'adjust')
-      return this.say(
-        'Adjust needs a drag. To type values instead, press By numbers above the pictures.',
-      );
+    if (tool === 'adjust') return this.say(words.pointerInput.adjustNeedsADragToType);
     if (!this.canPaint()) return;
     rememberPaint(this.store);
     this.store.set({ hint: false });
@@ -184,7 +182,7 @@ export class Pointer {
     const { gradientStart } = this;
     this.gradientStart = gradientStart ? null : point;
     if (gradientStart) this.engine.line(gradientStart, point);
-    else this.say('It begins here. Move to where it ends, and press Enter again.');
+    else this.say(words.pointerInput.itBeginsHereMoveToWhere);
   }
 
   /** Handle a second finger: cancel what the first began, or end it if it is a stroke already.

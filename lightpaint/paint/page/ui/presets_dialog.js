@@ -3,6 +3,7 @@
 import { html, useState } from '../vendor/preact.js';
 import { Button, Dialog, Select } from './controls.js';
 import { Thumbnail } from './thumbnail.js';
+import { words } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
@@ -15,7 +16,7 @@ export function PresetsDialog({ ui, app, close }) {
   const [subject, setSubject] = useState(CENTRAL);
   const objects = [...new Set(/** @type {string[]} */ (ui.state?.objects ?? []))];
   const choices = [
-    { value: CENTRAL, label: 'The most central object' },
+    { value: CENTRAL, label: words.presetsDialog.theMostCentralObject },
     ...objects.map((name) => ({ value: name, label: name })),
   ];
   const apply = (/** @type {string} */ preset, /** @type {boolean} */ hasSubject) => {
@@ -27,13 +28,12 @@ export function PresetsDialog({ ui, app, close }) {
       subject: hasSubject && subject !== CENTRAL ? subject : null,
     });
   };
-  return html`<${Dialog} title="Presets" close=${close} class="looks-dialog">
-    <p>A preset asks for light, and the lamps come as close as they can. It becomes a group of layers,
-      whose strength you can change later.</p>
+  return html`<${Dialog} title=${words.presetsDialog.presets} close=${close} class="looks-dialog">
+    <p>${words.presetsDialog.aPresetAsksForLightAnd}</p>
     ${
       objects.length > 0 &&
-      html`<div class="row"><${Select} label="Subject" value=${subject} choices=${choices}
-        tip="For presets about one object" change=${setSubject} /></div>`
+      html`<div class="row"><${Select} label=${words.presetsDialog.subject} value=${subject} choices=${choices}
+        tip=${words.presetsDialog.forPresetsAboutOneObject} change=${setSubject} /></div>`
     }
     <ul class="sheet">${(ui.state?.presets ?? []).map(
       (/** @type {import("../engine/messages.js").PresetInfo} */ preset) => html`
@@ -48,6 +48,6 @@ export function PresetsDialog({ ui, app, close }) {
 
 /** @param {{app: App}} props */
 export function PresetsButton({ app }) {
-  return html`<${Button} label="Presets" class="in-head" tip="Moonlight, noir, gallery and others"
+  return html`<${Button} label=${words.presetsDialog.presets} class="in-head" tip=${words.presetsDialog.moonlightNoirGalleryAndOthers}
     act=${() => app.store.set({ dialog: 'presets' })} />`;
 }

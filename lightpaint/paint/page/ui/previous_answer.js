@@ -2,6 +2,7 @@
 
 import { html, useEffect } from '../vendor/preact.js';
 import { Icon } from './icons.js';
+import { words } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./engine_interface.js").RGB} RGB */
@@ -52,7 +53,7 @@ export function PreviousButton({ ui, app }) {
     void showPrevious(app);
   };
   return html`<button type="button" class=${`button is-icon previous ${ui.isPreviousHeld ? 'is-on' : ''}`}
-    disabled=${!ui.history.undo.length} aria-label="Hold: the answer before the last step"
-    aria-keyshortcuts="Q" data-tip="Hold: the answer before the last step" data-keys="Q"
+    disabled=${!ui.history.undo.length} aria-label=${words.previousAnswer.holdTheAnswerBeforeTheLast}
+    aria-keyshortcuts="Q" data-tip=${words.previousAnswer.holdTheAnswerBeforeTheLast} data-keys="Q"
     onPointerDown=${() => showPrevious(app)} onKeyDown=${press}><${Icon} name="previous" /></button>`;
 }

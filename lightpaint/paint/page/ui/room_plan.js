@@ -6,6 +6,7 @@ import { MoveButton } from './advice.js';
 import { dot, subtract, add, normalize } from './lamp_geometry.js';
 import { placeOf } from './lamp_marks.js';
 import { atFullBrightness, luminance, toHex } from './paint_colour.js';
+import { words } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
@@ -80,7 +81,7 @@ export function RoomPlan({ ui, app }) {
   const frame = useRef(/** @type {SVGElement | null} */ (null));
   const draggedLight = useRef(/** @type {number | null} */ (null));
   const plan = planOf(ui);
-  if (!plan || !ui.rig) return html`<p class="faint">Loading the scene …</p>`;
+  if (!plan || !ui.rig) return html`<p class="faint">${words.roomPlan.loadingTheScene}</p>`;
   const { rig } = ui;
   const [a, b] = [0, 1, 2].filter((axis) => axis !== rig.up);
   const corner = (/** @type {number} */ x, /** @type {number} */ z) => {
@@ -127,7 +128,7 @@ export function RoomPlan({ ui, app }) {
   };
   return html`<div class="room-plan">
     <svg ref=${frame} viewBox=${`0 0 ${WIDTH} ${HEIGHT}`} role="group"
-      aria-label="Plan of the room from above" class=${isHanging ? 'is-pointing' : ''}
+      aria-label=${words.roomPlan.planOfTheRoomFromAbove} class=${isHanging ? 'is-pointing' : ''}
       onPointerDown=${hang} onPointerMove=${(/** @type {any} */ e) => dragLight(e, false)}
       onPointerUp=${endDrag} onPointerCancel=${endDrag}>
       <polygon class="room" points=${outline} />

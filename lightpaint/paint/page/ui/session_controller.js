@@ -4,6 +4,7 @@ import { LampMoves } from './lamp_moves.js';
 import { ManyLights } from './lamps/many_lights.js';
 import { SessionLink } from './session_link.js';
 import { lockedLights, lockingLight } from './tied_lights.js';
+import { fill, words } from '../language/language.js';
 
 /** @typedef {import("./engine_interface.js").Requests} Requests */
 /** @typedef {import("./engine_interface.js").RGB} RGB */
@@ -95,7 +96,10 @@ export class SessionController extends SessionLink {
   /** Unlock all lights in one step, and restore their earlier constraints. */
   unlockAll() {
     const lights = lockedLights(this.store.value);
-    return this.unlockLights(lights, `unlock ${lights.length} lights`);
+    return this.unlockLights(
+      lights,
+      fill(words.sessionController.unlockLights, { count: lights.length }),
+    );
   }
 
   /** @param {number[]} lockedIndices of lights that are locked or off @param {string} label */

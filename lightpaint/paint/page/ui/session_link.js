@@ -13,6 +13,7 @@ import {
 } from './state_updates.js';
 import { relativePath } from './format.js';
 import { updateDisplay } from './tools.js';
+import { fill, words } from '../language/language.js';
 
 /** @typedef {import("./engine_interface.js").Host} Host */
 /** @typedef {import("./engine_interface.js").Message} Message */
@@ -119,7 +120,8 @@ export class SessionLink {
       }),
       answer: (/** @type {HostEvents['answer']} */ m) => answerUpdate(m, this.store.value),
       patch: (/** @type {HostEvents['patch']} */ m) => answerUpdate(m, this.store.value),
-      selected: (/** @type {HostEvents['selected']} */ m) => (m.history ? { history: m.history } : {}),
+      selected: (/** @type {HostEvents['selected']} */ m) =>
+        m.history ? { history: m.history } : {},
       renewed: (/** @type {HostEvents['renewed']} */ m) => ({
         resources: { ...this.store.value.resources, ...m.resources },
       }),
@@ -145,8 +147,7 @@ export class SessionLink {
       silence: (/** @type {HostEvents['silence']} */ m) => ({ isSilent: m.isSilent }),
     })[message.kind]?.(message);
     for (const key of CONFIRMED_KEYS)
-      if (changes?.[key] !== undefined)
-        Object.assign(this.confirmedState, { [key]: changes[key] });
+      if (changes?.[key] !== undefined) Object.assign(this.confirmedState, { [key]: changes[key] });
     if (changes?.weights) changes.weights = this.applyMoves(changes.weights);
     if (changes?.master !== undefined) changes.master = this.masterInHand ?? changes.master;
     if (changes) this.store.set(changes);
@@ -244,6 +245,8 @@ export class SessionLink {
 
 /** Return a sentence on the exported files. @param {string[]} names @param {boolean} isStopped */
 function exportText(names, isStopped) {
-  const sentence = names.length ? `Exported ${names.join(', ')}.` : 'Nothing was exported.';
-  return isStopped ? `Stopped. ${sentence}` : sentence;
+  const sentence = names.length
+    ? fill(words.sessionLink.exported, { value: names.join(', ') })
+    : words.sessionLink.nothingWasExported;
+  return isStopped ? fill(words.sessionLink.stopped, { sentence }) : sentence;
 }

@@ -3,55 +3,96 @@
  * the effect of each.
  */
 
-import { html, useLayoutEffect, useRef } from '../vendor/preact.js';
-import { Button, Choice, NumberField, useId } from './controls.js';
+import { html, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
+import { Button, Choice, NumberField, Select, useId } from './controls.js';
 import { numberText } from './format.js';
+import { fill, words, language, languageChoices, storeLanguage } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
 
-const AUTOMATIC_TIP = 'The best choice for a painting made here';
+const AUTOMATIC_TIP = words.settingsPanel.theBestChoiceForAPainting;
 
 const SPACES = [
-  { value: null, label: 'Automatic', tip: AUTOMATIC_TIP },
-  { value: 'display', label: 'Display', tip: 'Differences as the eye sees them on a display' },
-  { value: 'linear', label: 'Linear', tip: 'Differences in linear light: bright areas count most' },
+  { value: null, label: words.settingsPanel.automatic, tip: AUTOMATIC_TIP },
+  {
+    value: 'display',
+    label: words.settingsPanel.display,
+    tip: words.settingsPanel.differencesAsTheEyeSeesThem,
+  },
+  {
+    value: 'linear',
+    label: words.settingsPanel.linear,
+    tip: words.settingsPanel.differencesInLinearLightBright,
+  },
 ];
 const COLOURS = [
-  { value: null, label: 'Automatic', tip: AUTOMATIC_TIP },
-  { value: 'free', label: 'Free', tip: 'Any colour' },
-  { value: 'gentle', label: 'Gentle', tip: 'Their own, unless the paint asks for another' },
-  { value: 'white', label: 'White', tip: 'Whites from 2200 to 9000 K' },
+  { value: null, label: words.settingsPanel.automatic, tip: AUTOMATIC_TIP },
+  { value: 'free', label: words.settingsPanel.free, tip: words.settingsPanel.anyColour },
+  {
+    value: 'gentle',
+    label: words.settingsPanel.gentle,
+    tip: words.settingsPanel.theirOwnUnlessThePaintAsks,
+  },
+  {
+    value: 'white',
+    label: words.settingsPanel.white,
+    tip: words.settingsPanel.whitesFrom2200To9000K,
+  },
 ];
 const HOLDS = [
-  { value: 'auto', label: 'Automatic', tip: AUTOMATIC_TIP },
-  { value: 'hold', label: 'Hold', tip: 'They stay near their current look' },
-  { value: 'go', label: 'Ignore', tip: 'They may change freely: only the paint counts' },
+  { value: 'auto', label: words.settingsPanel.automatic, tip: AUTOMATIC_TIP },
+  {
+    value: 'hold',
+    label: words.settingsPanel.hold,
+    tip: words.settingsPanel.theyStayNearTheirCurrentLook,
+  },
+  {
+    value: 'go',
+    label: words.settingsPanel.ignore,
+    tip: words.settingsPanel.theyMayChangeFreelyOnlyThe,
+  },
 ];
 const PAINT_READINGS = [
-  { value: false, label: 'Sketch', tip: 'Strokes show what should change' },
-  { value: true, label: 'Literal', tip: 'Each stroke is the exact light you want' },
+  {
+    value: false,
+    label: words.settingsPanel.sketch,
+    tip: words.settingsPanel.strokesShowWhatShouldChange,
+  },
+  {
+    value: true,
+    label: words.settingsPanel.literal,
+    tip: words.settingsPanel.eachStrokeIsTheExactLight,
+  },
 ];
 const THEMES = [
-  { value: 'system', label: 'System', tip: 'As the system, or the notebook around it' },
-  { value: 'dark', label: 'Dark' },
-  { value: 'light', label: 'Light' },
+  {
+    value: 'system',
+    label: words.settingsPanel.system,
+    tip: words.settingsPanel.asTheSystemOrTheNotebook,
+  },
+  { value: 'dark', label: words.settingsPanel.dark },
+  { value: 'light', label: words.settingsPanel.light },
 ];
 const MINOR_LIGHTS = [
-  { value: false, label: 'May change', tip: 'Every change that brings the answer closer' },
-  { value: true, label: 'Stay', tip: 'As they are now, unless a change helps much' },
+  {
+    value: false,
+    label: words.settingsPanel.mayChange,
+    tip: words.settingsPanel.everyChangeThatBringsTheAnswer,
+  },
+  { value: true, label: words.settingsPanel.stay, tip: words.settingsPanel.asTheyAreNowUnlessA },
 ];
 
 /** Short explanations of the choices. @type {Record<string, Record<string, string>>} */
 const DESCRIPTIONS = {
   space: {
-    display: 'differences as the eye sees them on a display',
-    linear: 'differences in linear light, where bright areas count most',
+    display: words.settingsPanel.differencesAsTheEyeSeesThem2,
+    linear: words.settingsPanel.differencesInLinearLightWhere,
   },
   colors: {
-    free: 'any colour',
-    gentle: 'their own, unless the paint asks for another',
-    white: 'whites from 2200 to 9000 K',
+    free: words.settingsPanel.anyColour2,
+    gentle: words.settingsPanel.theirOwnUnlessThePaintAsks2,
+    white: words.settingsPanel.whitesFrom2200To9000K2,
   },
 };
 
@@ -71,65 +112,76 @@ export function SettingsPanel({ ui, app }) {
   const pull = settings.prefer_current || null;
   return html`<${Panel} labelledby=${id} close=${close}>
     <div class="panel-head">
-      <h2 id=${id}>Solve settings</h2>
-      <${Button} icon="close" tip="Close" keys="Escape" act=${close} />
+      <h2 id=${id}>${words.settingsPanel.solveSettings}</h2>
+      <${Button} icon="close" tip=${words.settingsPanel.close} keys="Escape" act=${close} />
     </div>
-    <${Row} title="Unpainted parts" description=${describeSource(hold === null, describeHold(effectiveSettings.hold))}>
-      <${Choice} label="Unpainted parts" value=${mode} choices=${HOLDS}
+    <${Row} title=${words.settingsPanel.unpaintedParts} description=${describeSource(hold === null, describeHold(effectiveSettings.hold))}>
+      <${Choice} label=${words.settingsPanel.unpaintedParts} value=${mode} choices=${HOLDS}
         change=${(/** @type {string} */ newMode) => set('hold')({ auto: null, hold: hold || DEFAULT_HOLD, go: 0 }[newMode])} />
       ${
         mode === 'hold' &&
-        html`<${NumberField} label="Strength" value=${hold} min=${0.01} max=${100} step=${0.1}
-        unit="×" tip="1: they count as much as all paint together. 3 is the usual value."
+        html`<${NumberField} label=${words.settingsPanel.strength} value=${hold} min=${0.01} max=${100} step=${0.1}
+        unit="×" tip=${words.settingsPanel.n1TheyCountAsMuchAs}
         change=${set('hold')} />`
       }
     </${Row}>
-    <${Row} title="Colour space of the match" description=${describeSource(!settings.space, DESCRIPTIONS.space[effectiveSettings.space])}>
-      <${Choice} label="Colour space of the match" value=${settings.space ?? null} choices=${SPACES}
+    <${Row} title=${words.settingsPanel.colourSpaceOfTheMatch} description=${describeSource(!settings.space, DESCRIPTIONS.space[effectiveSettings.space])}>
+      <${Choice} label=${words.settingsPanel.colourSpaceOfTheMatch} value=${settings.space ?? null} choices=${SPACES}
         change=${set('space')} /></${Row}>
-    <${Row} title="Light colours"
+    <${Row} title=${words.settingsPanel.lightColours}
       description=${describeSource(!settings.colors, DESCRIPTIONS.colors[effectiveSettings.colors])}>
-      <${Choice} label="Light colours" value=${settings.colors ?? null}
+      <${Choice} label=${words.settingsPanel.lightColours} value=${settings.colors ?? null}
         choices=${COLOURS} change=${set('colors')} /></${Row}>
-    <${Row} title="Read the paint as" description=${
+    <${Row} title=${words.settingsPanel.readThePaintAs} description=${
       settings.literal
-        ? 'Every stroke is exact: linear light, nothing held, any colour, unless set otherwise above'
-        : 'Strokes show what should change; the rest of the picture counts, too'
+        ? words.settingsPanel.everyStrokeIsExactLinearLight
+        : words.settingsPanel.strokesShowWhatShouldChangeThe
     }>
-      <${Choice} label="Read the paint as" value=${Boolean(settings.literal)} choices=${PAINT_READINGS}
+      <${Choice} label=${words.settingsPanel.readThePaintAs} value=${Boolean(settings.literal)} choices=${PAINT_READINGS}
         change=${set('literal')} /></${Row}>
-    <${Row} title="Lights that make little difference" description=${
-      pull ? 'They stay as they are now' : 'They may change, too'
+    <${Row} title=${words.settingsPanel.lightsThatMakeLittleDifference} description=${
+      pull ? words.settingsPanel.theyStayAsTheyAreNow : words.settingsPanel.theyMayChangeToo
     }>
-      <${Choice} label="Lights that make little difference" value=${pull !== null} choices=${MINOR_LIGHTS}
+      <${Choice} label=${words.settingsPanel.lightsThatMakeLittleDifference} value=${pull !== null} choices=${MINOR_LIGHTS}
         change=${(/** @type {boolean} */ isPulled) =>
           set('prefer_current')(isPulled ? (pull ?? DEFAULT_PREFER_CURRENT) : null)} />
       ${
         pull !== null &&
-        html`<${NumberField} label="Pull" value=${pull} min=${0.001} max=${10} step=${0.01}
-        digits=${3} tip="0.01: only where the paint leaves it open. 1: unless a change helps very much."
+        html`<${NumberField} label=${words.settingsPanel.pull} value=${pull} min=${0.001} max=${10} step=${0.01}
+        digits=${3} tip=${words.settingsPanel.n001OnlyWhereThePaint}
         change=${set('prefer_current')} />`
       }
     </${Row}>
-    <${Row} title="Number of lights" description=${
+    <${Row} title=${words.settingsPanel.numberOfLights} description=${
       settings.sparse
-        ? 'The most useful ones, besides locked lights; the others are off'
-        : 'No limit'
+        ? words.settingsPanel.theMostUsefulOnesBesidesLocked
+        : words.settingsPanel.noLimit
     }>
-      <${NumberField} label="At most" value=${settings.sparse ?? null} min=${1} digits=${0}
-        max=${ui.lights.length || 1} placeholder="all" unit="lights"
-        tip="Empty: no limit" change=${set('sparse')} /></${Row}>
+      <${NumberField} label=${words.settingsPanel.atMost} value=${settings.sparse ?? null} min=${1} digits=${0}
+        max=${ui.lights.length || 1} placeholder=${words.settingsPanel.all} unit=${words.settingsPanel.lights}
+        tip=${words.settingsPanel.emptyNoLimit} change=${set('sparse')} /></${Row}>
     <${PageSettings} ui=${ui} app=${app} />
   </${Panel}>`;
 }
 
 /** Settings of this page that change no answer. @param {{ui: Ui, app: App}} props */
 function PageSettings({ ui, app }) {
-  return html`<div class="panel-head is-page"><h2>This page</h2></div>
-    <${Row} title="Theme" description="The grey around the pictures is the same in both">
-      <${Choice} label="Theme" value=${ui.theme} choices=${THEMES}
+  const [nextLanguage, setNextLanguage] = useState(language);
+  const chooseLanguage = (/** @type {string} */ code) => {
+    storeLanguage(code);
+    setNextLanguage(code);
+  };
+  return html`<div class="panel-head is-page"><h2>${words.settingsPanel.thisPage}</h2></div>
+    <${Row} title=${words.settingsPanel.theme} description=${words.settingsPanel.theGreyAroundThePicturesIs}>
+      <${Choice} label=${words.settingsPanel.theme} value=${ui.theme} choices=${THEMES}
         change=${(/** @type {import("./theme.js").Theme} */ theme) => app.store.set({ theme })} />
-    </${Row}>`;
+    </${Row}>
+    ${
+      languageChoices.length > 1 &&
+      html`<${Row} title=${words.settingsPanel.language} description=${words.settingsPanel.whenThePageOpensNext}>
+        <${Select} label=${words.settingsPanel.language} hidden value=${nextLanguage}
+          choices=${languageChoices} change=${chooseLanguage} /></${Row}>`
+    }`;
 }
 
 /**
@@ -167,13 +219,18 @@ function Row({ title, description, children }) {
 /** The current value, and whether it follows from the painting. @param {boolean} isAuto
  * @param {string | undefined} text */
 function describeSource(isAuto, text = '') {
-  return isAuto && text ? `Now: ${text}` : text.charAt(0).toUpperCase() + text.slice(1);
+  return isAuto && text
+    ? fill(words.settingsPanel.now, { text })
+    : text.charAt(0).toUpperCase() + text.slice(1);
 }
 
 /** The setting for unpainted parts. @param {number | null | undefined} hold */
 function describeHold(hold) {
   if (hold === undefined || hold === null) return '';
-  if (!hold) return 'free to change';
-  const weight = hold === 1 ? 'the same weight as' : `${numberText(hold)} times the weight of`;
-  return `held near their current look, with ${weight} the paint`;
+  if (!hold) return words.settingsPanel.freeToChange;
+  const weight =
+    hold === 1
+      ? words.settingsPanel.theSameWeightAs
+      : fill(words.settingsPanel.timesTheWeightOf, { number: numberText(hold) });
+  return fill(words.settingsPanel.heldNearTheirCurrentLookWith, { weight });
 }

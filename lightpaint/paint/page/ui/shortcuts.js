@@ -3,6 +3,7 @@
 import { saveLook } from './look_actions.js';
 import { PREVIOUS_KEY, showPrevious } from './previous_answer.js';
 import { chooseSelect, updateSelection } from './selection/selection_settings.js';
+import { words } from '../language/language.js';
 import { showNextView } from './view_tabs.js';
 import {
   chooseTool,
@@ -24,9 +25,6 @@ import {
 /** isOnce: ignores repeats of a held key.
  * @typedef {{keys: string, symbols: string[], description: string, act?: (app: App) => void,
  *   isOnce?: boolean}} Key */
-
-/** Name of the Ctrl key on this system. */
-export const MOD = /mac/i.test(navigator.platform) ? '⌘' : 'Ctrl';
 
 const zoomBy =
   (/** @type {number} */ factor) =>
@@ -52,7 +50,7 @@ const changeExposure =
 /** @type {{title: string, keys: Key[]}[]} */
 export const SHORTCUTS = [
   {
-    title: 'Tools',
+    title: words.shortcuts.tools,
     keys: TOOLS.map(({ tool, keys, label }) => ({
       keys: keys.toLowerCase(),
       symbols: [keys],
@@ -61,25 +59,25 @@ export const SHORTCUTS = [
     })),
   },
   {
-    title: 'General',
+    title: words.shortcuts.general,
     keys: [
       {
         keys: 'mod+s',
         symbols: ['Ctrl', 'S'],
-        description: 'save look',
+        description: words.shortcuts.saveLook,
         act: (app) => void saveLook(app),
         isOnce: true,
       },
       {
         keys: 'p',
         symbols: ['P'],
-        description: 'show or hide panels',
+        description: words.shortcuts.showOrHidePanels,
         act: ({ store }) => togglePanels(store),
       },
       {
         keys: 'd',
         symbols: ['D'],
-        description: 'mark the lights, and move them',
+        description: words.shortcuts.markTheLightsAndMove,
         act: ({ store, session }) => {
           if (store.value.state?.can_render) session.toggleLamps();
         },
@@ -87,65 +85,74 @@ export const SHORTCUTS = [
       {
         keys: '?',
         symbols: ['?'],
-        description: 'show these shortcuts',
+        description: words.shortcuts.showTheseShortcuts,
         act: ({ store }) => store.set({ dialog: 'keys' }),
       },
-      { keys: '', symbols: ['Tab'], description: 'next control' },
+      { keys: '', symbols: ['Tab'], description: words.shortcuts.nextControl },
       {
         keys: '',
         symbols: ['← ↑ ↓ →'],
-        description: 'move the brush on the pictures; Enter paints',
+        description: words.shortcuts.moveTheBrushOnThe,
       },
-      { keys: '', symbols: ['Shift', 'Enter'], description: 'there, a line from the last stroke' },
+      { keys: '', symbols: ['Shift', 'Enter'], description: words.shortcuts.thereALineFromThe },
     ],
   },
   {
-    title: 'Brush',
+    title: words.shortcuts.brush,
     keys: [
       {
         keys: '[',
         symbols: ['['],
-        description: 'smaller',
+        description: words.shortcuts.smaller,
         act: ({ store }) => resizeBrush(store, -1),
       },
       {
         keys: ']',
         symbols: [']'],
-        description: 'larger',
+        description: words.shortcuts.larger,
         act: ({ store }) => resizeBrush(store, 1),
       },
       {
         keys: '{',
         symbols: ['Shift', '['],
-        description: 'softer',
+        description: words.shortcuts.softer,
         act: ({ store }) => hardenBrush(store, -1),
       },
       {
         keys: '}',
         symbols: ['Shift', ']'],
-        description: 'harder',
+        description: words.shortcuts.harder,
         act: ({ store }) => hardenBrush(store, 1),
       },
-      { keys: 'digit', symbols: ['1', '…', '9', '0'], description: 'flow 10 % to 100 %' },
+      { keys: 'digit', symbols: ['1', '…', '9', '0'], description: words.shortcuts.flow10To100 },
       {
         keys: 'x',
         symbols: ['X'],
-        description: 'swap colours',
+        description: words.shortcuts.swapColours,
         act: ({ store }) => swapColours(store),
       },
-      { keys: '', symbols: ['Alt', 'click'], description: 'pick light from the picture' },
-      { keys: '', symbols: ['Shift', 'click'], description: 'line from the last stroke' },
+      {
+        keys: '',
+        symbols: ['Alt', words.shortcuts.click],
+        description: words.shortcuts.pickLightFromThePicture,
+      },
+      {
+        keys: '',
+        symbols: ['Shift', words.shortcuts.click],
+        description: words.shortcuts.lineFromTheLastStroke,
+      },
       {
         keys: 'escape',
         symbols: ['Esc'],
-        description: 'cancel the stroke',
+        description: words.shortcuts.cancelTheStroke,
         act: ({ engine, store }) => {
           const { draft } = store.value.selection;
           if (draft) return updateSelection(store, { draft: null });
           const { maskLayer, panel, clickAction, isLassoing } = store.value;
           const panelChange = engine.cancel() ? {} : { panel: null };
           const isOther = maskLayer !== null || panel || clickAction || isLassoing;
-          const selectionChange = isOther || !('panel' in panelChange) ? {} : { selectedLights: [] };
+          const selectionChange =
+            isOther || !('panel' in panelChange) ? {} : { selectedLights: [] };
           if (maskLayer !== null) engine.paintMask(null);
           store.set({
             dragAdjustment: null,
@@ -160,7 +167,7 @@ export const SHORTCUTS = [
       {
         keys: 'mod+z',
         symbols: ['Ctrl', 'Z'],
-        description: 'undo',
+        description: words.shortcuts.undo,
         // Undo first cancels the current stroke, which is the last action.
         act: ({ engine, session, store }) => {
           if (engine.cancel()) store.set({ dragAdjustment: null });
@@ -170,68 +177,85 @@ export const SHORTCUTS = [
       {
         keys: 'mod+shift+z',
         symbols: ['Ctrl', 'Shift', 'Z'],
-        description: 'redo',
+        description: words.shortcuts.redo,
         act: ({ session }) => void session.send('redo'),
       },
     ],
   },
   {
-    title: 'Selection',
+    title: words.shortcuts.selection,
     keys: [
       {
         keys: 'mod+a',
         symbols: ['Ctrl', 'A'],
-        description: 'select all',
+        description: words.shortcuts.selectAll,
         act: ({ engine }) => void engine.selections.select({ kind: 'all' }),
       },
       {
         keys: 'mod+d',
         symbols: ['Ctrl', 'D'],
-        description: 'select nothing',
+        description: words.shortcuts.selectNothing,
         act: ({ engine }) => engine.selections.change({ kind: 'none' }),
       },
       {
         keys: 'mod+shift+i',
         symbols: ['Ctrl', 'Shift', 'I'],
-        description: 'invert the selection',
+        description: words.shortcuts.invertTheSelection,
         act: ({ engine }) => engine.selections.change({ kind: 'invert' }),
       },
-      { keys: '', symbols: ['Shift', 'drag'], description: 'add to the selection' },
-      { keys: '', symbols: ['Alt', 'drag'], description: 'subtract from it' },
-      { keys: '', symbols: ['Shift', 'Alt', 'drag'], description: 'intersect with it' },
+      {
+        keys: '',
+        symbols: ['Shift', words.shortcuts.drag],
+        description: words.shortcuts.addToTheSelection,
+      },
+      {
+        keys: '',
+        symbols: ['Alt', words.shortcuts.drag],
+        description: words.shortcuts.subtractFromIt,
+      },
+      {
+        keys: '',
+        symbols: ['Shift', 'Alt', words.shortcuts.drag],
+        description: words.shortcuts.intersectWithIt,
+      },
     ],
   },
   {
-    title: 'Pictures',
+    title: words.shortcuts.pictures,
     keys: [
-      { keys: '', symbols: ['Space', 'drag'], description: 'pan' },
-      { keys: '', symbols: ['Ctrl', 'wheel'], description: 'zoom' },
-      { keys: '+', symbols: ['+'], description: 'zoom in', act: zoomBy(1.25) },
-      { keys: '-', symbols: ['−'], description: 'zoom out', act: zoomBy(0.8) },
+      { keys: '', symbols: ['Space', words.shortcuts.drag], description: words.shortcuts.pan },
+      { keys: '', symbols: ['Ctrl', words.shortcuts.wheel], description: words.shortcuts.zoom },
+      { keys: '+', symbols: ['+'], description: words.shortcuts.zoomIn, act: zoomBy(1.25) },
+      { keys: '-', symbols: ['−'], description: words.shortcuts.zoomOut, act: zoomBy(0.8) },
       {
         keys: 'f',
         symbols: ['F'],
-        description: 'fit to window',
+        description: words.shortcuts.fitToWindow,
         act: ({ store }) => updateDisplay(store, { zoom: 1, pan: [0, 0] }),
       },
-      { keys: 'shift+f', symbols: ['Shift', 'F'], description: '100 %', act: showPixels },
+      {
+        keys: 'shift+f',
+        symbols: ['Shift', 'F'],
+        description: words.shortcuts.n100,
+        act: showPixels,
+      },
       {
         keys: 'v',
         symbols: ['V'],
-        description: 'side by side, wipe, blink',
+        description: words.shortcuts.sideBySideWipeBlink,
         act: ({ store }) =>
           updateDisplay(store, { layout: nextValue(LAYOUTS, store.value.display.layout) }),
       },
       {
         keys: 'n',
         symbols: ['N'],
-        description: 'next view, if there are several',
+        description: words.shortcuts.nextViewIfThereAre,
         act: showNextView,
       },
       {
         keys: 'k',
         symbols: ['K'],
-        description: 'switch the picture in blink',
+        description: words.shortcuts.switchThePictureInBlink,
         act: ({ store }) =>
           updateDisplay(store, {
             layout: 'blink',
@@ -241,32 +265,32 @@ export const SHORTCUTS = [
       {
         keys: PREVIOUS_KEY,
         symbols: ['Q'],
-        description: 'hold: the answer before the last step',
+        description: words.shortcuts.holdTheAnswerBeforeThe,
         act: (app) => void showPrevious(app),
         isOnce: true,
       },
       {
         keys: ',',
         symbols: [','],
-        description: 'lower display exposure',
+        description: words.shortcuts.lowerDisplayExposure,
         act: changeExposure(-0.5),
       },
       {
         keys: '.',
         symbols: ['.'],
-        description: 'raise display exposure',
+        description: words.shortcuts.raiseDisplayExposure,
         act: changeExposure(0.5),
       },
       {
         keys: 'c',
         symbols: ['C'],
-        description: 'denoise on or off',
+        description: words.shortcuts.denoiseOnOrOff,
         act: ({ store }) => updateDisplay(store, { clean: !store.value.display.clean }),
       },
       {
         keys: 'o',
         symbols: ['O'],
-        description: 'next overlay',
+        description: words.shortcuts.nextOverlay,
         act: ({ store }) =>
           updateDisplay(store, { overlay: nextValue(OVERLAYS, store.value.display.overlay) }),
       },

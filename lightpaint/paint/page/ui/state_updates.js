@@ -7,6 +7,7 @@
 
 import { stateOfView } from '../engine/message_frames.js';
 import { comparedLooks, resetMix } from './look_comparison.js';
+import { words } from '../language/language.js';
 
 /** State of requested tasks while none is running.
  * @type {Record<string, Partial<Ui>>} */
@@ -177,7 +178,7 @@ function closenessUpdate(answer, { view, views }) {
   };
 }
 
-const UNPAINTED = 'Nothing is painted in this view. It follows the others.';
+const UNPAINTED = words.stateUpdates.nothingIsPaintedInThisView;
 
 const UNKNOWN = { error: null, is_constrained: false, is_unreached: false };
 

@@ -18,6 +18,7 @@ import {
   swapColours,
   TOOLS,
 } from './tools.js';
+import { fill, words } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
@@ -35,10 +36,18 @@ const FACTOR_CURVE = {
 };
 
 const AREAS = [
-  { value: 'spot', label: 'Spot', tip: 'A soft spot where the drag begins' },
-  { value: 'object', label: 'Object', tip: 'The whole object under the pointer' },
+  { value: 'spot', label: words.toolbar.spot, tip: words.toolbar.aSoftSpotWhereTheDrag },
+  {
+    value: 'object',
+    label: words.toolbar.object,
+    tip: words.toolbar.theWholeObjectUnderThePointer,
+  },
 ];
-const SELECTED = { value: 'selection', label: 'Selection', tip: 'All that is selected' };
+const SELECTED = {
+  value: 'selection',
+  label: words.toolbar.selection,
+  tip: words.toolbar.allThatIsSelected,
+};
 
 /** Return the areas that a drag may adjust. @param {Ui} ui */
 const areasOf = ({ state, selection }) => [
@@ -48,10 +57,10 @@ const areasOf = ({ state, selection }) => [
 const PAINT_MODES = [
   {
     value: 'light',
-    label: 'Light',
-    tip: 'Paint the light on a surface: its own colour stays visible',
+    label: words.toolbar.light,
+    tip: words.toolbar.paintTheLightOnASurface,
   },
-  { value: 'colour', label: 'Colour', tip: 'Paint the final colour, as it should appear' },
+  { value: 'colour', label: words.toolbar.colour, tip: words.toolbar.paintTheFinalColourAsIt },
 ];
 
 /** @param {{ui: Ui, app: App}} props */
@@ -64,7 +73,7 @@ export function ToolBar({ ui, app }) {
     '--second': toHex(second.colour),
     '--second-shown': displayColour(second, app),
   };
-  return html`<nav class="tools" aria-label="Tools">
+  return html`<nav class="tools" aria-label=${words.toolbar.tools}>
     ${TOOLS.map(
       ({ tool, icon, keys, tip }) => html`<${Button} key=${tool} icon=${icon} tip=${tip}
       keys=${keys} pressed=${ui.tool === tool}
@@ -74,11 +83,11 @@ export function ToolBar({ ui, app }) {
     <div class="spring"></div>
     ${
       ui.state?.can_render &&
-      html`<${Button} icon="lamp" tip="Lights in the picture: mark and move them" keys="D"
+      html`<${Button} icon="lamp" tip=${words.toolbar.lightsInThePictureMarkAnd} keys="D"
       pressed=${ui.areLampsMarked} act=${() => app.session.toggleLamps()} />`
     }
-    <button type="button" class="two-colours" style=${style} data-tip="Swap colours" data-keys="X"
-      aria-keyshortcuts="X" aria-label=${`Swap colours: the current one is ${toHex(ui.colour)}, ${signedText(ui.stops)} stops`}
+    <button type="button" class="two-colours" style=${style} data-tip=${words.toolbar.swapColours} data-keys="X"
+      aria-keyshortcuts="X" aria-label=${fill(words.toolbar.swapColoursTheCurrentOneIs, { colour: toHex(ui.colour), signed: signedText(ui.stops) })}
       onClick=${() => swapColours(store)}><i></i><i></i></button>
   </nav>`;
 }
@@ -94,19 +103,19 @@ export function ToolOptions({ ui, app }) {
   const isPanelOpen = ui.side && !ui.panel && Boolean(ui.open.ask);
   const togglePanel = () =>
     store.set({ side: true, panel: null, open: { ...ui.open, ask: !isPanelOpen } });
-  return html`<div class="options" role="group" aria-label=${`${label} settings`}>
+  return html`<div class="options" role="group" aria-label=${fill(words.toolbar.settings, { label })}>
     <strong>${label}</strong>
     ${
       isPaintTool &&
       ui.resources[nameInView('albedo', ui.view)] !== undefined &&
-      html`<${Choice} label="Paint as"
+      html`<${Choice} label=${words.toolbar.paintAs}
       value=${ui.paintMode} choices=${PAINT_MODES} change=${(/** @type {any} */ paintMode) => store.set({ paintMode })} />`
     }
     ${
       ui.tool === 'weight' &&
-      html`<${Slider} label="Weight" value=${ui.importance} min=${0.1}
+      html`<${Slider} label=${words.toolbar.weight} value=${ui.importance} min=${0.1}
       max=${10} curve=${FACTOR_CURVE} step=${0.1} digits=${2} resetValue=${1} unit="×"
-      tip="How many times as much the area counts: above 1 the answer matches better there"
+      tip=${words.toolbar.howManyTimesAsMuchThe}
       change=${(/** @type {number} */ importance) => store.set({ importance })} />`
     }
     ${ui.tool === 'gradient' && html`<${GradientOptions} ui=${ui} app=${app} />`}
@@ -114,42 +123,43 @@ export function ToolOptions({ ui, app }) {
     ${
       ui.tool === 'adjust' &&
       (ui.state?.objects?.length > 0 || ui.selection.current) &&
-      html`<${Choice} label="Area" value=${ui.adjustedArea} choices=${areasOf(ui)} change=${(/** @type {any} */ adjustedArea) =>
-        store.set({ adjustedArea })} />`
+      html`<${Choice} label=${words.toolbar.area} value=${ui.adjustedArea} choices=${areasOf(ui)} change=${(
+        /** @type {any} */ adjustedArea,
+      ) => store.set({ adjustedArea })} />`
     }
     ${
       (isStrokeTool || (ui.tool === 'adjust' && ui.adjustedArea === 'spot')) &&
-      html`<${Slider} label="Size"
-      value=${ui.size} min=${MIN_BRUSH_SIZE} curve=${RATIO_CURVE} max=${MAX_BRUSH_SIZE} unit="px" keys="[ ]"
-      tip="Size" change=${(/** @type {number} */ size) => store.set({ size })} />`
+      html`<${Slider} label=${words.toolbar.size}
+      value=${ui.size} min=${MIN_BRUSH_SIZE} curve=${RATIO_CURVE} max=${MAX_BRUSH_SIZE} unit=${words.toolbar.px} keys="[ ]"
+      tip=${words.toolbar.size} change=${(/** @type {number} */ size) => store.set({ size })} />`
     }
     ${
       isStrokeTool &&
-      html`<${Slider} label="Hardness" value=${100 * ui.hardness} min=${0} max=${100} unit="%"
-        keys="Shift [ ]" tip="Hardness of the edge"
+      html`<${Slider} label=${words.toolbar.hardness} value=${100 * ui.hardness} min=${0} max=${100} unit="%"
+        keys="Shift [ ]" tip=${words.toolbar.hardnessOfTheEdge}
         change=${(/** @type {number} */ percent) => store.set({ hardness: percent / 100 })} />`
     }
     ${
       ui.tool === 'fill' &&
       ui.selection.current &&
-      html`<${Choice} label="Area" value=${ui.adjustedArea === 'selection' ? 'selection' : 'object'}
+      html`<${Choice} label=${words.toolbar.area} value=${ui.adjustedArea === 'selection' ? 'selection' : 'object'}
         choices=${areasOf(ui).filter(({ value }) => value !== 'spot')}
         change=${(/** @type {any} */ adjustedArea) => store.set({ adjustedArea })} />`
     }
     ${
       (isStrokeTool || ui.tool === 'fill') &&
-      html`<${Slider} label="Flow" value=${100 * flowOf(ui)}
+      html`<${Slider} label=${words.toolbar.flow} value=${100 * flowOf(ui)}
       min=${1} max=${100} unit="%" keys="1 … 0" tip=${
         isStrokeTool
-          ? 'Flow: how much paint each dab adds'
-          : 'Flow: 100 % covers the object completely'
+          ? words.toolbar.flowHowMuchPaintEachDab
+          : words.toolbar.flow100CoversTheObjectCompletely
       }
       change=${(/** @type {number} */ flow) => setFlow(store, flow / 100)} />`
     }
     ${
       ui.tool === 'adjust' &&
-      html`<${Button} label="By numbers" pressed=${isPanelOpen}
-      tip="Type stops and mired, for an object or the whole picture" act=${togglePanel} />`
+      html`<${Button} label=${words.toolbar.byNumbers} pressed=${isPanelOpen}
+      tip=${words.toolbar.typeStopsAndMiredForAn} act=${togglePanel} />`
     }
   </div>`;
 }
@@ -166,8 +176,11 @@ export function AdjustPanel({ ui, app }) {
   // By its name, since another view numbers its objects differently and may not show this one.
   const isMissing = object !== null && !objects.includes(object);
   const choices = [
-    { value: WHOLE_PICTURE, label: ui.selection.current ? 'Selection' : 'Whole picture' },
-    ...(isMissing ? [{ value: object, label: `${object}: not in this view` }] : []),
+    {
+      value: WHOLE_PICTURE,
+      label: ui.selection.current ? words.toolbar.selection : words.toolbar.wholePicture,
+    },
+    ...(isMissing ? [{ value: object, label: fill(words.toolbar.notInThisView, { object }) }] : []),
     ...[...objects]
       .sort((a, b) => a.localeCompare(b))
       .map((name) => ({ value: name, label: name })),
@@ -181,13 +194,13 @@ export function AdjustPanel({ ui, app }) {
     if (event.detail) reveal(/** @type {HTMLElement} */ (event.currentTarget), '.stage', true);
   };
   return html`<div class="ask" data-numbers>
-    <${Select} label="Area" value=${object ?? WHOLE_PICTURE} choices=${choices}
+    <${Select} label=${words.toolbar.area} value=${object ?? WHOLE_PICTURE} choices=${choices}
       change=${(/** @type {string} */ area) => set({ object: area === WHOLE_PICTURE ? null : area })} />
-    <${NumberField} label="Brighter" value=${stops} min=${-8} max=${8} step=${0.1} unit="st"
+    <${NumberField} label=${words.toolbar.brighter} value=${stops} min=${-8} max=${8} step=${0.1} unit=${words.toolbar.st}
       change=${(/** @type {number} */ value) => set({ stops: value })} />
-    <${NumberField} label="Warmer" value=${mired} min=${-300} max=${300} step=${5} digits=${0}
-      unit="mired" change=${(/** @type {number} */ value) => set({ mired: value })} />
-    <${Button} label="Apply" disabled=${isMissing || (!stops && !mired)} act=${adjust}
-      tip="Applied as one stroke, which can be undone" />
+    <${NumberField} label=${words.toolbar.warmer} value=${mired} min=${-300} max=${300} step=${5} digits=${0}
+      unit=${words.toolbar.mired} change=${(/** @type {number} */ value) => set({ mired: value })} />
+    <${Button} label=${words.toolbar.apply} disabled=${isMissing || (!stops && !mired)} act=${adjust}
+      tip=${words.toolbar.appliedAsOneStrokeWhichCan} />
   </div>`;
 }

@@ -2,6 +2,7 @@
 
 import { toHex } from './paint_colour.js';
 import { exposureOf } from './display_state.js';
+import { words } from '../language/language.js';
 
 /** @typedef {import("./engine_interface.js").Tool} Tool */
 /** @typedef {import("./engine_interface.js").RGB} RGB */
@@ -9,70 +10,88 @@ import { exposureOf } from './display_state.js';
 
 /** @type {{tool: Tool, label: string, icon: string, keys: string, tip: string}[]} */
 export const TOOLS = [
-  { tool: 'brush', label: 'Brush', icon: 'brush', keys: 'B', tip: 'Brush: paint light' },
+  {
+    tool: 'brush',
+    label: words.tools.brush,
+    icon: 'brush',
+    keys: 'B',
+    tip: words.tools.brushPaintLight,
+  },
   {
     tool: 'eraser',
-    label: 'Eraser',
+    label: words.tools.eraser,
     icon: 'eraser',
     keys: 'E',
-    tip: 'Eraser: remove paint. Unpainted parts stay near their current look.',
+    tip: words.tools.eraserRemovePaintUnpaintedParts,
   },
   {
     tool: 'weight',
-    label: 'Importance',
+    label: words.tools.importance,
     icon: 'weight',
     keys: 'W',
-    tip: 'Importance: where the answer must match best',
+    tip: words.tools.importanceWhereTheAnswerMust,
   },
   {
     tool: 'pick',
-    label: 'Picker',
+    label: words.tools.picker,
     icon: 'pick',
     keys: 'I',
-    tip: 'Picker: take paint from a picture',
+    tip: words.tools.pickerTakePaintFromAPicture,
   },
-  { tool: 'fill', label: 'Fill', icon: 'fill', keys: 'G', tip: 'Fill: paint a whole object' },
-  { tool: 'line', label: 'Line', icon: 'line', keys: 'L', tip: 'Line: paint a straight line' },
+  {
+    tool: 'fill',
+    label: words.tools.fill,
+    icon: 'fill',
+    keys: 'G',
+    tip: words.tools.fillPaintAWholeObject,
+  },
+  {
+    tool: 'line',
+    label: words.tools.line,
+    icon: 'line',
+    keys: 'L',
+    tip: words.tools.linePaintAStraightLine,
+  },
   {
     tool: 'adjust',
-    label: 'Adjust',
+    label: words.tools.adjust,
     icon: 'adjust',
     keys: 'A',
-    tip: 'Adjust: drag up for brighter, right for warmer',
+    tip: words.tools.adjustDragUpForBrighterRight,
   },
   {
     tool: 'gradient',
-    label: 'Gradient',
+    label: words.tools.gradient,
     icon: 'gradient',
     keys: 'R',
-    tip: 'Gradient: light that falls off from one place to another',
+    tip: words.tools.gradientLightThatFallsOffFrom,
   },
   {
     tool: 'select',
-    label: 'Select',
+    label: words.tools.select,
     icon: 'marquee',
     keys: 'M',
-    tip: 'Select: paint and adjust only there. Again for the next shape.',
+    tip: words.tools.selectPaintAndAdjustOnlyThere,
   },
 ];
 
 const HINTS = /** @type {Record<Tool, string>} */ ({
-  brush: 'Drag on the painting. Shift-click paints a line, Alt-click picks a colour.',
-  eraser: 'Removes paint. Unpainted parts stay near their current look.',
-  weight: 'Paint where the answer must match best. Above 1× an area counts more, below 1× less.',
-  pick: 'Click either picture: the light there becomes the paint.',
-  fill: 'Click an object to paint all of it.',
-  line: 'Drag from one end of the line to the other.',
-  adjust: 'Drag on a picture: up brighter, down darker, right warmer, left cooler.',
-  gradient: 'Drag from where it begins to where it ends. Its ends can be moved later.',
-  select: 'Drag, or click, on a picture. Shift adds, Alt subtracts, both together intersect.',
+  brush: words.tools.dragOnThePaintingShiftClick,
+  eraser: words.tools.removesPaintUnpaintedPartsStay,
+  weight: words.tools.paintWhereTheAnswerMustMatch,
+  pick: words.tools.clickEitherPictureTheLightThere,
+  fill: words.tools.clickAnObjectToPaintAll,
+  line: words.tools.dragFromOneEndOfThe,
+  adjust: words.tools.dragOnAPictureUpBrighter,
+  gradient: words.tools.dragFromWhereItBeginsTo,
+  select: words.tools.dragOrClickOnAPicture,
 });
 
 /** Hints on touch screens. @type {Partial<Record<Tool, string>>} */
 const TOUCH_HINTS = {
-  brush: 'Drag on the painting with one finger. Two fingers pan and zoom.',
-  pick: 'Tap either picture: the light there becomes the paint.',
-  fill: 'Tap an object to paint all of it.',
+  brush: words.tools.dragOnThePaintingWithOne,
+  pick: words.tools.tapEitherPictureTheLightThere,
+  fill: words.tools.tapAnObjectToPaintAll,
 };
 
 /** Return the hint of a tool. @param {Tool} tool */
@@ -82,29 +101,29 @@ export function toolHint(tool) {
 }
 
 const PAINT_HINT = {
-  title: 'Paint how it should look',
-  text: 'Choose a colour and drag over this picture. The other one shows what the lights can do.',
+  title: words.tools.paintHowItShouldLook,
+  text: words.tools.chooseAColourAndDragOver,
 };
 
 /** First hint on the painting, for tools other than brushes.
  * @type {Partial<Record<Tool, {title: string, text: string}>>} */
 const FIRST_HINTS = {
-  weight: { title: 'Mark what matters most', text: 'Drag over it on this picture.' },
+  weight: { title: words.tools.markWhatMattersMost, text: words.tools.dragOverItOnThisPicture },
   pick: {
-    title: 'Pick light from a picture',
-    text: 'It becomes the paint. Then choose the brush.',
+    title: words.tools.pickLightFromAPicture,
+    text: words.tools.itBecomesThePaintThenChoose,
   },
   fill: {
     title: PAINT_HINT.title,
-    text: 'Choose a colour, then click an object in this picture. The other one shows what the lights can do.',
+    text: words.tools.chooseAColourThenClickAn,
   },
   select: {
-    title: 'Select a part of the picture',
-    text: 'Then paint it, fill it or adjust it: everything else stays as it is.',
+    title: words.tools.selectAPartOfThePicture,
+    text: words.tools.thenPaintItFillItOr,
   },
   adjust: {
-    title: 'Adjust how it should look',
-    text: 'Drag on this picture: up brighter, down darker, right warmer, left cooler.',
+    title: words.tools.adjustHowItShouldLook,
+    text: words.tools.dragOnThisPictureUpBrighter,
   },
 };
 

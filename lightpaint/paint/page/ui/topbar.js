@@ -6,14 +6,15 @@ import { signedText } from './format.js';
 import { PreviousButton } from './previous_answer.js';
 import { showPixels } from './shortcuts.js';
 import { togglePanels, updateDisplay } from './tools.js';
+import { fill, words } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
 
 const LAYOUTS = [
-  { value: 'side', label: 'Side by side', icon: 'side', keys: 'V' },
-  { value: 'wipe', label: 'Wipe', icon: 'wipe', keys: 'V' },
-  { value: 'blink', label: 'Blink', icon: 'blink', keys: 'V' },
+  { value: 'side', label: words.topbar.sideBySide, icon: 'side', keys: 'V' },
+  { value: 'wipe', label: words.topbar.wipe, icon: 'wipe', keys: 'V' },
+  { value: 'blink', label: words.topbar.blink, icon: 'blink', keys: 'V' },
 ];
 
 /** @param {{ui: Ui, app: App}} props */
@@ -25,31 +26,31 @@ export function TopBar({ ui, app }) {
   const title = ui.state?.scene || 'lightpaint';
   return html`<header class="top">
     <div class="title"><${TruncatedText} text=${title} maxLength=${16} tag="strong" /></div>
-    <div class="group" role="group" aria-label="History">
-      <${Button} icon="undo" tip=${undo ? `Undo: ${undo}` : 'Undo'} keys="Control+Z"
+    <div class="group" role="group" aria-label=${words.topbar.history}>
+      <${Button} icon="undo" tip=${undo ? fill(words.topbar.undo, { undo }) : words.topbar.undo2} keys="Control+Z"
         disabled=${!undo} act=${() => session.send('undo')} />
-      <${Button} icon="redo" tip=${redo ? `Redo: ${redo}` : 'Redo'} keys="Control+Shift+Z"
+      <${Button} icon="redo" tip=${redo ? fill(words.topbar.redo, { redo }) : words.topbar.redo2} keys="Control+Shift+Z"
         disabled=${!redo} act=${() => session.send('redo')} />
       <${PreviousButton} ui=${ui} app=${app} />
     </div>
     <div class="spring"></div>
-    <${Choice} label="Layout" icons value=${display.layout} choices=${LAYOUTS}
+    <${Choice} label=${words.topbar.layout} icons value=${display.layout} choices=${LAYOUTS}
       change=${(/** @type {any} */ layout) => updateDisplay(store, { layout })} />
     <${ComparisonChoice} ui=${ui} app=${app} />
-    <${Slider} label="Exposure" value=${display.stops} min=${-6} max=${6} step=${0.1} digits=${1}
-      unit="st" resetValue=${0} keys=", ." tip="Display exposure. The light does not change."
-      text=${`${signedText(display.stops)} stops`}
+    <${Slider} label=${words.topbar.exposure} value=${display.stops} min=${-6} max=${6} step=${0.1} digits=${1}
+      unit=${words.topbar.st} resetValue=${0} keys=", ." tip=${words.topbar.displayExposureTheLightDoesNot}
+      text=${fill(words.topbar.stops, { signed: signedText(display.stops) })}
       change=${(/** @type {number} */ stops) => updateDisplay(store, { stops })} />
     <${ViewChoice} ui=${ui} app=${app} />
     <${Zoom} ui=${ui} app=${app} />
-    <div class="group" role="group" aria-label="Painter">
-      <${Button} icon="settings" tip="Solve settings"
+    <div class="group" role="group" aria-label=${words.topbar.painter}>
+      <${Button} icon="settings" tip=${words.topbar.solveSettings}
         pressed=${ui.panel === 'settings'}
         act=${() => store.set({ panel: ui.panel ? null : 'settings' })} />
-      <${Button} icon="export" tip="Export"
+      <${Button} icon="export" tip=${words.topbar.export}
         act=${() => store.set({ dialog: 'export' })} />
-      <${Button} icon="keys" tip="Keyboard shortcuts" keys="?" act=${() => store.set({ dialog: 'keys' })} />
-      <${Button} icon="panel" tip="Show or hide the panels" keys="P" pressed=${ui.side || ui.panel !== null}
+      <${Button} icon="keys" tip=${words.topbar.keyboardShortcuts} keys="?" act=${() => store.set({ dialog: 'keys' })} />
+      <${Button} icon="panel" tip=${words.topbar.showOrHideThePanels} keys="P" pressed=${ui.side || ui.panel !== null}
         act=${() => togglePanels(store)} />
     </div>
   </header>`;
@@ -60,12 +61,12 @@ export function TopBar({ ui, app }) {
 function Zoom({ ui: { display, fit }, app }) {
   const scale = (fit ?? 1) * display.zoom;
   const isFitted = display.zoom === 1 && display.pan.every((x) => x === 0);
-  return html`<div class="group" role="group" aria-label="Zoom">
-    <${Button} label=${isFitted ? 'Fit' : `${Math.round(100 * scale)} %`} class="zoom" keys="F"
-      tip="Fit the whole picture. Zoom with Ctrl and the wheel, or with + and −."
+  return html`<div class="group" role="group" aria-label=${words.topbar.zoom}>
+    <${Button} label=${isFitted ? words.topbar.fit : `${Math.round(100 * scale)} %`} class="zoom" keys="F"
+      tip=${words.topbar.fitTheWholePictureZoomWith}
       act=${() => updateDisplay(app.store, { zoom: 1, pan: [0, 0] })} />
     <${Button} label="1:1" class="zoom pixels" keys="Shift+F" pressed=${fit !== null && Math.abs(scale - 1) < 1e-3}
-      tip="100 %: one image pixel on one pixel of the page" act=${() => showPixels(app)} />
+      tip=${words.topbar.n100OneImagePixelOnOne} act=${() => showPixels(app)} />
   </div>`;
 }
 
@@ -74,11 +75,11 @@ function ViewChoice({ ui, app }) {
   const { display } = ui;
   if (!ui.ready) return null;
   const names = (ui.state?.transforms ?? []).map((/** @type {any} */ entry) => entry.name ?? entry);
-  return html`<${Select} label="View" hidden value=${display.transform}
-    tip="View transform: how the display shows linear light"
+  return html`<${Select} label=${words.topbar.view} hidden value=${display.transform}
+    tip=${words.topbar.viewTransformHowTheDisplayShows}
     choices=${names.map((/** @type {string} */ name) => ({ value: name, label: transformLabel(name) }))}
     change=${(/** @type {string} */ transform) => updateDisplay(app.store, { transform })} />
-  <${Checkbox} label="Denoise" checked=${display.clean} tip="Denoise the pictures (C). The solve does not change."
+  <${Checkbox} label=${words.topbar.denoise} checked=${display.clean} tip=${words.topbar.denoiseThePicturesCTheSolve}
     change=${(/** @type {boolean} */ clean) => updateDisplay(app.store, { clean })} />`;
 }
 
@@ -86,9 +87,9 @@ function ViewChoice({ ui, app }) {
 function transformLabel(name) {
   const labels = /** @type {Record<string, string>} */ ({
     srgb: 'sRGB',
-    linear: 'Linear',
-    filmic: 'Filmic',
-    agx: 'AgX',
+    linear: words.topbar.linear,
+    filmic: words.topbar.filmic,
+    agx: words.topbar.agx,
   });
   return labels[name] ?? name.replace(/^ocio:/, '').replace('/', ' · ');
 }
@@ -99,14 +100,14 @@ function ComparisonChoice({ ui, app }) {
   const { display } = ui;
   const value = ui.mix ? 'looks' : `${display.left} ${display.right}`;
   const choices = [
-    { value: 'painting solution', label: 'Painting | Answer' },
-    { value: 'present solution', label: 'Now | Answer' },
-    { value: 'present painting', label: 'Now | Painting' },
-    ...(ui.verification ? [{ value: 'solution verified', label: 'Answer | Render' }] : []),
-    ...(ui.mix ? [{ value: 'looks', label: 'Two looks' }] : []),
+    { value: 'painting solution', label: words.topbar.paintingAnswer },
+    { value: 'present solution', label: words.topbar.nowAnswer },
+    { value: 'present painting', label: words.topbar.nowPainting },
+    ...(ui.verification ? [{ value: 'solution verified', label: words.topbar.answerRender }] : []),
+    ...(ui.mix ? [{ value: 'looks', label: words.topbar.twoLooks }] : []),
   ];
-  return html`<${Select} label="Compare" hidden value=${value} choices=${choices}
-    tip="Which two pictures to compare" change=${(/** @type {string} */ pair) => {
+  return html`<${Select} label=${words.topbar.compare} hidden value=${value} choices=${choices}
+    tip=${words.topbar.whichTwoPicturesToCompare} change=${(/** @type {string} */ pair) => {
       if (pair === 'looks') return;
       const [left, right] = /** @type {any} */ (pair.split(' '));
       store.set({ mix: null });

@@ -5,6 +5,7 @@ import { html } from '../vendor/preact.js';
 import { numberText } from './format.js';
 import { viewUpdate } from './state_updates.js';
 import { Thumbnail } from './thumbnail.js';
+import { fill, words } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
@@ -25,15 +26,15 @@ export function showNextView(app) {
 /** @param {{ui: Ui, app: App}} props */
 export function ViewTabs({ ui, app }) {
   if (ui.views.length < 2) return null;
-  return html`<div class="views" role="group" aria-label="Views">
+  return html`<div class="views" role="group" aria-label=${words.viewTabs.views}>
     ${ui.views.map(({ name }, k) => {
       const picture = nameInView('look', k);
       const closeness = ui.closeness?.[k];
       const note = closeness
-        ? `ΔE ${numberText(closeness.delta_e, 2)}`
-        : ui.closeness && 'not painted';
+        ? fill(words.viewTabs.deltae, { number: numberText(closeness.delta_e, 2) })
+        : ui.closeness && words.viewTabs.notPainted;
       return html`<button type="button" class=${`view-tab ${k === ui.view ? 'is-on' : ''}`}
-        key=${name} aria-pressed=${String(k === ui.view)} data-tip=${`Show and paint ${name}`}
+        key=${name} aria-pressed=${String(k === ui.view)} data-tip=${fill(words.viewTabs.showAndPaint, { name })}
         data-keys="N" onClick=${() => showView(app, k)}>
         <${Thumbnail} name=${picture} generation=${ui.resources[picture]} app=${app} />
         <span class="view-name">${name}</span>

@@ -1,5 +1,7 @@
 /** The order and properties of layers, the lowest first; the twin of paint/layers/layer_stack.py. */
 
+import { words } from '../../language/language.js';
+
 /** @typedef {import("../messages.js").Layer} Layer */
 /** @typedef {import("./layer_composition.js").ShownLayer} ShownLayer */
 
@@ -32,7 +34,7 @@ export function newLayer(id, kind, properties = {}) {
 }
 
 /** The painting of a session without other layers. @type {Layer} */
-export const PAINTING = newLayer(PAINTING_ID, 'pixels', { name: 'Painting' });
+export const PAINTING = newLayer(PAINTING_ID, 'pixels', { name: words.layerList.painting });
 
 /** Return the properties of a layer alone, as requests have them. @param {Layer} layer
  * @returns {Layer} */
@@ -70,7 +72,9 @@ export function shownLayers(list, accents) {
   return list.flatMap((layer) => {
     const group = layer.group === null ? undefined : byId.get(layer.group);
     if (layer.kind === 'group' || !layer.is_visible || group?.is_visible === false) return [];
-    const strength = group ? Math.min(MAX_STRENGTH, layer.strength * group.strength) : layer.strength;
+    const strength = group
+      ? Math.min(MAX_STRENGTH, layer.strength * group.strength)
+      : layer.strength;
     const importance = group
       ? Math.min(MAX_FACTOR, layer.importance * group.importance)
       : layer.importance;
@@ -95,6 +99,9 @@ export function changedLayers(before, after) {
   let end = 0;
   const left = Math.min(one.length, other.length) - start;
   while (end < left && one[one.length - 1 - end] === other[other.length - 1 - end]) end += 1;
-  const middle = [...before.slice(start, before.length - end), ...after.slice(start, after.length - end)];
+  const middle = [
+    ...before.slice(start, before.length - end),
+    ...after.slice(start, after.length - end),
+  ];
   return [...new Set(middle.map(({ id }) => id))];
 }

@@ -1,5 +1,6 @@
 /** Names of layers, made from what they do: "Knot, +1.2 stops, warmer"; "3 strokes, brighter". */
 import { luminance } from '../../../../viewer/drawing/colour.js';
+import { fill, fillCount, words } from '../../language/language.js';
 
 /** @typedef {import("../messages.js").Layer} Layer */
 
@@ -13,16 +14,18 @@ const LEAST_SEEN = 0.15;
 function adjustmentText({ gain, tint }) {
   const stops = Math.log2(gain);
   const warmth = Math.log2(tint[0] / tint[2]);
-  const words = [];
-  if (Math.abs(stops) >= LEAST_STOPS) words.push(stopsText(stops));
-  if (Math.abs(warmth) >= LEAST_WARMTH) words.push(warmth > 0 ? 'warmer' : 'cooler');
-  return words.join(', ') || 'unchanged';
+  const parts = [];
+  if (Math.abs(stops) >= LEAST_STOPS) parts.push(stopsText(stops));
+  if (Math.abs(warmth) >= LEAST_WARMTH)
+    parts.push(warmth > 0 ? words.layerNames.warmer : words.layerNames.cooler);
+  return parts.join(', ') || words.layerNames.unchanged;
 }
 
 /** @param {number} stops */
 function stopsText(stops) {
   const size = Math.abs(stops).toFixed(1);
-  return `${stops < 0 ? '−' : '+'}${size} ${size === '1.0' ? 'stop' : 'stops'}`;
+  const signed = `${stops < 0 ? '−' : '+'}${size}`;
+  return fillCount(words.layerNames.stops, Number(size), { signed });
 }
 
 /** Return the name of an adjustment. @param {string} area @param {Layer} layer */
@@ -40,35 +43,42 @@ export function renamed(before, after) {
 }
 
 /** @param {number} times */
-export const importanceName = (times) => `Importance ×${Number(times.toPrecision(2))}`;
+export const importanceName = (times) =>
+  fill(words.layerNames.importance, { value: Number(times.toPrecision(2)) });
 
-/** Strokes that a made name counts. */
-const COUNTED = /^(\d+) strokes?\b/;
+/** The number of strokes in a made name. */
+const COUNTED = /\d+/;
 
 /** Return the name of a painted layer after another stroke; a typed name stays.
  * @param {string} name before @param {string} effect @param {boolean} isNew */
 export function strokesName(name, effect, isNew) {
-  const count = isNew ? 1 : 1 + Number(COUNTED.exec(name)?.[1] ?? NaN);
-  if (Number.isNaN(count)) return name;
-  return [`${count} ${count === 1 ? 'stroke' : 'strokes'}`, effect].filter(Boolean).join(', ');
+  const before = Number(COUNTED.exec(name)?.[0] ?? NaN);
+  const isMade = name.startsWith(fillCount(words.layerNames.strokes, before));
+  if (!isNew && !isMade) return name;
+  const strokes = fillCount(words.layerNames.strokes, isNew ? 1 : before + 1);
+  return [strokes, effect].filter(Boolean).join(', ');
 }
 
 /** Return what becomes of light, in words. @param {number[]} before mean RGB
  * @param {number[]} after @returns {string} */
 export function effectText(before, after) {
   const [level, now] = [luminance(before), luminance(after)];
-  if (!(level > 0) || !(now > 0)) return now > level ? 'brighter' : level > 0 ? 'dark' : '';
+  if (!(level > 0) || !(now > 0)) {
+    return now > level ? words.layerNames.brighter : level > 0 ? words.layerNames.dark : '';
+  }
   const stops = Math.log2(now / level);
   const warmth = Math.log2((after[0] * before[2]) / (before[0] * after[2]));
-  const words = [];
-  if (Math.abs(stops) >= LEAST_SEEN) words.push(stops > 0 ? 'brighter' : 'darker');
-  if (Math.abs(warmth) >= LEAST_SEEN) words.push(warmth > 0 ? 'warmer' : 'cooler');
-  return words.join(', ');
+  const parts = [];
+  if (Math.abs(stops) >= LEAST_SEEN)
+    parts.push(stops > 0 ? words.layerNames.brighter : words.layerNames.darker);
+  if (Math.abs(warmth) >= LEAST_SEEN)
+    parts.push(warmth > 0 ? words.layerNames.warmer : words.layerNames.cooler);
+  return parts.join(', ');
 }
 
 /** Return the name of an object as a name begins: `marble_knot` as "Marble knot".
  * @param {string | null | undefined} name */
 export function areaName(name) {
-  const words = (name ?? '').replace(/[_]+/g, ' ').trim();
-  return words ? words[0].toUpperCase() + words.slice(1, 48) : '';
+  const text = (name ?? '').replace(/[_]+/g, ' ').trim();
+  return text ? text[0].toUpperCase() + text.slice(1, 48) : '';
 }

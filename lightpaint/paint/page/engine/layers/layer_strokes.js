@@ -5,11 +5,18 @@
  * new one. The eraser takes from the layer that lies at its first point.
  */
 import { gradientLayer } from './gradient.js';
-import { adjustmentName, areaName, effectText, importanceName, strokesName } from './layer_names.js';
+import {
+  adjustmentName,
+  areaName,
+  effectText,
+  importanceName,
+  strokesName,
+} from './layer_names.js';
 import { newLayer, PAINTING_ID, plainLayer, withLayers } from './layer_list.js';
 import { LayerCanvas } from './layer_canvas.js';
 import { TILE_SIDE } from './layer_pixels.js';
 import { LABELS } from '../stroke.js';
+import { fill, words } from '../../language/language.js';
 
 /** @typedef {import("../brush.js").Point} Point */
 /** @typedef {import("../message_frames.js").Region} Region */
@@ -18,6 +25,8 @@ import { LABELS } from '../stroke.js';
 /** @typedef {import("../stroke.js").Tool} Tool */
 /** @typedef {import("../stroke.js").ToolSettings} ToolSettings */
 /** @typedef {import("./layer_mirror.js").LayerMirror} LayerMirror */
+
+const texts = words.layerStrokes;
 
 /** Tiles that are looked at to say what a layer does. */
 const LOOKED_AT = 12;
@@ -57,8 +66,9 @@ export class LayerStrokes {
     if (!found) return true;
     // A new layer lies over what is drawn; another one has to be the page's own.
     if (!mirror.layer(found.id)) return true;
-    return mirror.canCompose() && mirror.picture.shown.slice(mirror.picture.base?.count).some(
-      ({ id }) => id === found.id,
+    return (
+      mirror.canCompose() &&
+      mirror.picture.shown.slice(mirror.picture.base?.count).some(({ id }) => id === found.id)
     );
   }
 
@@ -144,14 +154,16 @@ export class LayerStrokes {
     const area = areaName(this.objectName(object ?? painting.objectAt(x, y)));
     const isSelection = adjustedArea === 'selection' && this.selection !== null;
     if (tool === 'adjust') {
-      const spot = area ? `Spot on ${area}` : 'Spot';
-      const whole = this.selection ? 'Selection' : 'Whole picture';
+      const spot = area ? fill(texts.spotOn, { area }) : texts.spot;
+      const whole = this.selection ? texts.selection : texts.wholePicture;
       const isSpot = object === undefined && (adjustedArea !== 'object' || !area);
       const name = isSelection ? whole : isSpot ? spot : area || whole;
       return this.layerNew('adjust', { name });
     }
     if (tool === 'fill')
-      return this.layerNew('paint', { name: isSelection ? 'Selection' : area || 'Fill' });
+      return this.layerNew('paint', {
+        name: isSelection ? texts.selection : area || texts.fill,
+      });
     if (tool === 'weight') return this.weighing(importance);
     return tool === 'eraser' ? this.erased(x, y) : this.painted();
   }
@@ -164,7 +176,8 @@ export class LayerStrokes {
   /** Return the layer that the brush paints. @returns {Layer} */
   painted() {
     const active = this.mirror.layer(this.activeId);
-    const isOwn = active?.kind === 'paint' || (active?.kind === 'pixels' && this.isPaintingLowest());
+    const isOwn =
+      active?.kind === 'paint' || (active?.kind === 'pixels' && this.isPaintingLowest());
     if (active && isOwn && this.isShown(active) && !this.isWishDone) return active;
     return this.layerNew('paint', {});
   }
@@ -240,8 +253,7 @@ export class LayerStrokes {
     if (!picture || !canvas) return region;
     if (canvas instanceof LayerCanvas) {
       const { layer } = canvas;
-      if (layer !== this.mirror.layer(layer.id))
-        this.mirror.show(withLayers(list, [layer]));
+      if (layer !== this.mirror.layer(layer.id)) this.mirror.show(withLayers(list, [layer]));
       canvas.pixels.put(region, { image: canvas.image, coverage: canvas.importance });
     }
     const changed = canvas instanceof LayerCanvas ? canvas.layer.id : PAINTING_ID;
@@ -267,7 +279,7 @@ export class LayerStrokes {
   stepName(tool, { x, y }, layer) {
     if (layer?.name && this.maskId === null && ['adjust', 'fill'].includes(tool)) return layer.name;
     const area = areaName(this.objectName(this.mirror.picture?.painting.objectAt(x, y) ?? -1));
-    return area ? `${LABELS[tool]} on ${area}` : LABELS[tool];
+    return area ? fill(texts.on, { value: LABELS[tool], area }) : LABELS[tool];
   }
 
   /** Cancel the stroke. @returns {Region | null} what has to be drawn */
@@ -296,7 +308,7 @@ export class LayerStrokes {
       return [layer.name, this.effectOf(layer)].filter(Boolean).join(', ');
     if (layer.kind !== 'paint' || this.maskId !== null) return layer.name;
     if (!isNew || !layer.name) return strokesName(layer.name, this.effectOf(layer), isNew);
-    return [layer.name, this.effectOf(layer) || 'filled'].join(', ');
+    return [layer.name, this.effectOf(layer) || texts.filled].join(', ');
   }
 
   /** Return what a layer does to the light below and above it, in words. @param {Layer} layer */

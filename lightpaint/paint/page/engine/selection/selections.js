@@ -6,6 +6,7 @@ import { feathered, grown, inverted, joined } from './mask_operations.js';
 import { FULL, ellipse, polygonMask, rectangle } from './polygon_mask.js';
 import { SelectionMirror } from './selection_mirror.js';
 import { brightnessMask, colourMask, lightMask, objectMask } from './shown_masks.js';
+import { fill, words } from '../../language/language.js';
 
 /** @typedef {import("../../../../viewer/drawing/view.js").Kind} Kind */
 /** @typedef {import("./mask_operations.js").Mode} Mode */
@@ -76,15 +77,19 @@ export class Selections {
     const mask = await this.maskOf(part);
     if (!mask || view !== this.mirror.view || count !== this.count) return;
     const soft = feathered(mask, this.mirror.size, feather);
-    this.put(joined(this.current?.mask ?? null, soft, mode), `select ${this.nameOf(part)}`);
+    this.put(
+      joined(this.current?.mask ?? null, soft, mode),
+      fill(words.selections.select, { part: this.nameOf(part) }),
+    );
   }
 
   /** Return what a step calls a part. @param {Part} part */
   nameOf(part) {
     const { state } = this.session;
-    if (part.kind === 'object') return state?.objects?.[part.object] ?? 'background';
-    if (part.kind === 'light') return `what ${state?.lights[part.light]?.name} lights`;
-    return part.kind === 'brightness' || part.kind === 'colour' ? `by ${part.kind}` : part.kind;
+    if (part.kind === 'object') return state?.objects?.[part.object] ?? words.selections.background;
+    if (part.kind === 'light')
+      return fill(words.selections.whatLights, { name: state?.lights[part.light]?.name });
+    return words.selections[part.kind];
   }
 
   /** Change what is selected. @param {Change} change */
@@ -93,14 +98,15 @@ export class Selections {
     const { size } = this.mirror;
     if (!current) return;
     this.count += 1;
-    if (change.kind === 'none') this.put(null, 'deselect');
-    else if (change.kind === 'invert') this.put(inverted(current.mask), 'invert selection');
+    if (change.kind === 'none') this.put(null, words.selections.deselect);
+    else if (change.kind === 'invert')
+      this.put(inverted(current.mask), words.selections.invertSelection);
     else if (change.kind === 'feather')
-      this.put(feathered(current.mask, size, change.pixels), 'feather selection');
+      this.put(feathered(current.mask, size, change.pixels), words.selections.featherSelection);
     else
       this.put(
         grown(current.mask, size, change.pixels),
-        change.pixels < 0 ? 'shrink selection' : 'grow selection',
+        change.pixels < 0 ? words.selections.shrinkSelection : words.selections.growSelection,
       );
   }
 

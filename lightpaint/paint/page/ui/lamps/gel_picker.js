@@ -5,6 +5,7 @@ import { useId } from '../controls.js';
 import { signedText } from '../format.js';
 import { atFullBrightness, toHex } from '../paint_colour.js';
 import { html, useState } from '../../vendor/preact.js';
+import { fill, words } from '../../language/language.js';
 
 /** @typedef {import("../../../../viewer/gels/gels.js").Gel} Gel */
 /** @typedef {import("../engine_interface.js").RGB} RGB */
@@ -26,22 +27,26 @@ export function GelPicker({ white, gel, choose }) {
     )?.focus();
   };
   const label = (/** @type {Gel} */ one) =>
-    `${gelName(one)} ${one.name}, ${signedText(-lossInStops(one, white))} st`;
+    fill(words.gelPicker.st, {
+      one: gelName(one),
+      name: one.name,
+      signed: signedText(-lossInStops(one, white)),
+    });
   return html`<div class="gels">
-    <label class="field words"><span class="name" id=${id}>Filter</span>
-      <input type="text" value=${text} placeholder="201, R80, amber" spellcheck=${false} autocomplete="off"
-        data-typed=${text ? 'yes' : 'no'} data-tip="Number or name; Enter takes the first of the list"
+    <label class="field words"><span class="name" id=${id}>${words.gelPicker.filter}</span>
+      <input type="text" value=${text} placeholder=${words.gelPicker.n201R80Amber} spellcheck=${false} autocomplete="off"
+        data-typed=${text ? 'yes' : 'no'} data-tip=${words.gelPicker.numberOrNameEnterTakesThe}
         onInput=${(/** @type {any} */ event) => setText(event.currentTarget.value)}
         onKeyDown=${press} /></label>
-    <select size="6" value=${gel?.code ?? ''} aria-label="Filters" data-tip="Stops that each costs on this lamp"
+    <select size="6" value=${gel?.code ?? ''} aria-label=${words.gelPicker.filters} data-tip=${words.gelPicker.stopsThatEachCostsOnThis}
       onChange=${(/** @type {any} */ event) =>
         choose(gels.find(({ code }) => code === event.currentTarget.value) ?? null)}>
-      ${!text && html`<option value="">No filter</option>`}
+      ${!text && html`<option value="">${words.gelPicker.noFilter}</option>`}
       ${gels.map(
         (one) => html`<option key=${one.code} value=${one.code}
           style=${{ '--gel': toHex(atFullBrightness(filtered(one, white))) }}>${label(one)}</option>`,
       )}
     </select>
-    ${!gels.length && html`<p class="faint">No filter has this number or name.</p>`}
+    ${!gels.length && html`<p class="faint">${words.gelPicker.noFilterHasThisNumberOr}</p>`}
   </div>`;
 }

@@ -8,12 +8,16 @@ import { atFullBrightness, luminance } from '../paint_colour.js';
 import { html } from '../../vendor/preact.js';
 import { GelPicker } from './gel_picker.js';
 import { ownWhite } from './lamp_colours.js';
+import { fill, words } from '../../language/language.js';
 
 /** @typedef {import("../shortcuts.js").App} App */
 /** @typedef {import("../ui_state.js").Ui} Ui */
 /** @typedef {import("../engine_interface.js").RGB} RGB */
 
-const LAMP_MIXERS = [...MIXERS, { value: 'gel', label: 'Gel', tip: 'Colour filters by number' }];
+const LAMP_MIXERS = [
+  ...MIXERS,
+  { value: 'gel', label: words.lampColour.gel, tip: words.lampColour.colourFiltersByNumber },
+];
 
 /** Controls for the colour of some lamps, which keep their levels; they begin at that of the first.
  * @param {{ui: Ui, app: App, lights: number[]}} props */
@@ -29,10 +33,10 @@ export function LampColour({ ui, app, lights }) {
   const set = (/** @type {RGB} */ newColour, /** @type {boolean} */ isFinal) => {
     if (Math.max(...newColour) > 0) many.colour(lights, newColour, isFinal);
   };
-  return html`<div class="lamp-colour colour" role="group" aria-label="Colour">
+  return html`<div class="lamp-colour colour" role="group" aria-label=${words.lampColour.colour}>
     <div class="colour-row">
       <${Hex} colour=${colour} set=${set} />
-      <${Choice} label="Colour model" value=${mixer} choices=${LAMP_MIXERS}
+      <${Choice} label=${words.lampColour.colourModel} value=${mixer} choices=${LAMP_MIXERS}
         change=${(/** @type {Ui["lampMixer"]} */ lampMixer) => app.store.set({ lampMixer })} />
     </div>
     ${mixer === 'white' && html`<${White} colour=${colour} set=${set} isPure />`}
@@ -45,7 +49,7 @@ export function LampColour({ ui, app, lights }) {
     }
     ${
       gel &&
-      html`<p class="faint" role="status">${gelName(gel)} ${gel.name}, ${signedText(-lossInStops(gel, white))} st</p>`
+      html`<p class="faint" role="status">${fill(words.lampColour.st, { gel: gelName(gel), name: gel.name, signed: signedText(-lossInStops(gel, white)) })}</p>`
     }
   </div>`;
 }

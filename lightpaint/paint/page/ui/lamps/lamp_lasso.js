@@ -1,6 +1,7 @@
 /** A lasso over the pictures, which selects the lights whose marks it encloses. */
 
 import { html, useRef, useState } from '../../vendor/preact.js';
+import { words } from '../../language/language.js';
 
 /** @typedef {import("../shortcuts.js").App} App */
 /** @typedef {import("../ui_state.js").Ui} Ui */
@@ -38,7 +39,7 @@ export function LampLasso({ ui, app }) {
       isLassoing: false,
       selectedLights: isAdding(event) ? [...new Set([...selectedLights, ...lights])] : lights,
     }));
-    if (!lights.length) app.session.toast('No light is marked there. Draw around the marks.');
+    if (!lights.length) app.session.toast(words.lampLasso.noLightIsMarkedThereDraw);
   };
   const cancel = () => {
     outline.current = [];

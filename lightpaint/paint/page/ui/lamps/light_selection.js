@@ -2,6 +2,7 @@
 
 import { listedLights } from './listed_lights.js';
 import { shortenName } from '../format.js';
+import { fill, words } from '../../language/language.js';
 
 /** @typedef {import("../ui_state.js").Ui} Ui */
 /** @typedef {import("../ui_state.js").UiStore} UiStore */
@@ -44,6 +45,6 @@ export function toggleLights(store, lights) {
 /** Return lights in words: two by name, more by their number. @param {Ui} ui
  * @param {number[]} lights */
 export function lightsText(ui, lights) {
-  if (lights.length > 2) return `${lights.length} lights`;
-  return lights.map((k) => shortenName(ui.lights[k].label, 24)).join(' and ');
+  if (lights.length > 2) return fill(words.lightSelection.lights, { count: lights.length });
+  return lights.map((k) => shortenName(ui.lights[k].label, 24)).join(words.lightSelection.and);
 }

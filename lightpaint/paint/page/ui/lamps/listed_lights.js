@@ -2,6 +2,7 @@
 
 import { luminance } from '../paint_colour.js';
 import { findTie } from '../tied_lights.js';
+import { fill, words } from '../../language/language.js';
 
 /** @typedef {import("../ui_state.js").Ui} Ui */
 
@@ -28,9 +29,7 @@ function isFound({ name, label, group, members }, text) {
   const names = [name, label, group ?? '', ...members].map((one) => one.toLowerCase());
   const allNames = names.join(' ');
   const matches = (/** @type {string} */ word) =>
-    /[*?[]/.test(word)
-      ? names.some((one) => patternOf(word).test(one))
-      : allNames.includes(word);
+    /[*?[]/.test(word) ? names.some((one) => patternOf(word).test(one)) : allNames.includes(word);
   return matches(text) || text.split(/\s+/).every(matches);
 }
 
@@ -109,8 +108,9 @@ const MIN_PREFIX_GROUP = 3;
 function groupOf(ui, k) {
   const { name, group } = ui.lights[k];
   const tie = findTie(ui, k);
-  const otherNames = tie && (tie.length === 2 ? tie[1] : `${tie.length - 1} more`);
-  if (tie) return `${tie[0]} and ${otherNames}, tied`;
+  const otherNames =
+    tie && (tie.length === 2 ? tie[1] : fill(words.listedLights.more, { count: tie.length - 1 }));
+  if (tie) return fill(words.listedLights.andTied, { value: tie[0], otherNames });
   return group ?? (ui.lights.length > MAX_ROWS_WITH_SLIDERS ? namePrefix(name) : null);
 }
 

@@ -2,10 +2,11 @@
 
 import { gelName, gelOn } from '../../../../viewer/gels/gels.js';
 import { luminance } from '../paint_colour.js';
-import { countText, signedText } from '../format.js';
+import { lightCountText, signedText } from '../format.js';
 import { findTie, lockedLights, lockingLight } from '../tied_lights.js';
 import { atLevelOf, ownWhite, scaled, warmed, withGel } from './lamp_colours.js';
 import { lightsText } from './light_selection.js';
+import { fill, words } from '../../language/language.js';
 
 /** @typedef {import("../engine_interface.js").RGB} RGB */
 /** @typedef {import("../ui_state.js").Constraints} Constraints */
@@ -34,21 +35,24 @@ export class ManyLights {
   /** Dim lights by a factor, which keeps their ratio. @param {number[]} lights
    * @param {number} factor @param {boolean} isFinal false while a slider moves */
   dim(lights, factor, isFinal) {
-    const stops = factor > 0 ? `${signedText(Math.log2(factor))} st` : 'off';
+    const stops =
+      factor > 0
+        ? fill(words.manyLights.st, { signed: signedText(Math.log2(factor)) })
+        : words.manyLights.dimmedToOff;
     return this.move(lights, (rgb) => scaled(rgb, factor), stops, isFinal, true);
   }
 
   /** Make lights warmer by some mireds. @param {number[]} lights @param {number} mired
    * @param {boolean} isFinal */
   warm(lights, mired, isFinal) {
-    const text = `${signedText(mired, 0)} mired`;
+    const text = fill(words.manyLights.mired, { signed: signedText(mired, 0) });
     return this.move(lights, (rgb) => warmed(rgb, mired), text, isFinal);
   }
 
   /** Give lights a colour, each at its own level. @param {number[]} lights @param {RGB} colour
    * @param {boolean} isFinal */
   colour(lights, colour, isFinal) {
-    return this.move(lights, (rgb) => atLevelOf(colour, rgb), 'colour', isFinal);
+    return this.move(lights, (rgb) => atLevelOf(colour, rgb), words.manyLights.colour, isFinal);
   }
 
   /** Put a filter on lights, instead of the one that is there; null takes it off.
@@ -61,7 +65,7 @@ export class ManyLights {
         const present = gelOn(rgb, ownWhite(all[k]), gelCodes[all[k].name]);
         return withGel(rgb, all[k], gel, present);
       },
-      gel ? gelName(gel) : 'no filter',
+      gel ? gelName(gel) : words.manyLights.noFilter,
       true,
     );
     const codes = lights.map((k) => [all[k].name, gel?.code ?? '']);
@@ -158,7 +162,7 @@ export class ManyLights {
     this.queue(
       {
         lights: new Map(open.map((k) => [k, ui.weights[k]])),
-        label: `lock ${lightsText(ui, open)}`,
+        label: fill(words.manyLights.lock, { lights: lightsText(ui, open) }),
         isFinal: true,
       },
       this.session.groupMoves,
@@ -169,7 +173,10 @@ export class ManyLights {
   unlock(lights) {
     const ui = this.store.value;
     const held = leaders(ui, adjustableLights(ui, lights)).filter((k) => isHeld(ui, k));
-    return this.session.unlockLights(held, `unlock ${lightsText(ui, held)}`);
+    return this.session.unlockLights(
+      held,
+      fill(words.manyLights.unlock, { lights: lightsText(ui, held) }),
+    );
   }
 
   /** Switch lights off. @param {number[]} lights */
@@ -178,7 +185,10 @@ export class ManyLights {
     const lit = leaders(ui, adjustableLights(ui, lights));
     for (const k of lit) this.session.noteUnlocked(k);
     const entries = lit.map((k) => [ui.lights[k].name, { off: true }]);
-    return this.constrain(Object.fromEntries(entries), `${lightsText(ui, lit)} off`);
+    return this.constrain(
+      Object.fromEntries(entries),
+      fill(words.manyLights.off, { lights: lightsText(ui, lit) }),
+    );
   }
 
   /** Put lights, and all that is tied to them, on one dimmer. @param {number[]} lights */
@@ -225,8 +235,9 @@ function leaders(ui, lights) {
 
 /** @param {number[]} candidates @param {boolean} isLevel */
 function refusalText(candidates, isLevel) {
-  if (candidates.length) return `${countText(candidates.length, 'light')} off: switch on first.`;
+  if (candidates.length)
+    return fill(words.manyLights.offSwitchOnFirst, { count: lightCountText(candidates.length) });
   return isLevel
-    ? 'These lights stay as they are in the scene.'
-    : 'Tied lights, and lights with one number for all channels, keep their colours.';
+    ? words.manyLights.theseLightsStayAsTheyAre
+    : words.manyLights.tiedLightsAndLightsWithOne;
 }

@@ -1,7 +1,7 @@
 /** What is done to all selected lights, each time as one step. */
 
 import { Button } from '../controls.js';
-import { countText, signedText, stopsText } from '../format.js';
+import { lightCountText, signedText, stopsText } from '../format.js';
 import { gradient } from '../kelvin_slider.js';
 import { stopsOf } from '../level_field.js';
 import { fromKelvin } from '../paint_colour.js';
@@ -10,6 +10,7 @@ import { html, useState } from '../../vendor/preact.js';
 import { LampColour } from './lamp_colour.js';
 import { adjustableLights, colouredLights, isHeld } from './many_lights.js';
 import { RelativeSlider, parseMired, parseStops } from './relative_dimmer.js';
+import { fill, words } from '../../language/language.js';
 
 /** @typedef {import("../shortcuts.js").App} App */
 /** @typedef {import("../ui_state.js").Ui} Ui */
@@ -24,9 +25,9 @@ const WARM_TRACK = gradient([9000, 5600, 4000, 3000, 2300].map((kelvin) => fromK
  * @param {{app: App, lights: number[], label: string, isPlain?: boolean, disabled?: boolean}} props */
 export function GroupDimmer({ app, lights, label, isPlain, disabled }) {
   return html`<${RelativeSlider} label=${label} range=${DIM_RANGE} step=${0.1} isPlain=${isPlain}
-    disabled=${disabled} text=${(/** @type {number} */ stops) => `${signedText(stops)} st`} parse=${parseStops}
-    tip="Dims these lights together, which keeps their ratio, and locks them there"
-    hint="Type stops (-1), percent (50 %) or off." say=${(/** @type {string} */ text) => app.session.toast(text)}
+    disabled=${disabled} text=${(/** @type {number} */ stops) => fill(words.selectionPanel.st, { signed: signedText(stops) })} parse=${parseStops}
+    tip=${words.selectionPanel.dimsTheseLightsTogetherWhich}
+    hint=${words.selectionPanel.typeStops} say=${(/** @type {string} */ text) => app.session.toast(text)}
     change=${(/** @type {number} */ stops, /** @type {boolean} */ isFinal) =>
       app.session.many.dim(lights, 2 ** stops, isFinal)} />`;
 }
@@ -39,16 +40,16 @@ export function SelectionPanel({ ui, app }) {
   const { many } = app.session;
   const coloured = colouredLights(ui, lights);
   const fixedCount = lights.length - adjustableLights(ui, lights).length;
-  return html`<section class="lamp-selection" aria-label="Selected lights">
+  return html`<section class="lamp-selection" aria-label=${words.selectionPanel.selectedLights}>
     <div class="row">
-      <strong role="status">${countText(lights.length, 'light')} selected</strong>
+      <strong role="status">${fill(words.selectionPanel.selected, { count: lightCountText(lights.length) })}</strong>
       <span class="faint">${levelsText(ui, lights)}</span><span class="spring"></span>
-      <${Button} icon="close" tip="Select none" keys="Escape" act=${() => app.store.set({ selectedLights: [] })} />
+      <${Button} icon="close" tip=${words.selectionPanel.selectNone} keys="Escape" act=${() => app.store.set({ selectedLights: [] })} />
     </div>
-    <${GroupDimmer} app=${app} lights=${lights} label="Dim" disabled=${fixedCount === lights.length} />
-    <${RelativeSlider} label="Warm" range=${WARM_RANGE} step=${5} disabled=${!coloured.length} track=${WARM_TRACK}
-      text=${(/** @type {number} */ mired) => `${signedText(mired, 0)} mired`} parse=${parseMired}
-      tip="Warmer to the right, in mireds; levels stay" hint="Type mireds: 20 is warmer, -20 cooler."
+    <${GroupDimmer} app=${app} lights=${lights} label=${words.selectionPanel.dim} disabled=${fixedCount === lights.length} />
+    <${RelativeSlider} label=${words.selectionPanel.warm} range=${WARM_RANGE} step=${5} disabled=${!coloured.length} track=${WARM_TRACK}
+      text=${(/** @type {number} */ mired) => fill(words.selectionPanel.mired, { signed: signedText(mired, 0) })} parse=${parseMired}
+      tip=${words.selectionPanel.warmerToTheRightInMireds} hint=${words.selectionPanel.typeMireds}
       say=${(/** @type {string} */ text) => app.session.toast(text)}
       change=${(/** @type {number} */ mired, /** @type {boolean} */ isFinal) =>
         many.warm(lights, mired, isFinal)} />
@@ -57,10 +58,9 @@ export function SelectionPanel({ ui, app }) {
       hasColour &&
       (coloured.length
         ? html`<${LampColour} ui=${ui} app=${app} lights=${coloured} />`
-        : html`<p class="faint">Tied lights, and lights with one number for all channels, keep their
-            colours.</p>`)
+        : html`<p class="faint">${words.selectionPanel.tiedLightsAndLightsWithOne}</p>`)
     }
-    ${fixedCount > 0 && html`<p class="faint">${countText(fixedCount, 'light')} of these cannot be set.</p>`}
+    ${fixedCount > 0 && html`<p class="faint">${fill(words.selectionPanel.ofTheseCannotBeSet, { count: lightCountText(fixedCount) })}</p>`}
   </section>`;
 }
 
@@ -70,29 +70,28 @@ function Actions({ ui, app, hasColour, showColour }) {
   const { many } = app.session;
   const adjustable = adjustableLights(ui, lights);
   const areHeld = adjustable.length > 0 && adjustable.every((k) => isHeld(ui, k));
-  const areOff = adjustable.length > 0 && adjustable.every((k) => constraints[ui.lights[k].name]?.off);
+  const areOff =
+    adjustable.length > 0 && adjustable.every((k) => constraints[ui.lights[k].name]?.off);
   const tie = findTie(ui, lights[0]);
   const areTied = tie !== undefined && lights.every((k) => tie.includes(ui.lights[k].name));
   const isSolo = lights.every((k) => solo.includes(k));
   const toggleSolo = () =>
     app.store.set({
-      solo: isSolo
-        ? solo.filter((k) => !lights.includes(k))
-        : [...new Set([...solo, ...lights])],
+      solo: isSolo ? solo.filter((k) => !lights.includes(k)) : [...new Set([...solo, ...lights])],
     });
   return html`<div class="row">
-    <${Button} label="Colour" pressed=${hasColour} tip="Set the colour of all: white, HSV, RGB, hex or gel"
+    <${Button} label=${words.selectionPanel.colour} pressed=${hasColour} tip=${words.selectionPanel.setTheColourOfAllWhite}
       act=${() => showColour(!hasColour)} />
-    <${Button} label=${areHeld ? 'Unlock' : 'Lock'} disabled=${!adjustable.length}
-      tip=${areHeld ? 'Let the solve set them again' : 'Lock all as they are in the answer'}
+    <${Button} label=${areHeld ? words.selectionPanel.unlock : words.selectionPanel.lock} disabled=${!adjustable.length}
+      tip=${areHeld ? words.selectionPanel.letTheSolveSetThemAgain : words.selectionPanel.lockAllAsTheyAreIn}
       act=${() => void (areHeld ? many.unlock(lights) : many.lock(lights))} />
-    <${Button} label=${areOff ? 'On' : 'Off'} disabled=${!adjustable.length}
-      tip=${areOff ? 'Switch all on again' : 'Switch all off in every answer'}
+    <${Button} label=${areOff ? words.selectionPanel.on : words.selectionPanel.off} disabled=${!adjustable.length}
+      tip=${areOff ? words.selectionPanel.switchAllOnAgain : words.selectionPanel.switchAllOffInEveryAnswer}
       act=${() => void (areOff ? many.unlock(lights) : many.switchOff(lights))} />
-    <${Button} label=${areTied ? 'Untie' : 'Tie'} disabled=${adjustable.length < 2}
-      tip=${areTied ? 'Give each its own dimmer' : 'Put all on one dimmer'}
+    <${Button} label=${areTied ? words.selectionPanel.untie : words.selectionPanel.tie} disabled=${adjustable.length < 2}
+      tip=${areTied ? words.selectionPanel.giveEachItsOwnDimmer : words.selectionPanel.putAllOnOneDimmer}
       act=${() => void (areTied ? many.untie(lights) : many.tie(lights))} />
-    <${Button} label="Solo" pressed=${isSolo} tip="Show these alone. The answer does not change."
+    <${Button} label=${words.selectionPanel.solo} pressed=${isSolo} tip=${words.selectionPanel.showTheseAloneTheAnswerDoes}
       act=${toggleSolo} />
   </div>`;
 }
@@ -102,9 +101,11 @@ function Actions({ ui, app, hasColour, showColour }) {
 export function levelsText(ui, lights) {
   const levels = lights.map((k) => stopsOf(ui.weights[k] ?? ui.lights[k].present, ui.lights[k]));
   const stops = levels.filter((level) => level !== null);
-  if (!stops.length) return 'off';
+  if (!stops.length) return words.selectionPanel.allOff;
   const [low, high] = [Math.min(...stops), Math.max(...stops)];
   const isEqual = stopsText(low) === stopsText(high);
-  const text = isEqual ? stopsText(low) : `${signedText(low)} to ${signedText(high)} st`;
-  return stops.length < levels.length ? `${text}, some off` : text;
+  const text = isEqual
+    ? stopsText(low)
+    : fill(words.selectionPanel.toSt, { signed: signedText(low), signed2: signedText(high) });
+  return stops.length < levels.length ? fill(words.selectionPanel.someOff, { text }) : text;
 }

@@ -2,6 +2,7 @@
 
 import { html, useEffect, useRef, useState } from '../../vendor/preact.js';
 import { Button, Dialog } from '../controls.js';
+import { fill, words } from '../../language/language.js';
 
 /** @typedef {import("../ui_state.js").Ui} Ui */
 /** @typedef {import("../shortcuts.js").App} App */
@@ -17,7 +18,7 @@ const ENDINGS = ['.ora', '.exr'];
 export function takeLayerFile({ store, session, engine }, file) {
   if (!file) return;
   if (!ENDINGS.some((ending) => file.name.toLowerCase().endsWith(ending))) {
-    session.toast(`${file.name} has no layers: drop an .ora file, or layers.exr.`, 'warn');
+    session.toast(fill(words.layerImport.hasNoLayersDropAnOra, { name: file.name }), 'warn');
     return;
   }
   const { layers, isPaintingEmpty, views } = store.value;
@@ -30,11 +31,11 @@ export function takeLayerFile({ store, session, engine }, file) {
 /** Send a file to the session. @param {App} app @param {File} file @param {boolean} replaces */
 async function sendLayerFile({ store, session }, file, replaces) {
   store.set({ layerFile: null });
-  session.toast(`Importing ${file.name} …`);
+  session.toast(fill(words.layerImport.importing, { name: file.name }));
   const { view } = store.value;
   try {
     const bytes = new Uint8Array(await file.arrayBuffer());
-    for (let start = 0; start < bytes.length; ) {
+    for (let start = 0; start < bytes.length;) {
       const rows = Math.min(PART_ROWS, Math.floor((bytes.length - start) / ROW_BYTES));
       const count = rows ? rows * ROW_BYTES : bytes.length - start;
       const data = bytes.slice(start, start + count);
@@ -58,7 +59,7 @@ export function LayerImportButton({ app }) {
     currentTarget.value = ''; // so that the same file can be chosen again
   };
   return html`<div class="layer-import">
-    <${Button} label="Import layers …" tip="From an .ora file of any program, or layers.exr. You can also drop the file here."
+    <${Button} label=${words.layerImport.importLayers} tip=${words.layerImport.fromAnOraFileOfAny}
       act=${() => ref.current?.click()} />
     <input type="file" accept=${ENDINGS.join()} hidden ref=${ref} onChange=${take}
       aria-hidden="true" tabindex="-1" />
@@ -71,12 +72,12 @@ export function LayerImportDialog({ ui, app }) {
   const file = ui.layerFile;
   if (!file) return null;
   const close = () => app.store.set({ layerFile: null });
-  return html`<${Dialog} title="Import layers" close=${close} class="layer-import-dialog">
-    <p>Where do the layers of <strong>${file.name}</strong> go?</p>
+  return html`<${Dialog} title=${words.layerImport.importLayers2} close=${close} class="layer-import-dialog">
+    <p>${words.layerImport.whereDoTheLayersOf} <strong>${file.name}</strong> ${words.layerImport.go}</p>
     <div class="row">
-      <${Button} label="Put them on top" primary act=${() => sendLayerFile(app, file, false)} />
-      <${Button} label="Replace all layers" act=${() => sendLayerFile(app, file, true)} />
-      <${Button} label="Cancel" act=${close} />
+      <${Button} label=${words.layerImport.putThemOnTop} primary act=${() => sendLayerFile(app, file, false)} />
+      <${Button} label=${words.layerImport.replaceAllLayers} act=${() => sendLayerFile(app, file, true)} />
+      <${Button} label=${words.layerImport.cancel} act=${close} />
     </div>
   </${Dialog}>`;
 }
@@ -109,5 +110,8 @@ export function LayerDropFrame({ app, root }) {
     root().addEventListener('drop', drop, { signal });
     return () => ends.abort();
   }, []);
-  return isOver && html`<div class="layer-drop" aria-hidden="true"><span>Drop to import layers</span></div>`;
+  return (
+    isOver &&
+    html`<div class="layer-drop" aria-hidden="true"><span>${words.layerImport.dropToImportLayers}</span></div>`
+  );
 }

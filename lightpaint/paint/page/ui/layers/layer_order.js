@@ -1,5 +1,7 @@
 /** Changes of the layers' order, as requests: moved, grouped, copied and deleted layers. */
 
+import { fill, words } from '../../language/language.js';
+
 /** @typedef {import("../../engine/messages.js").Layer} Layer */
 /** @typedef {import("../../engine/messages.js").ChangeLayers} ChangeLayers */
 /** A row of the list, the topmost first: members of a group follow it.
@@ -29,7 +31,7 @@ export function movedLayer(layers, id, before, group) {
   return {
     layers: isOther ? [{ ...moved, group }] : [],
     order: rest.map(({ layer }) => layer.id).reverse(),
-    label: 'order of layers',
+    label: words.layerOrder.orderOfLayers,
   };
 }
 
@@ -58,7 +60,8 @@ export function steppedLayer(layers, id, way) {
     return movedLayer(layers, id, next.layer.id, layer.group);
   }
   if (next.layer.kind !== 'group') return movedLayer(layers, id, after(end + 1), layer.group);
-  if (isGroup) return movedLayer(layers, id, after(end + blockOf(rows, next.layer.id).length), null);
+  if (isGroup)
+    return movedLayer(layers, id, after(end + blockOf(rows, next.layer.id).length), null);
   return movedLayer(layers, id, after(end + 1), next.layer.id);
 }
 
@@ -66,7 +69,10 @@ export function steppedLayer(layers, id, way) {
  * @param {Layer[]} layers @param {number[]} ids @returns {ChangeLayers} */
 export function withoutLayers(layers, ids) {
   const stay = layers.filter(({ id, group }) => !ids.includes(id) && !ids.includes(group ?? -1));
-  return { order: stay.map(({ id }) => id), label: ids.length > 1 ? 'delete layers' : 'delete layer' };
+  return {
+    order: stay.map(({ id }) => id),
+    label: ids.length > 1 ? words.layerOrder.deleteLayers : words.layerOrder.deleteLayer,
+  };
 }
 
 /** Return the change that puts layers into a new group, at the place of the topmost.
@@ -84,15 +90,28 @@ export function groupedLayers(layers, ids, next) {
     return id === top.id ? own : [id, ...own];
   });
   /** @type {Layer} */
-  const group = { ...top, id: next, kind: 'group', name: 'Group', group: null, is_visible: true };
-  const plain = { strength: 1, importance: 1, gain: 1, times: 1, tint: /** @type {const} */ ([1, 1, 1]) };
+  const group = {
+    ...top,
+    id: next,
+    kind: 'group',
+    name: words.layerOrder.group,
+    group: null,
+    is_visible: true,
+  };
+  const plain = {
+    strength: 1,
+    importance: 1,
+    gain: 1,
+    times: 1,
+    tint: /** @type {const} */ ([1, 1, 1]),
+  };
   return {
     layers: [
       { ...group, ...plain, tint: [1, 1, 1] },
       ...members.map((layer) => ({ ...layer, group: next })),
     ],
     order,
-    label: 'group layers',
+    label: words.layerOrder.groupLayers,
   };
 }
 
@@ -102,7 +121,7 @@ export function ungroupedLayers(layers, id) {
   return {
     layers: layers.filter(({ group }) => group === id).map((layer) => ({ ...layer, group: null })),
     order: layers.map((layer) => layer.id).filter((one) => one !== id),
-    label: 'ungroup layers',
+    label: words.layerOrder.ungroupLayers,
   };
 }
 
@@ -117,12 +136,12 @@ export function copiedLayers(layers, id, next) {
     id: /** @type {number} */ (ids.get(layer.id)),
     // A painting that is always there is copied as paint like any other layer of pixels.
     group: layer.group === null ? null : (ids.get(layer.group) ?? layer.group),
-    name: layer.id === id ? `${layer.name} copy` : layer.name,
+    name: layer.id === id ? fill(words.layerOrder.copy, { name: layer.name }) : layer.name,
   }));
   const order = layers.flatMap((layer) =>
     layer.id === id ? [id, ...made.map((one) => one.id)] : [layer.id],
   );
   const pixels = block.filter(({ kind }) => kind !== 'group');
   const copies = Object.fromEntries(pixels.map((layer) => [ids.get(layer.id), layer.id]));
-  return { layers: made, order, copies, label: 'copy layer' };
+  return { layers: made, order, copies, label: words.layerOrder.copyLayer };
 }

@@ -14,6 +14,7 @@ import {
   ungroupedLayers,
   withoutLayers,
 } from './layer_order.js';
+import { fill, words } from '../../language/language.js';
 
 /** @typedef {import("../ui_state.js").Ui} Ui */
 /** @typedef {import("../shortcuts.js").App} App */
@@ -49,7 +50,7 @@ export function LayerRow({ ui, app, layer, isInner, isActive, isUnfolded, isChos
   const show = () =>
     engine.changeLayers({
       layers: [{ ...layer, is_visible: !isVisible }],
-      label: isVisible ? `hide ${name}` : `show ${name}`,
+      label: isVisible ? fill(words.layerRow.hide, { name }) : fill(words.layerRow.show, { name }),
     });
   const hover = (/** @type {number | null} */ hoveredLayer) => () => store.set({ hoveredLayer });
   const focus = (/** @type {any} */ event) =>
@@ -57,11 +58,11 @@ export function LayerRow({ ui, app, layer, isInner, isActive, isUnfolded, isChos
   return html`<li class=${kind.filter(Boolean).join(' ')} data-layer=${id}>
     <div class="layer-line" onPointerEnter=${hover(id)} onPointerLeave=${hover(null)}>
       <${Button} icon=${isVisible ? 'eye' : 'hidden'} 
-        tip=${`${isVisible ? 'Hide' : 'Show'} ${name}`} act=${show} />
+        tip=${fill(isVisible ? words.layerRow.hideLayer : words.layerRow.showLayer, { name })} act=${show} />
       ${
         isGroup
           ? html`<button type="button" class="layer-fold" aria-expanded=${String(isOpen)}
-              aria-label=${`Layers of ${name}`} onClick=${fold}><${Icon} name="fold" /></button>`
+              aria-label=${fill(words.layerRow.layersOf, { name })} onClick=${fold}><${Icon} name="fold" /></button>`
           : html`<${LayerThumbnail} ui=${ui} app=${app} id=${id} />`
       }
       <button type="button" class="layer-name" aria-current=${isActive ? 'true' : undefined}
@@ -69,9 +70,9 @@ export function LayerRow({ ui, app, layer, isInner, isActive, isUnfolded, isChos
         aria-keyshortcuts="Alt+ArrowUp Alt+ArrowDown Delete" data-tip=${name.length > 24 ? name : undefined}
         onClick=${(/** @type {MouseEvent} */ event) => chooseLayer(event, app, id)} onFocus=${focus}
         onBlur=${hover(null)} onKeyDown=${(/** @type {KeyboardEvent} */ event) =>
-          pressKey(event, app, layer)}>${name || 'Layer'}</button>
+          pressKey(event, app, layer)}>${name || words.layerRow.layer}</button>
       ${layer.strength !== 1 && html`<span class="faint">${Math.round(100 * layer.strength)} %</span>`}
-      <span class="grip" aria-hidden="true" data-tip="Drag to order"><${Icon} name="grip" /></span>
+      <span class="grip" aria-hidden="true" data-tip=${words.layerRow.dragToOrder}><${Icon} name="grip" /></span>
     </div>
     ${isUnfolded && html`<${LayerControls} ui=${ui} app=${app} layer=${layer} />`}
   </li>`;
@@ -119,14 +120,14 @@ function LayerControls({ ui, app, layer }) {
   // A slider that is let go where it was grasped has no other end.
   const release = () => setTimeout(() => engine.finishLayers());
   return html`<div class="layer-controls" onPointerUp=${release}>
-    <${Slider} label="Strength" value=${100 * layer.strength} min=${0} max=${200} unit="%" resetValue=${100}
-      tip="100 %: as asked for; 200 %: twice the stops"
+    <${Slider} label=${words.layerRow.strength} value=${100 * layer.strength} min=${0} max=${200} unit="%" resetValue=${100}
+      tip=${words.layerRow.n100AsAskedFor200Twice}
       change=${(/** @type {number} */ to, /** @type {boolean} */ done) =>
         set({ strength: Math.round(to) / 100 }, 'strength', done)} />
     ${
       kind !== 'weigh' &&
-      html`<${Slider} label="Importance" value=${layer.importance} min=${0.1} max=${10} curve=${TIMES}
-      step=${0.1} digits=${2} resetValue=${1} unit="×" tip="How many times as much this layer counts"
+      html`<${Slider} label=${words.layerRow.importance} value=${layer.importance} min=${0.1} max=${10} curve=${TIMES}
+      step=${0.1} digits=${2} resetValue=${1} unit="×" tip=${words.layerRow.howManyTimesAsMuchThis}
       change=${(/** @type {number} */ importance, /** @type {boolean} */ done) =>
         set({ importance }, 'importance', done)} />`
     }
@@ -134,29 +135,29 @@ function LayerControls({ ui, app, layer }) {
     ${(kind === 'adjust' || (layer.gradient && !layer.gradient.light)) && html`<${Adjustment} layer=${layer} set=${set} />`}
     ${
       kind === 'weigh' &&
-      html`<${NumberField} label="Weight" value=${layer.times} min=${0.01} max=${100} step=${0.5}
+      html`<${NumberField} label=${words.layerRow.weight} value=${layer.times} min=${0.01} max=${100} step=${0.5}
       unit="×" change=${(/** @type {number} */ times) => set({ times }, 'importance')} />`
     }
     <${LayerName} layer=${layer} set=${set} />
-    <div class="layer-acts" role="group" aria-label=${`Actions for ${layer.name}`}>
+    <div class="layer-acts" role="group" aria-label=${fill(words.layerRow.actionsFor, { name: layer.name })}>
       ${
         ['adjust', 'weigh', 'gradient'].includes(kind) &&
-        html`<${Button} label="Mask" pressed=${isMasked} act=${mask}
-        tip="Paint where this layer applies: the brush adds, the eraser removes" />`
+        html`<${Button} label=${words.layerRow.mask} pressed=${isMasked} act=${mask}
+        tip=${words.layerRow.paintWhereThisLayerAppliesThe} />`
       }
       ${
         kind === 'group'
-          ? html`<${Button} label="Ungroup" act=${() => change(ungroupedLayers(ui.layers, id))} />`
-          : html`<${Button} icon="group" tip=${ids.length > 1 ? `Group ${ids.length} layers` : 'Put into a group'}
+          ? html`<${Button} label=${words.layerRow.ungroup} act=${() => change(ungroupedLayers(ui.layers, id))} />`
+          : html`<${Button} icon="group" tip=${ids.length > 1 ? fill(words.layerRow.groupLayers, { count: ids.length }) : words.layerRow.putIntoAGroup}
               act=${() => change(groupedLayers(ui.layers, ids, ui.nextLayer))} />`
       }
       <span class="spring"></span>
       ${
         id !== 0 &&
-        html`<${Button} icon="copy" tip="Duplicate"
+        html`<${Button} icon="copy" tip=${words.layerRow.duplicate}
         act=${() => change(copiedLayers(ui.layers, id, ui.nextLayer))} />`
       }
-      <${Button} icon="trash" tip=${ids.length > 1 ? `Delete ${ids.length} layers` : 'Delete'}
+      <${Button} icon="trash" tip=${ids.length > 1 ? fill(words.layerRow.deleteLayers, { count: ids.length }) : words.layerRow.delete}
         act=${() => change(withoutLayers(ui.layers, ids))} />
     </div>
   </div>`;
@@ -168,10 +169,10 @@ function Adjustment({ layer, set }) {
   const stops = Math.log2(layer.gain);
   const mired = miredOf(layer.tint);
   return html`<div class="layer-wish" data-numbers>
-    <${NumberField} label="Brighter" value=${stops} min=${-8} max=${8} step=${0.1} unit="st"
+    <${NumberField} label=${words.layerRow.brighter} value=${stops} min=${-8} max=${8} step=${0.1} unit=${words.layerRow.st}
       change=${(/** @type {number} */ to) => set({ gain: 2 ** to }, 'adjust')} />
-    <${NumberField} label="Warmer" value=${mired} min=${-300} max=${300} step=${5} digits=${0}
-      unit="mired" change=${(/** @type {number} */ to) => set({ tint: warmer(to) }, 'adjust')} />
+    <${NumberField} label=${words.layerRow.warmer} value=${mired} min=${-300} max=${300} step=${5} digits=${0}
+      unit=${words.layerRow.mired} change=${(/** @type {number} */ to) => set({ tint: warmer(to) }, 'adjust')} />
   </div>`;
 }
 
@@ -194,13 +195,13 @@ function LayerName({ layer, set }) {
   const take = (/** @type {string} */ text) => {
     setTyped(null);
     const name = text.trim();
-    if (name && name !== layer.name) set({ name }, 'rename layer');
+    if (name && name !== layer.name) set({ name }, words.layerRow.renameLayer);
   };
   const press = (/** @type {any} */ { key, currentTarget }) => {
     if (key === 'Enter') take(currentTarget.value);
     if (key === 'Escape') setTyped(null);
   };
-  return html`<label class="field layer-label" data-tip=${layer.name.length > 20 ? layer.name : undefined}><span class="name">Name</span>
+  return html`<label class="field layer-label" data-tip=${layer.name.length > 20 ? layer.name : undefined}><span class="name">${words.layerRow.name}</span>
     <input type="text" value=${typed ?? layer.name} maxlength="80" autocomplete="off" spellcheck=${false}
       data-typed=${typed === null ? 'no' : 'yes'} onKeyDown=${press}
       onInput=${(/** @type {any} */ event) => setTyped(event.currentTarget.value)}
@@ -236,7 +237,11 @@ function pressKey(event, app, layer) {
   if (way && event.altKey) {
     const change = steppedLayer(layers, layer.id, way);
     if (change) engine.changeLayers(change);
-    store.set({ layerNote: change ? `${layer.name} moved ${way < 0 ? 'up' : 'down'}` : '' });
+    store.set({
+      layerNote: change
+        ? fill(way < 0 ? words.layerRow.movedUp : words.layerRow.movedDown, { name: layer.name })
+        : '',
+    });
     // An element that is moved loses the focus.
     const own = `[data-layer="${layer.id}"] .layer-name`;
     requestAnimationFrame(() => /** @type {HTMLElement} */ (list.querySelector(own))?.focus());
@@ -245,7 +250,10 @@ function pressKey(event, app, layer) {
     const at = names().indexOf(element);
     const ids = selectedLayers.includes(layer.id) ? selectedLayers : [layer.id];
     engine.changeLayers(withoutLayers(layers, ids));
-    store.set({ layerNote: `${layer.name} deleted`, hoveredLayer: null });
+    store.set({
+      layerNote: fill(words.layerRow.deleted, { name: layer.name }),
+      hoveredLayer: null,
+    });
     requestAnimationFrame(() => names()[Math.min(at, names().length - 1)]?.focus());
   } else return;
   event.preventDefault();

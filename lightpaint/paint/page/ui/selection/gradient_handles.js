@@ -1,6 +1,7 @@
 /** The ends of the active gradient, on the painting: drag them, or move them by the arrow keys. */
 
 import { html, useRef } from '../../vendor/preact.js';
+import { fill, words } from '../../language/language.js';
 
 /** @typedef {import("../engine_interface.js").Pane} Pane */
 /** @typedef {import("../ui_state.js").Ui} Ui */
@@ -10,8 +11,8 @@ import { html, useRef } from '../../vendor/preact.js';
 
 /** @type {{end: "start" | "end", label: string}[]} */
 const ENDS = [
-  { end: 'start', label: 'Start of the gradient' },
-  { end: 'end', label: 'End of the gradient' },
+  { end: 'start', label: words.gradientHandles.startOfTheGradient },
+  { end: 'end', label: words.gradientHandles.endOfTheGradient },
 ];
 
 /** @param {{ui: Ui, app: App, panes: Pane[]}} props */
@@ -37,7 +38,10 @@ export function GradientHandles({ ui, app, panes }) {
         html`<circle cx=${start.x} cy=${start.y} r=${radius} /><circle cx=${start.x} cy=${start.y} r=${radius} />`
       }</g></svg>
     ${ENDS.map(
-      (one, k) => html`<${Handle} key=${one.end} ...${one} app=${app} layer=${layer} gradient=${gradient}
+      (
+        one,
+        k,
+      ) => html`<${Handle} key=${one.end} ...${one} app=${app} layer=${layer} gradient=${gradient}
         place=${[start, end][k]} scale=${pane.scale} />`,
     )}</div>`;
 }
@@ -49,7 +53,7 @@ function Handle({ end, label, app, layer, gradient, place, scale }) {
   const move = (/** @type {[number, number]} */ to, /** @type {boolean} */ isFinal) =>
     app.engine.changeLayers({
       layers: [{ ...layer, gradient: { ...gradient, [end]: to } }],
-      label: 'gradient',
+      label: words.gradientHandles.gradient,
       is_final: isFinal,
     });
   const press = (/** @type {PointerEvent} */ event) => {
@@ -70,7 +74,9 @@ function Handle({ end, label, app, layer, gradient, place, scale }) {
     app.engine.finishLayers();
   };
   const key = (/** @type {KeyboardEvent} */ event) => {
-    const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
+    const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[
+      event.key
+    ];
     if (!way) return;
     event.preventDefault();
     event.stopPropagation();
@@ -79,7 +85,7 @@ function Handle({ end, label, app, layer, gradient, place, scale }) {
     move([x + step * way[0], y + step * way[1]], true);
   };
   return html`<button type="button" class=${`gradient-end is-${end}`} aria-label=${label}
-    data-tip=${`${label}: drag it, or move it by the arrow keys`}
+    data-tip=${fill(words.gradientHandles.dragItOrMoveItBy, { label })}
     style=${{ transform: `translate(${place.x}px, ${place.y}px)` }} onPointerDown=${press}
     onPointerMove=${drag} onPointerUp=${release} onPointerCancel=${release} onKeyDown=${key} />`;
 }

@@ -4,24 +4,45 @@ import { warmer } from '../../../../viewer/drawing/colour.js';
 import { html } from '../../vendor/preact.js';
 import { Choice, NumberField } from '../controls.js';
 import { paintOf } from '../display_state.js';
+import { words } from '../../language/language.js';
 
 /** @typedef {import("../ui_state.js").Ui} Ui */
 /** @typedef {import("../shortcuts.js").App} App */
 /** @typedef {import("./gradient_settings.js").GradientUi} GradientUi */
 
 export const GRADIENT_SHAPES = [
-  { value: 'linear', label: 'Linear', tip: 'From one line to another' },
-  { value: 'radial', label: 'Radial', tip: 'Around the place where the drag begins' },
+  {
+    value: 'linear',
+    label: words.gradientOptions.linear,
+    tip: words.gradientOptions.fromOneLineToAnother,
+  },
+  {
+    value: 'radial',
+    label: words.gradientOptions.radial,
+    tip: words.gradientOptions.aroundThePlaceWhereTheDrag,
+  },
 ];
 
 const EFFECTS = [
-  { value: false, label: 'Paint', tip: 'Light of the current colour' },
-  { value: true, label: 'Adjust', tip: 'Brighter and warmer by numbers' },
+  {
+    value: false,
+    label: words.gradientOptions.paint,
+    tip: words.gradientOptions.lightOfTheCurrentColour,
+  },
+  {
+    value: true,
+    label: words.gradientOptions.adjust,
+    tip: words.gradientOptions.brighterAndWarmerByNumbers,
+  },
 ];
 
 const ENDS = [
-  { value: false, label: 'To nothing', tip: 'It fades out' },
-  { value: true, label: 'To 2nd colour', tip: 'It becomes the second colour (X swaps them)' },
+  { value: false, label: words.gradientOptions.toNothing, tip: words.gradientOptions.itFadesOut },
+  {
+    value: true,
+    label: words.gradientOptions.to2ndColour,
+    tip: words.gradientOptions.itBecomesTheSecondColourX,
+  },
 ];
 
 /** @param {{ui: Ui, app: App}} props */
@@ -30,17 +51,17 @@ export function GradientOptions({ ui, app }) {
   const set = (/** @type {Partial<GradientUi>} */ changes) =>
     app.store.set((state) => ({ gradient: { ...state.gradient, ...changes } }));
   return html`
-    <${Choice} label="Shape" value=${gradient.shape} choices=${GRADIENT_SHAPES}
+    <${Choice} label=${words.gradientOptions.shape} value=${gradient.shape} choices=${GRADIENT_SHAPES}
       change=${(/** @type {any} */ shape) => set({ shape })} />
-    <${Choice} label="Effect" value=${gradient.isAdjusting} choices=${EFFECTS}
+    <${Choice} label=${words.gradientOptions.effect} value=${gradient.isAdjusting} choices=${EFFECTS}
       change=${(/** @type {boolean} */ isAdjusting) => set({ isAdjusting })} />
     ${
       gradient.isAdjusting
-        ? html`<${NumberField} label="Brighter" value=${gradient.stops} min=${-8} max=${8} step=${0.1}
-            unit="st" change=${(/** @type {number} */ stops) => set({ stops })} />
-          <${NumberField} label="Warmer" value=${gradient.mired} min=${-300} max=${300} step=${5} digits=${0}
-            unit="mired" change=${(/** @type {number} */ mired) => set({ mired })} />`
-        : html`<${Choice} label="End" value=${gradient.hasEnd} choices=${ENDS}
+        ? html`<${NumberField} label=${words.gradientOptions.brighter} value=${gradient.stops} min=${-8} max=${8} step=${0.1}
+            unit=${words.gradientOptions.st} change=${(/** @type {number} */ stops) => set({ stops })} />
+          <${NumberField} label=${words.gradientOptions.warmer} value=${gradient.mired} min=${-300} max=${300} step=${5} digits=${0}
+            unit=${words.gradientOptions.mired} change=${(/** @type {number} */ mired) => set({ mired })} />`
+        : html`<${Choice} label=${words.gradientOptions.end} value=${gradient.hasEnd} choices=${ENDS}
             change=${(/** @type {boolean} */ hasEnd) => set({ hasEnd })} />`
     }`;
 }

@@ -3,6 +3,7 @@
 import { html } from '../../vendor/preact.js';
 import { Button, Choice, Slider } from '../controls.js';
 import { MODES, SHAPES, updateSelection } from './selection_settings.js';
+import { words } from '../../language/language.js';
 
 /** @typedef {import("../ui_state.js").Ui} Ui */
 /** @typedef {import("../shortcuts.js").App} App */
@@ -32,21 +33,21 @@ export function SelectOptions({ ui, app }) {
   const togglePanel = () =>
     store.set({ side: true, panel: null, open: { ...ui.open, select: !isPanelOpen } });
   return html`
-    <${Choice} label="Shape" icons value=${selection.shape} choices=${shapes}
+    <${Choice} label=${words.selectOptions.shape} icons value=${selection.shape} choices=${shapes}
       change=${(/** @type {any} */ shape) => updateSelection(store, { shape })} />
-    <${Choice} label="Join" icons value=${selection.mode} choices=${MODES}
+    <${Choice} label=${words.selectOptions.join} icons value=${selection.mode} choices=${MODES}
       change=${(/** @type {any} */ mode) => updateSelection(store, { mode })} />
-    <${Slider} label="Feather" value=${selection.feather} min=${0} max=${MAX_FEATHER} unit="px"
-      curve=${FEATHER_CURVE} tip="Width of the soft edge of what you select next" resetValue=${0}
+    <${Slider} label=${words.selectOptions.feather} value=${selection.feather} min=${0} max=${MAX_FEATHER} unit=${words.selectOptions.px}
+      curve=${FEATHER_CURVE} tip=${words.selectOptions.widthOfTheSoftEdgeOf} resetValue=${0}
       change=${(/** @type {number} */ feather) => updateSelection(store, { feather })} />
     ${
       selection.shape === 'colour' &&
-      html`<${Slider} label="Tolerance" value=${selection.tolerance} min=${1} max=${MAX_TOLERANCE}
-      tip="How far from the clicked colour, in ΔE of the picture as it is shown"
+      html`<${Slider} label=${words.selectOptions.tolerance} value=${selection.tolerance} min=${1} max=${MAX_TOLERANCE}
+      tip=${words.selectOptions.howFarFromTheClickedColour}
       change=${(/** @type {number} */ tolerance) => updateSelection(store, { tolerance })} />`
     }
-    <${Button} label="None" keys="Ctrl D" tip="Select nothing: paint goes everywhere"
+    <${Button} label=${words.selectOptions.none} keys="Ctrl D" tip=${words.selectOptions.selectNothingPaintGoesEverywhere}
       disabled=${!selection.current} act=${() => engine.selections.change({ kind: 'none' })} />
-    <${Button} label="More" pressed=${isPanelOpen} act=${togglePanel}
-      tip="Grow, shrink, feather; select by numbers, brightness, or what a light lights" />`;
+    <${Button} label=${words.selectOptions.more} pressed=${isPanelOpen} act=${togglePanel}
+      tip=${words.selectOptions.growShrinkFeatherSelectByNumbers} />`;
 }

@@ -4,6 +4,7 @@ import { html } from '../../vendor/preact.js';
 import { Button, Choice, NumberField, Select, reveal } from '../controls.js';
 import { MAX_FEATHER } from './select_options.js';
 import { MODES, selectedText, updateSelection } from './selection_settings.js';
+import { words } from '../../language/language.js';
 
 /** @typedef {import("../ui_state.js").Ui} Ui */
 /** @typedef {import("../shortcuts.js").App} App */
@@ -12,16 +13,16 @@ import { MODES, selectedText, updateSelection } from './selection_settings.js';
 
 /** @type {{value: import("./selection_settings.js").TypedKind, label: string}[]} */
 const KINDS = [
-  { value: 'rectangle', label: 'Rectangle' },
-  { value: 'ellipse', label: 'Ellipse' },
-  { value: 'object', label: 'Object' },
-  { value: 'light', label: 'What a light lights' },
-  { value: 'brightness', label: 'Brightness' },
+  { value: 'rectangle', label: words.selectionFields.rectangle },
+  { value: 'ellipse', label: words.selectionFields.ellipse },
+  { value: 'object', label: words.selectionFields.object },
+  { value: 'light', label: words.selectionFields.whatALightLights },
+  { value: 'brightness', label: words.selectionFields.brightness },
 ];
 
 const PICTURES = [
-  { value: 'painting', label: 'Painting' },
-  { value: 'solution', label: 'Answer' },
+  { value: 'painting', label: words.selectionFields.painting },
+  { value: 'solution', label: words.selectionFields.answer },
 ];
 
 /** @param {{ui: Ui, app: App}} props */
@@ -30,8 +31,9 @@ export function SelectionFields({ ui, app }) {
   const { selection } = ui;
   const set = (/** @type {Partial<SelectionUi>} */ changes) => updateSelection(store, changes);
   const part = partOf(ui);
-  const change = (/** @type {import("../../engine/selection/selections.js").Change} */ made) => () =>
-    engine.selections.change(made);
+  const change =
+    (/** @type {import("../../engine/selection/selections.js").Change} */ made) => () =>
+      engine.selections.change(made);
   const { pixels, current } = selection;
   const select = () =>
     part && engine.selections.select(part, { mode: selection.mode, feather: selection.feather });
@@ -43,29 +45,29 @@ export function SelectionFields({ ui, app }) {
   };
   return html`<div class="ask select-panel" data-numbers onClick=${leave}>
     <p role="status">${selectedText(selection)}</p>
-    <div class="row" role="group" aria-label="Selection">
-      <${Button} label="All" keys="Ctrl A" act=${() => engine.selections.select({ kind: 'all' })} />
-      <${Button} label="None" keys="Ctrl D" disabled=${!current} act=${change({ kind: 'none' })} />
-      <${Button} label="Invert" keys="Ctrl Shift I" disabled=${!current} act=${change({ kind: 'invert' })} />
+    <div class="row" role="group" aria-label=${words.selectionFields.selection}>
+      <${Button} label=${words.selectionFields.all} keys="Ctrl A" act=${() => engine.selections.select({ kind: 'all' })} />
+      <${Button} label=${words.selectionFields.none} keys="Ctrl D" disabled=${!current} act=${change({ kind: 'none' })} />
+      <${Button} label=${words.selectionFields.invert} keys="Ctrl Shift I" disabled=${!current} act=${change({ kind: 'invert' })} />
       <span class="spring"></span>
-      <${Button} label="Tint" pressed=${selection.show === 'tint'}
-        tip="Tint what is not selected, instead of an outline around what is at least half selected"
+      <${Button} label=${words.selectionFields.tint} pressed=${selection.show === 'tint'}
+        tip=${words.selectionFields.tintWhatIsNotSelectedInstead}
         act=${() => set({ show: selection.show === 'tint' ? 'ants' : 'tint' })} />
     </div>
-    <div class="row" role="group" aria-label="Its edge">
-      <${NumberField} label="Edge" hidden value=${pixels} min=${1} max=${MAX_FEATHER} digits=${0} unit="px"
+    <div class="row" role="group" aria-label=${words.selectionFields.itsEdge}>
+      <${NumberField} label=${words.selectionFields.edge} hidden value=${pixels} min=${1} max=${MAX_FEATHER} digits=${0} unit=${words.selectionFields.px}
         change=${(/** @type {number} */ value) => set({ pixels: value })} />
-      <${Button} label="Grow" disabled=${!current} act=${change({ kind: 'grow', pixels })} />
-      <${Button} label="Shrink" disabled=${!current} act=${change({ kind: 'grow', pixels: -pixels })} />
-      <${Button} label="Feather" disabled=${!current} act=${change({ kind: 'feather', pixels })} />
+      <${Button} label=${words.selectionFields.grow} disabled=${!current} act=${change({ kind: 'grow', pixels })} />
+      <${Button} label=${words.selectionFields.shrink} disabled=${!current} act=${change({ kind: 'grow', pixels: -pixels })} />
+      <${Button} label=${words.selectionFields.feather} disabled=${!current} act=${change({ kind: 'feather', pixels })} />
     </div>
-    <${Select} label="Select" value=${selection.kind} choices=${kinds}
+    <${Select} label=${words.selectionFields.select} value=${selection.kind} choices=${kinds}
       change=${(/** @type {any} */ kind) => set({ kind })} />
     <${PartFields} ui=${ui} set=${set} />
     <div class="row">
-      <${Choice} label="Join" icons value=${selection.mode} choices=${MODES}
+      <${Choice} label=${words.selectionFields.join} icons value=${selection.mode} choices=${MODES}
         change=${(/** @type {any} */ mode) => set({ mode })} />
-      <${Button} label="Select" primary disabled=${!part} act=${select} />
+      <${Button} label=${words.selectionFields.select} primary disabled=${!part} act=${select} />
     </div>
   </div>`;
 }
@@ -76,27 +78,31 @@ function PartFields({ ui, set }) {
   const { kind, box, brightness } = selection;
   const [height, width] = ui.state?.size ?? [1, 1];
   if (kind === 'object')
-    return html`<${Select} label="Object" value=${selection.object}
+    return html`<${Select} label=${words.selectionFields.object} value=${selection.object}
       choices=${namesOf(ui.state?.objects ?? [])} change=${(/** @type {string} */ object) => set({ object })} />`;
   if (kind === 'light')
-    return html`<${Select} label="Light" value=${selection.light}
+    return html`<${Select} label=${words.selectionFields.light} value=${selection.light}
       choices=${namesOf(lights.map(({ name }) => name))}
-      tip="Softly, as much as its light arrives there" change=${(/** @type {string} */ light) => set({ light })} />`;
+      tip=${words.selectionFields.softlyAsMuchAsItsLight} change=${(/** @type {string} */ light) => set({ light })} />`;
   if (kind === 'brightness')
-    return html`<${Choice} label="Of the picture" value=${selection.picture} choices=${PICTURES}
+    return html`<${Choice} label=${words.selectionFields.ofThePicture} value=${selection.picture} choices=${PICTURES}
         change=${(/** @type {any} */ picture) => set({ picture })} />
       <div class="row">
-        <${NumberField} label="From" value=${brightness[0]} min=${0} max=${100} digits=${0} unit="%"
-          tip="Lightness L* of the picture as it is shown"
+        <${NumberField} label=${words.selectionFields.from} value=${brightness[0]} min=${0} max=${100} digits=${0} unit="%"
+          tip=${words.selectionFields.lightnessLOfThePictureAs}
           change=${(/** @type {number} */ low) => set({ brightness: [low, Math.max(low, brightness[1])] })} />
-        <${NumberField} label="to" value=${brightness[1]} min=${0} max=${100} digits=${0} unit="%"
+        <${NumberField} label=${words.selectionFields.to} value=${brightness[1]} min=${0} max=${100} digits=${0} unit="%"
           change=${(/** @type {number} */ high) => set({ brightness: [Math.min(high, brightness[0]), high] })} />
       </div>`;
-  const field = (/** @type {keyof typeof box} */ key, /** @type {string} */ label, /** @type {number} */ max) =>
+  const field = (
+    /** @type {keyof typeof box} */ key,
+    /** @type {string} */ label,
+    /** @type {number} */ max,
+  ) =>
     html`<${NumberField} label=${label} value=${box[key]} min=${key === 'x' || key === 'y' ? 0 : 1}
-      max=${max} digits=${0} unit="px" change=${(/** @type {number} */ value) => set({ box: { ...box, [key]: value } })} />`;
-  return html`<div class="row is-pair">${field('x', 'Left', width)}${field('y', 'Top', height)}</div>
-    <div class="row is-pair">${field('width', 'Width', width)}${field('height', 'Height', height)}</div>`;
+      max=${max} digits=${0} unit=${words.selectionFields.px} change=${(/** @type {number} */ value) => set({ box: { ...box, [key]: value } })} />`;
+  return html`<div class="row is-pair">${field('x', words.selectionFields.left, width)}${field('y', words.selectionFields.top, height)}</div>
+    <div class="row is-pair">${field('width', words.selectionFields.width, width)}${field('height', words.selectionFields.height, height)}</div>`;
 }
 
 /** Return the part that the panel describes; null while something is missing. @param {Ui} ui
@@ -124,6 +130,6 @@ function partOf({ selection, state, lights }) {
 
 /** @param {string[]} names */
 const namesOf = (names) => [
-  { value: '', label: 'Choose …' },
+  { value: '', label: words.selectionFields.choose },
   ...[...names].sort((a, b) => a.localeCompare(b)).map((name) => ({ value: name, label: name })),
 ];

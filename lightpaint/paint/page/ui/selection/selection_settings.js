@@ -1,5 +1,7 @@
 /** The settings of selecting, and what happens to them when something is selected. */
 
+import { fill, words } from '../../language/language.js';
+
 /** @typedef {import("../engine_interface.js").Engine} Engine */
 /** @typedef {import("../engine_interface.js").Kind} Kind */
 /** @typedef {import("../ui_state.js").Ui} Ui */
@@ -35,23 +37,63 @@
 
 /** @type {{shape: Shape, label: string, icon: string, hint: string}[]} */
 export const SHAPES = [
-  { shape: 'rectangle', label: 'Rectangle', icon: 'rectangle', hint: 'Drag from corner to corner.' },
-  { shape: 'ellipse', label: 'Ellipse', icon: 'ellipse', hint: 'Drag from corner to corner.' },
-  { shape: 'lasso', label: 'Lasso', icon: 'lasso', hint: 'Drag around what you want.' },
-  { shape: 'object', label: 'Object', icon: 'object', hint: 'Click an object.' },
-  { shape: 'colour', label: 'Colour', icon: 'wand', hint: 'Click a colour in a picture.' },
+  {
+    shape: 'rectangle',
+    label: words.selectionSettings.rectangle,
+    icon: 'rectangle',
+    hint: words.selectionSettings.dragFromCornerToCorner,
+  },
+  {
+    shape: 'ellipse',
+    label: words.selectionSettings.ellipse,
+    icon: 'ellipse',
+    hint: words.selectionSettings.dragFromCornerToCorner,
+  },
+  {
+    shape: 'lasso',
+    label: words.selectionSettings.lasso,
+    icon: 'lasso',
+    hint: words.selectionSettings.dragAroundWhatYouWant,
+  },
+  {
+    shape: 'object',
+    label: words.selectionSettings.object,
+    icon: 'object',
+    hint: words.selectionSettings.clickAnObject,
+  },
+  {
+    shape: 'colour',
+    label: words.selectionSettings.colour,
+    icon: 'wand',
+    hint: words.selectionSettings.clickAColourInAPicture,
+  },
 ];
 
 /** @type {{value: Mode, label: string, icon: string, tip: string}[]} */
 export const MODES = [
-  { value: 'replace', label: 'New', icon: 'join-replace', tip: 'Select only the new part' },
-  { value: 'add', label: 'Add', icon: 'join-add', tip: 'Add to the selection (Shift)' },
-  { value: 'subtract', label: 'Subtract', icon: 'join-subtract', tip: 'Take from it (Alt)' },
+  {
+    value: 'replace',
+    label: words.selectionSettings.new,
+    icon: 'join-replace',
+    tip: words.selectionSettings.selectOnlyTheNewPart,
+  },
+  {
+    value: 'add',
+    label: words.selectionSettings.add,
+    icon: 'join-add',
+    tip: words.selectionSettings.addToTheSelectionShift,
+  },
+  {
+    value: 'subtract',
+    label: words.selectionSettings.subtract,
+    icon: 'join-subtract',
+    tip: words.selectionSettings.takeFromItAlt,
+  },
   {
     value: 'intersect',
-    label: 'Intersect',
+    label: words.selectionSettings.intersect,
     icon: 'join-intersect',
-    tip: 'Keep what is in both (Shift Alt)',
+    tip: words.selectionSettings.keepWhatIsInBothShift,
   },
 ];
 
@@ -119,8 +161,9 @@ export function modeOf({ shiftKey, altKey }, mode) {
 
 /** Return how much is selected, in words. @param {SelectionUi} selection */
 export function selectedText({ current }) {
-  if (!current) return 'Nothing is selected: paint goes everywhere.';
+  if (!current) return words.selectionSettings.nothingIsSelectedPaintGoes;
   const percent = 100 * current.share;
-  const share = percent < 0.1 ? 'Less than 0.1' : percent.toFixed(percent < 10 ? 1 : 0);
-  return `${share} % of the picture is selected.`;
+  const share =
+    percent < 0.1 ? words.selectionSettings.lessThan01 : percent.toFixed(percent < 10 ? 1 : 0);
+  return fill(words.selectionSettings.ofThePictureIsSelected, { share });
 }
