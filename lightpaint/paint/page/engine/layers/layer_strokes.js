@@ -5,18 +5,12 @@
  * new one. The eraser takes from the layer that lies at its first point.
  */
 import { gradientLayer } from './gradient.js';
-import {
-  adjustmentName,
-  areaName,
-  effectText,
-  importanceName,
-  strokesName,
-} from './layer_names.js';
+import { fill, words } from '../../language/language.js';
+import { adjustmentName, areaName, effectText, importanceName, strokesName } from './layer_names.js';
 import { newLayer, PAINTING_ID, plainLayer, withLayers } from './layer_list.js';
 import { LayerCanvas } from './layer_canvas.js';
 import { TILE_SIDE } from './layer_pixels.js';
 import { LABELS } from '../stroke.js';
-import { fill, words } from '../../language/language.js';
 
 /** @typedef {import("../brush.js").Point} Point */
 /** @typedef {import("../message_frames.js").Region} Region */
@@ -25,8 +19,6 @@ import { fill, words } from '../../language/language.js';
 /** @typedef {import("../stroke.js").Tool} Tool */
 /** @typedef {import("../stroke.js").ToolSettings} ToolSettings */
 /** @typedef {import("./layer_mirror.js").LayerMirror} LayerMirror */
-
-const texts = words.layerStrokes;
 
 /** Tiles that are looked at to say what a layer does. */
 const LOOKED_AT = 12;
@@ -66,9 +58,8 @@ export class LayerStrokes {
     if (!found) return true;
     // A new layer lies over what is drawn; another one has to be the page's own.
     if (!mirror.layer(found.id)) return true;
-    return (
-      mirror.canCompose() &&
-      mirror.picture.shown.slice(mirror.picture.base?.count).some(({ id }) => id === found.id)
+    return mirror.canCompose() && mirror.picture.shown.slice(mirror.picture.base?.count).some(
+      ({ id }) => id === found.id,
     );
   }
 
@@ -146,7 +137,7 @@ export class LayerStrokes {
   layerFor(settings, place, object) {
     const { tool, importance, adjustedArea } = settings;
     const { x, y } = place;
-    const { mirror } = this;
+    const [{ mirror }, { layerStrokes: texts }] = [this, words];
     if (tool === 'gradient') return this.layerNew('gradient', gradientLayer(settings, place));
     const masked = this.maskId === null ? undefined : mirror.layer(this.maskId);
     if (masked && tool !== 'adjust' && tool !== 'fill') return masked;
@@ -161,9 +152,7 @@ export class LayerStrokes {
       return this.layerNew('adjust', { name });
     }
     if (tool === 'fill')
-      return this.layerNew('paint', {
-        name: isSelection ? texts.selection : area || texts.fill,
-      });
+      return this.layerNew('paint', { name: isSelection ? texts.selection : area || texts.fill });
     if (tool === 'weight') return this.weighing(importance);
     return tool === 'eraser' ? this.erased(x, y) : this.painted();
   }
@@ -176,8 +165,7 @@ export class LayerStrokes {
   /** Return the layer that the brush paints. @returns {Layer} */
   painted() {
     const active = this.mirror.layer(this.activeId);
-    const isOwn =
-      active?.kind === 'paint' || (active?.kind === 'pixels' && this.isPaintingLowest());
+    const isOwn = active?.kind === 'paint' || (active?.kind === 'pixels' && this.isPaintingLowest());
     if (active && isOwn && this.isShown(active) && !this.isWishDone) return active;
     return this.layerNew('paint', {});
   }
@@ -253,7 +241,8 @@ export class LayerStrokes {
     if (!picture || !canvas) return region;
     if (canvas instanceof LayerCanvas) {
       const { layer } = canvas;
-      if (layer !== this.mirror.layer(layer.id)) this.mirror.show(withLayers(list, [layer]));
+      if (layer !== this.mirror.layer(layer.id))
+        this.mirror.show(withLayers(list, [layer]));
       canvas.pixels.put(region, { image: canvas.image, coverage: canvas.importance });
     }
     const changed = canvas instanceof LayerCanvas ? canvas.layer.id : PAINTING_ID;
@@ -279,7 +268,7 @@ export class LayerStrokes {
   stepName(tool, { x, y }, layer) {
     if (layer?.name && this.maskId === null && ['adjust', 'fill'].includes(tool)) return layer.name;
     const area = areaName(this.objectName(this.mirror.picture?.painting.objectAt(x, y) ?? -1));
-    return area ? fill(texts.on, { value: LABELS[tool], area }) : LABELS[tool];
+    return area ? fill(words.layerStrokes.on, { value: LABELS[tool], area }) : LABELS[tool];
   }
 
   /** Cancel the stroke. @returns {Region | null} what has to be drawn */
@@ -308,7 +297,7 @@ export class LayerStrokes {
       return [layer.name, this.effectOf(layer)].filter(Boolean).join(', ');
     if (layer.kind !== 'paint' || this.maskId !== null) return layer.name;
     if (!isNew || !layer.name) return strokesName(layer.name, this.effectOf(layer), isNew);
-    return [layer.name, this.effectOf(layer) || texts.filled].join(', ');
+    return [layer.name, this.effectOf(layer) || words.layerStrokes.filled].join(', ');
   }
 
   /** Return what a layer does to the light below and above it, in words. @param {Layer} layer */
