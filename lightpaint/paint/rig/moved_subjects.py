@@ -1,16 +1,21 @@
 """The subjects of a session with moved lights, for its exports and verification."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+from lightpaint.display_text import some_names
 from lightpaint.files import write_text
-from lightpaint.paint.rig.added_lights import new_emitter
+from lightpaint.paint.rig.added_lights import is_panel, new_emitter
 from lightpaint.paint.rig.lamp_rig import LampRig
 from lightpaint.paint.session.moved_lights import Placed, added_names
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.subject import Subject, places_path
 from lightpaint.placement.placement import AddedLight, Move
 from lightpaint.placement.placement_record import PlacementRecord
+from lightpaint.scene.properties.pose import Site
+from lightpaint.scene.scene import Scene
 
 
 def of_moved_scenes(
@@ -29,12 +34,37 @@ def of_moved_scenes(
     return moved, replace(snapshot, bases=bases)
 
 
+def shadow_remark(rig: LampRig, placed: Placed) -> str:
+    """Return which moved and added panels cast a shadow in a render of the answer, but not in the
+    pictures of other lights; "" if there is none.
+    """
+    names = [name for name, values in placed.items() if _has_shape(rig, name, values)]
+    if not names:
+        return ""
+    verb, whose = ("casts", "its") if len(names) == 1 else ("cast", "their")
+    return (
+        f"In it {some_names(names)} {verb} {whose} shadow, which the pictures of the other lights "
+        "do not have yet"
+    )
+
+
+def _has_shape(rig: LampRig, name: str, values: Mapping[str, Any]) -> bool:
+    return values.get("kind") == "panel" or (
+        "kind" not in values and is_panel(rig.scene.light(name))
+    )
+
+
+def _site(scene: Scene, name: str) -> Site:
+    return scene.light(name).members[0].site
+
+
 def write_places(folder: Path, rig: LampRig, placed: Placed) -> Path:
     """Write the places of moved and added lights for `solve` to `folder`; return the file."""
-    added = added_names(placed)
+    added, moved_scene = added_names(placed), rig.moved_scene(placed)
+    # As in the scene: the rig has panels as squares of their size.
     moves = tuple(
-        Move(name, rig.site(name, {}), rig.site(name, values), gain_share=0.0)
-        for name, values in placed.items()
+        Move(name, _site(rig.scene, name), _site(moved_scene, name), gain_share=0.0)
+        for name in placed
         if name not in added
     )
     additions = tuple(AddedLight(new_emitter(x, placed[x]), gain_share=0.0) for x in added)

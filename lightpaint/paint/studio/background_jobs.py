@@ -27,7 +27,7 @@ from lightpaint.paint.protocol import (
 )
 from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.rig.light_mover import LightMover
-from lightpaint.paint.rig.moved_subjects import of_moved_scenes, write_places
+from lightpaint.paint.rig.moved_subjects import of_moved_scenes, shadow_remark, write_places
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import SessionAccess
 from lightpaint.paint.store.history_steps import name_in_view
@@ -229,6 +229,8 @@ class BackgroundJobs:
         picture, text, agrees = render_verification(
             subjects[view], snapshot.bases[view], lighting, progress
         )
+        if remark := shadow_remark(self._mover.rig, snapshot.requests.placed):
+            text = f"{text} {remark}."
         check()
         self._publisher.publish_picture(name_in_view("verified", view), as_halves(picture))
         is_old = self._access.version != snapshot.version
