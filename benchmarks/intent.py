@@ -292,7 +292,7 @@ def painted(
     current = basis.mix(basis.current_weights)
     intended, ratio = next(
         (image, ratio)
-        for image, ratio in intentions(basis, current, rng)
+        for _, image, ratio in intentions(basis, current, rng)
         if (np.abs(ratio).max(axis=-1) > 0.5).mean() > 0.005
     )
     soft = basis.size[1] / 80
@@ -361,8 +361,10 @@ def over_lamp(basis: lp.Basis, rng: np.random.Generator) -> Case | None:
 
 def intentions(
     basis: lp.Basis, current: np.ndarray, rng: np.random.Generator
-) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Pictures (h, w, 3) of lightings that one may mean, and their log₂ ratio to the current."""
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Weights (n, 3) of lightings that one may mean, their pictures (h, w, 3), and the log₂ ratios
+    of these to the current one.
+    """
     lights = np.flatnonzero(~basis.is_fixed)
     dark = 0.01 * current.mean()
     while True:
@@ -376,7 +378,7 @@ def intentions(
                 tint = kelvin_to_rgb(rng.uniform(2800, 9500)) / kelvin_to_rgb(6500)
                 weights[k] *= tint / luminance(tint)
         image = basis.mix(weights)
-        yield image, np.log2((image + dark) / (current + dark))
+        yield weights, image, np.log2((image + dark) / (current + dark))
 
 
 def region(strong: np.ndarray, style: str) -> np.ndarray:

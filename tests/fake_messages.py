@@ -50,6 +50,7 @@ def fake_state(resources: dict[str, int], **fields: Any) -> SessionState:
         "resources": resources,
         "looks": (),
         "presets": (),
+        "references": (),
         "basis": SampleCount(1, 1, True),
         "verifications": (),
         "is_new": True,

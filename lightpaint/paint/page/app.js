@@ -23,6 +23,8 @@ import { Banner, Tips, Toasts, RunningTasks } from './ui/notices.js';
 import { RoomPlan } from './ui/room_plan.js';
 import { SelectionFields } from './ui/selection/selection_fields.js';
 import { selectionUpdate } from './ui/selection/selection_settings.js';
+import { ReferencePaste } from './ui/references/reference_files.js';
+import { ReferencePane } from './ui/references/reference_pane.js';
 import { PresetsButton } from './ui/presets_dialog.js';
 import { SessionController } from './ui/session_controller.js';
 import { SettingsPanel } from './ui/settings_panel.js';
@@ -65,6 +67,7 @@ export async function mount(element, host, { global = false, engine }) {
   listen(app);
   const controller = new AbortController();
   const { signal } = controller;
+  if (global) root.dataset.isWholePage = 'true';
   if (global) window.addEventListener('keydown', (event) => handleKey(event, app), { signal });
   else listenWithin(root, app, signal);
   render(html`<${Painter} app=${app} root=${() => root} />`, root);
@@ -165,6 +168,7 @@ function Painter({ app, root }) {
       <${ToolOptions} ui=${ui} app=${app} />
       <${ViewTabs} ui=${ui} app=${app} />
       <div class="view"><${Stage} ui=${ui} app=${app} />
+        <${ReferencePane} ui=${ui} app=${app} />
         <${Banner} ui=${ui} app=${app} />
         <${Toasts} ui=${ui} app=${app} /></div>
       <div class="status"><${PointerStatus} ui=${ui} /><${RunningTasks} ui=${ui} app=${app} /></div>
@@ -180,6 +184,7 @@ function Painter({ app, root }) {
     <${PreviewDialog} ui=${ui} app=${app} />
     <${LayerImportDialog} ui=${ui} app=${app} />
     <${LayerDropFrame} app=${app} root=${root} />
+    <${ReferencePaste} app=${app} root=${root} />
     <${Tips} root=${root} />`;
 }
 

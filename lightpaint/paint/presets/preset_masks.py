@@ -25,7 +25,7 @@ def preset_masks(preset: LightingPreset, canvas: Canvas, subject: str | None) ->
     """
     basis = canvas.basis
     areas = ViewAreas(canvas.current, basis.emitters_seen, basis.features, basis.objects, subject)
-    selected = _selected(canvas)
+    selected = selected_mask(canvas)
     return [adjustment.mask(areas) * selected for adjustment in preset.adjustments]
 
 
@@ -59,7 +59,7 @@ def open_preset(canvases: Canvases, name: str, subject: str | None) -> list[tupl
     return [(view, canvas.full_region) for view, canvas in enumerate(canvases)]
 
 
-def _selected(canvas: Canvas) -> Mask | np.float32:
+def selected_mask(canvas: Canvas) -> Mask | np.float32:
     """Return the mask of what is selected in a view; 1 if nothing is."""
     bounds = canvas.selection.bounds
     mask = selection_mask(canvas.selection)
@@ -70,23 +70,34 @@ def _selected(canvas: Canvas) -> Mask | np.float32:
     return selected
 
 
-def requested_look(preset: LightingPreset, canvas: Canvas, side: int) -> Floats:
-    """Return what a preset asks of the current look of a view, (h, w, 3) linear, reduced.
+def reduced_areas(
+    canvas: Canvas, light: Floats, side: int, subject: str | None = None
+) -> tuple[Floats, ViewAreas]:
+    """Return a picture of a view, (h, w, 3), reduced, and its areas.
 
     side: approximate pixels of its longer side.
     """
     factor = max(1, round(max(canvas.size) / side))
     basis = canvas.basis
-    look = np.asarray(block_mean(canvas.current, factor), np.float32)
+    look = np.asarray(block_mean(light, factor), np.float32)
     height, width = look.shape[:2]
     sample = slice(0, factor * height, factor), slice(0, factor * width, factor)
     features, objects = basis.features, basis.objects
-    areas = ViewAreas(
+    return look, ViewAreas(
         look,
         basis.emitters_seen[sample],
         None if features is None else features.reduced(factor),
         None if objects is None else Objects(objects.index[sample], objects.names),
+        subject,
     )
+
+
+def requested_look(preset: LightingPreset, canvas: Canvas, side: int) -> Floats:
+    """Return what a preset asks of the current look of a view, (h, w, 3) linear, reduced.
+
+    side: approximate pixels of its longer side.
+    """
+    look, areas = reduced_areas(canvas, canvas.current, side)
     pixels = Pixels.unpainted(look)
     for layer, adjustment in zip(layers_of(preset, 1, "")[:-1], preset.adjustments, strict=True):
         mask = Pixels(np.zeros_like(look), adjustment.mask(areas))

@@ -28,6 +28,10 @@ MIN_ALBEDO = 0.05
 #: above which it is a wall or a floor.
 OBJECT_SHARES = (0.003, 0.12)
 
+#: Heights in a picture, 0 at its top and 1 at its bottom, between which its upper part ends and its
+#: lower part begins.
+BAND_ENDS = (0.2, 0.45), (0.55, 0.8)
+
 
 class ViewAreas:
     """Soft masks (h, w) of areas in one view, 0 to 1.
@@ -109,6 +113,16 @@ class ViewAreas:
         """A soft pool around the subject."""
         return self._usable(self._pool(self.subject))
 
+    @property
+    def bands(self) -> tuple[Mask, Mask, Mask]:
+        """The upper part of the picture, its middle, and its lower part."""
+        upper, middle, lower = soft_bands(self._look.shape[:2])
+        return self._usable(upper), self._usable(middle), self._usable(lower)
+
+    def around(self, x: float, y: float, radius: float) -> Mask:
+        """Return a soft spot. x, y: its place, 0 to 1. radius: in longer sides of the picture."""
+        return self._usable(soft_spot(self._look.shape[:2], x, y, radius))
+
     @cached_property
     def subject_name(self) -> str | None:
         """Name of the chosen object, or of the most central one of its size; None without one."""
@@ -180,6 +194,27 @@ class ViewAreas:
     def _usable(self, mask: npt.NDArray[np.floating]) -> Mask:
         """Return a mask without pixels in which an emitter is seen."""
         return np.where(self._emitters_seen, np.float32(0), mask.astype(np.float32))
+
+
+def soft_bands(size: tuple[int, ...]) -> tuple[Mask, Mask, Mask]:
+    """Return soft weights (h, w) of the upper part of a picture, its middle, and its lower part."""
+    height, width = size
+    y = (np.arange(height, dtype=np.float32) + np.float32(0.5)) / height
+    (first, second), (third, fourth) = BAND_ENDS
+    upper = np.clip((second - y) / (second - first), 0, 1)
+    lower = np.clip((y - third) / (fourth - third), 0, 1)
+    rows = [x.astype(np.float32)[:, None] for x in (upper, 1 - upper - lower, lower)]
+    first_band, second_band, third_band = (np.repeat(x, width, axis=1) for x in rows)
+    return first_band, second_band, third_band
+
+
+def soft_spot(size: tuple[int, ...], x: float, y: float, radius: float) -> Mask:
+    """Return soft weights (h, w) around a place. x, y: 0 to 1. radius: in longer sides."""
+    height, width = size
+    scale = radius * max(size)
+    down = (np.arange(height) + 0.5 - y * height) / scale
+    across = (np.arange(width) + 0.5 - x * width) / scale
+    return np.exp(-0.5 * (down[:, None] ** 2 + across[None] ** 2)).astype(np.float32)
 
 
 def _smoothed(values: Mask) -> Mask:

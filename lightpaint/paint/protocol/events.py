@@ -21,6 +21,7 @@ from lightpaint.paint.protocol.message_parts import (
     LookInfo,
     Place,
     PresetInfo,
+    ReferenceInfo,
     SampleCount,
     StepInfo,
     TableInfo,
@@ -85,6 +86,7 @@ class SessionState(EditState, Message, kind="state"):
     resources: Mapping[str, int]
     looks: tuple[LookInfo, ...]
     presets: tuple[PresetInfo, ...]
+    references: tuple[ReferenceInfo, ...]
     basis: SampleCount
     verifications: tuple[VerificationResult, ...]
     is_new: bool
@@ -223,6 +225,15 @@ class LookList(Message, kind="looks"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class ReferenceList(Message, kind="references"):
+    """The references, the oldest first: the answer to requests about them, and unasked once a file
+    has become one.
+    """
+
+    references: tuple[ReferenceInfo, ...]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Rig(Message, kind="rig"):
     """The places of all lights. Sent after every move, once requested.
 
@@ -286,6 +297,7 @@ EVENTS: Mapping[str, type[Any]] = {
         StepList,
         PreviousAnswer,
         LookList,
+        ReferenceList,
         ProgressReport,
         TaskStarted,
         TaskStopped,

@@ -204,6 +204,24 @@ class PresetInfo:
 
 
 @dataclass(frozen=True)
+class ReferenceInfo:
+    """A reference. Its pictures are `reference/ID`, (h, w, 3) uint8 as the session's view transform
+    shows it, and `reference_light/ID`, its light, reduced, (h, w, 3) float16.
+    """
+
+    id: int
+    name: str
+
+
+@dataclass(frozen=True)
+class PlacePair:
+    """Two places that should look alike: (x, y) as shares of width and height, 0 to 1."""
+
+    reference: tuple[float, float]
+    picture: tuple[float, float]
+
+
+@dataclass(frozen=True)
 class ResolvedFit:
     """The resolved values of all settings, as in `lightpaint.Fit`."""
 

@@ -2,15 +2,19 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from lightpaint.arrays import RGB
 from lightpaint.paint.layers.layer import PAINTING_ID, Layer
 from lightpaint.paint.protocol.base import Message
+from lightpaint.paint.protocol.message_parts import PlacePair
 from lightpaint.paint.store.canvas_pixels import Region
 
 #: Maximum number of steps in one list.
 MAX_LISTED_STEPS = 10_000
+
+#: Maximum number of pairs of places that are compared with a reference.
+MAX_PAIRS = 20
 
 
 @dataclass(frozen=True)
@@ -149,6 +153,54 @@ class ApplyPreset(Message, kind="apply_preset"):
 
     preset: str
     subject: str | None = None
+
+
+@dataclass(frozen=True)
+class AddReference(Message, kind="add_reference"):
+    """A part of a picture file that becomes a reference; with array `part`, its bytes. Answered by
+    `started`. After the last part follows `references`, or a `notice` that says why not.
+
+    name: of the file. size: of the whole file in bytes. start: position of the part, which arrive
+    in order.
+    """
+
+    request_buffers: ClassVar[Mapping[str, str]] = {"part": "bytes, uint8 of any shape"}
+
+    name: str
+    size: int
+    start: int
+
+
+@dataclass(frozen=True)
+class DropReference(Message, kind="drop_reference"):
+    """Delete a reference. Answered by `references`."""
+
+    reference: int
+
+
+@dataclass(frozen=True)
+class LookLike(Message, kind="look_like"):
+    """Put layers on top that ask for the light of a reference, within what is selected: one step.
+    Answered by `patch`.
+
+    areas: that are compared: the `whole` picture with its shadows and lit parts; also its
+    `regions`, top, middle and bottom; nine `parts`, for a reference of the same view; or `pairs` of
+    places, each in the reference and in the view. matches_brightness: whether the picture becomes
+    as bright as the reference; otherwise only differences within it count.
+    """
+
+    reference: int
+    areas: Literal["whole", "regions", "parts", "pairs"] = "regions"
+    pairs: tuple[PlacePair, ...] = ()
+    view: int = 0
+    matches_brightness: bool = False
+
+    def __post_init__(self) -> None:
+        if len(self.pairs) > MAX_PAIRS:
+            raise ValueError(f"pairs of places are at most {MAX_PAIRS}")
+        places = [x for pair in self.pairs for x in (*pair.reference, *pair.picture)]
+        if not all(0 <= x <= 1 for x in places):
+            raise ValueError("places are shares of width and height, 0 to 1")
 
 
 @dataclass(frozen=True)

@@ -24,17 +24,20 @@ from lightpaint.paint.protocol.light_requests import (
     TieLights,
 )
 from lightpaint.paint.protocol.painting_requests import (
+    AddReference,
     ApplyPreset,
     ChangeLayers,
     ClearPainting,
     CompareLooks,
     CopyLook,
     DropLook,
+    DropReference,
     DropStroke,
     GoToStep,
     ImportLayers,
     ListSteps,
     LoadLook,
+    LookLike,
     MixLooks,
     Paint,
     Propose,
@@ -158,6 +161,9 @@ AnyRequest = (
     | ListSteps
     | GoToStep
     | ApplyPreset
+    | AddReference
+    | DropReference
+    | LookLike
     | ShowPrevious
     | ClearPainting
     | StartOver

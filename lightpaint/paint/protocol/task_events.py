@@ -43,7 +43,16 @@ class TaskStarted(Message, kind="started"):
     """Notice that a long task has started. task: the request, or `stop`."""
 
     task: Literal[
-        "export", "verify", "explain", "preview", "rig", "place", "compare", "import", "stop"
+        "export",
+        "verify",
+        "explain",
+        "preview",
+        "rig",
+        "place",
+        "compare",
+        "import",
+        "reference",
+        "stop",
     ]
 
 

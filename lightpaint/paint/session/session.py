@@ -62,6 +62,7 @@ class Session:
         live_answer: Requests, and the last answer.
         bases_at: Returns the bases of all views with lights at other places, rendered or estimated.
         history: Its steps, to list and to compare with.
+        references: Its reference pictures.
         compositions: Returns what `Store.put_compositions` keeps; None if there is nothing new.
 
     Raises:
@@ -92,6 +93,7 @@ class Session:
         self.views, self.live_answer = self._edits.views, self._edits.live_answer
         self.bases_at = self._edits.bases_at
         self.history, self.compositions = self._edits.history, self._edits.compositions
+        self.references = self._edits.references
 
     @property
     def version(self) -> int:

@@ -16,8 +16,8 @@ from lightpaint.paint.layers.layer import PAINTING_ID
 from lightpaint.paint.layers.layer_stack import LayerStack
 from lightpaint.paint.layers.layered_paintings import LayeredPaintings
 from lightpaint.paint.layers.selection import selection_patch
-from lightpaint.paint.presets.preset_masks import open_preset
-from lightpaint.paint.presets.presets import PRESETS
+from lightpaint.paint.references.likeness_layers import open_request
+from lightpaint.paint.references.reference_table import ReferenceTable
 from lightpaint.paint.session.history import Changes, History, restore
 from lightpaint.paint.session.live_answer import LiveAnswer, weights_by_name
 from lightpaint.paint.session.moved_lights import MovedLights, Placed, PlaneSource
@@ -36,6 +36,7 @@ Travel = (
     | protocol.ClearPainting
     | protocol.StartOver
     | protocol.ApplyPreset
+    | protocol.LookLike
 )
 
 
@@ -47,7 +48,7 @@ class SessionEdits:
     Attributes:
         views: Canvas of each view.
         live_answer: Requests, and the last answer.
-        history: The steps.
+        history, references: The steps, and the reference pictures.
         version: A number that grows with every change.
         stroke: Number of the last stroke that arrived.
     """
@@ -84,6 +85,7 @@ class SessionEdits:
             lights_of=lambda session_requests: self._moved_lights.lights(session_requests.placed),
         )
         self.history = History(store, self.views, self.live_answer)
+        self.references = ReferenceTable(store, transform)
         self._update_answer()
 
     @property
@@ -177,9 +179,9 @@ class SessionEdits:
                 changes = self.history.go_to(request.step)
             case protocol.ClearPainting() | protocol.StartOver():
                 return self._clear(keep_requests=isinstance(request, protocol.ClearPainting))
-            case protocol.ApplyPreset():
-                changes = open_preset(self.views, request.preset, request.subject)
-                self.history.close_stroke(PRESETS[request.preset].title)
+            case protocol.ApplyPreset() | protocol.LookLike():
+                changes, label = open_request(self.views, request, self.references)
+                self.history.close_stroke(label)
         self._update_answer()
         return changes
 
@@ -192,9 +194,8 @@ class SessionEdits:
     def keep_answer(self) -> None:
         """Keep the answer with the last step, for the list of steps."""
         self._answered_step = self._store.last_id
-        shown = self.live_answer.requests_at_rest.output(
-            self.live_answer.weights, self.live_answer.basis.is_fixed
-        )
+        answer = self.live_answer
+        shown = answer.requests_at_rest.output(answer.weights, answer.basis.is_fixed)
         self.history.keep_answer(shown, self._transform)
 
     def append_requests(self, label: str, requests: SessionRequests) -> None:
@@ -307,9 +308,8 @@ class SessionEdits:
 
     def renew_planes(self, names: Sequence[str]) -> None:
         """Take the planes of moved lights again after they have been rendered."""
-        self._moved_lights.renew(
-            names, self.live_answer.requests.placed, self.views, self.live_answer
-        )
+        placed = self.live_answer.requests.placed
+        self._moved_lights.renew(names, placed, self.views, self.live_answer)
         self._update_answer()
 
     def _update_answer(self) -> None:

@@ -4,7 +4,13 @@ from typing import Any
 
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.paint.presets.presets import PRESETS
-from lightpaint.paint.protocol import PresetInfo, SampleCount, TableInfo, TransformInfo
+from lightpaint.paint.protocol import (
+    PresetInfo,
+    ReferenceInfo,
+    SampleCount,
+    TableInfo,
+    TransformInfo,
+)
 from lightpaint.paint.session import picture_table
 from lightpaint.paint.session.answer_messages import light_info
 from lightpaint.paint.session.look_library import LookLibrary
@@ -35,6 +41,7 @@ def state_fields(
         "presets": tuple(
             PresetInfo(x.name, x.title, x.description, x.has_subject) for x in PRESETS.values()
         ),
+        "references": tuple(ReferenceInfo(x.id, x.name) for x in session.references),
         "basis": SampleCount(
             spp=basis.origin.spp,
             target_spp=target_spp or basis.origin.spp,

@@ -10,16 +10,21 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.denoised_planes import DenoisedPlanes, RoughPlanes, as_halves, scale_of
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import PaintError
+from lightpaint.images.resampling import resampled
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.layers.selection import selection_mask
 from lightpaint.paint.presets.preset_masks import requested_look
 from lightpaint.paint.presets.presets import find_preset
 from lightpaint.paint.protocol import ViewInfo
+from lightpaint.paint.references.reference_table import Reference, ReferenceTable
 from lightpaint.paint.session import picture_table
 from lightpaint.paint.session.edit_messages import layer_picture
 from lightpaint.paint.session.picture_table import Picture, PictureTable
 from lightpaint.paint.store.history_steps import name_in_view
+
+#: Pixels of the longer side of a reference's light, of which a page picks paint.
+LIGHT_SIDE = 400
 
 
 def offer_transforms(table: PictureTable, transforms: Sequence[ViewTransform]) -> None:
@@ -98,6 +103,30 @@ def offer_steps(table: PictureTable, picture_of: Callable[[int], Picture]) -> No
         return picture_of(int(step))
 
     table.offer_family("step", picture)
+
+
+def offer_references(table: PictureTable, references: ReferenceTable) -> None:
+    """Offer the references as the session shows them, as `reference/2`, and their light, reduced,
+    as `reference_light/2`.
+    """
+
+    def light(name: str) -> Picture:
+        picture = references.light(_numbered(references, "reference_light", name))
+        height, width = picture.shape[:2]
+        factor = min(1.0, LIGHT_SIDE / max(height, width))
+        size = max(1, round(height * factor)), max(1, round(width * factor))
+        return as_halves(resampled(picture, size))
+
+    table.offer_family(
+        "reference", lambda name: references.picture(_numbered(references, "reference", name))
+    )
+    table.offer_family("reference_light", light)
+
+
+def _numbered(references: ReferenceTable, prefix: str, name: str) -> Reference:
+    if not name.isdecimal():
+        raise PaintError(f"there is no picture {f'{prefix}/{name}'[:40]!r}")
+    return references[int(name)]
 
 
 def _layer(views: Canvases, name: str) -> Picture:

@@ -40,6 +40,12 @@ ANSWER_TABLE = """
 CREATE TABLE IF NOT EXISTS step_answer (step INTEGER PRIMARY KEY, fields TEXT, picture BLOB)
 """
 
+#: References. Only files that have some have this.
+REFERENCE_TABLE = """
+CREATE TABLE IF NOT EXISTS reference
+(id INTEGER PRIMARY KEY, name TEXT, dtype TEXT, shape TEXT, data BLOB)
+"""
+
 _DAMAGED = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
 
 

@@ -15,7 +15,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from lightpaint.display_text import some_names
-from lightpaint.errors import LightpaintError, PaintError
+from lightpaint.errors import LightpaintError, OutputError, PaintError
 from lightpaint.files import flush
 from lightpaint.paint.store.compression import unpack, unpack_patch
 from lightpaint.paint.store.damaged_rows import (
@@ -28,7 +28,9 @@ from lightpaint.paint.store.damaged_rows import (
 )
 from lightpaint.paint.store.database import (
     APPLICATION,
+    REFERENCE_TABLE,
     VERSION,
+    DamagedError,
     damaged_error,
     free_name,
     open_database,
@@ -45,6 +47,17 @@ UNREADABLE_ERRORS = (AssertionError, LightpaintError, *DAMAGE_ERRORS)
 
 #: Bytes of a database's header, and of the longest file that is given its length again.
 HEADER_BYTES, MAX_RESTORED_BYTES = 100, 2**36
+
+
+def recover_or_raise(path: Path, identity: Identity | None, error: DamagedError | None) -> str:
+    """Recover a session as `recover` does. Raises `error`, or an OutputError without one, where the
+    system does not let it.
+    """
+    try:
+        return recover(path, identity)
+    except OSError as reason:
+        text = f"cannot write beside {path}: {reason.strerror or reason}"
+        raise error or OutputError(text) from None
 
 
 def recover(path: Path, identity: Identity | None) -> str:
@@ -101,6 +114,7 @@ def _copy_readable(copy: Path, new: Path, path: Path, identity: Identity | None)
             if stored_identity is None or not (steps or looks or not (lost_steps or lost_looks)):
                 raise PaintError("nothing of it can be read")
             position = _read_position(old, [row[0][0] for row in steps])
+            references = _read_references(old)
     except (sqlite3.Error, PaintError) as error:
         raise damaged_error(path, error) from None
     with closing(open_database(new, stored_identity)) as database, transaction(database):
@@ -112,6 +126,9 @@ def _copy_readable(copy: Path, new: Path, path: Path, identity: Identity | None)
             database.execute("INSERT INTO look VALUES (?, ?)", row)
             rows = [(row[0], *array) for array in arrays]
             database.executemany("INSERT INTO look_array VALUES (?, ?, ?, ?, ?)", rows)
+        if references:
+            database.execute(REFERENCE_TABLE)
+            database.executemany("INSERT INTO reference VALUES (?, ?, ?, ?, ?)", references)
         values = [("position", position), ("identity", json.dumps(asdict(stored_identity)))]
         database.executemany("INSERT OR REPLACE INTO about VALUES (?, ?)", values)
     lost = []
@@ -226,3 +243,13 @@ def _read_arrays(old: sqlite3.Connection, look: int) -> tuple[list[Row], set[str
         except UNREADABLE_ERRORS:
             unreadable.add(str(name))
     return arrays, unreadable
+
+
+def _read_references(old: sqlite3.Connection) -> list[Row]:
+    """Return the rows of references that can be read; nobody misses a lost one in the answer."""
+    with suppress(*UNREADABLE_ERRORS):
+        query = "SELECT id, name, dtype, shape, data FROM reference WHERE id = ?"
+        numbers, _ = row_numbers(old, ("reference", "id"))
+        rows = [read_row(old, query, number) for number in numbers]
+        return [row for row in rows if row is not None]
+    return []

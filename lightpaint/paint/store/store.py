@@ -13,9 +13,11 @@ history takes no memory.
 
 import sqlite3
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from threading import RLock
+from typing import Any
 
 from lightpaint.arrays import Floats
 from lightpaint.errors import OutputError, PaintError
@@ -29,6 +31,7 @@ from lightpaint.paint.store.database import (
 )
 from lightpaint.paint.store.history_steps import Identity, Step, StoredLook
 from lightpaint.paint.store.lazy_arrays import LookArrays, pack_arrays
+from lightpaint.paint.store.recovery import recover_or_raise
 from lightpaint.paint.store.session_rows import (
     delete_look,
     insert_answer,
@@ -79,7 +82,7 @@ class Store:
         except DamagedError as error:
             if path is None or not path.is_file():
                 raise
-            self.remarks.append(_recover(path, identity, error))
+            self.remarks.append(recover_or_raise(path, identity, error))
             self._open_file()
 
     @classmethod
@@ -130,7 +133,7 @@ class Store:
                 raise PaintError(f"{self.path} is damaged")
             self._database.close()
             try:
-                result = _recover(self.path, self.identity, None)
+                result = recover_or_raise(self.path, self.identity, None)
             finally:
                 self._open_file()
             self.remarks.append(result)
@@ -160,7 +163,7 @@ class Store:
             self.position += 1
 
             row = (number, step.kind, step.label, fields, places)
-            self._enqueue(partial(insert_step, row=row, blobs=blobs, last_kept=last_kept))
+            self.enqueue(partial(insert_step, row=row, blobs=blobs, last_kept=last_kept))
 
     def move_to(self, position: int) -> None:
         """Undo or redo steps: `position` of them are done."""
@@ -168,7 +171,7 @@ class Store:
             if not 0 <= position <= len(self.steps):
                 raise PaintError(f"no step {position}: there are {len(self.steps)}")
             self.position = position
-            self._enqueue(lambda _: None)
+            self.enqueue(lambda _: None)
 
     @property
     def step_ids(self) -> tuple[int, ...]:
@@ -215,7 +218,7 @@ class Store:
                 blobs = pack_arrays(arrays)
                 self._arrays.keep_look(number, blobs)
             self._looks[number] = self._make_look(number, fields)
-            self._enqueue(partial(insert_look, number=number, fields=fields, arrays=blobs))
+            self.enqueue(partial(insert_look, number=number, fields=fields, arrays=blobs))
 
     def drop_look(self, number: int) -> None:
         """Forget a look. Raises PaintError if there is none of that number."""
@@ -223,7 +226,7 @@ class Store:
             if self._looks.pop(number, None) is None:
                 raise PaintError(f"no look {number}")
             self._arrays.drop_look(number)
-            self._enqueue(partial(delete_look, number=number))
+            self.enqueue(partial(delete_look, number=number))
 
     def put_compositions(
         self,
@@ -273,9 +276,17 @@ class Store:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _enqueue(self, write: WriteJob) -> None:
-        self._queue.add(write)
-        self.flush()
+    def enqueue(self, write: WriteJob) -> None:
+        """Write what steps and looks do not have, now or once the file takes it."""
+        with self._lock:
+            self._queue.add(write)
+            self.flush()
+
+    def rows(self, query: str) -> list[tuple[Any, ...]]:
+        """Return the rows of a query; none if they cannot be read."""
+        with self._lock, suppress(*DAMAGE_ERRORS):
+            return self._database.execute(query).fetchall()
+        return []
 
     def _read_all(self) -> None:
         """Read all of the file but pixels."""
@@ -296,16 +307,6 @@ class Store:
 
     def _make_look(self, number: int, fields: str) -> StoredLook:
         return StoredLook(number, strict_json(fields), LookArrays(self._arrays, number))
-
-
-def _recover(path: Path, identity: Identity | None, error: DamagedError | None) -> str:
-    from lightpaint.paint.store.recovery import recover
-
-    try:
-        return recover(path, identity)
-    except OSError as reason:
-        text = f"cannot write beside {path}: {reason.strerror or reason}"
-        raise error or OutputError(text) from None
 
 
 class MemoryStore(Store):

@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
 from lightpaint.errors import LightpaintError, PaintError
@@ -22,8 +21,9 @@ from lightpaint.paint.protocol import Message, Notice, TaskStarted
 from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session_access import SessionAccess
+from lightpaint.paint.studio.received_file import ReceivedFile
 
-#: Largest file that a page may send, in bytes. It is in memory until it has arrived.
+#: Largest file that a page may send, in bytes.
 MAX_FILE_BYTES = 2**29
 
 
@@ -60,31 +60,17 @@ class LayerImports:
     ) -> None:
         self._access, self._publisher, self._threads = access, publisher, threads
         self._on_loaded = on_loaded
-        self._parts: list[bytes] = []
+        self._file = ReceivedFile(MAX_FILE_BYTES)
 
     def handle(
         self, message: protocol.ImportLayers, arrays: Mapping[str, npt.NDArray[Any]]
     ) -> list[Message]:
         """Take a part of a file; read the file after the last. Raises PaintError for no part."""
-        part = arrays.get("part")
-        if part is None or part.dtype != np.uint8:
-            raise PaintError("a part of a file without its bytes")
-        if message.size > MAX_FILE_BYTES:
-            raise PaintError(
-                f"{message.name} has {message.size / 1e9:.1f} GB: open it with the command instead"
-            )
-        if message.start == 0:
-            self._parts = []
-        end = message.start + part.size
-        if message.start != sum(map(len, self._parts)) or end > message.size:
-            raise PaintError(f"{message.name} did not arrive in order: import it again")
         if message.view >= len(self._access.session.views):
             raise PaintError(f"no view {message.view}: there are {len(self._access.session.views)}")
         if message.replaces and len(self._access.session.views) > 1:
             raise PaintError("layers of a file are of one view: put them on top")
-        self._parts.append(part.tobytes())
-        if end == message.size:
-            parts, self._parts = self._parts, []
+        if (parts := self._file.take(message, arrays)) is not None:
             self._threads.start_low_priority(lambda: self._import(message, parts), "import")
         return [TaskStarted(task="import")]
 

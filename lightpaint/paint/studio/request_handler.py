@@ -28,6 +28,7 @@ from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.studio.background_jobs import BackgroundJobs
 from lightpaint.paint.studio.exact_answers import ExactAnswers
 from lightpaint.paint.studio.layer_imports import LayerImports
+from lightpaint.paint.studio.reference_imports import ReferenceImports
 
 
 class RequestHandler:
@@ -58,6 +59,7 @@ class RequestHandler:
         self._comparison = comparison
         self._subjects = mover.rig.subjects
         self._imports = LayerImports(access, publisher, threads, exact_answers.notify)
+        self._references = ReferenceImports(access, publisher, threads)
         self._placer = LightPlacer(access, publisher, mover.rig, threads, self._hang_lights)
 
     def state(self) -> SessionState | SessionPending:
@@ -123,6 +125,8 @@ class RequestHandler:
                     return self._jobs.handle(message)
                 case protocol.ImportLayers():
                     return self._imports.handle(message, arrays)
+                case protocol.AddReference() | protocol.DropReference():
+                    return self._references.handle(message, arrays)
                 case protocol.Preview():
                     return self._jobs.start_preview(message, session.preview_requests(message))
                 case protocol.ShowRig():

@@ -16,6 +16,7 @@ from lightpaint.paint.session.session_state import offered_transforms
 from lightpaint.paint.session.view_pictures import (
     offer_layers,
     offer_presets,
+    offer_references,
     offer_steps,
     offer_transforms,
     offer_view,
@@ -135,6 +136,7 @@ class SessionBases:
         offer_transforms(pictures, offered_transforms(session))
         offer_layers(pictures, session.views)
         offer_presets(pictures, session.views[0], session.transform)
+        offer_references(pictures, session.references)
         offer_steps(pictures, session.history.picture)
         self._mover.offer_all(session)
 

@@ -31,6 +31,8 @@ ASKED = {
     "show_previous": {},
     "clear_painting": {},
     "apply_preset": {"preset": "moonlight"},
+    "look_like": {"reference": 1, "areas": "whole"},
+    "drop_reference": {"reference": 1},
     "start_over": {},
     "export": {"outputs": ["target", "lighting"]},
     "verify": {"run": True},
@@ -40,7 +42,7 @@ ASKED = {
 
 #: Requests of a rig, layers and a selection, which the session that tests make up does not have.
 RIG = {"move", "point", "show_rig", "place", "add_light", "remove_light", "change_layers", "select"}
-RIG |= {"compare_looks", "import_layers"}
+RIG |= {"compare_looks", "import_layers", "add_reference"}
 
 
 def check(message: dict[str, Any]) -> None:

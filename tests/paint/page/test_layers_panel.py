@@ -434,12 +434,12 @@ def test_layers_are_imported_by_dialog_and_by_drop(me: Person, tmp_path: Path) -
         [list(path.read_bytes()), "Other.ORA"],
     )
     page.locator(".lightpaint").dispatch_event("dragover", {"dataTransfer": data})
-    page.get_by_text("Drop to import layers").wait_for()
+    page.get_by_text("Drop a reference picture, or layers").wait_for()
     page.locator(".lightpaint").dispatch_event("drop", {"dataTransfer": data})
     page.get_by_role("button", name="Replace all layers").click()
     page.get_by_text("Imported 1 layer of Other.ORA").wait_for()
     assert me.still().names == ["Strip"]
-    assert page.get_by_text("Drop to import layers").count() == 0
+    assert page.get_by_text("Drop a reference picture, or layers").count() == 0
     me.press("Control+z")
     assert len(me.names) == 3
 

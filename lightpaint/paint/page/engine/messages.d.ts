@@ -238,6 +238,23 @@ export interface PresetInfo {
 }
 
 /**
+ * A reference. Its pictures are `reference/ID`, (h, w, 3) uint8 as the session's view transform
+ * shows it, and `reference_light/ID`, its light, reduced, (h, w, 3) float16.
+ */
+export interface ReferenceInfo {
+  id: number;
+  name: string;
+}
+
+/**
+ * Two places that should look alike: (x, y) as shares of width and height, 0 to 1.
+ */
+export interface PlacePair {
+  reference: [number, number];
+  picture: [number, number];
+}
+
+/**
  * The resolved values of all settings, as in `lightpaint.Fit`.
  */
 export interface ResolvedFit {
@@ -372,6 +389,7 @@ export interface SessionState {
   resources: Record<string, number>;
   looks: LookInfo[];
   presets: PresetInfo[];
+  references: ReferenceInfo[];
   basis: SampleCount;
   verifications: Omit<VerificationResult, 'kind' | 'arrays'>[];
   is_new: boolean;
@@ -565,6 +583,17 @@ export interface LookList {
 }
 
 /**
+ * The references, the oldest first: the answer to requests about them, and unasked once a file
+ * has become one.
+ */
+export interface ReferenceList {
+  kind: 'references';
+  reply?: number;
+  references: ReferenceInfo[];
+  arrays: {  };
+}
+
+/**
  * The progress of a long task. Unasked.
  *
  * task: `export`, `basis`, `sampling` for samples added where the paint needs them, or the
@@ -586,7 +615,7 @@ export interface ProgressReport {
 export interface TaskStarted {
   kind: 'started';
   reply?: number;
-  task: 'export' | 'verify' | 'explain' | 'preview' | 'rig' | 'place' | 'compare' | 'import' | 'stop';
+  task: 'export' | 'verify' | 'explain' | 'preview' | 'rig' | 'place' | 'compare' | 'import' | 'reference' | 'stop';
   arrays: {  };
 }
 
@@ -866,6 +895,43 @@ export interface GoToStep {
 export interface ApplyPreset {
   preset: string;
   subject?: string | null;
+}
+
+/**
+ * A part of a picture file that becomes a reference; with array `part`, its bytes. Answered by
+ * `started`. After the last part follows `references`, or a `notice` that says why not.
+ *
+ * name: of the file. size: of the whole file in bytes. start: position of the part, which arrive
+ * in order.
+ */
+export interface AddReference {
+  name: string;
+  size: number;
+  start: number;
+}
+
+/**
+ * Delete a reference. Answered by `references`.
+ */
+export interface DropReference {
+  reference: number;
+}
+
+/**
+ * Put layers on top that ask for the light of a reference, within what is selected: one step.
+ * Answered by `patch`.
+ *
+ * areas: that are compared: the `whole` picture with its shadows and lit parts; also its
+ * `regions`, top, middle and bottom; nine `parts`, for a reference of the same view; or `pairs` of
+ * places, each in the reference and in the view. matches_brightness: whether the picture becomes
+ * as bright as the reference; otherwise only differences within it count.
+ */
+export interface LookLike {
+  reference: number;
+  areas?: 'whole' | 'regions' | 'parts' | 'pairs';
+  pairs?: PlacePair[];
+  view?: number;
+  matches_brightness?: boolean;
 }
 
 /**
@@ -1166,6 +1232,7 @@ export interface Events {
   steps: StepList;
   previous: PreviousAnswer;
   looks: LookList;
+  references: ReferenceList;
   progress: ProgressReport;
   started: TaskStarted;
   stopped: TaskStopped;
@@ -1195,6 +1262,9 @@ export interface Requests {
   list_steps: ListSteps;
   go_to_step: GoToStep;
   apply_preset: ApplyPreset;
+  add_reference: AddReference;
+  drop_reference: DropReference;
+  look_like: LookLike;
   show_previous: ShowPrevious;
   clear_painting: ClearPainting;
   start_over: StartOver;

@@ -4,6 +4,7 @@ import { html } from '../vendor/preact.js';
 import { Button, NumberField } from './controls.js';
 import { placeOf } from './lamp_marks.js';
 import { fill, words } from '../language/language.js';
+import { completePair } from './references/reference_picture.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
@@ -26,6 +27,7 @@ const CLICK_MODES = /** @type {const} */ ({
 export function pointingHint(action, lights) {
   if (action.mode === 'hang')
     return fill(words.lampFields.clickTheSurfaceThatTheNew, { type: action.type });
+  if (action.mode === 'pair') return words.references.pressItsPlaceOrCancel;
   const { mode, edge } = action;
   const name = lights[action.light]?.label ?? '';
   if (mode === 'aim') return fill(words.lampFields.clickWhatIsToPointAt, { name });
@@ -40,6 +42,7 @@ export function pointingHint(action, lights) {
 export function pointLamp(app, point) {
   const { clickAction, view } = app.store.value;
   if (!clickAction || !point) return;
+  if (clickAction.mode === 'pair') return completePair(app, clickAction, point);
   const pixel = /** @type {[number, number]} */ ([point.x, point.y]);
   if (clickAction.mode === 'hang')
     return void app.session.addLight({ type: clickAction.type, pixel, view });

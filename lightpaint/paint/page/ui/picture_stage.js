@@ -20,6 +20,7 @@ import { gradientOf } from './selection/gradient_options.js';
 import { SelectionOutline } from './selection/selection_outline.js';
 import { firstHint, flowOf, updateDisplay } from './tools.js';
 import { LampMarks } from './lamp_marks.js';
+import { PairMarks } from './references/reference_picture.js';
 import { LampLasso } from './lamps/lamp_lasso.js';
 import { Legend } from './analysis_panel.js';
 import { ProgressBar } from './progress_bar.js';
@@ -201,6 +202,7 @@ export function Stage({ ui, app }) {
     )}
     ${ui.ready && html`<${GradientHandles} ui=${ui} app=${app} panes=${panes} />`}
     ${ui.ready && html`<${LampMarks} ui=${ui} app=${app} panes=${panes} />`}
+    ${ui.ready && html`<${PairMarks} ui=${ui} panes=${panes} />`}
     ${ui.ready && html`<${LampLasso} ui=${ui} app=${app} />`}
     ${ui.ready && html`<${Legend} ui=${ui} app=${app} panes=${panes} />`}
     ${ui.display.layout === 'wipe' && ui.ready && html`<${Wipe} ui=${ui} app=${app} />`}

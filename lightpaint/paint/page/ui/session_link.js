@@ -12,6 +12,7 @@ import {
   verificationUpdate,
 } from './state_updates.js';
 import { relativePath } from './format.js';
+import { referencesUpdate } from './references/reference_state.js';
 import { updateDisplay } from './tools.js';
 import { fill, words } from '../language/language.js';
 
@@ -39,6 +40,7 @@ const EVENT_KINDS = [
   'notice',
   'failed',
   'looks',
+  'references',
   'exported',
   'verified',
   'explained',
@@ -134,6 +136,8 @@ export class SessionLink {
       notice: (/** @type {HostEvents['notice']} */ m) => this.showNotice(m),
       failed: (/** @type {HostEvents['failed']} */ m) => this.toast(m.text, m.tone ?? 'warn'),
       looks: (/** @type {HostEvents['looks']} */ m) => looksUpdate(m, this.store.value),
+      references: (/** @type {HostEvents['references']} */ m) =>
+        referencesUpdate(m, this.store.value),
       exported: (/** @type {HostEvents['exported']} */ m) => this.takeExport(m),
       verified: (/** @type {HostEvents['verified']} */ m) =>
         verificationUpdate(m, this.store.value),

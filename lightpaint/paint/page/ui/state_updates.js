@@ -17,6 +17,7 @@ export const TASK_RESETS = {
   explain: { isExplaining: false },
   preview: { preview: null },
   place: { placementProgress: null, trial: null },
+  reference: { isReferenceComing: false },
 };
 
 /** State while no task is known to be running. */
@@ -54,6 +55,7 @@ export function stateUpdate(message, /** @type {import('./ui_state.js').Ui} */ p
     history: message.history,
     looks,
     resources: message.resources ?? {},
+    references: message.references ?? [],
     hint: Boolean(message.is_new),
     connection: 'open',
     closure: null,

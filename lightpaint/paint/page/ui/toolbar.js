@@ -81,6 +81,9 @@ export function ToolBar({ ui, app }) {
       disabled=${tool === 'fill' && !ui.state?.objects?.length && !ui.selection.current} />`,
     )}
     <div class="spring"></div>
+    <${Button} icon="photo" tip=${words.references.button}
+      pressed=${ui.isReferenceOpen}
+      act=${() => store.set({ isReferenceOpen: !ui.isReferenceOpen, clickAction: null })} />
     ${
       ui.state?.can_render &&
       html`<${Button} icon="lamp" tip=${words.toolbar.lightsInThePictureMarkAnd} keys="D"

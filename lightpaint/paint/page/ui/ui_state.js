@@ -3,6 +3,7 @@
 import { INITIAL_LAMPS } from './lamps/lamp_state.js';
 import { fromKelvin } from './paint_colour.js';
 import { DEFAULT_PREFERENCES } from './preferences.js';
+import { INITIAL_REFERENCES } from './references/reference_state.js';
 import { initialGradient } from './selection/gradient_settings.js';
 import { initialSelection } from './selection/selection_settings.js';
 
@@ -27,7 +28,8 @@ import { initialSelection } from './selection/selection_settings.js';
 /** The effect of the next click: aim a light or hang a new one. edge: the place that casts the
  * shadow, once clicked.
  * @typedef {{light: number, mode: "aim" | "highlight" | "shadow", edge?: [number, number]}
- *   | {mode: "hang", type: NewKind}} ClickAction */
+ *   | {mode: "hang", type: NewKind}
+ *   | {mode: "pair", reference: [number, number], owner: number}} ClickAction */
 /** @typedef {"spot" | "point" | "panel"} NewKind */
 /** since: time of the first report, in ms, and the progress then; remainingSeconds: an estimate,
  * once known.
@@ -36,7 +38,8 @@ import { initialSelection } from './selection/selection_settings.js';
 /** @typedef {{id: number, text: string, tone: "info" | "warn"}} Toast */
 
 /**
- * @typedef {import("./lamps/lamp_state.js").LampState & import("./preferences.js").Preferences & BaseUi} Ui
+ * @typedef {import("./lamps/lamp_state.js").LampState & import("./preferences.js").Preferences
+ *   & import("./references/reference_state.js").ReferenceState & BaseUi} Ui
  *
  * @typedef {object} BaseUi
  * @property {boolean} ready whether the session has said what there is
@@ -278,5 +281,6 @@ export function initialState() {
     openLights: [],
     ...INITIAL_LAMPS,
     ...DEFAULT_PREFERENCES,
+    ...INITIAL_REFERENCES,
   };
 }

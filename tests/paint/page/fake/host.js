@@ -25,6 +25,7 @@ export class FakeHost {
       ids: 0,
       stroke: 0,
     });
+    this.references = [];
     this.weights = room.lights.map(({ present }) => [...present]);
     this.constraints = {};
     this.ties = [];
@@ -121,6 +122,7 @@ export class FakeHost {
       can_render: true,
       stroke: 0,
       looks: this.looks,
+      references: this.references,
       presets: [
         ['moonlight', 'Moonlight', false],
         ['only_object', 'Only this object', true],
@@ -287,6 +289,24 @@ export class FakeHost {
   apply_preset({ preset }) {
     this.step(preset);
     return this.patch();
+  }
+  look_like({ reference }) {
+    this.step(`Like ${this.references.find(({ id }) => id === reference)?.name}`);
+    return this.patch();
+  }
+  add_reference({ name, size, start }, { part }) {
+    if (start + part.data.length < size) return { kind: 'started', task: 'reference' };
+    const id = (this.references.at(-1)?.id ?? 0) + 1;
+    this.references = [...this.references, { id, name: name.replace(/\.[^.]*$/, '') }];
+    setTimeout(() => this.tell({ ...this.referenceList(), arrays: {} }), 1);
+    return { kind: 'started', task: 'reference' };
+  }
+  drop_reference({ reference }) {
+    this.references = this.references.filter(({ id }) => id !== reference);
+    return this.referenceList();
+  }
+  referenceList() {
+    return { kind: 'references', references: this.references };
   }
   clear_painting() {
     this.step('clear painting');

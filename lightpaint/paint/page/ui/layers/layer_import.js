@@ -3,15 +3,27 @@
 import { html, useEffect, useRef, useState } from '../../vendor/preact.js';
 import { Button, Dialog } from '../controls.js';
 import { fill, words } from '../../language/language.js';
+import { sendFile } from '../file_parts.js';
+import { addReference, isPicture } from '../references/reference_files.js';
 
 /** @typedef {import("../ui_state.js").Ui} Ui */
 /** @typedef {import("../shortcuts.js").App} App */
 
-/** Bytes of a part of a file, in rows: no side of an array in a message may be longer. */
-const [ROW_BYTES, PART_ROWS] = [2 ** 16, 16];
-
 /** Files that may hold layers, by how their names end. */
 const ENDINGS = ['.ora', '.exr'];
+
+/** Names of EXRs that surely are of layers: the painter writes such ones. */
+const LAYER_NAME = /layers/i;
+
+/** Take a file that was dropped: of layers or, for a picture, as a reference.
+ * @param {App} app @param {File | undefined} file */
+function takeDroppedFile(app, file) {
+  if (!file) return;
+  const isExr = file.name.toLowerCase().endsWith('.exr');
+  if (isExr && !LAYER_NAME.test(file.name)) app.store.set({ layerFile: file });
+  else if (!isExr && isPicture(file)) void addReference(app, file);
+  else takeLayerFile(app, file);
+}
 
 /** Take a file: import it, or ask what becomes of the layers that are there.
  * @param {App} app @param {File | undefined} file */
@@ -29,26 +41,10 @@ export function takeLayerFile({ store, session, engine }, file) {
 }
 
 /** Send a file to the session. @param {App} app @param {File} file @param {boolean} replaces */
-async function sendLayerFile({ store, session }, file, replaces) {
-  store.set({ layerFile: null });
-  session.toast(fill(words.layerImport.importing, { name: file.name }));
-  const { view } = store.value;
-  try {
-    const bytes = new Uint8Array(await file.arrayBuffer());
-    for (let start = 0; start < bytes.length;) {
-      const rows = Math.min(PART_ROWS, Math.floor((bytes.length - start) / ROW_BYTES));
-      const count = rows ? rows * ROW_BYTES : bytes.length - start;
-      const data = bytes.slice(start, start + count);
-      const fields = { name: file.name, size: bytes.length, start, view, replaces };
-      const part = { data, shape: rows ? [rows, ROW_BYTES] : [count] };
-      const reply = await session.host.send('import_layers', fields, { part });
-      session.receive(reply);
-      if (reply.kind !== 'started') return;
-      start += count;
-    }
-  } catch (error) {
-    session.toast(error instanceof Error ? error.message : String(error), 'warn');
-  }
+async function sendLayerFile(app, file, replaces) {
+  app.store.set({ layerFile: null });
+  app.session.toast(fill(words.layerImport.importing, { name: file.name }));
+  await sendFile(app, file, 'import_layers', { view: app.store.value.view, replaces });
 }
 
 /** The button that opens a file dialog. @param {{app: App}} props */
@@ -72,11 +68,24 @@ export function LayerImportDialog({ ui, app }) {
   const file = ui.layerFile;
   if (!file) return null;
   const close = () => app.store.set({ layerFile: null });
-  return html`<${Dialog} title=${words.layerImport.importLayers2} close=${close} class="layer-import-dialog">
-    <p>${words.layerImport.whereDoTheLayersOf} <strong>${file.name}</strong> ${words.layerImport.go}</p>
+  const isReference = isPicture(file);
+  const use = () => {
+    close();
+    void addReference(app, file);
+  };
+  const title = isReference ? words.references.useAPicture : words.layerImport.importLayers2;
+  return html`<${Dialog} title=${title} close=${close} class="layer-import-dialog">
+    <p>${words.layerImport.whereDoTheLayersOf} <strong>${file.name}</strong> ${words.layerImport.go}
+      ${isReference && ` ${words.references.orIsItAPicture}`}</p>
     <div class="row">
-      <${Button} label=${words.layerImport.putThemOnTop} primary act=${() => sendLayerFile(app, file, false)} />
-      <${Button} label=${words.layerImport.replaceAllLayers} act=${() => sendLayerFile(app, file, true)} />
+      ${isReference && html`<${Button} label=${words.references.useItAsAReference} primary act=${use} />`}
+      <${Button} label=${words.layerImport.putThemOnTop} primary=${!isReference}
+        act=${() => sendLayerFile(app, file, false)} />
+      ${
+        ui.views.length < 2 &&
+        html`<${Button} label=${words.layerImport.replaceAllLayers}
+          act=${() => sendLayerFile(app, file, true)} />`
+      }
       <${Button} label=${words.layerImport.cancel} act=${close} />
     </div>
   </${Dialog}>`;
@@ -103,7 +112,7 @@ export function LayerDropFrame({ app, root }) {
       if (!hasFile(event)) return;
       event.preventDefault();
       setOver(false);
-      takeLayerFile(app, event.dataTransfer?.files[0]);
+      takeDroppedFile(app, event.dataTransfer?.files[0]);
     };
     root().addEventListener('dragover', over, { signal });
     root().addEventListener('dragleave', leave, { signal });

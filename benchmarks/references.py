@@ -1,0 +1,247 @@
+"""How well *Look like this* finds the light of a reference.
+
+    python benchmarks/references.py [--scenes gallery stage] [--cases 12] [--first 0]
+                                    [--methods whole regions pairs ...]
+
+A reference is a picture of the scene under a lighting that is known, one of those that
+`benchmarks/intent.py` means, in 8 bits: from the view that is painted, that picture mirrored, a
+part of it, or another view (of the stage, which has two). Judged is the whole picture of the
+answer: its mean CIEDE2000 to the scene under that lighting, after both have been exposed alike,
+since the exposure of a reference is unknown.
+
+`pixels` paints the reference itself over the picture, which only a reference of the same view
+allows. `pairs` are the places, at most five, in which the reference differs most.
+"""
+
+import argparse
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from intent import SCENES, SIZES, SPP, intentions
+from scipy.ndimage import gaussian_filter
+
+import lightpaint as lp
+from lightpaint.basis.cache.cached_render import obtain_basis
+from lightpaint.basis.exposure_meter import meter_exposure
+from lightpaint.colour.color import luminance
+from lightpaint.colour.color_difference import delta_e
+from lightpaint.paint.protocol import LookLike, PlacePair
+from lightpaint.paint.session.session import Session
+from lightpaint.paint.store.history_steps import Identity
+from lightpaint.paint.store.store import MemoryStore
+from lightpaint.pipeline.job.settings import Settings
+
+#: Sensors by scene: that which is painted, and another one, if there is one.
+SENSORS = {"gallery": ("camera", None), "stage": ("balcony", "box")}
+
+KINDS = ("same", "mirrored", "part", "other view")
+
+#: What is asked for by each method; None paints the reference itself.
+METHODS: dict[str, dict[str, Any] | None] = {
+    "pixels": None,
+    "whole": {"areas": "whole"},
+    "regions": {"areas": "regions"},
+    "pairs": {"areas": "pairs"},
+}
+
+#: Mean ΔE of the current picture, exposed alike, from which on a lighting is another one.
+LEAST_CHANGE = 4.0
+
+#: Share of each side of the picture that a part of it has.
+PART = 0.65
+
+#: Pairs of places, at most; and their least distance, in longer sides.
+PAIRS, DISTANCE = 5, 0.15
+
+Places = list[tuple[tuple[float, float], tuple[float, float]]]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A lighting that is meant. meant: (h, w, 3) linear. references: light and places by kind."""
+
+    meant: np.ndarray
+    references: dict[str, tuple[np.ndarray, Places]]
+
+
+def main() -> None:
+    """Print a table for each scene."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--scenes", nargs="+", default=list(SENSORS), choices=SENSORS)
+    parser.add_argument("--methods", nargs="+", default=list(METHODS), choices=METHODS)
+    parser.add_argument("--cases", type=int, default=12, metavar="N")
+    parser.add_argument("--first", type=int, default=0, metavar="K", help="number of the first")
+    options = parser.parse_args()
+    for name in options.scenes:
+        basis, other = (
+            None if sensor is None else render(name, sensor) for sensor in SENSORS[name]
+        )
+        assert basis is not None
+        numbers = range(options.first, options.first + options.cases)
+        transform = lp.ViewTransform("srgb", meter_exposure(basis.current_look, basis))
+        cases = [
+            make_case(basis, other, transform, np.random.default_rng([77, k])) for k in numbers
+        ]
+        print(f"\n{name} {SIZES[name]}, {SPP} spp, cases {numbers[0]} to {numbers[-1]}: mean ΔE")
+        print(f"{'':16s}" + "".join(f"{kind:>12s}" for kind in KINDS) + f"{'s':>8s}")
+        idle = np.mean([judged(basis.current_look, x.meant, transform) for x in cases])
+        print(f"{'doing nothing':16s}" + f"{idle:12.2f}" * (4 if other else 3), flush=True)
+        for method in options.methods:
+            start_s = time.perf_counter()
+            errors = [list(errors_of(basis, x, method, transform)) for x in cases]
+            taken_s = (time.perf_counter() - start_s) / sum(map(len, errors))
+            means = np.mean(errors, axis=0)
+            columns = "".join(f"{x:12.2f}" for x in means)
+            print(f"{method:16s}{columns:48s}{taken_s:8.2f}", flush=True)
+
+
+def render(scene: str, sensor: str) -> lp.Basis:
+    """Return the basis of a view of a scene."""
+    loaded = lp.load_scene(SCENES / scene / "scene.xml", sensor=sensor)
+    return obtain_basis(loaded.reduced(SIZES[scene]), spp=SPP)
+
+
+def errors_of(
+    basis: lp.Basis, case: Case, method: str, transform: lp.ViewTransform
+) -> Iterator[float]:
+    """Yield the ΔE of the answers to a case's references."""
+    request = METHODS[method]
+    for light, places in case.references.values():
+        reference = np.round(255 * transform.encode(light)).astype(np.uint8)
+        if request is None:
+            target = painted(reference, basis, transform)
+        else:
+            pairs = tuple(PlacePair(*pair) for pair in places)
+            target = asked_target(basis, reference, {"pairs": pairs, **request}, transform)
+        answer = basis.current_look if target is None else answer_to(basis, target)
+        yield judged(answer, case.meant, transform)
+
+
+def asked_target(
+    basis: lp.Basis, reference: np.ndarray, request: dict[str, Any], transform: lp.ViewTransform
+) -> lp.Target | None:
+    """Return the painting after *Look like this*; None if it asks for nothing."""
+    store = MemoryStore(Identity.of([basis]))
+    look = basis.current_look
+    session = Session([basis], [look], store, settings=Settings(), transform=transform)
+    number = session.references.add("reference", reference).id
+    try:
+        session.handle(LookLike(number, **request), {})
+    except lp.LightpaintError:
+        return None
+    return session.target()
+
+
+def painted(reference: np.ndarray, basis: lp.Basis, transform: lp.ViewTransform) -> lp.Target:
+    """Return the reference itself as a painting of the whole picture, as bright as it is now."""
+    height, width = basis.size
+    rows = (np.arange(height) + 0.5) * reference.shape[0] / height
+    columns = (np.arange(width) + 0.5) * reference.shape[1] / width
+    pixels = reference[rows.astype(int)][:, columns.astype(int)]
+    image = transform.decode(pixels / 255)
+    return lp.Target(
+        "reference",
+        image.astype(np.float32),
+        np.ones(basis.size, np.float32),
+        everything=True,
+        at_least=pixels >= 255,
+        transform=transform,
+        through_view=True,
+        over_look=True,
+    )
+
+
+def answer_to(basis: lp.Basis, target: lp.Target) -> np.ndarray:
+    """Return the picture of the lighting that is found, as `lightpaint solve` finds it."""
+    return basis.mix(lp.correct_noise(lp.solve(basis, target)).weights)
+
+
+def judged(image: np.ndarray, meant: np.ndarray, transform: lp.ViewTransform) -> float:
+    """Mean ΔE of a picture against what was meant, once it is exposed like that."""
+    scale = 1.0
+    for _ in range(8):
+        scale *= brightness(meant, transform) / brightness(scale * image, transform)
+    shown = [transform.encode(x) for x in (scale * image, meant)]
+    plain = lp.ViewTransform(transform.name)
+    return float(delta_e(*(plain.decode(x) for x in shown)).mean())
+
+
+def brightness(image: np.ndarray, transform: lp.ViewTransform) -> float:
+    """Return the geometric mean of the luminance of a picture, with a floor where it is black."""
+    return float(np.exp(np.log(luminance(image) * 2**transform.stops + 0.02).mean()))
+
+
+def make_case(
+    basis: lp.Basis,
+    other: lp.Basis | None,
+    transform: lp.ViewTransform,
+    rng: np.random.Generator,
+) -> Case:
+    """Return a lighting that somebody means, and references that show it."""
+    current = basis.current_look
+    weights, meant, ratio = next(
+        (weights, image, ratio)
+        for weights, image, ratio in intentions(basis, current, rng)
+        if judged(current, image, transform) > LEAST_CHANGE
+    )
+    change = np.abs(ratio).sum(axis=-1)
+    places = striking(gaussian_filter(change, 0.02 * max(basis.size)))
+    left, top = rng.uniform(0, 1 - PART, 2)
+    height, width = basis.size
+    rows = slice(round(top * height), round((top + PART) * height))
+    columns = slice(round(left * width), round((left + PART) * width))
+    references = {
+        "same": (meant, [(place, place) for place in places]),
+        "mirrored": (meant[:, ::-1], [((1 - x, y), (x, y)) for x, y in places]),
+        "part": (
+            meant[rows, columns],
+            [
+                (((x - left) / PART, (y - top) / PART), (x, y))
+                for x, y in places
+                if left < x < left + PART and top < y < top + PART
+            ],
+        ),
+    }
+    if other is not None:
+        references["other view"] = (other.mix(weights), seen_in_both(other, basis, change))
+    return Case(meant, references)
+
+
+def striking(change: np.ndarray) -> list[tuple[float, float]]:
+    """Return the places (x, y), 0 to 1, at which a picture changes most."""
+    height, width = change.shape
+    y, x = np.mgrid[:height, :width]
+    left, places = change.copy(), []
+    while len(places) < PAIRS and left.max() > 0.25 * change.max():
+        row, column = np.unravel_index(np.argmax(left), left.shape)
+        places.append(((column + 0.5) / width, (row + 0.5) / height))
+        left[np.hypot(y - row, x - column) < DISTANCE * width] = 0
+    return places
+
+
+def seen_in_both(other: lp.Basis, basis: lp.Basis, change: np.ndarray) -> Places:
+    """Return the middles of the objects that change most, in the other view and in this one."""
+    assert basis.objects is not None
+    assert other.objects is not None
+    shares = {
+        name: float(change[basis.objects.mask(name)].mean())
+        for name in dict.fromkeys(basis.objects.names)
+        if basis.objects.mask(name).mean() > 0.004 and other.objects.mask(name).mean() > 0.004
+    }
+    names = sorted(shares, key=lambda name: -shares[name])[:PAIRS]
+    return [(middle(other.objects.mask(x)), middle(basis.objects.mask(x))) for x in names]
+
+
+def middle(mask: np.ndarray) -> tuple[float, float]:
+    """Return the pixel of a mask nearest to its middle, as shares of width and height."""
+    rows, columns = np.nonzero(mask)
+    nearest = int(np.argmin(np.hypot(rows - rows.mean(), columns - columns.mean())))
+    height, width = mask.shape
+    return (columns[nearest] + 0.5) / width, (rows[nearest] + 0.5) / height
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""References: pictures whose light somebody asks for, as layers that fit the scene."""

@@ -1,0 +1,162 @@
+"""Changes of brightness and colour, by area, that make a picture look like a reference."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, Floats, as_rgb
+from lightpaint.colour.color import luminance
+from lightpaint.paint.layers.composition import adjusted
+from lightpaint.paint.layers.layer import Layer
+from lightpaint.paint.presets.view_areas import Mask, ViewAreas
+from lightpaint.paint.references.tones import Tones, Weights
+
+#: Most stops that an area is made brighter or darker, and that a channel of it is tinted.
+MAX_STOPS, MAX_TINT = 3.0, 1.5
+
+#: Changes that nobody sees: these are not asked for.
+MIN_STOPS, MIN_TINT = 0.08, 0.04
+
+#: Rounds in which the areas, which overlap, are brought near the reference.
+ROUNDS = 3
+
+#: Radius of the place that is compared, and of that which is changed, in longer sides.
+SEEN_RADIUS, CHANGED_RADIUS = 0.03, 0.12
+
+#: Parts of a picture by name, and their radius in longer sides.
+PARTS = {
+    f"{row} {column}".strip().capitalize(): (x, y)
+    for y, row in ((0.2, "upper"), (0.5, ""), (0.8, "lower"))
+    for x, column in ((0.15, "left"), (0.5, "middle"), (0.85, "right"))
+}
+PART_RADIUS = 0.15
+
+#: Least share of the picture that an area has to have.
+MIN_AREA = 0.004
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class LightArea:
+    """An area that is compared, and changed.
+
+    seen: weights of its pixels in a picture, or in the reference by `seen_there`. mask: where it is
+    changed. has_level: whether brightness is compared, and not only colour.
+    """
+
+    name: str
+    seen: Callable[[Tones], Weights]
+    mask: Callable[[ViewAreas], Mask]
+    has_level: bool = True
+    seen_there: Callable[[Tones], Weights] | None = None
+
+
+@dataclass(frozen=True)
+class AreaChange:
+    """A change of an area. tint: stops of each channel, of no luminance."""
+
+    area: LightArea
+    stops: float
+    tint: Doubles
+
+    @property
+    def is_visible(self) -> bool:
+        """True if anybody sees it."""
+        return abs(self.stops) >= MIN_STOPS or float(np.abs(self.tint).max()) >= MIN_TINT
+
+    def layer(self, number: int, group: int) -> Layer:
+        """Return the layer of an id, in a group, that asks for this."""
+        gains = 2.0**self.tint
+        tint = as_rgb(gains / luminance(gains))
+        gain = float(2.0**self.stops)
+        return Layer(number, "adjust", self.area.name, group=group, gain=gain, tint=tint)
+
+
+WHOLE_AREAS = (
+    LightArea("Everything", lambda tones: tones.whole, lambda view: view.whole, has_level=False),
+    LightArea("Shadows", lambda tones: tones.shadows, lambda view: view.shadows),
+    LightArea("Lit parts", lambda tones: tones.lit, lambda view: view.lit),
+)
+
+BAND_AREAS = (
+    LightArea("Top", lambda tones: tones.bands[0], lambda view: view.bands[0]),
+    LightArea("Middle", lambda tones: tones.bands[1], lambda view: view.bands[1]),
+    LightArea("Bottom", lambda tones: tones.bands[2], lambda view: view.bands[2]),
+)
+
+
+def spot_area(name: str, there: Point, here: Point, seen: float, changed: float) -> LightArea:
+    """Return a soft spot. there, here: its middle (x, y) in the reference and in the picture, from
+    0 to 1. seen, changed: radius that is compared, and changed, in longer sides.
+    """
+    return LightArea(
+        name,
+        lambda tones: tones.around(*here, seen),
+        lambda view: view.around(*here, changed),
+        seen_there=lambda tones: tones.around(*there, seen),
+    )
+
+
+PART_AREAS = tuple(
+    spot_area(name, place, place, PART_RADIUS, PART_RADIUS) for name, place in PARTS.items()
+)
+
+
+def find_changes(
+    reference: Tones,
+    light: Floats,
+    view: ViewAreas,
+    areas: Sequence[LightArea],
+    *,
+    matches_brightness: bool = False,
+) -> list[AreaChange]:
+    """Return the changes of areas that bring a picture near a reference, without invisible ones.
+
+    light: (h, w, 3) linear, the picture now. view: its areas. matches_brightness: whether it
+    becomes as bright as the reference as a whole; otherwise only differences within it count.
+    """
+    masks = [area.mask(view) for area in areas]
+    usable = view.whole > 0
+    changes = [AreaChange(area, 0.0, np.zeros(3)) for area in areas]
+    for _ in range(ROUNDS):
+        for k, (area, mask) in enumerate(zip(areas, masks, strict=True)):
+            if mask.mean() < MIN_AREA:
+                continue
+            tones = Tones(_changed(light, changes, masks), usable)
+            stops, tint = _difference(reference, tones, area, matches_brightness)
+            changes[k] = AreaChange(
+                area,
+                float(np.clip(changes[k].stops + stops, -MAX_STOPS, MAX_STOPS)),
+                np.clip(changes[k].tint + tint, -MAX_TINT, MAX_TINT),
+            )
+    return [change for change in changes if change.is_visible]
+
+
+def _difference(
+    reference: Tones, tones: Tones, area: LightArea, matches_brightness: bool
+) -> tuple[float, Doubles]:
+    """Return how much brighter the reference is in an area, and its tint there, in stops."""
+    there = reference.tone((area.seen_there or area.seen)(reference))
+    here = tones.tone(area.seen(tones))
+    if there is None or here is None:
+        return 0.0, np.zeros(3)
+    stops = 0.0
+    if matches_brightness:
+        stops = there.level - here.level
+    elif area.has_level:
+        whole_there, whole_here = reference.tone(reference.whole), tones.tone(tones.whole)
+        assert whole_there is not None
+        assert whole_here is not None
+        stops = (there.level - whole_there.level) - (here.level - whole_here.level)
+    return stops, there.chroma - here.chroma
+
+
+def _changed(light: Floats, changes: Sequence[AreaChange], masks: Sequence[Mask]) -> Floats:
+    """Return a picture with these changes, as layers over it make them."""
+    for change, mask in zip(changes, masks, strict=True):
+        if change.stops or change.tint.any():
+            layer = change.layer(1, 2)
+            light = light + mask[..., None] * (adjusted(light, layer.gain, layer.tint) - light)
+    return light

@@ -1,0 +1,110 @@
+"""Reads files of references: pictures of all formats of paintings, WebP and Radiance HDR."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Floats
+from lightpaint.colour.display.exposure import choose_exposure
+from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour.icc import read_icc
+from lightpaint.errors import ImageError
+from lightpaint.files import first_line, one_line
+from lightpaint.images.formats.bitmap import MAX_PIXELS, Bitmap
+from lightpaint.images.formats.bitmap_decoder import light_of_integers
+from lightpaint.images.formats.file_kinds import head_of
+from lightpaint.images.formats.library_output import silenced
+from lightpaint.images.picture import read_picture
+from lightpaint.images.resampling import resampled
+
+#: Pixels of the longer side of a reference that is kept; larger ones are reduced.
+MAX_SIDE = 1280
+
+#: Largest light of a reference that is kept, where display white is 1.
+MAX_LIGHT = 1000.0
+
+#: Display values (h, w, 3) uint8; of files of light, light float16, whose display white is 1.
+ReferencePixels = npt.NDArray[Any]
+
+
+def read_reference(path: Path, transform: ViewTransform) -> ReferencePixels:
+    """Return the picture in a file, at most MAX_SIDE pixels long.
+
+    transform: by which the session shows light. Raises ImageError, in one line that names the file.
+    """
+    head = head_of(path, 16)
+    is_light = True
+    if head.startswith(b"RIFF") and head[8:12] == b"WEBP":
+        light, is_light = light_of_integers(*_webp(path), transform), False
+    elif head.startswith(b"#?"):
+        light = _radiance(path)
+    else:
+        picture = read_picture(path, transform=transform)
+        light, is_light = picture.image, picture.codes is None
+        if picture.alpha is not None:
+            light = light * np.clip(picture.alpha, 0, 1)[..., None]
+    light = np.clip(_reduced(np.nan_to_num(light, posinf=0, neginf=0)), 0, None)
+    if not light.any():
+        raise ImageError(f"{path} is black: choose a picture with light in it")
+    if not is_light:
+        return np.asarray(np.round(255 * transform.encode(light)), np.uint8)
+    exposed = light * 2.0 ** choose_exposure(light)
+    return np.asarray(np.minimum(exposed, MAX_LIGHT), np.float16)
+
+
+def _reduced(light: Floats) -> Floats:
+    height, width = light.shape[:2]
+    factor = MAX_SIDE / max(height, width)
+    if factor >= 1:
+        return light
+    return resampled(light, (max(1, round(height * factor)), max(1, round(width * factor))))
+
+
+def _webp(path: Path) -> tuple[Bitmap, None]:
+    """Return the picture in a WebP file over black."""
+    from PIL import Image, ImageOps
+
+    try:
+        with Image.open(path, formats=["WEBP"]) as file:
+            _check_size(path, file.size)
+            profile = file.info.get("icc_profile")
+            upright = ImageOps.exif_transpose(file).convert("RGBA")
+        values = np.asarray(upright)
+    except (OSError, EOFError, LookupError, SyntaxError, ValueError, Image.DecompressionBombError):
+        raise ImageError(f"{path} is damaged or cut off: export it again") from None
+    alpha = values[..., 3:].astype(np.float32) / 255
+    display = np.round(values[..., :3] * alpha).astype(np.uint8)
+    icc = None if profile is None else read_icc(profile)
+    return Bitmap("webp", display, None, False, 255, icc, lossy=True), None
+
+
+def _radiance(path: Path) -> Floats:
+    """Return the light in a Radiance HDR file, (h, w, 3)."""
+    import OpenImageIO
+
+    with silenced():
+        OpenImageIO.geterror()
+        file = OpenImageIO.ImageInput.open(str(path))
+        if file is None:
+            reason = one_line(first_line(OpenImageIO.geterror(), path=path))
+            raise ImageError(f"{path} is damaged: {reason}")
+        try:
+            spec = file.spec()
+            _check_size(path, (spec.width, spec.height))
+            pixels = file.read_image(0, 0, 0, 3, "float") if spec.nchannels == 3 else None
+            if pixels is None or file.geterror():
+                raise ImageError(f"{path} is damaged or cut off: export it again")
+        finally:
+            file.close()
+    return np.asarray(pixels, np.float32).reshape(spec.height, spec.width, 3)
+
+
+def _check_size(path: Path, size: tuple[int, int]) -> None:
+    width, height = size
+    if min(size) < 1 or width * height > MAX_PIXELS:
+        raise ImageError(
+            f"{path} declares {width}x{height} pixels: expected at most {MAX_PIXELS / 1e6:.0f} "
+            "million"
+        )

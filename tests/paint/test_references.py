@@ -1,0 +1,323 @@
+"""*Look like this* asks for the light of a reference, softly, in one step."""
+
+import io
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenEXR
+import OpenImageIO
+import pytest
+from PIL import Image
+
+import lightpaint as lp
+from lightpaint.colour.color import luminance
+from lightpaint.errors import ImageError, PaintError
+from lightpaint.paint import protocol
+from lightpaint.paint.protocol import LookLike, PlacePair
+from lightpaint.paint.references.reference_file import MAX_SIDE, read_reference
+from lightpaint.paint.references.reference_table import MAX_REFERENCES, ReferenceTable
+from lightpaint.paint.session.session import Session
+from lightpaint.paint.store.history_steps import Identity
+from lightpaint.paint.store.store import MemoryStore, Store
+from lightpaint.pipeline.job.settings import Settings
+
+H, W = 36, 64
+
+AREAS = ("whole", "regions", "parts", "pairs")
+
+#: Pairs of places that the two pictures have at the same place.
+PAIRS = (PlacePair((0.2, 0.2), (0.2, 0.2)), PlacePair((0.7, 0.6), (0.7, 0.6)))
+
+TRANSFORM = lp.ViewTransform()
+
+
+def room(make_basis: Any) -> lp.Basis:
+    """A wall of a pattern that two lights reach, each from a side."""
+    y, x = np.mgrid[:H, :W] / W
+    pattern = 0.6 + 0.3 * np.sin(40 * x) * np.cos(30 * y)
+    light = (0.1 + np.exp(-(x**2) / 0.2) * (1.2 - y))[..., None] * np.array([1, 0.8, 0.6])
+    first = 0.5 * pattern[..., None] * light
+    basis: lp.Basis = make_basis(
+        images=np.array([first, 0.7 * first[:, ::-1]]), emission=[[0.7] * 3, [0.4] * 3]
+    )
+    return basis
+
+
+def session_in(basis: lp.Basis, store: Store | None = None) -> Session:
+    store = store or MemoryStore(Identity.of([basis]))
+    look = basis.current_look
+    return Session([basis], [look], store, settings=Settings(), transform=TRANSFORM)
+
+
+def as_shown(light: np.ndarray) -> np.ndarray:
+    return np.round(255 * TRANSFORM.encode(light)).astype(np.uint8)
+
+
+def ask(session: Session, light: np.ndarray, areas: str = "regions", **options: Any) -> None:
+    """Ask for the light of a picture."""
+    number = session.references.add("evening", as_shown(light)).id
+    request: Any = {"areas": areas, **options}
+    if areas == "pairs":
+        request = {"pairs": PAIRS, **request}
+    session.handle(LookLike(number, **request), {})
+
+
+def stops(session: Session) -> np.ndarray:
+    """What is asked for in each pixel, in stops of luminance."""
+    view = session.views[0]
+    return np.asarray(np.log2(luminance(view.image) / luminance(view.current)))
+
+
+@pytest.fixture
+def session(make_basis: Any) -> Session:
+    return session_in(room(make_basis))
+
+
+@pytest.mark.parametrize("areas", AREAS)
+@pytest.mark.parametrize("gain", [1.0, 1.5, 0.5])
+def test_the_picture_itself_asks_for_nothing_at_any_exposure(
+    session: Session, areas: str, gain: float
+) -> None:
+    with pytest.raises(PaintError, match="Like evening: the picture has that light already"):
+        ask(session, gain * session.views[0].current, areas)
+    assert not session.store.steps
+    assert not session.is_painted
+
+
+@pytest.mark.parametrize("areas", AREAS)
+def test_a_brighter_reference_makes_brighter_if_that_is_wanted(
+    session: Session, areas: str
+) -> None:
+    ask(session, 1.5 * session.views[0].current, areas, matches_brightness=True)
+    asked = stops(session)
+    covered = session.views[0].importance > 0.9
+    np.testing.assert_allclose(asked[covered].mean(), np.log2(1.5), atol=0.12)
+
+
+def test_a_brighter_ceiling_raises_the_top_against_the_rest(session: Session) -> None:
+    light = session.views[0].current.copy()
+    light[: H // 4] *= 2
+    ask(session, light, "regions")
+    asked = stops(session)
+    assert asked[: H // 5].mean() - asked[H // 2 :].mean() > 0.5
+
+
+@pytest.mark.parametrize("areas", ["parts", "pairs"])
+def test_a_brighter_left_half_raises_the_left(session: Session, areas: str) -> None:
+    light = session.views[0].current.copy()
+    light[:, : W // 2] *= 2
+    ask(session, light, areas)
+    asked, counts = stops(session), session.views[0].importance
+    left, right = ((asked * counts)[:, half].mean() for half in (np.s_[: W // 3], np.s_[-W // 3 :]))
+    assert left - right > 0.15
+
+
+@pytest.mark.parametrize("areas", AREAS)
+def test_warm_light_is_asked_for_as_warm_light(session: Session, areas: str) -> None:
+    ask(session, session.views[0].current * np.array([1.2, 1.0, 0.6]), areas)
+    view = session.views[0]
+    covered = view.importance > 0.9
+    ratio = (view.image / view.current)[covered].mean(axis=0)
+    assert ratio[0] / ratio[2] == pytest.approx(2, rel=0.2)
+    assert abs(stops(session)[covered].mean()) < 0.15
+
+
+def test_light_is_soft_and_no_pattern_of_a_reference_comes_through(session: Session) -> None:
+    rng = np.random.default_rng(0)
+    light = session.views[0].current * rng.uniform(0.5, 1.5, (H, W, 1))
+    light[:, W // 2 :] *= 0.4
+    ask(session, light, "parts")
+    asked = stops(session)
+    assert np.ptp(asked) > 0.5
+    assert np.abs(np.diff(asked, axis=1)).max() < 0.15
+
+
+def test_a_mirrored_reference_of_the_same_tones_asks_the_whole_for_nothing(
+    session: Session,
+) -> None:
+    with pytest.raises(PaintError, match="that light already"):
+        ask(session, session.views[0].current[:, ::-1], "whole")
+
+
+def test_it_is_a_group_of_layers_and_one_step_that_undo_takes_back(session: Session) -> None:
+    light = session.views[0].current.copy()
+    light[: H // 3] *= 2
+    ask(session, light)
+    group = session.views.layers.layers[-1]
+    assert (group.kind, group.name) == ("group", "Like evening")
+    assert [step.label for step in session.store.steps] == ["Like evening"]
+    asked = session.views[0].image.copy()
+    session.handle(protocol.ChangeLayers(layers=(replace(group, strength=0.5),)), {})
+    assert 0.2 < np.ptp(stops(session)) < 0.9 * np.ptp(np.log2(luminance(asked)))
+    session.handle(protocol.Undo(), {})
+    np.testing.assert_array_equal(session.views[0].image, asked)
+    session.handle(protocol.Undo(), {})
+    assert not session.is_painted
+    session.handle(protocol.Redo(), {})
+    np.testing.assert_array_equal(session.views[0].image, asked)
+
+
+def test_asked_again_there_is_hardly_more_to_ask_for(session: Session) -> None:
+    light = session.views[0].current.copy()
+    light[: H // 3] *= 2
+    ask(session, light)
+    first = stops(session)
+    try:
+        session.handle(LookLike(1), {})
+    except PaintError:
+        return
+    assert np.abs(stops(session) - first).max() < 0.3 * np.abs(first).max()
+
+
+def test_it_keeps_to_what_is_selected(session: Session) -> None:
+    session.handle(protocol.Select((0, H, 0, 10)), {"mask": np.full((H, 10), 255, np.uint8)})
+    ask(session, session.views[0].current * np.array([1.3, 1, 0.5]))
+    assert session.views[0].importance[:, :10].all()
+    assert not session.views[0].importance[:, 10:].any()
+
+
+def test_layers_and_references_are_there_again_and_the_painting_is_exported(
+    make_basis: Any, tmp_path: Path
+) -> None:
+    basis, path = room(make_basis), tmp_path / "session.db"
+    with Store.open(path, Identity.of([basis])) as store:
+        session = session_in(basis, store)
+        light = np.asarray(session.views[0].current.copy())
+        light[: H // 3] *= 2
+        ask(session, light)
+        session.references.drop(session.references.add("other", as_shown(light)).id)
+        asked = session.views[0].image.copy()
+    with Store.open(path, Identity.of([basis])) as store:
+        session = session_in(basis, store)
+        np.testing.assert_array_equal(session.views[0].image, asked)
+        [reference] = session.references
+        assert reference.name == "evening"
+        np.testing.assert_array_equal(reference.pixels, as_shown(light))
+        target = session.target()
+        assert target is not None
+        np.testing.assert_array_equal(target.image, asked)
+        session.references.drop(reference.id)
+    with Store.open(path, Identity.of([basis])) as store:
+        assert list(session_in(basis, store).references) == []
+
+
+def test_references_of_a_damaged_file_are_recovered(make_basis: Any, tmp_path: Path) -> None:
+    basis, path = room(make_basis), tmp_path / "session.db"
+    with Store.open(path, Identity.of([basis])) as store:
+        session = session_in(basis, store)
+        ask(session, session.views[0].current * np.array([1.3, 1, 0.5]))
+        store.recover()
+        assert [x.name for x in ReferenceTable(store, TRANSFORM)] == ["evening"]
+
+
+def test_a_file_without_references_has_no_table_of_them(make_basis: Any, tmp_path: Path) -> None:
+    basis, path = room(make_basis), tmp_path / "session.db"
+    with Store.open(path, Identity.of([basis])) as store:
+        references = ReferenceTable(store, TRANSFORM)
+        assert list(references) == []
+        assert store.rows("SELECT name FROM sqlite_schema WHERE name = 'reference'") == []
+        references.add("new", np.full((2, 3, 3), 9, np.uint8))
+        assert len(list(ReferenceTable(store, TRANSFORM))) == 1
+
+
+def test_what_cannot_be_asked_for_is_refused_and_nothing_changes(session: Session) -> None:
+    with pytest.raises(PaintError, match="there is no reference 7"):
+        session.handle(LookLike(7), {})
+    with pytest.raises(PaintError, match="no places to compare"):
+        ask(session, session.views[0].current, "pairs", pairs=())
+    with pytest.raises(PaintError, match="no view 3"):
+        session.handle(LookLike(1, view=3), {})
+    with pytest.raises(ValueError, match="0 to 1"):
+        LookLike(1, pairs=(PlacePair((0, 2), (0, 0)),))
+    assert not session.store.steps
+    for _ in range(MAX_REFERENCES - 1):
+        session.references.add("x", np.zeros((1, 1, 3), np.uint8))
+    with pytest.raises(PaintError, match=f"^{MAX_REFERENCES} references are kept: remove one"):
+        session.references.add("x", np.zeros((1, 1, 3), np.uint8))
+
+
+def picture(size: tuple[int, int] = (24, 40)) -> np.ndarray:
+    y, x = np.mgrid[: size[0], : size[1]]
+    return np.dstack([5 * x, 6 * y, np.full(size, 90)]).clip(0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize("kind", ["png", "jpeg", "webp", "tiff"])
+def test_pictures_of_display_values_are_kept_as_they_are(tmp_path: Path, kind: str) -> None:
+    options = {"lossless": True} if kind == "webp" else {"quality": 98, "subsampling": 0}
+    Image.fromarray(picture()).save(tmp_path / "file", format=kind, **options)
+    read = read_reference(tmp_path / "file", TRANSFORM)
+    assert read.dtype == np.uint8
+    np.testing.assert_allclose(read.astype(int), picture(), atol=6 if kind == "jpeg" else 1)
+
+
+def test_a_large_picture_is_reduced(tmp_path: Path) -> None:
+    Image.fromarray(picture((900, 3000))).save(tmp_path / "file", format="png")
+    assert read_reference(tmp_path / "file", TRANSFORM).shape == (384, MAX_SIDE, 3)
+
+
+@pytest.mark.parametrize("kind", ["exr", "hdr"])
+def test_pictures_of_light_are_exposed_and_kept_beyond_white(tmp_path: Path, kind: str) -> None:
+    light = 400 * (0.01 + picture() / np.float32(255)).astype(np.float32)
+    path = tmp_path / f"sun.{kind}"
+    if kind == "exr":
+        OpenEXR.File({}, {"RGB": light}).write(str(path))
+    else:
+        file = OpenImageIO.ImageOutput.create(str(path))
+        file.open(str(path), OpenImageIO.ImageSpec(40, 24, 3, "float"))
+        file.write_image(light)
+        file.close()
+    read = read_reference(path, lp.ViewTransform("agx", 2.0)).astype(np.float32)
+    ratio = read / light
+    # Radiance's three numbers share an exponent.
+    brightest = np.median(ratio) * light.max(axis=-1, keepdims=True)
+    assert (np.abs(read - np.median(ratio) * light) <= 0.01 * brightest).all()
+    assert 0.02 < np.median(read) < 2
+    store = MemoryStore(None)
+    references = ReferenceTable(store, lp.ViewTransform("agx", 2.0))
+    reference = references.add("sun", read.astype(np.float16))
+    np.testing.assert_allclose(references.light(reference), read / 4, rtol=1e-3)
+    assert references.picture(reference).dtype == np.uint8
+
+
+def _cut(kind: str, **options: Any) -> bytes:
+    file = io.BytesIO()
+    Image.fromarray(picture()).save(file, format=kind, **options)
+    return file.getvalue()[: len(file.getvalue()) // 2]
+
+
+HOSTILE: dict[str, Callable[[], bytes]] = {
+    "empty": lambda: b"",
+    "text": lambda: b"a picture of the evening\n" * 9,
+    "cut png": lambda: _cut("png"),
+    "cut jpeg": lambda: _cut("jpeg"),
+    "cut webp": lambda: _cut("webp"),
+    "webp of nothing": lambda: b"RIFF\x10\0\0\0WEBPVP8 \xff\xff\xff\xff" + bytes(30),
+    "riff of sound": lambda: b"RIFF\x10\0\0\0WAVEfmt " + bytes(30),
+    "radiance without end": lambda: b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 9 +X 9\n",
+    "radiance of millions": lambda: (
+        b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 99999999 +X 99999999\n" + bytes(99)
+    ),
+    "exr of nothing": lambda: b"\x76\x2f\x31\x01" + bytes(60),
+    "black": lambda: _whole(np.zeros((4, 4, 3), np.uint8)),
+}
+
+
+def _whole(pixels: np.ndarray) -> bytes:
+    file = io.BytesIO()
+    Image.fromarray(pixels).save(file, format="png")
+    return file.getvalue()
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_hostile_file_ends_in_one_line_that_names_it(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "reference"
+    path.write_bytes(HOSTILE[name]())
+    with pytest.raises(ImageError) as caught:
+        read_reference(path, TRANSFORM)
+    text = str(caught.value)
+    assert str(path) in text
+    assert "\n" not in text
+    assert len(text) < 300 + len(str(path))
