@@ -1,21 +1,24 @@
-"""How well *Look like this* finds the light of a reference.
+"""How well *Look like this* finds the light of a reference, and presets that which they are called.
 
-    python benchmarks/references.py [--scenes gallery stage] [--cases 12] [--first 0]
-                                    [--methods whole regions pairs ...]
+    python benchmarks/references.py [--scenes gallery stage] [--cases 4] [--first 0]
+                                    [--methods whole regions parts pairs ...]
 
-A reference is a picture of the scene under a lighting that is known, one of those that
-`benchmarks/intent.py` means, in 8 bits: from the view that is painted, that picture mirrored, a
-part of it, or another view (of the stage, which has two). Judged is the whole picture of the
-answer: its mean CIEDE2000 to the scene under that lighting, after both have been exposed alike,
-since the exposure of a reference is unknown.
+A reference is a picture of the scene, in 8 bits, under a lighting that is known: one that was found
+for a painting in `targets/`, or one of those that `benchmarks/intent.py` means. It shows the view
+that is painted, or that picture mirrored, or a part of it, or another view (of the stage, which has
+two). Judged is the whole picture of the answer: its mean CIEDE2000 to the scene under that
+lighting, after both have been exposed alike, since the exposure of a reference is unknown.
 
 `pixels` paints the reference itself over the picture, which only a reference of the same view
 allows. `pairs` are the places, at most five, in which the reference differs most.
+
+A preset is judged by the lighting of a painting that somebody made of what it is called: before it,
+what it asks for, and the answer.
 """
 
 import argparse
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,7 +31,7 @@ from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.basis.exposure_meter import meter_exposure
 from lightpaint.colour.color import luminance
 from lightpaint.colour.color_difference import delta_e
-from lightpaint.paint.protocol import LookLike, PlacePair
+from lightpaint.paint.protocol import ApplyPreset, LookLike, PlacePair
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.store import MemoryStore
@@ -37,14 +40,26 @@ from lightpaint.pipeline.job.settings import Settings
 #: Sensors by scene: that which is painted, and another one, if there is one.
 SENSORS = {"gallery": ("camera", None), "stage": ("balcony", "box")}
 
-KINDS = ("same", "mirrored", "part", "other view")
-
 #: What is asked for by each method; None paints the reference itself.
 METHODS: dict[str, dict[str, Any] | None] = {
     "pixels": None,
     "whole": {"areas": "whole"},
     "regions": {"areas": "regions"},
+    "parts": {"areas": "parts"},
     "pairs": {"areas": "pairs"},
+}
+
+#: Paintings of which lightings are found, by scene, and a preset that means such a one.
+PAINTINGS = {
+    "gallery": {
+        "after-hours.png": "night",
+        "evening.exr": None,
+        "last-sun.png": "golden_hour",
+        "morning.exr": None,
+        "opening.png": None,
+        "overcast.png": "overcast",
+    },
+    "stage": {"moonlight.exr": "moonlight", "sunset.exr": "golden_hour"},
 }
 
 #: Mean ΔE of the current picture, exposed alike, from which on a lighting is another one.
@@ -72,7 +87,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--scenes", nargs="+", default=list(SENSORS), choices=SENSORS)
     parser.add_argument("--methods", nargs="+", default=list(METHODS), choices=METHODS)
-    parser.add_argument("--cases", type=int, default=12, metavar="N")
+    parser.add_argument("--cases", type=int, default=4, metavar="N")
     parser.add_argument("--first", type=int, default=0, metavar="K", help="number of the first")
     options = parser.parse_args()
     for name in options.scenes:
@@ -80,22 +95,84 @@ def main() -> None:
             None if sensor is None else render(name, sensor) for sensor in SENSORS[name]
         )
         assert basis is not None
-        numbers = range(options.first, options.first + options.cases)
         transform = lp.ViewTransform("srgb", meter_exposure(basis.current_look, basis))
+        lightings = {file: found_lighting(name, file, basis) for file in PAINTINGS[name]}
         cases = [
-            make_case(basis, other, transform, np.random.default_rng([77, k])) for k in numbers
+            make_case(basis, other, weights, np.random.default_rng([78, k]))
+            for k, weights in enumerate(lightings.values())
         ]
-        print(f"\n{name} {SIZES[name]}, {SPP} spp, cases {numbers[0]} to {numbers[-1]}: mean ΔE")
-        print(f"{'':16s}" + "".join(f"{kind:>12s}" for kind in KINDS) + f"{'s':>8s}")
-        idle = np.mean([judged(basis.current_look, x.meant, transform) for x in cases])
-        print(f"{'doing nothing':16s}" + f"{idle:12.2f}" * (4 if other else 3), flush=True)
-        for method in options.methods:
-            start_s = time.perf_counter()
-            errors = [list(errors_of(basis, x, method, transform)) for x in cases]
-            taken_s = (time.perf_counter() - start_s) / sum(map(len, errors))
-            means = np.mean(errors, axis=0)
-            columns = "".join(f"{x:12.2f}" for x in means)
-            print(f"{method:16s}{columns:48s}{taken_s:8.2f}", flush=True)
+        compare_methods(f"{name}, lightings of paintings", basis, cases, transform, options.methods)
+        numbers = range(options.first, options.first + options.cases)
+        generators = [np.random.default_rng([77, k]) for k in numbers]
+        cases = [
+            make_case(basis, other, random_lighting(basis, transform, rng), rng)
+            for rng in generators
+        ]
+        title = f"{name}, random lightings {numbers[0]} to {numbers[-1]}"
+        compare_methods(title, basis, cases, transform, options.methods)
+        judge_presets(name, basis, lightings, transform)
+
+
+def compare_methods(
+    title: str,
+    basis: lp.Basis,
+    cases: Sequence[Case],
+    transform: lp.ViewTransform,
+    methods: Sequence[str],
+) -> None:
+    """Print the mean ΔE of each method, by kind of reference."""
+    kinds = list(cases[0].references)
+    print(f"\n{title}: mean ΔE of {len(cases)}")
+    print(f"{'':16s}" + "".join(f"{kind:>12s}" for kind in kinds) + f"{'s':>8s}")
+    idle = np.mean([judged(basis.current_look, x.meant, transform) for x in cases])
+    print(f"{'doing nothing':16s}" + f"{idle:12.2f}" * len(kinds), flush=True)
+    for method in methods:
+        start_s = time.perf_counter()
+        errors = [list(errors_of(basis, x, method, transform)) for x in cases]
+        taken_s = (time.perf_counter() - start_s) / sum(map(len, errors))
+        columns = "".join(f"{x:12.2f}" for x in np.mean(errors, axis=0))
+        print(f"{method:16s}{columns}{taken_s:8.2f}", flush=True)
+
+
+def judge_presets(
+    name: str, basis: lp.Basis, lightings: dict[str, np.ndarray], transform: lp.ViewTransform
+) -> None:
+    """Print the ΔE of presets to the lightings of paintings of what they are called."""
+    print(f"\n{name}, presets{'before':>24s}{'asked for':>12s}{'answer':>12s}")
+    for file, preset in PAINTINGS[name].items():
+        if preset is None:
+            continue
+        session = open_session(basis, transform)
+        session.handle(ApplyPreset(preset), {})
+        target, meant = session.target(), basis.mix(lightings[file])
+        assert target is not None
+        images = basis.current_look, target.image, answer_to(basis, target)
+        columns = "".join(f"{judged(x, meant, transform):12.2f}" for x in images)
+        print(f"{preset:14s}{file:16s}{columns}", flush=True)
+
+
+def open_session(basis: lp.Basis, transform: lp.ViewTransform) -> Session:
+    """Return a new session of a view."""
+    store, look = MemoryStore(Identity.of([basis])), basis.current_look
+    return Session([basis], [look], store, settings=Settings(), transform=transform)
+
+
+def found_lighting(scene: str, file: str, basis: lp.Basis) -> np.ndarray:
+    """Return the weights (n, 3) that are found for a painting."""
+    target = lp.read_target(SCENES.parent / "targets" / scene / file)
+    return lp.correct_noise(lp.solve(basis, target.resized(basis.size))).weights
+
+
+def random_lighting(
+    basis: lp.Basis, transform: lp.ViewTransform, rng: np.random.Generator
+) -> np.ndarray:
+    """Return the weights (n, 3) of another lighting."""
+    current = basis.current_look
+    return next(
+        weights
+        for weights, image, _ in intentions(basis, current, rng)
+        if judged(current, image, transform) > LEAST_CHANGE
+    )
 
 
 def render(scene: str, sensor: str) -> lp.Basis:
@@ -124,9 +201,7 @@ def asked_target(
     basis: lp.Basis, reference: np.ndarray, request: dict[str, Any], transform: lp.ViewTransform
 ) -> lp.Target | None:
     """Return the painting after *Look like this*; None if it asks for nothing."""
-    store = MemoryStore(Identity.of([basis]))
-    look = basis.current_look
-    session = Session([basis], [look], store, settings=Settings(), transform=transform)
+    session = open_session(basis, transform)
     number = session.references.add("reference", reference).id
     try:
         session.handle(LookLike(number, **request), {})
@@ -175,18 +250,12 @@ def brightness(image: np.ndarray, transform: lp.ViewTransform) -> float:
 
 
 def make_case(
-    basis: lp.Basis,
-    other: lp.Basis | None,
-    transform: lp.ViewTransform,
-    rng: np.random.Generator,
+    basis: lp.Basis, other: lp.Basis | None, weights: np.ndarray, rng: np.random.Generator
 ) -> Case:
-    """Return a lighting that somebody means, and references that show it."""
-    current = basis.current_look
-    weights, meant, ratio = next(
-        (weights, image, ratio)
-        for weights, image, ratio in intentions(basis, current, rng)
-        if judged(current, image, transform) > LEAST_CHANGE
-    )
+    """Return references that show a lighting. weights: (n, 3)."""
+    current, meant = basis.current_look, basis.mix(weights)
+    dark = 0.01 * current.mean()
+    ratio = np.log2((meant + dark) / (current + dark))
     change = np.abs(ratio).sum(axis=-1)
     places = striking(gaussian_filter(change, 0.02 * max(basis.size)))
     left, top = rng.uniform(0, 1 - PART, 2)

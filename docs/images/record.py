@@ -10,6 +10,9 @@ writes beside itself
     painter-views.jpg   the stage, painted from the balcony and from a box
     painter-layers.jpg  the gallery with wishes as layers, one of them unfolded
     painter-selection.jpg  a warm gradient on the wall of the window, which is selected
+    painter-reference.jpg  the gallery made to look like one of four references
+    painter-presets.jpg, painter-looks.jpg, painter-history.jpg  what is asked for at a click, the
+                        looks that were kept, and the steps that led to them
     painter-lamps.jpg   spots dimmed together, two of them with a gel, under a master
     lights.webp     somebody drags a spot, aims it by a click, paints, and lets the lights move;
                     it also prints the answers a second of the drag
@@ -37,6 +40,7 @@ from playwright.sync_api import Page, sync_playwright
 
 HERE = Path(__file__).resolve().parent
 SCENES = HERE.parent.parent / "scenes"
+PAINTINGS = HERE.parent.parent / "targets/gallery"
 
 #: Of the page, and of the recording.
 WINDOW, SIZE = (1360, 800), (1020, 600)
@@ -232,6 +236,50 @@ def many_lamps(hand: Hand) -> None:
     hand.wait()
 
 
+def like_a_reference(hand: Hand) -> None:
+    """Paintings as references, and the light of one of them."""
+    page = hand.page
+    page.get_by_role("button", name="References").click()
+    for name in ("opening.png", "overcast.png", "after-hours.png", "last-sun.png"):
+        page.locator(".reference-pane input[type=file]").set_input_files(PAINTINGS / name)
+        label = name.removesuffix(".png")
+        page.locator(".reference-name", has_text=label).wait_for()
+    page.get_by_role("button", name="Same view", exact=True).click()
+    page.get_by_role("button", name="Look like this", exact=True).click()
+    page.mouse.move(5, 5)
+    hand.wait()
+
+
+def keep_looks(hand: Hand) -> None:
+    """Looks of the references, and of two presets; each is a step, or several."""
+    page = hand.page
+    _save(hand, "Last sun")
+    for name in ("overcast", "opening"):
+        page.keyboard.press("Control+z")
+        page.get_by_role("button", name=f"Show {name}").click()
+        page.get_by_role("button", name="Look like this", exact=True).click()
+        hand.wait()
+        _save(hand, name.capitalize())
+    page.get_by_role("button", name="Close the references").click()
+    for name in ("Moonlight", "Noir", "Only this object"):
+        page.get_by_role("button", name="Clear painting", exact=True).click()
+        page.get_by_role("button", name="Presets", exact=True).click()
+        page.locator(".sheet button", has_text=name).click()
+        hand.wait()
+        _save(hand, name)
+    page.mouse.move(5, 5)
+    hand.wait()
+
+
+def _save(hand: Hand, name: str) -> None:
+    hand.page.get_by_role("button", name="Save look").first.click()
+    field = hand.page.get_by_role("textbox", name="Name").first
+    if field.count():
+        field.fill(name)
+        field.press("Enter")
+    hand.wait()
+
+
 def _type(page: Page, label: str, text: str) -> None:
     field = page.get_by_role("textbox", name=label, exact=True).first
     field.fill(text)
@@ -365,7 +413,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--spp", type=int, default=64)
     parser.add_argument("--port", type=int, default=8431)
-    pictures = ("painting", "views", "layers", "selection", "lamps", "lights")
+    pictures = ("painting", "views", "layers", "selection", "lamps", "lights", "reference")
     parser.add_argument("--only", choices=pictures)
     asked = parser.parse_args()
     if asked.only in (None, "lights"):
@@ -382,6 +430,22 @@ def main() -> None:
         with painter("gallery", asked.spp, asked.port) as url, using(url) as hand:
             many_lamps(hand)
             hand.page.screenshot(path=HERE / "painter-lamps.jpg", type="jpeg", quality=88)
+    if asked.only in (None, "reference"):
+        with painter("gallery", asked.spp, asked.port) as url, using(url) as hand:
+            page = hand.page
+            like_a_reference(hand)
+            page.screenshot(path=HERE / "painter-reference.jpg", type="jpeg", quality=88)
+            page.get_by_role("button", name="Presets", exact=True).click()
+            page.wait_for_timeout(4000)
+            page.screenshot(path=HERE / "painter-presets.jpg", type="jpeg", quality=88)
+            page.keyboard.press("Escape")
+            page.get_by_role("button", name="Colour", exact=True).last.click()
+            page.get_by_role("button", name="History", exact=True).click()
+            keep_looks(hand)
+            page.screenshot(path=HERE / "painter-history.jpg", type="jpeg", quality=88)
+            page.get_by_role("button", name="All looks").click()
+            page.wait_for_timeout(2000)
+            page.screenshot(path=HERE / "painter-looks.jpg", type="jpeg", quality=88)
     if asked.only in (None, "layers"):
         with painter("gallery", asked.spp, asked.port) as url, using(url) as hand:
             layered(hand)

@@ -1,6 +1,7 @@
 """Presets on the views of a session: the masks of their layers, and what they ask for."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,11 +12,14 @@ from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.layers.composition import compose_layer
-from lightpaint.paint.layers.layer import MAX_NAME_LENGTH
+from lightpaint.paint.layers.layer import MAX_NAME_LENGTH, Layer
 from lightpaint.paint.layers.selection import FULL, selection_mask
 from lightpaint.paint.presets.presets import LightingPreset, find_preset, layers_of
 from lightpaint.paint.presets.view_areas import Mask, ViewAreas
 from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
+
+#: Steps of coverage in a mask, which are not seen, and which a session file packs well.
+MASK_STEPS = 256
 
 
 def preset_masks(preset: LightingPreset, canvas: Canvas, subject: str | None) -> list[Mask]:
@@ -50,13 +54,28 @@ def open_preset(canvases: Canvases, name: str, subject: str | None) -> list[tupl
     check_subject(list(canvases), subject)
     title = preset.title if subject is None else f"{preset.title}: {subject}"
     layers = layers_of(preset, canvases.next_layer, title[:MAX_NAME_LENGTH])
-    canvases.open_layers(canvases.layers.with_layers(layers))
-    for view, canvas in enumerate(canvases):
-        masks = preset_masks(preset, canvas, subject)
-        for layer, mask in zip(layers[:-1], masks, strict=True):
+    masks = {k: preset_masks(preset, canvas, subject) for k, canvas in enumerate(canvases)}
+    return open_group(canvases, layers, masks)
+
+
+def open_group(
+    canvases: Canvases, layers: Sequence[Layer], masks: Mapping[int, Sequence[Mask]]
+) -> list[tuple[int, Region]]:
+    """Put layers and their group, the last, on top, as an open change; return what changes.
+
+    masks: of each layer but the group, by view.
+    """
+    # Hidden until all have their masks, so that they are composed once.
+    hidden = [replace(layer, is_visible=layer.kind == "group") for layer in layers]
+    canvases.open_layers(canvases.layers.with_layers(hidden))
+    for view, masks_of_view in masks.items():
+        for layer, mask in zip(layers[:-1], masks_of_view, strict=True):
             no_colour = np.broadcast_to(np.float32(0), (*mask.shape, 3))
-            canvases.paint(view, layer.id, canvas.full_region, Pixels(no_colour, mask))
-    return [(view, canvas.full_region) for view, canvas in enumerate(canvases)]
+            region = canvases[view].full_region
+            stepped = np.round(mask * MASK_STEPS) / np.float32(MASK_STEPS)
+            canvases.paint(view, layer.id, region, Pixels(no_colour, stepped.astype(np.float32)))
+    canvases.open_layers(canvases.layers.with_layers(layers))
+    return [(view, canvases[view].full_region) for view in masks]
 
 
 def selected_mask(canvas: Canvas) -> Mask | np.float32:

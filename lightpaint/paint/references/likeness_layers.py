@@ -2,14 +2,18 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from lightpaint.errors import PaintError
+from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.layers.layer import MAX_NAME_LENGTH, Layer
-from lightpaint.paint.presets.preset_masks import open_preset, reduced_areas, selected_mask
+from lightpaint.paint.presets.preset_masks import (
+    open_group,
+    open_preset,
+    reduced_areas,
+    selected_mask,
+)
 from lightpaint.paint.presets.presets import PRESETS
-from lightpaint.paint.presets.view_areas import ViewAreas
+from lightpaint.paint.presets.view_areas import Mask, ViewAreas
 from lightpaint.paint.protocol import ApplyPreset, LookLike
 from lightpaint.paint.references.likeness import (
     BAND_AREAS,
@@ -23,7 +27,7 @@ from lightpaint.paint.references.likeness import (
 )
 from lightpaint.paint.references.reference_table import ReferenceTable
 from lightpaint.paint.references.tones import Tones
-from lightpaint.paint.store.canvas_pixels import Pixels, Region
+from lightpaint.paint.store.canvas_pixels import Region
 
 #: Approximate pixels of the longer side of the picture in which changes are found.
 FINDING_SIDE = 160
@@ -65,25 +69,17 @@ def _open_likeness(
     first = canvases.next_layer
     group = first + len(changes)
     layers = [change.layer(first + k, group) for k, change in enumerate(changes)]
-    canvases.open_layers(canvases.layers.with_layers([*layers, Layer(group, "group", name)]))
     views = [request.view] if request.areas == "pairs" else range(len(canvases))
-    for view in views:
-        _paint_masks(canvases, view, layers, [change.area for change in changes])
-    return [(view, canvases[view].full_region) for view in views]
+    masks = {k: _masks(canvases[k], [change.area for change in changes]) for k in views}
+    return open_group(canvases, [*layers, Layer(group, "group", name)], masks)
 
 
-def _paint_masks(
-    canvases: Canvases, view: int, layers: Sequence[Layer], areas: Sequence[LightArea]
-) -> None:
-    """Paint where layers apply in a view: in these areas, within what is selected."""
-    canvas = canvases[view]
+def _masks(canvas: Canvas, areas: Sequence[LightArea]) -> list[Mask]:
+    """Return the masks of areas in a view, within what is selected."""
     basis = canvas.basis
-    found = ViewAreas(canvas.image.copy(), basis.emitters_seen, basis.features, basis.objects)
+    found = ViewAreas(canvas.image, basis.emitters_seen, basis.features, basis.objects)
     selected = selected_mask(canvas)
-    no_colour = np.broadcast_to(np.float32(0), (*canvas.size, 3))
-    masks = [area.mask(found) * selected for area in areas]  # before the first one changes anything
-    for layer, mask in zip(layers, masks, strict=True):
-        canvases.paint(view, layer.id, canvas.full_region, Pixels(no_colour, mask))
+    return [area.mask(found) * selected for area in areas]
 
 
 def compared_areas(request: LookLike) -> Sequence[LightArea]:
