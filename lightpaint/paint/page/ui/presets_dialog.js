@@ -19,14 +19,19 @@ export function PresetsDialog({ ui, app, close }) {
     { value: CENTRAL, label: words.presetsDialog.theMostCentralObject },
     ...objects.map((name) => ({ value: name, label: name })),
   ];
-  const apply = (/** @type {string} */ preset, /** @type {boolean} */ hasSubject) => {
+  const apply = async (/** @type {string} */ preset, /** @type {boolean} */ hasSubject) => {
     close();
     app.engine.cancel();
-    app.store.set((state) => ({ open: { ...state.open, layers: true } }));
-    void app.session.send('apply_preset', {
+    const { store } = app;
+    store.set((state) => ({ open: { ...state.open, layers: true } }));
+    const before = new Set(store.value.layers.map(({ id }) => id));
+    await app.session.send('apply_preset', {
       preset,
       subject: hasSubject && subject !== CENTRAL ? subject : null,
     });
+    // Its strength is what people change next.
+    const group = store.value.layers.find(({ id, kind }) => kind === 'group' && !before.has(id));
+    if (group) store.set({ openLayer: group.id });
   };
   return html`<${Dialog} title=${words.presetsDialog.presets} close=${close} class="looks-dialog">
     <p>${words.presetsDialog.aPresetAsksForLightAnd}</p>
@@ -38,7 +43,7 @@ export function PresetsDialog({ ui, app, close }) {
     <ul class="sheet">${(ui.state?.presets ?? []).map(
       (/** @type {import("../engine/messages.js").PresetInfo} */ preset) => html`
       <li key=${preset.name}><button type="button"
-        onClick=${() => apply(preset.name, preset.has_subject)}>
+        onClick=${() => void apply(preset.name, preset.has_subject)}>
         <${Thumbnail} name=${`preset/${preset.name}`} generation=${0} app=${app} />
         <span><strong>${preset.title}</strong></span><span class="faint">${preset.description}</span>
       </button></li>`,
