@@ -118,18 +118,37 @@ def test_snippets_of_python_run_one_after_the_other(
             names["painter"].close()
 
 
+def words_of_the_page() -> dict[str, str]:
+    """Texts of the page in English by `section.name`, of those that have no forms by number."""
+    words, section = dict[str, str](), ""
+    text = (ROOT / "lightpaint/paint/page/language/en.js").read_text()
+    for name, key, quoted in re.findall(
+        r"^  (\w+): \{$|^    (\w+):\s+('(?:[^'\\]|\\.)*'|\"[^\"]*\"),$", text, re.MULTILINE
+    ):
+        if name:
+            section = name
+        else:
+            words[f"{section}.{key}"] = quoted[1:-1].replace("\\'", "'")
+    assert len(words) > 500
+    return words
+
+
 def test_keys_of_the_painter_are_those_of_its_page():
-    page = ROOT / "lightpaint" / "paint" / "page" / "ui"
+    page, words = ROOT / "lightpaint" / "paint" / "page" / "ui", words_of_the_page()
     tools = re.findall(
-        r"label: '(\w+)',\s*icon: '\w+',\s*keys: '(\w)'", (page / "tools.js").read_text()
+        r"label: words\.([\w.]+),\s*icon: '\w+',\s*keys: '(\w)'", (page / "tools.js").read_text()
     )
     others = re.findall(
-        r"symbols: \[((?:'[^']*'(?:, )?)+)\],\s*description: '([^']*)'",
+        r"symbols: \[((?:'[^']*'|[^\]'])+)\],\s*description: words\.([\w.]+)",
         (page / "shortcuts.js").read_text(),
     )
-    keys = [*((f"'{key}'", label) for label, key in tools), *others]
+    keys = [*((f"'{key}'", words[label]) for label, key in tools)]
+    keys += [(symbols, words[description]) for symbols, description in others]
     assert len(keys) > 30
-    page_keys = [re.findall(r"'([^']*)'", names) for names, _ in keys]
+    page_keys = [
+        [text or words[word] for text, word in re.findall(r"'([^']*)'|words\.([\w.]+)", names)]
+        for names, _ in keys
+    ]
     rows = [
         f"| {' '.join(f'`{name}`' for name in names)} | {does} |"
         for names, (_, does) in zip(page_keys, keys, strict=True)
@@ -198,7 +217,7 @@ def test_numbers_of_settings_are_the_same_in_documents_and_on_the_page():
     assert f"const DEFAULT_HOLD = {DEFAULT_HOLD:g};" in page
     assert f"`--hold {DEFAULT_HOLD:g}`" in solving
     assert f"It is {DEFAULT_HOLD:g} by default where something was painted over" in method
-    for text in (page, solving):
+    for text in (" ".join(words_of_the_page().values()), solving):
         assert f"{LAMP_KELVINS[0]} to {LAMP_KELVINS[1]} K" in text
     assert f"`--kelvin '*={LAMP_KELVINS[0]}:{LAMP_KELVINS[1]}'`" in method
 
