@@ -15,6 +15,7 @@ from renderer import REPOSITORY
 import lightpaint as lp
 from lightpaint.errors import PaintError
 from lightpaint.paint import protocol
+from lightpaint.paint.layers.composed_layers import ComposedLayers
 from lightpaint.paint.layers.composition import (
     ShownLayer,
     accent,
@@ -170,6 +171,41 @@ def test_any_partition_of_the_picture_gives_the_same_bits(seed: int) -> None:
         for columns in ((0, x), (x, SIZE[1])):
             region = (int(rows[0]), int(rows[1]), int(columns[0]), int(columns[1]))
             assert target_of(*layers, region=region).equals(target.part(region))
+
+
+@pytest.mark.parametrize("start", [1, 4, 5])
+def test_the_end_of_a_stroke_composes_importance_alone(
+    start: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An accent changes no light: the same bits, without the light of all layers above."""
+    rng, size = np.random.default_rng(start), (150, 140)
+    whole = (0, *size[:1], 0, *size[1:])
+    kinds = ("paint", "adjust", "weigh", "paint", "pixels", "adjust")
+    stack = LayerStack.of(
+        Layer(k, kind, gain=1.3, times=3.0) for k, kind in enumerate(kinds, start=1)
+    )
+    current = rng.uniform(0.1, 2, (*size, 3)).astype(np.float32)
+    layers = ComposedLayers(0, current, stack, ())
+    for number in range(1, 7):
+        top = 0 if number in (2, 6) else int(rng.integers(0, 60))
+        region = (top, size[0] if number in (2, 6) else top + 40, 0, size[1])
+        shape = (region[1] - top, size[1])
+        coverage = 0.2 + 0.8 * rng.random(shape, np.float32)
+        layers.put(number, region, Pixels(rng.random((*shape, 3), np.float32), coverage))
+    layers.show(stack, (), at_rest=True)
+    before, image = layers.accent(start), layers.target.image.copy()
+    stroke = (100, 130, 20, 60)
+    ones = np.ones((30, 40), np.float32)
+    layers.put(start, stroke, Pixels(np.repeat(ones[..., None], 3, -1), ones))
+    image[100:130, 20:60] = layers.target.image[100:130, 20:60]
+    monkeypatch.setattr("lightpaint.paint.layers.composed_layers.compose_over", None)
+    change = layers.show(stack, (), at_rest=True)
+    assert layers.accent(start) < before
+    assert change.with_importance
+    np.testing.assert_array_equal(layers.target.image, image)
+    pairs = [(layer, layers.layer(layer.id)) for layer in stack.shown()]
+    afresh = [ShownLayer(*pair, weight) for pair, weight in zip(pairs, accents(pairs), strict=True)]
+    assert layers.target.equals(compose(afresh, current, whole))
 
 
 def test_light_falls_off_from_place_to_place_and_counts_by_how_far_it_covers() -> None:

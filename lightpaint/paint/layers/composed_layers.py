@@ -5,13 +5,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lightpaint.arrays import Floats
+from lightpaint.arrays import Bools, Floats
 from lightpaint.errors import PaintError
 from lightpaint.paint.layers.composition import (
     AlbedoSource,
     ShownLayer,
     accents,
     compose,
+    compose_importance,
     compose_over,
     with_effect,
 )
@@ -134,9 +135,11 @@ class ComposedLayers:
             *before[same_below : len(before) - same_above],
             *self._shown[same_below : len(self._shown) - same_above],
         ]
-        region = enclosing([shown.pixels.bounds for shown in changed])
         self._pixels = {number: self._pixels[number] for number in layers.ids}
-        return self._compose(region, same_below)
+        if _without_accents(before) == _without_accents(self._shown):
+            bands = [band for shown in changed for band in shown.pixels.bands]
+            return self._compose_importance(bands, same_below)
+        return self._compose(enclosing([shown.pixels.bounds for shown in changed]), same_below)
 
     def _with_accents(
         self, layers: LayerStack, before: Sequence[ShownLayer] | None = None
@@ -172,6 +175,24 @@ class ComposedLayers:
             target.at_least[area] = False if at_least is None else at_least
         return Change(region, with_importance)
 
+    def _compose_importance(self, bands: Sequence[Region], start: int) -> Change:
+        """Compose importance alone again in some bands, after a change of accents alone.
+
+        start: as for `_compose`.
+        """
+        changed_regions = []
+        for top in {band[0] for band in bands}:
+            region = enclosing([band for band in bands if band[0] == top])
+            below = self._lower.importance(self._shown[:start], region)
+            importance = compose_importance(self._shown[start:], below, region)
+            if self._is_doubtful:
+                return self._compose(self.full_region, 0)
+            target = self.target.importance[slices(region)]
+            changed_regions.append(_bounds_of(importance != target, region))
+            target[...] = importance
+        region = enclosing(changed_regions)
+        return Change(region, with_importance=not is_empty(region))
+
     def _doubt(self) -> None:
         """Note that a layer was not as its stored composition had it."""
         self._is_doubtful = True
@@ -196,6 +217,24 @@ def _patches_by_layer(steps: Sequence[Step], view: int) -> dict[int, list[Patch]
         if patch.view == view:
             patches.setdefault(patch.layer, []).append(patch)
     return patches
+
+
+def _without_accents(shown: Sequence[ShownLayer]) -> list[tuple[object, object]]:
+    return [(layer, pixels) for layer, pixels, _ in shown]
+
+
+def _bounds_of(changed: Bools, region: Region) -> Region:
+    """Return the smallest region of changed pixels. changed: (rows, columns) of a region."""
+    rows, columns = (np.flatnonzero(changed.any(axis=k)) for k in (1, 0))
+    top, _, left, _ = region
+    if not len(rows):
+        return top, top, left, left
+    return (
+        top + int(rows[0]),
+        top + int(rows[-1]) + 1,
+        left + int(columns[0]),
+        left + int(columns[-1]) + 1,
+    )
 
 
 def _equal_count(first: Sequence[ShownLayer], second: Sequence[ShownLayer]) -> int:

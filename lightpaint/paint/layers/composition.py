@@ -41,7 +41,6 @@ MAX_LIGHT = 65504.0
 
 _Array = npt.NDArray[np.float32]
 
-
 #: Returns the albedo of a view, (h, w, 3) float32; None where there is none.
 AlbedoSource = Callable[[], Floats | None]
 
@@ -65,6 +64,11 @@ class GradientPixels:
         return self._values[1].bounds
 
     @property
+    def bands(self) -> list[Region]:
+        """Bands of the mask."""
+        return self._values[1].bands
+
+    @property
     def revision(self) -> int:
         """Revision of the mask."""
         return self._values[1].revision
@@ -84,6 +88,10 @@ class GradientPixels:
         gradient, mask, albedo = self._values
         surface = albedo() if gradient.is_incident else None
         return gradient_pixels(gradient, mask.part(region).importance, region, surface)
+
+    def coverage(self, region: Region) -> _Array:
+        """Return the coverage of a region."""
+        return self.part(region).importance
 
     def _totals(self) -> tuple[float, bool]:
         gradient, mask, _ = self._values
@@ -176,18 +184,32 @@ def compose_over(layers: Sequence[ShownLayer], below: Pixels, region: Region) ->
     return result
 
 
+def compose_importance(
+    layers: Sequence[ShownLayer], below: _Array | None, region: Region
+) -> _Array:
+    """Return the importance that `compose_over` gives in a region, for a fraction of its time.
+
+    Light and marks do not depend on importance. below: in that region, changed; None for zeros.
+    """
+    top, bottom, left, right = region
+    result = np.zeros((bottom - top, right - left), np.float32) if below is None else below
+    for layer, pixels, own_accent in layers:
+        if is_empty(area := shared(pixels.bounds, region)):
+            continue
+        inner = slices(relative(area, region))
+        result[inner] = _counts(layer, pixels.coverage(area), result[inner], own_accent)
+    return result
+
+
 def compose_layer(layer: Layer, pixels: Pixels, below: Pixels, accent: float = 1.0) -> Pixels:
     """Return the pixels below a layer with the layer applied."""
-    factor = np.float32(accent * layer.importance)
-    if layer.kind == "pixels":
-        return _replace(layer, pixels, below, factor)
     coverage = pixels.importance
-    covered = coverage >= np.float32(MIN_COVERAGE)
+    counts = _counts(layer, coverage, below.importance, accent)
+    if layer.kind == "pixels":
+        return _replace(layer, pixels, below, counts)
     if layer.kind == "weigh":
-        times = np.float32(layer.times**layer.strength)
-        base = np.where(below.importance > 0, below.importance, np.float32(1))
-        weighed = below.importance + coverage * (_weighed(base, times) - below.importance)
-        return below._replace(importance=np.where(covered, weighed, below.importance))
+        return below._replace(importance=counts)
+    covered = coverage >= np.float32(MIN_COVERAGE)
     if layer.kind == "paint":
         to, share = pixels.image, coverage * np.float32(layer.strength)
     else:
@@ -195,14 +217,26 @@ def compose_layer(layer: Layer, pixels: Pixels, below: Pixels, accent: float = 1
         to, share = adjusted(below.image, gain, (tint[0], tint[1], tint[2])), coverage
     light = below.image + share[..., None] * (to - below.image)
     light = np.minimum(np.maximum(light, np.float32(0)), np.float32(MAX_LIGHT))
-    grown = below.importance + coverage * (factor - below.importance)
-    counts = np.where(covered & (below.importance < factor), grown, below.importance)
     image = np.where(covered[..., None], light, below.image)
     return Pixels(image, counts, _unmarked(below.at_least, covered))
 
 
-def _replace(layer: Layer, pixels: Pixels, below: Pixels, factor: np.float32) -> Pixels:
-    """Return the pixels with those of a `pixels` layer, where it is painted."""
+def _counts(layer: Layer, coverage: _Array, below: _Array, accent: float) -> _Array:
+    """Return the importance with a layer applied. coverage: of the layer; below: without it."""
+    factor = np.float32(accent * layer.importance)
+    if layer.kind == "pixels":
+        return np.where(coverage > 0, coverage * factor, below)
+    covered = coverage >= np.float32(MIN_COVERAGE)
+    if layer.kind == "weigh":
+        times = np.float32(layer.times**layer.strength)
+        base = np.where(below > 0, below, np.float32(1))
+        return np.where(covered, below + coverage * (_weighed(base, times) - below), below)
+    grown = below + coverage * (factor - below)
+    return np.where(covered & (below < factor), grown, below)
+
+
+def _replace(layer: Layer, pixels: Pixels, below: Pixels, counts: _Array) -> Pixels:
+    """Return the pixels with those of a `pixels` layer, where it is painted. counts: of all."""
     painted = pixels.importance > 0
     image = pixels.image
     if layer.strength != 1:
@@ -212,7 +246,6 @@ def _replace(layer: Layer, pixels: Pixels, below: Pixels, factor: np.float32) ->
     if pixels.at_least is not None:
         own = pixels.at_least & painted[..., None]
         marks = own if marks is None else marks | own
-    counts = np.where(painted, pixels.importance * factor, below.importance)
     return Pixels(np.where(painted[..., None], image, below.image), counts, marks)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools
-from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
+from lightpaint.paint.store.canvas_pixels import Pixels, Region
 from lightpaint.paint.store.history_steps import Patch, replay
 
 #: Side of a tile, in pixels.
@@ -127,6 +127,15 @@ class LayerPixels:
         return self.summary.bounds
 
     @property
+    def bands(self) -> list[Region]:
+        """The bounds of its covered pixels in each row of tiles, in whole tiles."""
+        rows = sorted({row for row, _ in self._tiles})
+        return [
+            enclosing([self._tile_region(key) for key in self._tiles if key[0] == row])
+            for row in rows
+        ]
+
+    @property
     def mean_coverage(self) -> float:
         """Mean over the view of the coverage, or importance, up to 1."""
         return self.summary.mean_coverage
@@ -156,6 +165,16 @@ class LayerPixels:
                 marks = np.zeros(image.shape, bool) if marks is None else marks
                 marks[to] = tile.pixels.at_least[source]
         return Pixels(image, coverage, marks)
+
+    def coverage(self, region: Region) -> npt.NDArray[np.float32]:
+        """Return a copy of the coverage, or importance, of a region."""
+        top, bottom, left, right = region
+        coverage = np.zeros((bottom - top, right - left), np.float32)
+        for key in self._keys(region):
+            if (tile := self._tiles.get(key)) is not None:
+                to, source = self._areas(key, region)
+                coverage[to] = tile.pixels.importance[source]
+        return coverage
 
     def put(self, region: Region, pixels: Pixels) -> None:
         """Replace the pixels of a region."""
@@ -214,9 +233,13 @@ class LayerPixels:
         self, key: tuple[int, int], region: Region
     ) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
         """Return where a tile lies in a region, and the region in the tile."""
-        tile = self._tile_region(key)
-        area = shared(tile, region)
-        return slices(relative(area, region)), slices(relative(area, tile))
+        # Written out, since a picture has hundreds of tiles, and a stroke crosses many layers.
+        top, bottom, left, right = region
+        y, x = TILE_SIDE * key[0], TILE_SIDE * key[1]
+        first, last = max(y, top), min(y + TILE_SIDE, bottom)
+        start, end = max(x, left), min(x + TILE_SIDE, right)
+        in_region = slice(first - top, last - top), slice(start - left, end - left)
+        return in_region, (slice(first - y, last - y), slice(start - x, end - x))
 
 
 def enclosing(regions: Sequence[Region]) -> Region:

@@ -7,6 +7,7 @@ picture, when a stroke first comes there.
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from lightpaint.arrays import Floats
 from lightpaint.paint.layers.composition import ShownLayer, compose_over
@@ -30,13 +31,26 @@ class LowerLayers:
         """Return a copy of the composition of these layers, the lowest first, in a region."""
         if not layers:
             return Pixels.unpainted(np.array(self.current[slices(region)], np.float32))
+        self._follow(layers, region)
+        return self._pixels.part(region).copy()
+
+    def importance(
+        self, layers: Sequence[ShownLayer], region: Region
+    ) -> npt.NDArray[np.float32] | None:
+        """Return a copy of the importance of the same; None below the lowest layer."""
+        if not layers:
+            return None
+        self._follow(layers, region)
+        return self._pixels.importance[slices(region)].copy()
+
+    def _follow(self, layers: Sequence[ShownLayer], region: Region) -> None:
+        """Keep the composition of these layers, at least in a region."""
         revised = [(shown, shown.pixels.revision) for shown in layers]
         if revised != self._layers:
             height, width = self.current.shape[:2]
             self._layers, self._pixels = revised, Pixels.unpainted(self.current.copy())
             self._is_known = np.zeros((-(-height // TILE_SIDE), -(-width // TILE_SIDE)), bool)
         self._complete(layers, region)
-        return self._pixels.part(region).copy()
 
     def _complete(self, layers: Sequence[ShownLayer], region: Region) -> None:
         """Compose the cells of a region that are not known yet."""
