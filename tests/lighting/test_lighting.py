@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
+from lightpaint.batch.manifest.variations import shift, with_emission
 from lightpaint.errors import LightingError, UnknownLightError
+from lightpaint.lighting.answer.combination import dimmed
 
 SIZE = (6, 5)
 
@@ -110,3 +112,31 @@ def test_what_are_no_weights_is_refused_in_one_line(
     with pytest.raises(LightingError, match=words) as refusal:
         lp.combine(basis, invalid_weights)
     assert "\n" not in str(refusal.value)
+
+
+def test_no_claim_of_a_solve_outlives_its_emission(lighting: lp.Lighting):
+    """Dimmed, shifted, mixed or chosen: what the basis cannot tell stays, unless it is chosen."""
+    old = replace(
+        lighting["key"],
+        constraint="locked",
+        is_active=True,
+        standard_error=(0.1, 0.1, None),
+        interval=((0.0, 1.0), (0.0, 1.0), None),
+        reached=(True, True, False),
+        untold=True,
+    )
+    solved = replace(lighting, lights=(old, *lighting.lights[1:]))
+    whole = replace(old, reached=(True, True, True))
+    shifted = shift(replace(lighting, lights=(whole, *lighting.lights[1:])), 60.0)
+    results = {
+        "dimmed": dimmed(solved, 0.5)["key"],
+        "shifted": shifted["key"],
+        "mixed": with_emission(old, (0.5, 0.25, 0.1)),
+        "chosen": solved.with_emission("key", (0.5, 0.25, 0.1))["key"],
+    }
+    for name, light in results.items():
+        claims = light.constraint, light.is_active, light.standard_error, light.interval
+        assert claims == ("", False, None, None), name
+        assert light.emission == light.weight != old.emission, name
+        assert light.untold == (name != "chosen"), name
+        assert light.reached == (old.reached if name in ("dimmed", "mixed") else (True,) * 3), name

@@ -96,13 +96,4 @@ def with_emission(
     if keeps_luminance and (current := float(luminance(values))) > 0:
         values = values * float(luminance(np.array(light.emission))) / current
     rgb: RGB = (float(values[0]), float(values[1]), float(values[2]))
-    return replace(
-        light,
-        emission=rgb,
-        weight=rgb,
-        constraint="",
-        is_active=False,
-        standard_error=None,
-        interval=None,
-        untold=False,
-    )
+    return light.with_emission(rgb)

@@ -61,15 +61,7 @@ def dimmed(lighting: Lighting, factor: float) -> Lighting:
         if light.is_fixed:
             return light
         emission, weight = (as_rgb(factor * np.asarray(x)) for x in (light.emission, light.weight))
-        return replace(
-            light,
-            emission=emission,
-            weight=weight,
-            constraint="",
-            is_active=False,
-            standard_error=None,
-            interval=None,
-        )
+        return light.with_emission(emission, weight=weight)
 
     return replace(lighting, lights=tuple(map(setting, lighting.lights)), certificate=None)
 

@@ -1,6 +1,6 @@
 """A light of an answer: its emission, its constraint, and its error."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from lightpaint.arrays import RGB
 from lightpaint.errors import LightingError
@@ -71,6 +71,22 @@ class LightSetting:
                 f"light {self.name!r} has the unit_flux {list(self.unit_flux)}: need three numbers "
                 f"from 0 to {BRIGHTEST:g}"
             )
+
+    def with_emission(self, emission: RGB, *, weight: RGB | None = None) -> "LightSetting":
+        """Return the light at another emission, which no solve has found.
+
+        It has no constraint and no error bars. What the basis cannot tell of it stays: channels
+        that reach nothing, too few samples. weight: by default the same numbers.
+        """
+        return replace(
+            self,
+            emission=emission,
+            weight=emission if weight is None else weight,
+            constraint="",
+            is_active=False,
+            standard_error=None,
+            interval=None,
+        )
 
     @property
     def is_partly_reached(self) -> bool:

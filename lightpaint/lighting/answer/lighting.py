@@ -183,22 +183,9 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         Raises UnknownLightError if there is no such light.
         """
         old = self[name]
-        lights = tuple(
-            replace(
-                light,
-                emission=emission,
-                weight=emission,
-                constraint="",
-                is_active=False,
-                reached=ALL_REACHED,
-                standard_error=None,
-                interval=None,
-                untold=False,
-            )
-            if light is old
-            else light
-            for light in self.lights
-        )
+        # Somebody chose it, whatever the basis can tell of the light.
+        chosen = replace(old.with_emission(emission), reached=ALL_REACHED, untold=False)
+        lights = tuple(chosen if light is old else light for light in self.lights)
         return replace(self, lights=lights, certificate=None)
 
     def for_target(self, target: str) -> "Lighting":
