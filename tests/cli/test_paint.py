@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command import as_from_a_terminal, run_refused
+from command import as_from_a_terminal, run, run_refused
 from light_groups import interleaved, pictures
 from raw_message import RawMessage
 from server_key import key_of, offered
@@ -41,6 +41,7 @@ from lightpaint.paint.store.store import Store
 from lightpaint.paint.subject_factory import make_subject, make_subjects
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
 from lightpaint.version import __version__
+from lightpaint.viewer.bundle import BundleError
 
 
 @pytest.fixture
@@ -390,6 +391,22 @@ def test_a_host_is_told_what_it_means_and_a_closed_terminal_ends_it(
 def test_a_host_that_this_machine_has_not_is_one_line(work_folder: Path, host: str) -> None:
     refusal = run_refused(work_folder, "paint", "room.basis.exr", "--no-browser", "--host", host)
     assert "give an address of this machine, 0.0.0.0 for all of them" in refusal
+
+
+def test_a_page_that_cannot_be_bundled_is_one_line(
+    work_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse() -> None:
+        raise BundleError("paint/page/x.js: cannot bundle `export *`: write it as another export")
+
+    monkeypatch.setattr("lightpaint.paint.server.server.page_files", refuse)
+    completed = run(work_folder, "paint", "room.basis.exr", "--no-browser", "-q")
+    assert completed.returncode == 2
+    assert completed.stderr == (
+        "lightpaint paint: the page cannot be served: paint/page/x.js: cannot bundle `export *`: "
+        "write it as another export\n"
+    )
+    assert not (work_folder / "room.paint" / "painter.json").exists()
 
 
 def test_a_session_of_another_basis_is_refused(work_folder: Path, make_basis: Any) -> None:

@@ -20,6 +20,7 @@ from lightpaint.paint.server.served_session import ServedSession
 from lightpaint.paint.server.session_clients import Connections, picture_message
 from lightpaint.paint.store.store import Store
 from lightpaint.version import __version__
+from lightpaint.viewer.bundle import BundleError
 
 if TYPE_CHECKING:
     import uvicorn
@@ -189,7 +190,10 @@ class Server:
         from lightpaint.paint.server.http_connections import bounded_http_protocol
         from lightpaint.paint.server.shutdown import GracefulServer, PageSocket, stop_on_hangup
 
-        files = page_files()
+        try:
+            files = page_files()
+        except BundleError as error:
+            raise PaintError(f"the page cannot be served: {error}") from None
         self._guard.app, self._guard.public = (
             page_app(self._connections, files=files, is_program=self._guard.is_program),
             files,
