@@ -54,6 +54,7 @@ def comparison_image(
     solution: Solution,
     predicted: Floats,
     verified: Floats | None,
+    verified_spp: int | None = None,
     appearance: Appearance | None = None,
     looks: CleanLooks | None = None,
     missed: Residual | None = None,
@@ -63,7 +64,8 @@ def comparison_image(
     predicted, verified: (h, w, 3) linear, the latter possibly at a multiple of the size; smaller
     pictures are shown with larger pixels. Three pictures where `verified` is None. The residual is
     false-coloured luminance of prediction minus target, of raw data; pixels that do not count are
-    grey, dim and hatched. appearance: the result of `compare_appearance`, if
+    grey, dim and hatched. verified_spp: samples per pixel of `verified`, which its caption says,
+    since few show no small patches of light. appearance: the result of `compare_appearance`, if
     known. looks: shown instead of raw renders. missed: the result of `residual_of`. Raises
     SizeError if target and basis differ in size.
     """
@@ -81,10 +83,11 @@ def comparison_image(
     ]
     if verified is not None and looks.verified is not None:
         difference = _rms_difference(predicted, verified)
+        samples = "" if verified_spp is None else f", {verified_spp} samples per pixel"
         tiles.append(
             Tile(
                 f"verified{view_note}",
-                f"independent render, {difference:.2g} RMS off the prediction",
+                f"independent render{samples}, {difference:.2g} RMS off the prediction",
                 to_8_bit(transform.encode(looks.verified)),
             )
         )

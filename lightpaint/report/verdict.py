@@ -38,6 +38,9 @@ REASON_CLAUSES: dict[str, tuple[str, str]] = {
 #: Maximum number of names in one clause; of more it tells the number.
 MAX_NAMES = 3
 
+#: Samples per pixel of a render below which its denoised picture may lack small bright patches.
+FEW_SPP = 16
+
 #: The clause if no cause has a third of the error.
 NO_MAIN_CAUSE = "for several reasons, none of which accounts for a third of it"
 
@@ -236,6 +239,14 @@ def spoken_blindness(verification: Verification) -> str:
         *first_phrases, last = visible_names
         names = f"{', '.join(first_phrases)} and {last}" if first_phrases else last
     return f"The render would probably have missed an error of {100 * ERROR:.0f} % in {names}"
+
+
+def spoken_samples(spp: int | None) -> str:
+    """Return how many samples a verification took, and what few of them mean for its picture."""
+    if spp is None:
+        return ""
+    text = f" with {spp} sample{'s' if spp > 1 else ''} per pixel"
+    return f"{text}; so few may leave out small bright patches" if spp < FEW_SPP else text
 
 
 def agreement(verification: Verification | None) -> str:

@@ -1,6 +1,7 @@
 """report.html: whole in itself, safe against names, and loud when it must be."""
 
 import base64
+import html
 import io
 import re
 from dataclasses import replace
@@ -275,6 +276,23 @@ def test_a_page_of_usual_size_can_be_mailed(make_basis: Any):
     # Independent noise in every pixel is the worst there is to compress.
     assert len(page) < 7_000_000
     assert _looks(Page(page))["render"].shape == (360, 640, 3)
+
+
+@pytest.mark.parametrize(
+    ("spp", "words"),
+    [
+        (None, "An independent render of the relit scene."),
+        (2, "with 2 samples per pixel; so few may leave out small bright patches."),
+        (64, "relit scene with 64 samples per pixel."),
+    ],
+)
+def test_the_picture_of_a_render_says_how_many_samples_it_has(
+    make_basis: Any, spp: int | None, words: str
+):
+    result = _result(make_basis)
+    verification = replace(result["verification"], spp=spp)
+    page = report_page(**{**result, "verification": verification})
+    assert words in html.unescape(page)
 
 
 def test_another_size_is_refused(make_basis: Any):

@@ -213,6 +213,7 @@ def write_report(folder: Path, look: Look, *, command: str, is_shown: bool = Tru
             solution=look.solution,
             predicted=look.predicted.image,
             verified=verified,
+            verified_spp=None if look.verification is None else look.verification.spp,
             appearance=look.analysis.appearance,
             looks=looks,
             missed=missed,

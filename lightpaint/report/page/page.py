@@ -46,7 +46,7 @@ from lightpaint.report.page.mixer import mixer_assets, mixer_html, planes_for_pa
 from lightpaint.report.page.placement_section import placement_section
 from lightpaint.report.page.suggestion_section import suggestion_section
 from lightpaint.report.rig.hung_lights import HungLights
-from lightpaint.report.verdict import verdict
+from lightpaint.report.verdict import spoken_samples, verdict
 from lightpaint.report.visible_emitters import emitter_remarks
 from lightpaint.target.target import Target
 from lightpaint.viewer.bundle import compact_script, compact_styles, unindented
@@ -101,7 +101,15 @@ def report_page(
             transform=transform,
             missed=missed,
         ),
-        "wipe": partial(_wipe, target, solution, looks, raw, transform=transform),
+        "wipe": partial(
+            _wipe,
+            target,
+            solution,
+            looks,
+            raw,
+            transform=transform,
+            verified_spp=None if verification is None else verification.spp,
+        ),
         "missed": partial(
             missed_section,
             solution,
@@ -194,8 +202,12 @@ def _wipe(
     raw: CleanLooks,
     *,
     transform: ViewTransform,
+    verified_spp: int | None,
 ) -> str:
-    """Return the pictures to compare, in the order of the page's lists."""
+    """Return the pictures to compare, in the order of the page's lists.
+
+    verified_spp: samples per pixel of the render; None if unknown.
+    """
 
     def picture(name: str, alt: str, clean: Floats, raw: Floats) -> PagePicture:
         size = looks.predicted.shape[:2]
@@ -217,7 +229,7 @@ def _wipe(
         ),
     ]
     if looks.verified is not None and raw.verified is not None:
-        caption = "An independent render of the relit scene."
+        caption = f"An independent render of the relit scene{spoken_samples(verified_spp)}."
         pictures.append(picture("render", caption, looks.verified, raw.verified))
     return wipe(pictures)
 
