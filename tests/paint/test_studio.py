@@ -24,6 +24,7 @@ from lightpaint.basis.cache.denoised_planes import (
 from lightpaint.cli.commands.paint_command import command_for_paintings
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.paint import protocol, subject
+from lightpaint.paint.background_threads import SOLVE_DELAY_S
 from lightpaint.paint.protocol import Message
 from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.session import picture_table
@@ -112,6 +113,34 @@ def client(basis: lp.Basis, tmp_path: Path) -> Iterator[StudioClient]:
     studio_client = StudioClient(tmp_path, basis)
     yield studio_client
     studio_client.studio.close()
+
+
+def test_selections_start_no_solve(client: StudioClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither does undo of them, nor redo; undo of the stroke before them does."""
+    client.paint(1, 0.8)
+    client.exact()
+    solved = []
+    solution = SessionSnapshot.solution
+
+    def counted(snapshot: SessionSnapshot) -> Any:
+        solved.append(snapshot.version)
+        return solution(snapshot)
+
+    monkeypatch.setattr(SessionSnapshot, "solution", counted)
+    version = client.studio.session.version
+    mask = {"mask": np.full((2, 3), 255, np.uint8)}
+    client.studio.handle(protocol.Select((0, 2, 0, 3), "rectangle"), mask)
+    picture = client.studio.session.history.picture
+    selected, stroke = (client.studio.session.store.step_ids[k] for k in (-1, -2))
+    np.testing.assert_array_equal(picture(selected), picture(stroke))
+    for request in (protocol.Undo(), protocol.Redo(), protocol.GoToStep(stroke)):
+        [patch] = client.studio.handle(request, {})
+        assert patch.fields["version"] == client.studio.session.version == version
+    time.sleep(2 * SOLVE_DELAY_S)
+    assert not solved
+    client.studio.handle(protocol.Undo(), {})
+    client.exact()
+    assert solved == [version + 1]
 
 
 def test_what_is_exported_is_solved_alike(client: StudioClient, basis: lp.Basis, tmp_path: Path):

@@ -147,6 +147,12 @@ class History:
             self._live_answer.set_requests(SessionRequests.of(requests))
         return changes
 
+    def has_only_selected_since(self, position: int) -> bool:
+        """Return whether selections alone are between a position and the current one."""
+        first, last = sorted((position, self._store.position))
+        passed = self._store.steps[first:last]
+        return bool(passed) and all(step.kind == "selection" for step in passed)
+
     def picture(self, step_id: int) -> npt.NDArray[np.uint8]:
         """Return the small picture of the answer after a step, (h, w, 3); black if it has none."""
         answer = self._store.answer(step_id)

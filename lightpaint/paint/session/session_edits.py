@@ -158,6 +158,7 @@ class SessionEdits:
             self._update_answer()
         if patch is not None:
             self.history.append_selection(request.label, patch)
+            self.keep_answer()
 
     def drop_stroke(self) -> Changes:
         """Drop the open stroke; return its views and regions."""
@@ -172,6 +173,7 @@ class SessionEdits:
         if self.views.is_open:
             self.history.close_stroke("stroke")
             self._update_answer()
+        start = self._store.position
         match request:
             case protocol.Undo() | protocol.Redo():
                 changes = self.history.move(-1 if isinstance(request, protocol.Undo) else +1)
@@ -182,7 +184,8 @@ class SessionEdits:
             case protocol.ApplyPreset() | protocol.LookLike():
                 changes, label = open_request(self.views, request, self.references)
                 self.history.close_stroke(label)
-        self._update_answer()
+        if not self.history.has_only_selected_since(start):
+            self._update_answer()
         return changes
 
     def _clear(self, *, keep_requests: bool) -> Changes:

@@ -107,6 +107,7 @@ class RequestHandler:
         with self._access.lock:
             session, looks = self._access.session, self._access.looks
             view, self._mover.rig.step = 0, 1
+            version = session.version
             if isinstance(message, protocol.MoveLights | protocol.PointLight):
                 view = session.views[message.view].view  # before anything has moved
                 self._mover.rig.step = 1 if message.is_final else message.step
@@ -143,7 +144,9 @@ class RequestHandler:
                 case _:
                     messages = session.handle(message, arrays)
             messages = self._show_moves(messages, view=view)
-        self._exact_answers.notify()
+            has_changed = session.version != version
+        if has_changed:  # a selection changes no light
+            self._exact_answers.notify()
         return messages
 
     def _show_moves(

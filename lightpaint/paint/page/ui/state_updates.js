@@ -253,7 +253,9 @@ function weightsOf(message) {
  * exact answer found during an undo. @param {any} message @param {Ui} ui @returns {Partial<Ui>} */
 export function answerUpdate(message, ui) {
   if (message.version < ui.version) return {};
-  const changes = /** @type {Partial<Ui>} */ (weightsOf(message));
+  // Undo of a selection: it changes no light, and no exact answer follows.
+  const isSameAnswer = message.version === ui.version && !message.exact;
+  const changes = /** @type {Partial<Ui>} */ (isSameAnswer ? {} : weightsOf(message));
   changes.version = message.version ?? ui.version;
   for (const key of /** @type {const} */ ([
     'history',
@@ -269,7 +271,7 @@ export function answerUpdate(message, ui) {
   if (message.added_lights) changes.addedLights = message.added_lights;
   if (message.places !== undefined) changes.places = message.places ?? '';
   if (message.lights) Object.assign(changes, answerFields(message, ui));
-  else if (!message.exact) {
+  else if (!message.exact && !isSameAnswer) {
     changes.isLive = true;
     changes.isJudgementCurrent = false;
     // Earlier statements no longer hold once something is painted.
