@@ -9,7 +9,7 @@ READ = "aria-label|aria-valuetext|data-tip|description|label|placeholder|text|ti
 #: Literals that nobody reads: keys, types of elements and files, values of attributes.
 NOT_READ = re.compile(
     r"""(?:Enter|Escape|Arrow(?:Up|Down|Left|Right)|Home|End|Delete|Backspace|Tab|Space|Control|Shift
-    |Alt|AltGraph|Ctrl|Esc|INPUT|TEXTAREA|SELECT|HEAD|Files|[A-Z]|[A-Z]\d?
+    |Alt|AltGraph|Ctrl|Esc|Meta|INPUT|TEXTAREA|SELECT|HEAD|Files|[A-Z]|[A-Z]\d?
     |\(.*\)|[.\#\[].*|.*\bis-.*|[a-z]\[.*|[\w-]+\[.*|M\d.*|Bearer\ |.*sans-serif)""",
     re.VERBOSE,
 )

@@ -170,9 +170,6 @@ export const en = {
     close: 'Close',
   },
   dialogs: {
-    keyboardShortcuts: 'Keyboard shortcuts',
-    onATabletOneFingerPaints:
-      'On a tablet, one finger paints; two fingers pan and zoom. Pen pressure controls the flow.',
     painting: 'Painting',
     paintingExrForLightpaintSolve: 'painting.exr, for lightpaint solve',
     layers: 'Layers',
@@ -259,7 +256,6 @@ export const en = {
     toNothing: 'To nothing',
     itFadesOut: 'It fades out',
     to2ndColour: 'To 2nd colour',
-    itBecomesTheSecondColourX: 'It becomes the second colour (X swaps them)',
     shape: 'Shape',
     effect: 'Effect',
     brighter: 'Brighter',
@@ -267,6 +263,7 @@ export const en = {
     warmer: 'Warmer',
     mired: 'mired',
     end: 'End',
+    itBecomesTheSecondColour: 'It becomes the second colour. The key swaps the two.',
   },
   historyPanel: {
     beginning: 'Beginning',
@@ -566,7 +563,6 @@ export const en = {
   lookStrip: {
     looks: 'Looks',
     noLooksYet: 'No looks yet:',
-    s: '{MOD} S',
     savesPaintingAndAnswerAsA: 'saves painting and answer as a look.',
     allLooksPicturesAndLamps: 'All looks: pictures and lamps',
     paintingAndAnswerEqualThisLook: 'Painting and answer equal this look',
@@ -1012,6 +1008,25 @@ export const en = {
     drag: 'drag',
     wheel: 'wheel',
   },
+  shortcutsDialog: {
+    title: 'Keyboard shortcuts',
+    howToChange:
+      'Press a key in this list, then the new one; Delete leaves the command without a key.',
+    touch:
+      'On a tablet, one finger paints; two fingers pan and zoom. Pen pressure controls the flow.',
+    resetAll: 'Reset all keys',
+    allReset: 'All keys are those that the painter came with.',
+    isNow: '{name}: {keys}',
+    hasNoKey: '{name} has no key.',
+    isReserved: '{keys} cannot be set: the browser or the page needs it.',
+    none: 'none',
+    pressAKey: 'press a key',
+    changeKey: '{name}: {keys}. Change the key',
+    reset: 'Reset to {keys}',
+    conflict: '{keys} is: {name}',
+    take: 'Take it',
+    leave: 'Leave it',
+  },
   skipLinks: {
     skipLinks: 'Skip links',
     skipToThePictures: 'Skip to the pictures',
@@ -1147,13 +1162,12 @@ export const en = {
     stops: '{signed} stops',
     zoom: 'Zoom',
     fitTheWholePictureZoomWith:
-      'Fit the whole picture. Zoom with Ctrl and the wheel, or with + and −.',
+      'Fit the whole picture. Zoom with Ctrl and the wheel, or with {zoomIn} and {zoomOut}.',
     n100OneImagePixelOnOne: '100 %: one image pixel on one pixel of the page',
     fit: 'Fit',
     view: 'View',
     viewTransformHowTheDisplayShows: 'View transform: how the display shows linear light',
     denoise: 'Denoise',
-    denoiseThePicturesCTheSolve: 'Denoise the pictures (C). The solve does not change.',
     linear: 'Linear',
     filmic: 'Filmic',
     agx: 'AgX',
@@ -1164,6 +1178,7 @@ export const en = {
     twoLooks: 'Two looks',
     compare: 'Compare',
     whichTwoPicturesToCompare: 'Which two pictures to compare',
+    denoiseThePictures: 'Denoise the pictures. The solve does not change.',
   },
   viewTabs: {
     views: 'Views',

@@ -8,6 +8,7 @@ import { Icon } from './icons.js';
 import { overlayOf } from './display_state.js';
 import { updateDisplay } from './tools.js';
 import { fill, words } from '../language/language.js';
+import { shortcutsOf } from './key_bindings.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
@@ -62,7 +63,8 @@ export function AnalysisPanel({ ui, app }) {
     (text) => text !== ui.headline,
   );
   return html`<div class="truth" ref=${frame}>
-    <${Choice} label=${words.analysisPanel.overlay} value=${ui.display.overlay} choices=${OVERLAYS}
+    <${Choice} label=${words.analysisPanel.overlay} value=${ui.display.overlay} 
+      choices=${OVERLAYS.map((choice) => ({ ...choice, keys: shortcutsOf(ui, 'overlay') }))}
       change=${choose} />
     ${sentences.map((text) => html`<p key=${text}>${joinUnits(text)}</p>`)}
     <div class="row">

@@ -9,6 +9,7 @@ import { isAnswerHidden, saveLook } from './look_actions.js';
 import { toolHint } from './tools.js';
 import { exposureOf } from './display_state.js';
 import { fill, words } from '../language/language.js';
+import { shortcutsOf } from './key_bindings.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
@@ -69,7 +70,7 @@ export function AnswerLine({ ui, app }) {
     <${AdviceButton} ui=${ui} app=${app} />
     ${
       ui.ready &&
-      html`<${Button} label=${words.answerLine.saveLook} icon="plus" keys="Control+S"
+      html`<${Button} label=${words.answerLine.saveLook} icon="plus" keys=${shortcutsOf(ui, 'saveLook')}
       tip=${words.answerLine.savePaintingAndAnswerAsA}
       act=${() => saveLook(app)} />`
     }

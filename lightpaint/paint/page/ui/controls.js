@@ -93,10 +93,10 @@ export function Select({ label, value, choices, change, hidden, tip }) {
 }
 
 /** @param {{label: string, checked: boolean, change: (checked: boolean) => void, tip?: string,
- *   disabled?: boolean}} props */
-export function Checkbox({ label, checked, change, tip, disabled }) {
-  return html`<label class="check" data-tip=${tip}>
-    <input type="checkbox" checked=${checked} disabled=${disabled}
+ *   disabled?: boolean, keys?: string}} props */
+export function Checkbox({ label, checked, change, tip, disabled, keys }) {
+  return html`<label class="check" data-tip=${tip} data-keys=${keys}>
+    <input type="checkbox" checked=${checked} disabled=${disabled} aria-keyshortcuts=${keys}
       onChange=${(/** @type {any} */ event) => change(event.currentTarget.checked)} />
     <span>${label}</span>
   </label>`;

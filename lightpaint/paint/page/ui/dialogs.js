@@ -4,10 +4,9 @@ import { html, useState } from '../vendor/preact.js';
 import { ProgressBar } from './progress_bar.js';
 import { Button, Checkbox, Dialog } from './controls.js';
 import { percentText, progressText, relativePath } from './format.js';
-import { keyName } from './key_names.js';
 import { LooksDialog } from './looks_dialog.js';
 import { PresetsDialog } from './presets_dialog.js';
-import { SHORTCUTS } from './shortcuts.js';
+import { ShortcutsDialog } from './shortcuts_dialog.js';
 import { fill, words } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
@@ -16,27 +15,11 @@ import { fill, words } from '../language/language.js';
 /** @param {{ui: Ui, app: App}} props */
 export function Dialogs({ ui, app }) {
   const close = () => app.store.set({ dialog: null });
-  if (ui.dialog === 'keys') return html`<${ShortcutsDialog} close=${close} />`;
+  if (ui.dialog === 'keys') return html`<${ShortcutsDialog} ui=${ui} app=${app} close=${close} />`;
   if (ui.dialog === 'export') return html`<${ExportDialog} ui=${ui} app=${app} close=${close} />`;
   if (ui.dialog === 'looks') return html`<${LooksDialog} ui=${ui} app=${app} close=${close} />`;
   if (ui.dialog === 'presets') return html`<${PresetsDialog} ui=${ui} app=${app} close=${close} />`;
   return null;
-}
-
-/** @param {{close: () => void}} props */
-function ShortcutsDialog({ close }) {
-  return html`<${Dialog} title=${words.dialogs.keyboardShortcuts} close=${close} class="keys">
-    ${SHORTCUTS.map(
-      ({ title, keys }) => html`<section key=${title}><h3>${title}</h3><dl>
-      ${keys.map(
-        ({ symbols, description }) => html`<div key=${description}>
-        <dt>${symbols.map((key, k) => html`<kbd key=${k}>${keyName(key)}</kbd>`)}</dt>
-        <dd>${description}</dd></div>`,
-      )}
-    </dl></section>`,
-    )}
-    <p class="faint">${words.dialogs.onATabletOneFingerPaints}</p>
-  </${Dialog}>`;
 }
 
 /** @type {{key: import("../engine/messages.js").Export["outputs"][number], label: string,

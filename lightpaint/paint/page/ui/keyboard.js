@@ -1,27 +1,24 @@
 /** Keyboard input: finds the shortcut of a key, and keeps keys from the notebook around the painter. */
 
-import { SHORTCUTS } from './shortcuts.js';
+import { commandOf, hasModifier, pressedKeys } from './key_bindings.js';
+import { SHORTCUTS, escape } from './shortcuts.js';
 import { setFlow } from './tools.js';
 
 /** @typedef {import("./shortcuts.js").App} App */
+/** @typedef {import("./shortcuts.js").CommandKey} CommandKey */
 
-const SHORTCUTS_BY_KEY = new Map(
-  SHORTCUTS.flatMap(({ keys }) => keys)
-    .filter((shortcut) => shortcut.act)
-    .map((shortcut) => [shortcut.keys, shortcut]),
+const COMMAND_KEYS = new Map(
+  SHORTCUTS.flatMap(({ keys }) => keys).flatMap((key) =>
+    'command' in key ? [[key.command, key]] : [],
+  ),
 );
 
-/** Some keyboards have [ and ] behind AltGr, which is Ctrl and Alt on some systems.
- * @param {KeyboardEvent} event */
-const hasModifier = (event) =>
-  (event.ctrlKey || event.metaKey) && !event.getModifierState('AltGraph');
-
-/** @param {KeyboardEvent} event @returns {string} */
-function shortcutOf(event) {
-  const key = event.key.toLowerCase();
-  if (hasModifier(event)) return `mod+${event.shiftKey ? 'shift+' : ''}${key}`;
-  if (key === 'f' && event.shiftKey) return 'shift+f';
-  return key === '=' ? '+' : key;
+/** Return the command of a key, if it has one. @param {KeyboardEvent} event @param {App} app
+ * @returns {CommandKey | undefined} */
+function commandKeyOf(event, { store }) {
+  const commands = pressedKeys(event).map((keys) => commandOf(store.value, keys));
+  const command = commands.find((one) => one !== undefined);
+  return command && COMMAND_KEYS.get(command);
 }
 
 /** @param {KeyboardEvent} event @returns {boolean} whether it belongs to what is typed in */
@@ -41,9 +38,6 @@ function isAmongNumbers(event) {
     event.key.length === 1 && !hasModifier(event) && Boolean(element.closest?.('[data-numbers]'))
   );
 }
-
-/** Keys of undo and redo, which also work in a field without uncommitted text. */
-const HISTORY_KEYS = ['mod+z', 'mod+shift+z'];
 
 /** Return whether a field's text is committed. Then undo applies to the session, not to the text.
  * @param {KeyboardEvent} event in that field */
@@ -67,19 +61,31 @@ function commit(event) {
 export function handleKey(event, app) {
   const isAlt = event.altKey && !event.getModifierState('AltGraph');
   if (event.defaultPrevented || isAlt) return;
-  const name = shortcutOf(event);
+  const [name] = pressedKeys(event);
   const isInField = isTyping(event) || isAmongNumbers(event);
   // Suppress saving the page and selecting all, except in text fields.
   if (name === 'mod+s' || (name === 'mod+a' && !isInField)) event.preventDefault();
   if (app.store.value.dialog) return;
-  if (name === 'mod+s' && isInField) commit(event);
-  else if (isInField && !(HISTORY_KEYS.includes(name) && isCommitted(event))) return;
+  const shortcut = commandKeyOf(event, app);
+  if (isInField && !worksInField(event, shortcut)) return;
+  if (name === 'escape') return escape(app);
   const isDigit = /^[0-9]$/.test(event.key) && !event.ctrlKey && !event.metaKey;
-  const shortcut = SHORTCUTS_BY_KEY.get(name);
   if (isDigit) setFlow(app.store, (Number(event.key) || 10) / 10);
-  else if (shortcut && !(shortcut.isOnce && event.repeat)) shortcut.act?.(app);
+  else if (shortcut && !(shortcut.isOnce && event.repeat)) shortcut.act(app);
   else if (!shortcut) return;
-  if (name !== 'escape') event.preventDefault();
+  event.preventDefault();
+}
+
+/** Return whether a key that is pressed in a field is that of a command. Saving a look commits the
+ * text first; undo and redo work without uncommitted text.
+ * @param {KeyboardEvent} event @param {CommandKey | undefined} shortcut */
+function worksInField(event, shortcut) {
+  if (!shortcut || !hasModifier(event)) return false;
+  if (shortcut.command === 'saveLook') {
+    commit(event);
+    return true;
+  }
+  return ['undo', 'redo'].includes(shortcut.command) && isCommitted(event);
 }
 
 /** Keys that change a notebook's cells with Ctrl or ⌘: cut, paste, redo, run. */

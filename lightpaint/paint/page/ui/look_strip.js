@@ -7,7 +7,7 @@ import { nameInView } from '../engine/message_frames.js';
 import { html, useEffect, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
 import { Button, Select, Slider } from './controls.js';
 import { currentLook, loadLook } from './look_actions.js';
-import { MOD } from './key_names.js';
+import { keyText } from './key_bindings.js';
 import {
   looksElsewhere,
   mixName,
@@ -47,7 +47,7 @@ export function LookStrip({ ui, app }) {
     ${
       !looks.length &&
       ui.ready &&
-      html`<p class="faint">${words.lookStrip.noLooksYet} <kbd>${fill(words.lookStrip.s, { MOD })}</kbd> ${words.lookStrip.savesPaintingAndAnswerAsA}</p>`
+      html`<p class="faint">${words.lookStrip.noLooksYet} <kbd>${keyText(ui, 'saveLook')}</kbd> ${words.lookStrip.savesPaintingAndAnswerAsA}</p>`
     }
     ${
       looks.length > 1 &&

@@ -1,24 +1,26 @@
-/** What a person has chosen for the page itself, on this browser: its theme. */
+/** What a person has chosen for the page itself, on this browser: its theme and its keys. */
 
+import { validBindings } from './key_bindings.js';
 import { THEMES } from './theme.js';
-
-/** @typedef {import("./theme.js").Theme} Theme */
 
 /**
  * @typedef {object} Preferences
- * @property {Theme} theme
+ * @property {import("./theme.js").Theme} theme
+ * @property {import("./key_bindings.js").KeyBindings} keyBindings keys that differ from the default
  */
 
 /** @type {Preferences} */
 export const DEFAULT_PREFERENCES = {
   theme: 'system',
+  keyBindings: {},
 };
 
 /** @type {(keyof Preferences)[]} */
-export const PREFERENCE_FIELDS = ['theme'];
+export const PREFERENCE_FIELDS = ['theme', 'keyBindings'];
 
 /** Return what is valid of stored preferences. @param {Record<string, any>} stored
  * @returns {Partial<Preferences>} */
-export function validPreferences({ theme }) {
-  return THEMES.includes(theme) ? { theme } : {};
-}
+export const validPreferences = ({ theme, keyBindings }) => ({
+  ...(THEMES.includes(theme) ? { theme } : {}),
+  keyBindings: validBindings(keyBindings),
+});

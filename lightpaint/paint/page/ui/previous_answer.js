@@ -2,14 +2,12 @@
 
 import { html, useEffect } from '../vendor/preact.js';
 import { Icon } from './icons.js';
+import { keysOf, shortcutsOf } from './key_bindings.js';
 import { words } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./engine_interface.js").RGB} RGB */
 /** @typedef {import("./shortcuts.js").App} App */
-
-/** The key that shows it. */
-export const PREVIOUS_KEY = 'q';
 
 /** @param {App} app */
 export async function showPrevious({ store, session }) {
@@ -38,7 +36,9 @@ export function PreviousButton({ ui, app }) {
     // In the capture phase, since the painter stops its key events from leaving it.
     const options = { signal: controller.signal, capture: true };
     const release = (/** @type {KeyboardEvent} */ event) =>
-      [PREVIOUS_KEY, ' ', 'enter'].includes(event.key.toLowerCase()) && hide();
+      [keysOf(app.store.value, 'previous').at(-1), ' ', 'enter'].includes(
+        event.key.toLowerCase(),
+      ) && hide();
     window.addEventListener('keyup', release, options);
     // A key or a finger that is lifted in another window sends no event here.
     const leave = (/** @type {Event} */ event) => event.target === window && hide();
@@ -52,8 +52,9 @@ export function PreviousButton({ ui, app }) {
     event.preventDefault();
     void showPrevious(app);
   };
+  const keys = shortcutsOf(ui, 'previous');
   return html`<button type="button" class=${`button is-icon previous ${ui.isPreviousHeld ? 'is-on' : ''}`}
     disabled=${!ui.history.undo.length} aria-label=${words.previousAnswer.holdTheAnswerBeforeTheLast}
-    aria-keyshortcuts="Q" data-tip=${words.previousAnswer.holdTheAnswerBeforeTheLast} data-keys="Q"
+    aria-keyshortcuts=${keys} data-tip=${words.previousAnswer.holdTheAnswerBeforeTheLast} data-keys=${keys}
     onPointerDown=${() => showPrevious(app)} onKeyDown=${press}><${Icon} name="previous" /></button>`;
 }

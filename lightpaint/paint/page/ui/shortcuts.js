@@ -1,7 +1,7 @@
 /** The table of keyboard shortcuts, for the keyboard and for the dialog that lists them. */
 
 import { saveLook } from './look_actions.js';
-import { PREVIOUS_KEY, showPrevious } from './previous_answer.js';
+import { showPrevious } from './previous_answer.js';
 import { chooseSelect, updateSelection } from './selection/selection_settings.js';
 import { words } from '../language/language.js';
 import { showNextView } from './view_tabs.js';
@@ -22,9 +22,11 @@ import {
 /** @typedef {import("./session_controller.js").SessionController} SessionController */
 /** @typedef {import("./ui_state.js").UiStore} UiStore */
 /** @typedef {{store: UiStore, session: SessionController, engine: Engine}} App */
-/** isOnce: ignores repeats of a held key.
- * @typedef {{keys: string, symbols: string[], description: string, act?: (app: App) => void,
- *   isOnce?: boolean}} Key */
+/** A command with its key, or something that keys and pointer do and nobody can change.
+ * isOnce: ignores repeats of a held key.
+ * @typedef {{command: import("./key_bindings.js").Command, description: string,
+ *   act: (app: App) => void, isOnce?: boolean}} CommandKey
+ * @typedef {{symbols: string[], description: string}} FixedKey */
 
 const zoomBy =
   (/** @type {number} */ factor) =>
@@ -46,14 +48,31 @@ const changeExposure =
   (/** @type {App} */ { store }) =>
     updateDisplay(store, { stops: Math.min(10, Math.max(-10, store.value.display.stops + step)) });
 
-/** All shortcuts, by their effect. `keys`: the browser's names, after Shift and Mod (Ctrl or ⌘). */
-/** @type {{title: string, keys: Key[]}[]} */
+/** What Escape does: it ends what has begun last. @param {App} app */
+export function escape({ engine, store }) {
+  const { draft } = store.value.selection;
+  if (draft) return updateSelection(store, { draft: null });
+  const { maskLayer, panel, clickAction, isLassoing } = store.value;
+  const panelChange = engine.cancel() ? {} : { panel: null };
+  const isOther = maskLayer !== null || panel || clickAction || isLassoing;
+  const selectionChange = isOther || !('panel' in panelChange) ? {} : { selectedLights: [] };
+  if (maskLayer !== null) engine.paintMask(null);
+  store.set({
+    dragAdjustment: null,
+    hoveredLight: null,
+    clickAction: null,
+    isLassoing: false,
+    ...panelChange,
+    ...selectionChange,
+  });
+}
+
+/** All shortcuts, by their effect. @type {{title: string, keys: (CommandKey | FixedKey)[]}[]} */
 export const SHORTCUTS = [
   {
     title: words.shortcuts.tools,
-    keys: TOOLS.map(({ tool, keys, label }) => ({
-      keys: keys.toLowerCase(),
-      symbols: [keys],
+    keys: TOOLS.map(({ tool, label }) => ({
+      command: tool,
       description: label,
       act: ({ store }) => (tool === 'select' ? chooseSelect(store) : chooseTool(store, tool)),
     })),
@@ -62,111 +81,79 @@ export const SHORTCUTS = [
     title: words.shortcuts.general,
     keys: [
       {
-        keys: 'mod+s',
-        symbols: ['Ctrl', 'S'],
+        command: 'saveLook',
         description: words.shortcuts.saveLook,
         act: (app) => void saveLook(app),
         isOnce: true,
       },
       {
-        keys: 'p',
-        symbols: ['P'],
+        command: 'panels',
         description: words.shortcuts.showOrHidePanels,
         act: ({ store }) => togglePanels(store),
       },
       {
-        keys: 'd',
-        symbols: ['D'],
+        command: 'lights',
         description: words.shortcuts.markTheLightsAndMove,
         act: ({ store, session }) => {
           if (store.value.state?.can_render) session.toggleLamps();
         },
       },
       {
-        keys: '?',
-        symbols: ['?'],
+        command: 'shortcuts',
         description: words.shortcuts.showTheseShortcuts,
         act: ({ store }) => store.set({ dialog: 'keys' }),
       },
-      { keys: '', symbols: ['Tab'], description: words.shortcuts.nextControl },
+      { symbols: ['Tab'], description: words.shortcuts.nextControl },
       {
-        keys: '',
         symbols: ['← ↑ ↓ →'],
         description: words.shortcuts.moveTheBrushOnThe,
       },
-      { keys: '', symbols: ['Shift', 'Enter'], description: words.shortcuts.thereALineFromThe },
+      { symbols: ['Shift', 'Enter'], description: words.shortcuts.thereALineFromThe },
     ],
   },
   {
     title: words.shortcuts.brush,
     keys: [
       {
-        keys: '[',
-        symbols: ['['],
+        command: 'smaller',
         description: words.shortcuts.smaller,
         act: ({ store }) => resizeBrush(store, -1),
       },
       {
-        keys: ']',
-        symbols: [']'],
+        command: 'larger',
         description: words.shortcuts.larger,
         act: ({ store }) => resizeBrush(store, 1),
       },
       {
-        keys: '{',
-        symbols: ['Shift', '['],
+        command: 'softer',
         description: words.shortcuts.softer,
         act: ({ store }) => hardenBrush(store, -1),
       },
       {
-        keys: '}',
-        symbols: ['Shift', ']'],
+        command: 'harder',
         description: words.shortcuts.harder,
         act: ({ store }) => hardenBrush(store, 1),
       },
-      { keys: 'digit', symbols: ['1', '…', '9', '0'], description: words.shortcuts.flow10To100 },
+      { symbols: ['1', '…', '9', '0'], description: words.shortcuts.flow10To100 },
       {
-        keys: 'x',
-        symbols: ['X'],
+        command: 'swap',
         description: words.shortcuts.swapColours,
         act: ({ store }) => swapColours(store),
       },
       {
-        keys: '',
         symbols: ['Alt', words.shortcuts.click],
         description: words.shortcuts.pickLightFromThePicture,
       },
       {
-        keys: '',
         symbols: ['Shift', words.shortcuts.click],
         description: words.shortcuts.lineFromTheLastStroke,
       },
       {
-        keys: 'escape',
         symbols: ['Esc'],
         description: words.shortcuts.cancelTheStroke,
-        act: ({ engine, store }) => {
-          const { draft } = store.value.selection;
-          if (draft) return updateSelection(store, { draft: null });
-          const { maskLayer, panel, clickAction, isLassoing } = store.value;
-          const panelChange = engine.cancel() ? {} : { panel: null };
-          const isOther = maskLayer !== null || panel || clickAction || isLassoing;
-          const selectionChange =
-            isOther || !('panel' in panelChange) ? {} : { selectedLights: [] };
-          if (maskLayer !== null) engine.paintMask(null);
-          store.set({
-            dragAdjustment: null,
-            hoveredLight: null,
-            clickAction: null,
-            isLassoing: false,
-            ...panelChange,
-            ...selectionChange,
-          });
-        },
       },
       {
-        keys: 'mod+z',
-        symbols: ['Ctrl', 'Z'],
+        command: 'undo',
         description: words.shortcuts.undo,
         // Undo first cancels the current stroke, which is the last action.
         act: ({ engine, session, store }) => {
@@ -175,8 +162,7 @@ export const SHORTCUTS = [
         },
       },
       {
-        keys: 'mod+shift+z',
-        symbols: ['Ctrl', 'Shift', 'Z'],
+        command: 'redo',
         description: words.shortcuts.redo,
         act: ({ session }) => void session.send('redo'),
       },
@@ -186,35 +172,29 @@ export const SHORTCUTS = [
     title: words.shortcuts.selection,
     keys: [
       {
-        keys: 'mod+a',
-        symbols: ['Ctrl', 'A'],
+        command: 'selectAll',
         description: words.shortcuts.selectAll,
         act: ({ engine }) => void engine.selections.select({ kind: 'all' }),
       },
       {
-        keys: 'mod+d',
-        symbols: ['Ctrl', 'D'],
+        command: 'selectNone',
         description: words.shortcuts.selectNothing,
         act: ({ engine }) => engine.selections.change({ kind: 'none' }),
       },
       {
-        keys: 'mod+shift+i',
-        symbols: ['Ctrl', 'Shift', 'I'],
+        command: 'invert',
         description: words.shortcuts.invertTheSelection,
         act: ({ engine }) => engine.selections.change({ kind: 'invert' }),
       },
       {
-        keys: '',
         symbols: ['Shift', words.shortcuts.drag],
         description: words.shortcuts.addToTheSelection,
       },
       {
-        keys: '',
         symbols: ['Alt', words.shortcuts.drag],
         description: words.shortcuts.subtractFromIt,
       },
       {
-        keys: '',
         symbols: ['Shift', 'Alt', words.shortcuts.drag],
         description: words.shortcuts.intersectWithIt,
       },
@@ -223,38 +203,33 @@ export const SHORTCUTS = [
   {
     title: words.shortcuts.pictures,
     keys: [
-      { keys: '', symbols: ['Space', words.shortcuts.drag], description: words.shortcuts.pan },
-      { keys: '', symbols: ['Ctrl', words.shortcuts.wheel], description: words.shortcuts.zoom },
-      { keys: '+', symbols: ['+'], description: words.shortcuts.zoomIn, act: zoomBy(1.25) },
-      { keys: '-', symbols: ['−'], description: words.shortcuts.zoomOut, act: zoomBy(0.8) },
+      { symbols: ['Space', words.shortcuts.drag], description: words.shortcuts.pan },
+      { symbols: ['Ctrl', words.shortcuts.wheel], description: words.shortcuts.zoom },
+      { command: 'zoomIn', description: words.shortcuts.zoomIn, act: zoomBy(1.25) },
+      { command: 'zoomOut', description: words.shortcuts.zoomOut, act: zoomBy(0.8) },
       {
-        keys: 'f',
-        symbols: ['F'],
+        command: 'fit',
         description: words.shortcuts.fitToWindow,
         act: ({ store }) => updateDisplay(store, { zoom: 1, pan: [0, 0] }),
       },
       {
-        keys: 'shift+f',
-        symbols: ['Shift', 'F'],
+        command: 'pixels',
         description: words.shortcuts.n100,
         act: showPixels,
       },
       {
-        keys: 'v',
-        symbols: ['V'],
+        command: 'layout',
         description: words.shortcuts.sideBySideWipeBlink,
         act: ({ store }) =>
           updateDisplay(store, { layout: nextValue(LAYOUTS, store.value.display.layout) }),
       },
       {
-        keys: 'n',
-        symbols: ['N'],
+        command: 'nextView',
         description: words.shortcuts.nextViewIfThereAre,
         act: showNextView,
       },
       {
-        keys: 'k',
-        symbols: ['K'],
+        command: 'blink',
         description: words.shortcuts.switchThePictureInBlink,
         act: ({ store }) =>
           updateDisplay(store, {
@@ -263,33 +238,28 @@ export const SHORTCUTS = [
           }),
       },
       {
-        keys: PREVIOUS_KEY,
-        symbols: ['Q'],
+        command: 'previous',
         description: words.shortcuts.holdTheAnswerBeforeThe,
         act: (app) => void showPrevious(app),
         isOnce: true,
       },
       {
-        keys: ',',
-        symbols: [','],
+        command: 'lowerExposure',
         description: words.shortcuts.lowerDisplayExposure,
         act: changeExposure(-0.5),
       },
       {
-        keys: '.',
-        symbols: ['.'],
+        command: 'raiseExposure',
         description: words.shortcuts.raiseDisplayExposure,
         act: changeExposure(0.5),
       },
       {
-        keys: 'c',
-        symbols: ['C'],
+        command: 'denoise',
         description: words.shortcuts.denoiseOnOrOff,
         act: ({ store }) => updateDisplay(store, { clean: !store.value.display.clean }),
       },
       {
-        keys: 'o',
-        symbols: ['O'],
+        command: 'overlay',
         description: words.shortcuts.nextOverlay,
         act: ({ store }) =>
           updateDisplay(store, { overlay: nextValue(OVERLAYS, store.value.display.overlay) }),

@@ -19,6 +19,7 @@ import {
   TOOLS,
 } from './tools.js';
 import { fill, words } from '../language/language.js';
+import { shortcutsOf } from './key_bindings.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
@@ -75,8 +76,8 @@ export function ToolBar({ ui, app }) {
   };
   return html`<nav class="tools" aria-label=${words.toolbar.tools}>
     ${TOOLS.map(
-      ({ tool, icon, keys, tip }) => html`<${Button} key=${tool} icon=${icon} tip=${tip}
-      keys=${keys} pressed=${ui.tool === tool}
+      ({ tool, icon, tip }) => html`<${Button} key=${tool} icon=${icon} tip=${tip}
+      keys=${shortcutsOf(ui, tool)} pressed=${ui.tool === tool}
       act=${() => (tool === 'select' ? chooseSelect(store) : chooseTool(store, tool))}
       disabled=${tool === 'fill' && !ui.state?.objects?.length && !ui.selection.current} />`,
     )}
@@ -86,11 +87,11 @@ export function ToolBar({ ui, app }) {
       act=${() => store.set({ isReferenceOpen: !ui.isReferenceOpen, clickAction: null })} />
     ${
       ui.state?.can_render &&
-      html`<${Button} icon="lamp" tip=${words.toolbar.lightsInThePictureMarkAnd} keys="D"
+      html`<${Button} icon="lamp" tip=${words.toolbar.lightsInThePictureMarkAnd} keys=${shortcutsOf(ui, 'lights')}
       pressed=${ui.areLampsMarked} act=${() => app.session.toggleLamps()} />`
     }
-    <button type="button" class="two-colours" style=${style} data-tip=${words.toolbar.swapColours} data-keys="X"
-      aria-keyshortcuts="X" aria-label=${fill(words.toolbar.swapColoursTheCurrentOneIs, { colour: toHex(ui.colour), signed: signedText(ui.stops) })}
+    <button type="button" class="two-colours" style=${style} data-tip=${words.toolbar.swapColours} data-keys=${shortcutsOf(ui, 'swap')}
+      aria-keyshortcuts=${shortcutsOf(ui, 'swap')} aria-label=${fill(words.toolbar.swapColoursTheCurrentOneIs, { colour: toHex(ui.colour), signed: signedText(ui.stops) })}
       onClick=${() => swapColours(store)}><i></i><i></i></button>
   </nav>`;
 }
@@ -133,13 +134,13 @@ export function ToolOptions({ ui, app }) {
     ${
       (isStrokeTool || (ui.tool === 'adjust' && ui.adjustedArea === 'spot')) &&
       html`<${Slider} label=${words.toolbar.size}
-      value=${ui.size} min=${MIN_BRUSH_SIZE} curve=${RATIO_CURVE} max=${MAX_BRUSH_SIZE} unit=${words.toolbar.px} keys="[ ]"
+      value=${ui.size} min=${MIN_BRUSH_SIZE} curve=${RATIO_CURVE} max=${MAX_BRUSH_SIZE} unit=${words.toolbar.px} keys=${shortcutsOf(ui, 'smaller', 'larger')}
       tip=${words.toolbar.size} change=${(/** @type {number} */ size) => store.set({ size })} />`
     }
     ${
       isStrokeTool &&
       html`<${Slider} label=${words.toolbar.hardness} value=${100 * ui.hardness} min=${0} max=${100} unit="%"
-        keys="Shift [ ]" tip=${words.toolbar.hardnessOfTheEdge}
+        keys=${shortcutsOf(ui, 'softer', 'harder')} tip=${words.toolbar.hardnessOfTheEdge}
         change=${(/** @type {number} */ percent) => store.set({ hardness: percent / 100 })} />`
     }
     ${

@@ -8,69 +8,60 @@ import { words } from '../language/language.js';
 /** @typedef {import("./engine_interface.js").RGB} RGB */
 /** @typedef {import("./ui_state.js").UiStore} UiStore */
 
-/** @type {{tool: Tool, label: string, icon: string, keys: string, tip: string}[]} */
+/** @type {{tool: Tool, label: string, icon: string, tip: string}[]} */
 export const TOOLS = [
   {
     tool: 'brush',
     label: words.tools.brush,
     icon: 'brush',
-    keys: 'B',
     tip: words.tools.brushPaintLight,
   },
   {
     tool: 'eraser',
     label: words.tools.eraser,
     icon: 'eraser',
-    keys: 'E',
     tip: words.tools.eraserRemovePaintUnpaintedParts,
   },
   {
     tool: 'weight',
     label: words.tools.importance,
     icon: 'weight',
-    keys: 'W',
     tip: words.tools.importanceWhereTheAnswerMust,
   },
   {
     tool: 'pick',
     label: words.tools.picker,
     icon: 'pick',
-    keys: 'I',
     tip: words.tools.pickerTakePaintFromAPicture,
   },
   {
     tool: 'fill',
     label: words.tools.fill,
     icon: 'fill',
-    keys: 'G',
     tip: words.tools.fillPaintAWholeObject,
   },
   {
     tool: 'line',
     label: words.tools.line,
     icon: 'line',
-    keys: 'L',
     tip: words.tools.linePaintAStraightLine,
   },
   {
     tool: 'adjust',
     label: words.tools.adjust,
     icon: 'adjust',
-    keys: 'A',
     tip: words.tools.adjustDragUpForBrighterRight,
   },
   {
     tool: 'gradient',
     label: words.tools.gradient,
     icon: 'gradient',
-    keys: 'R',
     tip: words.tools.gradientLightThatFallsOffFrom,
   },
   {
     tool: 'select',
     label: words.tools.select,
     icon: 'marquee',
-    keys: 'M',
     tip: words.tools.selectPaintAndAdjustOnlyThere,
   },
 ];

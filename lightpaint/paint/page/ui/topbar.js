@@ -7,15 +7,27 @@ import { PreviousButton } from './previous_answer.js';
 import { showPixels } from './shortcuts.js';
 import { togglePanels, updateDisplay } from './tools.js';
 import { fill, words } from '../language/language.js';
+import { keyText, shortcutsOf } from './key_bindings.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
 
 const LAYOUTS = [
-  { value: 'side', label: words.topbar.sideBySide, icon: 'side', keys: 'V' },
-  { value: 'wipe', label: words.topbar.wipe, icon: 'wipe', keys: 'V' },
-  { value: 'blink', label: words.topbar.blink, icon: 'blink', keys: 'V' },
+  { value: 'side', label: words.topbar.sideBySide, icon: 'side' },
+  { value: 'wipe', label: words.topbar.wipe, icon: 'wipe' },
+  { value: 'blink', label: words.topbar.blink, icon: 'blink' },
 ];
+
+/** The layouts, with their keys. @param {Ui} ui */
+const layoutsOf = (ui) =>
+  LAYOUTS.map((choice) => ({
+    ...choice,
+    keys: shortcutsOf(
+      ui,
+      'layout',
+      ...(choice.value === 'blink' ? /** @type {const} */ (['blink']) : []),
+    ),
+  }));
 
 /** @param {{ui: Ui, app: App}} props */
 export function TopBar({ ui, app }) {
@@ -27,18 +39,18 @@ export function TopBar({ ui, app }) {
   return html`<header class="top">
     <div class="title"><${TruncatedText} text=${title} maxLength=${16} tag="strong" /></div>
     <div class="group" role="group" aria-label=${words.topbar.history}>
-      <${Button} icon="undo" tip=${undo ? fill(words.topbar.undo, { undo }) : words.topbar.undo2} keys="Control+Z"
+      <${Button} icon="undo" tip=${undo ? fill(words.topbar.undo, { undo }) : words.topbar.undo2} keys=${shortcutsOf(ui, 'undo')}
         disabled=${!undo} act=${() => session.send('undo')} />
-      <${Button} icon="redo" tip=${redo ? fill(words.topbar.redo, { redo }) : words.topbar.redo2} keys="Control+Shift+Z"
+      <${Button} icon="redo" tip=${redo ? fill(words.topbar.redo, { redo }) : words.topbar.redo2} keys=${shortcutsOf(ui, 'redo')}
         disabled=${!redo} act=${() => session.send('redo')} />
       <${PreviousButton} ui=${ui} app=${app} />
     </div>
     <div class="spring"></div>
-    <${Choice} label=${words.topbar.layout} icons value=${display.layout} choices=${LAYOUTS}
+    <${Choice} label=${words.topbar.layout} icons value=${display.layout} choices=${layoutsOf(ui)}
       change=${(/** @type {any} */ layout) => updateDisplay(store, { layout })} />
     <${ComparisonChoice} ui=${ui} app=${app} />
     <${Slider} label=${words.topbar.exposure} value=${display.stops} min=${-6} max=${6} step=${0.1} digits=${1}
-      unit=${words.topbar.st} resetValue=${0} keys=", ." tip=${words.topbar.displayExposureTheLightDoesNot}
+      unit=${words.topbar.st} resetValue=${0} keys=${shortcutsOf(ui, 'lowerExposure', 'raiseExposure')} tip=${words.topbar.displayExposureTheLightDoesNot}
       text=${fill(words.topbar.stops, { signed: signedText(display.stops) })}
       change=${(/** @type {number} */ stops) => updateDisplay(store, { stops })} />
     <${ViewChoice} ui=${ui} app=${app} />
@@ -49,8 +61,8 @@ export function TopBar({ ui, app }) {
         act=${() => store.set({ panel: ui.panel ? null : 'settings' })} />
       <${Button} icon="export" tip=${words.topbar.export}
         act=${() => store.set({ dialog: 'export' })} />
-      <${Button} icon="keys" tip=${words.topbar.keyboardShortcuts} keys="?" act=${() => store.set({ dialog: 'keys' })} />
-      <${Button} icon="panel" tip=${words.topbar.showOrHideThePanels} keys="P" pressed=${ui.side || ui.panel !== null}
+      <${Button} icon="keys" tip=${words.topbar.keyboardShortcuts} keys=${shortcutsOf(ui, 'shortcuts')} act=${() => store.set({ dialog: 'keys' })} />
+      <${Button} icon="panel" tip=${words.topbar.showOrHideThePanels} keys=${shortcutsOf(ui, 'panels')} pressed=${ui.side || ui.panel !== null}
         act=${() => togglePanels(store)} />
     </div>
   </header>`;
@@ -58,14 +70,15 @@ export function TopBar({ ui, app }) {
 
 /** The size of a picture pixel on the page, or *fit*.
  * @param {{ui: Ui, app: App}} props */
-function Zoom({ ui: { display, fit }, app }) {
+function Zoom({ ui, app }) {
+  const { display, fit } = ui;
   const scale = (fit ?? 1) * display.zoom;
   const isFitted = display.zoom === 1 && display.pan.every((x) => x === 0);
   return html`<div class="group" role="group" aria-label=${words.topbar.zoom}>
-    <${Button} label=${isFitted ? words.topbar.fit : `${Math.round(100 * scale)} %`} class="zoom" keys="F"
-      tip=${words.topbar.fitTheWholePictureZoomWith}
+    <${Button} label=${isFitted ? words.topbar.fit : `${Math.round(100 * scale)} %`} class="zoom" keys=${shortcutsOf(ui, 'fit')}
+      tip=${fill(words.topbar.fitTheWholePictureZoomWith, { zoomIn: keyText(ui, 'zoomIn'), zoomOut: keyText(ui, 'zoomOut') })}
       act=${() => updateDisplay(app.store, { zoom: 1, pan: [0, 0] })} />
-    <${Button} label="1:1" class="zoom pixels" keys="Shift+F" pressed=${fit !== null && Math.abs(scale - 1) < 1e-3}
+    <${Button} label="1:1" class="zoom pixels" keys=${shortcutsOf(ui, 'pixels')} pressed=${fit !== null && Math.abs(scale - 1) < 1e-3}
       tip=${words.topbar.n100OneImagePixelOnOne} act=${() => showPixels(app)} />
   </div>`;
 }
@@ -79,7 +92,8 @@ function ViewChoice({ ui, app }) {
     tip=${words.topbar.viewTransformHowTheDisplayShows}
     choices=${names.map((/** @type {string} */ name) => ({ value: name, label: transformLabel(name) }))}
     change=${(/** @type {string} */ transform) => updateDisplay(app.store, { transform })} />
-  <${Checkbox} label=${words.topbar.denoise} checked=${display.clean} tip=${words.topbar.denoiseThePicturesCTheSolve}
+  <${Checkbox} label=${words.topbar.denoise} checked=${display.clean} tip=${words.topbar.denoiseThePictures}
+    keys=${shortcutsOf(ui, 'denoise')}
     change=${(/** @type {boolean} */ clean) => updateDisplay(app.store, { clean })} />`;
 }
 

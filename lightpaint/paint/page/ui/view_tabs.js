@@ -6,6 +6,7 @@ import { numberText } from './format.js';
 import { viewUpdate } from './state_updates.js';
 import { Thumbnail } from './thumbnail.js';
 import { fill, words } from '../language/language.js';
+import { shortcutsOf } from './key_bindings.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
@@ -35,7 +36,7 @@ export function ViewTabs({ ui, app }) {
         : ui.closeness && words.viewTabs.notPainted;
       return html`<button type="button" class=${`view-tab ${k === ui.view ? 'is-on' : ''}`}
         key=${name} aria-pressed=${String(k === ui.view)} data-tip=${fill(words.viewTabs.showAndPaint, { name })}
-        data-keys="N" onClick=${() => showView(app, k)}>
+        data-keys=${shortcutsOf(ui, 'nextView')} onClick=${() => showView(app, k)}>
         <${Thumbnail} name=${picture} generation=${ui.resources[picture]} app=${app} />
         <span class="view-name">${name}</span>
         <span class="faint">${note}</span>

@@ -5,6 +5,7 @@ import { html } from '../../vendor/preact.js';
 import { Choice, NumberField } from '../controls.js';
 import { paintOf } from '../display_state.js';
 import { words } from '../../language/language.js';
+import { shortcutsOf } from '../key_bindings.js';
 
 /** @typedef {import("../ui_state.js").Ui} Ui */
 /** @typedef {import("../shortcuts.js").App} App */
@@ -36,12 +37,14 @@ const EFFECTS = [
   },
 ];
 
-const ENDS = [
+/** @param {Ui} ui */
+const endsOf = (ui) => [
   { value: false, label: words.gradientOptions.toNothing, tip: words.gradientOptions.itFadesOut },
   {
     value: true,
     label: words.gradientOptions.to2ndColour,
-    tip: words.gradientOptions.itBecomesTheSecondColourX,
+    tip: words.gradientOptions.itBecomesTheSecondColour,
+    keys: shortcutsOf(ui, 'swap'),
   },
 ];
 
@@ -61,7 +64,7 @@ export function GradientOptions({ ui, app }) {
             unit=${words.gradientOptions.st} change=${(/** @type {number} */ stops) => set({ stops })} />
           <${NumberField} label=${words.gradientOptions.warmer} value=${gradient.mired} min=${-300} max=${300} step=${5} digits=${0}
             unit=${words.gradientOptions.mired} change=${(/** @type {number} */ mired) => set({ mired })} />`
-        : html`<${Choice} label=${words.gradientOptions.end} value=${gradient.hasEnd} choices=${ENDS}
+        : html`<${Choice} label=${words.gradientOptions.end} value=${gradient.hasEnd} choices=${endsOf(ui)}
             change=${(/** @type {boolean} */ hasEnd) => set({ hasEnd })} />`
     }`;
 }

@@ -4,6 +4,7 @@ import { html } from '../../vendor/preact.js';
 import { Button, Choice, Slider } from '../controls.js';
 import { MODES, SHAPES, updateSelection } from './selection_settings.js';
 import { words } from '../../language/language.js';
+import { shortcutsOf } from '../key_bindings.js';
 
 /** @typedef {import("../ui_state.js").Ui} Ui */
 /** @typedef {import("../shortcuts.js").App} App */
@@ -46,7 +47,7 @@ export function SelectOptions({ ui, app }) {
       tip=${words.selectOptions.howFarFromTheClickedColour}
       change=${(/** @type {number} */ tolerance) => updateSelection(store, { tolerance })} />`
     }
-    <${Button} label=${words.selectOptions.none} keys="Ctrl D" tip=${words.selectOptions.selectNothingPaintGoesEverywhere}
+    <${Button} label=${words.selectOptions.none} keys=${shortcutsOf(ui, 'selectNone')} tip=${words.selectOptions.selectNothingPaintGoesEverywhere}
       disabled=${!selection.current} act=${() => engine.selections.change({ kind: 'none' })} />
     <${Button} label=${words.selectOptions.more} pressed=${isPanelOpen} act=${togglePanel}
       tip=${words.selectOptions.growShrinkFeatherSelectByNumbers} />`;

@@ -5,6 +5,7 @@ import { Button, Choice, NumberField, Select, reveal } from '../controls.js';
 import { MAX_FEATHER } from './select_options.js';
 import { MODES, selectedText, updateSelection } from './selection_settings.js';
 import { words } from '../../language/language.js';
+import { shortcutsOf } from '../key_bindings.js';
 
 /** @typedef {import("../ui_state.js").Ui} Ui */
 /** @typedef {import("../shortcuts.js").App} App */
@@ -46,9 +47,9 @@ export function SelectionFields({ ui, app }) {
   return html`<div class="ask select-panel" data-numbers onClick=${leave}>
     <p role="status">${selectedText(selection)}</p>
     <div class="row" role="group" aria-label=${words.selectionFields.selection}>
-      <${Button} label=${words.selectionFields.all} keys="Ctrl A" act=${() => engine.selections.select({ kind: 'all' })} />
-      <${Button} label=${words.selectionFields.none} keys="Ctrl D" disabled=${!current} act=${change({ kind: 'none' })} />
-      <${Button} label=${words.selectionFields.invert} keys="Ctrl Shift I" disabled=${!current} act=${change({ kind: 'invert' })} />
+      <${Button} label=${words.selectionFields.all} keys=${shortcutsOf(ui, 'selectAll')} act=${() => engine.selections.select({ kind: 'all' })} />
+      <${Button} label=${words.selectionFields.none} keys=${shortcutsOf(ui, 'selectNone')} disabled=${!current} act=${change({ kind: 'none' })} />
+      <${Button} label=${words.selectionFields.invert} keys=${shortcutsOf(ui, 'invert')} disabled=${!current} act=${change({ kind: 'invert' })} />
       <span class="spring"></span>
       <${Button} label=${words.selectionFields.tint} pressed=${selection.show === 'tint'}
         tip=${words.selectionFields.tintWhatIsNotSelectedInstead}

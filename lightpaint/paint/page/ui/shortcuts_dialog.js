@@ -1,0 +1,135 @@
+/** The dialog of all keyboard shortcuts, in which the keys of commands can be changed. */
+
+import { fill, words } from '../language/language.js';
+import { html, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
+import { Button, Dialog } from './controls.js';
+import {
+  DEFAULT_KEYS,
+  commandOf,
+  isAllowed,
+  keySymbols,
+  keysOf,
+  pressedKeys,
+  withKeys,
+} from './key_bindings.js';
+import { keyName } from './key_names.js';
+import { SHORTCUTS } from './shortcuts.js';
+
+/** @typedef {import("./ui_state.js").Ui} Ui */
+/** @typedef {import("./shortcuts.js").App} App */
+/** @typedef {import("./shortcuts.js").CommandKey} CommandKey */
+/** @typedef {import("./key_bindings.js").Command} Command */
+/** What is being changed: the command that waits for a key, and the one that was pressed if another
+ * command has it. @typedef {{command: Command, keys?: string, other?: Command}} Recording */
+
+const texts = words.shortcutsDialog;
+
+/** @type {Map<Command, string>} */
+const DESCRIPTIONS = new Map(
+  SHORTCUTS.flatMap(({ keys }) => keys).flatMap((key) =>
+    'command' in key ? [[key.command, key.description]] : [],
+  ),
+);
+
+/** @param {{ui: Ui, app: App, close: () => void}} props */
+export function ShortcutsDialog({ ui, app, close }) {
+  const [recording, setRecording] = useState(/** @type {Recording | null} */ (null));
+  const [note, setNote] = useState('');
+  const set = (/** @type {Command} */ command, /** @type {string} */ keys) => {
+    app.store.set((state) => withKeys(state, command, keys));
+    setRecording(null);
+    setNote(fill(keys ? texts.isNow : texts.hasNoKey, namesOf(command, keys)));
+  };
+  const isChanged = Object.keys(ui.keyBindings).length > 0;
+  const resetAll = () => {
+    app.store.set({ keyBindings: {} });
+    setNote(texts.allReset);
+  };
+  return html`<${Dialog} title=${texts.title} close=${close} class="keys">
+    ${SHORTCUTS.map(
+      ({ title, keys }) => html`<section key=${title}><h3>${title}</h3><dl>
+      ${keys.map((key) =>
+        'command' in key
+          ? html`<${CommandRow} key=${key.command} ui=${ui} entry=${key} recording=${recording}
+            setRecording=${setRecording} setNote=${setNote} set=${set} />`
+          : html`<div key=${key.description}><dt>${key.symbols.map(
+              (symbol, k) => html`<kbd key=${k}>${keyName(symbol)}</kbd>`,
+            )}</dt><dd>${key.description}</dd></div>`,
+      )}
+    </dl></section>`,
+    )}
+    <div class="key-foot"><p class="faint">${texts.howToChange}</p>
+      <p role="status">${note}</p>
+      <${Button} icon="undo" label=${texts.resetAll} disabled=${!isChanged} act=${resetAll} /></div>
+    <p class="faint">${texts.touch}</p>
+  </${Dialog}>`;
+}
+
+/** @param {Command} command @param {string} keys */
+const namesOf = (command, keys) => ({
+  name: DESCRIPTIONS.get(command) ?? command,
+  keys: keySymbols(keys).join(' '),
+});
+
+/**
+ * A command: its key, which a press on it changes, and what it does.
+ * @param {{ui: Ui, entry: CommandKey, recording: Recording | null,
+ *   setRecording: (recording: Recording | null) => void, setNote: (note: string) => void,
+ *   set: (command: Command, keys: string) => void}} props
+ */
+function CommandRow({ ui, entry, recording, setRecording, setNote, set }) {
+  const { command, description } = entry;
+  const own = recording?.command === command ? recording : null;
+  const isWaiting = own !== null && !own.keys;
+  const keys = keysOf(ui, command);
+  const setUnlessTaken = (/** @type {string} */ newKeys) => {
+    const other = commandOf(ui, newKeys);
+    if (other && other !== command) setRecording({ command, keys: newKeys, other });
+    else set(command, newKeys);
+  };
+  const press = (/** @type {KeyboardEvent} */ event) => {
+    if (!isWaiting) return;
+    if (event.key === 'Tab') return setRecording(null);
+    event.preventDefault();
+    event.stopPropagation();
+    if (event.key === 'Escape') return setRecording(null);
+    if (event.key === 'Delete' || event.key === 'Backspace') return set(command, '');
+    if (['Shift', 'Control', 'Alt', 'Meta', 'AltGraph'].includes(event.key)) return;
+    const [pressed] = pressedKeys(event);
+    if (isAllowed(pressed)) setUnlessTaken(pressed);
+    else setNote(fill(texts.isReserved, namesOf(command, pressed)));
+  };
+  const symbols = keySymbols(keys);
+  const shown = symbols.length ? symbols : [texts.none];
+  return html`<div class=${own ? 'is-recorded' : ''}>
+    <dt><button type="button" class="key-button" onKeyDown=${press}
+      aria-label=${fill(texts.changeKey, { name: description, keys: shown.join(' ') })}
+      aria-pressed=${String(isWaiting)} onBlur=${() => isWaiting && setRecording(null)}
+      onClick=${() => setRecording(own ? null : { command })}>${
+        isWaiting
+          ? html`<span>${texts.pressAKey}</span>`
+          : shown.map((symbol, k) => [k > 0 && ' ', html`<kbd>${symbol}</kbd>`])
+      }</button></dt>
+    <dd>${description}${
+      command in ui.keyBindings &&
+      html`<${Button} icon="undo" tip=${fill(texts.reset, namesOf(command, DEFAULT_KEYS[command]))}
+        act=${() => setUnlessTaken(DEFAULT_KEYS[command])} />`
+    }</dd>
+    ${
+      own?.keys &&
+      own.other &&
+      html`<${Conflict} keys=${own.keys} other=${own.other}
+      take=${() => set(command, own.keys ?? '')} cancel=${() => setRecording(null)} />`
+    }</div>`;
+}
+
+/** The choice between two commands of one key.
+ * @param {{keys: string, other: Command, take: () => void, cancel: () => void}} props */
+function Conflict({ keys, other, take, cancel }) {
+  const ref = useRef(/** @type {HTMLElement | null} */ (null));
+  useLayoutEffect(() => ref.current?.querySelector('button')?.focus(), []);
+  return html`<div class="key-conflict" role="group" ref=${ref} aria-label=${fill(texts.conflict, namesOf(other, keys))}>
+    <p>${fill(texts.conflict, namesOf(other, keys))}</p>
+    <${Button} label=${texts.take} primary act=${take} />
+    <${Button} label=${texts.leave} act=${cancel} /></div>`;
+}
