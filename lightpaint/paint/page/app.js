@@ -34,6 +34,7 @@ import { Store } from './ui/ui_store.js';
 import { AdjustPanel, ToolBar, ToolOptions } from './ui/toolbar.js';
 import { followTheme } from './ui/theme.js';
 import { TopBar } from './ui/topbar.js';
+import { startAtFirstVisit, Tour } from './ui/tour.js';
 import { AnalysisPanel } from './ui/analysis_panel.js';
 import { AnswerLine, PointerStatus } from './ui/answer_line.js';
 import { ViewTabs, showView } from './ui/view_tabs.js';
@@ -48,12 +49,12 @@ import { fillCount, language, words } from './language/language.js';
  * Show the painter in an element.
  *
  * `global`: keys work wherever the focus is, for a page that holds only the painter. `engine`: the
- * picture engine over that host.
+ * picture engine over that host. `isGuided`: the tour starts at the first visit.
  * @param {HTMLElement} element @param {Host} host
- * @param {{global?: boolean, engine: Engine}} options
+ * @param {{global?: boolean, engine: Engine, isGuided?: boolean}} options
  * @returns {Promise<{store: Store<Ui>, session: SessionController, close: () => void}>}
  */
-export async function mount(element, host, { global = false, engine }) {
+export async function mount(element, host, { global = false, engine, isGuided = false }) {
   const open = { ...initialState().open, ...storedFolds() };
   const store = new Store({ ...initialState(), ...storedTool(), ...storedPreferences(), open });
   const root = document.createElement('div');
@@ -73,11 +74,13 @@ export async function mount(element, host, { global = false, engine }) {
   render(html`<${Painter} app=${app} root=${() => root} />`, root);
   const observer = foldWhenNarrow(root, store);
   const stopStoring = storeChanges(store);
+  const stopTour = isGuided ? startAtFirstVisit(store, root) : () => {};
   const close = () => {
     controller.abort();
     observer.disconnect();
     stopStoring();
     stopTheme();
+    stopTour();
     render(null, root);
     engine.close();
     host.close();
@@ -185,6 +188,7 @@ function Painter({ app, root }) {
     <${LayerImportDialog} ui=${ui} app=${app} />
     <${LayerDropFrame} app=${app} root=${root} />
     <${ReferencePaste} app=${app} root=${root} />
+    <${Tour} ui=${ui} app=${app} root=${root} />
     <${Tips} root=${root} />`;
 }
 

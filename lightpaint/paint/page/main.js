@@ -9,5 +9,5 @@ if (element) {
   const engine = openEngine(host);
   // For measurements, and for the console.
   Object.assign(element, { painter: { host, engine } });
-  void mount(element, host, { global: true, engine });
+  void mount(element, host, { global: true, engine, isGuided: !navigator.webdriver });
 }

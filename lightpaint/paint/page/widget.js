@@ -16,7 +16,7 @@ async function render({ model, el }) {
   el.append(style, frame);
   const host = new ModelHost(model);
   const engine = openEngine(host);
-  const painter = await mount(frame, host, { engine });
+  const painter = await mount(frame, host, { engine, isGuided: !navigator.webdriver });
   host.open();
   return () => {
     model.off('change:height', size);

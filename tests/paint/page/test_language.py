@@ -128,6 +128,7 @@ STATES: dict[str, Callable[[Painter], None]] = {
     "importance": show(
         "{ tool: 'weight', display: { ...painter.store.value.display, overlay: 'missed' } }"
     ),
+    "tour": show("{ tour: 2 }"),
     "lost": show("{ connection: 'lost', lostStrokes: 3 }"),
     "comparison": show("{ mix: { a: 1, b: 2, share: 0.5 } }"),
 }

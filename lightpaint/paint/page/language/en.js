@@ -959,6 +959,9 @@ export const en = {
     heldNearTheirCurrentLookWith: 'held near their current look, with {weight} the paint',
     language: 'Language',
     whenThePageOpensNext: 'When the page opens next',
+    tour: 'Tour',
+    tourDescription: 'Five steps through what the painter does',
+    showTheTour: 'Show the tour',
   },
   shortcuts: {
     tools: 'Tools',
@@ -1026,6 +1029,7 @@ export const en = {
     conflict: '{keys} is: {name}',
     take: 'Take it',
     leave: 'Leave it',
+    showTheTour: 'Show the tour',
   },
   skipLinks: {
     skipLinks: 'Skip links',
@@ -1179,6 +1183,33 @@ export const en = {
     compare: 'Compare',
     whichTwoPicturesToCompare: 'Which two pictures to compare',
     denoiseThePictures: 'Denoise the pictures. The solve does not change.',
+  },
+  tour: {
+    step: 'Step {number} of {count}',
+    end: 'End the tour',
+    back: 'Back',
+    next: 'Next',
+    done: 'Done',
+    paint: {
+      title: 'Paint how it should look',
+      text: 'Choose a colour and drag over the left picture. The light of the room follows your brush.',
+    },
+    answer: {
+      title: 'See the answer',
+      text: 'The right picture shows the closest that your lights can do. This sentence says how close that is, what is missing, and why.',
+    },
+    ask: {
+      title: 'Ask by numbers',
+      text: 'Brighter by so many stops, warmer by so many mireds: for an object, a selection or the whole picture. Adjust, in the tools, does the same by dragging.',
+    },
+    lights: {
+      title: 'Your lights',
+      text: 'Each light with its picture and its level. Lock it, switch it off or give it a colour: the others are solved around it.',
+    },
+    looks: {
+      title: 'Keep looks, and export',
+      text: '{key} keeps painting and answer as a look. Export, at the top right, writes the lights for your scene and other programs.',
+    },
   },
   viewTabs: {
     views: 'Views',

@@ -206,7 +206,7 @@ export function Stage({ ui, app }) {
     ${ui.ready && html`<${LampLasso} ui=${ui} app=${app} />`}
     ${ui.ready && html`<${Legend} ui=${ui} app=${app} panes=${panes} />`}
     ${ui.display.layout === 'wipe' && ui.ready && html`<${Wipe} ui=${ui} app=${app} />`}
-    ${ui.hint && ui.ready && !ui.areLampsMarked && !ui.history.undo.length && html`<${Hint} panes=${panes} tool=${ui.tool} />`}
+    ${ui.hint && ui.tour === null && ui.ready && !ui.areLampsMarked && !ui.history.undo.length && html`<${Hint} panes=${panes} tool=${ui.tool} />`}
     ${ui.ready && html`<${PointerLabel} ui=${ui} engine=${engine} rings=${rings} />`}
     ${!ui.ready && html`<${WaitingScreen} ui=${ui} />`}
   </div>`;

@@ -7,6 +7,7 @@ import { html, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
 import { Button, Choice, NumberField, Select, useId } from './controls.js';
 import { numberText } from './format.js';
 import { fill, words, language, languageChoices, storeLanguage } from '../language/language.js';
+import { startTour } from './tour.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
@@ -176,6 +177,8 @@ function PageSettings({ ui, app }) {
       <${Choice} label=${words.settingsPanel.theme} value=${ui.theme} choices=${THEMES}
         change=${(/** @type {import("./theme.js").Theme} */ theme) => app.store.set({ theme })} />
     </${Row}>
+    <${Row} title=${words.settingsPanel.tour} description=${words.settingsPanel.tourDescription}>
+      <${Button} label=${words.settingsPanel.showTheTour} act=${() => startTour(app.store)} /></${Row}>
     ${
       languageChoices.length > 1 &&
       html`<${Row} title=${words.settingsPanel.language} description=${words.settingsPanel.whenThePageOpensNext}>

@@ -4,6 +4,7 @@ import { saveLook } from './look_actions.js';
 import { showPrevious } from './previous_answer.js';
 import { chooseSelect, updateSelection } from './selection/selection_settings.js';
 import { words } from '../language/language.js';
+import { endTour } from './tour.js';
 import { showNextView } from './view_tabs.js';
 import {
   chooseTool,
@@ -50,6 +51,7 @@ const changeExposure =
 
 /** What Escape does: it ends what has begun last. @param {App} app */
 export function escape({ engine, store }) {
+  if (store.value.tour !== null) return endTour(store);
   const { draft } = store.value.selection;
   if (draft) return updateSelection(store, { draft: null });
   const { maskLayer, panel, clickAction, isLassoing } = store.value;

@@ -14,6 +14,7 @@ import {
 } from './key_bindings.js';
 import { keyName } from './key_names.js';
 import { SHORTCUTS } from './shortcuts.js';
+import { startTour } from './tour.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
@@ -60,6 +61,7 @@ export function ShortcutsDialog({ ui, app, close }) {
     )}
     <div class="key-foot"><p class="faint">${texts.howToChange}</p>
       <p role="status">${note}</p>
+      <${Button} label=${texts.showTheTour} act=${() => startTour(app.store)} />
       <${Button} icon="undo" label=${texts.resetAll} disabled=${!isChanged} act=${resetAll} /></div>
     <p class="faint">${texts.touch}</p>
   </${Dialog}>`;

@@ -147,6 +147,7 @@ import { initialSelection } from './selection/selection_settings.js';
  * @property {Record<string, boolean>} open what is unfolded
  * @property {boolean} side whether the panels are there
  * @property {null | "settings"} panel what lies over the panels
+ * @property {number | null} tour step of the tour that is shown
  * @property {null | "keys" | "export" | "looks" | "presets"} dialog
  * @property {string} search
  * @property {"scene" | "name" | "share" | "change"} sort
@@ -275,6 +276,7 @@ export function initialState() {
     open: { colour: true, lights: true, plan: true, truth: false },
     side: true,
     panel: null,
+    tour: null,
     dialog: null,
     search: '',
     sort: 'scene',

@@ -1,5 +1,6 @@
 /** The interface over a session and an engine that are made up: `?lights=N`, `?shadow`, `?first`,
  * `?elsewhere`; `?crowd`: as much of everything as there may be, and as long;
+ * `?tour`: as for people, whom the tour greets at their first visit;
  * `?model`: that of a notebook, `?model=taken`: at a place that loses the painter at once. */
 
 import { mount } from '../app.js';
@@ -35,6 +36,10 @@ const session = asked.has('model') ? new ModelHost(model) : host;
 const engine = asked.has('engine')
   ? (await import('../engine/picture_engine.js')).openEngine(session)
   : new FakeEngine(session, room);
-const painter = await mount(element, session, { global: !asked.has('shadow'), engine });
+const painter = await mount(element, session, {
+  global: !asked.has('shadow'),
+  engine,
+  isGuided: asked.has('tour'),
+});
 Object.assign(window, { painter, host, engine, model });
 session.open();
