@@ -14,6 +14,7 @@ writes beside itself
     painter-presets.jpg, painter-looks.jpg, painter-history.jpg  what is asked for at a click, the
                         looks that were kept, and the steps that led to them
     painter-lamps.jpg   spots dimmed together, two of them with a gel, under a master
+    painter-side-by-side.jpg   three looks side by side, in the light theme
     lights.webp     somebody drags a spot, aims it by a click, paints, and lets the lights move;
                     it also prints the answers a second of the drag
     painter-lights.jpg  the painter when that is done
@@ -34,6 +35,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
+from typing import Literal
 
 from PIL import Image, ImageDraw
 from playwright.sync_api import Page, sync_playwright
@@ -280,6 +282,29 @@ def _save(hand: Hand, name: str) -> None:
     hand.wait()
 
 
+def looks_beside(hand: Hand) -> None:
+    """Looks of three presets, side by side."""
+    page = hand.page
+    for preset in ("Moonlight", "Golden hour", "Gallery"):
+        page.get_by_role("button", name="Presets", exact=True).click()
+        page.locator(".sheet button", has=page.get_by_text(preset, exact=True)).click()
+        hand.wait()
+        page.keyboard.press("Control+s")
+        page.wait_for_timeout(1000)
+        name = page.locator(".look-name").last
+        name.click()
+        page.locator(".naming").fill(preset)
+        page.keyboard.press("Enter")
+        page.keyboard.press("Control+z")
+        hand.wait()
+    page.get_by_role("button", name="All looks").click()
+    sheet = page.get_by_role("dialog")
+    for box in sheet.get_by_role("checkbox").all():
+        box.check()
+    sheet.get_by_role("button", name="Side by side").click()
+    page.wait_for_timeout(2000)
+
+
 def _type(page: Page, label: str, text: str) -> None:
     field = page.get_by_role("textbox", name=label, exact=True).first
     field.fill(text)
@@ -393,13 +418,13 @@ def painter(
 
 
 @contextmanager
-def using(url: str) -> Iterator[Hand]:
+def using(url: str, theme: Literal["dark", "light"] = "dark") -> Iterator[Hand]:
     """A page at that address, with all pictures."""
     with sync_playwright() as playwright:
         path = shutil.which("chromium") or playwright.chromium.executable_path
         browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
         page = browser.new_page(
-            viewport={"width": WINDOW[0], "height": WINDOW[1]}, color_scheme="dark"
+            viewport={"width": WINDOW[0], "height": WINDOW[1]}, color_scheme=theme
         )
         page.goto(url)
         page.locator("[data-light]").first.wait_for(timeout=600_000)
@@ -413,7 +438,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--spp", type=int, default=64)
     parser.add_argument("--port", type=int, default=8431)
-    pictures = ("painting", "views", "layers", "selection", "lamps", "lights", "reference")
+    pictures = ("painting", "views", "layers", "selection", "lamps", "lights", "reference", "looks")
     parser.add_argument("--only", choices=pictures)
     asked = parser.parse_args()
     if asked.only in (None, "lights"):
@@ -446,6 +471,10 @@ def main() -> None:
             page.get_by_role("button", name="All looks").click()
             page.wait_for_timeout(2000)
             page.screenshot(path=HERE / "painter-looks.jpg", type="jpeg", quality=88)
+    if asked.only in (None, "looks"):
+        with painter("gallery", asked.spp, asked.port) as url, using(url, "light") as hand:
+            looks_beside(hand)
+            hand.page.screenshot(path=HERE / "painter-side-by-side.jpg", type="jpeg", quality=88)
     if asked.only in (None, "layers"):
         with painter("gallery", asked.spp, asked.port) as url, using(url) as hand:
             layered(hand)

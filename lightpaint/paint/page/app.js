@@ -11,6 +11,7 @@ import { LayerDropFrame, LayerImportDialog } from './ui/layers/layer_import.js';
 import { LayerCount, LayerPanel, hasLayers } from './ui/layers/layer_panel.js';
 import { LightList, LightListActions } from './ui/light_list.js';
 import { LookStrip } from './ui/look_strip.js';
+import { LookWall } from './ui/look_wall.js';
 import {
   storedTool,
   storeChanges,
@@ -172,6 +173,7 @@ function Painter({ app, root }) {
       <${ViewTabs} ui=${ui} app=${app} />
       <div class="view"><${Stage} ui=${ui} app=${app} />
         <${ReferencePane} ui=${ui} app=${app} />
+        <${LookWall} ui=${ui} app=${app} />
         <${Banner} ui=${ui} app=${app} />
         <${Toasts} ui=${ui} app=${app} /></div>
       <div class="status"><${PointerStatus} ui=${ui} /><${RunningTasks} ui=${ui} app=${app} /></div>

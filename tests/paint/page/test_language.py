@@ -130,6 +130,7 @@ STATES: dict[str, Callable[[Painter], None]] = {
     ),
     "tour": show("{ tour: 2 }"),
     "lost": show("{ connection: 'lost', lostStrokes: 3 }"),
+    "wall": show("{ mix: { a: 1, b: 2, share: 1, more: [] } }"),
     "comparison": show("{ mix: { a: 1, b: 2, share: 0.5 } }"),
 }
 

@@ -12,6 +12,10 @@ const DRAFT_PAUSE_MS = 180;
 /** Milliseconds that a GPU has to come back. */
 const GPU_RECOVERY_MS = 3000;
 
+/** Size in CSS pixels. choose: has the view draw the picture of a canvas, if there is one.
+ * @typedef {{canvases: HTMLCanvasElement[], width: number, height: number,
+ *   choose: (index: number) => boolean}} Copies */
+
 export class Screen {
   /** @param {HTMLElement} element
    * @param {{view?: 'gl' | 'cpu' | null, refill: () => void}} options refill: called when the view
@@ -28,6 +32,8 @@ export class Screen {
     this.params = { ...DEFAULTS };
     this.width = 0;
     this.height = 0;
+    /** Canvases that show looks instead, and what prepares each. @type {Copies | null} */
+    this.copies = null;
     this.frame = 0;
     this.isLive = false;
     /** Whether a brush is down; slow work waits until it is lifted. */
@@ -93,14 +99,22 @@ export class Screen {
     this.fit();
   }
 
+  /** Draw looks on other canvases instead, or for null the pictures again.
+   * @param {Copies | null} copies */
+  copyTo(copies) {
+    this.copies = copies;
+    this.fit();
+  }
+
   /** Match the canvas to the pixels of the display. */
   fit() {
     if (!this.view) return;
     const { canvas } = this.view;
+    const area = this.copies ?? this;
     canvas.style.display = 'block';
-    canvas.style.width = `${this.width}px`;
-    canvas.style.height = `${this.height}px`;
-    const [width, height] = [this.width, this.height].map((n) =>
+    canvas.style.width = `${area.width}px`;
+    canvas.style.height = `${area.height}px`;
+    const [width, height] = [area.width, area.height].map((n) =>
       Math.max(1, Math.round(n * this.ratio)),
     );
     if (canvas.width !== width) canvas.width = width;
@@ -115,7 +129,8 @@ export class Screen {
 
   /** In device pixels. @returns {Pane[]} */
   panes() {
-    const [width, height] = [this.width * this.ratio, this.height * this.ratio].map(Math.round);
+    const area = this.copies ?? this;
+    const [width, height] = [area.width * this.ratio, area.height * this.ratio].map(Math.round);
     return panes(this.params, { width, height }, this.size);
   }
 
@@ -142,9 +157,22 @@ export class Screen {
   drawNow() {
     cancelAnimationFrame(this.frame);
     this.frame = 0;
+    if (this.copies) return this.drawCopies(this.copies);
     const { left, right } = this.params;
     const kinds = { left: this.substitute(left), right: this.substitute(right) };
     this.view?.draw({ ...this.params, ...kinds, live: this.isLive });
+  }
+
+  /** Draw one look after another, and copy each. @param {Copies} copies */
+  drawCopies({ canvases, choose }) {
+    const { view } = this;
+    canvases.forEach((canvas, k) => {
+      if (!view || !choose(k)) return;
+      view.draw({ ...this.params, live: this.isLive });
+      const { width, height } = view.canvas;
+      Object.assign(canvas, { width, height });
+      canvas.getContext('2d')?.drawImage(view.canvas, 0, 0);
+    });
   }
 
   /** Return the picture shown in place of another.

@@ -91,6 +91,14 @@ class PictureEngine extends Emitter {
     this.mirror.show(display);
   }
 
+  /** Draw the looks that are side by side on canvases of one size; none: the pictures again.
+   * @param {HTMLCanvasElement[]} canvases @param {number} width @param {number} height */
+  showLooks(canvases, width, height) {
+    const choose = (/** @type {number} */ k) => this.mirror.chooseLook(k);
+    this.screen.copyTo(canvases.length ? { canvases, width, height, choose } : null);
+    if (!canvases.length) this.mirror.showWeights();
+  }
+
   /** In CSS pixels of the element. @returns {(Omit<Pane, 'middle'>)[]} */
   panes() {
     const { ratio } = this.screen;

@@ -9,11 +9,11 @@ import { nameInView } from './message_frames.js';
  * which to show the solution and the other mix.
  * @typedef {Omit<import("../../../viewer/drawing/view.js").Params, 'live'> & {transform: string, clean: boolean,
  *   visibleLights: boolean[] | null, solutionWeights: RGB[] | null, otherWeights: RGB[] | null,
- *   lookPictures: (number | null)[] | null, master?: number}} Display
+ *   lookPictures: (number | null)[] | null, lookMixes?: RGB[][] | null, master?: number}} Display
  */
 
 /** Number of looks that are compared at a time. Their pictures are planes behind those of lights. */
-export const COMPARED_COUNT = 2;
+export const COMPARED_COUNT = 4;
 
 /** Pictures that a page always shows or uses, by name. */
 const SHARED_PICTURES = ['present', 'albedo', 'objects', 'verified', 'beyond'];

@@ -71,7 +71,7 @@ export class PictureState {
     const weights = this.forPlanes(solutionWeights?.flat() ?? this.outputWeights(master));
     if (weights && visibleLights)
       weights.forEach(
-        (weight, i) => (weights[i] = visibleLights[Math.floor(i / 3)] ?? true ? weight : 0),
+        (weight, i) => (weights[i] = (visibleLights[Math.floor(i / 3)] ?? true) ? weight : 0),
       );
     return weights;
   }
@@ -85,6 +85,14 @@ export class PictureState {
     if (weights) view.setWeights(weights);
     if (otherMix) view.setWeights(otherMix, 'other');
     if (weights) this.checkPresent(weights);
+  }
+
+  /** Tell the view which of the looks that are side by side it draws next; false for none.
+   * @param {number} index */
+  chooseLook(index) {
+    const weights = this.forPlanes(this.display?.lookMixes?.[index]?.flat() ?? []);
+    if (weights) this.screen.view?.setWeights(weights, 'other');
+    return weights !== null;
   }
 
   /** Return the answer's weights under the master dimmer. @param {number} master a factor */
@@ -115,7 +123,9 @@ export class PictureState {
     const isPresent =
       isClean &&
       !this.haveLightsMoved &&
-      weights.every((weight, i) => Math.abs(weight - (present[i] ?? 0)) <= 1e-9 * (present[i] ?? 0));
+      weights.every(
+        (weight, i) => Math.abs(weight - (present[i] ?? 0)) <= 1e-9 * (present[i] ?? 0),
+      );
     screen.isPresent = isPresent && this.knowsPresent;
     if (screen.isPresent !== this.hasPresent && canvas) this.showPresent();
   }

@@ -588,6 +588,12 @@ export const en = {
     showPaintingAndAnswerAgain: 'Show painting and answer again',
     twoLooksSideBySideAnd: 'Two looks side by side, and a crossfade between them',
   },
+  lookWall: {
+    label:
+      'Looks side by side. Arrow keys go from one to another, Enter takes it, Escape goes back.',
+    take: 'Take {name}',
+    moving: '{name}: moving its lights …',
+  },
   looksDialog: {
     pictures: 'Pictures',
     lamps: 'Lamps',
@@ -598,6 +604,9 @@ export const en = {
     saveTwoLooksToCompareTheir: 'Save two looks to compare their lamps.',
     lampsOf: 'Lamps of',
     against: 'against',
+    sideBySide: 'Side by side',
+    sideBySideTip: 'The marked looks at full size, two to four',
+    mark: 'Compare {name}',
   },
   manyLights: {
     st: '{signed} st',
@@ -1183,6 +1192,7 @@ export const en = {
     compare: 'Compare',
     whichTwoPicturesToCompare: 'Which two pictures to compare',
     denoiseThePictures: 'Denoise the pictures. The solve does not change.',
+    looks: '{count} looks',
   },
   tour: {
     step: 'Step {number} of {count}',

@@ -93,12 +93,12 @@ export function Select({ label, value, choices, change, hidden, tip }) {
 }
 
 /** @param {{label: string, checked: boolean, change: (checked: boolean) => void, tip?: string,
- *   disabled?: boolean, keys?: string}} props */
-export function Checkbox({ label, checked, change, tip, disabled, keys }) {
+ *   disabled?: boolean, keys?: string, hidden?: boolean}} props */
+export function Checkbox({ label, checked, change, tip, disabled, keys, hidden }) {
   return html`<label class="check" data-tip=${tip} data-keys=${keys}>
     <input type="checkbox" checked=${checked} disabled=${disabled} aria-keyshortcuts=${keys}
       onChange=${(/** @type {any} */ event) => change(event.currentTarget.checked)} />
-    <span>${label}</span>
+    <span class=${hidden ? 'only-read' : undefined}>${label}</span>
   </label>`;
 }
 

@@ -44,6 +44,7 @@
  * @property {RGB[] | null} solutionWeights
  * @property {RGB[] | null} otherWeights
  * @property {(number | null)[] | null} lookPictures
+ * @property {RGB[][] | null} lookMixes weights of each of the looks that are side by side
  * @property {number} master factor of the answer's weights, but for fixed lights
  */
 
@@ -81,6 +82,8 @@
  * @property {HTMLElement} element where the pictures are drawn
  * @property {(width: number, height: number) => void} resize in CSS pixels
  * @property {(display: Display) => void} show
+ * @property {(canvases: HTMLCanvasElement[], width: number, height: number) => void} showLooks draws
+ *   the looks that are side by side on canvases of one size, in CSS pixels; none: the pictures again
  * @property {(settings: ToolSettings) => void} setTool
  * @property {() => Pane[]} panes
  * @property {(view: number) => void} showView another view: what is shown, and painted

@@ -72,7 +72,8 @@ export function currentLook(ui) {
 export function comparedAnswer(ui) {
   const current = ui.mix && currentLook(ui);
   if (!ui.mix || current === null) return null;
-  const isShown = current === ui.mix.a || (current === ui.mix.b && ui.mix.share === 1);
+  const { a, b, share, more } = ui.mix;
+  const isShown = current === a || (current === b && share === 1) || more?.includes(current);
   return (isShown && ui.looks.find(({ id }) => id === current)) || null;
 }
 

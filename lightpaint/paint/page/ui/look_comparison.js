@@ -1,16 +1,19 @@
 /**
- * Two looks side by side. A look whose lights hang as they do now is a mix of their planes; of any
- * other the session makes a picture, which counts as a plane behind those of the lights.
+ * Two to four looks side by side. A look whose lights hang as they do now is a mix of their planes;
+ * of any other the session makes a picture, which counts as a plane behind those of the lights.
  */
 
 import { nameInView } from '../engine/message_frames.js';
+import { COMPARED_COUNT } from '../engine/picture_slots.js';
 import { fill, words } from '../language/language.js';
 
 /** @typedef {import("./engine_interface.js").Display} Display */
 /** @typedef {import("./engine_interface.js").RGB} RGB */
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./ui_state.js").Look} Look */
-/** @typedef {{a: number, b: number, share: number}} Mix two looks, by their ids */
+/** Two looks, by their ids, with a crossfade between them; more: further ones, with which they are
+ * side by side without one.
+ * @typedef {{a: number, b: number, share: number, more?: number[]}} Mix */
 
 /** @type {RGB} */
 const OFF = [0, 0, 0];
@@ -18,17 +21,21 @@ const OFF = [0, 0, 0];
 /** @type {RGB} */
 const WHOLE = [1, 1, 1];
 
-/** Reset the comparison of two looks. @param {Ui} ui @returns {Partial<Ui>} */
+/** The display of looks side by side, each alone in its pane. @type {Partial<Display>} */
+const WALL_DISPLAY = { layout: 'blink', blink: 'right', right: 'other', overlay: null };
+
+/** Reset the comparison of looks. @param {Ui} ui @returns {Partial<Ui>} */
 export function resetMix({ display }) {
   const pair = /** @type {const} */ ({ left: 'painting', right: 'solution' });
   return { mix: null, display: { ...display, ...pair, solutionWeights: null, otherWeights: null } };
 }
 
 /** Return the compared looks; null if one of them no longer exists. @param {Ui} ui
- * @param {Mix} mix @returns {[Look, Look] | null} */
-export function comparedLooks({ looks }, { a, b }) {
-  const [first, second] = [a, b].map((id) => looks.find((look) => look.id === id));
-  return first && second ? [first, second] : null;
+ * @param {Mix} mix @returns {[Look, Look, ...Look[]] | null} */
+export function comparedLooks({ looks }, { a, b, more = [] }) {
+  const compared = [a, b, ...more].flatMap((id) => looks.find((look) => look.id === id) ?? []);
+  const isWhole = compared.length === 2 + more.length;
+  return isWhole ? /** @type {[Look, Look, ...Look[]]} */ (compared) : null;
 }
 
 /** Return whether a look has lights at other places than now. @param {Ui} ui @param {Look} look */
@@ -77,15 +84,19 @@ export function comparedDisplay(ui) {
   const looks = ui.mix && comparedLooks(ui, ui.mix);
   if (!ui.mix || !looks) return {};
   const hasPicture = looks.map((look) => isElsewhere(ui, look) && !isPending(ui, look));
-  const ofPictures = hasPicture.some(Boolean) ? looks : [];
+  const pictureCount = hasPicture.some(Boolean) ? COMPARED_COUNT : 0;
   const weights = looks.map((look, k) => [
     ...(hasPicture[k] ? ui.lights.map(() => OFF) : weightsIn(ui, look)),
-    ...ofPictures.map((_, picture) => (hasPicture[k] && picture === k ? WHOLE : OFF)),
+    ...Array.from({ length: pictureCount }, (_, picture) =>
+      hasPicture[k] && picture === k ? WHOLE : OFF,
+    ),
   ]);
+  const wall = ui.mix.more ? { ...WALL_DISPLAY, lookMixes: weights } : {};
   return {
     solutionWeights: blended(weights, 0),
     otherWeights: blended(weights, ui.mix.share),
-    lookPictures: ofPictures.length ? looks.map(({ id }, k) => (hasPicture[k] ? id : null)) : null,
+    lookPictures: pictureCount ? looks.map(({ id }, k) => (hasPicture[k] ? id : null)) : null,
+    ...wall,
   };
 }
 

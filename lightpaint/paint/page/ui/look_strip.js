@@ -158,6 +158,7 @@ function LookCrossfade({ ui, app }) {
   return html`<div class="mix" role="group" aria-label=${words.lookStrip.compareTwoLooks}>
     ${
       ui.mix &&
+      !ui.mix.more &&
       html`<${Select} label=${words.lookStrip.firstLook} hidden value=${String(comparison.a)} choices=${choices}
         tip=${fill(words.lookStrip.from, { a: describe(comparison.a) })}
         change=${(/** @type {string} */ id) => set({ a: Number(id) })} />

@@ -2,9 +2,11 @@
 
 import { nameInView } from '../engine/message_frames.js';
 import { html, useRef, useState } from '../vendor/preact.js';
-import { Button, Choice, Dialog, Select } from './controls.js';
+import { COMPARED_COUNT } from '../engine/picture_slots.js';
+import { Button, Checkbox, Choice, Dialog, Select } from './controls.js';
 import { LampTable } from './lamp_table.js';
 import { currentLook, loadLook } from './look_actions.js';
+import { showWall } from './look_wall.js';
 import { Thumbnail } from './thumbnail.js';
 import { fill, words } from '../language/language.js';
 
@@ -34,6 +36,9 @@ export function LooksDialog({ ui, app, close }) {
 function ContactSheet({ ui, app, close }) {
   const sheet = useRef(/** @type {HTMLElement | null} */ (null));
   const current = currentLook(ui);
+  const [marked, setMarked] = useState(/** @type {number[]} */ ([]));
+  const mark = (/** @type {number} */ id, /** @type {boolean} */ isMarked) =>
+    setMarked(isMarked ? [...marked, id] : marked.filter((other) => other !== id));
   const load = (/** @type {number} */ id) => {
     close();
     void loadLook(app, id);
@@ -48,10 +53,15 @@ function ContactSheet({ ui, app, close }) {
         return html`<li key=${look.id}><button type="button" onClick=${() => load(look.id)}
           aria-current=${look.id === current ? 'true' : undefined} aria-label=${fill(words.looksDialog.load, { name: look.name })}>
           <${Thumbnail} name=${picture} generation=${ui.resources[picture] ?? 0} app=${app} />
-          <span>${look.name}</span></button></li>`;
+          <span>${look.name}</span></button>
+          <${Checkbox} label=${fill(words.looksDialog.mark, { name: look.name })} hidden
+            checked=${marked.includes(look.id)} change=${(/** @type {boolean} */ on) => mark(look.id, on)}
+            disabled=${marked.length >= COMPARED_COUNT && !marked.includes(look.id)} /></li>`;
       })}
     </ul>
-    <div class="row"><span class="spring"></span>
+    <div class="row"><${Button} icon="side" label=${words.looksDialog.sideBySide} primary
+        tip=${words.looksDialog.sideBySideTip} disabled=${marked.length < 2} act=${() => showWall(app, marked)} />
+      <span class="spring"></span>
       <${Button} icon="export" label=${words.looksDialog.saveAsAPicture}
         act=${() => sheet.current && saveSheet(sheet.current, ui.looks)} /></div>`;
 }

@@ -118,7 +118,16 @@ function ComparisonChoice({ ui, app }) {
     { value: 'present solution', label: words.topbar.nowAnswer },
     { value: 'present painting', label: words.topbar.nowPainting },
     ...(ui.verification ? [{ value: 'solution verified', label: words.topbar.answerRender }] : []),
-    ...(ui.mix ? [{ value: 'looks', label: words.topbar.twoLooks }] : []),
+    ...(ui.mix
+      ? [
+          {
+            value: 'looks',
+            label: ui.mix.more
+              ? fill(words.topbar.looks, { count: 2 + ui.mix.more.length })
+              : words.topbar.twoLooks,
+          },
+        ]
+      : []),
   ];
   return html`<${Select} label=${words.topbar.compare} hidden value=${value} choices=${choices}
     tip=${words.topbar.whichTwoPicturesToCompare} change=${(/** @type {string} */ pair) => {

@@ -143,7 +143,7 @@ import { initialSelection } from './selection/selection_settings.js';
  * @property {number | null} hoveredLight light whose own picture is shown
  * @property {import("./engine_interface.js").Probe | null} probe
  * @property {number | null} fit CSS pixels for each of the picture where all of it is seen
- * @property {{a: number, b: number, share: number} | null} mix of two looks, by their ids
+ * @property {import("./look_comparison.js").Mix | null} mix of looks that are compared
  * @property {Record<string, boolean>} open what is unfolded
  * @property {boolean} side whether the panels are there
  * @property {null | "settings"} panel what lies over the panels
@@ -173,6 +173,7 @@ const DEFAULT_DISPLAY = {
   solutionWeights: null,
   otherWeights: null,
   lookPictures: null,
+  lookMixes: null,
   master: 1,
 };
 

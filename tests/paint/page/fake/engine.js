@@ -44,6 +44,26 @@ export class FakeEngine {
     this.draw();
   }
 
+  /** The looks that are side by side, at once, each whole. */
+  showLooks(canvases, width, height) {
+    this.calls.push(['showLooks', canvases.length, width, height]);
+    this.wall = canvases.length ? { canvases, width, height } : null;
+    this.draw();
+  }
+  drawLooks({ canvases, width, height }) {
+    canvases.forEach((canvas, k) => {
+      const weights = this.shown.lookMixes?.[k];
+      if (!weights) return;
+      Object.assign(canvas, { width, height });
+      const pane = this.panes()[0];
+      const { w, h } = this.room;
+      const picture = this.toCanvas(this.mix(weights));
+      canvas
+        .getContext('2d')
+        .drawImage(picture, pane.left, pane.top, w * pane.scale, h * pane.scale);
+    });
+  }
+
   hear(message) {
     const data = message.arrays?.weights?.data;
     if (data) this.weights = this.room.lights.map((_, k) => [...data.slice(3 * k, 3 * k + 3)]);
@@ -63,7 +83,7 @@ export class FakeEngine {
   panes() {
     const { layout, wipe, left, right, blink, zoom = 1, pan = [0, 0] } = this.shown ?? {};
     const { w, h } = this.room;
-    const [width, height] = this.size;
+    const [width, height] = this.wall ? [this.wall.width, this.wall.height] : this.size;
     const placed = (kind, x, y, across, down, area = [x, y, across, down]) => {
       const scale = Math.min(area[2] / w, area[3] / h) * zoom;
       return {
@@ -186,6 +206,7 @@ export class FakeEngine {
     if (this.waiting || !this.shown) return;
     this.waiting = requestAnimationFrame(() => {
       this.waiting = 0;
+      if (this.wall) return this.drawLooks(this.wall);
       const context = this.element.getContext('2d');
       const ratio = devicePixelRatio;
       context.fillStyle = '#18181a';

@@ -1,0 +1,156 @@
+/** Two to four looks at full size, side by side, with one zoom and one exposure; a click takes one. */
+
+import { fill, words } from '../language/language.js';
+import { html, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
+import { currentLook, loadLook } from './look_actions.js';
+import { comparedLooks, isPending, resetMix } from './look_comparison.js';
+import { updateDisplay } from './tools.js';
+
+/** @typedef {import("./ui_state.js").Ui} Ui */
+/** @typedef {import("./ui_state.js").Look} Look */
+/** @typedef {import("./shortcuts.js").App} App */
+/** @typedef {{width: number, height: number}} Size in CSS pixels */
+
+/** Space between pictures, in pixels. */
+const GAP = 4;
+
+/** Pixels that a pointer moves before a press pans, and takes no look. */
+const MIN_PAN = 4;
+
+/** Show looks side by side. @param {App} app @param {number[]} ids two to four */
+export function showWall({ store }, [a, b, ...more]) {
+  store.set({ mix: { a, b, share: 1, more }, dialog: null });
+  updateDisplay(store, { left: 'solution', right: 'other', zoom: 1, pan: [0, 0] });
+}
+
+/** Return the looks that are side by side; none if they are not. @param {Ui} ui @returns {Look[]} */
+export const wallLooks = (ui) => (ui.mix?.more && comparedLooks(ui, ui.mix)) || [];
+
+/** Return the columns with which pictures are largest. @param {Size} frame @param {number} count
+ * @param {[height: number, width: number]} picture */
+function bestColumns(frame, count, [height, width]) {
+  const scales = Array.from({ length: count }, (_, k) => {
+    const pane = paneSize(frame, count, k + 1);
+    return Math.min(pane.width / width, pane.height / height);
+  });
+  return 1 + scales.indexOf(Math.max(...scales));
+}
+
+/** @param {Size} frame @param {number} count @param {number} columns @returns {Size} */
+function paneSize({ width, height }, count, columns) {
+  const rows = Math.ceil(count / columns);
+  return {
+    width: Math.max(1, Math.floor((width - GAP * (columns - 1)) / columns)),
+    height: Math.max(1, Math.floor((height - GAP * (rows - 1)) / rows)),
+  };
+}
+
+/** @param {{ui: Ui, app: App}} props */
+export function LookWall({ ui, app }) {
+  const looks = wallLooks(ui);
+  return looks.length && ui.ready ? html`<${Wall} ui=${ui} app=${app} looks=${looks} />` : null;
+}
+
+/** @param {{ui: Ui, app: App, looks: Look[]}} props */
+function Wall({ ui, app, looks }) {
+  const { store, engine } = app;
+  const frame = useRef(/** @type {HTMLElement | null} */ (null));
+  const [size, setSize] = useState(/** @type {Size | null} */ (null));
+  useLayoutEffect(() => {
+    const element = frame.current;
+    if (!element) return undefined;
+    const measure = () => setSize({ width: element.clientWidth, height: element.clientHeight });
+    measure();
+    const observer = new ResizeObserver(measure);
+    observer.observe(element);
+    element.querySelector('button')?.focus({ preventScroll: true });
+    return () => {
+      observer.disconnect();
+      engine.showLooks([], 1, 1);
+    };
+  }, []);
+  const columns = size ? bestColumns(size, looks.length, ui.state.size) : 1;
+  const pane = size && paneSize(size, looks.length, columns);
+  useLayoutEffect(() => {
+    if (!pane || !frame.current) return;
+    engine.showLooks([...frame.current.querySelectorAll('canvas')], pane.width, pane.height);
+  }, [pane?.width, pane?.height, looks.length]);
+  const isDragged = usePanning(frame, app);
+  const take = (/** @type {number} */ id) => {
+    if (isDragged()) return;
+    store.set(resetMix);
+    void loadLook(app, id);
+  };
+  const press = (/** @type {KeyboardEvent} */ event) => {
+    const step = { ArrowRight: 1, ArrowLeft: -1, ArrowDown: columns, ArrowUp: -columns }[event.key];
+    const buttons = [...(frame.current?.querySelectorAll('button') ?? [])];
+    const next = buttons[buttons.indexOf(/** @type {any} */ (event.target)) + (step ?? 0)];
+    if (event.key === 'Escape') store.set(resetMix);
+    else if (step) next?.focus();
+    else return;
+    event.preventDefault();
+    event.stopPropagation();
+  };
+  const current = currentLook(ui);
+  return html`<div class="look-wall" ref=${frame} role="group" aria-label=${words.lookWall.label}
+    style=${{ '--columns': String(columns) }} onKeyDown=${press}>
+    ${looks.map(
+      (look) => html`<button type="button" key=${look.id} class="look-pane"
+      aria-label=${fill(words.lookWall.take, { name: look.name })}
+      aria-current=${look.id === current ? 'true' : undefined} onClick=${() => take(look.id)}>
+      <canvas aria-hidden="true"></canvas><span class="tag" aria-hidden="true">${
+        isPending(ui, look) ? fill(words.lookWall.moving, { name: look.name }) : look.name
+      }</span></button>`,
+    )}</div>`;
+}
+
+/**
+ * Pan all pictures by a drag, and zoom them by Ctrl and the wheel.
+ * @param {{current: HTMLElement | null}} frame @param {App} app
+ * @returns {() => boolean} whether the last press has panned
+ */
+function usePanning(frame, { store, engine }) {
+  const drag = useRef({ x: 0, y: 0, isDown: false, hasMoved: false });
+  useLayoutEffect(() => {
+    const element = frame.current;
+    if (!element) return undefined;
+    const pan = (/** @type {number} */ x, /** @type {number} */ y) => {
+      const scale = engine.panes()[0]?.scale ?? 1;
+      const [px, py] = store.value.display.pan;
+      updateDisplay(store, { pan: [px - x / scale, py - y / scale] });
+    };
+    const controller = new AbortController();
+    const options = { signal: controller.signal };
+    element.addEventListener(
+      'pointerdown',
+      ({ clientX: x, clientY: y }) => (drag.current = { x, y, isDown: true, hasMoved: false }),
+      options,
+    );
+    const move = (/** @type {PointerEvent} */ event) => {
+      const [dx, dy] = [event.clientX - drag.current.x, event.clientY - drag.current.y];
+      const { isDown, hasMoved } = drag.current;
+      if (!isDown || (!hasMoved && Math.hypot(dx, dy) < MIN_PAN)) return;
+      drag.current = { x: event.clientX, y: event.clientY, isDown, hasMoved: true };
+      pan(dx, dy);
+    };
+    window.addEventListener('pointermove', move, options);
+    const release = () => (drag.current.isDown = false);
+    window.addEventListener('pointerup', release, options);
+    window.addEventListener('pointercancel', release, options);
+    const wheel = (/** @type {WheelEvent} */ event) => {
+      event.preventDefault();
+      if (!event.ctrlKey && !event.metaKey) return pan(-event.deltaX, -event.deltaY);
+      const pane = /** @type {HTMLElement} */ (event.target).closest('button');
+      const box = (pane ?? element).getBoundingClientRect();
+      const factor = 2 ** (-event.deltaY / 300);
+      updateDisplay(
+        store,
+        engine.zoomAt(event.clientX - box.left, event.clientY - box.top, factor),
+      );
+      return undefined;
+    };
+    element.addEventListener('wheel', wheel, { ...options, passive: false });
+    return () => controller.abort();
+  }, []);
+  return () => drag.current.hasMoved;
+}
