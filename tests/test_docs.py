@@ -118,47 +118,6 @@ def test_snippets_of_python_run_one_after_the_other(
             names["painter"].close()
 
 
-def words_of_the_page() -> dict[str, str]:
-    """Texts of the page in English by `section.name`, of those that have no forms by number."""
-    words, section = dict[str, str](), ""
-    text = (ROOT / "lightpaint/paint/page/language/en.js").read_text()
-    for name, key, quoted in re.findall(
-        r"^  (\w+): \{$|^    (\w+):\s+('(?:[^'\\]|\\.)*'|\"[^\"]*\"),$", text, re.MULTILINE
-    ):
-        if name:
-            section = name
-        else:
-            words[f"{section}.{key}"] = quoted[1:-1].replace("\\'", "'")
-    assert len(words) > 500
-    return words
-
-
-def test_keys_of_the_painter_are_those_of_its_page():
-    page, words = ROOT / "lightpaint" / "paint" / "page" / "ui", words_of_the_page()
-    tools = re.findall(
-        r"label: words\.([\w.]+),\s*icon: '\w+',\s*keys: '(\w)'", (page / "tools.js").read_text()
-    )
-    others = re.findall(
-        r"symbols: \[((?:'[^']*'|[^\]'])+)\],\s*description: words\.([\w.]+)",
-        (page / "shortcuts.js").read_text(),
-    )
-    keys = [*((f"'{key}'", words[label]) for label, key in tools)]
-    keys += [(symbols, words[description]) for symbols, description in others]
-    assert len(keys) > 30
-    page_keys = [
-        [text or words[word] for text, word in re.findall(r"'([^']*)'|words\.([\w.]+)", names)]
-        for names, _ in keys
-    ]
-    rows = [
-        f"| {' '.join(f'`{name}`' for name in names)} | {does} |"
-        for names, (_, does) in zip(page_keys, keys, strict=True)
-    ]
-    [table] = re.findall(
-        r"\| key \| does \|\n\|[-|]+\|\n((?:\|.*\n)+)", (ROOT / "docs" / "painter.md").read_text()
-    )
-    assert table.splitlines() == rows
-
-
 def _parsers() -> list[ArgumentParser]:
     """Those of all sub-commands."""
     [commands] = (x for x in command_parser()._actions if isinstance(x.choices, dict))
@@ -212,12 +171,14 @@ def test_numbers_in_other_words_of_the_help_are_those_of_the_code():
 
 
 def test_numbers_of_settings_are_the_same_in_documents_and_on_the_page():
-    page = (ROOT / "lightpaint/paint/page/ui/settings_panel.js").read_text()
+    page = ROOT / "lightpaint" / "paint" / "page"
+    texts = (page / "language" / "en.js").read_text()
     solving, method = ((ROOT / "docs" / name).read_text() for name in ("solving.md", "method.md"))
-    assert f"const DEFAULT_HOLD = {DEFAULT_HOLD:g};" in page
+    panel = (page / "ui" / "settings_panel.js").read_text()
+    assert f"const DEFAULT_HOLD = {DEFAULT_HOLD:g};" in panel
     assert f"`--hold {DEFAULT_HOLD:g}`" in solving
     assert f"It is {DEFAULT_HOLD:g} by default where something was painted over" in method
-    for text in (" ".join(words_of_the_page().values()), solving):
+    for text in (texts, solving):
         assert f"{LAMP_KELVINS[0]} to {LAMP_KELVINS[1]} K" in text
     assert f"`--kelvin '*={LAMP_KELVINS[0]}:{LAMP_KELVINS[1]}'`" in method
 

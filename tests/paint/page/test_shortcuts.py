@@ -5,6 +5,7 @@ from typing import Any
 
 from axe import violations
 from painter_page import Painter
+from renderer import REPOSITORY
 
 TABLE = """async () => {
   const { DEFAULT_KEYS, keyText, shortcutsOf } = await import('/ui/key_bindings.js');
@@ -57,6 +58,23 @@ def test_every_key_is_in_the_list_and_in_the_tip_of_its_control(new_painter: Any
         row = key_button(painter, entry["description"])
         assert row.inner_text().split() == entry["shown"].split(), entry
     assert {one["command"] for one in table if one["shortcut"] not in shown} == LISTED_ONLY
+
+
+def test_the_document_lists_the_keys_of_the_page(new_painter: Any) -> None:
+    painter: Painter = new_painter()
+    keys = painter.page.evaluate(
+        """async () => {
+          const { DEFAULT_KEYS, keySymbols } = await import('/ui/key_bindings.js');
+          const { SHORTCUTS } = await import('/ui/shortcuts.js');
+          return SHORTCUTS.flatMap(({ keys }) => keys).map((key) =>
+            [key.symbols ?? keySymbols(DEFAULT_KEYS[key.command]), key.description]);
+        }"""
+    )
+    rows = [f"| {' '.join(f'`{name}`' for name in names)} | {does} |" for names, does in keys]
+    document = (REPOSITORY / "docs" / "painter.md").read_text()
+    [table] = re.findall(r"\| key \| does \|\n\|[-|]+\|\n((?:\|.*\n)+)", document)
+    assert len(rows) > 50
+    assert table.splitlines() == rows
 
 
 def test_a_key_is_changed_shown_kept_and_reset(new_painter: Any, axe: str) -> None:
