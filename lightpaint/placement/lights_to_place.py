@@ -13,7 +13,7 @@ from lightpaint.placement.free_light import FreeLight, places_of
 from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.movable import Movable
 from lightpaint.placement.new_lights import NEW_CONE, MirroredPair, NewLights
-from lightpaint.placement.paths.frozen_paths import PanelSite
+from lightpaint.placement.paths.light_origin import PanelSite
 from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.placement.space.free_space import as_position
 from lightpaint.placement.space.permitted_places import BoxOfPlaces, Places

@@ -22,7 +22,7 @@ from lightpaint.placement.lights_to_place import (
 )
 from lightpaint.placement.movable import Arrangement, Movable
 from lightpaint.placement.new_lights import MirroredPair, NewLights
-from lightpaint.placement.paths.frozen_paths import PanelSite
+from lightpaint.placement.paths.light_origin import PanelSite
 from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.placement.placement import AddedLight, Move, Placement, hung
 from lightpaint.placement.placement_fit import fit_of

@@ -16,7 +16,8 @@ import lightpaint as lp
 from lightpaint.arrays import Floats, Position
 from lightpaint.errors import SceneError
 from lightpaint.images.pixel_blocks import block_mean
-from lightpaint.placement.paths.frozen_paths import FrozenPaths, PanelSite
+from lightpaint.placement.paths.frozen_paths import FrozenPaths
+from lightpaint.placement.paths.light_origin import PanelSite
 from lightpaint.placement.paths.path_sums import PathSums
 from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.scene.lights.new_emitter import NewEmitter
@@ -27,6 +28,9 @@ from lightpaint.scene.surfaces import render_features
 
 #: Where kernels are counted.
 COUNT_KERNELS = REPOSITORY / "tests" / "frozen_path_kernels.py"
+
+#: Largest number of vertices that share light: about those of one path for each pixel.
+MOST = 3000
 
 #: Lights of the test room that no ray meets by chance.
 SEARCHED = ("bulb", "beam", "sun")
@@ -141,6 +145,43 @@ def test_a_filter_along_surfaces_takes_noise_and_no_light(room: Scene) -> None:
     assert filtered.mean() == pytest.approx(truth.mean(), rel=0.05)
 
 
+@pytest.mark.parametrize("bounces", [6, 8, 20])
+def test_no_number_of_paths_changes_the_energy(room: Scene, bounces: int) -> None:
+    """Also where they do not fill square grids of cells in a pixel."""
+    light, expected = (
+        along_paths(room, lambda p: p.indirect_images(sites(room)).sum(), bounces=count)
+        for count in (bounces, 100)
+    )
+    assert light == pytest.approx(expected, rel=0.1)  # noise
+
+
+def test_vertices_that_share_with_none_are_those_of_all_paths(room: Scene) -> None:
+    """In cells so small that each vertex has its own, as without cells."""
+    placed = [*sites(room), Site((0.1, 1.2, 0.4), (0.0, -1.0, 0.2), cutoff=30.0, beam=20.0)]
+    own, shared = (
+        along_paths(room, lambda p: p.indirect_images(placed), bounces=4, seed=2, **options)
+        for options in ({}, {"shared": 10**12})
+    )
+    np.testing.assert_allclose(shared, own, atol=1e-5 * own.max())  # float32
+
+
+def test_vertices_of_all_paths_share_few_shadow_rays(room: Scene) -> None:
+    """As many as those of few paths have less than half their noise, and the same light."""
+    truth = along_paths(room, lambda p: p.indirect_images(sites(room)), bounces=400)
+
+    def error(seed: int, **options: Any) -> Floats:
+        def squares(paths: FrozenPaths) -> Floats:
+            assert paths.indirect is not None
+            assert len(paths.indirect) <= MOST
+            return np.square(paths.indirect_images(sites(room)) - truth).sum(axis=(1, 2, 3))
+
+        return along_paths(room, squares, first_hits=1, seed=seed, **options)
+
+    few = np.mean([error(seed, bounces=1) for seed in range(3)], axis=0)
+    many = np.mean([error(seed, bounces=25, shared=MOST) for seed in range(3)], axis=0)
+    assert (many < 0.5 * few).all()
+
+
 def test_one_place_has_one_column_whatever_came_before(room: Scene) -> None:
     site = Site(position=(0.2, 1.1, 0.4))
     other_site = Site(position=(-0.4, 1.3, 0.1))
@@ -166,7 +207,7 @@ def test_light_falls_with_the_square_of_the_distance(room: Scene) -> None:
 
     def ratio(paths: FrozenPaths) -> Floats:
         near, far = (
-            paths.contributions(paths.direct, Site(position=(0, y, 0.2))).astype(float)
+            paths.contributions(paths.direct, [Site(position=(0, y, 0.2))])[0].astype(float)
             for y in (1.0, 1.001)
         )
         points = paths.points(paths.direct).astype(float)
@@ -195,7 +236,7 @@ def test_cones_are_those_of_mitsuba(room: Scene) -> None:
         angle = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
         # Linear in the angle, as Mitsuba documents it.
         share = np.clip((beam.cutoff - angle) / (beam.cutoff - beam.beam), 0, 1)
-        light = share[:, None] * paths.contributions(vertices, beam)
+        light = share[:, None] * paths.contributions(vertices, [beam])[0]
         pixels, starts = vertices.first_of_pixel
         image = np.zeros((paths.size[0] * paths.size[1], 3))
         image[pixels] = np.add.reduceat(light, starts, axis=0)

@@ -14,7 +14,7 @@ from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.placement.free_light import FreeLight
 from lightpaint.placement.look_goals import LookGoal
 from lightpaint.placement.movable import Arrangement, Movable
-from lightpaint.placement.paths.frozen_paths import PanelSite
+from lightpaint.placement.paths.light_origin import PanelSite
 from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.placement.placement_fit import PlacementFit
 from lightpaint.placement.search.pose_steps import PoseSteps

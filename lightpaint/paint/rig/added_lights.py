@@ -12,7 +12,7 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.errors import PaintError, SceneError
 from lightpaint.paint.rig.cameras import FirstHit
 from lightpaint.paint.rig.pointing import FreeLength
-from lightpaint.placement.paths.frozen_paths import PanelSite
+from lightpaint.placement.paths.light_origin import PanelSite
 from lightpaint.scene.lights.light import Light
 from lightpaint.scene.lights.new_emitter import PLUGIN_OF, NewEmitter
 from lightpaint.scene.properties.emission import MULTIPLE, PLUGINS

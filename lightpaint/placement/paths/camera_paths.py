@@ -54,6 +54,14 @@ class Vertices:
         """Their places, (v, 3) float32."""
         return np.array(self.interaction.p, dtype=np.float32).reshape(3, -1).T.copy()
 
+    def pixel_sums(self, light: Floats, count: int) -> Floats:
+        """Return sums over the vertices of each of `count` pixels, (…, h · w). light: (…, v)."""
+        pixels, starts = self.first_of_pixel
+        sums = np.zeros((*light.shape[:-1], count), np.float32)
+        if len(pixels):
+            sums[..., pixels] = np.add.reduceat(light, starts, axis=-1)
+        return sums
+
 
 def longest_path(scene: Scene) -> int:
     """Return the largest number of vertices of a path at which lights contribute."""
@@ -77,15 +85,18 @@ def later_vertices_of(
     longest: int,
     rng: np.random.Generator,
 ) -> Vertices | None:
-    """Return the vertices of paths after the first ones, ordered by pixel."""
+    """Return the vertices of paths after the first ones, ordered by pixel.
+
+    paths: of each pixel, about: they fill grids of cells in a pixel.
+    """
     import drjit as dr
     import mitsuba as mi
 
     side = max(1, math.isqrt(paths))
-    vertices = []
-    for _ in range(max(1, round(paths / side**2))):
+    vertices, rounds = [], max(1, round(paths / side**2))
+    for _ in range(rounds):
         rays, weight, pixels = _camera_rays(camera, size, side, rng)
-        weight *= side**2 / paths
+        weight /= rounds
         for depth in range(longest):
             hits = _compressed(loaded.ray_intersect(rays), weight, pixels)
             if not len(hits):

@@ -12,7 +12,7 @@ indirect light is smooth, and is averaged along surfaces (images/surface_filter.
 
 import math
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -29,9 +29,15 @@ from lightpaint.placement.paths.camera_paths import (
     later_vertices_of,
     longest_path,
 )
+from lightpaint.placement.paths.light_origin import (
+    ORIGIN_VALUES,
+    LightOrigin,
+    PanelSite,
+    added_light,
+)
 from lightpaint.placement.paths.panels_in_view import SightLines
+from lightpaint.placement.paths.shared_vertices import SharedVertices
 from lightpaint.placement.paths.spot_cones import away_from, share_in_cone
-from lightpaint.scene.properties.rotation import across
 from lightpaint.scene.properties.site import Site
 from lightpaint.scene.runtime.render_lock import tracing
 from lightpaint.scene.scene import Scene
@@ -43,47 +49,8 @@ LANES = 2**20
 #: Number of cached values at vertices, which limits the number of cached origins.
 KEPT_VALUES = 2**24
 
-#: Shadow rays stop short of a light by this, relative to its distance, to miss its mounting
-#: surface.
-SHADOW_EPSILON = 1e-3
-
-#: Values of an origin that a launch reads: position, axis, two half sides of a panel, kind.
-ORIGIN_VALUES = 13
-_POINT, _SUN, _PANEL = 0.0, 1.0, 2.0
-
 #: Steps of the sequence that spreads points over a panel: the reciprocals of the plastic number.
 _SPREAD = np.array([0.7548776662466927, 0.5698402909980532])
-
-
-@dataclass(frozen=True)
-class PanelSite(Site):
-    """The place of a square panel, which shines to its front. side: in units of the scene."""
-
-    side: float = 0.0
-
-
-@dataclass(frozen=True)
-class LightOrigin:
-    """The parameters of a shadow ray: the origin of light, without the cone of a spot."""
-
-    position: tuple[float, ...]
-    axis: tuple[float, ...]
-    side: float
-    kind: float
-
-    @classmethod
-    def of(cls, site: Site) -> "LightOrigin":
-        if site.position is None:
-            return cls((0, 0, 0), site.direction or (0, 0, 1), 0, _SUN)
-        if isinstance(site, PanelSite):
-            return cls(site.position, site.direction or (0, 0, 1), site.side, _PANEL)
-        return cls(site.position, (0, 0, 1), 0, _POINT)
-
-    @property
-    def row(self) -> Floats:
-        """Its values for a launch."""
-        sides = across(self.axis) * self.side / 2
-        return np.array([*self.position, *self.axis, *sides.ravel(), self.kind], np.float32)
 
 
 class FrozenPaths:
@@ -94,6 +61,8 @@ class FrozenPaths:
         loaded: That scene, loaded; see `Scene.while_loaded`.
         first_hits: First hits of a pixel, a square number.
         bounces: Paths per pixel that continue from further first hits; 0 for direct light only.
+        shared: Largest number of vertices after first hits that take the light of a place, for all
+            others near them; None for all.
         seed: Of the paths.
 
     Raises:
@@ -101,7 +70,14 @@ class FrozenPaths:
     """
 
     def __init__(
-        self, scene: Scene, loaded: Any, *, first_hits: int = 16, bounces: int = 4, seed: int = 0
+        self,
+        scene: Scene,
+        loaded: Any,
+        *,
+        first_hits: int = 16,
+        bounces: int = 4,
+        shared: int | None = None,
+        seed: int = 0,
     ) -> None:
         if scene.has_media:
             raise SceneError(f"{scene.path} has fog or the like: lights cannot be moved in it")
@@ -119,7 +95,10 @@ class FrozenPaths:
                 if bounces and longest > 1
                 else None
             )
+            if shared is not None and self.indirect is not None:
+                self.indirect = SharedVertices.of(self.indirect, shared, rng)
         self._shift = rng.random(2)
+        self._panel_points: dict[int, tuple[Any, Any]] = {}
         self._filter: SurfaceFilter | None = None
         self._kept: OrderedDict[tuple[int, LightOrigin], _Shone] = OrderedDict()
 
@@ -169,9 +148,10 @@ class FrozenPaths:
             image[...] = raw if self._filter is None else self._filter(raw)
         return images
 
-    def contributions(self, vertices: Vertices, site: Site) -> Floats:
-        """Return contributions of `site` at the vertices, (v, 3); for a spot, without its cone."""
-        return self._shone(vertices, [LightOrigin.of(site)])[0].light.T
+    def contributions(self, vertices: Vertices, sites: Sequence[Site]) -> Floats:
+        """Return contributions of sites at the vertices, (k, v, 3); of spots without their cone."""
+        shone = self._shone(vertices, [LightOrigin.of(site) for site in sites])
+        return np.stack([each.light.T for each in shone])
 
     def points(self, vertices: Vertices) -> Floats:
         """Return the places of vertices, (v, 3)."""
@@ -179,7 +159,8 @@ class FrozenPaths:
 
     def _sums(self, vertices: Vertices, sites: Sequence[Site]) -> Floats:
         """Return the images of lights from their contributions at vertices, (k, h · w, 3)."""
-        sums = np.empty((len(sites), self.size[0] * self.size[1], 3), np.float32)
+        count = self.size[0] * self.size[1]
+        sums = np.empty((len(sites), count, 3), np.float32)
         origins = [LightOrigin.of(site) for site in sites]
         # Sites of one origin, like the directions of a spot, share its shadow rays.
         by_origin: dict[LightOrigin, list[int]] = {}
@@ -191,15 +172,7 @@ class FrozenPaths:
             batch = distinct[start : start + at_once]
             for origin, shone in zip(batch, self._shone(vertices, batch), strict=True):
                 for k in by_origin[origin]:
-                    sums[k] = self._pixel_sums(vertices, shone.towards(sites[k])).T
-        return sums
-
-    def _pixel_sums(self, vertices: Vertices, light: Floats) -> Floats:
-        """Return sums over the vertices of each pixel, (…, h · w). light: (…, v)."""
-        pixels, starts = vertices.first_of_pixel
-        sums = np.zeros((*light.shape[:-1], self.size[0] * self.size[1]), np.float32)
-        if len(pixels):
-            sums[..., pixels] = np.add.reduceat(light, starts, axis=-1)
+                    sums[k] = vertices.pixel_sums(shone.towards(sites[k]), count).T
         return sums
 
     def _shone(self, vertices: Vertices, origins: Sequence[LightOrigin]) -> "list[_Shone]":
@@ -223,9 +196,11 @@ class FrozenPaths:
         """Return the points of a panel that vertices sample, two coordinates from -1 to 1."""
         import mitsuba as mi
 
-        start = np.arange(count)[:, None] * _SPREAD + self._shift
-        u, v = (mi.Float(aligned(x, np.float32)) for x in (2 * (start % 1) - 1).T)
-        return u, v
+        if count not in self._panel_points:
+            start = np.arange(count)[:, None] * _SPREAD + self._shift
+            u, v = (mi.Float(aligned(x, np.float32)) for x in (2 * (start % 1) - 1).T)
+            self._panel_points[count] = u, v
+        return self._panel_points[count]
 
     def _launch(self, vertices: Vertices, rows: Floats) -> Floats:
         """Return the light of origins at vertices, (k, 3, v). rows: (k, ORIGIN_VALUES)."""
@@ -278,42 +253,3 @@ class _Shone:
     @cached_property
     def _away(self) -> Floats:
         return away_from(self.origin.position, self.vertices.points)
-
-
-def added_light(
-    loaded: Any,
-    vertices: Vertices,
-    row: Sequence[Any],
-    at: tuple[Any, Any],
-    share_towards: Callable[[Any], Any] | None = None,
-) -> Any:
-    """Return contributions of origins at vertices, as a color of Mitsuba. row: the values of one.
-
-    Each vertex samples its own point of a panel. at: that point, two coordinates from -1 to 1.
-    share_towards: returns the share of its light that a spot sends in directions; where there is
-    none, no ray is traced.
-    """
-    import drjit as dr
-    import mitsuba as mi
-
-    si, kind = vertices.interaction, row[12]
-    is_sun, is_panel = (kind > _POINT) & (kind < _PANEL), kind > _SUN
-    axis = mi.Vector3f(*row[3:6])
-    place = mi.Point3f(*row[:3])
-    sides = mi.Vector3f(*row[6:9]), mi.Vector3f(*row[9:12])
-    place += at[0] * sides[0] + at[1] * sides[1]
-    between = place - si.p
-    squared = dr.squared_norm(between)
-    towards = dr.select(is_sun, -axis, between * dr.rsqrt(squared))
-    area = 4 * dr.norm(sides[0]) * dr.norm(sides[1])
-    power = dr.select(is_panel, area * dr.maximum(dr.dot(-towards, axis), 0), 1) / squared
-    power = dr.select(is_sun, 1.0, power)
-    if share_towards is not None:
-        power *= share_towards(-towards)
-    is_lit = power > 0
-    reflected = si.bsdf().eval(mi.BSDFContext(), si, si.to_local(towards), is_lit)
-    is_lit &= dr.max(reflected) > 0
-    ray = si.spawn_ray(towards)
-    ray.maxt = dr.select(is_sun, dr.inf, dr.sqrt(squared) * (1 - SHADOW_EPSILON))
-    is_lit &= ~loaded.ray_test(ray, is_lit)
-    return dr.select(is_lit, vertices.throughput * reflected * power, 0.0)

@@ -114,7 +114,14 @@ class SightLines:
 
 def _across(directions: Floats) -> Floats:
     """Return the sides of panels, (k, 2, 3) unit vectors, as `across` has them, for directions."""
-    axes = directions / np.linalg.norm(directions, axis=1, keepdims=True)
-    normals = np.cross(axes, np.eye(3, dtype=np.float32)[np.argmin(np.abs(axes), axis=1)])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.stack([normals, np.cross(axes, normals)], axis=1)
+    axes = directions / np.sqrt(np.square(directions).sum(axis=1, keepdims=True))
+    normals = _cross(axes, np.eye(3, dtype=np.float32)[np.argmin(np.abs(axes), axis=1)])
+    normals /= np.sqrt(np.square(normals).sum(axis=1, keepdims=True))
+    return np.stack([normals, _cross(axes, normals)], axis=1)
+
+
+def _cross(first: Floats, second: Floats) -> Floats:
+    """Return cross products of rows, (k, 3), as `np.cross`, in a fraction of its time for few."""
+    next_axis, last_axis = [1, 2, 0], [2, 0, 1]
+    ahead = first[:, next_axis] * second[:, last_axis]
+    return np.asarray(ahead - first[:, last_axis] * second[:, next_axis])

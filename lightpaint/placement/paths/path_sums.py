@@ -12,12 +12,8 @@ import numpy as np
 
 from lightpaint.arrays import Floats, aligned
 from lightpaint.placement.paths.camera_paths import Vertices
-from lightpaint.placement.paths.frozen_paths import (
-    ORIGIN_VALUES,
-    FrozenPaths,
-    LightOrigin,
-    added_light,
-)
+from lightpaint.placement.paths.frozen_paths import FrozenPaths
+from lightpaint.placement.paths.light_origin import ORIGIN_VALUES, LightOrigin, added_light
 from lightpaint.scene.properties.site import Site
 from lightpaint.scene.runtime.render_lock import tracing
 

@@ -25,12 +25,15 @@ from lightpaint.scene.scene_render import Stream, pass_seed
 from lightpaint.scene.surfaces import loaded_features
 
 #: First hits per pixel, and continued paths, to rank and compare candidates on small films.
-COARSE_SAMPLES = ((1, 0), (9, 2))
+COARSE_SAMPLES = ((1, 0), (16, 16))
 
 #: Approximate number of first hits on a larger film, in each of two halves, to refine and judge
 #: candidates and to measure the spread of places; the smallest and largest side of their grid in a
 #: pixel; and the share of them that continue as paths.
-FINE_HITS, FINE_SIDES, CONTINUED_SHARE = 2**17, (3, 6), 2 / 9
+FINE_HITS, FINE_SIDES, CONTINUED_SHARE = 2**17, (3, 6), 1
+
+#: Largest number of vertices after first hits that take the light of a place.
+SHARED = 2**13, 2**13
 
 #: Number of independent sets of paths per view.
 SETS = 10
@@ -78,9 +81,10 @@ class ViewPaths:
         """The first hits, (v, 3)."""
         return np.concatenate([part.points(part.direct) for part in self.parts])
 
-    def contributions(self, site: Site) -> Floats:
-        """Return a light's contribution at each first hit, (v, 3), as if it shone all around."""
-        return np.concatenate([part.contributions(part.direct, site) for part in self.parts])
+    def contributions(self, sites: Sequence[Site]) -> Floats:
+        """Return contributions at each first hit, (k, v, 3), as if lights shone all around."""
+        parts = [part.contributions(part.direct, sites) for part in self.parts]
+        return np.concatenate(parts, axis=1)
 
     @cached_property
     def eyes(self) -> list[Doubles]:
@@ -179,6 +183,7 @@ class SearchPaths:
                 self.loaded,
                 first_hits=samples[0],
                 bounces=samples[1],
+                shared=SHARED[views is self._large],
                 seed=pass_seed(self._seed, Stream.FROZEN_PATHS, k + SETS * j),
             )
             view_paths.append(paths.filtered_along(view_features))

@@ -33,7 +33,7 @@ NOTHING = 1e-4
 FEW_FITS = 1.3213
 
 #: Steps of a fit along other paths, and their initial differences, relative to those of a search.
-REFIT_STEPS, REFIT_SHARE = 5, 0.5
+REFIT_STEPS, REFIT_SHARE = 3, 0.5
 
 
 @dataclass(frozen=True)

@@ -17,10 +17,10 @@ from lightpaint.placement.search.pose_search import SHORT_STEPS, PoseSearch
 from lightpaint.scene.properties.pose import Site
 
 #: Least decrease of the error for which a new light moves once all are added.
-WORTH_AGAIN = 0.05
+WORTH_AGAIN = 0.02
 
 #: Steps of all lights together, after each addition.
-STEPS = 6
+STEPS = 8
 
 #: Weight, relative to the largest, below which a light is off.
 OFF = 1e-6
@@ -54,7 +54,7 @@ class NewLightSearch:
             if more is None:
                 break
             # Until the others make room for it, a light may seem to gain next to nothing.
-            more = self._steps.descend(more, self._paths.compare, STEPS, first_share=0.5)
+            more = self._steps.descend(more, self._paths.compare, STEPS, first_share=1.0)
             if not self._judge.is_worth(arrangement, more):
                 break
             added = more.movables[-1]
@@ -63,14 +63,17 @@ class NewLightSearch:
         return self._merged(self._tried_again(arrangement))
 
     def _tried_again(self, arrangement: Arrangement) -> Arrangement:
-        """Return the arrangement after trying each new light at other places."""
-        for k, movable in enumerate(arrangement.movables):
+        """Return the arrangement after trying each new light at other places.
+
+        The last one has just been tried with the others where they are.
+        """
+        for k, movable in enumerate(arrangement.movables[:-1]):
             if movable.group is None or arrangement.missed <= NOTHING * self._fit.norm2:
                 continue
             better = self._search.tried(arrangement, k)
             if better.missed < (1 - WORTH_AGAIN) * arrangement.missed:
                 arrangement = self._steps.descend(
-                    better, self._paths.compare, STEPS, first_share=0.5
+                    better, self._paths.compare, STEPS, first_share=1.0
                 )
         return arrangement
 
@@ -132,7 +135,7 @@ class NewLightSearch:
         del sites[second]
         fitted = self._steps.fitted(movables, sites, self._paths.compare)
         joined = Arrangement(tuple(movables), tuple(sites), fitted)
-        return self._steps.descend(joined, self._paths.compare, STEPS, first_share=0.5)
+        return self._steps.descend(joined, self._paths.compare, STEPS, first_share=1.0)
 
     def _nearest_pair(self, arrangement: Arrangement) -> tuple[int, int] | None:
         """Return the nearest two new lights of one group that may be merged, or None."""

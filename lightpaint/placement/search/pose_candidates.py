@@ -13,7 +13,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.placement.free_light import FreeLight
-from lightpaint.placement.paths.frozen_paths import PanelSite
+from lightpaint.placement.paths.light_origin import PanelSite
 from lightpaint.placement.paths.spot_cones import away_from
 from lightpaint.placement.paths.view_paths import ViewPaths
 from lightpaint.placement.placement_fit import Ranking
@@ -26,6 +26,12 @@ APART, CONES = 20.0, 5
 
 #: Number of trial sides of a panel that the camera sees, and of pixels that are enough to rank it.
 SIDES, SEEN_PIXELS = 3, 256
+
+#: Number of directions, from one place, in which all cones and sides are tried.
+AIMS = 12
+
+#: Number of lights whose contributions are computed at once.
+AT_ONCE = 64
 
 #: Every second first hit is used.
 THINNING = 2
@@ -56,9 +62,10 @@ class PoseCandidates:
         if light.site.position is None:
             yield from self._suns(light)
             return
-        for place in places:
-            at_place = replace(light.site, position=as_position(place))
-            added = self._paths.contributions(Site(at_place.position))[::THINNING]
+        at_places = [replace(light.site, position=as_position(place)) for place in places]
+        for place, at_place, added in zip(
+            places, at_places, self._contributions(at_places), strict=True
+        ):
             if light.site.direction is None:
                 yield self._gains(added, None), partial(_aimed, at_place, None)
                 continue
@@ -66,13 +73,28 @@ class PoseCandidates:
             if isinstance(at_place, PanelSite):
                 yield from self._panels(light, at_place, directions, added, np.maximum(cosine, 0))
                 continue
-            for cutoff, beam in cones:
-                # Linear in the cosine instead of the angle, which ranks as well.
-                edge, full = (math.cos(math.radians(angle)) for angle in (cutoff, beam))
-                share = (cosine - np.float32(edge)) * np.float32(1 / max(full - edge, 1e-6))
-                opened = replace(at_place, cutoff=cutoff, beam=beam)
-                gains = self._gains(added, np.clip(share, 0, 1, out=share))
-                yield gains, partial(_aimed, opened, directions)
+            yield from self._spots(at_place, cones, directions, added, cosine)
+
+    def _spots(
+        self,
+        site: Site,
+        cones: Sequence[tuple[float, float]],
+        directions: Floats,
+        added: Floats,
+        cosine: Floats,
+    ) -> Iterator[tuple[Doubles, Callable[[int], Site]]]:
+        """Yield the gains of spots at one place: the first cone in all directions, and the others
+        in the best ones. added, cosine: at first hits.
+        """
+        for cutoff, beam in cones:
+            # Linear in the cosine instead of the angle, which ranks as well.
+            edge, full = (math.cos(math.radians(angle)) for angle in (cutoff, beam))
+            share = (cosine - np.float32(edge)) * np.float32(1 / max(full - edge, 1e-6))
+            opened = replace(site, cutoff=cutoff, beam=beam)
+            gains = self._gains(added, np.clip(share, 0, 1, out=share))
+            yield gains, partial(_aimed, opened, directions)
+            best = np.argsort(-gains)[:AIMS]
+            directions, cosine = directions[best], cosine[best]
 
     def _panels(
         self,
@@ -82,7 +104,7 @@ class PoseCandidates:
         added: Floats,
         cosine: Floats,
     ) -> Iterator[tuple[Doubles, Callable[[int], Site]]]:
-        """Yield the gains of panels at one place. added, cosine: at first hits."""
+        """Yield the gains of panels at one place; see `_spots`. added, cosine: at first hits."""
         sides = light.some_sides(SIDES)
         assert site.position is not None
         radius = sides.max() / math.sqrt(2)
@@ -96,12 +118,21 @@ class PoseCandidates:
             # From afar, a panel acts as a point whose light falls off with the cosine.
             gains = self._gains(added * side**2, cosine, seen)
             yield gains, partial(_aimed, replace(site, side=float(side)), directions)
+            best = np.argsort(-gains)[:AIMS]
+            directions, cosine = directions[best], cosine[best]
 
     def _suns(self, light: FreeLight) -> Iterator[tuple[Doubles, Callable[[int], Site]]]:
-        for direction in light.directions(APART / 2):
-            site = replace(light.site, direction=as_position(direction))
-            added = self._paths.contributions(site)[::THINNING]
+        directions = light.directions(APART / 2)
+        sites = [replace(light.site, direction=as_position(x)) for x in directions]
+        for site, added in zip(sites, self._contributions(sites), strict=True):
             yield self._gains(added, None), partial(_aimed, site, None)
+
+    def _contributions(self, sites: Sequence[Site]) -> Iterator[Floats]:
+        """Yield the contributions of lights at first hits, (v, 3), without cones and sizes."""
+        bare = [site if site.position is None else Site(site.position) for site in sites]
+        for start in range(0, len(bare), AT_ONCE):
+            for added in self._paths.contributions(bare[start : start + AT_ONCE]):
+                yield added[::THINNING]
 
     def _gains(
         self,

@@ -13,7 +13,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Floats
 from lightpaint.placement.movable import Arrangement, Movable, all_sites, by_column
-from lightpaint.placement.paths.frozen_paths import PanelSite
+from lightpaint.placement.paths.light_origin import PanelSite
 from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.placement.placement_fit import Fitted, PlacementFit, Ranking, with_columns
 from lightpaint.placement.search.pose_candidates import PoseCandidates, best_poses
@@ -21,15 +21,16 @@ from lightpaint.placement.search.pose_rules import PoseRules
 from lightpaint.placement.search.pose_steps import PoseSteps
 from lightpaint.scene.properties.pose import Site
 
-#: Number of trial places of a light: if all lights are on lines, otherwise, and for new lights.
-PLACES_ON_LINES, PLACES, PLACES_OF_NEW = 24, 64, 112
+#: Number of trial places of a light: if all lights are on lines, otherwise, and for new lights and
+#: new panels, which have many directions and sides.
+PLACES_ON_LINES, PLACES, PLACES_OF_NEW, PLACES_OF_PANELS = 24, 64, 176, 112
 
 #: Number of further trial places of a panel, where the camera may see it, and their largest
 #: distance, relative to the spread of visible points.
 PLACES_IN_VIEW, REACH = 64, 4.0
 
 #: Number of best places around which more are tried, and the number of these.
-BESIDE, AROUND = 6, 8
+BESIDE, AROUND = 10, 10
 
 #: Largest number of rounds over all lights, and the share by which a round has to lower the error
 #: for another one.
@@ -37,7 +38,7 @@ TURNS, WORTH_A_TURN = 2, 0.15
 
 #: Number of candidates for which all light is computed; number of those that are refined, far apart
 #: in place or direction; and the steps of the refinement.
-COMPARED, REFINED, SHORT_STEPS = 32, 3, 3
+COMPARED, REFINED, SHORT_STEPS = 40, 5, 4
 
 #: Least distance between refined candidates, relative to the spread of visible points, and in
 #: degrees.
@@ -137,7 +138,7 @@ class PoseSearch:
             return light.some_places(1, self._rng)
         count = PLACES_ON_LINES if light.freedom.all_rails else PLACES
         if movable.group is not None:
-            count = PLACES_OF_NEW
+            count = PLACES_OF_PANELS if isinstance(light.site, PanelSite) else PLACES_OF_NEW
         places = light.some_places(count, self._rng)
         is_permitted = self._is_permitted(others, movable, places)
         if movable.group is None:

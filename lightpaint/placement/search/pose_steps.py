@@ -8,7 +8,7 @@ import numpy as np
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.placement.free_light import FreeLight
 from lightpaint.placement.movable import Arrangement, Movable, all_sites, by_column
-from lightpaint.placement.paths.frozen_paths import PanelSite
+from lightpaint.placement.paths.light_origin import PanelSite
 from lightpaint.placement.paths.view_paths import ViewPaths
 from lightpaint.placement.placement_fit import Fitted, PlacementFit, with_columns
 from lightpaint.placement.space.free_space import as_position
