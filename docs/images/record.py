@@ -274,12 +274,14 @@ def keep_looks(hand: Hand) -> None:
 
 
 def _save(hand: Hand, name: str) -> None:
-    hand.page.get_by_role("button", name="Save look").first.click()
-    field = hand.page.get_by_role("textbox", name="Name").first
-    if field.count():
-        field.fill(name)
-        field.press("Enter")
-    hand.wait()
+    page = hand.page
+    page.get_by_role("button", name="Save look").first.click()
+    page.wait_for_timeout(1000)
+    page.locator(".look-name").last.click()
+    field = page.locator("input.naming")
+    field.fill(name)
+    field.press("Enter")
+    page.wait_for_timeout(500)
 
 
 def looks_beside(hand: Hand) -> None:

@@ -95,7 +95,8 @@ def compared_areas(request: LookLike) -> Sequence[LightArea]:
         return (WHOLE_AREAS[0], *PART_AREAS)
     if not request.pairs:
         raise PaintError("no places to compare: press one in the reference, then in the picture")
-    return [
+    spots = [
         spot_area(f"Place {k + 1}", pair.reference, pair.picture, SEEN_RADIUS, CHANGED_RADIUS)
         for k, pair in enumerate(request.pairs)
     ]
+    return [WHOLE_AREAS[0], *spots]

@@ -921,10 +921,10 @@ export interface DropReference {
  * Put layers on top that ask for the light of a reference, within what is selected: one step.
  * Answered by `patch`.
  *
- * areas: that are compared: the `whole` picture with its shadows and lit parts; also its
- * `regions`, top, middle and bottom; nine `parts`, for a reference of the same view; or `pairs` of
- * places, each in the reference and in the view. matches_brightness: whether the picture becomes
- * as bright as the reference; otherwise only differences within it count.
+ * areas: that are compared beside the colour of the `whole` picture: its shadows and lit parts;
+ * these and its `regions`, top, middle and bottom; nine `parts`, for a reference of the same view;
+ * or `pairs` of places, each in the reference and in the view. matches_brightness: whether the
+ * picture becomes as bright as the reference; otherwise only differences within it count.
  */
 export interface LookLike {
   reference: number;

@@ -86,16 +86,21 @@ function LookLikeFields({ ui, app, shown }) {
   const { store, session, engine } = app;
   const pairs = shownPairs(ui);
   const arePairs = ui.comparedAreas === 'pairs';
-  const ask = () => {
+  const ask = async () => {
     engine.cancel();
+    const before = new Set(store.value.layers.map(({ id }) => id));
     store.set((state) => ({ open: { ...state.open, layers: true }, hint: false }));
-    void session.send('look_like', {
+    await session.send('look_like', {
       reference: shown,
       areas: ui.comparedAreas,
       pairs: pairs.map(({ reference, picture }) => ({ reference, picture })),
       view: ui.view,
       matches_brightness: ui.matchesBrightness,
     });
+    // Its strength is what people change next, and its many layers hardly ever.
+    const group = store.value.layers.find(({ id, kind }) => kind === 'group' && !before.has(id));
+    if (group)
+      store.set(({ open }) => ({ openLayer: group.id, open: { ...open, [`layer ${group.id}`]: false } }));
   };
   return html`<div class="look-like">
     <${Choice} label=${words.references.whatIsCompared} value=${ui.comparedAreas} choices=${AREAS}
@@ -104,7 +109,7 @@ function LookLikeFields({ ui, app, shown }) {
     <${Checkbox} label=${words.references.asBrightAsIt} checked=${ui.matchesBrightness}
       tip=${words.references.asBrightAsItTip}
       change=${(/** @type {boolean} */ matchesBrightness) => store.set({ matchesBrightness })} />
-    <${Button} label=${words.references.lookLikeThis} primary disabled=${arePairs && !pairs.length} act=${ask}
+    <${Button} label=${words.references.lookLikeThis} primary disabled=${arePairs && !pairs.length} act=${() => void ask()}
       tip=${words.references.lookLikeThisTip} />
   </div>`;
 }
