@@ -247,41 +247,45 @@ def like_a_reference(hand: Hand) -> None:
         label = name.removesuffix(".png")
         page.locator(".reference-name", has_text=label).wait_for()
     page.get_by_role("button", name="Same view", exact=True).click()
+    page.get_by_role("checkbox", name="As bright as it").check()
     page.get_by_role("button", name="Look like this", exact=True).click()
-    page.mouse.move(5, 5)
+    _wait_for_layer(hand, "Like last-sun")
+
+
+def _wait_for_layer(hand: Hand, name: str) -> None:
+    hand.page.locator(".layer-name", has_text=name).first.wait_for()
+    hand.page.mouse.move(5, 5)
     hand.wait()
 
 
 def keep_looks(hand: Hand) -> None:
-    """Looks of the references, and of two presets; each is a step, or several."""
+    """Looks of the references, and of presets; each is a step, or two."""
     page = hand.page
     _save(hand, "Last sun")
     for name in ("overcast", "opening"):
         page.keyboard.press("Control+z")
         page.get_by_role("button", name=f"Show {name}").click()
         page.get_by_role("button", name="Look like this", exact=True).click()
-        hand.wait()
+        _wait_for_layer(hand, f"Like {name}")
         _save(hand, name.capitalize())
     page.get_by_role("button", name="Close the references").click()
     for name in ("Moonlight", "Noir", "Only this object"):
         page.get_by_role("button", name="Clear painting", exact=True).click()
         page.get_by_role("button", name="Presets", exact=True).click()
         page.locator(".sheet button", has_text=name).click()
-        hand.wait()
+        _wait_for_layer(hand, name)
         _save(hand, name)
-    page.mouse.move(5, 5)
-    hand.wait()
 
 
 def _save(hand: Hand, name: str) -> None:
     page = hand.page
+    count = page.locator(".look").count()
     page.get_by_role("button", name="Save look").first.click()
-    page.wait_for_timeout(1000)
+    page.locator(".look").nth(count).wait_for()
     page.locator(".look-name").last.click()
-    field = page.locator("input.naming")
-    field.fill(name)
-    field.press("Enter")
-    page.wait_for_timeout(500)
+    page.locator("input.naming").fill(name)
+    page.keyboard.press("Enter")
+    page.locator(".look-name", has_text=name).wait_for()
 
 
 def looks_beside(hand: Hand) -> None:
