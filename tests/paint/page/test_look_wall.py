@@ -151,6 +151,34 @@ def test_zoom_pan_and_exposure_are_common(open_looks: Any) -> None:
     assert painter.requests("load_look") == []  # a drag takes none
 
 
+def test_two_fingers_zoom_and_one_pans(open_looks: Any) -> None:
+    painter = open_looks()
+    open_wall(painter, "Look 1", "Look 2")
+    painter.page.evaluate(
+        """async () => {
+          const frame = () => new Promise((done) => setTimeout(done, 100));
+          const pane = document.querySelector('.look-pane');
+          const { left, top, width, height } = pane.getBoundingClientRect();
+          const touch = (kind, pointerId, x, y) => pane.dispatchEvent(
+            new PointerEvent(kind, { pointerId, pointerType: 'touch', bubbles: true,
+              clientX: left + x * width, clientY: top + y * height }));
+          touch('pointerdown', 1, 0.4, 0.5);
+          touch('pointerdown', 2, 0.6, 0.5);
+          touch('pointermove', 1, 0.3, 0.5);
+          await frame();
+          touch('pointermove', 2, 0.7, 0.5);
+          await frame();
+          touch('pointerup', 1, 0.3, 0.5);
+          touch('pointerup', 2, 0.7, 0.5);
+        }"""
+    )
+    painter.still()
+    assert painter.ui("display")["zoom"] == pytest.approx(2, rel=0.01)
+    assert np.abs(painter.ui("display")["pan"]).max() < 1  # about the middle
+    painter.page.locator(".look-pane").first.dispatch_event("click")
+    assert painter.requests("load_look") == []
+
+
 def test_pictures_are_those_of_the_engine(open_looks: Any) -> None:
     """Those that ships draws each look with its own lights, as beside each other in two panes."""
     painter = open_looks("lights=5&engine")

@@ -10,6 +10,7 @@ import { updateDisplay } from './tools.js';
 /** @typedef {import("./ui_state.js").Look} Look */
 /** @typedef {import("./shortcuts.js").App} App */
 /** @typedef {{width: number, height: number}} Size in CSS pixels */
+/** @typedef {{x: number, y: number}} Place in the window */
 
 /** Space between pictures, in pixels. */
 const GAP = 4;
@@ -105,52 +106,65 @@ function Wall({ ui, app, looks }) {
 }
 
 /**
- * Pan all pictures by a drag, and zoom them by Ctrl and the wheel.
+ * Pan all pictures by a drag, and zoom them by two fingers or by Ctrl and the wheel.
  * @param {{current: HTMLElement | null}} frame @param {App} app
- * @returns {() => boolean} whether the last press has panned
+ * @returns {() => boolean} whether the last press has moved the pictures
  */
 function usePanning(frame, { store, engine }) {
-  const drag = useRef({ x: 0, y: 0, isDown: false, hasMoved: false });
+  const hasMoved = useRef(false);
   useLayoutEffect(() => {
     const element = frame.current;
     if (!element) return undefined;
+    const root = /** @type {Document | ShadowRoot} */ (element.getRootNode());
     const pan = (/** @type {number} */ x, /** @type {number} */ y) => {
       const scale = engine.panes()[0]?.scale ?? 1;
       const [px, py] = store.value.display.pan;
       updateDisplay(store, { pan: [px - x / scale, py - y / scale] });
     };
-    const controller = new AbortController();
-    const options = { signal: controller.signal };
-    element.addEventListener(
-      'pointerdown',
-      ({ clientX: x, clientY: y }) => (drag.current = { x, y, isDown: true, hasMoved: false }),
-      options,
-    );
-    const move = (/** @type {PointerEvent} */ event) => {
-      const [dx, dy] = [event.clientX - drag.current.x, event.clientY - drag.current.y];
-      const { isDown, hasMoved } = drag.current;
-      if (!isDown || (!hasMoved && Math.hypot(dx, dy) < MIN_PAN)) return;
-      drag.current = { x: event.clientX, y: event.clientY, isDown, hasMoved: true };
-      pan(dx, dy);
+    const zoom = (/** @type {Place} */ { x, y }, /** @type {number} */ factor) => {
+      const pane = root.elementFromPoint(x, y) ?? element;
+      const box = (pane.closest('.look-pane') ?? element).getBoundingClientRect();
+      updateDisplay(store, engine.zoomAt(x - box.left, y - box.top, factor));
     };
-    window.addEventListener('pointermove', move, options);
-    const release = () => (drag.current.isDown = false);
-    window.addEventListener('pointerup', release, options);
-    window.addEventListener('pointercancel', release, options);
+    /** @type {Map<number, Place>} */
+    const fingers = new Map();
+    const press = (/** @type {PointerEvent} */ event) => {
+      if (!fingers.size) hasMoved.current = false;
+      fingers.set(event.pointerId, placeOf(event));
+    };
+    const move = (/** @type {PointerEvent} */ event) => {
+      const [before, place] = [fingers.get(event.pointerId), placeOf(event)];
+      if (!before) return;
+      const [dx, dy] = [place.x - before.x, place.y - before.y];
+      if (!hasMoved.current && Math.hypot(dx, dy) < MIN_PAN) return;
+      hasMoved.current = true;
+      const other = [...fingers].find(([id]) => id !== event.pointerId)?.[1];
+      fingers.set(event.pointerId, place);
+      if (!other) return pan(dx, dy);
+      pan(dx / 2, dy / 2);
+      const middle = { x: (place.x + other.x) / 2, y: (place.y + other.y) / 2 };
+      zoom(middle, distance(place, other) / Math.max(1, distance(before, other)));
+    };
+    const release = (/** @type {PointerEvent} */ event) => fingers.delete(event.pointerId);
     const wheel = (/** @type {WheelEvent} */ event) => {
       event.preventDefault();
-      if (!event.ctrlKey && !event.metaKey) return pan(-event.deltaX, -event.deltaY);
-      const pane = /** @type {HTMLElement} */ (event.target).closest('button');
-      const box = (pane ?? element).getBoundingClientRect();
-      const factor = 2 ** (-event.deltaY / 300);
-      updateDisplay(
-        store,
-        engine.zoomAt(event.clientX - box.left, event.clientY - box.top, factor),
-      );
-      return undefined;
+      if (event.ctrlKey || event.metaKey) zoom(placeOf(event), 2 ** (-event.deltaY / 300));
+      else pan(-event.deltaX, -event.deltaY);
     };
-    element.addEventListener('wheel', wheel, { ...options, passive: false });
+    const controller = new AbortController();
+    const { signal } = controller;
+    element.addEventListener('pointerdown', press, { signal });
+    window.addEventListener('pointermove', move, { signal });
+    window.addEventListener('pointerup', release, { signal });
+    window.addEventListener('pointercancel', release, { signal });
+    element.addEventListener('wheel', wheel, { signal, passive: false });
     return () => controller.abort();
   }, []);
-  return () => drag.current.hasMoved;
+  return () => hasMoved.current;
 }
+
+/** @param {MouseEvent} event @returns {Place} */
+const placeOf = ({ clientX: x, clientY: y }) => ({ x, y });
+
+/** @param {Place} a @param {Place} b */
+const distance = (a, b) => Math.hypot(a.x - b.x, a.y - b.y);
