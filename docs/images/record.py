@@ -308,6 +308,7 @@ def looks_beside(hand: Hand) -> None:
     for box in sheet.get_by_role("checkbox").all():
         box.check()
     sheet.get_by_role("button", name="Side by side").click()
+    page.mouse.move(5, 5)
     page.wait_for_timeout(2000)
 
 
