@@ -239,6 +239,17 @@ def test_what_cannot_be_asked_for_is_refused_and_nothing_changes(session: Sessio
         session.references.add("x", np.zeros((1, 1, 3), np.uint8))
 
 
+@pytest.mark.parametrize("areas", ["regions", "pairs"])
+def test_regions_are_of_all_views_and_places_of_one(make_basis: Any, areas: str) -> None:
+    bases = [room(make_basis), room(make_basis)]
+    looks = [basis.current_look for basis in bases]
+    store = MemoryStore(Identity.of(bases))
+    session = Session(bases, looks, store, settings=Settings(), transform=TRANSFORM)
+    ask(session, looks[1] * np.array([1.3, 1, 0.5]), areas, view=1)
+    first, second = (view.importance.any() for view in session.views)
+    assert (first, second) == (areas == "regions", True)
+
+
 def picture(size: tuple[int, int] = (24, 40)) -> np.ndarray:
     y, x = np.mgrid[: size[0], : size[1]]
     return np.dstack([5 * x, 6 * y, np.full(size, 90)]).clip(0, 255).astype(np.uint8)
@@ -295,6 +306,7 @@ HOSTILE: dict[str, Callable[[], bytes]] = {
     "cut jpeg": lambda: _cut("jpeg"),
     "cut webp": lambda: _cut("webp"),
     "webp of nothing": lambda: b"RIFF\x10\0\0\0WEBPVP8 \xff\xff\xff\xff" + bytes(30),
+    "webp of a damaged profile": lambda: _whole(picture(), "webp", icc_profile=b"no profile" * 20),
     "riff of sound": lambda: b"RIFF\x10\0\0\0WAVEfmt " + bytes(30),
     "radiance without end": lambda: b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 9 +X 9\n",
     "radiance of millions": lambda: (
@@ -305,9 +317,9 @@ HOSTILE: dict[str, Callable[[], bytes]] = {
 }
 
 
-def _whole(pixels: np.ndarray) -> bytes:
+def _whole(pixels: np.ndarray, kind: str = "png", **options: Any) -> bytes:
     file = io.BytesIO()
-    Image.fromarray(pixels).save(file, format="png")
+    Image.fromarray(pixels).save(file, format=kind, **options)
     return file.getvalue()
 
 

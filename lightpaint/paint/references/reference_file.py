@@ -35,16 +35,17 @@ def read_reference(path: Path, transform: ViewTransform) -> ReferencePixels:
     transform: by which the session shows light. Raises ImageError, in one line that names the file.
     """
     head = head_of(path, 16)
-    is_light = True
-    if head.startswith(b"RIFF") and head[8:12] == b"WEBP":
-        light, is_light = light_of_integers(*_webp(path), transform), False
-    elif head.startswith(b"#?"):
-        light = _radiance(path)
-    else:
-        picture = read_picture(path, transform=transform)
-        light, is_light = picture.image, picture.codes is None
-        if picture.alpha is not None:
-            light = light * np.clip(picture.alpha, 0, 1)[..., None]
+    is_light = False
+    try:
+        if head.startswith(b"RIFF") and head[8:12] == b"WEBP":
+            light = light_of_integers(_webp(path), None, transform)
+        elif head.startswith(b"#?"):
+            light, is_light = _radiance(path), True
+        else:
+            light, is_light = _light_of_painting(path, transform)
+    except ImageError as error:
+        text = str(error)
+        raise error if str(path) in text else ImageError(f"{path} {one_line(text)}") from None
     light = np.clip(_reduced(np.nan_to_num(light, posinf=0, neginf=0)), 0, None)
     if not light.any():
         raise ImageError(f"{path} is black: choose a picture with light in it")
@@ -62,26 +63,37 @@ def _reduced(light: Floats) -> Floats:
     return resampled(light, (max(1, round(height * factor)), max(1, round(width * factor))))
 
 
-def _webp(path: Path) -> tuple[Bitmap, None]:
-    """Return the picture in a WebP file over black."""
+def _light_of_painting(path: Path, transform: ViewTransform) -> tuple[Floats, bool]:
+    """Return the light (h, w, 3) in a file of a kind that paintings have, and whether it holds
+    light.
+    """
+    picture = read_picture(path, transform=transform)
+    light = picture.image
+    if picture.alpha is not None:
+        light = light * np.clip(picture.alpha, 0, 1)[..., None]
+    return light, picture.codes is None
+
+
+def _webp(path: Path) -> Bitmap:
+    """Return the picture in a WebP file over black. Raises ImageError, without naming the file."""
     from PIL import Image, ImageOps
 
     try:
         with Image.open(path, formats=["WEBP"]) as file:
-            _check_size(path, file.size)
+            _check_size(file.size)
             profile = file.info.get("icc_profile")
             upright = ImageOps.exif_transpose(file).convert("RGBA")
         values = np.asarray(upright)
     except (OSError, EOFError, LookupError, SyntaxError, ValueError, Image.DecompressionBombError):
-        raise ImageError(f"{path} is damaged or cut off: export it again") from None
+        raise ImageError("is damaged or cut off: export it again") from None
     alpha = values[..., 3:].astype(np.float32) / 255
     display = np.round(values[..., :3] * alpha).astype(np.uint8)
     icc = None if profile is None else read_icc(profile)
-    return Bitmap("webp", display, None, False, 255, icc, lossy=True), None
+    return Bitmap("webp", display, None, False, 255, icc, lossy=True)
 
 
 def _radiance(path: Path) -> Floats:
-    """Return the light in a Radiance HDR file, (h, w, 3)."""
+    """Return the light in a Radiance HDR file, (h, w, 3). Raises ImageError, without naming it."""
     import OpenImageIO
 
     with silenced():
@@ -89,22 +101,21 @@ def _radiance(path: Path) -> Floats:
         file = OpenImageIO.ImageInput.open(str(path))
         if file is None:
             reason = one_line(first_line(OpenImageIO.geterror(), path=path))
-            raise ImageError(f"{path} is damaged: {reason}")
+            raise ImageError(f"is damaged: {reason}")
         try:
             spec = file.spec()
-            _check_size(path, (spec.width, spec.height))
+            _check_size((spec.width, spec.height))
             pixels = file.read_image(0, 0, 0, 3, "float") if spec.nchannels == 3 else None
             if pixels is None or file.geterror():
-                raise ImageError(f"{path} is damaged or cut off: export it again")
+                raise ImageError("is damaged or cut off: export it again")
         finally:
             file.close()
     return np.asarray(pixels, np.float32).reshape(spec.height, spec.width, 3)
 
 
-def _check_size(path: Path, size: tuple[int, int]) -> None:
+def _check_size(size: tuple[int, int]) -> None:
     width, height = size
     if min(size) < 1 or width * height > MAX_PIXELS:
         raise ImageError(
-            f"{path} declares {width}x{height} pixels: expected at most {MAX_PIXELS / 1e6:.0f} "
-            "million"
+            f"declares {width}x{height} pixels: expected at most {MAX_PIXELS / 1e6:.0f} million"
         )
