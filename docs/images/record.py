@@ -291,16 +291,18 @@ def _save(hand: Hand, name: str) -> None:
 def looks_beside(hand: Hand) -> None:
     """Looks of three presets, side by side."""
     page = hand.page
-    for preset in ("Moonlight", "Golden hour", "Gallery"):
+    names = page.locator(".look-name")
+    for k, preset in enumerate(("Moonlight", "Golden hour", "Gallery")):
         page.get_by_role("button", name="Presets", exact=True).click()
         page.locator(".sheet button", has=page.get_by_text(preset, exact=True)).click()
+        page.locator(".layer-name", has_text=preset).first.wait_for()
+        page.wait_for_timeout(3000)  # a busy machine begins to solve late
         hand.wait()
         page.keyboard.press("Control+s")
-        page.wait_for_timeout(1000)
-        name = page.locator(".look-name").last
-        name.click()
+        names.nth(k).click()
         page.locator(".naming").fill(preset)
         page.keyboard.press("Enter")
+        page.get_by_role("button", name=f"Load {preset}").wait_for()
         page.keyboard.press("Control+z")
         hand.wait()
     page.get_by_role("button", name="All looks").click()
