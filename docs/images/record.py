@@ -17,7 +17,6 @@ writes beside itself
     painter-side-by-side.jpg   three looks side by side, in the light theme
     lights.webp     somebody drags a spot, aims it by a click, paints, and lets the lights move;
                     it also prints the answers a second of the drag
-    painter-lights.jpg  the painter when that is done
 
 The painter's own server, with new sessions in folders that are removed, and headless Chromium.
 A basis is rendered once, and kept where all bases are. Nothing is sped up but the waiting.
@@ -31,7 +30,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
@@ -54,8 +53,12 @@ FRAME = 90
 #: machine a drag begins to be solved only after a while.
 CALM = 4
 
-#: Milliseconds between looks at a search for places of lights.
-SEARCH_PAUSE_MS = 1500
+#: Milliseconds between looks at a search for places of lights, and frames of it that are shown: on
+#: a busy machine a search takes many minutes.
+SEARCH_PAUSE_MS, SEARCH_FRAMES = 1500, 24
+
+#: Seconds after which something has failed, however busy the machine is.
+PATIENCE_S = 1800
 
 #: Counts answers to moves of lights.
 COUNT_ANSWERS = """() => {
@@ -120,21 +123,38 @@ class Hand:
         self.page.mouse.click(*self.at)
         self.see(3)
 
+    def thin_out(self, first: int, count: int) -> None:
+        """Keep only `count` of the frames from the first of these on, evenly spread."""
+        step = max(1, -(-(len(self.frames) - first) // count))
+        self.frames[first:] = self.frames[first::step]
+        self.times[first:] = self.times[first::step]
+
     def wait(self, times: int = 12) -> None:
         """Until the answer is exact, and stays it, and its sentence and the reasons are there.
 
         Raises RuntimeError where the page warns of something.
         """
-        until, calm = time.time() + 600, 0
-        while calm < CALM:
+        calm = 0
+
+        def is_settled() -> bool:
+            nonlocal calm
             if warnings := self.page.locator(".toast.is-warn").all_inner_texts():
                 raise RuntimeError(warnings[0])
-            if time.time() > until:
-                raise TimeoutError("the painter has been solving for ten minutes")
-            time.sleep(0.4)
             calm = calm + 1 if self.is_calm() else 0
+            return calm >= CALM
+
+        self.until(is_settled, "the answer is exact")
         time.sleep(0.8)  # a toast, a sharp picture
         self.see(times)
+
+    def until(self, is_so: Callable[[], bool], what: str) -> None:
+        """Wait until something is so. Raises TimeoutError, which says what never was."""
+        start = time.monotonic()
+        while not is_so():
+            if time.monotonic() > start + PATIENCE_S:
+                raise TimeoutError(f"after {PATIENCE_S} s it is not so that {what}")
+            self.page.wait_for_timeout(400)
+        print(f"{time.monotonic() - start:6.1f} s until {what}", flush=True)
 
     def is_calm(self) -> bool:
         """Whether nothing is being solved or explained."""
@@ -370,18 +390,24 @@ def moving_lights(hand: Hand) -> None:
     hand.go(on(0.61, 0.55))
     before = page.locator(".lamp-aim").first.get_attribute("style")
     page.mouse.click(*hand.at)
-    while page.locator(".lamp-aim").first.get_attribute("style") == before:
-        page.wait_for_timeout(200)
+    aimed = page.locator(".lamp-aim").first
+    hand.until(lambda: aimed.get_attribute("style") != before, "the spot is aimed")
     hand.wait(16)
     # A wish that lights answer by moving.
     hand.drag(on(0.03, 0.27), on(0.13, 0.34), on(0.25, 0.41), on(0.1, 0.37))
     hand.wait()
     hand.press("Let lights move")
     working = page.get_by_role("button", name="Stop, move nothing")
-    working.wait_for(timeout=300_000)
-    while working.count():
+    working.wait_for(timeout=1000 * PATIENCE_S)
+    first = len(hand.frames)
+
+    def has_ended() -> bool:
         hand.see(2)
         page.wait_for_timeout(SEARCH_PAUSE_MS)
+        return not working.count()
+
+    hand.until(has_ended, "the search has ended")
+    hand.thin_out(first, SEARCH_FRAMES)
     hand.wait(24)
 
 
@@ -453,7 +479,6 @@ def main() -> None:
     if asked.only in (None, "lights"):
         with painter("gallery", asked.spp, asked.port) as url, using(url) as hand:
             moving_lights(hand)
-            hand.page.screenshot(path=HERE / "painter-lights.jpg", type="jpeg", quality=88)
         _write(hand, HERE / "lights.webp")
     if asked.only in (None, "views"):
         seats = ("--sensor=balcony", "--sensor=box", "--resolution=1/2")
