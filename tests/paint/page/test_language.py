@@ -129,6 +129,7 @@ STATES: dict[str, Callable[[Painter], None]] = {
         "{ tool: 'weight', display: { ...painter.store.value.display, overlay: 'missed' } }"
     ),
     "tour": show("{ tour: 2 }"),
+    "references": show("{ isReferenceOpen: true }"),
     "lost": show("{ connection: 'lost', lostStrokes: 3 }"),
     "wall": show("{ mix: { a: 1, b: 2, share: 1, more: [] } }"),
     "comparison": show("{ mix: { a: 1, b: 2, share: 0.5 } }"),

@@ -122,8 +122,15 @@ STATES: dict[str, Callable[[Painter], None]] = {
     "layers": show_layers,
     "notices": show_notices,
     "select": press("Select"),
+    "references": press("References"),
+    "tour": lambda painter: painter.page.evaluate("() => painter.store.set({ tour: 2 })"),
     "lights marked": press("Lights in the picture"),
 }
+
+
+#: Waits until what has just appeared is opaque.
+FADED_IN = """() => Promise.all(document.getAnimations().filter(({ animationName }) =>
+  animationName === 'lightpaint-in').map((animation) => animation.finished))"""
 
 
 @pytest.mark.parametrize("theme", ["dark", "light"])
@@ -136,6 +143,7 @@ def test_axe_finds_enough_contrast_in_any_state(new_painter: Any, axe: str, them
     for name, show in STATES.items():
         show(painter)
         painter.still()
+        painter.page.evaluate(FADED_IN)
         if wrong := violations(painter.page, ".lightpaint", ["color-contrast"]):
             found[name] = wrong
         painter.page.evaluate("() => painter.store.set({ ...window.first })")
