@@ -84,12 +84,14 @@ function ReferenceList({ ui, app, shown }) {
 /** What is compared, and the button. @param {{ui: Ui, app: App, shown: number}} props */
 function LookLikeFields({ ui, app, shown }) {
   const { store, session, engine } = app;
+  const [isBusy, setBusy] = useState(false);
   const pairs = shownPairs(ui);
   const arePairs = ui.comparedAreas === 'pairs';
   const ask = async () => {
     engine.cancel();
     const before = new Set(store.value.layers.map(({ id }) => id));
     store.set((state) => ({ open: { ...state.open, layers: true }, hint: false }));
+    setBusy(true); // large pictures take seconds
     await session.send('look_like', {
       reference: shown,
       areas: ui.comparedAreas,
@@ -97,6 +99,7 @@ function LookLikeFields({ ui, app, shown }) {
       view: ui.view,
       matches_brightness: ui.matchesBrightness,
     });
+    setBusy(false);
     // Its strength is what people change next, and its many layers hardly ever.
     const group = store.value.layers.find(({ id, kind }) => kind === 'group' && !before.has(id));
     if (group)
@@ -109,7 +112,7 @@ function LookLikeFields({ ui, app, shown }) {
     <${Checkbox} label=${words.references.asBrightAsIt} checked=${ui.matchesBrightness}
       tip=${words.references.asBrightAsItTip}
       change=${(/** @type {boolean} */ matchesBrightness) => store.set({ matchesBrightness })} />
-    <${Button} label=${words.references.lookLikeThis} primary disabled=${arePairs && !pairs.length} act=${() => void ask()}
+    <${Button} label=${words.references.lookLikeThis} primary disabled=${isBusy || (arePairs && !pairs.length)} act=${() => void ask()}
       tip=${words.references.lookLikeThisTip} />
   </div>`;
 }
