@@ -976,6 +976,7 @@ export const en = {
     tools: 'Tools',
     general: 'General',
     saveLook: 'save look',
+    pasteAReference: 'add a copied picture to the references',
     showOrHidePanels: 'show or hide panels',
     markTheLightsAndMove: 'mark the lights, and move them',
     showTheseShortcuts: 'show these shortcuts',

@@ -88,6 +88,7 @@ export const SHORTCUTS = [
         act: (app) => void saveLook(app),
         isOnce: true,
       },
+      { symbols: ['Ctrl', 'V'], description: words.shortcuts.pasteAReference },
       {
         command: 'panels',
         description: words.shortcuts.showOrHidePanels,
