@@ -1,13 +1,15 @@
 """Makes the pictures of the scenes that the README and the documentation show.
 
     pip install pyoidn
-    python docs/images/make.py [--spp 64] [--bases FOLDER] [gallery] [stage] [six-looks]
+    python docs/images/make.py [--spp 64] [--bases FOLDER] [gallery] [stage] [six-looks] [placement]
 
 writes beside itself
 
     gallery.jpg     the gallery with the lighting found for its evening
     stage.jpg       the stage with the lighting found for its sunset
     six-looks.jpg   the gallery with the lightings found for six paintings, which are in the corners
+    placement.jpg   the gallery's evening with spots that may turn and slide on their two tracks, as
+                    a report draws it; it also prints what moved, and the processor's seconds
 
 Each scene's basis is rendered once at 1280 x 720, and kept in FOLDER for the next time if there is
 one. Each look is the sum of that basis for the lighting found; its noise is taken away by Open
@@ -17,6 +19,7 @@ Image Denoise. Two cores take about five minutes for 64 samples.
 from __future__ import annotations
 
 import argparse
+import resource
 import sys
 import tempfile
 from dataclasses import dataclass
@@ -32,9 +35,30 @@ sys.path.insert(0, str(ROOT / "targets"))
 from clean import Floats, Surfaces, denoise, see  # noqa: E402
 
 import lightpaint as lp  # noqa: E402
+from lightpaint.images.denoiser import denoised  # noqa: E402
+from lightpaint.report.page.placement_section import aim_picture  # noqa: E402
+from lightpaint.report.rig.hung_lights import hung_lights  # noqa: E402
+from lightpaint.report.rig.rig_drawing import rig_drawing  # noqa: E402
 
 SIZE = (1280, 720)
 CELL, INSET, GAP = (640, 360), (176, 99), 8
+PICTURES = ("gallery", "stage", "six-looks", "placement")
+
+#: The two tracks of the gallery, the spots that may turn and slide on each, and spots to add.
+TRACKS = {
+    "left": {"line": [[-1.8, 3.5, 0.6], [-1.8, 3.5, 6.0]]},
+    "right": {"line": [[2.2, 3.5, 0.6], [2.2, 3.5, 6.0]]},
+}
+MOVES = {
+    name: {"move": {"on": side}, "aim": 40}
+    for side, names in {
+        "left": ("spot_tide", "spot_figure"),
+        "right": ("spot_knot", "spot_vase"),
+    }.items()
+    for name in names
+}
+CEILING_SPOTS = {"kind": "spot", "count": 2, "on": ["ceiling"]}
+
 LOOKS = ("morning.exr", "overcast.png", "last-sun.png", "evening.exr", "opening.png",
          "after-hours.png")  # fmt: skip
 
@@ -111,14 +135,61 @@ def six_looks(room: Set) -> Image.Image:
     return sheet
 
 
+def placement() -> Image.Image:
+    """The picture of a solve in which spots may move, with its plan and elevation below it."""
+    room = ROOT / "scenes" / "gallery" / "scene.xml"
+    before = cpu_s()
+    with tempfile.TemporaryDirectory() as folder:
+        look = lp.paint_with_light(
+            str(room),
+            str(ROOT / "targets" / "gallery" / "evening.exr"),
+            Path(folder) / "look",
+            rigging=lp.Rigging.of(MOVES, on=TRACKS, new=[CEILING_SPOTS]),
+            resolution="1/4",
+            resize=True,
+            literal=True,
+            report=False,
+            use_cache=False,
+        )
+    found = look.placement
+    assert found is not None
+    for change in (*found.moves, *found.additions):
+        print(change)
+    print(
+        f"missed, by the search: {found.missed_before:.4f} to {found.missed_after:.4f} of the "
+        f"painting's energy, {cpu_s() - before:.0f} CPU seconds in all; {look.verdict}"
+    )
+    lights = hung_lights(look.lighting)
+    features = look.basis.features
+    answer = np.asarray(shown(denoised(look.predicted.image, features)))
+    drawings = (
+        aim_picture(answer, features, lights),
+        rig_drawing(features, lights, up=look.lighting.up, width=answer.shape[1] * 4),
+    )
+    pictures = [Image.fromarray(drawing) for drawing in drawings if drawing is not None]
+    width = max(picture.width for picture in pictures)
+    sheet = Image.new("RGB", (width, sum(picture.height for picture in pictures)), "black")
+    top = 0
+    for picture in pictures:
+        sheet.paste(picture, ((width - picture.width) // 2, top))
+        top += picture.height
+    return sheet
+
+
+def cpu_s() -> float:
+    """Seconds of the processor that this process has taken."""
+    usage = resource.getrusage(resource.RUSAGE_SELF)
+    return usage.ru_utime + usage.ru_stime
+
+
 def main() -> None:
     """Make those that the command line names, or all."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("pictures", nargs="*", help="gallery, stage, six-looks; all by default")
+    parser.add_argument("pictures", nargs="*", help=f"{', '.join(PICTURES)}; all by default")
     parser.add_argument("--spp", type=int, default=64)
     parser.add_argument("--bases", type=Path, metavar="FOLDER")
     asked = parser.parse_args()
-    wanted = set(asked.pictures) or {"gallery", "stage", "six-looks"}
+    wanted = set(asked.pictures) or set(PICTURES)
     made: dict[str, Image.Image] = {}
     if wanted & {"gallery", "six-looks"}:
         gallery = Set.built("gallery", asked.spp, asked.bases)
@@ -128,6 +199,8 @@ def main() -> None:
             made["six-looks"] = six_looks(gallery)
     if "stage" in wanted:
         made["stage"] = Set.built("stage", asked.spp, asked.bases).lit_as("sunset.exr")
+    if "placement" in wanted:
+        made["placement"] = placement()
     for name, picture in made.items():
         picture.save(HERE / f"{name}.jpg", quality=88, optimize=True, progressive=True)
 
