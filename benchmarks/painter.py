@@ -133,6 +133,10 @@ def main() -> None:
         painter_layers.print_session(basis, options.layers, options.strokes)
         if not options.session:
             painter_layers.print_opening(cases[0])
+            words = made_up_painter(cases[0], {})
+            painter_layers.print_page_opening(
+                cases[0], lambda path, beside: Opened((*words, path), beside=beside)
+            )
             opened = partial(Opened, made_up_painter(cases[0], {}), view=options.view)
             painter_layers.print_pages(opened, options.layers, options.strokes)
         return
@@ -231,8 +235,11 @@ def stroke_ms(
     return float(np.median(times))
 
 
-def serve(case: str, constraints: str, space: str) -> None:
-    """A painter of a made-up basis, until it is ended; says where it is."""
+def serve(case: str, constraints: str, space: str, path: str = "") -> None:
+    """A painter of a made-up basis, until it is ended; says where it is.
+
+    path: of a session file, by default a new one.
+    """
     n, width, height = map(int, case.split("x"))
     with tempfile.TemporaryDirectory() as folder:
         subject = Subject(
@@ -243,7 +250,8 @@ def serve(case: str, constraints: str, space: str) -> None:
             settings=Settings(space=space or None, use_cache=False),  # type: ignore[arg-type]
             constraints=lp.Constraints.of(json.loads(constraints)),
         )
-        studio = Studio([subject], partial(Store.open, Path(folder) / "made_up.lightpaint"))
+        file = Path(path) if path else Path(folder) / "made_up.lightpaint"
+        studio = Studio([subject], partial(Store.open, file))
         server = Server(studio, port=0)
         studio.start()
         signal.signal(signal.SIGUSR1, lambda *_: trim())

@@ -11,6 +11,8 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +41,14 @@ LAYERS = """async (count) => {
     while (mirror.strokes.isPending) await new Promise((done) => setTimeout(done, 10));
   }
   engine.layers.isWishDone = true;
+}"""
+
+
+#: Whether a page has its session with all layers, and all pictures.
+LOADED = """() => {
+  const painter = document.getElementById('lightpaint')?.painter;
+  const mirror = painter?.engine.mirror;
+  return mirror?.isReady && !mirror.loader.missingSlots().length;
 }"""
 
 
@@ -164,6 +174,34 @@ def print_opening(case: tuple[int, ...], counts: tuple[int, ...] = (1, 200)) -> 
                 path = Path(folder) / f"{count}.lightpaint"
                 words = [way, str(path), str(count), "x".join(map(str, case))]
                 subprocess.run([sys.executable, __file__, *words], check=True)
+
+
+def print_page_opening(
+    case: tuple[int, ...], opened: Callable[[str, Any], Any], counts: tuple[int, int] = (1, 200)
+) -> None:
+    """Print how soon a page shows a session with so many layers, and all its pictures.
+
+    opened: returns an open painter of a session file, as a context, in the browser of another one.
+    Its page is loaded again, in turns with that of the other count.
+    """
+    print("loading the page of such a session again, ms of the clock until all pictures are there")
+    with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
+        painters: list[Any] = []
+        for count in counts:
+            path = str(Path(folder) / f"{count}.lightpaint")
+            words = ["make", path, str(count), "x".join(map(str, case))]
+            subprocess.run([sys.executable, __file__, *words], check=True)
+            painters.append(stack.enter_context(opened(path, painters[0] if painters else None)))
+        times: list[list[float]] = [[], []]
+        for turn in range(8):
+            for k in (0, 1) if turn % 2 else (1, 0):
+                start = time.perf_counter()
+                painters[k].page.reload()
+                painters[k].page.wait_for_function(LOADED, timeout=120_000)
+                times[k].append(1e3 * (time.perf_counter() - start))
+    middles = [float(np.median(values)) for values in times]
+    for count, middle in zip(counts, middles, strict=True):
+        print(f"{count:4d} layers: {middle:6.0f} ({middle / middles[0]:.2f}x)", flush=True)
 
 
 def open_session(way: str, path: Path, count: int, case: tuple[int, ...]) -> None:

@@ -24,6 +24,8 @@ from lightpaint.pipeline.job.settings import Settings
 class InventedPlanes:
     """Planes that follow from the places of lights, and show nothing real."""
 
+    outdated: tuple[str, ...] = ()
+
     def check(self, placed: Placed) -> None:
         """All places are possible."""
 

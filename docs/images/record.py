@@ -15,6 +15,8 @@ writes beside itself
                         looks that were kept, and the steps that led to them
     painter-lamps.jpg   spots dimmed together, two of them with a gel, under a master
     painter-side-by-side.jpg   three looks side by side, in the light theme
+    painter-tour.jpg, painter-keys.jpg, painter-settings.jpg, painter-analysis.jpg  a step of the
+                        tour, the shortcuts, the settings, and why an answer is no closer
     lights.webp     somebody drags a spot, aims it by a click, paints, and lets the lights move;
                     it also prints the answers a second of the drag
 
@@ -334,6 +336,35 @@ def looks_beside(hand: Hand) -> None:
     page.wait_for_timeout(2000)
 
 
+def panels(hand: Hand) -> Iterator[str]:
+    """Panels that stand still; yields the name of each while it is shown."""
+    page, on = hand.page, hand.of_painting
+    page.keyboard.press("?")
+    dialog = page.get_by_role("dialog")
+    dialog.wait_for()
+    page.wait_for_timeout(600)
+    yield "keys"
+    dialog.get_by_role("button", name="Show the tour").click()
+    for _ in range(2):
+        page.get_by_role("button", name="Next", exact=True).last.click()
+    page.wait_for_timeout(600)
+    yield "tour"
+    page.keyboard.press("Escape")
+    page.keyboard.press("a")
+    page.get_by_role("button", name="Object", exact=True).click()
+    for (x, y), up in ((on(0.06, 0.48), 110), (on(0.16, 0.48), -110)):
+        hand.drag((x, y), (x, y - up))
+    hand.wait()
+    hand.press("Analysis")
+    hand.press("Why not closer?")
+    hand.wait()
+    yield "analysis"
+    hand.press("Solve settings")
+    page.mouse.move(5, 5)
+    page.wait_for_timeout(600)
+    yield "settings"
+
+
 def _type(page: Page, label: str, text: str) -> None:
     field = page.get_by_role("textbox", name=label, exact=True).first
     field.fill(text)
@@ -473,7 +504,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--spp", type=int, default=64)
     parser.add_argument("--port", type=int, default=8431)
-    pictures = ("painting", "views", "layers", "selection", "lamps", "lights", "reference", "looks")
+    pictures = (
+        "painting",
+        "views",
+        "layers",
+        "selection",
+        "lamps",
+        "lights",
+        "reference",
+        "looks",
+        "panels",
+    )
     parser.add_argument("--only", choices=pictures)
     asked = parser.parse_args()
     if asked.only in (None, "lights"):
@@ -509,6 +550,10 @@ def main() -> None:
         with painter("gallery", asked.spp, asked.port) as url, using(url, "light") as hand:
             looks_beside(hand)
             hand.page.screenshot(path=HERE / "painter-side-by-side.jpg", type="jpeg", quality=88)
+    if asked.only in (None, "panels"):
+        with painter("gallery", asked.spp, asked.port) as url, using(url, "light") as hand:
+            for name in panels(hand):
+                hand.page.screenshot(path=HERE / f"painter-{name}.jpg", type="jpeg", quality=88)
     if asked.only in (None, "layers"):
         with painter("gallery", asked.spp, asked.port) as url, using(url) as hand:
             layered(hand)

@@ -497,9 +497,16 @@ def test_what_is_held_is_let_go_of_by_zero(basis: lp.Basis):
 
 
 def test_a_setting_is_undone_by_the_name_that_the_page_has_for_it():
-    page = REPOSITORY / "lightpaint" / "paint" / "page" / "ui" / "settings_panel.js"
-    titles = re.findall(r'<\$\{Row\} title="([^"]+)"', page.read_text("utf-8"))
-    assert list(TITLES.values()) == titles
+    page = REPOSITORY / "lightpaint" / "paint" / "page"
+    panel = (page / "ui" / "settings_panel.js").read_text("utf-8")
+    words = (page / "language" / "en.js").read_text("utf-8")
+    section = words[words.index("\n  settingsPanel: {") :]
+    titles = [
+        section.split(f"\n    {row}: '")[1].split("'")[0]
+        for row in re.findall(r"<\$\{Row\} title=\$\{words\.settingsPanel\.(\w+)\}", panel)
+    ]
+    assert list(TITLES.values()) == titles[: len(TITLES)]
+    assert titles[len(TITLES) :] == ["Theme", "Tour", "Language"]  # of the page, not of the solve
     assert set(TITLES) == {*FIT_KEYS, *ALL_LIGHTS_KEYS}
 
 

@@ -152,7 +152,7 @@ class LightPlacer:
             self._publish(f"No light was {_done(request)}: somebody moved lights meanwhile.")
             return
         summary = "; ".join(map(str, (*placement.moves, *placement.additions)))
-        self._publish(summary[0].upper() + summary[1:] + ".", tuple(placed))
+        self._publish(f"{summary}.", tuple(placed))
 
     def _differences(
         self, snapshot: SessionSnapshot, solution: Solution, placed: Placed
