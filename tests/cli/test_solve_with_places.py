@@ -54,7 +54,7 @@ def work_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def opened_subject(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Subject:
-    """What `lightpaint paint` would serve."""
+    """Return the subject that `lightpaint paint` serves, without a server."""
     subjects: list[Subject] = []
 
     def serve(served: Any, **_: Any) -> CommandOutcome:

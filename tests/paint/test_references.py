@@ -66,7 +66,7 @@ def ask(session: Session, light: np.ndarray, areas: str = "regions", **options: 
 
 
 def stops(session: Session) -> np.ndarray:
-    """What is asked for in each pixel, in stops of luminance."""
+    """Return the change that the painting asks for at each pixel, (h, w), in stops of luminance."""
     view = session.views[0]
     return np.asarray(np.log2(luminance(view.image) / luminance(view.current)))
 

@@ -43,7 +43,7 @@ const PAINTED_LABEL = words.analysisPanel.painted;
 /** Legends of the overlays: colours and hatches. @type {Record<string, string[]>} */
 const LEGEND_TEXTS = {
   missed: [words.analysisPanel.tooDark, words.analysisPanel.matches, words.analysisPanel.tooBright],
-  beyond: [words.analysisPanel.inReach, words.analysisPanel.outOfReach2],
+  beyond: [words.analysisPanel.inReach, words.analysisPanel.legendOutOfReach],
   falsecolor: [words.analysisPanel.n6Stops, words.analysisPanel.grey, '+6'],
   importance: [words.analysisPanel.unpainted, PAINTED_LABEL],
 };
@@ -71,7 +71,7 @@ export function AnalysisPanel({ ui, app }) {
       <${Button} label=${ui.isExplaining ? words.analysisPanel.findingReasons : words.analysisPanel.whyNotCloser}
         disabled=${ui.isExplaining} act=${() => session.explain()}
         tip=${words.analysisPanel.whatKeepsTheAnswerFromMatching} />
-      ${ui.isExplaining && html`<${ProgressBar} progress=${{ done: 0, total: 0 }} label=${words.analysisPanel.findingReasons2} />`}
+      ${ui.isExplaining && html`<${ProgressBar} progress=${{ done: 0, total: 0 }} label=${words.analysisPanel.reasonsProgress} />`}
       ${ui.state?.can_render && html`<${VerifyButton} ui=${ui} app=${app} />`}
     </div>
     ${ui.verification && html`<${VerificationResult} ui=${ui} app=${app} />`}

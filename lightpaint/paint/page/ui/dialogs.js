@@ -90,7 +90,7 @@ function ExportDialog({ ui, app, close }) {
     ${
       isBusy &&
       html`<div class="row"><span class="faint folder">${words.dialogs.youCanCloseThisWindow}</span>
-        <${ProgressBar} progress=${ui.exportProgress ?? { done: 0, total: 0 }} label=${words.dialogs.exporting2} />
+        <${ProgressBar} progress=${ui.exportProgress ?? { done: 0, total: 0 }} label=${words.dialogs.exportProgress} />
         <span class="faint">${ui.exportProgress && progressText(ui.exportProgress)}</span>
         <${Button} label=${words.dialogs.stop} icon="close" act=${() => app.session.exportFiles([])}
           tip=${words.dialogs.filesThatAreWrittenAlreadyStay} /></div>`

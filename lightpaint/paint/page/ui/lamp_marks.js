@@ -1,6 +1,6 @@
 /** Lights, marked where they hang in the pictures, with handles on the one that was chosen. */
 
-import { html, useRef } from '../vendor/preact.js';
+import { html, useEffect, useRef } from '../vendor/preact.js';
 import {
   dragInPlane,
   subtract,
@@ -276,6 +276,13 @@ function useDrag(app, pane, resolveDrag) {
       (event.clientY - top - pane.top) / pane.scale,
     ];
   };
+  const end = () => {
+    start.current = null;
+    app.engine.dragLight(false);
+    app.store.set({ drag: null });
+  };
+  // A mark that goes away while it is dragged hears of no end: pictures would stay drafts.
+  useEffect(() => () => void (start.current && end()), []);
   const down = (
     /** @type {PointerEvent} */ event,
     /** @type {number} */ light,
@@ -312,11 +319,9 @@ function useDrag(app, pane, resolveDrag) {
     const drag = start.current;
     if (!drag) return;
     event.stopPropagation();
-    start.current = null;
-    app.engine.dragLight(false);
     if (drag.isMoved && drag.lastRequest)
       app.session.lampMoves.queue(drag.light, drag.lastRequest, true);
-    app.store.set({ drag: null });
+    end();
   };
   return { down, move, up };
 }

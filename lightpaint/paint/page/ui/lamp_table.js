@@ -88,6 +88,6 @@ function lampText(emission, present) {
   const hex = toHex(atFullBrightness(emission));
   const colour = white ? whiteText(white.kelvin, white.green) : hex;
   const stops =
-    scene > 0 ? fill(words.lampTable.st2, { signed: signedText(Math.log2(level / scene)) }) : '';
+    scene > 0 ? fill(words.lampTable.stopsThen, { signed: signedText(Math.log2(level / scene)) }) : '';
   return html`<i style=${{ background: hex }}></i> ${stops}${colour}`;
 }

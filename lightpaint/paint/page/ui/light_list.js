@@ -132,7 +132,7 @@ function Group({ name, ui, app, members, isMany }) {
         onClick=${() => store.set({ open: { ...ui.open, [groupKey(name)]: !open } })}>
         <${Icon} name="fold" /><strong>${name}</strong>
         <span class="faint">${lightCountText(members.length)} · ${percentText(share)}</span></button>
-      <${Button} icon="select" class="letter" pressed=${areSelected} tip=${fill(words.lightList.select2, { name })}
+      <${Button} icon="select" class="letter" pressed=${areSelected} tip=${fill(words.lightList.selectGroup, { name })}
         act=${() => toggleLights(store, members)} />
       <${Button} label=${words.lightList.s} class="letter" pressed=${isSolo} tip=${fill(words.lightList.showAlone, { name })}
         act=${() => store.set({ solo: isSolo ? solo : [...solo, ...members] })} />

@@ -87,13 +87,13 @@ const MINOR_LIGHTS = [
 /** Short explanations of the choices. @type {Record<string, Record<string, string>>} */
 const DESCRIPTIONS = {
   space: {
-    display: words.settingsPanel.differencesAsTheEyeSeesThem2,
+    display: words.settingsPanel.describedDisplay,
     linear: words.settingsPanel.differencesInLinearLightWhere,
   },
   colors: {
-    free: words.settingsPanel.anyColour2,
-    gentle: words.settingsPanel.theirOwnUnlessThePaintAsks2,
-    white: words.settingsPanel.whitesFrom2200To9000K2,
+    free: words.settingsPanel.describedFree,
+    gentle: words.settingsPanel.describedGentle,
+    white: words.settingsPanel.describedWhite,
   },
 };
 

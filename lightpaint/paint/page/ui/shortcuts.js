@@ -217,7 +217,7 @@ export const SHORTCUTS = [
       },
       {
         command: 'pixels',
-        description: words.shortcuts.n100,
+        description: words.shortcuts.fullSize,
         act: showPixels,
       },
       {

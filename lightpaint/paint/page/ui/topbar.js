@@ -39,9 +39,9 @@ export function TopBar({ ui, app }) {
   return html`<header class="top">
     <div class="title"><${TruncatedText} text=${title} maxLength=${16} tag="strong" /></div>
     <div class="group" role="group" aria-label=${words.topbar.history}>
-      <${Button} icon="undo" tip=${undo ? fill(words.topbar.undo, { undo }) : words.topbar.undo2} keys=${shortcutsOf(ui, 'undo')}
+      <${Button} icon="undo" tip=${undo ? fill(words.topbar.undo, { undo }) : words.topbar.undoNothing} keys=${shortcutsOf(ui, 'undo')}
         disabled=${!undo} act=${() => session.send('undo')} />
-      <${Button} icon="redo" tip=${redo ? fill(words.topbar.redo, { redo }) : words.topbar.redo2} keys=${shortcutsOf(ui, 'redo')}
+      <${Button} icon="redo" tip=${redo ? fill(words.topbar.redo, { redo }) : words.topbar.redoNothing} keys=${shortcutsOf(ui, 'redo')}
         disabled=${!redo} act=${() => session.send('redo')} />
       <${PreviousButton} ui=${ui} app=${app} />
     </div>

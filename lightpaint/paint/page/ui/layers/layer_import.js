@@ -73,7 +73,7 @@ export function LayerImportDialog({ ui, app }) {
     close();
     void addReference(app, file);
   };
-  const title = isReference ? words.references.useAPicture : words.layerImport.importLayers2;
+  const title = isReference ? words.references.useAPicture : words.layerImport.importTitle;
   return html`<${Dialog} title=${title} close=${close} class="layer-import-dialog">
     <p>${words.layerImport.whereDoTheLayersOf} <strong>${file.name}</strong> ${words.layerImport.go}
       ${isReference && ` ${words.references.orIsItAPicture}`}</p>
