@@ -44,7 +44,7 @@ def file_length(
         detail = getattr(reason, "strerror", None) or reason
         raise error(f"cannot read {one_line(str(path))}: {detail}") from None
     if stat.S_ISDIR(status.st_mode):
-        raise error(f"{path} is a folder, not {article} {kind}")
+        raise error(f"{path} is a folder, not {article} {kind}: name the file in it")
     if not stat.S_ISREG(status.st_mode):
         raise error(f"{path} is a device or a pipe, not {article} {kind}")
     if status.st_size > limit:

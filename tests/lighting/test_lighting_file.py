@@ -200,7 +200,7 @@ def test_a_file_cut_off_anywhere(good_file: tuple[Path, dict[str, Any]]):
 def test_no_file(tmp_path: Path):
     with pytest.raises(LightingError, match="no such lighting file"):
         read_lighting(tmp_path / "none.json")
-    with pytest.raises(LightingError, match="is a folder, not a lighting file"):
+    with pytest.raises(LightingError, match="a folder, not a lighting file: name the file in it"):
         read_lighting(tmp_path)
 
 
