@@ -13,12 +13,7 @@ import re
 from functools import cache
 from importlib import resources
 
-#: A quoted text of a style sheet, or a mark with space around it that has no meaning.
-_CSS_SPACE = re.compile(r""""[^"]*"|'[^']*'|\s*([{};,>])\s*|(?<=[\w-])(:)\s+""")
-
-#: The same of a line of a script, without templates, patterns and escapes.
-_SCRIPT_SPACE = re.compile(r""""[^"]*"|'[^']*'|[ \t]*(=>|[=*<>?:,;{}()|&])[ \t]*""")
-_HARD_TO_READ = re.compile(r"[`/\\]")
+from lightpaint.viewer.compaction import compact_styles, unindented
 
 _IMPORT = re.compile(
     r"^import\s+(?:(?P<names>[^;'\"]+?)\s+from\s+)?(?P<q>['\"])(?P<path>[^'\"]+)(?P=q);?[ \t]*$",
@@ -62,33 +57,7 @@ def _code(path: str) -> str:
 @cache
 def styles(*paths: str) -> str:
     """Return style sheets joined, without their comments and spaces between rules."""
-    return "\n".join(compact_styles(_minified(source(path))) for path in paths)
-
-
-def compact_styles(text: str) -> str:
-    """Return a style sheet without space that has no meaning. Quoted texts stay."""
-
-    def compacted(match: re.Match[str]) -> str:
-        return match[1] or match[2] or match[0]
-
-    return _CSS_SPACE.sub(compacted, text).replace(";}", "}").strip()
-
-
-def compact_script(text: str) -> str:
-    """Return a script with less space, in lines without templates, slashes and backslashes.
-
-    Templates over several lines stay, if none is inside another.
-    """
-
-    def compacted(match: re.Match[str]) -> str:
-        return match[1] or match[0]
-
-    lines, is_template = [], False
-    for line in text.split("\n"):
-        is_plain = not is_template and not _HARD_TO_READ.search(line)
-        lines.append(_SCRIPT_SPACE.sub(compacted, line) if is_plain else line)
-        is_template ^= bool(line.count("`") % 2)
-    return "\n".join(lines)
+    return "\n".join(compact_styles(source(path)) for path in paths)
 
 
 @cache
@@ -204,14 +173,6 @@ def _exported(path: str) -> tuple[str, ...]:
     for match in _EXPORT_LIST.finditer(text):
         names += [name for _, name in _pairs(match["names"])]
     return tuple(names)
-
-
-def unindented(text: str) -> str:
-    """Return code without indentation and empty lines, which would be a tenth of a report.
-
-    Neither has a meaning, not even in the templates of these scripts.
-    """
-    return "\n".join(line.strip() for line in text.splitlines() if line.strip())
 
 
 def _minified(text: str) -> str:

@@ -37,6 +37,9 @@ from lightpaint.report.comparison import shorten_to_width
 from lightpaint.version import __version__
 from lightpaint.viewer.bundle import bundled, styles
 
+#: Style sheets of the page.
+STYLES = ("batch/gallery/gallery.css", "viewer/mixer/wipe.css", "viewer/mixer/mixer.css")
+
 #: Contact sheet: most pictures, pictures in a row, width of each, gap and height of a caption.
 MAX_PICTURES, COLUMNS, WIDTH, GAP, CAPTION_HEIGHT = 120, 6, 240, 14, 22
 
@@ -111,7 +114,7 @@ def gallery_page(
         transforms=script_json(transforms_of(finished_rows) if mixers else {}),
         mixers="\n".join(mixers.values()),
         places=places,
-        style=styles("batch/gallery/gallery.css", "viewer/mixer/mixer.css"),
+        style=styles(*STYLES),
         script=bundled("batch/gallery/gallery.js"),
         version=escape(__version__),
     )

@@ -12,7 +12,12 @@ from lightpaint.batch.manifest.folder_names import THUMBNAILS
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.answer.lighting_file import read_lighting
-from lightpaint.report.page.mixer import kelvin_colors, lighting_data, transform_data
+from lightpaint.report.page.mixer import (
+    kelvin_colors,
+    lighting_data,
+    packed_gels,
+    transform_data,
+)
 
 #: Maximum number of mixers of a page (each may take two megabytes), and most lights of a mixer with
 #: sliders.
@@ -55,6 +60,7 @@ def _mixer(folder: Path, name: str, record: Mapping[str, Any], rows: Sequence[Su
         "shown": _strongest_lights(record, rows),
         "rest": None,
         "kelvins": kelvin_colors(),
+        "gels": packed_gels(),
         "transform": transform_data(ViewTransform()),
         "painting": None,
         "lighting": lighting_data(lighting),

@@ -1,6 +1,5 @@
 /** The mixers of a gallery, one for each basis, and the looks that they can start from. */
 import { begin } from '../../viewer/mixer/mixer.js';
-import { addGels } from '../../viewer/mixer/mixer_gels.js';
 import { createElement } from '../../viewer/mixer/page_elements.js';
 import { elementOf, inputOf, looks, titleOf, transforms } from './gallery_data.js';
 
@@ -41,7 +40,7 @@ export class LookMixers {
     const request = ++this.requests;
     for (const mixer of this.roots.values()) if (mixer !== root) mixer.hidden = true;
     inputOf('from').value = String(looks.indexOf(look));
-    begin(root, startOf(look), () => request === this.requests, addGels);
+    begin(root, startOf(look), () => request === this.requests);
     scrollTo(0, 0);
   }
 }

@@ -143,10 +143,12 @@ def wipe(looks: list[PagePicture]) -> str:
     switch = switch if any(look.raw is not None for look in looks) else ""
     return (
         f'<figure class="wipe" id="wipe" style="--aspect: {width / height:.5f}">'
-        f'<div class="stage" id="stage" style="aspect-ratio: {width} / {height}">{images}'
-        '<div class="edge" aria-hidden="true"><i></i></div>'
-        f'<span class="tag tag-a" id="tag-a" aria-hidden="true">{looks[a].name}</span>'
-        f'<span class="tag tag-b" id="tag-b" aria-hidden="true">{looks[b].name}</span></div>'
+        f'<div class="wipe-stage stage" id="stage" style="aspect-ratio: {width} / {height}">'
+        f"{images}"
+        '<div class="wipe-edge" aria-hidden="true"><i></i></div>'
+        f'<span class="wipe-tag" id="tag-a" aria-hidden="true">{looks[a].name}</span>'
+        f'<span class="wipe-tag is-right" id="tag-b" aria-hidden="true">{looks[b].name}</span>'
+        "</div>"
         '<figcaption class="controls">'
         f'<label>Left <select id="a">{choices(a)}</select></label>'
         '<label class="slide">Wipe <input type="range" id="split" min="0" max="100" step="1" '

@@ -7,8 +7,11 @@ offline.
 
 import base64
 import json
+import re
+import zlib
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -32,11 +35,12 @@ from lightpaint.report.basis_memo import cached_clean_planes, make_once, page_re
 from lightpaint.report.page.figures import CLEAN_REDUCTION, data_uri
 from lightpaint.report.page.lights_table import most_visible_lights
 from lightpaint.threads import parallel_map
-from lightpaint.viewer.bundle import bundled, compact_script, styles
+from lightpaint.viewer.bundle import bundled, source, styles
+from lightpaint.viewer.compaction import compact_script
 
 #: Colour temperatures of the sliders, in kelvin, evenly in mireds; and the distance from Planck's
 #: locus up to which a colour is one.
-COOLEST, WARMEST, STEPS, WHITE = 15000.0, 1500.0, 41, 0.02
+COOLEST, WARMEST, STEPS, WHITE = 15000.0, 1500.0, 31, 0.02
 
 #: Points of the table of a transform: as a curve, as each side of a lattice; its ends in stops.
 CURVE, SIDE, LOW, HIGH = 256, 32, -14.0, 7.0
@@ -76,6 +80,7 @@ def mixer_html(
         "lights": [_light(basis, lighting, k) for k in shown],
         "rest": _rest(basis, lighting, shown),
         "kelvins": kelvin_colors(),
+        "gels": packed_gels(),
         "transform": transform_data(transform),
         "painting": None if painting is None else _painting(painting, basis, len(planes)),
         "lighting": lighting_data(lighting),
@@ -200,13 +205,18 @@ def _rest(basis: Basis, lighting: Lighting, shown: Indices) -> dict[str, Any] | 
     }
 
 
-def kelvin_colors() -> list[Any]:
-    """Return colours of luminance 1 by temperature, for the sliders."""
+def kelvin_colors() -> dict[str, Any]:
+    """Return colours of luminance 1 by temperature, evenly in mireds, for the sliders."""
     mireds = np.linspace(1e6 / COOLEST, 1e6 / WARMEST, STEPS)
-    return [
-        [float(1e6 / mired), [round(float(x), 6) for x in kelvin_to_rgb(float(1e6 / mired))]]
-        for mired in mireds
-    ]
+    colors = [[round(float(x), 5) for x in kelvin_to_rgb(float(1e6 / m))] for m in mireds]
+    return {"coolest": COOLEST, "warmest": WARMEST, "colors": colors}
+
+
+@cache
+def packed_gels() -> str:
+    """Return the table of colour filters that the painter has, deflated, for the page."""
+    [rows] = re.findall(r"`\n([^`]*)`", source("viewer/gels/gel_table.js"))
+    return "data:;base64," + base64.b64encode(zlib.compress(rows.encode(), 9)).decode("ascii")
 
 
 def transform_data(transform: ViewTransform) -> dict[str, Any]:

@@ -49,7 +49,8 @@ from lightpaint.report.rig.hung_lights import HungLights
 from lightpaint.report.verdict import spoken_samples, verdict
 from lightpaint.report.visible_emitters import emitter_remarks
 from lightpaint.target.target import Target
-from lightpaint.viewer.bundle import compact_script, compact_styles, unindented
+from lightpaint.viewer.bundle import styles
+from lightpaint.viewer.compaction import compact_script, compact_styles, unindented
 
 
 def report_page(
@@ -159,7 +160,7 @@ def _frame() -> str:
     text = unindented(template.read_text(encoding="utf-8"))
     head, style, body, script, end = re.split("</?(?:style|script)>", text)
     return (
-        f"{head}<style>{compact_styles(style)}</style>{body}"
+        f"{head}<style>{compact_styles(style)}{styles('viewer/mixer/wipe.css')}</style>{body}"
         f"<script>{compact_script(script)}</script>{end}"
     )
 

@@ -4,22 +4,18 @@
  * Kelvin is a place on Planck's locus; green is the distance from it in CIE 1960 (u, v), times
  * 1000, positive towards green (1000 Duv).
  */
+import { fromXyz, luminance } from './chromaticity.js';
 import { decodeSrgb, encodeSrgb } from './view_transform.js';
 
 /** @typedef {[number, number, number]} RGB */
 
-export { decodeSrgb as decode, encodeSrgb as encode };
+export { decodeSrgb as decode, encodeSrgb as encode, luminance };
 
 /** Temperatures for which the locus below is good, in kelvin. */
 const KELVIN_RANGE = { low: 1000, high: 15000 };
 
 /** Neutral temperature of warmer and cooler gains. */
 const NEUTRAL_MIRED = 200;
-
-/** Relative luminance (ITU-R BT.709-6, item 3.2). @param {ArrayLike<number>} rgb linear */
-export function luminance(rgb) {
-  return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
-}
 
 /** Return the display colour; light brighter than 1 is scaled down.
  * @param {ArrayLike<number>} rgb linear */
@@ -68,19 +64,9 @@ export function fromKelvin(kelvin, green = 0) {
   const { uv, tangent } = locus(kelvin);
   const normal = greenNormal(tangent);
   const [u, v] = [0, 1].map((i) => uv[i] + (green / 1000) * normal[i]);
-  const [X, Z] = [(3 * u) / (2 * v), (4 - u - 10 * v) / (2 * v)];
-  const rgb = mapChannels((c) =>
-    Math.max(0, FROM_XYZ[c][0] * X + FROM_XYZ[c][1] + FROM_XYZ[c][2] * Z),
-  );
+  const rgb = fromXyz((3 * u) / (2 * v), (4 - u - 10 * v) / (2 * v)).map((x) => Math.max(0, x));
   const maxChannel = Math.max(...rgb);
   return mapChannels((c) => rgb[c] / maxChannel);
-}
-
-/** Return the linear light of a chromaticity, CIE 1931 (x, y), of luminance 1. Channels of colours
- * outside of Rec.709 are below 0. @param {number} x @param {number} y @returns {RGB} */
-export function fromChromaticity(x, y) {
-  const [X, Z] = [x / y, (1 - x - y) / y];
-  return mapChannels((c) => FROM_XYZ[c][0] * X + FROM_XYZ[c][1] + FROM_XYZ[c][2] * Z);
 }
 
 /** Return the correlated temperature (Ohno 2013) and green of a colour; null for black, for colours
@@ -122,16 +108,11 @@ export function warmer(mired) {
   return mapChannels((c) => gains[c] / luminance(gains));
 }
 
-/** CIE XYZ of linear Rec.709 and back (IEC 61966-2-1's primaries and white). */
+/** CIE XYZ of linear Rec.709 (IEC 61966-2-1's primaries and white). */
 const TO_XYZ = [
   [0.4123908, 0.35758434, 0.18048079],
   [0.21263901, 0.71516868, 0.07219232],
   [0.01933082, 0.11919478, 0.95053215],
-];
-const FROM_XYZ = [
-  [3.24096994, -1.53738318, -0.49861076],
-  [-0.96924364, 1.8759675, 0.04155506],
-  [0.05563008, -0.20397696, 1.05697151],
 ];
 
 /**

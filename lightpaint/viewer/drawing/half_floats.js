@@ -16,7 +16,7 @@ export function replaceNonFinite(halves) {
   return halves;
 }
 
-/** @param {Uint16Array} halves @param {number} [scale] */
+/** @param {ArrayLike<number>} halves @param {number} [scale] */
 export function toFloats(halves, scale = 1) {
   const values = new Float32Array(halves.length);
   for (let i = 0; i < values.length; i++) values[i] = VALUES[halves[i]] * scale;

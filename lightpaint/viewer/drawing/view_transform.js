@@ -5,11 +5,6 @@
  * for all light below 2^low. Interpolation is trilinear. sRGB (IEC 61966-2-1) is computed exactly.
  * If each display value depends on its own channel only, one curve replaces the lattice.
  */
-import { VALUES } from './half_floats.js';
-
-/** @typedef {Uint8Array | Int16Array | Uint16Array | Float32Array | Float64Array} Data */
-/** An array. float16: bits of halves in a Uint16Array (see half_floats.js).
- * @typedef {{data: Data, shape: number[]}} Picture */
 /** @typedef {{side: number, low: number, high: number}} Shaper */
 
 /** lattice: (side, side, side, 3) display values, axes r, g, b; null for sRGB. curve: (side,) if it
@@ -22,17 +17,6 @@ export const SRGB = Object.freeze({
   lattice: null,
   curve: null,
 });
-
-/** @param {string} name of the transform @param {Picture} picture float16 @param {Shaper} shaper
- * @returns {Lut} */
-export function lutOf(name, picture, shaper) {
-  if (name === 'srgb') return SRGB;
-  const { data } = picture;
-  if (data.length !== shaper.side ** 3 * 3)
-    throw new Error(`a lattice of ${data.length} numbers, not of ${shaper.side}³ colours`);
-  const lattice = Float32Array.from(data, (bits) => VALUES[bits]);
-  return { shaper, lattice, curve: curveOf(lattice, shaper.side) };
-}
 
 /** Return the display value in [0, 1] of light in [0, 1], by IEC 61966-2-1.
  * @param {number} light */
@@ -155,20 +139,4 @@ export class Encoder {
       rgba[4 * p + 3] = 255;
     }
   }
-}
-
-/** Return the common curve of all channels, (side,), if the lattice equals it to half a code.
- * @param {Float32Array} lattice @param {number} side */
-function curveOf(lattice, side) {
-  const curve = Float32Array.from(
-    { length: side },
-    (_, i) => lattice[i * (side * side + side + 1) * 3],
-  );
-  let index = 0;
-  for (let r = 0; r < side; r++)
-    for (let g = 0; g < side; g++)
-      for (let b = 0; b < side; b++)
-        for (const i of [r, g, b])
-          if (Math.abs(lattice[index++] - curve[i]) > 1 / 1024) return null;
-  return curve;
 }

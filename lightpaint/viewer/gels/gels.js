@@ -4,11 +4,12 @@
  * with. On daylight lamps the colour is off by .01 in (x, y) as a rule, and .025 for one in ten
  * filters, compared with their spectra.
  */
-import { fromChromaticity, luminance } from '../drawing/colour.js';
-import { GEL_ROWS } from './gel_table.js';
+import { fromChromaticity, luminance } from '../drawing/chromaticity.js';
 
-/** @typedef {import("../drawing/colour.js").RGB} RGB */
-/** factor: of each channel. @typedef {{code: string, maker: string, number: string, name: string, factor: RGB}} Gel */
+/** @typedef {import("../drawing/chromaticity.js").RGB} RGB */
+/** factor: of each channel. percent: of the light that passes.
+ * @typedef {{code: string, maker: string, number: string, name: string, percent: number,
+ *   factor: RGB}} Gel */
 
 /** Makers by the letter of their codes, and chromaticities of the light that they measure with. */
 const MAKERS = new Map([
@@ -16,21 +17,21 @@ const MAKERS = new Map([
   ['R', { maker: 'Rosco', source: fromChromaticity(0.44757, 0.40745) }],
 ]);
 
-/** Largest difference of a channel between equal colours, relative to the largest channel. */
-const MAX_HUE_DIFFERENCE = 1e-3;
-
-/** @type {Gel[]} */
-export const GELS = GEL_ROWS.trim()
-  .split('\n')
-  .map((row) => {
-    const words = row.split(' ');
-    const [x, y, percent] = words.slice(-3).map(Number);
-    const [code] = words;
-    const { maker, source } = /** @type {{maker: string, source: RGB}} */ (MAKERS.get(code[0]));
-    const name = words.slice(1, -3).join(' ');
-    const factor = transmission(fromChromaticity(x, y), source, percent / 100);
-    return { code, maker, number: code.slice(1), name, factor };
-  });
+/** Return the filters of a table like `GEL_ROWS`. @param {string} rows @returns {Gel[]} */
+export function gelsOf(rows) {
+  return rows
+    .trim()
+    .split('\n')
+    .map((row) => {
+      const words = row.split(' ');
+      const [x, y, percent] = words.slice(-3).map(Number);
+      const [code] = words;
+      const { maker, source } = /** @type {{maker: string, source: RGB}} */ (MAKERS.get(code[0]));
+      const name = words.slice(1, -3).join(' ');
+      const factor = transmission(fromChromaticity(x, y), source, percent / 100);
+      return { code, maker, number: code.slice(1), name, percent, factor };
+    });
+}
 
 /** Return the factor of each channel. A colour outside of Rec.709 has none below 0; its transmission
  * stays. @param {RGB} colour @param {RGB} source @param {number} share of the light that passes
@@ -54,8 +55,9 @@ export const lossInStops = (gel, white) =>
 export const gelName = ({ maker, number }) => `${maker} ${number}`;
 
 /** Return the filters that a text may mean: all whose number or code begin with it, then those with
- * its words in their names. @param {string} text like 201, L201, lee 201, amber @returns {Gel[]} */
-export function findGels(text) {
+ * its words in their names. @param {Gel[]} gels @param {string} text like 201, L201, lee 201, amber
+ * @returns {Gel[]} */
+export function findGels(gels, text) {
   const words = text.trim().toLowerCase().split(/\s+/).filter(Boolean);
   const rank = (/** @type {Gel} */ gel) => {
     const [code, number] = [gel.code.toLowerCase(), gel.number];
@@ -67,24 +69,9 @@ export function findGels(text) {
         ? 2
         : 1;
   };
-  return GELS.map((gel) => ({ gel, rank: rank(gel) }))
+  return gels
+    .map((gel) => ({ gel, rank: rank(gel) }))
     .filter((entry) => entry.rank > 0)
     .sort((a, b) => b.rank - a.rank)
     .map(({ gel }) => gel);
-}
-
-/** Return the filter that gives a lamp its colour; null for none, or if several would: reds beyond
- * Rec.709 are one. @param {RGB} rgb of the lamp @param {RGB} white its own, without a filter
- * @param {string} [code] of the filter that was put there last */
-export function gelOn(rgb, white, code) {
-  if (isSameHue(white, rgb)) return null;
-  const gels = GELS.filter((gel) => isSameHue(filtered(gel, white), rgb));
-  return gels.find((gel) => gel.code === code) ?? (gels.length === 1 ? gels[0] : null);
-}
-
-/** Return whether two colours differ at most in brightness. @param {RGB} a @param {RGB} b */
-function isSameHue(a, b) {
-  const [first, second] = [Math.max(...a), Math.max(...b)];
-  const differences = a.map((x, c) => Math.abs(x / first - b[c] / second));
-  return first > 0 && second > 0 && Math.max(...differences) < MAX_HUE_DIFFERENCE;
 }

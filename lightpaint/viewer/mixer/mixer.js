@@ -3,11 +3,13 @@
  *
  * Fills each `.mixer` element from the JSON in it; without scripts the element stays hidden.
  */
+import { luminance } from '../drawing/chromaticity.js';
 import { Encoder, SRGB } from '../drawing/view_transform.js';
 import { Mix } from '../drawing/mix.js';
 import { canvasOfSize, contextOf, drawLight } from './mixer_canvas.js';
 import { lutOf, unpackMixer } from './mixer_data.js';
-import { Row, kelvinTable, luminance } from './mixer_light.js';
+import { addGels } from './mixer_gels.js';
+import { Row, kelvinTable } from './mixer_light.js';
 import { Selection } from './mixer_selection.js';
 import { createElement, createSlider, followDrag } from './page_elements.js';
 
@@ -22,9 +24,9 @@ import { createElement, createSlider, followDrag } from './page_elements.js';
 const [THUMBNAIL_WIDTH, WHITE_SHARE] = [88, 0.98];
 
 class Mixer {
-  /** @param {HTMLElement} root @param {Data} data @param {Uint16Array[]} planes
+  /** @param {HTMLElement} root @param {import("./mixer_data.js").Unpacked} unpacked
    * @param {import("../drawing/view_transform.js").Lut} lut */
-  constructor(root, data, planes, lut) {
+  constructor(root, [data, planes, gels], lut) {
     this.data = data;
     this.planes = planes.map((halves, k) => ({ halves, scale: data.planes[k].scale }));
     this.encoder = new Encoder(lut, data.transform.stops);
@@ -57,6 +59,7 @@ class Mixer {
       this.rows.push(restRow);
     }
     this.selection = new Selection(this.rows, redraw);
+    addGels(this.selection, gels);
     const view = this.createStage();
     view.append(this.selection.element, ...this.createButtons());
     const list = createElement('div', 'mixer-lights');
@@ -71,7 +74,7 @@ class Mixer {
     const [height, width] = this.data.size;
     const { painting } = this.data;
     const view = createElement('div', 'mixer-view');
-    const createStage = createElement('div', 'mixer-stage');
+    const createStage = createElement('div', 'mixer-stage wipe-stage');
     createStage.style.aspectRatio = `${width} / ${height}`;
     this.picture.className = 'mixer-mix';
     this.picture.setAttribute('role', 'img');
@@ -83,10 +86,10 @@ class Mixer {
     image.src = painting;
     image.alt = 'The painting';
     image.draggable = false;
-    const edge = createElement('div', 'mixer-edge');
+    const edge = createElement('div', 'wipe-edge');
     edge.append(createElement('i'));
-    createStage.append(image, edge, createElement('span', 'mixer-tag', 'painting'));
-    createStage.append(createElement('span', 'mixer-tag is-right', 'mix'));
+    createStage.append(image, edge, createElement('span', 'wipe-tag', 'painting'));
+    createStage.append(createElement('span', 'wipe-tag is-right', 'mix'));
     // The whole mix is visible until the wipe moves, since a light may affect only one half.
     const wipe = createSlider('Wipe: how much of the painting', 0, 100);
     wipe.value = '0';
@@ -254,14 +257,12 @@ function createButton(text, title, act) {
 
 /** Start a mixer from its answer or a look, or say why there is none.
  * @param {HTMLElement} root @param {Look} [look]
- * @param {() => boolean} [isWanted] whether it is still wanted once it is unpacked
- * @param {(selection: Selection) => void} [extend] adds controls for the selected lights */
-export async function begin(root, look, isWanted = () => true, extend) {
+ * @param {() => boolean} [isWanted] whether it is still wanted once it is unpacked */
+export async function begin(root, look, isWanted = () => true) {
   root.dataset.ready = '';
   const body = createElement('div', 'mixer-body');
   try {
-    const { selection } = await buildMixer(body, root, look);
-    extend?.(selection);
+    await buildMixer(body, root, look);
   } catch (error) {
     body.append(createElement('p', 'mixer-said', failureText(error)));
   }
@@ -273,7 +274,7 @@ export async function begin(root, look, isWanted = () => true, extend) {
 
 /** @param {HTMLElement} body @param {HTMLElement} root @param {Look} [look] */
 async function buildMixer(body, root, look) {
-  let [data, planes] = await unpackMixer(root);
+  let [data, planes, gels] = await unpackMixer(root);
   if (look) {
     const lights = data.lights.map((light) => {
       const answer = look.emission.get(light.name) ?? light.present;
@@ -283,7 +284,7 @@ async function buildMixer(body, root, look) {
     const lighting = { ...data.lighting, target: `${look.name}-mix` };
     data = { ...data, lights, lighting, transform: look.transform };
   }
-  return new Mixer(body, data, planes, await lutOf(data.transform));
+  return new Mixer(body, [data, planes, gels], await lutOf(data.transform));
 }
 
 /** @param {unknown} error */

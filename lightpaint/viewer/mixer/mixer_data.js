@@ -1,7 +1,8 @@
 /** The data of a mixer, from JSON in the page, and their unpacked planes. */
-import { VALUES } from '../drawing/half_floats.js';
+import { toFloats } from '../drawing/half_floats.js';
 import { SRGB } from '../drawing/view_transform.js';
-import { unpack } from './packed_picture.js';
+import { gelsOf } from '../gels/gels.js';
+import { inflate, unpack } from './packed_picture.js';
 
 /** @typedef {import("./packed_picture.js").Compact} Compact */
 /** @typedef {import("./mixer_light.js").Light} Light */
@@ -9,27 +10,31 @@ import { unpack } from './packed_picture.js';
 
 /** lights: those with their own plane, in the order of the planes. shown: indices of those with
  * sliders; the others stay as in the look. rest: all other lights together, as in the answer and as
- * in the scene: two more planes. lighting: the answer's file.
+ * in the scene: two more planes. gels: the table of filters, packed. lighting: the
+ * answer's file.
  * @typedef {{size: [number, number], planes: Compact[], lights: Light[], shown?: number[],
  *   rest: {label: string, answer: Record<string, RGB>, present: Record<string, RGB>} | null,
- *   kelvins: [number, RGB][], transform: {stops: number, low: number, high: number,
+ *   kelvins: {coolest: number, warmest: number, colors: RGB[]}, gels: string,
+ *   transform: {stops: number, low: number, high: number,
  *   curve: number[] | null, lattice: Compact | null}, painting: string | null,
  *   lighting: {target?: string, lights: Record<string, {emission: RGB, weight: RGB}>},
  *   command: string | null}} Data */
 
-/** The data and planes of a mixer, once unpacked.
- * @type {WeakMap<HTMLElement, Promise<[Data, Uint16Array[]]>>} */
+/** The data of a mixer, its planes and its filters, once unpacked.
+ * @typedef {[Data, Uint16Array[], import("../gels/gels.js").Gel[]]} Unpacked */
+/** @type {WeakMap<HTMLElement, Promise<Unpacked>>} */
 const unpackedMixers = new WeakMap();
 
-/** @param {HTMLElement} root @returns {Promise<[Data, Uint16Array[]]>} */
+/** @param {HTMLElement} root @returns {Promise<Unpacked>} */
 export function unpackMixer(root) {
   const cachedData = unpackedMixers.get(root);
   if (cachedData) return cachedData;
   const text = root.querySelector('script[type="application/json"]')?.textContent ?? '';
   /** @type {Data} */
   const data = JSON.parse(text);
-  const promise = Promise.all(data.planes.map(unpack)).then(
-    (planes) => /** @type {[Data, Uint16Array[]]} */ ([data, planes]),
+  const promise = Promise.all([Promise.all(data.planes.map(unpack)), inflate(data.gels)]).then(
+    ([planes, gels]) =>
+      /** @type {Unpacked} */ ([data, planes, gelsOf(new TextDecoder().decode(gels))]),
   );
   unpackedMixers.set(root, promise);
   return promise;
@@ -43,7 +48,6 @@ export async function lutOf({ low, high, curve, lattice }) {
     return { shaper, lattice: new Float32Array(1), curve: Float32Array.from(curve) };
   }
   if (!lattice) return SRGB;
-  const halves = await unpack(lattice);
-  const values = Float32Array.from(halves, (bits) => VALUES[bits] * lattice.scale);
+  const values = toFloats(await unpack(lattice), lattice.scale);
   return { shaper: { side: lattice.size[1], low, high }, lattice: values, curve: null };
 }

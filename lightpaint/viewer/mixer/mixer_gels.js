@@ -1,10 +1,10 @@
-/** Colour filters for the selected lights of a mixer: in galleries, since a report has no room. */
+/** Colour filters for the selected lights of a mixer. */
 
-import { GELS, filtered, findGels, gelName, lossInStops } from '../gels/gels.js';
-import { luminance } from './mixer_light.js';
+import { luminance } from '../drawing/chromaticity.js';
+import { filtered, findGels, gelName, lossInStops } from '../gels/gels.js';
 import { createElement } from './page_elements.js';
 
-/** @typedef {import("../drawing/colour.js").RGB} RGB */
+/** @typedef {import("../drawing/chromaticity.js").RGB} RGB */
 /** @typedef {import("./mixer_light.js").Row} Row */
 /** @typedef {import("../gels/gels.js").Gel} Gel */
 
@@ -12,32 +12,35 @@ import { createElement } from './page_elements.js';
  * @type {WeakMap<Row, {passed: number, hue: RGB}>} */
 const filters = new WeakMap();
 
-/** Add a field for the filter of the selected lights. @param {import("./mixer_selection.js").Selection} selection */
-export function addGels(selection) {
+let count = 0;
+
+/** Add a field for the filter of the selected lights.
+ * @param {import("./mixer_selection.js").Selection} selection @param {Gel[]} gels */
+export function addGels(selection, gels) {
   const field = createElement('input');
   Object.assign(field, { type: 'search', placeholder: 'Gel: 201, R80, amber' });
   field.ariaLabel = 'Gel of the selected lights: a number or a name; empty for none';
+  field.title = 'Filters of Lee (L) and Rosco (R), with the light that passes as their makers say';
   const list = createElement('datalist');
   list.id = `gels-${(count += 1)}`;
   field.setAttribute('list', list.id);
-  list.append(...GELS.map((gel) => new Option(gel.name, gel.code)));
+  list.append(...gels.map(({ code, name, percent }) => new Option(`${name}, ${percent} %`, code)));
   const output = createElement('span');
   output.setAttribute('role', 'status');
   field.addEventListener('change', () => {
-    const gel = field.value.trim() ? findGels(field.value)[0] : null;
-    output.textContent = gel === undefined ? 'no such gel' : gel ? gelName(gel) : '';
+    const gel = field.value.trim() ? findGels(gels, field.value)[0] : null;
+    output.textContent = gel === undefined ? 'no such gel' : '';
     if (gel === undefined) return;
     const rows = selection.selected.filter(({ light }) => !light.isScalar);
     for (const row of rows) setGel(row, gel);
     if (gel && rows.length) {
-      const white = ownWhite(rows[0]);
-      output.textContent = `${gelName(gel)}, \u2212${lossInStops(gel, white).toFixed(1)} st`;
+      const loss = lossInStops(gel, ownWhite(rows[0])).toFixed(1);
+      output.textContent = `${gelName(gel)}, \u2212${loss} st`;
     }
   });
-  selection.element.append(field, output, list);
+  selection.addControl(field);
+  selection.element.append(output, list);
 }
-
-let count = 0;
 
 /** A light's own white: its colour in the scene. @param {Row} row @returns {RGB} */
 const ownWhite = ({ light }) => (luminance(light.present) > 0 ? light.present : [1, 1, 1]);

@@ -1,5 +1,6 @@
 /** One light of the mixer: its row with its sliders. */
 
+import { luminance } from '../drawing/chromaticity.js';
 import { decodeSrgb, encodeSrgb } from '../drawing/view_transform.js';
 import { slideByTouch } from '../touch_sliders.js';
 import { createElement, createSlider } from './page_elements.js';
@@ -12,27 +13,21 @@ import { createElement, createSlider } from './page_elements.js';
 /** Ends of the dimmer, in stops from the current level; the left one is off. */
 const [DIMMER_MIN_STOPS, DIMMER_MAX_STOPS] = [-8, 6];
 
-/** @param {ArrayLike<number>} rgb */
-export function luminance(rgb) {
-  return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
-}
-
 /** Colours of luminance 1 by temperature, interpolated in mireds.
- * @param {[number, RGB][]} table from cool to warm @typedef {ReturnType<typeof kelvinTable>} Kelvins */
-export function kelvinTable(table) {
-  const mireds = table.map(([kelvin]) => 1e6 / kelvin);
-  const last = mireds.length - 1;
+ * @param {import("./mixer_data.js").Data["kelvins"]} table colors: evenly in mireds
+ * @typedef {ReturnType<typeof kelvinTable>} Kelvins */
+export function kelvinTable({ coolest, warmest, colors }) {
+  const [first, last, count] = [1e6 / coolest, 1e6 / warmest, colors.length - 1];
   /** @param {number} mired @returns {RGB} */
   const rgb = (mired) => {
-    const step = (mireds[last] - mireds[0]) / last;
-    const position = Math.min(last, Math.max(0, (mired - mireds[0]) / step));
-    const k = Math.min(last - 1, Math.floor(position));
-    const [a, b] = [table[k][1], table[k + 1][1]];
+    const position = Math.min(count, Math.max(0, (count * (mired - first)) / (last - first)));
+    const k = Math.min(count - 1, Math.floor(position));
+    const [a, b] = [colors[k], colors[k + 1]];
     const blend = /** @type {RGB} */ (a.map((x, c) => x + (position - k) * (b[c] - x)));
     const presentLevel = luminance(blend);
     return /** @type {RGB} */ (blend.map((x) => x / presentLevel));
   };
-  return { rgb, coolest: mireds[0], warmest: mireds[last] };
+  return { rgb, coolest: first, warmest: last };
 }
 
 /** A light with sliders. */

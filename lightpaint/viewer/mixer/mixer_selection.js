@@ -18,14 +18,16 @@ export class Selection {
     this.master = 1;
     this.anchor = 0;
     this.element = createElement('div', 'mixer-all');
+    /** What acts on selected lights. @type {HTMLInputElement[]} */
+    this.controls = [];
     this.masterSlider = this.addSlider('Master', 0, MASTER_MAX, (percent) => {
       this.master = percent / 100;
       return `${Math.round(percent)} %`;
     });
-    this.dim = this.addRelative('Dim', DIM_RANGE, 'st', (row, rgb, stops) =>
+    this.addRelative('Dim', DIM_RANGE, 'st', (row, rgb, stops) =>
       row.set(/** @type {RGB} */ (rgb.map((x) => x * 2 ** stops)), row.kelvin),
     );
-    this.warm = this.addRelative('Warm', WARM_RANGE, 'mired', (row, _, mired, kelvin) => {
+    this.addRelative('Warm', WARM_RANGE, 'mired', (row, _, mired, kelvin) => {
       if (kelvin && !row.light.isScalar) row.setTemperature(1e6 / kelvin + mired);
     });
     this.pattern = createElement('input');
@@ -91,6 +93,7 @@ export class Selection {
       return `${amount < 0 ? '\u2212' : '+'}${Math.abs(amount).toFixed(unit === 'st' ? 2 : 0)} ${unit}`;
     });
     const { slider } = control;
+    this.controls.push(slider);
     const rest = () => {
       start = [];
       slider.value = '0';
@@ -98,13 +101,19 @@ export class Selection {
     slider.addEventListener('change', rest);
     slider.addEventListener('pointerup', rest);
     slider.value = '0';
-    return control;
+  }
+
+  /** Add a control of the selected lights. @param {HTMLInputElement} control */
+  addControl(control) {
+    this.controls.push(control);
+    this.element.append(control);
+    this.show();
   }
 
   show() {
     const count = this.selected.length;
     this.count.textContent = `${count} selected`;
-    for (const { slider } of [this.dim, this.warm]) slider.disabled = !count;
+    for (const control of this.controls) control.disabled = !count;
   }
 
   reset() {

@@ -7,7 +7,7 @@ import { replaceNonFinite } from '../drawing/half_floats.js';
 /** Return the picture as halves (h, w, 3), divided by its scale.
  * @param {Compact} picture @returns {Promise<Uint16Array>} */
 export async function unpack({ data, dropped, size: [height, width] }) {
-  const bytes = await inflate(data.slice(data.indexOf(',') + 1));
+  const bytes = await inflate(data);
   const count = height * width;
   const planes = [0, 1, 2].map((c) => unpackPlane(bytes, c * count, 3 * count, height, width));
   const [green, red, blue] = planes;
@@ -41,8 +41,10 @@ function unpackPlane(bytes, first, numberCount, height, width) {
   return numbers;
 }
 
-/** @param {string} text base64 @returns {Promise<Uint8Array>} */
-async function inflate(text) {
+/** Return the bytes that an address `data:` has, deflated. @param {string} data
+ * @returns {Promise<Uint8Array>} */
+export async function inflate(data) {
+  const text = data.slice(data.indexOf(',') + 1);
   const deflated = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   const stream = new Blob([deflated]).stream().pipeThrough(new DecompressionStream('deflate'));
   return new Uint8Array(await new Response(stream).arrayBuffer());

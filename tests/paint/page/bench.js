@@ -1,7 +1,8 @@
 /** What tests of the picture engine call in the browser. */
 import { PaintCanvas } from "/engine/paint_canvas.js";
 import { chooseView } from "/viewer/drawing/choose_renderer.js";
-import { SRGB, lutOf } from "/viewer/drawing/view_transform.js";
+import { lutOf } from "/viewer/drawing/lattice.js";
+import { SRGB } from "/viewer/drawing/view_transform.js";
 import { pictureOf } from "/engine/message_frames.js";
 import { DEFAULTS } from "/viewer/drawing/view.js";
 

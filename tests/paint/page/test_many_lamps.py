@@ -227,17 +227,17 @@ def test_published_colours_of_gels_come_out_on_the_light_they_were_measured_with
     """The table against numbers of the makers' swatch books, and against itself."""
     gels = painter.page.evaluate(
         """async () => {
-          const { GELS, filtered, findGels, gelOn, lossInStops } =
-            await import('/viewer/gels/gels.js');
+          const { GELS, gelOn, gelsNamed } = await import('/viewer/gels/gel_list.js');
+          const { filtered, lossInStops } = await import('/viewer/gels/gels.js');
           const { fromKelvin, toKelvin } = await import('/viewer/drawing/colour.js');
           const white = fromKelvin(3200);
           return {
             codes: GELS.map(({ code }) => code),
             kelvins: ['L201', 'L202', 'L203', 'L204'].map(
-              (code) => toKelvin(filtered(findGels(code)[0], white)).kelvin),
+              (code) => toKelvin(filtered(gelsNamed(code)[0], white)).kelvin),
             losses: ['L201', 'L209', 'L211', 'L106'].map(
-              (code) => lossInStops(findGels(code)[0], white)),
-            found: GELS.every((gel) => findGels(gel.code)[0] === gel),
+              (code) => lossInStops(gelsNamed(code)[0], white)),
+            found: GELS.every((gel) => gelsNamed(gel.code)[0] === gel),
             known: gelOn(filtered(GELS[1], white).map((x) => 7 * x), white)?.code,
             none: gelOn(white, white),
             finite: GELS.every(({ factor }) => factor.every((x) => x >= 0 && x < 1.1)),

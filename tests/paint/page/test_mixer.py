@@ -185,6 +185,48 @@ def test_selected_lights_are_dimmed_together_and_the_master_dims_all(
     check(page, codes(basis, answer, transform))
 
 
+def test_a_gel_takes_its_light_and_another_takes_its_place(make_basis: Any, open_file: Any) -> None:
+    basis = light_basis(make_basis, 2)
+    transform, answer = transform_of_report(basis), solve_painting(basis)[1].weights
+    page = open_file(report(basis))
+    gel = page.get_by_label("Gel of the selected lights")
+    assert gel.is_disabled()  # no light is selected
+    page.get_by_role("checkbox", name="Select light 0").press("Space")
+    white, y = basis.current_weights[0], np.array([0.2126, 0.7152, 0.0722])
+
+    def filtered(x: float, y_: float, share: float, source: tuple[float, float]) -> Any:
+        """Weights under a filter of published CIE x and y, and share of light that passes."""
+        light, lamp = (_rgb_of_chromaticity(*xy) for xy in ((x, y_), source))
+        factor = np.maximum(light, 0) / lamp
+        return factor * share * (lamp @ y) / ((factor * lamp) @ y) * white
+
+    open_level = (answer[0] @ y) / (white @ y)
+    for text, weights in (
+        ("r80", filtered(0.157, 0.209, 0.0595, (0.44757, 0.40745))),
+        ("full c.t. orange", filtered(0.51, 0.42, 0.628, (0.4234, 0.399))),
+        ("", white),
+    ):
+        gel.fill(text)
+        gel.press("Enter")
+        expected = answer.copy()
+        expected[0] = open_level * weights
+        check(page, codes(basis, expected, transform))
+    gel.fill("9999")
+    gel.press("Enter")
+    page.get_by_text("no such gel").wait_for()
+    check(page, codes(basis, expected, transform))
+
+
+def _rgb_of_chromaticity(x: float, y: float) -> Any:
+    """Linear Rec.709 of luminance 1."""
+    to_rgb = [
+        [3.2409699, -1.5373832, -0.4986108],
+        [-0.9692436, 1.8759675, 0.0415551],
+        [0.0556301, -0.203977, 1.0569715],
+    ]
+    return np.array(to_rgb) @ [x / y, 1, (1 - x - y) / y]
+
+
 def test_kelvin_turns_the_colour_and_keeps_the_luminance(make_basis: Any, open_file: Any) -> None:
     basis = light_basis(make_basis, 2)
     transform, answer = transform_of_report(basis), solve_painting(basis)[1].weights
@@ -303,7 +345,7 @@ def test_the_wipe(make_basis: Any, open_file: Any) -> None:
     stage = page.locator(".mixer-stage")
     box = stage.bounding_box()
     # The mix is whole at first: in the painting no slider changes anything.
-    tag = page.locator(".mixer-tag", has_text="painting")
+    tag = page.locator(".mixer-stage .wipe-tag", has_text="painting")
     assert page.get_by_role("slider", name="Wipe: how much").input_value() == "0"
     assert not tag.is_visible()
     stage.click(position={"x": 0.25 * box["width"], "y": 20})

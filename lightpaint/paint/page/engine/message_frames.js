@@ -9,8 +9,8 @@
 /** Version of this protocol. */
 export const VERSION = 3;
 
-/** @typedef {import("../../../viewer/drawing/view_transform.js").Data} Data */
-/** @typedef {import("../../../viewer/drawing/view_transform.js").Picture} Picture */
+/** @typedef {import("../../../viewer/drawing/lattice.js").Data} Data */
+/** @typedef {import("../../../viewer/drawing/lattice.js").Picture} Picture */
 /** @typedef {Record<string, Picture>} Arrays */
 /** @typedef {import("../../../viewer/drawing/view.js").Region} Region */
 /** @typedef {import("../../../viewer/drawing/colour.js").RGB} RGB */

@@ -1,6 +1,7 @@
 /** A list of colour filters, found by number or name. */
 
-import { filtered, findGels, gelName, lossInStops } from '../../../../viewer/gels/gels.js';
+import { gelsNamed } from '../../../../viewer/gels/gel_list.js';
+import { filtered, gelName, lossInStops } from '../../../../viewer/gels/gels.js';
 import { useId } from '../controls.js';
 import { signedText } from '../format.js';
 import { atFullBrightness, toHex } from '../paint_colour.js';
@@ -14,7 +15,7 @@ import { fill, words } from '../../language/language.js';
  * without a filter */
 export function GelPicker({ white, gel, choose }) {
   const [text, setText] = useState('');
-  const gels = findGels(text);
+  const gels = gelsNamed(text);
   const id = useId();
   const press = (/** @type {KeyboardEvent} */ event) => {
     if (event.key === 'Enter' && gels.length) choose(gels[0]);

@@ -1,6 +1,7 @@
 /** The colour of lamps that are held: white, HSV, RGB, hex, or a filter. */
 
-import { gelName, gelOn, lossInStops } from '../../../../viewer/gels/gels.js';
+import { gelOn } from '../../../../viewer/gels/gel_list.js';
+import { gelName, lossInStops } from '../../../../viewer/gels/gels.js';
 import { Hex, Hsv, MIXERS, Rgb, White } from '../colour_mixers.js';
 import { Choice } from '../controls.js';
 import { signedText } from '../format.js';

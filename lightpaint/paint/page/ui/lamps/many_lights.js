@@ -1,6 +1,7 @@
 /** Changes of several lights at once: each is one step of undo, and one solve. */
 
-import { gelName, gelOn } from '../../../../viewer/gels/gels.js';
+import { gelOn } from '../../../../viewer/gels/gel_list.js';
+import { gelName } from '../../../../viewer/gels/gels.js';
 import { luminance } from '../paint_colour.js';
 import { lightCountText, signedText } from '../format.js';
 import { findTie, lockedLights, lockingLight } from '../tied_lights.js';

@@ -1,0 +1,52 @@
+"""Scripts and styles of a page without space: they mean what they meant."""
+
+import re
+
+import pytest
+
+from lightpaint.viewer.bundle import bundled
+from lightpaint.viewer.compaction import compact_script, compact_styles
+
+
+@pytest.mark.parametrize(
+    ("script", "compacted"),
+    [
+        ("const x = 3; // three\nlet y = x;\n", "const x=3;let y=x;"),
+        ("a = b\nc = d\n", "a=b\nc=d"),
+        ("a = b +\n  c", "a=b+\nc"),
+        ("x = a + +b - -c / d", "x=a+ +b- -c/d"),
+        ("f(\n  1,\n  [2, 3],\n)\n;", "f(1,[2,3],);"),
+        ("const text = 'a  =  b // c';", "const text='a  =  b // c';"),
+        ('say("it\'s // \\" no  comment");', 'say("it\'s // \\" no  comment");'),
+        ("const t = `a  ${x + 1}  b`;", "const t=`a  ${x + 1}  b`;"),
+        ("const r = /[/] '  \\/ /g; // x", "const r=/[/] '  \\/ /g;"),
+        ("const q = a / b / c;", "const q=a/b/c;"),
+        ("return / x'/.test(y)", "return/ x'/.test(y)"),
+        ("const z = (a + b) / 2, y = 'x / y';", "const z=(a+b)/2,y='x / y';"),
+        ("/*! licence */\n/* no */ x  =  1", "/*! licence */\nx=1"),
+        ("if (a) return\nb()", "if(a)return\nb()"),
+        ("a\n++b", "a\n++b"),
+        ("const { a, b } = m0\nconst c = 1", "const{a,b}=m0\nconst c=1"),
+        ("typeof x === 'y' && !z", "typeof x==='y'&&!z"),
+    ],
+)
+def test_a_script_keeps_its_meaning(script: str, compacted: str) -> None:
+    assert compact_script(script) == compacted
+    assert compact_script(compacted) == compacted
+
+
+def test_a_style_sheet_keeps_its_meaning() -> None:
+    text = """/* no */ a > b:hover,
+    c { color: red; content: ' { ; '; margin: calc(1px + 0.5em) 0.25px; }
+    @media (max-width: 860px) { a { --p: 0%; } }"""
+    assert compact_styles(text) == (
+        "a>b:hover,c{color:red;content:' { ; ';margin:calc(1px + .5em) .25px}"
+        "@media (max-width:860px){a{--p:0%}}"
+    )
+
+
+def test_names_and_texts_of_the_mixer_stay() -> None:
+    words = re.compile(r"[\w$]{3,}")
+    script = bundled("viewer/mixer/mixer.js")
+    code = re.sub(r"//[^\n]*", "", script)
+    assert words.findall(compact_script(script)) == words.findall(code)
