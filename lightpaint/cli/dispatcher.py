@@ -19,6 +19,7 @@ from lightpaint.errors import BatchError, LightpaintError
 #: Modules of the commands that are not in `render_commands`.
 _MODULES = {
     "batch": "batch_command",
+    "blender": "blender_command",
     "cache": "maintenance",
     "doctor": "maintenance",
     "export": "export_command",

@@ -60,6 +60,8 @@ def values_of(options: Namespace, words: Sequence[str]) -> dict[str, Any]:
         case "verify":
             folders = list(map(Path, options.folders))
             return {"folders": folders, "variant": options.variant, "settings": settings}
+        case "blender":
+            return {"output": output or Path("lightpaint-blender.zip"), "force": options.force}
         case "cache":
             return {"action": options.action, "names": options.names}
         case _:

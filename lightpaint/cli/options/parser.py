@@ -214,6 +214,15 @@ def _export(parser: argparse.ArgumentParser) -> None:
     add_force(parser)
 
 
+def _blender(parser: argparse.ArgumentParser) -> None:
+    add_output(parser, "F.zip", "file to write (default: lightpaint-blender.zip)")
+    parser.add_argument(
+        "--force",
+        action="store_true",
+        help="replace a file that is no add-on of lightpaint (default: refuse)",
+    )
+
+
 def _relight(parser: argparse.ArgumentParser) -> None:
     add_scene(parser)
     parser.add_argument(
@@ -256,6 +265,7 @@ _COMMANDS: dict[str, tuple[str, Callable[[argparse.ArgumentParser], None]]] = {
     "paint": ("paint in the browser, and see the closest lighting as you paint", _paint),
     "batch": ("solve many looks from one manifest; a stopped batch continues", add_batch),
     "export": ("write a lighting for other programs, fixtures and consoles", _export),
+    "blender": ("write the add-on for Blender, whose lamps follow the painter", _blender),
     "relight": ("write lightings into the scene, and render it", _relight),
     "verify": ("render results again, and compare them with the prediction", _verify),
     "cache": ("list or delete the bases that earlier runs kept", _cache),

@@ -1,0 +1,231 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Background work: a render, a painter, a solve. One timer asks them for news.
+
+Nothing here is Blender's data, so undo and loading leave it alone.
+"""
+
+import atexit
+import os
+import traceback
+from typing import Any
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ..lamps.lamp_levels import PREVIEWS, discard_levels, grouped_places
+from ..lamps.memory import recall, remember
+from ..painter.program import find_program
+from ..shot.cycles_render import RENDERING, ShotRender, put_back_output
+from ..shot.shot_files import ShotFolder
+from ..shot.view_options import plain_options, view_options
+from .live_session import LiveSession
+
+#: Seconds between two looks at what has happened.
+TICK_S = 1 / 30
+
+
+class Controller:
+    """The render, the painter and the solve that run now, if any.
+
+    Attributes:
+        message: The last sentence for the user; is_error: whether it is about a failure.
+        left: What is in no light group, with the reasons.
+    """
+
+    def __init__(self):
+        self.reset()
+
+    def reset(self):
+        """Forget everything, as of another file."""
+        self.render: ShotRender | None = None
+        self.session: LiveSession | None = None
+        self.solve: Any = None
+        self.message, self.is_error, self.left, self._then_paint = "", False, [], False
+
+    def say(self, text, *, is_error=False):
+        """Show a sentence in the panel."""
+        self.message, self.is_error = text, is_error
+        redraw()
+
+    def begin_render(self, render, scene, *, then_paint):
+        """Start a render; the painter opens when it is done. Return whether it is done already."""
+        self.render, self._then_paint = render, then_paint
+        self.say("Cycles renders the light groups …")
+        render.start(scene, waits=bpy.app.background)
+        start_timer()
+        if bpy.app.background:
+            self.tick()
+
+    def begin_paint(self, scene, view_layer, folder):
+        """Start the painter on a rendered shot. Raises OSError with what to do."""
+        program = self.check_program()
+        self.end_paint()
+        self.session = LiveSession(folder, scene, view_layer)
+        view, variables = view_options(scene, ocio_path())
+        self.session.start(program, view, variables, plain_options(scene) if variables else None)
+        self.say("")
+        start_timer()
+
+    def check_program(self):
+        """Return the path of lightpaint. Raises FileNotFoundError, with what to do."""
+        preferences = preferences_of()
+        return find_program(preferences.program if preferences else "")
+
+    def end_paint(self):
+        """End the painter and the connection to it."""
+        if self.session is not None:
+            self.session.end()
+        self.session = None
+
+    def tick(self):
+        """Look at all that runs. Return whether anything is left that could run."""
+        if self.render is not None:
+            self._look_at_render()
+        if self.session is not None and self.session.tick():
+            redraw()
+        if self.solve is not None and self.solve.tick():
+            text, is_error = self.solve.result
+            self.solve = None
+            self.say(text, is_error=is_error)
+        has_session = self.session is not None and not self.session.is_over
+        return self.render is not None or self.solve is not None or has_session
+
+    def _look_at_render(self):
+        render = self.render
+        if (
+            render is None
+            or not (render.is_done or render.is_cancelled)
+            or bpy.app.is_job_running("RENDER")
+        ):
+            return
+        self.render = None
+        error = render.finish()
+        self.say(error or "the shot is rendered", is_error=bool(error))
+        scene = bpy.data.scenes.get(render.scene_name)
+        if not error and self._then_paint and scene is not None:
+            try:
+                self.begin_paint(scene, scene.view_layers[render.layer_name], render.folder)
+            except OSError as failure:
+                self.say(str(failure), is_error=True)
+
+
+controller = Controller()
+
+
+def shot_folder(scene):
+    """Return the folder of a scene's shot: the chosen one, or one beside the .blend."""
+    chosen = scene.lightpaint_settings.folder
+    if chosen:
+        return ShotFolder(bpy.path.abspath(chosen))
+    name = bpy.path.clean_name(scene.name) or "scene"
+    if bpy.data.filepath:
+        stem = os.path.splitext(bpy.data.filepath)[0]
+        return ShotFolder(os.path.join(f"{stem}.lightpaint", name))
+    # A file without a name has no folder of its own until it is saved.
+    return ShotFolder(os.path.join(bpy.app.tempdir, "lightpaint", name))
+
+
+def preferences_of():
+    """Return the add-on's preferences; None while it is not enabled as one."""
+    addon = bpy.context.preferences.addons.get(__package__.rpartition(".")[0])
+    return addon.preferences if addon else None
+
+
+def ocio_path():
+    """Return the path of the colour management that Blender uses; "" if it is not known."""
+    if chosen := os.environ.get("OCIO"):
+        return chosen
+    folder = bpy.utils.system_resource("DATAFILES", path="colormanagement")
+    return os.path.join(folder, "config.ocio") if folder else ""
+
+
+def redraw():
+    """Draw the panels again."""
+    for window in bpy.context.window_manager.windows if bpy.context.window_manager else ():
+        for area in window.screen.areas:
+            if area.type in ("VIEW_3D", "PROPERTIES"):
+                area.tag_redraw()
+
+
+def start_timer():
+    """Make Blender call the controller, if it does not do so already."""
+    if not bpy.app.background and not bpy.app.timers.is_registered(_on_timer):
+        bpy.app.timers.register(_on_timer, first_interval=TICK_S, persistent=True)
+
+
+def _on_timer():
+    try:
+        return TICK_S if controller.tick() else None
+    except Exception as error:
+        # A timer that fails is never called again, and nobody would know why.
+        traceback.print_exc()
+        controller.end_paint()
+        controller.say(f"lightpaint has failed: {error}", is_error=True)
+        return None
+
+
+@persistent
+def on_render_complete(*_):
+    """Note that Blender has rendered; this runs in a thread of the render."""
+    if controller.render is not None:
+        controller.render.is_done = True
+
+
+@persistent
+def on_render_cancel(*_):
+    """Note that somebody has stopped a render."""
+    if controller.render is not None:
+        controller.render.is_cancelled = True
+
+
+@persistent
+def on_undo(*_):
+    """Discard a preview that an undone step had taken along, so that one undo takes all back."""
+    for scene in bpy.data.scenes:
+        discard_preview(scene)
+
+
+@persistent
+def on_load(*_):
+    """End what belongs to another file, and put back what a render had set when this was saved."""
+    controller.end_paint()
+    controller.reset()
+    for scene in bpy.data.scenes:
+        if scene.library is None and RENDERING in recall(scene):
+            put_back_output(scene)
+
+
+def discard_preview(scene):
+    """Put back the levels of before a scene's preview, if it shows one. Return whether it does."""
+    memory = recall(scene)
+    if scene.library is not None or not memory.get(PREVIEWS):
+        return False
+    for view_layer in scene.view_layers:
+        discard_levels(grouped_places(scene, view_layer))
+    remember(scene, {**memory, PREVIEWS: False})
+    return True
+
+
+HANDLERS = (
+    ("render_complete", on_render_complete),
+    ("render_cancel", on_render_cancel),
+    ("undo_post", on_undo),
+    ("load_post", on_load),
+)
+
+
+def register():
+    for name, handler in HANDLERS:
+        getattr(bpy.app.handlers, name).append(handler)
+    atexit.register(controller.end_paint)
+
+
+def unregister():
+    for name, handler in HANDLERS:
+        handlers = getattr(bpy.app.handlers, name)
+        if handler in handlers:
+            handlers.remove(handler)
+    controller.end_paint()
+    atexit.unregister(controller.end_paint)
+    if bpy.app.timers.is_registered(_on_timer):
+        bpy.app.timers.unregister(_on_timer)

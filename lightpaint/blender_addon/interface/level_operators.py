@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators on levels: apply or discard a preview, use looks, and revert everything."""
+
+import bpy
+
+from ..lamps.lamp_levels import PREVIEWS, grouped_places, keep_levels, key_levels, show_factors
+from ..lamps.memory import MEMORY_KEY, recall, remember
+from ..shot.layer_setup import revert
+from .controller import controller, discard_preview, shot_folder
+from .shot_operators import ShotOperator
+
+
+def known_looks(scene):
+    """Return the looks of the painter, or those kept in the folder while it does not run."""
+    session = controller.session
+    if session is not None and session.state.is_open:
+        return [(look.name, look.factors) for look in session.state.looks]
+    return shot_folder(scene).read_looks()
+
+
+def apply_levels(scene, view_layer):
+    """Make the levels that are shown the scene's own."""
+    keep_levels(grouped_places(scene, view_layer))
+    remember(scene, {**recall(scene), PREVIEWS: False})
+
+
+class LIGHTPAINT_OT_apply(ShotOperator):
+    """Keep the lamps as the painter shows them: one step of undo"""
+
+    bl_idname, bl_label = "lightpaint.apply", "Apply"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        return bool(recall(context.scene).get(PREVIEWS))
+
+    def run(self, context):
+        apply_levels(context.scene, context.view_layer)
+        return "the lamps are as painted"
+
+
+class LIGHTPAINT_OT_discard(ShotOperator):
+    """Put the lamps back to what they were before this preview"""
+
+    bl_idname, bl_label = "lightpaint.discard", "Discard"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        return bool(recall(context.scene).get(PREVIEWS))
+
+    def run(self, context):
+        discard_preview(context.scene)
+        return "the lamps are as before the preview"
+
+
+class LIGHTPAINT_OT_revert(ShotOperator):
+    """Put back everything that lightpaint has changed in this file: lamps, light groups, passes"""
+
+    bl_idname, bl_label = "lightpaint.revert", "Revert All"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        return MEMORY_KEY in context.scene
+
+    def run(self, context):
+        controller.end_paint()
+        problems = revert(context.scene)
+        controller.left = problems
+        return "everything is as before lightpaint"
+
+
+class LookOperator(ShotOperator):
+    """An operator on one of the looks"""
+
+    bl_options = {"REGISTER", "UNDO"}
+
+    index: bpy.props.IntProperty(options={"HIDDEN", "SKIP_SAVE"})
+
+    def look(self, context):
+        """Return name and multipliers of the chosen look. Raises ValueError if it has gone."""
+        looks = known_looks(context.scene)
+        if not 0 <= self.index < len(looks):
+            raise ValueError("this look is no longer there")
+        return looks[self.index]
+
+
+class LIGHTPAINT_OT_apply_look(LookOperator):
+    """Set the lamps to this look: one step of undo"""
+
+    bl_idname, bl_label = "lightpaint.apply_look", "Apply Look"
+
+    def run(self, context):
+        name, factors = self.look(context)
+        groups = grouped_places(context.scene, context.view_layer)
+        show_factors(groups, factors)
+        apply_levels(context.scene, context.view_layer)
+        return f"the lamps are set to {name}"
+
+
+class LIGHTPAINT_OT_key_look(LookOperator):
+    """Set the lamps to this look at the current frame, by keyframes: two looks blend over time"""
+
+    bl_idname, bl_label = "lightpaint.key_look", "Key Look"
+
+    def run(self, context):
+        name, factors = self.look(context)
+        groups = grouped_places(context.scene, context.view_layer)
+        show_factors(groups, factors)
+        key_levels(groups, context.scene.frame_current)
+        apply_levels(context.scene, context.view_layer)
+        return f"{name} is keyed at frame {context.scene.frame_current}"
+
+
+CLASSES = (
+    LIGHTPAINT_OT_apply,
+    LIGHTPAINT_OT_discard,
+    LIGHTPAINT_OT_revert,
+    LIGHTPAINT_OT_apply_look,
+    LIGHTPAINT_OT_key_look,
+)

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The painter that belongs to this Blender: started, observed, and followed by the lamps.
+
+It holds no data of Blender, which undo and loading would make invalid: only names.
+"""
+
+import contextlib
+import json
+
+import bpy
+
+from ..lamps.lamp_levels import PREVIEWS, grouped_places, show_factors
+from ..lamps.memory import recall, remember
+from ..painter.painter_link import PainterLink
+from ..painter.painter_messages import PainterState
+from ..painter.program import ProgramRun, paint_arguments, running_painter
+
+#: Seconds in which a painter that listens has to answer.
+PATIENCE_S = 30.0
+
+#: Distance from 1 of a multiplier that changes nothing.
+UNCHANGED = 1e-9
+
+ENDED_TEXT = "the painter has ended: the lamps stay as they are until you apply or discard"
+
+
+class LiveSession:
+    """A painter, from its start to its end.
+
+    Attributes:
+        state: What is known of its session.
+        message: A sentence for the user about its state.
+    """
+
+    def __init__(self, folder, scene, view_layer):
+        self.folder, self.scene_name, self.layer_name = folder, scene.name, view_layer.name
+        self.state, self.message, self.is_over = PainterState(), "the painter starts …", False
+        self._run: ProgramRun | None = None
+        self._link: PainterLink | None = None
+        self._commands, self._shown, self._looks_known = [], None, None
+
+    def start(self, program, view, environment, fallback):
+        """Start the painter, or connect to the one that serves this shot already.
+
+        view: options of its view transform, with variables of its environment; fallback: options
+        to try if lightpaint is there without what these need. Raises OSError.
+        """
+        shot, session = self.folder.render, self.folder.session
+        self._commands = [(program, paint_arguments(shot, session, view), environment)]
+        if fallback:
+            self._commands.append((program, paint_arguments(shot, session, fallback), {}))
+        if found := running_painter(session):
+            self._link = PainterLink(*found)
+        else:
+            self._run = ProgramRun(*self._commands.pop(0))
+
+    @property
+    def is_connected(self):
+        """True while the painter is there."""
+        return self._link is not None and self._link.is_connected and not self.is_over
+
+    @property
+    def page_url(self):
+        """The address of its page; "" if another Blender has started it."""
+        return self._run.page_url if self._run else ""
+
+    def tick(self):
+        """Take in what has happened since the last call. Return whether anything has."""
+        if self.is_over:
+            return False
+        if self._link is None:
+            return self._await_start()
+        has_news = is_lit = False
+        for content, buffers in self._link.messages():
+            is_lit |= self.state.receive(content, buffers)
+            has_news = True
+        if has_news:
+            self.message = self.state.headline or self.state.notice
+            self._keep_looks()
+        if is_lit:
+            self.show()
+        if self._link.has_ended:
+            self._after_end()
+            return True
+        return has_news
+
+    def show(self, factors=None):
+        """Make the lamps follow the painter's answer, or show other multipliers."""
+        scene = bpy.data.scenes.get(self.scene_name)
+        view_layer = scene.view_layers.get(self.layer_name) if scene else None
+        if view_layer is None or bpy.app.is_job_running("RENDER"):
+            return
+        self._shown = self.state.factors
+        shown = self.state.factors if factors is None else factors
+        if not recall(scene).get(PREVIEWS) and self.state.is_new and are_one(shown):
+            return  # nothing is painted yet
+        show_preview(scene, view_layer, shown)
+
+    def end(self):
+        """End the painter, if it was started here, and the connection to it."""
+        if self._link is not None:
+            self._link.close()
+        if self._run is not None:
+            self._run.stop()
+        self._end("the painter has ended")
+
+    def _await_start(self):
+        """Connect once the painter listens, or tell why it does not."""
+        run = self._run
+        if run is None:
+            return False
+        if run.first_line:
+            try:
+                found = json.loads(run.first_line)
+                self._link = PainterLink(found["address"], found["token"], PATIENCE_S)
+            except (ValueError, KeyError, TypeError):
+                self.end()
+                self.message = "this is no painter of lightpaint: check the add-on's preferences"
+            return True
+        if run.code is None:
+            return False
+        if not self._start_next():
+            self._end(run.error_text)
+        return True
+
+    def _start_next(self):
+        """Start the next command that could serve the shot. Return whether there was one."""
+        if not self._commands:
+            return False
+        self._link, self._run = None, ProgramRun(*self._commands.pop(0))
+        return True
+
+    def _after_end(self):
+        """Tell why the connection is over, or start a painter if an earlier one has gone."""
+        link = self._link
+        if link is None:
+            return
+        if link.is_connected:
+            self._end(self.state.closing or ENDED_TEXT)
+        elif self._run is not None or not self._start_next():
+            self.end()
+            self.message = f"the painter does not answer ({link.error}): press Paint again"
+
+    def _keep_looks(self):
+        looks = [(look.name, look.factors) for look in self.state.looks]
+        if self.state.is_open and looks != self._looks_known:
+            self._looks_known = looks
+            # If this fails: they are in the painter's session, too.
+            with contextlib.suppress(OSError):
+                self.folder.write_looks(looks)
+
+    def _end(self, text):
+        self.is_over, self.message = True, text
+
+
+def are_one(factors):
+    """Return whether multipliers leave all lamps as they were rendered."""
+    return all(abs(value - 1) < UNCHANGED for factor in factors.values() for value in factor)
+
+
+def show_preview(scene, view_layer, factors):
+    """Set lamps to multipliers, as a preview that can be discarded. Return how many changed."""
+    changed = show_factors(grouped_places(scene, view_layer), factors)
+    memory = recall(scene)
+    if changed and not memory.get(PREVIEWS):
+        remember(scene, {**memory, PREVIEWS: True})
+    return changed

@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel, in the sidebar of the 3D view and in the render properties."""
+
+import textwrap
+
+import bpy
+
+from ..lamps.lamp_levels import PREVIEWS
+from ..lamps.memory import recall
+from .controller import controller, shot_folder
+from .level_operators import known_looks
+
+#: Reasons that are listed at most; the rest is counted.
+MAX_REASONS = 8
+
+#: Pixels of one character, about, at Blender's usual size.
+CHARACTER_PIXELS = 7.5
+
+
+class LightpaintPanel:
+    """Contents of both panels."""
+
+    bl_label = "lightpaint"
+
+    def draw(self, context):
+        layout, scene = self.layout, context.scene
+        session = controller.session
+        is_painting = session is not None and not session.is_over
+        column = layout.column(align=True)
+        column.scale_y = 1.4
+        column.operator(
+            "lightpaint.paint", text="Open Page" if is_painting else "Paint", icon="BRUSH_DATA"
+        )
+        row = layout.row(align=True)
+        row.operator("lightpaint.prepare", icon="LIGHT")
+        row.operator("lightpaint.render", icon="RENDER_STILL")
+        if is_painting:
+            layout.operator("lightpaint.stop", icon="X")
+        self.draw_messages(layout, context, session)
+        self.draw_preview(layout, scene)
+        self.draw_looks(layout, scene)
+
+    def draw_messages(self, layout, context, session):
+        texts = [(controller.message, controller.is_error)]
+        if session is not None:
+            texts.append((session.message, session.is_over))
+        for text, is_error in texts:
+            if text:
+                draw_text(layout, context, text, icon="ERROR" if is_error else "INFO")
+        if controller.left:
+            box = layout.box()
+            box.label(text="In no light group:")
+            for reason in controller.left[:MAX_REASONS]:
+                draw_text(box, context, reason, icon="DOT")
+            if len(controller.left) > MAX_REASONS:
+                box.label(text=f"and {len(controller.left) - MAX_REASONS} more")
+
+    def draw_preview(self, layout, scene):
+        row = layout.row(align=True)
+        if recall(scene).get(PREVIEWS):
+            row.operator("lightpaint.apply", icon="CHECKMARK")
+            row.operator("lightpaint.discard", icon="LOOP_BACK")
+        if recall(scene):
+            layout.operator("lightpaint.revert", icon="TRASH")
+
+    def draw_looks(self, layout, scene):
+        looks = known_looks(scene)
+        if not looks:
+            return
+        box = layout.box()
+        box.label(text="Looks")
+        for index, (name, _) in enumerate(looks):
+            row = box.row(align=True)
+            row.operator("lightpaint.apply_look", text=name, translate=False).index = index
+            row.operator("lightpaint.key_look", text="", icon="KEY_HLT").index = index
+
+
+class ShotPanel:
+    """The settings of a shot, and ways without the painter."""
+
+    bl_label, bl_options = "Shot", {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout, settings = self.layout, context.scene.lightpaint_settings
+        layout.use_property_split = True
+        layout.prop(settings, "grouping")
+        layout.prop(settings, "folder")
+        draw_text(layout, context, str(shot_folder(context.scene).path), icon="FILE_FOLDER")
+
+
+def draw_text(layout, context, text, icon="NONE"):
+    """Draw a sentence on as many lines as it needs."""
+    width = context.region.width if context.region else 300
+    scale = context.preferences.system.ui_scale * CHARACTER_PIXELS
+    lines = textwrap.wrap(text, max(16, int((width - 60) / scale))) or [""]
+    column = layout.column(align=True)
+    for number, line in enumerate(lines):
+        column.label(text=line, icon=icon if number == 0 else "BLANK1", translate=False)
+
+
+class LIGHTPAINT_PT_view(LightpaintPanel, bpy.types.Panel):
+    bl_space_type, bl_region_type, bl_category = "VIEW_3D", "UI", "lightpaint"
+
+
+class LIGHTPAINT_PT_view_shot(ShotPanel, bpy.types.Panel):
+    bl_space_type, bl_region_type, bl_category = "VIEW_3D", "UI", "lightpaint"
+    bl_parent_id = "LIGHTPAINT_PT_view"
+
+
+class LIGHTPAINT_PT_render(LightpaintPanel, bpy.types.Panel):
+    bl_space_type, bl_region_type, bl_context = "PROPERTIES", "WINDOW", "render"
+    bl_options = {"DEFAULT_CLOSED"}
+
+
+class LIGHTPAINT_PT_render_shot(ShotPanel, bpy.types.Panel):
+    bl_space_type, bl_region_type, bl_context = "PROPERTIES", "WINDOW", "render"
+    bl_parent_id = "LIGHTPAINT_PT_render"
+
+
+CLASSES = (
+    LIGHTPAINT_PT_view,
+    LIGHTPAINT_PT_view_shot,
+    LIGHTPAINT_PT_render,
+    LIGHTPAINT_PT_render_shot,
+)

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The three steps: prepare, render, paint."""
+
+import bpy
+
+from ..lamps.memory import recall
+from ..shot.cycles_render import ShotRender, current_digest
+from ..shot.layer_setup import prepare
+from .controller import controller, shot_folder
+
+
+def prepare_shot(context):
+    """Prepare the view layer of a context. Raises ValueError if that is impossible."""
+    scene, view_layer = context.scene, context.view_layer
+    if scene.library is not None:
+        raise ValueError(f"the scene {scene.name} is linked from another file: open it there")
+    grouping = prepare(scene, view_layer, scene.lightpaint_settings.grouping)
+    controller.left = grouping.left
+    if not grouping.members:
+        raise ValueError("nothing in this scene gives light that can be changed")
+    return grouping
+
+
+def check_camera(scene):
+    """Raise ValueError if a scene has nothing to render through."""
+    if scene.camera is None:
+        raise ValueError("the scene has no camera: add one (Shift A), and look through it")
+
+
+def is_rendered(scene, view_layer, folder):
+    """Return whether the render in a folder shows the scene as it is."""
+    digest = folder.rendered_digest()
+    return bool(digest) and digest == current_digest(scene, view_layer)
+
+
+class ShotOperator(bpy.types.Operator):
+    """An operator whose errors are one sentence, in the panel and in the status bar"""
+
+    bl_options = {"REGISTER"}
+
+    @classmethod
+    def poll(cls, context):
+        is_idle = controller.render is None and not bpy.app.is_job_running("RENDER")
+        return context.scene is not None and is_idle
+
+    def execute(self, context):
+        try:
+            text = self.run(context)
+        except (OSError, ValueError, RuntimeError) as error:
+            sentence = one_sentence(error)
+            controller.say(sentence, is_error=True)
+            self.report({"ERROR"}, sentence)
+            return {"CANCELLED"}
+        if text:
+            controller.say(text)
+            self.report({"INFO"}, text)
+        return {"FINISHED"}
+
+
+class LIGHTPAINT_OT_prepare(ShotOperator):
+    """Give each light a group of its own, and switch on the passes that the painter needs"""
+
+    bl_idname, bl_label = "lightpaint.prepare", "Prepare"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def run(self, context):
+        grouping = prepare_shot(context)
+        left = f"; {len(grouping.left)} stay as they are" if grouping.left else ""
+        return f"{len(grouping.members)} light groups{left}"
+
+
+class LIGHTPAINT_OT_render(ShotOperator):
+    """Render the light groups into the shot's folder. An unchanged shot is not rendered again"""
+
+    bl_idname, bl_label = "lightpaint.render", "Render"
+
+    again: bpy.props.BoolProperty(name="Render Again", options={"SKIP_SAVE"})
+
+    def invoke(self, context, event):
+        self.again = self.again or event.shift
+        return self.execute(context)
+
+    def run(self, context):
+        if not begin_shot(context, then_paint=False, again=self.again):
+            return "the shot is rendered already (Shift: render it again)"
+        return ""
+
+
+class LIGHTPAINT_OT_paint(ShotOperator):
+    """Open the painter in the browser; the lamps follow. Prepares and renders what is missing"""
+
+    bl_idname, bl_label = "lightpaint.paint", "Paint"
+
+    def run(self, context):
+        if controller.session is not None and controller.session.is_connected:
+            if url := controller.session.page_url:
+                bpy.ops.wm.url_open(url=url)
+            return ""
+        if not begin_shot(context, then_paint=True):
+            folder = shot_folder(context.scene)
+            controller.begin_paint(context.scene, context.view_layer, folder)
+        return ""
+
+
+class LIGHTPAINT_OT_stop(ShotOperator):
+    """End the painter. Its session stays in the shot's folder"""
+
+    bl_idname, bl_label = "lightpaint.stop", "End Painter"
+
+    @classmethod
+    def poll(cls, context):
+        return controller.session is not None
+
+    def run(self, context):
+        controller.end_paint()
+        return "the painter has ended; its session is kept in the shot's folder"
+
+
+def begin_shot(context, *, then_paint, again=False):
+    """Prepare and render a shot, unless that has been done. Return whether it has to render."""
+    scene, view_layer = context.scene, context.view_layer
+    check_camera(scene)
+    if then_paint:
+        controller.check_program()
+    folder = shot_folder(scene)
+    folder.check_writable()
+    prepare_shot(context)
+    if not again and is_rendered(scene, view_layer, folder):
+        return False
+    controller.end_paint()
+    render = ShotRender(scene, view_layer, folder)
+    controller.begin_render(render, scene, then_paint=then_paint)
+    return True
+
+
+def one_sentence(error):
+    """Return an error in one line."""
+    if isinstance(error, OSError) and error.strerror:
+        where = f": {error.filename}" if error.filename else ""
+        return f"{error.strerror}{where}: choose another folder under Shot"
+    return " ".join(str(error).split())
+
+
+def has_memory(scene):
+    """Return whether lightpaint has changed anything in a scene."""
+    return bool(recall(scene))
+
+
+CLASSES = (
+    LIGHTPAINT_OT_prepare,
+    LIGHTPAINT_OT_render,
+    LIGHTPAINT_OT_paint,
+    LIGHTPAINT_OT_stop,
+)

@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Emitters of a scene: lamps, meshes with emission, the world; and what cannot be changed.
+
+Linked data, drivers, keyframes of others, emission inside node groups, and lamps at zero or below
+stay as they are. Their light is no light group's, so the painter holds it as `rest`.
+"""
+
+from dataclasses import dataclass, field
+
+from .emission import (
+    EMITTING_NODES,
+    LampEmission,
+    NodeEmission,
+    PlainColour,
+    animated_paths,
+)
+from .memory import recall
+
+#: Key of an object's or world's memory with the paths that lightpaint has keyed.
+KEYED = "keyed"
+
+
+@dataclass
+class Emitter:
+    """An object or world that emits, and the places where its light can be set.
+
+    reason: why it cannot be in a light group; "" if it can.
+    """
+
+    item: object
+    places: list = field(default_factory=list)
+    reason: str = ""
+
+    @property
+    def name(self):
+        """Name of the object or world."""
+        return self.item.name
+
+    @property
+    def shared(self):
+        """Names of the data that hold its light: what two emitters share changes in both."""
+        return {(place.owner.bl_rna.identifier, place.owner.name) for place in self.places}
+
+
+def emitters(scene, view_layer):
+    """Return all emitters that a render of a view layer has, in the order of their names."""
+    found = [emitter_of(item) for item in view_layer.objects if is_rendered(item)]
+    if scene.world is not None:
+        found.append(world_emitter(scene.world))
+    return sorted((x for x in found if x is not None), key=lambda x: x.name.casefold())
+
+
+def is_rendered(item):
+    """Return whether a render has an object."""
+    collections = item.users_collection
+    return not item.hide_render and not (
+        collections and all(collection.hide_render for collection in collections)
+    )
+
+
+def emitter_of(item):
+    """Return an object's light; None for one that has none."""
+    if item.type == "LIGHT":
+        return _checked(Emitter(item, [LampEmission(item.data)]))
+    places, hidden = [], []
+    for slot in item.material_slots:
+        if (material := slot.material) is not None and has_nodes(material):
+            its_places, its_hidden = tree_emission(material)
+            known = {place.owner for place in places}
+            places += its_places if material not in known else []
+            hidden += its_hidden
+    if hidden:
+        return Emitter(item, [], f"its emission is inside the node group {hidden[0]}")
+    return _checked(Emitter(item, places)) if places else None
+
+
+def world_emitter(world):
+    """Return a world's light; None for a black one."""
+    if not has_nodes(world):
+        is_lit = any(world.color) or PlainColour.slot in recall(world).get("slots", ())
+        places, hidden = [PlainColour(world)] * is_lit, []
+    else:
+        places, hidden = tree_emission(world)
+    if hidden:
+        return Emitter(world, [], f"its light is inside the node group {hidden[0]}")
+    return _checked(Emitter(world, places)) if places else None
+
+
+def has_nodes(owner):
+    """Return whether nodes decide what emits; from Blender 5 on they do wherever there are any."""
+    if owner.node_tree is None:
+        return False
+    # Blender 5 warns of everybody who asks.
+    return owner.node_tree is not None if _nodes_always(owner) else owner.use_nodes
+
+
+def _nodes_always(owner):
+    prop = owner.bl_rna.properties.get("use_nodes")
+    return prop is None or getattr(prop, "is_deprecated", False)
+
+
+def tree_emission(owner):
+    """Return the emitting nodes of a material or world, and names of node groups that hide some.
+
+    Only nodes that reach the output count, and of these only those that are not black, or that
+    are black since lightpaint has turned them off.
+    """
+    places, hidden, known = [], [], recall(owner).get("slots", ())
+    for node in reaching_nodes(owner.node_tree):
+        if node.type == "GROUP":
+            if node.node_tree and _group_emits(node.node_tree, {owner.node_tree}):
+                hidden.append(node.node_tree.name)
+        elif node.type in EMITTING_NODES and (node.name in known or not is_dark(node)):
+            places.append(NodeEmission(owner, node))
+    return places, hidden
+
+
+def reaching_nodes(tree):
+    """Return the nodes whose result reaches an output that Cycles uses."""
+    outputs = ("OUTPUT_MATERIAL", "OUTPUT_WORLD", "GROUP_OUTPUT")
+    waiting = [
+        node
+        for node in tree.nodes
+        if node.type in outputs and getattr(node, "target", "ALL") in ("ALL", "CYCLES")
+    ]
+    reached = []
+    while waiting:
+        node = waiting.pop()
+        if node in reached or node.mute:
+            continue
+        reached.append(node)
+        waiting += [link.from_node for socket in node.inputs for link in socket.links]
+    # Their order shall be that of the tree, whatever was connected first.
+    return [node for node in tree.nodes if node in reached]
+
+
+def is_dark(node):
+    """Return whether a node that can emit does not, as most Principled shaders."""
+    names, strength_name = EMITTING_NODES[node.type]
+    colour = next((node.inputs[name] for name in names if name in node.inputs), None)
+    strength = node.inputs.get(strength_name)
+    if colour is None:
+        return True
+    if strength is not None and not strength.is_linked and strength.default_value == 0:
+        return True
+    return not colour.is_linked and not any(list(colour.default_value)[:3])
+
+
+def _group_emits(tree, seen):
+    """Return whether a node group has something in it that emits, however deep."""
+    if tree in seen:
+        return False
+    seen.add(tree)
+    return any(
+        (node.type in EMITTING_NODES and not is_dark(node))
+        or (node.type == "GROUP" and node.node_tree and _group_emits(node.node_tree, seen))
+        for node in tree.nodes
+    )
+
+
+def _checked(emitter):
+    """Return an emitter with the reason why it cannot be changed, if there is one."""
+    item = emitter.item
+    if item.library is not None or any(place.owner.library is not None for place in emitter.places):
+        emitter.reason = "it is linked from another file"
+        return emitter
+    for place in emitter.places:
+        owner, paths = place.animated_target()
+        ours = set(recall(place.owner).get(KEYED, ()))
+        if (others := animated_paths(owner) & set(paths) - ours) and others:
+            emitter.reason = "keyframes or a driver decide its light"
+        elif is_off(place):
+            emitter.reason = "it gives no light: its energy or strength is zero"
+        elif min(place.values()) < 0:
+            emitter.reason = "its energy, strength or colour is negative"
+    return emitter
+
+
+def is_off(place):
+    """Return whether a light is off as its owner has it, not because a painting turned it off."""
+    stored = recall(place.owner).get("slots", {}).get(place.slot)
+    level, *colour = stored["base"] if stored else place.values()
+    return level == 0 or not any(colour)

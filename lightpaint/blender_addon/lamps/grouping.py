@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A light group for each lamp, mesh with emission, and the world."""
+
+from dataclasses import dataclass, field
+
+from .emitters import emitters
+from .group_names import group_bytes, group_name, stem
+from .memory import recall, remember
+
+#: Kinds of grouping: each lamp, alike lamps, or a collection as one group.
+LAMPS, ALIKE, COLLECTIONS = "LAMPS", "ALIKE", "COLLECTIONS"
+
+
+@dataclass
+class Grouping:
+    """The light groups of a view layer.
+
+    members: emitters by name of group. left: sentences on what is in none.
+    """
+
+    members: dict = field(default_factory=dict)
+    left: list = field(default_factory=list)
+
+
+def plan_groups(scene, view_layer, by=LAMPS):
+    """Return the groups that a scene's lights should be in; nothing is changed.
+
+    Lights that share their data (a lamp's, or an emissive material) change together, so they are
+    in one group. A group keeps the name that it was given first.
+    """
+    found = emitters(scene, view_layer)
+    grouping = Grouping(left=[f"{x.name}: {x.reason}" for x in found if x.reason])
+    limit = group_bytes(view_layer.name)
+    if not limit:
+        raise ValueError(
+            f"the view layer's name has {len(view_layer.name.encode())} bytes, which leaves none "
+            "for light groups in an EXR: shorten it to 40"
+        )
+    parts = _parts([x for x in found if not x.reason], by)
+    kept_names = [_kept_name(part, view_layer) for part in parts]
+    for part, kept in zip(parts, kept_names, strict=True):
+        name = kept if kept and kept not in grouping.members else ""
+        if not name:
+            taken = [*grouping.members, *(other for other in kept_names if other)]
+            name = group_name(_part_name(part, by), taken, limit)
+        grouping.members[name] = part
+    return grouping
+
+
+def _parts(found, by):
+    """Return emitters that share data, a collection or a name, each set of them as one list."""
+    parts = []
+    for emitter in found:
+        keys = set(emitter.shared)
+        collections = getattr(emitter.item, "users_collection", ())
+        if by == COLLECTIONS and collections:
+            keys.add(("Collection", collections[0].name))
+        elif by == ALIKE:
+            keys.add(("Name", type(emitter.item).__name__, stem(emitter.name)))
+        joined = [part for part in parts if part[0] & keys]
+        for part in joined:
+            parts.remove(part)
+        members = [x for part in joined for x in part[1]] + [emitter]
+        parts.append((keys.union(*(part[0] for part in joined)), members))
+    return [members for _, members in parts]
+
+
+def _part_name(part, by):
+    """Return the name of the thing that a group stands for."""
+    first = part[0]
+    collections = getattr(first.item, "users_collection", ())
+    if by == COLLECTIONS and collections and collections[0].name != "Scene Collection":
+        return collections[0].name
+    return stem(first.name) if len(part) > 1 else first.name
+
+
+def _kept_name(part, view_layer):
+    """Return the group that lightpaint gave to these emitters before; "" if it gave none."""
+    names = {x.item.lightgroup for x in part if "group" in recall(x.item)}
+    [name] = names if len(names) == 1 else [""]
+    return name if name in view_layer.lightgroups else ""
+
+
+def assign_groups(grouping):
+    """Put emitters into their groups, and remember which they were in."""
+    for name, members in grouping.members.items():
+        for emitter in members:
+            item, memory = emitter.item, recall(emitter.item)
+            memory.setdefault("group", item.lightgroup)
+            remember(item, memory)
+            if item.lightgroup != name:
+                item.lightgroup = name
+
+
+def clear_others(grouping, view_layer, scene):
+    """Take everything else out of these groups: what cannot be changed shall be in none."""
+    inside = {id(x.item) for members in grouping.members.values() for x in members}
+    named = {x.item.name for members in grouping.members.values() for x in members}
+    others = [*view_layer.objects, *[scene.world] * (scene.world is not None)]
+    for item in others:
+        is_inside = id(item) in inside or item.name in named
+        if item.library is None and not is_inside and item.lightgroup in grouping.members:
+            memory = recall(item)
+            memory.setdefault("group", item.lightgroup)
+            remember(item, memory)
+            item.lightgroup = ""

@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Multipliers of light groups, set in lamps: a preview until they are applied.
+
+Of each place that has a level (`Place`), its owner remembers four: `original`, before lightpaint
+changed anything; `base`, as rendered; `kept`, to which a discarded preview returns; and `last`,
+which the add-on has set last. Somebody who changes a lamp by hand makes a new `kept`.
+"""
+
+from .emission import LampEmission, NodeEmission, PlainColour, action_curves, remove_curves
+from .emitters import KEYED, emitters
+from .lamp_units import are_equal
+from .memory import recall, remember
+
+#: Key of a scene's memory: whether the lamps show a preview.
+PREVIEWS = "is_preview"
+
+
+def grouped_places(scene, view_layer):
+    """Return the places of each light group's levels, each place once."""
+    groups = {}
+    for emitter in emitters(scene, view_layer):
+        memory = recall(emitter.item)
+        if not emitter.reason and "group" in memory and emitter.item.lightgroup:
+            known = groups.setdefault(emitter.item.lightgroup, {})
+            for place in emitter.places:
+                known.setdefault((place.owner.name_full, place.slot), place)
+    return {name: list(places.values()) for name, places in groups.items()}
+
+
+def present_levels(groups):
+    """Return the levels of all places, by owner and slot."""
+    return {(place.owner.name_full, place.slot): place.values() for place in _each(groups)}
+
+
+def commit_base(groups, levels):
+    """Take levels, as `present_levels` returned them, as those that are rendered."""
+    for place in _each(groups):
+        values = levels.get((place.owner.name_full, place.slot))
+        if values is None:  # it has come since
+            continue
+        slot = _slot(place)
+        slot.setdefault("original", values)
+        slot.setdefault("kept", values)
+        if not are_equal(values, slot.get("last", values)):  # changed by hand
+            slot["kept"] = values
+        _store(place, {**slot, "base": values, "last": place.values()})
+
+
+def show_factors(groups, factors):
+    """Set levels to multiples of what was rendered. Return the number of places that changed.
+
+    factors: multipliers of red, green and blue by name of group; groups without one stay.
+    """
+    changed = 0
+    for name, places in groups.items():
+        if name not in factors:
+            continue
+        for place in places:
+            slot = _slot(place)
+            if "base" not in slot:
+                continue
+            values = place.values()
+            if not are_equal(values, slot["last"]):  # changed by hand since
+                slot["kept"] = values
+            wanted = place.scaled(slot["base"], factors[name])
+            if not are_equal(values, wanted):
+                place.assign(wanted)
+                changed += 1
+            _store(place, {**slot, "last": place.values()})
+    return changed
+
+
+def keep_levels(groups):
+    """Make the levels that are shown be the ones that a discarded preview returns to."""
+    for place in _each(groups):
+        if slot := _slot(place):
+            values = place.values()
+            _store(place, {**slot, "kept": values, "last": values})
+
+
+def discard_levels(groups):
+    """Put back the levels of before the preview, but for lamps changed by hand since."""
+    for place in _each(groups):
+        slot = _slot(place)
+        if slot and are_equal(place.values(), slot["last"]):
+            place.assign(slot["kept"])
+            _store(place, {**slot, "last": place.values()})
+
+
+def rendered_levels(groups):
+    """Set the levels that were rendered where nobody changed them since; return what undoes that.
+
+    So that what was rendered can be compared with what would be rendered.
+    """
+    undo = []
+    for place in _each(groups):
+        slot = _slot(place)
+        values = place.values()
+        if slot and are_equal(values, slot["last"]) and not are_equal(values, slot["base"]):
+            place.assign(slot["base"])
+            undo.append((place, values))
+    return undo
+
+
+def key_levels(groups, frame):
+    """Insert a keyframe for each level at a frame; remember which curves are lightpaint's."""
+    for place in _each(groups):
+        place.make_keyable()
+        owner, paths = place.animated_target()
+        memory = recall(place.owner)
+        before = {curve.data_path for curve in action_curves(owner)}
+        had_animation = getattr(owner, "animation_data", None) is not None
+        for path in paths:
+            owner.keyframe_insert(path, frame=frame)
+        new = [path for path in paths if path not in before]
+        memory[KEYED] = sorted({*memory.get(KEYED, ()), *new})
+        memory.setdefault("had_animation", had_animation)
+        remember(place.owner, memory)
+
+
+def remove_keys(owner, memory):
+    """Delete the keyframes that lightpaint has inserted into a lamp, a material or a world."""
+    if not memory.get(KEYED):
+        return
+    target = owner if owner.bl_rna.identifier.endswith("Light") else None
+    for animated in [target] if target else [owner, owner.node_tree]:
+        if animated is None:
+            continue
+        remove_curves(animated, memory[KEYED])
+        if not memory.get("had_animation", True) and not action_curves(animated):
+            action = animated.animation_data.action if animated.animation_data else None
+            animated.animation_data_clear()
+            if action is not None and action.users == 0:
+                _delete_action(action)
+
+
+def put_back_levels(owner, memory):
+    """Set all levels of an owner to those before lightpaint changed anything."""
+    for name, slot in memory.get("slots", {}).items():
+        if (place := _place(owner, name)) is not None:
+            place.assign(slot["original"])
+
+
+def _place(owner, slot):
+    """Return the place of a level by its name; None if it is no longer there."""
+    if slot == LampEmission.slot:
+        return LampEmission(owner)
+    if slot == PlainColour.slot:
+        return PlainColour(owner)
+    node = owner.node_tree.nodes.get(slot) if owner.node_tree else None
+    return NodeEmission(owner, node) if node else None
+
+
+def _delete_action(action):
+    import bpy
+
+    bpy.data.actions.remove(action)
+
+
+def _each(groups):
+    return [place for places in groups.values() for place in places]
+
+
+def _slot(place):
+    return recall(place.owner).get("slots", {}).get(place.slot, {})
+
+
+def _store(place, slot):
+    memory = recall(place.owner)
+    memory.setdefault("slots", {})[place.slot] = slot
+    remember(place.owner, memory)

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The arithmetic of multipliers: weight 1 is the light as rendered.
+
+Power in watts (point, spot, area), irradiance (sun) and strength (world, emission) are all
+proportional to the light that arrives, so one rule serves them.
+"""
+
+import math
+import struct
+
+#: Relative distance below which two numbers of Blender, which have float32, are the same.
+FLOAT32_ROUNDING = 2.0**-22
+
+
+def scaled(base, factor):
+    """Return [level, red, green, blue] multiplied by a factor for each channel.
+
+    The level takes the factor's mean and the colour the rest, so that a change of brightness alone
+    leaves the colour as it is. A light that goes out keeps its colour.
+    """
+    level, *colour = base
+    mean = sum(factor) / 3
+    if not all(map(math.isfinite, factor)) or mean <= 0:
+        return [0.0, *colour]
+    return [level * mean, *(c * f / mean for c, f in zip(colour, factor, strict=True))]
+
+
+def scaled_colour(base, factor):
+    """Return the same for a light without a level of its own: only the colour changes."""
+    level, *colour = base
+    if not all(map(math.isfinite, factor)):
+        factor = (0.0, 0.0, 0.0)
+    return [level, *(c * max(f, 0.0) for c, f in zip(colour, factor, strict=True))]
+
+
+def are_equal(first, second):
+    """Return whether two lists of numbers are the same but for the rounding of float32."""
+    return len(first) == len(second) and all(
+        abs(a - b) <= FLOAT32_ROUNDING * max(abs(a), abs(b))
+        for a, b in zip(first, second, strict=True)
+    )
+
+
+def as_float32(value):
+    """Return the number that Blender makes of one."""
+    return struct.unpack("<f", struct.pack("<f", value))[0]

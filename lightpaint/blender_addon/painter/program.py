@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""lightpaint as a program: where it is, and processes of it that Blender does not wait for."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import threading
+from pathlib import Path
+
+#: How to install it, for messages.
+INSTALL_TEXT = (
+    "lightpaint is not installed, or not on the PATH: run  pip install 'lightpaint[paint]'  "
+    "in a terminal, or name the program in the add-on's preferences"
+)
+
+#: Lines of its errors that are kept.
+MAX_LINES = 200
+
+#: Variables by which Blender's own Python would disturb that of lightpaint.
+BLENDER_VARIABLES = ("PYTHONPATH", "PYTHONHOME", "PYTHONSTARTUP", "LD_PRELOAD")
+
+
+def find_program(chosen=""):
+    """Return the path of the program. chosen: path in the preferences; "" for that on PATH.
+
+    Raises FileNotFoundError, with what to do, if there is none.
+    """
+    if chosen:
+        found = shutil.which(os.path.expanduser(chosen))
+        if not found:
+            raise FileNotFoundError(f"{chosen} is no program: correct it in the preferences")
+        return found
+    found = shutil.which("lightpaint")
+    if not found:
+        raise FileNotFoundError(INSTALL_TEXT)
+    return found
+
+
+class ProgramRun:
+    """A running command of lightpaint.
+
+    Attributes:
+        first_line: The first line of its output, None until it has come.
+        lines: The last lines of what it says.
+    """
+
+    def __init__(self, program, arguments, variables=None):
+        """Start it. variables: of its environment. Raises OSError if it cannot be started."""
+        environment = {k: v for k, v in os.environ.items() if k not in BLENDER_VARIABLES}
+        environment.update(variables or {})
+        environment["PYTHONIOENCODING"] = "utf-8:replace"
+        self.first_line, self.lines = None, []
+        self._process = subprocess.Popen(
+            [program, *map(str, arguments)],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            env=environment,
+            encoding="utf-8",
+            errors="replace",
+            creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+        )
+        self._threads = [
+            threading.Thread(target=self._read_output, daemon=True),
+            threading.Thread(target=self._read_errors, daemon=True),
+        ]
+        for thread in self._threads:
+            thread.start()
+
+    @property
+    def code(self):
+        """Exit code; None while it runs."""
+        return self._process.poll()
+
+    @property
+    def error_text(self):
+        """The last thing that it has complained about, without its name before it."""
+        for thread in self._threads:
+            thread.join(1.0)
+        complaint = next((line for line in reversed(self.lines) if line.strip()), "")
+        return re.sub(r"^lightpaint( \w+)?: ", "", complaint) or f"exit code {self.code}"
+
+    @property
+    def page_url(self):
+        """The address of the painter's page; "" until it is known."""
+        for line in self.lines:
+            if match := re.search(r"https?://\S+#token=\S+", line):
+                return match.group()
+        return ""
+
+    def stop(self, patience_s=5.0):
+        """End it, by force if it does not end itself within some seconds."""
+        if self._process.poll() is None:
+            self._process.terminate()
+            try:
+                self._process.wait(patience_s)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+
+    def _read_output(self):
+        for line in self._process.stdout or ():
+            if self.first_line is None:
+                self.first_line = line
+
+    def _read_errors(self):
+        for line in self._process.stderr or ():
+            self.lines.append(line.rstrip("\n"))
+            del self.lines[:-MAX_LINES]
+
+
+def paint_arguments(shot, session, view):
+    """Return the arguments that open the painter on a shot."""
+    return ["paint", "--lights", shot, "-o", session, "--json", *view]
+
+
+def running_painter(session):
+    """Return address and token of a painter that serves a session; None if nothing says so."""
+    try:
+        found = json.loads((Path(session) / "painter.json").read_text(encoding="utf-8"))
+        return found["address"], found["token"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return None

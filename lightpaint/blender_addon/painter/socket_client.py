@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A WebSocket's client side in plain Python (RFC 6455), since Blender brings no library for it."""
+
+import base64
+import hashlib
+import os
+import socket
+import struct
+from urllib.parse import urlsplit
+
+#: Seconds within which a painter of this machine accepts a connection.
+CONNECT_S = 10.0
+
+#: Maximum size of a message in bytes, as the painter has it.
+MAX_MESSAGE = 2**28
+
+#: Maximum size of the answer to the handshake in bytes.
+MAX_HANDSHAKE = 2**16
+
+_GUID = "258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
+_CONTINUATION, _TEXT, _BINARY, _CLOSE, _PING, _PONG = 0, 1, 2, 8, 9, 10
+
+
+class SocketClient:
+    """A connection that sends and receives binary messages. One thread reads, any may send."""
+
+    def __init__(self, connection, unread):
+        self._connection, self._unread = connection, bytearray(unread)
+
+    @classmethod
+    def open(cls, address, token):
+        """Connect to `live` under a painter's address. Raises OSError if it does not answer."""
+        parts = urlsplit(address)
+        connection = socket.create_connection((parts.hostname, parts.port or 80), CONNECT_S)
+        try:
+            key = base64.b64encode(os.urandom(16)).decode()
+            request = (
+                f"GET {parts.path.rstrip('/')}/live HTTP/1.1\r\nHost: {parts.netloc}\r\n"
+                "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+                f"Sec-WebSocket-Key: {key}\r\nAuthorization: Bearer {token}\r\n\r\n"
+            )
+            connection.sendall(request.encode("ascii"))
+            head, unread = _read_head(connection)
+            expected = base64.b64encode(hashlib.sha1((key + _GUID).encode()).digest()).decode()
+            if not head.startswith("HTTP/1.1 101") or expected not in head:
+                raise ConnectionError(f"the painter refused: {head.splitlines()[0][:80]}")
+            connection.settimeout(None)
+        except BaseException:
+            connection.close()
+            raise
+        return cls(connection, unread)
+
+    def send(self, data):
+        """Send one binary message."""
+        self._connection.sendall(client_frame(_BINARY, data))
+
+    def receive(self):
+        """Return the next binary message; None once the connection has ended."""
+        parts = []
+        while True:
+            try:
+                is_last, code, data = self._read_frame()
+                if code == _PING:
+                    self._connection.sendall(client_frame(_PONG, data))
+            except OSError:
+                return None
+            if code == _CLOSE:
+                return None
+            if code in (_CONTINUATION, _TEXT, _BINARY):
+                parts.append(data)
+                if is_last:
+                    return b"".join(parts)
+
+    def close(self):
+        """End the connection, also for the thread that reads it."""
+        try:
+            self._connection.sendall(client_frame(_CLOSE, struct.pack(">H", 1000)))
+            self._connection.shutdown(socket.SHUT_RDWR)
+        except OSError:
+            pass
+        self._connection.close()
+
+    def _read_frame(self):
+        first, second = self._read(2)
+        length = second & 0x7F
+        if length == 126:
+            (length,) = struct.unpack(">H", self._read(2))
+        elif length == 127:
+            (length,) = struct.unpack(">Q", self._read(8))
+        if length > MAX_MESSAGE or second & 0x80:
+            raise ConnectionError("this is no frame of a painter")
+        return bool(first & 0x80), first & 0x0F, self._read(length)
+
+    def _read(self, count):
+        while len(self._unread) < count:
+            data = self._connection.recv(1 << 16)
+            if not data:
+                raise ConnectionError("the painter has closed the connection")
+            self._unread += data
+        data = bytes(self._unread[:count])
+        del self._unread[:count]
+        return data
+
+
+def client_frame(code, data):
+    """Return one masked frame, as clients have to send them."""
+    if len(data) < 126:
+        length = struct.pack(">B", 0x80 | len(data))
+    elif len(data) < 2**16:
+        length = struct.pack(">BH", 0x80 | 126, len(data))
+    else:
+        length = struct.pack(">BQ", 0x80 | 127, len(data))
+    mask = os.urandom(4)
+    # The exclusive or of two integers is a hundred times as fast as that of their bytes.
+    repeated = (mask * (len(data) // 4 + 1))[: len(data)]
+    masked = int.from_bytes(data, "big") ^ int.from_bytes(repeated, "big")
+    return bytes([0x80 | code]) + length + mask + masked.to_bytes(len(data), "big")
+
+
+def _read_head(connection):
+    """Return the head of the answer to a handshake, and what was read beyond it."""
+    received = b""
+    while b"\r\n\r\n" not in received:
+        data = connection.recv(1 << 12)
+        if not data or len(received) > MAX_HANDSHAKE:
+            raise ConnectionError("the painter did not answer the handshake")
+        received += data
+    head, _, unread = received.partition(b"\r\n\r\n")
+    return head.decode("latin-1"), unread
