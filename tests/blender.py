@@ -1,14 +1,29 @@
 """Runs scripts in Blender."""
 
 import os
+import shutil
 import subprocess
 from pathlib import Path
 
+import pytest
 
-def in_blender(blender: list[str], script: Path, *arguments: object) -> str:
+
+def blender_command() -> list[str]:
+    """How to run Python in Blender: $LIGHTPAINT_BPY, a Python that has its module, or Blender."""
+    if python := os.environ.get("LIGHTPAINT_BPY"):
+        return [python]
+    if program := shutil.which("blender"):
+        return [program, "--background", "--factory-startup", "--python-exit-code", "1", "--python"]
+    pytest.skip("Blender (LIGHTPAINT_BPY: a Python with its module bpy)")
+
+
+def in_blender(
+    blender: list[str], script: Path, *arguments: object, variables: dict[str, str] | None = None
+) -> str:
     dashes = ["--"] if len(blender) > 1 else []
     run = [*blender, str(script), *dashes, *map(str, arguments)]
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
+    environment |= variables or {}
     completed = subprocess.run(run, capture_output=True, text=True, env=environment, check=False)
     assert completed.returncode == 0, completed.stdout + completed.stderr
     return completed.stdout

@@ -17,9 +17,17 @@ bl_info = {
 
 
 def _modules():
-    from .interface import addon_settings, controller, level_operators, panels, shot_operators
+    from .interface import (
+        addon_settings,
+        controller,
+        image_operators,
+        level_operators,
+        panels,
+        shot_operators,
+    )
 
-    return addon_settings, shot_operators, level_operators, panels, controller
+    operators = shot_operators, level_operators, image_operators
+    return addon_settings, *operators, panels, controller
 
 
 def register():

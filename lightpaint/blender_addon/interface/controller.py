@@ -66,6 +66,12 @@ class Controller:
         self.say("")
         start_timer()
 
+    def begin_solve(self, solve, text):
+        """Follow a solve that runs in the background."""
+        self.solve = solve
+        self.say(text)
+        start_timer()
+
     def check_program(self):
         """Return the path of lightpaint. Raises FileNotFoundError, with what to do."""
         preferences = preferences_of()

@@ -75,8 +75,20 @@ class LightpaintPanel:
             row.operator("lightpaint.key_look", text="", icon="KEY_HLT").index = index
 
 
+class ImagePanel:
+    """Ways without the painter."""
+
+    bl_label, bl_options = "Without Painting", {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        column = self.layout.column(align=True)
+        column.operator("lightpaint.paint_over", icon="IMAGE_DATA")
+        column.operator("lightpaint.solve_image", icon="LIGHT_AREA")
+        self.layout.operator("lightpaint.look_like", icon="IMAGE_REFERENCE")
+
+
 class ShotPanel:
-    """The settings of a shot, and ways without the painter."""
+    """The settings of a shot."""
 
     bl_label, bl_options = "Shot", {"DEFAULT_CLOSED"}
 
@@ -102,6 +114,11 @@ class LIGHTPAINT_PT_view(LightpaintPanel, bpy.types.Panel):
     bl_space_type, bl_region_type, bl_category = "VIEW_3D", "UI", "lightpaint"
 
 
+class LIGHTPAINT_PT_view_image(ImagePanel, bpy.types.Panel):
+    bl_space_type, bl_region_type, bl_category = "VIEW_3D", "UI", "lightpaint"
+    bl_parent_id = "LIGHTPAINT_PT_view"
+
+
 class LIGHTPAINT_PT_view_shot(ShotPanel, bpy.types.Panel):
     bl_space_type, bl_region_type, bl_category = "VIEW_3D", "UI", "lightpaint"
     bl_parent_id = "LIGHTPAINT_PT_view"
@@ -112,6 +129,11 @@ class LIGHTPAINT_PT_render(LightpaintPanel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
 
+class LIGHTPAINT_PT_render_image(ImagePanel, bpy.types.Panel):
+    bl_space_type, bl_region_type, bl_context = "PROPERTIES", "WINDOW", "render"
+    bl_parent_id = "LIGHTPAINT_PT_render"
+
+
 class LIGHTPAINT_PT_render_shot(ShotPanel, bpy.types.Panel):
     bl_space_type, bl_region_type, bl_context = "PROPERTIES", "WINDOW", "render"
     bl_parent_id = "LIGHTPAINT_PT_render"
@@ -119,7 +141,9 @@ class LIGHTPAINT_PT_render_shot(ShotPanel, bpy.types.Panel):
 
 CLASSES = (
     LIGHTPAINT_PT_view,
+    LIGHTPAINT_PT_view_image,
     LIGHTPAINT_PT_view_shot,
     LIGHTPAINT_PT_render,
+    LIGHTPAINT_PT_render_image,
     LIGHTPAINT_PT_render_shot,
 )

@@ -162,6 +162,8 @@ class _SceneReader:
         for prop in struct.bl_rna.properties:
             name = prop.identifier
             is_plain = prop.type not in ("POINTER", "COLLECTION")
+            if name.startswith("uv_layer") and name != "uv_layers":
+                continue  # the active one and the like
             is_shown = name.startswith("show_") and name != "show_render"
             if name in IGNORED or is_shown or (is_plain and prop.is_readonly):
                 continue
@@ -175,8 +177,9 @@ class _SceneReader:
         if prop.type == "POINTER":
             self._follow(name, value)
         elif prop.type == "COLLECTION":
-            is_mesh_array = isinstance(struct, bpy.types.Mesh) and name in MESH_ARRAYS
-            if name not in SKIPPED_COLLECTIONS and not is_mesh_array:
+            if name == "links" and isinstance(struct, bpy.types.NodeTree):
+                self._add(name, sorted(map(_ends, value)))
+            elif name not in SKIPPED_COLLECTIONS and not _is_read_at_once(struct, name):
                 self._add(name, len(value))
                 for item in value:
                     self._follow(name, item)
@@ -189,10 +192,7 @@ class _SceneReader:
         """Add what a property points to: datablocks by name and later, parts at once."""
         if value is None or type(value).__name__ in OUTSIDE:
             return
-        if isinstance(value, bpy.types.NodeLink):
-            ends = value.from_node, value.from_socket, value.to_node, value.to_socket
-            self._add(name, [getattr(end, "identifier", end.name) for end in ends])
-        elif isinstance(value, bpy.types.ID) and not getattr(value, "is_embedded_data", False):
+        if isinstance(value, bpy.types.ID) and not getattr(value, "is_embedded_data", False):
             self._add(name, value.name_full)
             self.waiting.append(value)
         else:
@@ -219,6 +219,16 @@ MESH_ARRAYS = {
     "polygons": ("material_index", 1, "i"),
     "loops": ("vertex_index", 1, "i"),
 }
+
+
+def _is_read_at_once(struct, name):
+    return isinstance(struct, bpy.types.Mesh) and (name in MESH_ARRAYS or name == "uv_layers")
+
+
+def _ends(link):
+    """Return what a link connects; the order of links depends on when they were made."""
+    sockets = (link.from_node, link.from_socket), (link.to_node, link.to_socket)
+    return [(node.name, socket.identifier) for node, socket in sockets]
 
 
 def _plain(value):
