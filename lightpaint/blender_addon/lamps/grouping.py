@@ -3,8 +3,8 @@
 
 from dataclasses import dataclass, field
 
-from .emitters import emitters
 from .group_names import group_bytes, group_name, stem
+from .lit_items import emitters
 from .memory import recall, remember
 
 #: Kinds of grouping: each lamp, alike lamps, or a collection as one group.

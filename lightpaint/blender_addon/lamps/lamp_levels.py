@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Multipliers of light groups, set in lamps: a preview until they are applied.
 
-Of each place that has a level (`Place`), its owner remembers four: `original`, before lightpaint
-changed anything; `base`, as rendered; `kept`, to which a discarded preview returns; and `last`,
-which the add-on has set last. Somebody who changes a lamp by hand makes a new `kept`.
+The owner of each level remembers four: `original`, before lightpaint changed anything; `base`, as
+rendered; `kept`, to which a discarded preview returns; and `last`, which the add-on has set last.
+Somebody who changes a lamp by hand makes a new `kept`.
 """
 
-from .emission import LampEmission, NodeEmission, PlainColour, action_curves, remove_curves
-from .emitters import KEYED, emitters
+from .emission_places import LampEmission, NodeEmission, PlainColour, action_curves, remove_curves
 from .lamp_units import are_equal
+from .lit_items import KEYED, emitters
 from .memory import recall, remember
 
 #: Key of a scene's memory: whether the lamps show a preview.

@@ -38,7 +38,7 @@ def from_bytes(frame):
 
 
 @dataclass
-class Look:
+class SessionLook:
     """A kept look. factors: multiplier of red, green and blue by name of light group."""
 
     id: int
@@ -107,7 +107,7 @@ class PainterState:
 
     def _set_looks(self, looks):
         self.looks = [
-            Look(look["id"], look["name"], look_factors(look["lights"], look["weights"]))
+            SessionLook(look["id"], look["name"], look_factors(look["lights"], look["weights"]))
             for look in looks
         ]
 

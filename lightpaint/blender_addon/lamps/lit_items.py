@@ -7,7 +7,7 @@ stay as they are. Their light is no light group's, so the painter holds it as `r
 
 from dataclasses import dataclass, field
 
-from .emission import (
+from .emission_places import (
     EMITTING_NODES,
     LampEmission,
     NodeEmission,
@@ -21,7 +21,7 @@ KEYED = "keyed"
 
 
 @dataclass
-class Emitter:
+class LitItem:
     """An object or world that emits, and the places where its light can be set.
 
     reason: why it cannot be in a light group; "" if it can.
@@ -61,7 +61,7 @@ def is_rendered(item):
 def emitter_of(item):
     """Return an object's light; None for one that has none."""
     if item.type == "LIGHT":
-        return _checked(Emitter(item, [LampEmission(item.data)]))
+        return _checked(LitItem(item, [LampEmission(item.data)]))
     places, hidden = [], []
     for slot in item.material_slots:
         if (material := slot.material) is not None and has_nodes(material):
@@ -70,8 +70,8 @@ def emitter_of(item):
             places += its_places if material not in known else []
             hidden += its_hidden
     if hidden:
-        return Emitter(item, [], f"its emission is inside the node group {hidden[0]}")
-    return _checked(Emitter(item, places)) if places else None
+        return LitItem(item, [], f"its emission is inside the node group {hidden[0]}")
+    return _checked(LitItem(item, places)) if places else None
 
 
 def world_emitter(world):
@@ -82,8 +82,8 @@ def world_emitter(world):
     else:
         places, hidden = tree_emission(world)
     if hidden:
-        return Emitter(world, [], f"its light is inside the node group {hidden[0]}")
-    return _checked(Emitter(world, places)) if places else None
+        return LitItem(world, [], f"its light is inside the node group {hidden[0]}")
+    return _checked(LitItem(world, places)) if places else None
 
 
 def has_nodes(owner):
