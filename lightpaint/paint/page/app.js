@@ -39,6 +39,7 @@ import { startAtFirstVisit, Tour } from './ui/tour.js';
 import { AnalysisPanel } from './ui/analysis_panel.js';
 import { AnswerLine, PointerStatus } from './ui/answer_line.js';
 import { ViewTabs, showView } from './ui/view_tabs.js';
+import { watched } from './ui/watched_panel.js';
 import { fillCount, language, words } from './language/language.js';
 
 /** @typedef {import("./ui/engine_interface.js").Host} Host */
@@ -94,6 +95,7 @@ export async function mount(element, host, { global = false, engine, isGuided = 
 function listen(app) {
   const { engine, session, store } = app;
   engine.on('message', (message) => session.receive(message));
+  engine.on('frame', () => store.flush());
   engine.on('loading', (loadProgress) => store.set({ loadProgress }));
   engine.on('adjustment', (dragAdjustment) => store.set({ dragAdjustment }));
   engine.on('layers', () => store.set((ui) => layersUpdate(engine.layerState(), ui)));
@@ -156,6 +158,38 @@ function droppedText(count) {
   return fillCount(words.app.droppedStrokes, count);
 }
 
+/** The panels, each of which renders again only for the state that it shows. */
+const Watched = {
+  TopBar: watched(TopBar),
+  ToolBar: watched(ToolBar),
+  ToolOptions: watched(ToolOptions),
+  ViewTabs: watched(ViewTabs),
+  Stage: watched(Stage),
+  ReferencePane: watched(ReferencePane),
+  LookWall: watched(LookWall),
+  Banner: watched(Banner),
+  Toasts: watched(Toasts),
+  PointerStatus: watched(PointerStatus),
+  RunningTasks: watched(RunningTasks),
+  AnswerLine: watched(AnswerLine),
+  LookStrip: watched(LookStrip),
+  SettingsPanel: watched(SettingsPanel),
+  Dialogs: watched(Dialogs),
+  PreviewDialog: watched(PreviewDialog),
+  LayerImportDialog: watched(LayerImportDialog),
+  Tour: watched(Tour),
+  ColourPanel: watched(ColourPanel),
+  AdjustPanel: watched(AdjustPanel),
+  SelectionFields: watched(SelectionFields),
+  LayerPanel: watched(LayerPanel),
+  LayerCount: watched(LayerCount),
+  HistoryPanel: watched(HistoryPanel),
+  LightList: watched(LightList),
+  LightListActions: watched(LightListActions),
+  RoomPlan: watched(RoomPlan),
+  AnalysisPanel: watched(AnalysisPanel),
+};
+
 /** @param {{app: App, root: () => HTMLElement}} props */
 function Painter({ app, root }) {
   const { store } = app;
@@ -166,31 +200,31 @@ function Painter({ app, root }) {
   }, []);
   return html`
     <${SkipLinks} app=${app} />
-    <${TopBar} ui=${ui} app=${app} />
-    <${ToolBar} ui=${ui} app=${app} />
+    <${Watched.TopBar} ui=${ui} app=${app} />
+    <${Watched.ToolBar} ui=${ui} app=${app} />
     <main class=${`middle ${ui.side || ui.panel ? '' : 'is-wide'}`} aria-label=${words.app.painter}>
-      <${ToolOptions} ui=${ui} app=${app} />
-      <${ViewTabs} ui=${ui} app=${app} />
-      <div class="view"><${Stage} ui=${ui} app=${app} />
-        <${ReferencePane} ui=${ui} app=${app} />
-        <${LookWall} ui=${ui} app=${app} />
-        <${Banner} ui=${ui} app=${app} />
-        <${Toasts} ui=${ui} app=${app} /></div>
-      <div class="status"><${PointerStatus} ui=${ui} /><${RunningTasks} ui=${ui} app=${app} /></div>
-      <${AnswerLine} ui=${ui} app=${app} />
-      <${LookStrip} ui=${ui} app=${app} />
+      <${Watched.ToolOptions} ui=${ui} app=${app} />
+      <${Watched.ViewTabs} ui=${ui} app=${app} />
+      <div class="view"><${Watched.Stage} ui=${ui} app=${app} />
+        <${Watched.ReferencePane} ui=${ui} app=${app} />
+        <${Watched.LookWall} ui=${ui} app=${app} />
+        <${Watched.Banner} ui=${ui} app=${app} />
+        <${Watched.Toasts} ui=${ui} app=${app} /></div>
+      <div class="status"><${Watched.PointerStatus} ui=${ui} /><${Watched.RunningTasks} ui=${ui} app=${app} /></div>
+      <${Watched.AnswerLine} ui=${ui} app=${app} />
+      <${Watched.LookStrip} ui=${ui} app=${app} />
     </main>
     ${
       ui.panel
-        ? html`<${SettingsPanel} ui=${ui} app=${app} />`
+        ? html`<${Watched.SettingsPanel} ui=${ui} app=${app} />`
         : ui.side && html`<${Side} ui=${ui} app=${app} />`
     }
-    <${Dialogs} ui=${ui} app=${app} />
-    <${PreviewDialog} ui=${ui} app=${app} />
-    <${LayerImportDialog} ui=${ui} app=${app} />
+    <${Watched.Dialogs} ui=${ui} app=${app} />
+    <${Watched.PreviewDialog} ui=${ui} app=${app} />
+    <${Watched.LayerImportDialog} ui=${ui} app=${app} />
     <${LayerDropFrame} app=${app} root=${root} />
     <${ReferencePaste} app=${app} root=${root} />
-    <${Tour} ui=${ui} app=${app} root=${root} />
+    <${Watched.Tour} ui=${ui} app=${app} root=${root} />
     <${Tips} root=${root} />`;
 }
 
@@ -207,27 +241,27 @@ function Side({ ui, app }) {
     html`<${Fold} title=${title} class=${`is-${name}`} open=${isOpen} extra=${extra}
       toggle=${() => store.set({ open: { ...ui.open, [name]: !isOpen } })}>${content}</${Fold}>`;
   return html`<aside class="side" aria-label=${words.app.panels}>
-    ${renderFold('colour', words.app.colour, html`<${ColourPanel} ui=${ui} app=${app} />`)}
-    ${renderFold('ask', words.app.adjustByNumbers, html`<${AdjustPanel} ui=${ui} app=${app} />`)}
+    ${renderFold('colour', words.app.colour, html`<${Watched.ColourPanel} ui=${ui} app=${app} />`)}
+    ${renderFold('ask', words.app.adjustByNumbers, html`<${Watched.AdjustPanel} ui=${ui} app=${app} />`)}
     ${
       (ui.tool === 'select' || ui.selection.current) &&
-      renderFold('select', words.app.selection, html`<${SelectionFields} ui=${ui} app=${app} />`)
+      renderFold('select', words.app.selection, html`<${Watched.SelectionFields} ui=${ui} app=${app} />`)
     }
     ${renderFold(
       'layers',
       words.app.layers,
-      html`<${LayerPanel} ui=${ui} app=${app} />`,
-      html`<${LayerCount} ui=${ui} /><${PresetsButton} app=${app} />`,
+      html`<${Watched.LayerPanel} ui=${ui} app=${app} />`,
+      html`<${Watched.LayerCount} ui=${ui} /><${PresetsButton} app=${app} />`,
       ui.open.layers ?? hasLayers(ui),
     )}
-    ${renderFold('history', words.app.history, html`<${HistoryPanel} ui=${ui} app=${app} />`)}
+    ${renderFold('history', words.app.history, html`<${Watched.HistoryPanel} ui=${ui} app=${app} />`)}
     ${renderFold(
       'lights',
       words.app.lights,
-      html`<${LightList} ui=${ui} app=${app} />`,
-      html`<${LightListActions} ui=${ui} app=${app} />`,
+      html`<${Watched.LightList} ui=${ui} app=${app} />`,
+      html`<${Watched.LightListActions} ui=${ui} app=${app} />`,
     )}
-    ${ui.areLampsMarked && renderFold('plan', words.app.plan, html`<${RoomPlan} ui=${ui} app=${app} />`)}
-    ${renderFold('truth', words.app.analysis, html`<${AnalysisPanel} ui=${ui} app=${app} />`)}
+    ${ui.areLampsMarked && renderFold('plan', words.app.plan, html`<${Watched.RoomPlan} ui=${ui} app=${app} />`)}
+    ${renderFold('truth', words.app.analysis, html`<${Watched.AnalysisPanel} ui=${ui} app=${app} />`)}
   </aside>`;
 }

@@ -99,8 +99,10 @@ export class CpuView {
   /** @param {Params} params */
   draw(params) {
     const { context, canvas } = this;
+    const { draftStep = 1 } = params;
     if (!params.live) this.step = 1;
-    else if (!this.wasLive) this.step = this.liveStep();
+    else if (!this.wasLive || draftStep > this.step)
+      this.step = Math.max(this.liveStep(), draftStep);
     this.wasLive = params.live;
     context.fillStyle = `rgb(${GROUND.join(' ')})`;
     context.fillRect(0, 0, canvas.width, canvas.height);

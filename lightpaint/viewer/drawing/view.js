@@ -19,10 +19,11 @@
  * What is drawn. left, right: the pictures. layout: side by side (or stacked, if they are larger
  * so), the left one in front up to the wipe, or one alone (blink: 'left' or 'right'). zoom: 1 fits.
  * pan: offset of the centre, in picture pixels. stops: exposure. live: whether more frames follow
- * soon, so that speed matters more than sharpness.
+ * soon, so that speed matters more than sharpness. draftStep: between the pixels and rows that are
+ * worth drawing while live; others repeat these.
  * @typedef {{left: Kind, right: Kind, layout: 'side' | 'wipe' | 'blink', wipe: number,
  *   blink: 'left' | 'right', zoom: number, pan: [number, number], stops: number,
- *   overlay: Overlay, live: boolean}} Params
+ *   overlay: Overlay, live: boolean, draftStep?: number}} Params
  */
 
 /** @type {Readonly<Params>} */

@@ -27,14 +27,17 @@ export function repeatPixels({ data }, step, [height, width]) {
   const whole = new Uint16Array(3 * width * height);
   for (let y = 0; y < height; y += step) {
     const start = 3 * width * y;
-    for (let x = 0, to = start, row = (y / step) * rowLength; x < width; x++, to += 3) {
-      const from = row + 3 * Math.floor(x / step);
-      whole[to] = halves[from];
-      whole[to + 1] = halves[from + 1];
-      whole[to + 2] = halves[from + 2];
+    const end = start + 3 * width;
+    for (let to = start, from = (y / step) * rowLength; to < end; from += 3) {
+      const [r, g, b] = [halves[from], halves[from + 1], halves[from + 2]];
+      for (let k = 0; k < step && to < end; k++, to += 3) {
+        whole[to] = r;
+        whole[to + 1] = g;
+        whole[to + 2] = b;
+      }
     }
     for (let k = 1; k < step && y + k < height; k++)
-      whole.copyWithin(start + 3 * width * k, start, start + 3 * width);
+      whole.copyWithin(start + 3 * width * k, start, end);
   }
   return whole;
 }

@@ -18,8 +18,8 @@ const GPU_RECOVERY_MS = 3000;
 
 export class Screen {
   /** @param {HTMLElement} element
-   * @param {{view?: 'gl' | 'cpu' | null, refill: () => void}} options refill: called when the view
-   * has lost its pictures */
+   * @param {{view?: 'gl' | 'cpu' | null, refill: () => void, beforeDraw?: () => void}} options refill:
+   * called when the view has lost its pictures; beforeDraw: before it draws in a frame */
   constructor(element, options) {
     this.element = element;
     this.options = options;
@@ -38,8 +38,9 @@ export class Screen {
     this.isLive = false;
     /** Whether a brush is down; slow work waits until it is lifted. */
     this.isBrushDown = false;
-    /** Whether a light is being dragged; its pictures are drafts until it rests. */
-    this.isLightDragged = false;
+    /** While a light is being dragged, the step between the pixels that its pictures show.
+     * @type {number | null} */
+    this.draftStep = null;
     /** Whether the solution equals the current look. */
     this.isPresent = false;
     /** @type {ReturnType<typeof setTimeout> | undefined} */
@@ -141,14 +142,18 @@ export class Screen {
       this.isLive = true;
       this.scheduleSharpDraw();
     }
-    this.frame ||= requestAnimationFrame(() => this.drawNow());
+    this.frame ||= requestAnimationFrame(() => {
+      this.options.beforeDraw?.();
+      // Panels that follow the same message may want to see the pictures in another way.
+      queueMicrotask(() => this.frame && this.drawNow());
+    });
   }
 
   /** Draw sharply after a pause. */
   scheduleSharpDraw() {
     clearTimeout(this.pauseTimer);
     this.pauseTimer = setTimeout(() => {
-      if (this.isBrushDown || this.isLightDragged) return this.scheduleSharpDraw();
+      if (this.isBrushDown || this.draftStep !== null) return this.scheduleSharpDraw();
       this.isLive = false;
       this.requestDraw();
     }, DRAFT_PAUSE_MS);
@@ -160,7 +165,8 @@ export class Screen {
     if (this.copies) return this.drawCopies(this.copies);
     const { left, right } = this.params;
     const kinds = { left: this.substitute(left), right: this.substitute(right) };
-    this.view?.draw({ ...this.params, ...kinds, live: this.isLive });
+    const draftStep = this.draftStep ?? 1;
+    this.view?.draw({ ...this.params, ...kinds, live: this.isLive, draftStep });
   }
 
   /** Draw one look after another, and copy each. @param {Copies} copies */

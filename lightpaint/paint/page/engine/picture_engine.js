@@ -55,7 +55,11 @@ class PictureEngine extends Emitter {
     super();
     this.element = document.createElement('div');
     this.element.className = 'pictures';
-    this.screen = new Screen(this.element, { view, refill: () => this.mirror.refill() });
+    this.screen = new Screen(this.element, {
+      view,
+      refill: () => this.mirror.refill(),
+      beforeDraw: () => this.emit('frame', {}),
+    });
     this.mirror = new SessionMirror(host, this.screen, (kind, event) => this.emit(kind, event));
     this.on('lost', () => this.dropStroke());
     this.layers = new LayerStrokes(
@@ -193,14 +197,14 @@ class PictureEngine extends Emitter {
     return column >= 0 && row >= 0 && column < width && row < height ? [column, row] : null;
   }
 
-  /** Note whether a light is being dragged: its pictures are drafts until it rests.
-   * @param {boolean} isDragged */
-  dragLight(isDragged) {
-    this.screen.isLightDragged = isDragged;
+  /** Note that a light is being dragged, or for null that it rests: its pictures are drafts until
+   * then. @param {number | null} draftStep between the pixels and rows that they show */
+  dragLight(draftStep) {
+    this.screen.draftStep = draftStep;
   }
 
-  /** The step between the pixels and rows that a draft shows. */
-  get draftStep() {
+  /** The smallest step between the pixels and rows of drafts that are drawn in time. */
+  get minDraftStep() {
     const { view } = this.screen;
     return view instanceof CpuView ? view.liveStep() : 1;
   }

@@ -16,7 +16,7 @@ const RETRY_MS = 2000;
 export class PictureLoader {
   /** @param {import("./socket_host.js").Host} host
    * @param {(slot: string, name: string, picture: Picture, isLive?: boolean) => void} use a picture
-   *   for its slot; isLive: the next one follows at once
+   *   for its slot; isLive: an answer follows at once
    * @param {(done: number, total: number, isFirst: boolean) => void} onProgress isFirst: some light has no
    *   picture yet */
   constructor(host, use, onProgress) {
@@ -32,6 +32,8 @@ export class PictureLoader {
     /** @type {Set<string>} */
     this.activeFetches = new Set();
     this.total = 0;
+    /** The progress that was reported last. */
+    this.reported = '';
     /** Whether fetching is paused, since another page has the session. */
     this.isPaused = false;
     this.isOver = false;
@@ -108,11 +110,19 @@ export class PictureLoader {
     const isFirst = slots.some(
       ([slot]) => slot.startsWith('plane ') && !this.loadedVersions.has(slot),
     );
-    this.onProgress(this.total - slots.length, this.total, isFirst);
+    this.report(this.total - slots.length, isFirst);
     for (const [slot, name] of slots) {
       if (this.activeFetches.size >= MAX_FETCHES) return;
       if (!this.activeFetches.has(slot)) this.load(slot, name);
     }
+  }
+
+  /** Report progress that differs from the last. @param {number} done @param {boolean} isFirst */
+  report(done, isFirst) {
+    const progress = `${done} ${this.total} ${isFirst}`;
+    if (progress === this.reported) return;
+    this.reported = progress;
+    this.onProgress(done, this.total, isFirst);
   }
 
   /** @param {string} slot @param {string} name */

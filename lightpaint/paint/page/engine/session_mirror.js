@@ -2,12 +2,13 @@
  * The page's copy of the session: painting, weights and pictures, kept up to date by its messages.
  */
 import { LayerMirror } from './layers/layer_mirror.js';
+import { LightDrafts } from './light_drafts.js';
 import { PaintCanvas } from './paint_canvas.js';
 import { PictureLoader } from './picture_loader.js';
 import { PictureState } from './picture_state.js';
 import { lutOf } from '../../../viewer/drawing/lattice.js';
 import { SRGB } from '../../../viewer/drawing/view_transform.js';
-import { VERSION, nameInView, repeatPixels, stateOfView } from './message_frames.js';
+import { VERSION, nameInView, stateOfView } from './message_frames.js';
 import { COMPARED_COUNT, showsPresent, sizesText, wantedPictures } from './picture_slots.js';
 import { StrokeSender } from './stroke_sender.js';
 
@@ -46,6 +47,7 @@ export class SessionMirror extends PictureState {
     this.selections = null;
     /** Revision of the session in its last message. */
     this.version = -1;
+    this.drafts = new LightDrafts();
     /** Number of times that the session has sent the canvas. */
     this.patchCount = 0;
     /** Whether the canvas equals the session's. */
@@ -54,6 +56,7 @@ export class SessionMirror extends PictureState {
     this.hasLookPlanes = false;
     host.on('state', (message) => this.begin(message));
     host.on('answer', (message) => {
+      this.drafts.show(this.loader);
       this.takeAnswer(message);
       if (!message.layers) return;
       this.layers.remember(message.layers);
@@ -65,12 +68,10 @@ export class SessionMirror extends PictureState {
       this.loader.addResources(resources);
       this.requestPictures();
     });
-    host.on('dragged', ({ light, view: picturedView, step, resources, arrays }) => {
-      const isShown = picturedView === this.view && this.loader.wantedNames.has(`plane ${light}`);
-      if (isShown) {
-        const data = repeatPixels(arrays.data, step, this.screen.size);
-        this.loader.take(`plane ${light}`, resources, { ...arrays.data, data });
-      } else this.loader.addResources(resources);
+    host.on('dragged', (draft) => {
+      const isShown = draft.view === this.view && this.loader.wantedNames.has(`plane ${draft.light}`);
+      if (isShown) this.drafts.add(draft, this.screen.size);
+      else this.loader.addResources(draft.resources);
     });
     host.on('verified', ({ view = 0 }) => this.loader.renew(nameInView('verified', view)));
     host.on('explained', ({ view = 0 }) => this.loader.renew(nameInView('beyond', view)));
@@ -79,6 +80,7 @@ export class SessionMirror extends PictureState {
   /** @param {Message} state */
   begin(state) {
     this.version = -1;
+    this.drafts.waiting.clear();
     this.layers.remember(state.layers);
     this.open(state, this.view);
     const isOther = state.is_back === false;
@@ -244,7 +246,7 @@ export class SessionMirror extends PictureState {
   }
 
   /** @param {string} slot @param {string} name @param {Picture} picture @param {boolean} [isLive]
-   * whether the next picture follows at once */
+   * whether an answer follows at once, with which it is drawn */
   takePicture(slot, name, picture, isLive = false) {
     const { view } = this.screen;
     const { canvas, state } = this;
@@ -264,7 +266,7 @@ export class SessionMirror extends PictureState {
     else if (slot === 'objects') canvas.objects = /** @type {Int16Array} */ (data);
     else if (slot === 'verified') view.setPicture('verified', /** @type {Uint16Array} */ (data));
     else if (slot === 'beyond') view.setBeyond(/** @type {Uint8Array} */ (data));
-    this.screen.requestDraw(isLive);
+    if (!isLive) this.screen.requestDraw();
   }
 
   /** @param {Uint16Array} present */

@@ -87,8 +87,9 @@
  * @property {(settings: ToolSettings) => void} setTool
  * @property {() => Pane[]} panes
  * @property {(view: number) => void} showView another view: what is shown, and painted
- * @property {(isDragged: boolean) => void} dragLight whether a light is being dragged
- * @property {number} draftStep between the pixels and rows that the pictures of a dragged light show
+ * @property {(draftStep: number | null) => void} dragLight the step between the pixels and rows that
+ *   the pictures of a dragged light show; null: no light is dragged
+ * @property {number} minDraftStep the smallest such step with which they are drawn in time
  * @property {(x: number, y: number, factor: number) => {zoom: number, pan: [number, number]}} zoomAt
  * @property {(point: Point) => void} begin a stroke of the tool in the hand
  * @property {(points: Point[]) => void} move

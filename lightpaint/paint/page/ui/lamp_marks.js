@@ -278,7 +278,7 @@ function useDrag(app, pane, resolveDrag) {
   };
   const end = () => {
     start.current = null;
-    app.engine.dragLight(false);
+    app.engine.dragLight(null);
     app.store.set({ drag: null });
   };
   // A mark that goes away while it is dragged hears of no end: pictures would stay drafts.
@@ -310,17 +310,16 @@ function useDrag(app, pane, resolveDrag) {
     );
     if (!result) return;
     drag.isMoved = true;
-    app.engine.dragLight(true);
     drag.lastRequest = result.request;
     app.store.set({ drag: { light: drag.light, place: result.place, aimPixel: result.aimPixel } });
-    app.session.lampMoves.queue(drag.light, result.request, false, app.engine.draftStep);
+    app.session.lampMoves.drag(drag.light, result.request, app.engine);
   };
   const up = (/** @type {PointerEvent} */ event) => {
     const drag = start.current;
     if (!drag) return;
     event.stopPropagation();
     if (drag.isMoved && drag.lastRequest)
-      app.session.lampMoves.queue(drag.light, drag.lastRequest, true);
+      app.session.lampMoves.queue(drag.light, drag.lastRequest);
     end();
   };
   return { down, move, up };

@@ -3,13 +3,16 @@
  * the page draws the answer to one, the session computes that to the other.
  */
 
+import { DraftPace } from './draft_pace.js';
+
 /** @typedef {import("./session_controller.js").SessionController} SessionController */
 /** @typedef {Record<string, any>} Pose */
 /** A requested pose of a light, or a place to aim it by.
  * @typedef {{kind: "move", pose: Pose} | {kind: "point", mode: "aim" | "highlight" | "shadow",
  *   pixel: [number, number], edge?: [number, number], view: number}} LampRequest */
 
-/** @typedef {{light: number, request: LampRequest, isFinal: boolean, step: number}} Move */
+/** step: between the pixels of the light's picture.
+ * @typedef {{light: number, request: LampRequest, isFinal: boolean, step: number}} Move */
 
 /** Moves without an answer yet, at most. */
 const MAX_PENDING = 2;
@@ -21,14 +24,24 @@ export class LampMoves {
     /** @type {Move | null} */
     this.nextMove = null;
     this.pendingCount = 0;
+    this.pace = new DraftPace();
     /** Answers to moves so far. */
     this.answerCount = 0;
   }
 
-  /** @param {number} light @param {LampRequest} request @param {boolean} [isFinal] false while it is
-   * dragged @param {number} [step] between the pixels of its picture while it is dragged */
-  queue(light, request, isFinal = true, step = 1) {
-    this.nextMove = { light, request, isFinal, step };
+  /** Move a light. @param {number} light @param {LampRequest} request */
+  queue(light, request) {
+    this.nextMove = { light, request, isFinal: true, step: 1 };
+    this.sendNext();
+  }
+
+  /** Move a light while it is dragged: its pictures are drafts until it rests.
+   * @param {number} light @param {LampRequest} request
+   * @param {import("./engine_interface.js").Engine} engine */
+  drag(light, request, engine) {
+    const step = this.pace.nextStep(engine.minDraftStep);
+    engine.dragLight(step);
+    this.nextMove = { light, request, isFinal: false, step };
     this.sendNext();
   }
 
@@ -40,6 +53,7 @@ export class LampMoves {
     void this.send(move).then(() => {
       this.pendingCount -= 1;
       this.answerCount += 1;
+      if (!move.isFinal) this.pace.noteAnswer(performance.now());
       this.sendNext();
     });
   }

@@ -176,9 +176,11 @@ export function Stage({ ui, app }) {
       hasAlbedo,
     ],
   );
+  // Under a pointer that drags a light, the pictures are read once it rests.
+  const answer = ui.drag ? null : ui.weights;
   useEffect(
-    () => refreshProbe(engine, store),
-    [ui.weights, ui.version, ui.display, ui.view, ui.paintMode],
+    () => void (ui.drag || refreshProbe(engine, store)),
+    [answer, ui.drag ? null : ui.version, ui.display, ui.view, ui.paintMode],
   );
   useEffect(
     () => drawRings(rings.current, engine, ui),

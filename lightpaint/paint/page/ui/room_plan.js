@@ -107,7 +107,10 @@ export function RoomPlan({ ui, app }) {
     const [x, y] = [(event.clientX - box.left) * zoom, (event.clientY - box.top) * zoom];
     const position = plan.toScene(x, y, place.position[rig.up]);
     app.store.set({ drag: isFinal ? null : { light, place: { position } } });
-    app.session.moveLamp(light, { position }, isFinal);
+    const request = /** @type {const} */ ({ kind: 'move', pose: { position } });
+    if (!isFinal) return app.session.lampMoves.drag(light, request, app.engine);
+    app.engine.dragLight(null);
+    app.session.lampMoves.queue(light, request);
   };
   const isHanging = ui.clickAction?.mode === 'hang';
   const hang = (/** @type {PointerEvent} */ event) => {

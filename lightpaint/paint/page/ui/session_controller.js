@@ -199,10 +199,9 @@ export class SessionController extends SessionLink {
     if (!areLampsMarked && !rig) void this.send('show_rig');
   }
 
-  /** Move a light. @param {number} light @param {Record<string, any>} change of its pose
-   * @param {boolean} [isFinal] false while it is dragged */
-  moveLamp(light, change, isFinal = true) {
-    this.lampMoves.queue(light, { kind: 'move', pose: change }, isFinal);
+  /** Move a light. @param {number} light @param {Record<string, any>} change of its pose */
+  moveLamp(light, change) {
+    this.lampMoves.queue(light, { kind: 'move', pose: change });
   }
 
   /** Start or stop the search for places of lights. @param {boolean} [run] */

@@ -9,6 +9,8 @@ export class Store {
     this.value = value;
     /** @type {Set<() => void>} */
     this.listeners = new Set();
+    /** Whether listeners wait to be notified. */
+    this.isPending = false;
     this.isScheduled = false;
   }
 
@@ -18,15 +20,35 @@ export class Store {
    * @param {Partial<T> | ((value: T) => Partial<T>)} changes
    */
   set(changes) {
+    this.change(changes);
+    if (this.isScheduled) return;
+    this.isScheduled = true;
+    queueMicrotask(() => {
+      this.isScheduled = false;
+      this.flush();
+    });
+  }
+
+  /** Change part of the state, and notify listeners together with what else changes until the next
+   * frame. @param {Partial<T>} changes */
+  setForFrame(changes) {
+    const isFirst = !this.isPending;
+    this.change(changes);
+    if (isFirst) requestAnimationFrame(() => this.flush());
+  }
+
+  /** @param {Partial<T> | ((value: T) => Partial<T>)} changes */
+  change(changes) {
     const newValues = typeof changes === 'function' ? changes(this.value) : changes;
     this.value = { ...this.value, ...newValues };
-    if (!this.isScheduled) {
-      this.isScheduled = true;
-      queueMicrotask(() => {
-        this.isScheduled = false;
-        for (const listener of this.listeners) listener();
-      });
-    }
+    this.isPending = true;
+  }
+
+  /** Notify listeners of changes that wait. */
+  flush() {
+    if (!this.isPending) return;
+    this.isPending = false;
+    for (const listener of this.listeners) listener();
   }
 
   /**
