@@ -1,6 +1,6 @@
 """The role of each layer: a light, the whole picture, or neither. Names propose; sums decide."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,7 +24,8 @@ from lightpaint.basis.lightgroups.render_layers import RenderLayer
 class Roles:
     """The lights by name, and the picture that they add up to; None if there is none.
 
-    renderer: the one whose naming convention fits. view: the view layer, or "".
+    renderer: the one whose naming convention fits. view: the view layer, or "". noisy: the layer
+    that is the sum of the lights where the picture is not, since it was denoised; else None.
     """
 
     renderer: str
@@ -32,6 +33,7 @@ class Roles:
     lights: Mapping[str, RenderLayer]
     beauty: RenderLayer | None
     remarks: tuple[str, ...]
+    noisy: RenderLayer | None = None
 
 
 def roles_of(path: Path, read: Sequence[RenderLayer], pattern: str | None) -> Roles:
@@ -63,7 +65,20 @@ def roles_of(path: Path, read: Sequence[RenderLayer], pattern: str | None) -> Ro
         # Renderers include these in the sum or not, depending on version and settings.
         if beauty is None or _improves_sum(layers[layer], list(in_order.values()), beauty):
             in_order[name] = layers[layer]
-    return Roles(choice.renderer, choice.view, in_order, beauty, tuple(remarks))
+    noisy = _noisy(layers.values(), list(in_order.values()), beauty)
+    return Roles(choice.renderer, choice.view, in_order, beauty, tuple(remarks), noisy)
+
+
+def _noisy(
+    layers: Iterable[RenderLayer], lights: Sequence[RenderLayer], beauty: RenderLayer | None
+) -> RenderLayer | None:
+    """Return the layer that is the sum of the lights if the whole picture is not, and is noisy by
+    its name: Cycles denoises the picture, but no group.
+    """
+    others = [layer for layer in layers if "noisy" in layer.name.casefold()]
+    if beauty is None or not others or not lights or LayerSum.of(lights).is_of(beauty):
+        return None
+    return find_beauty_of_lights(others, lights)
 
 
 def _remove_non_lights(

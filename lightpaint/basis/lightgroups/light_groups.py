@@ -23,7 +23,7 @@ from lightpaint.basis.lightgroups.beauty_comparison import (
 from lightpaint.basis.lightgroups.denoising_passes import DenoisingPasses, split_passes
 from lightpaint.basis.lightgroups.layer_choice import ONE_FILE_PER_LIGHT
 from lightpaint.basis.lightgroups.layer_roles import Roles, roles_of
-from lightpaint.basis.lightgroups.render_layers import RenderLayer, read_layers
+from lightpaint.basis.lightgroups.render_layers import RenderFile, RenderLayer, read_render
 from lightpaint.basis.lights import BasisLight, Lights, free_name
 from lightpaint.basis.origin import LIGHT_GROUPS, Origin
 from lightpaint.basis.planes import IndirectLight, as_planes
@@ -119,9 +119,9 @@ def read_light_groups(
         ('Arnold', ('fill', 'key', 'rim'))
     """
     path = Path(path)
-    layers, remarks = read_layers(path, leave_out=leave_out)
-    candidates, passes = split_passes(layers)
-    return _light_groups(path, roles_of(path, candidates, pattern), passes, remarks)
+    read = read_render(path, leave_out=leave_out)
+    candidates, passes = split_passes(read.layers)
+    return _light_groups(path, roles_of(path, candidates, pattern), passes, read)
 
 
 def _check_light(
@@ -146,12 +146,9 @@ def _check_light(
 
 
 def _light_groups(
-    path: Path, roles: Roles, passes: DenoisingPasses, first_remarks: Sequence[str]
+    path: Path, roles: Roles, passes: DenoisingPasses, render: RenderFile
 ) -> LightGroups:
-    """Return the light groups in layers with known roles.
-
-    first_remarks: sentences to put before those of the roles.
-    """
+    """Return the light groups in layers with known roles. render: the layers were read from it."""
     names, lights, beauty = list(roles.lights), list(roles.lights.values()), roles.beauty
     if not lights:
         raise BasisError(f"{path} has no light group beside its beauty {beauty and beauty.name!r}")
@@ -164,7 +161,7 @@ def _light_groups(
     remark = f"light groups named as in {roles.renderer}: {some_names(names)}"
     if beauty is not None:
         remark += f"; the whole picture: {beauty.name or 'R, G, B'}"
-    remarks = [*first_remarks, remark, *roles.remarks, missing.remark]
+    remarks = [*render.remarks, remark, *roles.remarks, missing.remark]
     remarks += _remarks_on_black(roles.lights, missing.share)
     if lights[0].primaries is not None:
         remarks.append(
@@ -174,6 +171,7 @@ def _light_groups(
     if holes.any():
         remarks.append(f"{int(holes.sum())} pixels hold NaN or Inf in a layer and count nothing")
     basis = _basis(path, roles, passes, missing.rest, holes)
+    basis = replace(basis, objects=render.objects)
     remarks += _remarks_on_passes(basis)
     without_pixels = np.empty((0, 0, 3))
     layers = [replace(x, image=without_pixels.astype(x.image.dtype)) for x in lights]
@@ -215,6 +213,12 @@ def _missing_light(roles: Roles, holes: npt.NDArray[np.bool_]) -> _Missing:
     rest = whole - sum(_without_holes(layer.image, holes).astype(np.float64) for layer in lights)
     missing, exceeding = missing_and_exceeding(rest, whole)
     name = free_name(REST_NAME, roles.lights)
+    if roles.noisy is not None:
+        text = (
+            f"the groups add up to {roles.noisy.name}; what denoising changed in {beauty.name}, "
+            f"{share_text(max(missing, exceeding))} of its light, becomes the fixed light {name}"
+        )
+        return _Missing(rest, missing, exceeding, text)
     text, is_missing = describe_sum(rest, whole, [*lights, beauty], missing, exceeding, name)
     return _Missing(rest if is_missing else None, missing, exceeding, text)
 

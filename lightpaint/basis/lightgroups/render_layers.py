@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from lightpaint.arrays import Floats
+from lightpaint.basis.lightgroups.cryptomatte import declared_mattes, objects_of
 from lightpaint.basis.lightgroups.folder_files import candidate_files
 from lightpaint.basis.lightgroups.layer_choice import short_names
 from lightpaint.basis.lightgroups.naming_conventions import is_known
@@ -26,6 +27,7 @@ from lightpaint.images.formats.exr_layers import (
     primaries_of,
     vector_channels,
 )
+from lightpaint.images.object_map import Objects
 
 
 @dataclass(frozen=True)
@@ -68,24 +70,36 @@ class RenderLayer:
         return f"{self.file}{f' ({self.name})' if self.name else ''}"
 
 
-def read_layers(
-    path: Path, *, leave_out: Iterable[str | Path] = ()
-) -> tuple[list[RenderLayer], list[str]]:
-    """Return the layers of the file, or of the files in the folder, at `path`, in file order.
+@dataclass(frozen=True)
+class RenderFile:
+    """The contents of a render, a file or folder.
 
-    They are RGB layers, followed by vector layers of the same size. In a folder, a file with plain
-    R, G, B becomes a layer named after the file, without the common parts of these names. Files in
-    `leave_out` and others that cannot be lights (folder_files.py) are skipped, which the returned
-    sentences report. Raises ImageError if a file cannot be read, and BasisError if there are no RGB
-    layers, if they differ in size or if names repeat.
+    layers: RGB layers in the order of the file, followed by vector layers of the same size.
+    objects: those that its Cryptomatte shows; None without one. remarks: sentences for the user.
+    """
+
+    layers: Sequence[RenderLayer]
+    objects: Objects | None
+    remarks: Sequence[str]
+
+
+def read_render(path: Path, *, leave_out: Iterable[str | Path] = ()) -> RenderFile:
+    """Return what the file, or the files in the folder, at `path` hold.
+
+    In a folder, a file with plain R, G, B becomes a layer named after the file, without the common
+    parts of these names. Files in `leave_out` and others that cannot be lights (folder_files.py)
+    are skipped, which the remarks report.
+
+    Raises ImageError if a file cannot be read, and BasisError if there are no RGB layers, if they
+    differ in size or if names repeat.
     """
     path = Path(path)
     remarks: list[str] = []
+    files = [path]
     if path.is_dir():
         files, remarks = candidate_files(path, leave_out)
-        layers = _of_files(files)
-    else:
-        layers = _of_file(path)
+    contents = {file: _content(file) for file in files}
+    layers = _joined_layers(contents)
     colours = [layer for layer in layers if not layer.is_vector]
     if not colours:
         raise BasisError(f"{path} has no RGB layers: give the multi-layer EXR, or a folder of them")
@@ -108,14 +122,22 @@ def read_layers(
             "once: is it a sequence of frames, or several views? give one file of one view"
         )
     vectors = [x for x in layers if x.is_vector and x.image.shape == first.image.shape]
-    return colours + vectors, remarks
+    objects = None
+    for content in contents.values():
+        if objects is None and content.objects is not None:
+            remarks += content.remarks
+            if content.objects.size == first.image.shape[:2]:
+                objects = content.objects
+    return RenderFile(colours + vectors, objects, remarks)
 
 
-def _of_files(files: Sequence[Path]) -> list[RenderLayer]:
+def _joined_layers(contents: Mapping[Path, RenderFile]) -> list[RenderLayer]:
     """Return the layers of a folder's files; a single file may have any layers."""
-    if len(files) == 1:
-        return _of_file(files[0])
-    read = {file: _of_file(file) for file in files}
+    read = {file: content.layers for file, content in contents.items()}
+    if len(read) == 1:
+        return [layer for layers in read.values() for layer in layers]
+    # Files of mattes alone hold no light.
+    read = {file: layers for file, layers in read.items() if layers}
     plain_stems = [file.stem for file, layers in read.items() if [x.name for x in layers] == [""]]
     short = short_names(plain_stems)
     layers_of_folder = []
@@ -129,16 +151,20 @@ def _of_files(files: Sequence[Path]) -> list[RenderLayer]:
     return layers_of_folder
 
 
-def _of_file(path: Path) -> list[RenderLayer]:
-    parts = read_parts(path)
+def _content(path: Path) -> RenderFile:
+    parts = [part.in_display_window() for part in read_parts(path)]
+    mattes = declared_mattes(parts)
+    objects, remarks = objects_of(parts, mattes, path)
     layers = []
     for part in parts:
-        window, primaries = part.in_display_window(), _primaries(path, part)
-        colours = colour_channels(window.channels)
-        vectors = vector_channels(window.channels)
+        primaries = _primaries(path, part)
+        colours = colour_channels(part.channels)
+        vectors = vector_channels(part.channels)
         for prefix, channels in [*colours.items(), *vectors.items()]:
-            image = _rgb(path, window.channels, channels)
-            alpha = channel_named(window.channels, prefix, *ALPHA_NAMES)
+            if any(matte.is_layer(prefix or part.name) for matte in mattes):
+                continue
+            image = _rgb(path, part.channels, channels)
+            alpha = channel_named(part.channels, prefix, *ALPHA_NAMES)
             other_names = [part.name, f"{part.name}.{prefix}"]
             if len(parts) == 1 and not prefix:
                 other_names += [
@@ -153,12 +179,12 @@ def _of_file(path: Path) -> list[RenderLayer]:
                     channels=channels,
                     others=tuple(other_names),
                     image=image,
-                    alpha=None if alpha is None else window.channels[alpha],
+                    alpha=None if alpha is None else part.channels[alpha],
                     primaries=primaries,
                     is_vector=vectors.get(prefix) == channels,
                 )
             )
-    return layers
+    return RenderFile(layers, objects, remarks)
 
 
 def _primaries(path: Path, part: ExrPart) -> tuple[float, ...] | None:

@@ -60,7 +60,8 @@ RENDERINGS = """async () => {
   show({ ...first, child: 2 }, 'b');
   const afterOther = seen.length;
   show({ ...first, child: 2, shown: 3 }, 'b');
-  return { afterUnread, pressed, afterPressed, afterChild, afterOther, seen, text: root.textContent };
+  const text = root.textContent;
+  return { afterUnread, pressed, afterPressed, afterChild, afterOther, seen, text };
 }"""
 
 
