@@ -197,6 +197,8 @@ def compose_importance(
         if is_empty(area := shared(pixels.bounds, region)):
             continue
         inner = slices(relative(area, region))
+        if _counts_nowhere(layer, result[inner], own_accent):
+            continue  # before its coverage is put together
         result[inner] = _counts(layer, pixels.coverage(area), result[inner], own_accent)
     return result
 
@@ -223,6 +225,8 @@ def compose_layer(layer: Layer, pixels: Pixels, below: Pixels, accent: float = 1
 
 def _counts(layer: Layer, coverage: _Array, below: _Array, accent: float) -> _Array:
     """Return the importance with a layer applied. coverage: of the layer; below: without it."""
+    if _counts_nowhere(layer, below, accent):
+        return below
     factor = np.float32(accent * layer.importance)
     if layer.kind == "pixels":
         return np.where(coverage > 0, coverage * factor, below)
@@ -233,6 +237,15 @@ def _counts(layer: Layer, coverage: _Array, below: _Array, accent: float) -> _Ar
         return np.where(covered, below + coverage * (_weighed(base, times) - below), below)
     grown = below + coverage * (factor - below)
     return np.where(covered & (below < factor), grown, below)
+
+
+def _counts_nowhere(layer: Layer, below: _Array, accent: float) -> bool:
+    """Return whether all pixels below a layer count as much as it does: then it raises none.
+
+    So most layers over the whole picture are, above another one.
+    """
+    raises = layer.kind in ("paint", "adjust")
+    return raises and bool(below.min() >= np.float32(accent * layer.importance))
 
 
 def _replace(layer: Layer, pixels: Pixels, below: Pixels, counts: _Array) -> Pixels:
