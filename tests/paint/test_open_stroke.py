@@ -30,12 +30,21 @@ def picture(seed: int, marks: npt.NDArray[np.bool_] | None = None) -> Pixels:
     return Pixels(image, random.random((HEIGHT, WIDTH), np.float32), marks)
 
 
-@given(regions=st.lists(REGIONS, max_size=8), is_marked=st.booleans(), side=st.sampled_from([4, 7]))
-def test_what_was_before_is_given_back(regions: list[Region], is_marked: bool, side: int) -> None:
+@given(
+    regions=st.lists(REGIONS, max_size=8),
+    is_marked=st.booleans(),
+    is_new=st.booleans(),
+    side=st.sampled_from([4, 7]),
+)
+def test_what_was_before_is_given_back(
+    regions: list[Region], is_marked: bool, is_new: bool, side: int
+) -> None:
     marks = np.random.default_rng(1).random((HEIGHT, WIDTH, 3)) > 0.5 if is_marked else None
     layer = LayerPixels((HEIGHT, WIDTH))
-    layer.put((0, HEIGHT, 0, WIDTH), picture(0, marks))
     before = picture(0, marks)
+    if is_new:
+        before = Pixels.unpainted(np.zeros((HEIGHT, WIDTH, 3), np.float32))
+    layer.put((0, HEIGHT, 0, WIDTH), before)
     with patch.object(open_stroke, "SQUARE_SIDE", side):
         stroke = OpenStroke()
         for k, region in enumerate(regions):
@@ -49,5 +58,7 @@ def test_what_was_before_is_given_back(regions: list[Region], is_marked: bool, s
         assert stroke.region == (min(tops), max(bottoms), min(lefts), max(rights))
     assert pixels_before.equals(before.part(stroke.region))
     # However often a stroke goes over a place, it is kept once.
-    saved_values = sum(pixels.importance.size for pixels in stroke._before.values())
+    saved_values = sum(
+        pixels.importance.size for pixels in stroke._before.values() if pixels is not None
+    )
     assert saved_values <= HEIGHT * WIDTH

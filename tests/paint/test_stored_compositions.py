@@ -1,6 +1,7 @@
 """A session file keeps what its layers come to, and nobody reads it once it is stale."""
 
 import sqlite3
+import zlib
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,8 @@ from lightpaint.paint.layers.layer import Layer
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store import stored_compositions
 from lightpaint.paint.store.canvas_pixels import Pixels
+from lightpaint.paint.store.compression import ZEROS_LENGTH, pack, pack_patches, unpack_patch
+from lightpaint.paint.store.history_steps import Patch
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.store.stored_compositions import StoredComposition
 
@@ -205,3 +208,25 @@ def test_other_bits_of_a_composition_need_another_version() -> None:
     digest = stored_compositions._digest(target.image.data, target.importance.data).hex()
     assert digest == "6daa597fe1c54c7e9b591f816f000d6f"
     assert stored_compositions.COMPOSITION_VERSION == 1
+
+
+def test_zeros_of_masks_are_packed_as_other_numbers_are() -> None:
+    """Though they are never made: the streams say the same, and `unpack` reads them."""
+    rng, shape = np.random.default_rng(2), (600, 700)
+    assert ZEROS_LENGTH < 3 * 600 * 700
+    coverage = rng.random(shape, np.float32)
+    black = np.broadcast_to(np.float32(0), (*shape, 3))
+    empty = Pixels.unpainted(np.zeros((*shape, 3), np.float32))
+    patches = [
+        Patch((0, 600, 0, 700), empty, Pixels(black, coverage), 0, 3),
+        Patch((5, 7, 0, 2), Pixels(black[:2, :2], coverage[:2, :2]), empty.part((0, 2, 0, 2))),
+    ]
+    before, change = pack_patches(patches)
+    places = [(entry.region, False) for entry in patches]
+    for k, entry in enumerate(patches):
+        first, last = unpack_patch(places, k, before, change)
+        assert first.equals(entry.before)
+        assert last.equals(entry.after)
+    numbers = [np.r_[np.zeros(3 * 600 * 700), coverage.ravel()], coverage[:2, :2].ravel()]
+    plain = np.concatenate([numbers[0], np.zeros(12), numbers[1]]).astype(np.float32)
+    assert zlib.decompress(change) == zlib.decompress(pack(plain))

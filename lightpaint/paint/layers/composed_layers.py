@@ -112,10 +112,12 @@ class ComposedLayers:
         self.target = compose(self._shown, self.current, self.full_region)
 
     def put(self, number: int, region: Region, pixels: Pixels) -> Change:
-        """Put pixels into a layer, and compose the layers there."""
+        """Put pixels into a layer, and compose the layers there, unless it is hidden."""
         self.layer(number).put(region, pixels)
         numbers = [shown.layer.id for shown in self._shown]
-        return self._compose(region, numbers.index(number)) if number in numbers else Change(region)
+        if number not in numbers:
+            return Change((0, 0, 0, 0))
+        return self._compose(region, numbers.index(number))
 
     def show(self, layers: LayerStack, steps: Sequence[Step], *, at_rest: bool) -> Change:
         """Show other layers, or layers with other properties, and compose where that is seen.

@@ -160,11 +160,17 @@ class LayerPixels:
             if (tile := self._tiles.get(key)) is None:
                 continue
             to, source = self._areas(key, region)
-            image[to], coverage[to] = tile.pixels.image[source], tile.pixels.importance[source]
+            coverage[to] = tile.pixels.importance[source]
+            if not _is_black(tile.pixels.image):
+                image[to] = tile.pixels.image[source]
             if tile.pixels.at_least is not None:
                 marks = np.zeros(image.shape, bool) if marks is None else marks
                 marks[to] = tile.pixels.at_least[source]
         return Pixels(image, coverage, marks)
+
+    def is_empty_in(self, region: Region) -> bool:
+        """Return whether no tile of a region has coverage."""
+        return not any(key in self._tiles for key in self._keys(region))
 
     def coverage(self, region: Region) -> npt.NDArray[np.float32]:
         """Return a copy of the coverage, or importance, of a region."""
@@ -181,9 +187,16 @@ class LayerPixels:
         tiles = self._tiles  # before its summary is forgotten
         self._summary = None
         self.revision += 1
+        is_black = _is_black(pixels.image)
         for key in self._keys(region):
             source, to = self._areas(key, region)
             tile_region = self._tile_region(key)
+            if is_black and pixels.at_least is None and enclosing([tile_region, region]) == region:
+                # A mask over the whole picture has hundreds of such tiles.
+                coverage = pixels.importance[source].copy()
+                black = np.broadcast_to(np.float32(0), (*coverage.shape, 3))
+                self._keep(tiles, key, Pixels(black, coverage))
+                continue
             tile = self.part(tile_region)
             is_covered = pixels.importance[source] > 0
             tile.image[to] = np.where(is_covered[..., None], pixels.image[source], np.float32(0))
@@ -271,9 +284,16 @@ def relative(region: Region, origin: Region) -> Region:
     return top - origin[0], bottom - origin[0], left - origin[2], right - origin[2]
 
 
+def _is_black(image: npt.NDArray[np.float32]) -> bool:
+    """Return whether a picture is known to be black, as that of a mask, without looking at it."""
+    return not any(image.strides) and not image[:1, :1].any()
+
+
 def _packed(array: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
     """Return the same values, without memory for each if all are equal."""
-    first = array.reshape(-1)[0]
+    first = array.flat[0]
+    if not any(array.strides) and not np.signbit(first):
+        return array
     if array.reshape(-1)[-1] == first and (array == first).all() and not np.signbit(first):
         return np.broadcast_to(np.float32(first), array.shape)
     return array

@@ -2,8 +2,16 @@
 
 from collections.abc import Iterator
 
-from lightpaint.paint.layers.layer_pixels import LayerPixels, enclosing, is_empty
-from lightpaint.paint.store.canvas_pixels import Pixels, Region
+import numpy as np
+
+from lightpaint.paint.layers.layer_pixels import (
+    LayerPixels,
+    enclosing,
+    is_empty,
+    relative,
+    shared,
+)
+from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
 
 #: Side, in pixels, of the squares that are saved when a stroke first touches them.
 SQUARE_SIDE = 64
@@ -18,7 +26,7 @@ class OpenStroke:
 
     def __init__(self) -> None:
         self.region: Region = (0, 0, 0, 0)
-        self._before: dict[Region, Pixels] = {}
+        self._before: dict[Region, Pixels | None] = {}  # None for no coverage
 
     def __bool__(self) -> bool:
         """Return whether the stroke has touched anything."""
@@ -30,15 +38,26 @@ class OpenStroke:
             return
         for square in _squares(region, layer.size):
             if square not in self._before:
-                self._before[square] = layer.part(square)
+                self._before[square] = None if layer.is_empty_in(square) else layer.part(square)
         self.region = enclosing([self.region, region])
 
     def pixels_before(self, layer: LayerPixels) -> Pixels:
         """Return the pixels in `region` before the stroke. layer: the current one."""
-        before = layer.copy()
+        before = layer.part(self.region)
+        marks = before.at_least
+        saved_marks = [pixels.at_least for pixels in self._before.values() if pixels is not None]
+        if marks is None and any(x is not None for x in saved_marks):
+            marks = np.zeros(before.image.shape, bool)
         for square, pixels in self._before.items():
-            before.put(square, pixels)
-        return before.part(self.region)
+            area = shared(square, self.region)
+            to = slices(relative(area, self.region))
+            saved = None if pixels is None else pixels.part(relative(area, square))
+            before.image[to] = 0 if saved is None else saved.image
+            before.importance[to] = 0 if saved is None else saved.importance
+            if marks is not None:
+                marks[to] = False if saved is None or saved.at_least is None else saved.at_least
+        has_marks = marks is not None and marks.any()
+        return before._replace(at_least=marks if has_marks else None)
 
 
 def _squares(region: Region, size: tuple[int, ...]) -> Iterator[Region]:
