@@ -16,6 +16,7 @@ from lightpaint.relit.export.fixtures import fixtures_csv, fixtures_json
 from lightpaint.relit.export.nuke import needs_copy, nuke_script, spoken_unreadable
 from lightpaint.relit.export.scene_script import scene_script
 from lightpaint.relit.export.usd import check_usd, usd_overrides
+from lightpaint.relit.export.usd_groups import usd_multipliers
 from lightpaint.relit.relight import scene_of
 from lightpaint.relit.xml_patch import emitters_of, scene_patch
 from lightpaint.scene.scene import Scene
@@ -25,7 +26,7 @@ FORMS: dict[str, tuple[str | None, str | None]] = {
     "csv": ("fixtures.csv", "fixtures.csv"),
     "json": ("fixtures.json", "fixtures.json"),
     "mitsuba": ("relit.patch", None),
-    "usd": ("lights.usda", None),
+    "usd": ("lights.usda", "lights.usda"),
     "blender": ("set_scene.py", "set_lights.py"),
     "nuke": (None, "relit.nk"),
 }
@@ -71,6 +72,11 @@ def names_of_forms(forms: Iterable[str], source: Source) -> dict[str, str]:
             raise LightpaintError(f"{form} needs the scene: give it with scene=...")
         if form == "usd":
             check_usd()
+            if source.light_groups is not None and source.stage is None:
+                raise LightpaintError(
+                    "usd multiplies the lights that light groups were rendered from: give their "
+                    "stage with stage=..."
+                )
         names[form] = name
     if source.stage is not None and "usd" not in names:
         raise LightpaintError("stage=... belongs to the form usd: leave it out, or add that")
@@ -123,7 +129,7 @@ def _writer_of(
     if form in ("csv", "json"):
         return lambda: (fixtures_csv if form == "csv" else fixtures_json)(lighting)
     if source.light_groups is not None:
-        return _of_groups(form, lighting, source.light_groups, folder, listen)
+        return _of_groups(form, lighting, source, folder, listen)
     scene = source.scene
     assert scene is not None
     if form == "mitsuba":
@@ -167,13 +173,36 @@ def _usd_layer(
     return overridden.text
 
 
+def _usd_of_groups(lighting: Lighting, source: Source, folder: Path, listen: Listener) -> str:
+    """Return a layer of USD with these multipliers, and say which lights its stage lacks."""
+    assert source.stage is not None
+    assert source.light_groups is not None
+    overridden = usd_multipliers(
+        {light.name: light.weight for light in lighting.lights if not light.is_fixed},
+        source.stage,
+        folder,
+        about=f"lightpaint: lights of {source.light_groups.path.name} as solved for "
+        f"{lighting.target}",
+    )
+    if overridden.left:
+        listen.say(
+            f"{source.stage} has no light with the path, tag or name "
+            f"{some_names(overridden.left)}, or it is animated: set it by hand"
+        )
+    return overridden.text
+
+
 def _of_groups(
-    form: str, lighting: Lighting, groups: LightGroups, folder: Path, listen: Listener
+    form: str, lighting: Lighting, source: Source, folder: Path, listen: Listener
 ) -> Callable[[], str]:
     """Return a function that makes the text of one format for light groups."""
+    groups = source.light_groups
+    assert groups is not None
     lighting.weights_for(groups.basis)
     if form == "blender":
         return lambda: blender_script(groups, lighting)
+    if form == "usd":
+        return lambda: _usd_of_groups(lighting, source, folder, listen)
     if needs_copy(groups):
         raise OutputError(
             f"Nuke cannot tell the layers of {groups.path} apart: solve writes a copy of them "

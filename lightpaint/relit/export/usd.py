@@ -78,7 +78,7 @@ def usd_overrides(
     check_usd()
     from pxr import Sdf
 
-    opened_stage = None if stage is None else _opened(stage)
+    opened_stage = None if stage is None else open_stage(stage)
     layer = Sdf.Layer.CreateAnonymous(".usda")
     layer.comment = about
     # The layer's own stage is closed when this call returns: while open, it would look for
@@ -86,7 +86,7 @@ def usd_overrides(
     unset_names, unplaced = _write_lights(layer, opened_stage, list(emitters), places, up)
     if stage is not None:
         layer.subLayerPaths.append(Path(os.path.relpath(stage, folder)).as_posix())
-        _like(layer, stage)
+        like_stage(layer, stage)
     return Overrides(layer.ExportToString(), unset_names, unplaced)
 
 
@@ -160,7 +160,7 @@ def _override(prim: Any, kind: str, parameter: str, emission: RGB) -> None:
     light.CreateNormalizeAttr(NORMALIZED[parameter])
 
 
-def _opened(stage: Path) -> Any:
+def open_stage(stage: Path) -> Any:
     """Open a stage. Raises OutputError if it is invalid."""
     from pxr import Tf, Usd
 
@@ -186,7 +186,7 @@ def _lights_of(opened_stage: Any) -> Mapping[str, dict[str, str]]:
     return by_path
 
 
-def _like(layer: Any, stage: Path) -> None:
+def like_stage(layer: Any, stage: Path) -> None:
     """Copy the axes, units and default prim of the stage to the layer."""
     from pxr import Sdf
 
