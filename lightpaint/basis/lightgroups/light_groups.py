@@ -14,14 +14,14 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.lightgroups.beauty_comparison import (
-    NEGLIGIBLE_SHARE,
-    describe_sum,
-    missing_and_exceeding,
-    share_text,
-)
 from lightpaint.basis.lightgroups.denoising_passes import DenoisingPasses, split_passes
-from lightpaint.basis.lightgroups.layer_choice import ONE_FILE_PER_LIGHT
+from lightpaint.basis.lightgroups.group_remarks import (
+    REST_NAME,
+    missing_light,
+    remarks_on_black,
+    remarks_on_passes,
+    without_holes,
+)
 from lightpaint.basis.lightgroups.layer_roles import Roles, roles_of
 from lightpaint.basis.lightgroups.render_layers import RenderFile, RenderLayer, read_render
 from lightpaint.basis.lights import BasisLight, Lights, free_name
@@ -37,9 +37,6 @@ AS_RENDERED = "× as rendered"
 
 #: Maximum negative light of a group, as a share of its positive light: filters have negative lobes.
 MAX_NEGATIVE_SHARE = 0.25
-
-#: Name of the light that holds the missing part; underscores are added if a light has that name.
-REST_NAME = "rest"
 
 
 @keywords()
@@ -157,12 +154,12 @@ def _light_groups(
     if holes.all():
         raise BasisError(f"{path} holds NaN or Inf in every pixel: render it again")
     _check_light(path, roles.lights, holes)
-    missing = _missing_light(roles, holes)
+    missing = missing_light(roles, holes)
     remark = f"light groups named as in {roles.renderer}: {some_names(names)}"
     if beauty is not None:
         remark += f"; the whole picture: {beauty.name or 'R, G, B'}"
     remarks = [*render.remarks, remark, *roles.remarks, missing.remark]
-    remarks += _remarks_on_black(roles.lights, missing.share)
+    remarks += remarks_on_black(roles.lights, missing.share)
     if lights[0].primaries is not None:
         remarks.append(
             "the file has other primaries than Rec.709: multipliers are for linear Rec.709, so a "
@@ -172,7 +169,7 @@ def _light_groups(
         remarks.append(f"{int(holes.sum())} pixels hold NaN or Inf in a layer and count nothing")
     basis = _basis(path, roles, passes, missing.rest, holes)
     basis = replace(basis, objects=render.objects)
-    remarks += _remarks_on_passes(basis)
+    remarks += remarks_on_passes(basis)
     without_pixels = np.empty((0, 0, 3))
     layers = [replace(x, image=without_pixels.astype(x.image.dtype)) for x in lights]
     return LightGroups(
@@ -185,66 +182,6 @@ def _light_groups(
         missing.exceeding,
         holes,
         tuple(remarks),
-    )
-
-
-@dataclass(frozen=True)
-class _Missing:
-    """The difference between the groups and the beauty.
-
-    rest: (h, w, 3), None if it is within rounding. share, exceeding: shares of the beauty, None
-    without one. remark: the difference in words.
-    """
-
-    rest: Floats | None
-    share: float | None
-    exceeding: float | None
-    remark: str
-
-
-def _missing_light(roles: Roles, holes: npt.NDArray[np.bool_]) -> _Missing:
-    lights, beauty = list(roles.lights.values()), roles.beauty
-    if beauty is None:
-        text = "no beauty among the layers, so it is unknown whether the groups add up to all of it"
-        if roles.renderer == ONE_FILE_PER_LIGHT:
-            text += ", and whether each of them is a light"
-        return _Missing(None, None, None, text)
-    whole = _without_holes(beauty.image, holes).astype(np.float64)
-    rest = whole - sum(_without_holes(layer.image, holes).astype(np.float64) for layer in lights)
-    missing, exceeding = missing_and_exceeding(rest, whole)
-    name = free_name(REST_NAME, roles.lights)
-    if roles.noisy is not None:
-        text = (
-            f"the groups add up to {roles.noisy.name}; what denoising changed in {beauty.name}, "
-            f"{share_text(max(missing, exceeding))} of its light, becomes the fixed light {name}"
-        )
-        return _Missing(rest, missing, exceeding, text)
-    text, is_missing = describe_sum(rest, whole, [*lights, beauty], missing, exceeding, name)
-    return _Missing(rest if is_missing else None, missing, exceeding, text)
-
-
-def _remarks_on_black(lights: Mapping[str, RenderLayer], missing: float | None) -> list[str]:
-    """Return a sentence on lights that are black in the file, with the likely reason."""
-    black = [name for name, layer in lights.items() if not layer.image.any()]
-    if not black:
-        return []
-    text = f"the file holds nothing of {some_names(black)}: black in every pixel, so fixed"
-    if missing is None or missing <= NEGLIGIBLE_SHARE:
-        return [f"{text}; is the light off, or the group renamed?"]
-    return [
-        f"{text}; {share_text(missing)} of the light of the beauty is in no group: was the group "
-        "renamed after its lights were given it?"
-    ]
-
-
-def _remarks_on_passes(basis: Basis) -> list[str]:
-    """Return a sentence on the passes used for denoising, if the file has any."""
-    known_parts = ["albedo and normals"] if basis.features is not None else []
-    known_parts += ["direct and indirect light"] if basis.indirect is not None else []
-    return (
-        [f"pictures are denoised by {' and by '.join(known_parts)} of the file"]
-        if known_parts
-        else []
     )
 
 
@@ -262,7 +199,7 @@ def _basis(
     images = np.empty((len(lights) + (rest is not None), height, width, 3), np.float32)
     first = next(iter(lights.values()))
     for image, layer in zip(images, lights.values(), strict=False):
-        image[:] = layer.in_rec709(_without_holes(layer.image, holes))
+        image[:] = layer.in_rec709(without_holes(layer.image, holes))
     if rest is not None:
         basis_lights.append(
             _light(free_name(REST_NAME, lights), "beauty less the groups", "rest", is_fixed=True)
@@ -293,7 +230,7 @@ def _indirect_planes(
     indirect = images.copy()
     for plane, part, layer in zip(indirect, parts, roles.lights.values(), strict=False):
         if part is not None:
-            plane[:] = layer.in_rec709(_without_holes(part, holes))
+            plane[:] = layer.in_rec709(without_holes(part, holes))
     return indirect
 
 
@@ -316,7 +253,3 @@ def _origin(path: Path, roles: Roles, images: Floats, names: Sequence[str]) -> O
         halves=(0, 0),
         passes=(0, 0),
     )
-
-
-def _without_holes(image: Floats, holes: npt.NDArray[np.bool_]) -> npt.NDArray[np.float32]:
-    return np.where(holes[..., None], np.float32(0), image.astype(np.float32))

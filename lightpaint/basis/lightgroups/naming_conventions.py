@@ -30,6 +30,8 @@ class Convention:
     whole: name of a group that contains all lights, if the renderer has one.
     optional: layers, in lower case, that belong to the sum in some versions and settings.
     light: template for the name of a light.
+    group_setting: where the renderer is told the group of a light.
+    beauty_setting: where it is told to write the whole picture beside the groups.
     """
 
     renderer: str
@@ -38,6 +40,8 @@ class Convention:
     whole: str | None = None
     optional: tuple[str, ...] = ()
     light: str = NAME_FIELD
+    group_setting: str = ""
+    beauty_setting: str = ""
 
 
 CONVENTIONS = (
@@ -45,26 +49,46 @@ CONVENTIONS = (
         "Blender Cycles",
         re.compile(r"(?:(?P<view>.+)\.)?Combined_(?P<name>.+)"),
         "{view}Combined",
+        group_setting="Light Group in the properties of the object (under Shading) or of the world",
+        beauty_setting="Combined under Passes in the properties of the view layer",
     ),
-    Convention("Arnold", re.compile(r"RGBA_(?P<name>.+)"), "RGBA"),
-    Convention("Karma", re.compile(r"C_(?P<name>.+)"), "C"),
+    Convention(
+        "Arnold",
+        re.compile(r"RGBA_(?P<name>.+)"),
+        "RGBA",
+        group_setting="AOV Light Group of the light",
+        beauty_setting="an AOV RGBA",
+    ),
+    Convention(
+        "Karma",
+        re.compile(r"C_(?P<name>.+)"),
+        "C",
+        group_setting="LPE Tag of the light",
+        beauty_setting="Beauty in the Karma Render Settings",
+    ),
     Convention(
         "RenderMan or Redshift",
         re.compile(r"(?:[Bb]eauty|Ci)_(?P<name>.+)"),
         "beauty",
         whole="all",  # Redshift's Beauty_all
+        group_setting="Light Group of the light",
+        beauty_setting="a Beauty AOV for all lights",
     ),
     Convention(
         "LuxCore",
         re.compile(PREFIX_PATTERN + r"RADIANCE_GROUP_(?P<name>\d+)(?:[ ._-].*)?"),
         "RGBA",
         light="group_{name}",
+        group_setting="Light Group ID of the light",
+        beauty_setting="an output RGBA",
     ),
     Convention(
         "V-Ray or Corona",
         re.compile(PREFIX_PATTERN + r"(?:VRay)?LightSelect_(?P<name>.+)", re.I),
         "RGBA",
         optional=("environment", "self illumination", "self_illumination", "selfillum", "rest"),
+        group_setting="the list of lights of a LightSelect element",
+        beauty_setting="the RGB colour channel of the same EXR",
     ),
     Convention(
         "Octane",
@@ -72,8 +96,15 @@ CONVENTIONS = (
         "Main",
         optional=("ambient light", "ambient_light", "sunlight"),
         light="light_{name}",
+        group_setting="Light Pass ID of the emitter",
+        beauty_setting="the beauty pass Main",
     ),
 )
+
+
+def convention_of(renderer: str) -> Convention | None:
+    """Return the convention of a renderer; None for one that is not known."""
+    return next((x for x in CONVENTIONS if x.renderer == renderer), None)
 
 
 def is_known(name: str) -> bool:

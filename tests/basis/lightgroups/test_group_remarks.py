@@ -1,0 +1,45 @@
+"""What a file of light groups lacks is told with where its renderer is told to write it."""
+
+from pathlib import Path
+
+import pytest
+from light_groups import interleaved, pictures
+
+from lightpaint.basis.lightgroups.light_groups import read_light_groups
+from lightpaint.basis.lightgroups.naming_conventions import CONVENTIONS
+
+#: Prefix of a layer of a light, and the whole picture.
+NAMES = {
+    "Blender Cycles": ("ViewLayer.Combined_{}", "ViewLayer.Combined"),
+    "Arnold": ("RGBA_{}", "RGBA"),
+    "Karma": ("C_{}", "C"),
+    "RenderMan or Redshift": ("Beauty_{}", "Beauty"),
+    "V-Ray or Corona": ("LightSelect_{}", ""),
+    "Octane": ("Light {}", "Main"),
+}
+
+
+def remarks(path: Path, renderer: str, *, share: float, has_beauty: bool = True) -> str:
+    """Remarks on two lights, next to a beauty with so much of a third that has no group."""
+    layer, beauty = NAMES[renderer]
+    images = pictures(3)
+    layers = {layer.format(k): image for k, image in enumerate(images[:2], 1)}
+    if has_beauty:
+        layers[beauty] = images[0] + images[1] + share * images[2]
+    groups = read_light_groups(interleaved(path / "shot.exr", layers))
+    assert groups.renderer == renderer
+    return "\n".join(groups.remarks)
+
+
+@pytest.mark.parametrize("renderer", NAMES)
+def test_a_light_in_no_group(tmp_path: Path, renderer: str):
+    setting = next(x.group_setting for x in CONVENTIONS if x.renderer == renderer)
+    assert f"a light in no group gets one by {setting}" in remarks(tmp_path, renderer, share=0.5)
+    assert setting not in remarks(tmp_path, renderer, share=0)
+
+
+@pytest.mark.parametrize("renderer", NAMES)
+def test_no_whole_picture(tmp_path: Path, renderer: str):
+    setting = next(x.beauty_setting for x in CONVENTIONS if x.renderer == renderer)
+    text = remarks(tmp_path, renderer, share=0, has_beauty=False)
+    assert f"render it with them ({setting})" in text
