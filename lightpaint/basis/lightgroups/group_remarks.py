@@ -1,4 +1,4 @@
-"""What the groups of a file lack, and what to tell the user about them."""
+"""Light that the groups of a file lack, and remarks on it for the user."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
