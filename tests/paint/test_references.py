@@ -135,6 +135,17 @@ def test_light_is_soft_and_no_pattern_of_a_reference_comes_through(session: Sess
     assert np.abs(np.diff(asked, axis=1)).max() < 0.15
 
 
+def test_parts_of_another_scene_do_not_make_the_whole_brighter(session: Session) -> None:
+    """A bright figure before a dark stage: its parts are far above the mean of the picture."""
+    y, x = np.mgrid[:H, :W]
+    spot = np.exp(-(((y / H - 0.6) / 0.15) ** 2 + ((x / W - 0.5) / 0.12) ** 2))
+    light = (0.002 + spot)[..., None] * np.ones(3)
+    ask(session, light, "parts")
+    asked = stops(session)
+    assert np.ptp(asked) > 2
+    assert abs(asked.mean()) < 0.3
+
+
 def test_a_mirrored_reference_of_the_same_tones_asks_the_whole_for_nothing(
     session: Session,
 ) -> None:

@@ -1,11 +1,11 @@
 """Changes of brightness and colour, by area, that make a picture look like a reference."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats, as_rgb
+from lightpaint.arrays import Bools, Doubles, Floats, as_rgb
 from lightpaint.colour.color import luminance
 from lightpaint.paint.layers.composition import adjusted
 from lightpaint.paint.layers.layer import Layer
@@ -111,11 +111,13 @@ def find_changes(
     areas: Sequence[LightArea],
     *,
     matches_brightness: bool = False,
+    keeps_brightness: bool = False,
 ) -> list[AreaChange]:
     """Return the changes of areas that bring a picture near a reference, without invisible ones.
 
     light: (h, w, 3) linear, the picture now. view: its areas. matches_brightness: whether it
     becomes as bright as the reference as a whole; otherwise only differences within it count.
+    keeps_brightness: whether the whole picture, the first area, is then made as bright as it was.
     """
     masks = [area.mask(view) for area in areas]
     usable = view.whole > 0
@@ -131,7 +133,27 @@ def find_changes(
                 float(np.clip(changes[k].stops + stops, -MAX_STOPS, MAX_STOPS)),
                 np.clip(changes[k].tint + tint, -MAX_TINT, MAX_TINT),
             )
+    if keeps_brightness and not matches_brightness:
+        changes[0] = _steadied(changes, light, masks, usable)
     return [change for change in changes if change.is_visible]
+
+
+def _steadied(
+    changes: Sequence[AreaChange], light: Floats, masks: Sequence[Mask], usable: Bools
+) -> AreaChange:
+    """Return the change of the whole picture, the first, that leaves it as bright as it was.
+
+    Areas overlap, so that brighter ones would make all of it brighter, round after round.
+    """
+    whole, *_ = changes
+    before, after = (
+        tones.tone(tones.whole)
+        for tones in (Tones(x, usable) for x in (light, _changed(light, changes, masks)))
+    )
+    if before is None or after is None:
+        return whole
+    stops = float(np.clip(whole.stops + before.level - after.level, -MAX_STOPS, MAX_STOPS))
+    return replace(whole, stops=stops)
 
 
 def _difference(

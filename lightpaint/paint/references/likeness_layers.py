@@ -63,6 +63,7 @@ def _open_likeness(
         areas,
         compared_areas(request),
         matches_brightness=request.matches_brightness,
+        keeps_brightness=request.areas == "parts",
     )
     if not changes:
         raise PaintError(f"{name}: the picture has that light already")
