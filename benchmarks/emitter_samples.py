@@ -36,7 +36,7 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=3)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        scene = _scene(options.scene, options.resolution, Path(folder))
+        scene = open_scene(options.scene, options.resolution, Path(folder))
         pairs = [tuple(map(int, pair.split(","))) for pair in options.emitter_samples]
         print(f"{options.scene}: {len(scene.lights)} lights, {options.resolution}")
         measure(scene, pairs, options.spp, options.repeats)
@@ -80,7 +80,8 @@ def measure(scene: Scene, pairs: list[tuple[int, ...]], spp: int, repeats: int) 
         )
 
 
-def _scene(name: str, resolution: str, folder: Path) -> Scene:
+def open_scene(name: str, resolution: str, folder: Path) -> Scene:
+    """Return the scene of a name: one of the project, or a hall of so many lights."""
     width, height = map(int, resolution.split("x"))
     if name.startswith("hall"):
         return load_scene(write_hall(folder, int(name[4:]), width=width, height=height))

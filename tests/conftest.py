@@ -17,7 +17,6 @@ import pytest
 from hypothesis import settings
 from renderer import write_room
 from threadpoolctl import threadpool_limits
-from training import ALL_SAMPLES, FEW_SAMPLES, train_with
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight
@@ -147,20 +146,6 @@ def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Neither take nor leave anything in the cache of whoever runs the tests."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("LIGHTPAINT_CACHE", str(tmp_path_factory.mktemp("cache")))
-        yield
-
-
-@pytest.fixture(scope="module")
-def few_training_samples() -> Iterator[None]:
-    """Train emitter guides as briefly as suits bases of the small rooms."""
-    with train_with(FEW_SAMPLES):
-        yield
-
-
-@pytest.fixture
-def all_training_samples() -> Iterator[None]:
-    """Train emitter guides as they are elsewhere, for tests of how good an answer is."""
-    with train_with(ALL_SAMPLES):
         yield
 
 

@@ -32,8 +32,6 @@ from lightpaint.progress import Interrupted
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
-pytestmark = pytest.mark.usefixtures("few_training_samples")
-
 #: What one is called that no program has written to its end.
 DAMAGED = "da" * 16
 
@@ -200,7 +198,6 @@ obtain_basis(lp.load_scene({str(scene.path)!r}), spp={spp}, progress=kill)
     assert process.returncode == -signal.SIGKILL, process.stderr.decode()
 
 
-@pytest.mark.usefixtures("all_training_samples")  # as the process that is killed
 def test_a_render_that_was_killed_goes_on_to_the_bits_of_one(scene: Scene) -> None:
     single_render = obtain_basis(scene, spp=64, use_cache=False)
     _render_and_kill(scene, 64, 3)

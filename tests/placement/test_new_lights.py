@@ -15,8 +15,6 @@ from lightpaint.scene.lights.new_emitter import NewEmitter
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
-pytestmark = pytest.mark.usefixtures("few_training_samples")
-
 THERE = (0.45, 1.2, 0.5)
 
 

@@ -15,8 +15,6 @@ from lightpaint.scene.properties.pose import Site
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
-pytestmark = pytest.mark.usefixtures("few_training_samples")
-
 LINE = ((-1.0, 1.5, 0.0), (1.0, 1.5, 0.0))
 
 

@@ -6,7 +6,7 @@ from typing import Any
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.basis_render import render_basis, with_first_hits
-from lightpaint.basis.render.guide_training import TRAINING_SAMPLES
+from lightpaint.basis.render.guide_training import training_samples
 from lightpaint.basis.render.render_memory import check_memory
 from lightpaint.basis.render.render_origin import ONE_PASS, method_of
 from lightpaint.basis.render.render_parts import Part, PartSums, plan_parts
@@ -121,7 +121,7 @@ def obtain_guide_table(
         return None
     table = spool.guide_table() if start is None else start.guide_table
     if table is None:
-        expected_s = render_seconds(sum(TRAINING_SAMPLES), len(scene.lights))
+        expected_s = render_seconds(sum(training_samples(scene)), len(scene.lights))
         [result] = engine.run([GuideTraining("training", film, seed, expected_s)])
         if result.failure:
             raise BasisError(result.failure)

@@ -1,12 +1,13 @@
 """Choosing emitters by what was learned: probabilities, no bias, less noise, and going on."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from renderer import write_room
+from renderer import REPOSITORY, assert_equal_bits, write_room
 
 from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.basis.file.basis_reader import read_basis
@@ -15,6 +16,7 @@ from lightpaint.basis.render.basis_render import _render_one_by_one, render_basi
 from lightpaint.basis.render.render_budget import Budget, Keeper
 from lightpaint.progress import silent
 from lightpaint.scene.runtime.variant import use_variant
+from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 #: Two spots that each light one end of the floor, and a lamp behind the wall.
@@ -73,8 +75,9 @@ def test_a_light_is_asked_where_it_matters_however_faint_it_is() -> None:
 def test_guided_planes_are_those_of_separate_renders_within_noise(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, samples: tuple[int, ...]
 ) -> None:
-    """However short the training."""
+    """However short or long the training."""
     monkeypatch.setattr(guide_training, "TRAINING_SAMPLES", samples)
+    monkeypatch.setattr(guide_training, "TRAINING_SPP", 2**20)
     from renderer import LIGHTS
 
     lights = SPOTS + BEHIND + LIGHTS["panel"] + LIGHTS["sky"]
@@ -103,6 +106,38 @@ def test_lights_that_reach_little_get_their_samples_there(tmp_path: Path) -> Non
     assert (variance[:2] < 0.5 * hit_by_chance[:2]).all()
 
 
+def test_a_small_picture_trains_with_as_many_samples_as_suit_it() -> None:
+    scene = load_scene(REPOSITORY / "scenes" / "gallery" / "scene.xml")
+    whole, small = guide_training.training_samples(scene), scene.reduced("64x36")
+    assert whole == guide_training.TRAINING_SAMPLES
+    few = guide_training.training_samples(small)
+    assert abs(sum(few) - guide_training.TRAINING_SPP * 64 * 36) <= len(few)
+    assert few[1] == few[2] == pytest.approx(2 * few[0], abs=1)
+    # Where many emitters are to choose from, each wants some.
+    crowd = replace(small, emitters=small.emitters * 10)
+    expected = guide_training.TRAINING_SPP_PER_EMITTER * len(crowd.emitters) * 64 * 36
+    assert abs(sum(guide_training.training_samples(crowd)) - expected) <= 3
+    assert guide_training.training_samples(replace(crowd, film=scene.film)) == whole
+
+
+def test_a_guide_without_a_choice_is_not_trained(
+    small_room: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its planes are those of a trained one, to the bit."""
+    use_variant()
+    from lightpaint.basis.render.tracer.emitter_guide import EmitterGuide
+
+    alone = small_room.only(["panel"])
+    untrained = render_basis(alone, spp=8)
+    assert untrained.guide_table is not None
+    assert not untrained.guide_table.any()
+    monkeypatch.setattr(EmitterGuide, "has_choice", True)
+    trained = render_basis(alone, spp=8)
+    assert trained.guide_table is not None
+    assert trained.guide_table.any()
+    assert_equal_bits(untrained, replace(trained, guide_table=untrained.guide_table))
+
+
 def test_the_table_goes_through_the_file(tmp_path: Path) -> None:
     scene = load_scene(write_room(tmp_path, lights=SPOTS + BEHIND))
     basis = render_basis(scene, spp=8)
@@ -118,8 +153,6 @@ def test_the_table_goes_through_the_file(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("damage", ["nan", "negative", "shape", "none"])
 def test_a_damaged_memory_is_forgotten(tmp_path: Path, damage: str) -> None:
-    from dataclasses import replace
-
     scene = load_scene(write_room(tmp_path, lights=SPOTS))
     basis = render_basis(scene, spp=4)
     assert basis.guide_table is not None

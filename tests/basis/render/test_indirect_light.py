@@ -14,8 +14,6 @@ from lightpaint.basis.render.render_parts import PartRenderer, PartSums, plan_pa
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
-pytestmark = pytest.mark.usefixtures("few_training_samples")
-
 SPP = 16
 
 

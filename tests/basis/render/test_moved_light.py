@@ -33,8 +33,6 @@ from lightpaint.progress import Interrupted, listener, silent
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
-pytestmark = pytest.mark.usefixtures("few_training_samples")
-
 #: Edits of the XML of the test room.
 MOVED = ('x="-0.5" y="1" z="0.5"', 'x="-0.2" y="1.2" z="0.4"')
 NAMES = tuple(LIGHTS)

@@ -25,8 +25,6 @@ from lightpaint.scene.properties.emission import MULTIPLE
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
-pytestmark = pytest.mark.usefixtures("few_training_samples")
-
 SLOW = '<integrator type="volpathmis"><integer name="max_depth" value="5"/></integrator>'
 
 ROOM = "".join(LIGHTS.values()) + TWIN

@@ -78,6 +78,11 @@ class EmitterGuide:
             self.freeze()
         self._set_probabilities()
 
+    @property
+    def has_choice(self) -> bool:
+        """True if there is more than one emitter to choose from."""
+        return bool(self._can_sample.sum() > 1)
+
     def table(self) -> Floats:
         """Return (2, cells, emitters) float32: received light, and numbers of samples."""
         return np.stack([self._received_light, self._sample_counts]).astype(np.float32)
