@@ -19,8 +19,9 @@ from lightpaint.errors import SceneError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solve
-from lightpaint.placement.new_lights import NewLights
 from lightpaint.placement.place import place
+from lightpaint.placement.placement import Placement
+from lightpaint.placement.suggestions import light_search
 from lightpaint.placement.suggestions.light_search import (
     check_suggestible,
     emitter_xml,
@@ -123,13 +124,20 @@ def test_a_light_that_is_missing_is_found(
 
 
 def test_gains_of_a_display_fit_are_shares_of_its_last_linear_problem(
-    lacking: tuple[Scene, Basis], missing: Any
+    lacking: tuple[Scene, Basis], missing: Any, monkeypatch: pytest.MonkeyPatch
 ):
     """Its loss has another scale, by which a light would remove more than there is."""
     scene, basis = lacking
     solution = solve(basis, missing()[0], space="display")
+    placements: list[Placement] = []
+
+    def recorded(*arguments: Any, **options: Any) -> Placement:
+        placements.append(place(*arguments, **options))
+        return placements[-1]
+
+    monkeypatch.setattr(light_search, "place", recorded)
     [first] = suggest_lights(scene, basis, solution, count=1)
-    [light] = place(scene, basis, solution, new=[NewLights("point", count=1)]).additions
+    [light] = placements[0].additions
     # The search's film is that of the basis here: nothing is missed that it does not see but noise.
     assert first.gain_share == pytest.approx(light.gain_share, rel=0.1)
     assert solution.norm2.sum() != pytest.approx(solution.equations.target_norm2.sum(), rel=0.2)
@@ -222,8 +230,9 @@ def test_a_camera_that_sees_nothing_but_the_sky(tmp_path: Path):
     assert suggest_lights(scene, basis, solve(basis, full_target)) == ()
 
 
-def test_a_basis_of_a_smaller_film_than_the_scene(tmp_path: Path):
-    lights = LIGHTS["sky"]
+def test_a_basis_of_a_smaller_film_and_names_that_are_taken(tmp_path: Path):
+    lights = LIGHTS["sky"].replace('"sky"', '"suggested_1"')
+    lights += LIGHTS["bulb"].replace('"bulb"', '"candidate_1"')
     target = _target(_current(write_room(tmp_path, lights=lights + EXTRA, name="extra.xml")))
     scene = load_scene(write_room(tmp_path, lights=lights))
     basis = render_basis(scene.reduced("1/2"), spp=SPP)
@@ -231,20 +240,13 @@ def test_a_basis_of_a_smaller_film_than_the_scene(tmp_path: Path):
     [first] = suggest_lights(scene, basis, solution, count=1)
     assert first.with_it.shape == (10, 12, 3)
     assert first.gain_share > 0.5
+    assert first.name == "suggested_2"
+    assert ElementTree.fromstring(first.xml).attrib == {"type": "point", "id": "suggested_2"}
     other = basis.on_pixels(
         basis.images[:, :7], basis.half_differences[:, :7], basis.emitters_seen[:7]
     )
     with pytest.raises(SceneError, match="not blocks of those of the film"):
         suggest_lights(scene, other, solution, count=1)
-
-
-def test_names_that_are_taken_are_not_given(tmp_path: Path):
-    lights_text = LIGHTS["sky"].replace('"sky"', '"suggested_1"')
-    lights_text += LIGHTS["bulb"].replace('"bulb"', '"candidate_1"')
-    target = _target(_current(write_room(tmp_path, lights=lights_text + EXTRA, name="extra.xml")))
-    [first] = suggest_lights(*_solved(write_room(tmp_path, lights=lights_text), target), count=1)
-    assert first.name == "suggested_2"
-    assert ElementTree.fromstring(first.xml).attrib == {"type": "point", "id": "suggested_2"}
 
 
 def test_what_one_pass_cannot_do_is_refused(
