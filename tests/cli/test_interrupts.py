@@ -22,7 +22,7 @@ SEPARATELY = '<integrator type="volpathmis"><integer name="max_depth" value="5"/
 INTEGRATORS = {ONE_PASS: PATH, SEPARATE: SEPARATELY}
 
 #: Samples per pixel: dozens of passes, and seconds of work where it goes slowly.
-SPP = {ONE_PASS: 2500, SEPARATE: 250}
+SPP = {ONE_PASS: 1200, SEPARATE: 250}
 
 #: `lightpaint …` with passes of a hundredth of a second, each of which is kept.
 MAIN = """
@@ -33,7 +33,7 @@ budget.KEEP_EVERY_S, render.SAMPLES_PER_PASS = 0, 2**15
 if "SLOWLY" in os.environ:
     # However fast the machine is, there is a middle to be stopped in.
     keep = budget.Keeper.now_and_then
-    budget.Keeper.now_and_then = lambda *a: (time.sleep(0.1), keep(*a))
+    budget.Keeper.now_and_then = lambda *a: (time.sleep(0.25), keep(*a))
 sys.exit(main(sys.argv[1:]))
 """
 
