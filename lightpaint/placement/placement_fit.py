@@ -24,6 +24,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.unknowns.reduced_problem import reduced_problems
+from lightpaint.placement.light_columns import picture_slopes, seen_columns, with_columns
 from lightpaint.placement.look_goals import LookGoal, balanced, goal_of
 
 #: Share of a column that others cannot replace, below which it counts as none.
@@ -89,7 +90,7 @@ class PlacementFit:
     error, whether it is bright or dark.
 
     columns: (n, 2 p, 3) at unit emission, images and then half differences, or images alone,
-    (n, p, 3). goals: of each look.
+    (n, p, 3); with panels among them (…, 4). goals: of each look.
     """
 
     def __init__(self, columns: Floats, goals: Sequence[LookGoal]) -> None:
@@ -117,8 +118,9 @@ class PlacementFit:
     def fitted(self, columns: Floats) -> Fitted:
         """Return the best weights for `columns`, under the constraints of each look."""
         all_weights, missed = [], 0.0
+        seen = seen_columns(columns)
         for k, look in enumerate(self._looks):
-            equations, reduction = self._equations(columns, k), look.reduction
+            equations, reduction = self._equations(seen, k), look.reduction
             x = np.zeros(len(reduction.unknowns))
             for problem in reduced_problems(equations, reduction):
                 x[problem.unknowns] = minimise(
@@ -146,7 +148,8 @@ class PlacementFit:
 
     def _mixed(self, columns: Floats, weights: Doubles) -> Doubles:
         looks = [weights[:, 3 * k : 3 * k + 3] for k in range(len(self._looks))]
-        return np.concatenate([np.einsum("npc,nc->pc", columns, look) for look in looks], axis=1)
+        seen = seen_columns(columns)
+        return np.concatenate([np.einsum("npc,nc->pc", seen, look) for look in looks], axis=1)
 
     def missed_map(self, columns: Floats, weights: Doubles) -> Doubles:
         """Return the loss of each pixel, (p,), with weights that were found on other paths."""
@@ -156,14 +159,14 @@ class PlacementFit:
 
     def ranking(self, fitted: Fitted) -> "Ranking":
         """Return the ranking of candidates for the place of a light that is not in `fitted`."""
-        others, inverses, columns = [], [], fitted.columns
+        others, inverses, columns = [], [], seen_columns(fitted.columns)
         for c in self.channels:
             free = self._free(fitted.weights, c)
             weighted = (columns[free, : self.pixels, c % 3] * self._root[:, c]).astype(np.float32)
             power = (weighted @ weighted.T).astype(np.float64)
             others.append(weighted)
             inverses.append(np.linalg.pinv(power, rcond=1e-8, hermitian=True).astype(np.float32))
-        residual = self._residual(columns, fitted.weights)
+        residual = self._residual(fitted.columns, fitted.weights)
         return Ranking(self._root.astype(np.float32), residual.astype(np.float32), others, inverses)
 
     def newton(
@@ -179,9 +182,12 @@ class PlacementFit:
         residual = np.concatenate([residual, -self._noise(fitted.columns, fitted.weights)])
         p, count = self.pixels, max(numbers) + 1
         matrix, gradient = np.zeros((count, count)), np.zeros(count)
+        columns = seen_columns(fitted.columns)
         for c in self.channels:
-            root, weights = np.resize(self._root[:, c], len(residual)), fitted.weights[:, c]
-            weighted_slopes = slopes[:, :, c % 3] * root * weights[list(owners)][:, None]
+            root = np.resize(self._root[:, c], len(residual))
+            weighted_slopes = root * picture_slopes(
+                fitted.columns, fitted.weights, slopes, owners, c
+            )
             jacobian = np.zeros((count, len(residual)))
             for number, row in zip(numbers, weighted_slopes, strict=True):
                 jacobian[number] += row
@@ -189,7 +195,7 @@ class PlacementFit:
             jacobian = jacobian[:, :p]
             matrix += jacobian @ jacobian.T
             free = self._free(fitted.weights, c)
-            active = (fitted.columns[free, :, c % 3] * root).astype(np.float64)
+            active = (columns[free, :, c % 3] * root).astype(np.float64)
             if len(active):
                 reached, active = active @ residual[:, c], active[:, :p]
                 cross = jacobian @ active.T
@@ -229,14 +235,6 @@ def _products(images: Floats | Doubles) -> Doubles:
     return np.asarray(np.einsum("ipc,jpc->cij", images, images, optimize=True))
 
 
-def with_columns(columns: Floats, changed: Mapping[int, Floats]) -> Floats:
-    """Return columns (n, q, 3), some of them replaced by (q, 3)."""
-    replaced = columns.copy()
-    for k, column in changed.items():
-        replaced[k] = column
-    return replaced
-
-
 def fit_of(
     bases: Sequence[Basis],
     looks: Sequence[tuple[Solution, Sequence[int]]],
@@ -261,6 +259,8 @@ def fit_of(
         ],
         axis=1,
     )
+    if any(light.plugin == "area" for light in new):
+        current = np.pad(current, ((0, 0), (0, 0), (0, 1)))
     black = np.zeros((len(new), *current.shape[1:]), np.float32)
     goals = [goal_of(solution, views, sizes, new, constraints) for solution, views in looks]
     return PlacementFit(np.concatenate([current, black]), goals)

@@ -133,6 +133,16 @@ class FrozenPaths:
             shares = lines.covered(site.position, axis, site.side)[0]
             np.add.at(image, lines.pixels, shares[:, None])
 
+    def hidden(self, site: Site) -> Floats:
+        """Return the share of each pixel that a panel hides, with either side, (h · w,) float32."""
+        shares = np.zeros(self.size[0] * self.size[1], np.float32)
+        if isinstance(site, PanelSite) and site.position and not self.hides_panels:
+            lines = self.sight_lines.near(site.position, site.side / math.sqrt(2))
+            axis = np.array(site.direction or (0.0, 0.0, 1.0))
+            covered = lines.covered(site.position, np.stack([axis, -axis]), site.side)
+            np.add.at(shares, lines.pixels, covered.sum(axis=0))
+        return shares
+
     @cached_property
     def sight_lines(self) -> SightLines:
         """The lines of sight along which the camera sees panels."""

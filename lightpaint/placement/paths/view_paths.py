@@ -11,6 +11,7 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.images.denoiser import Features
 from lightpaint.placement.paths.frozen_paths import FrozenPaths
+from lightpaint.placement.paths.light_origin import PanelSite
 from lightpaint.placement.paths.panels_in_view import SightLines
 from lightpaint.placement.space.free_space import (
     CLEARANCE,
@@ -20,6 +21,7 @@ from lightpaint.placement.space.free_space import (
     seen_by_camera,
 )
 from lightpaint.scene.properties.pose import Site
+from lightpaint.scene.runtime.render_lock import tracing
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, pass_seed
 from lightpaint.scene.surfaces import loaded_features
@@ -53,7 +55,8 @@ class ViewPaths:
     def columns(self, sites: Sequence[Site]) -> Floats:
         """Return the images of lights at unit emission, (k, p, 3), p being all pixels.
 
-        With two halves (k, 2 p, 3): their means, followed by half their differences.
+        With two halves (k, 2 p, 3): their means, followed by half their differences. With a panel
+        among them (…, 4): the share of each pixel that it hides, in both parts.
         """
         halves = [
             np.concatenate(
@@ -64,9 +67,15 @@ class ViewPaths:
             if half
         ]
         if len(halves) == 1:
-            return halves[0]
-        one, other = halves
-        return np.concatenate([(one + other) / 2, (one - other) / 2], axis=1)
+            [columns] = halves
+        else:
+            one, other = halves
+            columns = np.concatenate([(one + other) / 2, (one - other) / 2], axis=1)
+        if not any(isinstance(site, PanelSite) for site in sites):
+            return columns
+        hidden = [np.concatenate([part.hidden(site) for part in self.parts]) for site in sites]
+        hidden_shares = np.tile(np.stack(hidden), len(halves))
+        return np.concatenate([columns, hidden_shares[:, :, None]], axis=2)
 
     def indices(self) -> Indices:
         """Return the index among all pixels of the pixel of each first hit, (v,)."""
@@ -91,6 +100,17 @@ class ViewPaths:
         """The places of the cameras that see panels, (3,) each."""
         origins = [its.origins[0] for its in self.sight_lines()]
         return [rows.mean(axis=0, dtype=float) for rows in origins if len(rows)]
+
+    def lit_place(self, site: Site) -> Doubles | None:
+        """Return the place, (3,), that a spot points at; None if nothing is there."""
+        import mitsuba as mi
+
+        origin, axis = (np.array(its or (0.0, 0.0, 1.0)) for its in (site.position, site.direction))
+        ray = mi.Ray3f(mi.Point3f(*origin.tolist()), mi.Vector3f(*axis.tolist()))
+        with tracing():
+            hit = self.parts[0].loaded.ray_intersect_preliminary(ray)
+            distance = float(np.array(hit.t).ravel()[0])
+        return np.asarray(origin + distance * axis) if math.isfinite(distance) else None
 
     def sight_lines(self) -> list[SightLines]:
         """Return the lines of sight of each view that shows panels, with indices of all pixels."""

@@ -124,7 +124,7 @@ class PlacementJudge:
         at = self._paths.refine
         start = self._steps.refitted(best, at)
         best = self._steps.descend(start, at, steps, first_share=REFIT_SHARE, progress=progress)
-        slid = self._steps.along_sight(best, at)
+        slid = self._steps.slid(best, at)
         if slid is best:
             return best
         return self._steps.descend(slid, at, REFIT_STEPS, first_share=REFIT_SHARE)
@@ -195,7 +195,7 @@ class PlacementJudge:
         """Return the spread of each pose between fits along independent paths."""
         fits = [best.sites]
         for at in (self._paths.judge, self._paths.spread):
-            start = self._steps.along_sight(self._steps.refitted(best, at), at)
+            start = self._steps.slid(self._steps.refitted(best, at), at)
             refit = self._steps.descend(start, at, REFIT_STEPS, first_share=REFIT_SHARE)
             fits.append(refit.sites)
         return [

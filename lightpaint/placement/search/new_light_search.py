@@ -16,11 +16,13 @@ from lightpaint.placement.search.judgement import NOTHING, PlacementJudge
 from lightpaint.placement.search.pose_search import SHORT_STEPS, PoseSearch
 from lightpaint.scene.properties.pose import Site
 
-#: Least decrease of the error for which a new light moves once all are added.
-WORTH_AGAIN = 0.02
+#: Least decrease of the error for which a new light moves once all are added, and how often one of
+#: them is tried at most.
+WORTH_AGAIN, MOST_TRIALS = 0.02, 3
 
-#: Steps of all lights together, after each addition.
-STEPS = 8
+#: Steps of all lights together, after each addition, and their first differences, relative to the
+#: usual ones, once lights slid.
+STEPS, SLID_SHARE = 8, 0.5
 
 #: Weight, relative to the largest, below which a light is off.
 OFF = 1e-6
@@ -54,7 +56,7 @@ class NewLightSearch:
             if more is None:
                 break
             # Until the others make room for it, a light may seem to gain next to nothing.
-            more = self._steps.descend(more, self._paths.compare, STEPS, first_share=1.0)
+            more = self._together(more)
             if not self._judge.is_worth(arrangement, more):
                 break
             added = more.movables[-1]
@@ -62,20 +64,37 @@ class NewLightSearch:
             arrangement = self._without_off(more)
         return self._merged(self._tried_again(arrangement))
 
-    def _tried_again(self, arrangement: Arrangement) -> Arrangement:
-        """Return the arrangement after trying each new light at other places.
+    def _together(self, arrangement: Arrangement) -> Arrangement:
+        """Return the arrangement after steps of all lights together."""
+        at = self._paths.compare
+        moved = self._steps.descend(arrangement, at, STEPS, first_share=1.0)
+        slid = self._steps.slid(moved, at)
+        if slid.missed > (1 - WORTH_AGAIN) * moved.missed:
+            return slid
+        return self._steps.descend(slid, at, STEPS, first_share=SLID_SHARE)
 
-        The last one has just been tried with the others where they are.
+    def _tried_again(self, arrangement: Arrangement) -> Arrangement:
+        """Return the arrangement after trying new lights elsewhere, those that do least first.
+
+        Where lights were taken for others, the last one often does what is left to do from a wrong
+        place, while the others have moved on to their own. The one that does most stays.
         """
-        for k, movable in enumerate(arrangement.movables[:-1]):
-            if movable.group is None or arrangement.missed <= NOTHING * self._fit.norm2:
-                continue
-            better = self._search.tried(arrangement, k)
+        place = 0
+        for _ in range(MOST_TRIALS):
+            order = self._least_first(arrangement)
+            if place >= len(order) - 1 or arrangement.missed <= NOTHING * self._fit.norm2:
+                break
+            better = self._search.tried(arrangement, order[place])
+            place += 1
             if better.missed < (1 - WORTH_AGAIN) * arrangement.missed:
-                arrangement = self._steps.descend(
-                    better, self._paths.compare, STEPS, first_share=1.0
-                )
+                arrangement, place = self._together(better), 0
         return arrangement
+
+    def _least_first(self, arrangement: Arrangement) -> list[int]:
+        """Return the new lights in the order of what is missed without each."""
+        new = [k for k, movable in enumerate(arrangement.movables) if movable.group is not None]
+        without = {k: self._fit.fitted(self._blackened(arrangement, k)).missed for k in new}
+        return sorted(new, key=lambda k: without[k])
 
     def _with_one_more(self, arrangement: Arrangement) -> Arrangement | None:
         """Return the arrangement with the best light added, and the others unchanged."""
@@ -135,7 +154,7 @@ class NewLightSearch:
         del sites[second]
         fitted = self._steps.fitted(movables, sites, self._paths.compare)
         joined = Arrangement(tuple(movables), tuple(sites), fitted)
-        return self._steps.descend(joined, self._paths.compare, STEPS, first_share=1.0)
+        return self._together(joined)
 
     def _nearest_pair(self, arrangement: Arrangement) -> tuple[int, int] | None:
         """Return the nearest two new lights of one group that may be merged, or None."""

@@ -1,5 +1,6 @@
 """Gauss-Newton steps of several lights' poses, their weights eliminated."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -7,10 +8,11 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.placement.free_light import FreeLight
+from lightpaint.placement.light_columns import with_columns
 from lightpaint.placement.movable import Arrangement, Movable, all_sites, by_column
 from lightpaint.placement.paths.light_origin import PanelSite
 from lightpaint.placement.paths.view_paths import ViewPaths
-from lightpaint.placement.placement_fit import Fitted, PlacementFit, with_columns
+from lightpaint.placement.placement_fit import Fitted, PlacementFit
 from lightpaint.placement.space.free_space import as_position
 from lightpaint.scene.properties.pose import Site
 
@@ -26,7 +28,7 @@ RIDGE, RIDGE_GROWTH, RIDGE_SHRINK, LEAST_RIDGE, TRIALS = 1e-2, 6.0, 4.0, 1e-5, 5
 #: progress.
 FIRST_STEP, LAST_SHARE, SHORTER, MUCH_SHORTER = 0.04, 0.15, 0.6, 0.4
 
-#: Ratios of distances that panels are tried at, and how many times in a row.
+#: Ratios of distances that panels and spots are tried at, and how many times in a row.
 RATIOS, MOST_SLIDES = (1.25, 1.08, 1.025), 8
 
 #: Decrease, as a share of the error, below which a step counts as no progress.
@@ -103,49 +105,53 @@ class PoseSteps:
             step = max((MUCH_SHORTER if share < MIN_PROGRESS else SHORTER) * step, last)
         return arrangement
 
-    def along_sight(self, arrangement: Arrangement, at: ViewPaths) -> Arrangement:
-        """Return the arrangement after panels slid along lines of sight, if that helps.
+    def slid(self, arrangement: Arrangement, at: ViewPaths) -> Arrangement:
+        """Return the arrangement after lights slid along lines that they look alike on, if better.
 
-        They keep their size in the picture. An outline tells everything about a panel's pose but
-        the distance, and leaves Gauss-Newton steps no way to another one, where it fits only with
-        the side that belongs to it.
+        A panel keeps its size in the picture on a line of sight, and a spot its circle of light on
+        its axis. Either tells everything about the pose but the distance, and leaves Gauss-Newton
+        steps no way to another one, where it fits only with the side or cone that belongs to it.
         """
         for k, movable in enumerate(arrangement.movables):
-            if isinstance(movable.light.site, PanelSite) and movable.light.freedom.slides:
+            light, site = movable.light, arrangement.sites[k]
+            if not light.freedom.slides:
+                continue
+            if isinstance(site, PanelSite):
                 for eye in at.eyes:
                     arrangement = self._slid(arrangement, k, eye, at)
+            elif light.freedom.cone is not None and (circle := at.lit_place(site)) is not None:
+                arrangement = self._slid(arrangement, k, circle, at)
         return arrangement
 
-    def _slid(self, arrangement: Arrangement, k: int, eye: Doubles, at: ViewPaths) -> Arrangement:
-        """Return the arrangement with panel `k` at the best distance from an eye."""
+    def _slid(self, arrangement: Arrangement, k: int, fixed: Doubles, at: ViewPaths) -> Arrangement:
+        """Return the arrangement with light `k` at the best distance from a fixed place."""
         for factor in (factor for ratio in RATIOS for factor in (ratio, 1 / ratio)):
             for _ in range(MOST_SLIDES):
-                trial = self._at_distance(arrangement, k, eye, factor, at)
+                trial = self._at_distance(arrangement, k, fixed, factor, at)
                 if trial is None or trial.missed >= arrangement.missed:
                     break
                 arrangement = trial
         return arrangement
 
     def _at_distance(
-        self, arrangement: Arrangement, k: int, eye: Doubles, factor: float, at: ViewPaths
+        self, arrangement: Arrangement, k: int, fixed: Doubles, factor: float, at: ViewPaths
     ) -> Arrangement | None:
-        """Return the arrangement with panel `k` at `factor` times its distance from an eye.
+        """Return the arrangement with light `k` at `factor` times its distance from a place.
 
-        It is as large as before from there. None if it may not hang there, or not be as large.
+        Its panel or circle of light looks as large as before from there. None if it may not hang
+        there, or not be so.
         """
         movables, site = arrangement.movables, arrangement.sites[k]
-        assert isinstance(site, PanelSite)
-        place = eye + factor * (np.array(site.position, dtype=float) - eye)
-        slid = replace(site, position=as_position(place), side=factor * site.side)
+        place = fixed + factor * (np.array(site.position, dtype=float) - fixed)
+        slid = _scaled(replace(site, position=as_position(place)), factor)
         permitted = movables[k].light.permitted(slid)
-        assert isinstance(permitted, PanelSite)
-        asked, given = ([*(its.position or ()), its.side] for its in (slid, permitted))
-        sites = [*arrangement.sites[:k], slid, *arrangement.sites[k + 1 :]]
+        asked, given = ([*(its.position or ()), *_size(its)] for its in (slid, permitted))
+        sites = [*arrangement.sites[:k], permitted, *arrangement.sites[k + 1 :]]
         if not np.allclose(asked, given, rtol=1e-9, atol=1e-9) or not self._permits(
             movables, sites
         ):
             return None
-        return arrangement.with_site(k, slid, self._moved(arrangement, sites, [k], at))
+        return arrangement.with_site(k, permitted, self._moved(arrangement, sites, [k], at))
 
     def step(
         self,
@@ -202,7 +208,7 @@ class PoseSteps:
         scales: dict[int, Doubles],
         step: float,
     ) -> tuple[Floats, list[int], list[int]]:
-        """Return slopes of columns (s, p, 3), the index of each one's column and number."""
+        """Return slopes of columns (s, p, 3 or 4), the index of each one's column and number."""
         ahead: list[Site] = []
         owners: list[int] = []
         places: list[int] = []
@@ -220,7 +226,7 @@ class PoseSteps:
             places += [q] * len(movable.columns)
             widths += [width] * len(movable.columns)
         slopes = at.columns(ahead)
-        slopes -= arrangement.fitted.columns[owners]
+        slopes -= arrangement.fitted.columns[owners][:, :, : slopes.shape[2]]
         slopes /= np.array(widths, np.float32)[:, None, None]
         return slopes, owners, places
 
@@ -228,3 +234,19 @@ class PoseSteps:
         """Return the amounts of a pose's numbers that are equivalent to sliding by one unit."""
         place, turn, cone = light.dimensions(site)
         return np.array([1.0] * place + [1 / self._unit] * (turn + cone))
+
+
+def _scaled(site: Site, factor: float) -> Site:
+    """Return a panel of `factor` times its side, or a spot of as wide a circle from so far."""
+    if isinstance(site, PanelSite):
+        return replace(site, side=factor * site.side)
+    cutoff, beam = (
+        math.degrees(math.atan(math.tan(math.radians(angle or 0.0)) / factor))
+        for angle in (site.cutoff, site.beam)
+    )
+    return replace(site, cutoff=cutoff, beam=beam)
+
+
+def _size(site: Site) -> list[float]:
+    """Return the side of a panel, or the cone of a spot."""
+    return [site.side] if isinstance(site, PanelSite) else [site.cutoff or 0.0]
