@@ -153,6 +153,21 @@ def run_cell(page: Any, k: int, is_done: Callable[[], bool]) -> None:
             time.sleep(0.1)
 
 
+def paste_picture(page: Any) -> None:
+    """Copies a picture, and pastes it where the focus is."""
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    page.evaluate(
+        """async () => {
+          const canvas = new OffscreenCanvas(32, 24), context = canvas.getContext('2d')
+          context.fillStyle = 'orange'
+          context.fillRect(4, 4, 12, 12)
+          const picture = await canvas.convertToBlob()
+          await navigator.clipboard.write([new ClipboardItem({ 'image/png': picture })])
+        }"""
+    )
+    page.keyboard.press("Control+V")
+
+
 def has_painting(folder: Path) -> bool:
     """Whether Python has heard of a painting."""
     path = folder / "told.txt"
@@ -179,6 +194,9 @@ def test_in_jupyterlab(browser: Any, folder: Path) -> None:
         paint(page, folder)
         # A key of the painter is none of the notebook's: `b` would put a cell below.
         page.keyboard.press("b")
+        assert page.locator(".jp-CodeCell").count() == 2
+        paste_picture(page)
+        page.locator(".lightpaint .reference-name").wait_for()
         assert page.locator(".jp-CodeCell").count() == 2
         row = page.locator('.lightpaint [data-light="light 0"]')
         assert "is-dim" not in row.get_attribute("class")
