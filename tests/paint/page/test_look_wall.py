@@ -217,3 +217,23 @@ def test_a_deleted_look_ends_it(open_looks: Any) -> None:
     painter.page.evaluate("() => painter.session.send('drop_look', { look: 3 })")
     painter.still()
     assert painter.page.locator(".look-wall").count() == 0
+
+
+def test_looks_of_the_strip_are_opened_by_keyboard(open_looks: Any, axe: str) -> None:
+    painter = open_looks(init=axe)
+    strip = painter.page.locator(".looks")
+    assert strip.get_by_role("button", name="Side by side").count() == 0
+    for name in ("Look 3", "Look 1"):
+        mark = strip.get_by_role("button", name=f"Compare {name}", exact=True)
+        mark.press("Enter")
+        assert mark.get_attribute("aria-pressed") == "true"
+    assert violations(painter.page, ".looks") == []
+    strip.get_by_role("button", name="Side by side").press("Enter")
+    painter.page.locator(".look-pane").first.wait_for()
+    names = painter.page.locator(".look-pane").all_inner_texts()
+    assert [name.strip() for name in names] == ["Look 3", "Look 1"]
+    # A deleted look is marked no more.
+    painter.page.keyboard.press("Escape")
+    for _ in range(2):
+        strip.get_by_role("button", name="Delete Look 1").click()
+    strip.get_by_role("button", name="Side by side").wait_for(state="detached")

@@ -6,6 +6,7 @@
 import { nameInView } from '../engine/message_frames.js';
 import { html, useEffect, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
 import { Button, Select, Slider } from './controls.js';
+import { COMPARED_COUNT } from '../engine/picture_slots.js';
 import { currentLook, loadLook } from './look_actions.js';
 import { keyText } from './key_bindings.js';
 import {
@@ -16,6 +17,7 @@ import {
   whyNotSaved,
   withoutLooks,
 } from './look_comparison.js';
+import { showWall } from './look_wall.js';
 import { Thumbnail } from './thumbnail.js';
 import { updateDisplay } from './tools.js';
 import { fill, words } from '../language/language.js';
@@ -34,6 +36,10 @@ export function LookStrip({ ui, app }) {
     if (looks.length > count.current) list.current?.scrollTo({ left: list.current.scrollWidth });
     count.current = ui.ready ? looks.length : Infinity;
   }, [looks.length, ui.ready]);
+  const [marks, setMarks] = useState(/** @type {number[]} */ ([]));
+  const marked = marks.filter((id) => looks.some((look) => look.id === id));
+  const toggle = (/** @type {number} */ id) =>
+    setMarks(marked.includes(id) ? marked.filter((other) => other !== id) : [...marked, id]);
   const current = currentLook(ui);
   const kind = !looks.length ? 'is-empty' : ui.mix ? 'is-comparing' : '';
   return html`<section class=${`looks ${kind}`} aria-label=${words.lookStrip.looks}><div class="looks-row">
@@ -41,13 +47,20 @@ export function LookStrip({ ui, app }) {
       looks.length > 0 &&
       html`<ul ref=${list}>${looks.map(
         (look) => html`<${LookItem} key=${look.id} look=${look} isCurrent=${look.id === current}
-          ui=${ui} app=${app} />`,
+          isMarked=${marked.includes(look.id)} canMark=${looks.length > 1 && marked.length < COMPARED_COUNT}
+          mark=${() => toggle(look.id)} ui=${ui} app=${app} />`,
       )}</ul>`
     }
     ${
       !looks.length &&
       ui.ready &&
       html`<p class="faint">${words.lookStrip.noLooksYet} <kbd>${keyText(ui, 'saveLook')}</kbd> ${words.lookStrip.savesPaintingAndAnswerAsA}</p>`
+    }
+    ${
+      marked.length > 1 &&
+      !ui.mix &&
+      html`<${Button} icon="side" label=${words.looksDialog.sideBySide} primary
+        tip=${words.looksDialog.sideBySideTip} act=${() => showWall(app, marked)} />`
     }
     ${
       looks.length > 1 &&
@@ -58,8 +71,9 @@ export function LookStrip({ ui, app }) {
   </div></section>`;
 }
 
-/** @param {{look: Look, isCurrent: boolean, ui: Ui, app: App}} props */
-function LookItem({ look, isCurrent, ui, app }) {
+/** @param {{look: Look, isCurrent: boolean, isMarked: boolean, canMark: boolean, mark: () => void,
+ *   ui: Ui, app: App}} props */
+function LookItem({ look, isCurrent, isMarked, canMark, mark, ui, app }) {
   const { session } = app;
   const [isNaming, setNaming] = useState(false);
   const [isConfirming, setConfirming] = useState(false);
@@ -84,6 +98,10 @@ function LookItem({ look, isCurrent, ui, app }) {
           onClick=${() => setNaming(true)}>${look.name}</button>`
     }
     <span class="look-tools">
+      ${
+        (canMark || isMarked) &&
+        html`<${Button} icon="side" tip=${fill(words.looksDialog.mark, { name: look.name })} pressed=${isMarked} act=${mark} />`
+      }
       <${Button} icon="copy" tip=${fill(words.lookStrip.duplicate, { name: look.name })}
         act=${() => session.send('copy_look', { look: look.id })} />
       <${Button} icon=${isConfirming ? 'check' : 'trash'} class=${isConfirming ? 'is-sure' : ''}
