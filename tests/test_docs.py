@@ -105,7 +105,7 @@ def test_snippets_of_python_run_one_after_the_other(
     monkeypatch.chdir(tmp_path)
 
     def small(path: str) -> lp.Scene:
-        return replace(load_scene(path).reduced("1/4"), spp=2)
+        return replace(load_scene(path).reduced("1/10"), spp=2)
 
     monkeypatch.setattr(lp, "load_scene", small)
     names: dict[str, Any] = {}
