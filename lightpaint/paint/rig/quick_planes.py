@@ -160,6 +160,7 @@ class _Spreading:
             self._weights = [mi.Float(aligned(row, np.float32)) for row in weights]
             self._albedo = [mi.Float(aligned(row, np.float32)) for row in albedo.T]
             dr.make_opaque(self._cells, self._weights, self._albedo)
+        self._add = dr.freeze(_add_spread)
 
     def at(self, pixels: npt.NDArray[np.intp]) -> "_Spreading":
         """Return the interpolation to these pixels alone."""
@@ -173,6 +174,7 @@ class _Spreading:
             others._weights = [dr.gather(mi.Float, x, where) for x in self._weights]
             others._albedo = [dr.gather(mi.Float, x, where) for x in self._albedo]
             dr.make_opaque(others._cells, others._weights, others._albedo)
+        others._add = dr.freeze(_add_spread)
         return others
 
     def __call__(self, indirect: Floats, direct: Any) -> npt.NDArray[np.float32]:
@@ -180,20 +182,28 @@ class _Spreading:
 
         indirect: of the cells, (rows, columns, 3). direct: of the pixels, as Dr.Jit has it.
         """
-        import drjit as dr
         import mitsuba as mi
 
         light = indirect.reshape(-1, 3) / self._cell_albedo
         with tracing():
             table = mi.Float(aligned(light.ravel(), np.float32))
-            mode = dr.ReduceMode.NoConflicts
-            pixel = 3 * dr.arange(mi.UInt32, dr.width(self._weights[0]))
-            for channel in range(3):
-                spread = dr.zeros(mi.Float, 1)
-                for cells, weights in zip(self._cells, self._weights, strict=True):
-                    spread = dr.fma(dr.gather(mi.Float, table, cells + channel), weights, spread)
-                dr.scatter_add(direct, spread * self._albedo[channel], pixel + channel, mode=mode)
-            return np.array(direct, np.float32)
+            lit = self._add(table, self._cells, self._weights, self._albedo, direct)
+            return np.array(lit, np.float32)
+
+
+def _add_spread(table: Any, cells: Any, weights: Any, albedo: Any, direct: Any) -> Any:
+    """Add to the light of pixels that of the cells around each. table: theirs, over albedo."""
+    import drjit as dr
+    import mitsuba as mi
+
+    pixel = 3 * dr.arange(mi.UInt32, dr.width(weights[0]))
+    for channel in range(3):
+        spread = dr.zeros(mi.Float, 1)
+        for cell, weight in zip(cells, weights, strict=True):
+            spread = dr.fma(dr.gather(mi.Float, table, cell + channel), weight, spread)
+        mode = dr.ReduceMode.NoConflicts
+        dr.scatter_add(direct, spread * albedo[channel], pixel + channel, mode=mode)
+    return direct
 
 
 def _between(count: int, cells: int) -> tuple[Sequence[npt.NDArray[np.intp]], Sequence[Floats]]:

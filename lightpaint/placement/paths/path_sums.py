@@ -6,9 +6,11 @@ rays outside the cone of a spot.
 """
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from lightpaint.arrays import Floats, aligned
 from lightpaint.placement.paths.camera_paths import Vertices
@@ -34,7 +36,9 @@ class PathSums:
         self._loaded, self._vertices = paths.loaded, vertices
         self._values = 3 * (pixel_count or paths.size[0] * paths.size[1])
         is_one_each = len(np.unique(vertices.pixels)) == len(vertices)
-        self._mode = dr.ReduceMode.NoConflicts if is_one_each else dr.ReduceMode.Auto
+        mode = dr.ReduceMode.NoConflicts if is_one_each else dr.ReduceMode.Auto
+        # Tracing the kernel anew for each light takes longer than running it.
+        self._add = _adder(mode, vertices.pixels)
         with tracing():
             self._panel_points = paths.panel_points(len(vertices))
             self._first = mi.UInt32(aligned(3 * vertices.pixels, np.uint32))
@@ -45,26 +49,45 @@ class PathSums:
         import drjit as dr
         import mitsuba as mi
 
+        vertices = self._vertices
         with tracing():
             sums = dr.zeros(mi.Float, self._values)
             row = mi.Float(_row(site))
             dr.make_opaque(sums, row)
-            if not len(self._vertices):
+            if not len(vertices):
                 return sums
-            values = [dr.gather(mi.Float, row, k) for k in range(ORIGIN_VALUES + _CONE_VALUES)]
-            origin, cone = values[:ORIGIN_VALUES], values[ORIGIN_VALUES:]
-
-            def share_towards(direction: Any) -> Any:
-                angle = dr.acos(dr.clip(dr.dot(direction, mi.Vector3f(*cone[:3])), -1, 1))
-                return dr.clip((cone[3] - angle) * cone[4], 0, 1)
-
-            light = added_light(
-                self._loaded, self._vertices, origin, self._panel_points, share_towards
-            )
-            for channel in range(3):
-                dr.scatter_add(sums, light[channel], self._first + channel, mode=self._mode)
+            paths = vertices.interaction, vertices.throughput
+            sums = self._add(self._loaded, *paths, self._panel_points, self._first, row, sums)
             dr.eval(sums)
         return sums
+
+
+def _adder(mode: Any, pixels: npt.NDArray[np.int64]) -> Callable[..., Any]:
+    """Return a function that adds the light of a site to sums, traced once.
+
+    mode: how light is added. pixels: of the vertices.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    def add(
+        loaded: Any, interaction: Any, throughput: Any, points: Any, first: Any, row: Any, sums: Any
+    ) -> Any:
+        values = [dr.gather(mi.Float, row, k) for k in range(ORIGIN_VALUES + _CONE_VALUES)]
+        origin, cone = values[:ORIGIN_VALUES], values[ORIGIN_VALUES:]
+
+        def share_towards(direction: Any) -> Any:
+            angle = dr.acos(dr.clip(dr.dot(direction, mi.Vector3f(*cone[:3])), -1, 1))
+            return dr.clip((cone[3] - angle) * cone[4], 0, 1)
+
+        vertices = Vertices(interaction, throughput, pixels)
+        light = added_light(loaded, vertices, origin, points, share_towards)
+        for channel in range(3):
+            dr.scatter_add(sums, light[channel], first + channel, mode=mode)
+        return sums
+
+    traced_once: Callable[..., Any] = dr.freeze(add)
+    return traced_once
 
 
 #: Values of a cone that a kernel reads: axis, cutoff, and the reciprocal of its width outside the
