@@ -9,7 +9,7 @@ const MAX_PERIOD_MS = 100;
 const AVERAGED_COUNT = 3;
 
 /** Largest step between the pixels of a draft, of which a picture of the room is still made out. */
-const MAX_STEP = 4;
+const MAX_STEP = 3;
 
 /** A longer pause is the hand's. */
 const MAX_PAUSE_MS = 1000;
