@@ -8,7 +8,9 @@ SAMPLES, SIZE = 16, (160, 90)
 
 def new_shot(*, view: str = "Standard") -> bpy.types.Scene:
     """Empty the file, and build a corner with one lamp of each kind, meshes that emit, a world."""
-    bpy.ops.wm.read_homefile(use_empty=True)
+    for kind in ("objects", "meshes", "lights", "materials", "cameras", "worlds"):
+        for owner in list(getattr(bpy.data, kind)):
+            getattr(bpy.data, kind).remove(owner)
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.cycles.samples, scene.cycles.use_denoising = SAMPLES, False
@@ -34,7 +36,7 @@ def add_room(scene: bpy.types.Scene) -> None:
         radius=0.8, location=(0, 1, 0.8), segments=16, ring_count=8
     )
     bpy.ops.object.camera_add(location=(0, -8, 3), rotation=(1.35, 0, 0))
-    scene.camera = bpy.context.object
+    scene.camera = bpy.context.view_layer.objects.active
 
 
 def add_lamps() -> None:
@@ -58,7 +60,8 @@ def add_emitting_meshes(scene: bpy.types.Scene) -> None:
     """Add a cube that emits a plain colour, and one that emits a texture."""
     for name, place, is_textured in (("Tube", (-2, 3, 3), False), ("Screen", (2, 3, 1), True)):
         bpy.ops.mesh.primitive_cube_add(size=0.7, location=place)
-        bpy.context.object.name = name
+        cube = bpy.context.view_layer.objects.active
+        cube.name = name
         material = bpy.data.materials.new(name)
         if bpy.app.version < (5, 0):
             material.use_nodes = True
@@ -71,7 +74,7 @@ def add_emitting_meshes(scene: bpy.types.Scene) -> None:
             links.new(nodes.new("ShaderNodeTexChecker").outputs["Color"], emission.inputs["Color"])
         output = nodes.new("ShaderNodeOutputMaterial")
         links.new(emission.outputs[0], output.inputs["Surface"])
-        bpy.context.object.data.materials.append(material)
+        cube.data.materials.append(material)
 
 
 def set_background(world: bpy.types.World, colour: tuple[float, ...], strength: float) -> None:

@@ -3,6 +3,7 @@
 import ast
 import io
 import re
+import sys
 import tomllib
 import zipfile
 from pathlib import Path
@@ -44,12 +45,12 @@ def test_the_addon_is_under_its_licence_and_needs_no_library(path: Path) -> None
     text = path.read_text("utf-8")
     assert text.startswith("# SPDX-License-Identifier: GPL-3.0-or-later\n")
     tree = ast.parse(text, feature_version=(3, 10))  # the Python of Blender 3.4
-    standard = {"bpy", *__import__("sys").stdlib_module_names}
+    known = {"bpy", "bpy_extras", *sys.stdlib_module_names}
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
-            assert {name.name.partition(".")[0] for name in node.names} <= standard
+            assert {name.name.partition(".")[0] for name in node.names} <= known
         elif isinstance(node, ast.ImportFrom) and not node.level:
-            assert str(node.module).partition(".")[0] in standard
+            assert str(node.module).partition(".")[0] in known
 
 
 def test_nothing_of_the_library_imports_the_addon() -> None:

@@ -10,6 +10,7 @@ import bpy
 from scripted_painter import (
     contents,
     controller,
+    has_answer,
     open_painter,
     start_addon,
     wait_until,
@@ -25,14 +26,15 @@ before = contents()
 bpy.ops.lightpaint.prepare()
 found["groups"] = contents()["groups"]
 bpy.ops.lightpaint.render()
-written = os.stat(controller_file := os.path.join(folder, "shot", "shot.exr")).st_mtime_ns
+written = os.stat(render_file := os.path.join(folder, "shot", "shot.exr")).st_mtime_ns
 bpy.ops.lightpaint.render()
-found["rendered once"] = os.stat(controller_file).st_mtime_ns == written
+found["rendered once"] = os.stat(render_file).st_mtime_ns == written
 found["output is put back"] = contents()["output"] == before["output"]
 
 painter = open_painter()
 found["still unpainted"] = [lamp.energy for lamp in bpy.data.lights]
 painter.brighten(*SIZE, gain=4.0)
+wait_until(has_answer, "an exact answer")
 painter.ask("save_look", name="Evening")
 wait_until(lambda: controller.session.state.looks, "a look")
 found["factors"] = {k: list(v) for k, v in controller.session.state.factors.items()}

@@ -106,6 +106,9 @@ class Controller:
             return
         self.render = None
         error = render.finish()
+        if not error:
+            # Undoing what comes next shall not take the groups and the rendered levels along.
+            push_undo("lightpaint Render")
         self.say(error or "the shot is rendered", is_error=bool(error))
         scene = bpy.data.scenes.get(render.scene_name)
         if not error and self._then_paint and scene is not None:
@@ -151,6 +154,14 @@ def redraw():
         for area in window.screen.areas:
             if area.type in ("VIEW_3D", "PROPERTIES"):
                 area.tag_redraw()
+
+
+def push_undo(message):
+    """Make the present state one that undo comes back to."""
+    windows = bpy.context.window_manager.windows
+    if windows and not bpy.app.background:
+        with bpy.context.temp_override(window=windows[0]):
+            bpy.ops.ed.undo_push(message=message)
 
 
 def start_timer():

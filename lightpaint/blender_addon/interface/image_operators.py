@@ -11,7 +11,7 @@ from ..shot.image_files import edited_image, image_file
 from ..shot.view_options import plain_options, view_options
 from .controller import controller, ocio_path, shot_folder
 from .live_session import show_preview
-from .shot_operators import ShotOperator, is_rendered
+from .shot_operators import ShotOperator, is_rendered, prepare_shot
 
 #: Labels of the areas that are compared.
 NAMES = {"whole": "Whole", "regions": "Regions", "parts": "Same View"}
@@ -50,6 +50,7 @@ class SolveOperator(ShotOperator):
     def begin(self, context, text, finish, function, *arguments):
         """Start a function of `solves` with program and shot as its first arguments."""
         program, folder = controller.check_program(), shot_folder(context.scene)
+        prepare_shot(context)
         if not is_rendered(context.scene, context.view_layer, folder):
             raise ValueError("the shot has changed, or is not rendered yet: press Render first")
         folder.check_writable()

@@ -5,8 +5,6 @@ import textwrap
 
 import bpy
 
-from ..lamps.lamp_levels import PREVIEWS
-from ..lamps.memory import recall
 from .controller import controller, shot_folder
 from .level_operators import known_looks
 
@@ -14,7 +12,7 @@ from .level_operators import known_looks
 MAX_REASONS = 8
 
 #: Pixels of one character, about, at Blender's usual size.
-CHARACTER_PIXELS = 7.5
+CHARACTER_PIXELS = 6.5
 
 
 class LightpaintPanel:
@@ -34,11 +32,15 @@ class LightpaintPanel:
         row = layout.row(align=True)
         row.operator("lightpaint.prepare", icon="LIGHT")
         row.operator("lightpaint.render", icon="RENDER_STILL")
-        if is_painting:
-            layout.operator("lightpaint.stop", icon="X")
+        # Always there, so that nothing jumps while somebody paints.
+        row = layout.row(align=True)
+        row.operator("lightpaint.apply", icon="CHECKMARK")
+        row.operator("lightpaint.discard", icon="LOOP_BACK")
         self.draw_messages(layout, context, session)
-        self.draw_preview(layout, scene)
         self.draw_looks(layout, scene)
+        row = layout.row(align=True)
+        row.operator("lightpaint.stop", icon="X")
+        row.operator("lightpaint.revert", icon="TRASH")
 
     def draw_messages(self, layout, context, session):
         texts = [(controller.message, controller.is_error)]
@@ -54,14 +56,6 @@ class LightpaintPanel:
                 draw_text(box, context, reason, icon="DOT")
             if len(controller.left) > MAX_REASONS:
                 box.label(text=f"and {len(controller.left) - MAX_REASONS} more")
-
-    def draw_preview(self, layout, scene):
-        row = layout.row(align=True)
-        if recall(scene).get(PREVIEWS):
-            row.operator("lightpaint.apply", icon="CHECKMARK")
-            row.operator("lightpaint.discard", icon="LOOP_BACK")
-        if recall(scene):
-            layout.operator("lightpaint.revert", icon="TRASH")
 
     def draw_looks(self, layout, scene):
         looks = known_looks(scene)
@@ -104,7 +98,7 @@ def draw_text(layout, context, text, icon="NONE"):
     """Draw a sentence on as many lines as it needs."""
     width = context.region.width if context.region else 300
     scale = context.preferences.system.ui_scale * CHARACTER_PIXELS
-    lines = textwrap.wrap(text, max(16, int((width - 60) / scale))) or [""]
+    lines = textwrap.wrap(text, max(16, int((width - 50) / scale))) or [""]
     column = layout.column(align=True)
     for number, line in enumerate(lines):
         column.label(text=line, icon=icon if number == 0 else "BLANK1", translate=False)

@@ -3,6 +3,7 @@
 
 import bpy
 
+from ..lamps.lamp_levels import adopt_levels, grouped_places
 from ..lamps.memory import recall
 from ..shot.cycles_render import ShotRender, current_digest
 from ..shot.layer_setup import prepare
@@ -28,9 +29,15 @@ def check_camera(scene):
 
 
 def is_rendered(scene, view_layer, folder):
-    """Return whether the render in a folder shows the scene as it is."""
+    """Return whether the render in a folder shows the scene as it is.
+
+    If so, levels that no longer know what was rendered, after undo or reverting, learn it again.
+    """
     digest = folder.rendered_digest()
-    return bool(digest) and digest == current_digest(scene, view_layer)
+    if not digest or digest != current_digest(scene, view_layer):
+        return False
+    adopt_levels(grouped_places(scene, view_layer))
+    return True
 
 
 class ShotOperator(bpy.types.Operator):

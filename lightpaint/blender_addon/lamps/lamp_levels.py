@@ -46,6 +46,15 @@ def commit_base(groups, levels):
         _store(place, {**slot, "base": values, "last": place.values()})
 
 
+def adopt_levels(groups):
+    """Take the present levels of places that know of no render as those that were rendered."""
+    unknown = {
+        name: [place for place in places if "base" not in _slot(place)]
+        for name, places in groups.items()
+    }
+    commit_base(unknown, present_levels(unknown))
+
+
 def show_factors(groups, factors):
     """Set levels to multiples of what was rendered. Return the number of places that changed.
 

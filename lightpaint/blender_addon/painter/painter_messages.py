@@ -9,6 +9,9 @@ from dataclasses import dataclass, field
 #: Version of the protocol that this add-on speaks.
 PROTOCOL_VERSION = 3
 
+#: Sentences while the lights change, and until the painter has said how close they come.
+LIVE_TEXT, ANALYSING_TEXT = "the lamps follow the brush", "the lamps are set; analysing"
+
 #: Types of numbers in buffers: their letter for `struct`, and their size in bytes.
 _NUMBERS = {"float16": "e", "float32": "f", "float64": "d", "int16": "h", "uint8": "B"}
 
@@ -89,6 +92,8 @@ class PainterState:
         answer = content.get("answer", content)
         if isinstance(answer, dict) and answer.get("headline"):
             self.headline = answer["headline"]
+        elif kind == "answer":
+            self.headline = ANALYSING_TEXT if content.get("exact") else LIVE_TEXT
         if kind not in ("state", "answer"):
             return False
         self.is_exact = content.get("exact", True)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 #: How to install it, for messages.
 INSTALL_TEXT = (
-    "lightpaint is not installed, or not on the PATH: run  pip install 'lightpaint[paint]'  "
+    "lightpaint is not installed, or not on the PATH: run  pip install 'lightpaint[paint,ocio]'  "
     "in a terminal, or name the program in the add-on's preferences"
 )
 
