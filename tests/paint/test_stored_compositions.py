@@ -20,7 +20,7 @@ from lightpaint.paint.layers.layer import Layer
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store import stored_compositions
 from lightpaint.paint.store.canvas_pixels import Pixels
-from lightpaint.paint.store.compression import ZEROS_LENGTH, pack, pack_patches, unpack_patch
+from lightpaint.paint.store.compression import ZEROS_LENGTH, pack, pack_patches, unpack_patches
 from lightpaint.paint.store.history_steps import Patch
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.store.stored_compositions import StoredComposition
@@ -223,8 +223,8 @@ def test_zeros_of_masks_are_packed_as_other_numbers_are() -> None:
     ]
     before, change = pack_patches(patches)
     places = [(entry.region, False) for entry in patches]
-    for k, entry in enumerate(patches):
-        first, last = unpack_patch(places, k, before, change)
+    pairs = unpack_patches(places, before, change)
+    for entry, (first, last) in zip(patches, pairs, strict=True):
         assert first.equals(entry.before)
         assert last.equals(entry.after)
     numbers = [np.r_[np.zeros(3 * 600 * 700), coverage.ravel()], coverage[:2, :2].ravel()]

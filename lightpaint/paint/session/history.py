@@ -34,6 +34,9 @@ PICTURE_SIDE = 96
 #: Number of steps after stored compositions that are repeated on them; after more, all is composed.
 MAX_REPEATED_STEPS = 32
 
+#: Bytes of pixels that are kept while a file is checked for damage, so that they are read once.
+MAX_KEPT_BYTES = 2**28
+
 #: Views, and the region of each that changed.
 Changes = Sequence[tuple[int, Region]]
 
@@ -133,8 +136,7 @@ class History:
         order = -1 if is_back else 1
         patches = [patch for step in passed for patch in step.patches[::order]]
         try:
-            for patch in patches:
-                _ = patch.before if is_back else patch.after
+            patches = _read_patches(patches, is_back=is_back)
         except DamagedError:
             raise PaintError(self._store.recover()) from None
         self._store.move_to(position)
@@ -230,3 +232,18 @@ def restore(
     if further := applied[position:]:  # of a process that ended early
         views.repeat(further, applied)
     return views, requests
+
+
+def _read_patches(patches: Sequence[Patch], *, is_back: bool) -> list[Patch]:
+    """Return patches, of which the first have their pixels in memory, on the side that is needed.
+
+    Raises DamagedError if any cannot be read.
+    """
+    read: list[Patch] = []
+    left = MAX_KEPT_BYTES
+    for patch in patches:
+        pixels = patch.before if is_back else patch.after
+        left -= sum(x.nbytes for x in pixels if x is not None)
+        kept = Patch(patch.region, pixels, pixels, patch.view, patch.layer)
+        read.append(kept if left >= 0 else patch)
+    return read

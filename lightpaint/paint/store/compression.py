@@ -8,6 +8,7 @@ import math
 import zlib
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -72,20 +73,21 @@ def pack_patches(patches: Sequence[Patch]) -> tuple[bytes, bytes]:
     return _pack_parts(before), _pack_parts(change)
 
 
-def unpack_patch(
-    places: Sequence[tuple[Region, bool]], k: int, before: bytes, change: bytes
-) -> tuple[Pixels, Pixels]:
-    """Return the pixels before and after of patch k, to the last bit.
+def unpack_patches(
+    places: Sequence[tuple[Region, bool]], before: bytes, change: bytes
+) -> list[tuple[Pixels, Pixels]]:
+    """Return the pixels before and after each patch of a step, to the last bit.
 
-    places: region of each patch of the step, and whether it is marked. Raises PaintError for a
-    damaged file.
+    places: region of each patch, and whether it is marked. Raises PaintError for a damaged file.
     """
-    ends = np.cumsum([0, *(_value_count(*place) for place in places)]).tolist()
-    before_bits, change_bits = (
-        np.asarray(unpack(x, "uint32", (ends[-1],)))[ends[k] : ends[k + 1]]
-        for x in (before, change)
-    )
-    return _from_bits(before_bits, *places[k]), _from_bits(before_bits ^ change_bits, *places[k])
+    counts = [count for place in places for count in _part_counts(*place)]
+    firsts, changes = iter(_unpack_parts(before, counts)), iter(_unpack_parts(change, counts))
+    pairs = []
+    for region, marked in places:
+        first = [next(firsts) for _ in _part_counts(region, marked)]
+        last = [_changed_bits(bits, next(changes)) for bits in first]
+        pairs.append((_from_parts(first, region), _from_parts(last, region)))
+    return pairs
 
 
 def pack_pixels(pixels: Pixels) -> bytes:
@@ -96,8 +98,7 @@ def pack_pixels(pixels: Pixels) -> bytes:
 
 def unpack_pixels(data: bytes, region: Region, *, marked: bool) -> Pixels:
     """Return the pixels that `pack_pixels` packed. Raises PaintError for anything else."""
-    bits = unpack(data, "uint32", (_value_count(region, marked),))
-    return _from_bits(bits, region, marked)
+    return _from_parts(_unpack_parts(data, _part_counts(region, marked)), region)
 
 
 def _size(region: Region) -> tuple[int, int]:
@@ -105,10 +106,10 @@ def _size(region: Region) -> tuple[int, int]:
     return bottom - top, right - left
 
 
-def _value_count(region: Region, marked: bool) -> int:
-    """Return how many numbers a region has: light, importance, and 32 marks in each."""
+def _part_counts(region: Region, marked: bool) -> list[int]:
+    """Return how many numbers light, importance and marks have; a number holds 32 marks."""
     pixels = math.prod(_size(region))
-    return 4 * pixels + marked * -(-3 * pixels // 32)
+    return [3 * pixels, pixels] + [-(-3 * pixels // 32)] * marked
 
 
 def _pack_parts(parts: Sequence[npt.NDArray[np.uint32]]) -> bytes:
@@ -146,7 +147,7 @@ def _zeros_block(count: int) -> bytes:
 
 def _packed_zeros(bits: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:
     """Return the same numbers, without memory if all are zero."""
-    return bits if bits.any() else np.broadcast_to(np.uint32(0), bits.shape)
+    return bits if bits.any() else _zero_bits(bits.size)
 
 
 def _changed_bits(
@@ -177,17 +178,64 @@ def _to_bits(pixels: Pixels, region: Region, marked: bool) -> list[npt.NDArray[n
 def _float_bits(values: npt.NDArray[np.floating]) -> npt.NDArray[np.uint32]:
     """Return the bits of numbers, (n,): zeros without memory."""
     if not any(values.strides) and not values.view(np.uint32).any():
-        return np.broadcast_to(np.uint32(0), (values.size,))
+        return _zero_bits(values.size)
     return _packed_zeros(np.ascontiguousarray(values, np.float32).reshape(-1).view(np.uint32))
 
 
-def _from_bits(bits: npt.NDArray[np.generic], region: Region, marked: bool) -> Pixels:
+def _unpack_parts(data: bytes, counts: Sequence[int]) -> list[npt.NDArray[np.uint32]]:
+    """Return the parts that `_pack_parts` packed: zeros without memory. counts: numbers of each."""
+    unpacking, parts = zlib.decompressobj(), [_zero_bits(count) for count in counts]
+    filled = [(k, count) for k, count in enumerate(counts) if count]
+    for byte in range(4):
+        for k, count in filled:
+            plain = np.frombuffer(_unpacked(unpacking, data, count), np.uint8)
+            data = unpacking.unconsumed_tail
+            if not plain.any():
+                continue
+            if parts[k].strides == (0,):
+                parts[k] = np.zeros(count, np.dtype("<u4"))
+            parts[k].view(np.uint8).reshape(-1, 4)[:, byte] = plain
+    if not unpacking.eof and _unpacked(unpacking, data, 1, is_end=True):
+        raise PaintError("a damaged picture: more bytes than it has")
+    return parts
+
+
+def _unpacked(unpacking: Any, data: bytes, count: int, *, is_end: bool = False) -> bytes:
+    """Return the next bytes of a stream. Raises PaintError if there are fewer, but at its end."""
+    pieces: list[bytes] = []
+    left = count
+    try:
+        while left:
+            pieces.append(unpacking.decompress(data, left))
+            data, left = unpacking.unconsumed_tail, left - len(pieces[-1])
+            if not pieces[-1]:
+                break
+    except zlib.error as error:
+        raise PaintError(f"a damaged picture: {error}") from None
+    if left and not is_end:
+        raise PaintError(f"a damaged picture: {left} bytes are missing")
+    return b"".join(pieces)
+
+
+def _zero_bits(count: int) -> npt.NDArray[np.uint32]:
+    return np.broadcast_to(np.uint32(0), (count,))
+
+
+def _from_parts(parts: Sequence[npt.NDArray[np.uint32]], region: Region) -> Pixels:
+    """Return the pixels of light, importance and maybe marks; they cannot be written."""
+    light, importance, *marks = parts
     size = _size(region)
-    light, end = 3 * math.prod(size), 4 * math.prod(size)
-    values = np.ascontiguousarray(bits).view(np.float32)
-    values.flags.writeable = False
     at_least = None
-    if marked:
-        flags = np.unpackbits(np.asarray(bits[end:]).astype("<u4").view(np.uint8), count=light)
+    if marks:
+        flags = np.unpackbits(marks[0].astype("<u4").view(np.uint8), count=light.size)
         at_least = flags.view(bool).reshape(*size, 3) if flags.any() else None
-    return Pixels(values[:light].reshape(*size, 3), values[light:end].reshape(size), at_least)
+    return Pixels(_floats(light, (*size, 3)), _floats(importance, size), at_least)
+
+
+def _floats(bits: npt.NDArray[np.uint32], shape: tuple[int, ...]) -> npt.NDArray[np.float32]:
+    """Return bits as numbers that cannot be written."""
+    if bits.strides == (0,):
+        return np.broadcast_to(np.float32(0), shape)
+    values = np.ascontiguousarray(bits, np.uint32).view(np.float32).reshape(shape)
+    values.flags.writeable = False
+    return values

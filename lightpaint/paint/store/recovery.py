@@ -17,7 +17,7 @@ from pathlib import Path
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError, OutputError, PaintError
 from lightpaint.files import flush
-from lightpaint.paint.store.compression import unpack, unpack_patch
+from lightpaint.paint.store.compression import unpack, unpack_patches
 from lightpaint.paint.store.damaged_rows import (
     DAMAGE_ERRORS,
     Losses,
@@ -199,10 +199,10 @@ def _check_step(row: Row | None, pixels: Row | None, identity: Identity | None) 
             if bottom > height or right > width:
                 raise ValueError("beyond the picture")
         regions.append(((top, bottom, left, right), marked))
-    for k in range(len(regions)):
+    if regions:
         if pixels is None:
             raise ValueError("no pixels")
-        unpack_patch(regions, k, *pixels)
+        unpack_patches(regions, *pixels)
 
 
 def _read_looks(old: sqlite3.Connection) -> tuple[list[tuple[Row, list[Row]]], Losses]:

@@ -9,7 +9,7 @@ from threading import RLock
 
 from lightpaint.errors import PaintError
 from lightpaint.paint.store.canvas_pixels import Pixels, Region
-from lightpaint.paint.store.compression import unpack_patch
+from lightpaint.paint.store.compression import unpack_patches
 from lightpaint.paint.store.damaged_rows import DAMAGE_ERRORS
 from lightpaint.paint.store.database import damaged_error
 from lightpaint.paint.store.lazy_arrays import PackedArray, PackedArrays, StoredPatch
@@ -37,9 +37,12 @@ class StoredArrays:
         self._unwritten_pixels: dict[int, tuple[bytes, bytes]] = {}  # by step
         self._unwritten_looks: dict[int, PackedArrays] = {}
         self._unwritten_answers: dict[int, StepAnswer] = {}  # by step
+        # The step that was read last, since its patches are packed together.
+        self._last_read: tuple[int, list[tuple[Pixels, Pixels]]] = (0, [])
 
     def keep_pixels(self, step: int, blobs: tuple[bytes, bytes]) -> None:
         """Keep the pixels before a step, and their change, until they are written."""
+        self._last_read = 0, []
         self._unwritten_pixels[step] = blobs
 
     def keep_look(self, number: int, arrays: PackedArrays) -> None:
@@ -56,6 +59,7 @@ class StoredArrays:
 
     def release_written(self) -> None:
         """Free the memory, since all is written."""
+        self._last_read = 0, []
         self._unwritten_pixels.clear()
         self._unwritten_looks.clear()
         self._unwritten_answers.clear()
@@ -108,6 +112,8 @@ class StoredArrays:
     ) -> tuple[Pixels, Pixels]:
         """Return pixels before and after a step, at its place k. Raises PaintError if damaged."""
         with self._lock:
+            if self._last_read[0] == step:
+                return self._last_read[1][k]
             blobs = self._unwritten_pixels.get(step)
             if blobs is None:
                 with self._as_damage():
@@ -115,7 +121,9 @@ class StoredArrays:
         if blobs is None:
             raise PaintError(f"a step that was cut off: {step}")
         with self._as_damage():
-            return unpack_patch(places, k, *blobs)
+            pairs = unpack_patches(places, *blobs)
+        self._last_read = step, pairs
+        return pairs[k]
 
     @contextmanager
     def _as_damage(self) -> Iterator[None]:
