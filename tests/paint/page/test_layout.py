@@ -403,3 +403,29 @@ def test_every_comparison_shows_the_two_pictures_that_it_names(new_painter: Any)
         choice.select_option(label=name)
         painter.still()
         assert painter.page.locator(".stage .tag").all_inner_texts() == name.split(" | ")
+
+
+def test_two_fingers_zoom_by_as_much_as_they_spread(painter: Painter) -> None:
+    """Though both move within one frame, and each alone is told to the page."""
+    zoom = painter.page.evaluate(
+        """async () => {
+          const stage = document.querySelector('.lightpaint .stage')
+          const { left, top, width, height } = stage.getBoundingClientRect()
+          const put = (kind, spread) => {
+            for (const pointerId of [1, 2]) {
+              const clientX = left + width / 4 + (2 * pointerId - 3) * spread
+              const place = { clientX, clientY: top + height / 2, pointerId, pointerType: 'touch' }
+              stage.dispatchEvent(new PointerEvent(kind, { ...place, bubbles: true, button: 0 }))
+            }
+          }
+          put('pointerdown', 30)
+          for (const spread of [40, 50, 60]) {
+            put('pointermove', spread)
+            await new Promise((done) => requestAnimationFrame(() => setTimeout(done)))
+          }
+          put('pointerup', 60)
+          await new Promise((done) => setTimeout(done, 50))
+          return window.painter.store.value.display.zoom
+        }"""
+    )
+    assert zoom == pytest.approx(2, rel=0.02)

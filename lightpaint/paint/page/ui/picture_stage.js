@@ -190,7 +190,7 @@ export function Stage({ ui, app }) {
   const panes = ui.ready ? engine.panes() : [];
   const fit = panes.length ? panes[0].scale / ui.display.zoom : null;
   useLayoutEffect(() => store.set({ fit }), [fit?.toPrecision(6)]);
-  return html`<div class=${`stage is-${ui.tool} ${ui.dragAdjustment ? 'is-asking' : ''} ${ui.clickAction ? 'is-pointing' : ''}`} ref=${frame} tabindex="0" role="application" inert=${Boolean(ui.mix?.more)}
+  return html`<div class=${`stage is-${ui.tool} ${ui.dragAdjustment ? 'is-asking' : ''} ${ui.clickAction ? 'is-pointing' : ''} ${ui.drag ? 'is-dragging' : ''}`} ref=${frame} tabindex="0" role="application" inert=${Boolean(ui.mix?.more)}
     aria-label=${words.pictureStage.picturesArrowKeysMoveTheBrush} aria-describedby="lp-status">
     ${ui.ready && html`<${ObjectOutline} ui=${ui} engine=${engine} panes=${panes} />`}
     ${ui.ready && html`<${SelectionOutline} ui=${ui} engine=${engine} panes=${panes} />`}

@@ -28,6 +28,9 @@ export class Pointer {
     this.selecting = new SelectDrag(engine, store);
     /** @type {null | "stroke" | "select" | "pan" | "pinch"} */
     this.gesture = null;
+    /** Places of the fingers in the last frame of a pinch, while they have moved since.
+     * @type {Map<number, {x: number, y: number}> | null} */
+    this.spreadFrom = null;
     this.startTime = 0;
     this.pathLength = 0;
     /** @type {Point | null} */
@@ -111,7 +114,7 @@ export class Pointer {
   move(event) {
     const place = this.place(event);
     const previous = this.fingers.get(event.pointerId);
-    if (this.gesture === 'pinch') this.spread(event.pointerId, place);
+    if (this.gesture === 'pinch') this.startSpread();
     if (previous) this.fingers.set(event.pointerId, place);
     this.isAdjusting &&= this.store.value.dragAdjustment !== null; // until it is cancelled
     if (!this.isAdjusting) this.onMove(place.x, place.y);
@@ -130,6 +133,7 @@ export class Pointer {
 
   /** @param {PointerEvent} event */
   up(event) {
+    this.spread();
     this.fingers.delete(event.pointerId);
     if (this.gesture === 'stroke' && event.type === 'pointercancel') this.engine.cancel();
     else if (this.gesture === 'stroke') this.engine.end();
@@ -200,19 +204,28 @@ export class Pointer {
     this.gesture = 'pinch';
   }
 
-  /** @param {number} id @param {{x: number, y: number}} place */
-  spread(id, place) {
-    const finger = this.fingers.get(id);
-    const otherFinger = [...this.fingers].find(([key]) => key !== id)?.[1];
-    if (!finger || !otherFinger) return;
-    const distance = (/** @type {{x: number, y: number}} */ a) =>
-      Math.hypot(a.x - otherFinger.x, a.y - otherFinger.y);
-    const factor = distance(place) / Math.max(1, distance(finger));
-    updateDisplay(
-      this.store,
-      this.engine.zoomAt((place.x + otherFinger.x) / 2, (place.y + otherFinger.y) / 2, factor),
-    );
-    this.pan((place.x - finger.x) / 2, (place.y - finger.y) / 2);
+  /** Zoom and pan by what both fingers do until the next frame: they move one after the other, and
+   * the engine zooms from what is shown. */
+  startSpread() {
+    if (this.spreadFrom) return;
+    this.spreadFrom = new Map(this.fingers);
+    requestAnimationFrame(() => this.spread());
+  }
+
+  spread() {
+    const ids = [...(this.spreadFrom?.keys() ?? [])].slice(0, 2);
+    const before = ids.flatMap((id) => this.spreadFrom?.get(id) ?? []);
+    const after = ids.flatMap((id) => this.fingers.get(id) ?? []);
+    this.spreadFrom = null;
+    if (before.length < 2 || after.length < 2) return;
+    const measure = (/** @type {{x: number, y: number}[]} */ [a, b]) => ({
+      x: (a.x + b.x) / 2,
+      y: (a.y + b.y) / 2,
+      length: Math.max(1, Math.hypot(a.x - b.x, a.y - b.y)),
+    });
+    const [from, to] = [measure(before), measure(after)];
+    updateDisplay(this.store, this.engine.zoomAt(to.x, to.y, to.length / from.length));
+    this.pan(to.x - from.x, to.y - from.y);
   }
 
   /** @param {number} x @param {number} y in CSS pixels */
