@@ -150,9 +150,8 @@ class PoseCandidates:
         if shares is None:
             products, squares = np.concatenate(inner).sum(axis=1)[None], power.sum(axis=0)[None]
         else:
-            with one_thread():
-                products = shares @ np.concatenate(inner).T
-                squares = np.square(shares) @ power
+            products = shares @ np.concatenate(inner).T
+            squares = np.square(shares) @ power
         for pixels, filled, each in seen:
             # First hits are of some pixels only.
             filled *= math.sqrt(each / THINNING)
@@ -186,10 +185,12 @@ def best_poses(
 ) -> list[tuple[float, Site]]:
     """Return the `count` poses with the largest gains, the best first."""
     best: list[tuple[float, Callable[[int], Site], int]] = []
-    for gains, make in batches:
-        order = np.argsort(-gains)[:count]
-        best += [(float(gains[k]), make, int(k)) for k in order if gains[k] > 0]
-        if len(best) > 4 * count:
-            best = sorted(best, key=lambda pose: -pose[0])[:count]
+    # Each of many products is small: threads of BLAS would wait far longer than they work.
+    with one_thread():
+        for gains, make in batches:
+            order = np.argsort(-gains)[:count]
+            best += [(float(gains[k]), make, int(k)) for k in order if gains[k] > 0]
+            if len(best) > 4 * count:
+                best = sorted(best, key=lambda pose: -pose[0])[:count]
     ordered = sorted(best, key=lambda pose: -pose[0])[:count]
     return [(gain, make(k)) for gain, make, k in ordered]
