@@ -15,11 +15,9 @@ from renderer import REPOSITORY
 import lightpaint as lp
 from lightpaint.errors import PaintError
 from lightpaint.paint import protocol
-from lightpaint.paint.layers.composed_layers import ComposedLayers
+from lightpaint.paint.layers.composed_layers import ComposedLayers, accent, accents
 from lightpaint.paint.layers.composition import (
     ShownLayer,
-    accent,
-    accents,
     adjusted,
     compose,
     with_effect,

@@ -15,7 +15,8 @@ from layered_sessions import RandomEditor, bases_of, identity_of, open_session
 
 from lightpaint.errors import PaintError
 from lightpaint.paint import protocol
-from lightpaint.paint.layers.composition import accent, compose_layer
+from lightpaint.paint.layers.composed_layers import accent
+from lightpaint.paint.layers.composition import compose_layer
 from lightpaint.paint.layers.layer import Layer
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store import stored_compositions

@@ -9,19 +9,24 @@ from lightpaint.arrays import Bools, Floats
 from lightpaint.errors import PaintError
 from lightpaint.paint.layers.composition import (
     AlbedoSource,
+    GradientPixels,
     ShownLayer,
-    accents,
     compose,
     compose_importance,
     compose_over,
     with_effect,
 )
+from lightpaint.paint.layers.layer import Layer
 from lightpaint.paint.layers.layer_pixels import LayerPixels, LayerSummary, enclosing, is_empty
 from lightpaint.paint.layers.layer_stack import LayerStack
 from lightpaint.paint.layers.lower_layers import LowerLayers
 from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
 from lightpaint.paint.store.history_steps import Patch, Step
 from lightpaint.paint.store.stored_compositions import StoredComposition
+
+#: Importance of the rest of a fully painted picture relative to one layer, and the largest accent,
+#: which compensates for a layer over a fortieth of the picture.
+REST_SHARE, MAX_ACCENT = 4.0, 10.0
 
 
 class Change(NamedTuple):
@@ -210,6 +215,25 @@ class ComposedLayers:
         ]
         self._is_doubtful = False
         return self.full_region
+
+
+def accent(part: float) -> float:
+    """Return the factor by which a layer over that part of a fully painted picture counts more."""
+    if part <= 0:
+        return MAX_ACCENT
+    return min(MAX_ACCENT, max(1.0, (1 - part) / (REST_SHARE * part)))
+
+
+def accents(layers: Sequence[tuple[Layer, LayerPixels | GradientPixels]]) -> list[float]:
+    """Return the accent of each visible layer, in one view.
+
+    It depends on their coverage alone, and not on when they were made.
+    """
+    covering = [layer.id for layer, pixels in layers if pixels.covers_all]
+    return [
+        accent(pixels.mean_coverage) if set(covering) - {layer.id} else 1.0
+        for layer, pixels in layers
+    ]
 
 
 def _patches_by_layer(steps: Sequence[Step], view: int) -> dict[int, list[Patch]]:

@@ -26,10 +26,6 @@ from lightpaint.paint.layers.layer_pixels import (
 )
 from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
 
-#: Importance of the rest of a fully painted picture relative to one layer, and the largest accent,
-#: which compensates for a layer over a fortieth of the picture.
-REST_SHARE, MAX_ACCENT = 4.0, 10.0
-
 #: Lower and upper bound of importance under repeated weighing.
 MIN_WEIGHED, MAX_WEIGHED = 0.01, 1000.0
 
@@ -131,25 +127,6 @@ def effect_of(layer: Layer) -> Layer:
         return layer
     kind: LayerKind = "adjust" if layer.gradient.light is None else "paint"
     return replace(layer, kind=kind, gradient=None)
-
-
-def accent(part: float) -> float:
-    """Return the factor by which a layer over that part of a fully painted picture counts more."""
-    if part <= 0:
-        return MAX_ACCENT
-    return min(MAX_ACCENT, max(1.0, (1 - part) / (REST_SHARE * part)))
-
-
-def accents(layers: Sequence[tuple[Layer, LayerPixels | GradientPixels]]) -> list[float]:
-    """Return the accent of each visible layer, in one view.
-
-    It depends on their coverage alone, and not on when they were made.
-    """
-    covering = [layer.id for layer, pixels in layers if pixels.covers_all]
-    return [
-        accent(pixels.mean_coverage) if set(covering) - {layer.id} else 1.0
-        for layer, pixels in layers
-    ]
 
 
 def compose(layers: Sequence[ShownLayer], current: Floats, region: Region) -> Pixels:
