@@ -8,6 +8,12 @@ Pictures are fetched, and not sent: `resources` in `state` and `renewed` say whi
 of views but the first as `plane/3@1`.
 """
 
+from lightpaint.paint.protocol.answer_parts import (
+    Advice,
+    Closeness,
+    Findings,
+    LightAnswer,
+)
 from lightpaint.paint.protocol.base import Message
 from lightpaint.paint.protocol.events import (
     EVENTS,
@@ -42,15 +48,11 @@ from lightpaint.paint.protocol.light_requests import (
     TieLights,
 )
 from lightpaint.paint.protocol.message_parts import (
-    Advice,
     Camera,
-    Closeness,
     EditState,
-    Findings,
     HistoryInfo,
     LayerInfo,
     LayerList,
-    LightAnswer,
     LightInfo,
     LightPlace,
     LookInfo,

@@ -15,13 +15,14 @@ from typing import Any, get_origin, get_type_hints
 import numpy as np
 
 from lightpaint.paint.layers.layer import Layer
-from lightpaint.paint.protocol import events, message_parts, requests
+from lightpaint.paint.protocol import answer_parts, events, message_parts, requests
 from lightpaint.paint.protocol.typescript import field_types
 
 
 def sections() -> dict[str, str]:
     """Return the generated parts of the document by the names of their marks."""
-    records = [record for record in vars(message_parts).values() if _is_part(record)]
+    modules = (message_parts, answer_parts)
+    records = [x for module in modules for x in vars(module).values() if _is_part(x)]
     return {
         "requests": "\n".join(_entry(record.kind, record) for record in requests.REQUESTS.values()),
         "events": "\n".join(_entry(record.kind, record) for record in events.EVENTS.values()),
@@ -39,7 +40,7 @@ def replace_sections(text: str) -> str:
 
 
 def _is_part(value: Any) -> bool:
-    names = (message_parts.__name__, Layer.__module__)
+    names = (message_parts.__name__, answer_parts.__name__, Layer.__module__)
     return getattr(value, "__module__", "") in names and isinstance(value, type)
 
 

@@ -11,11 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
+from lightpaint.paint.protocol.answer_parts import Findings
 from lightpaint.paint.protocol.base import OPTIONAL, Message
 from lightpaint.paint.protocol.message_parts import (
     Camera,
     EditState,
-    Findings,
     LightInfo,
     LightPlace,
     LookInfo,

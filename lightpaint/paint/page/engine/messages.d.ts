@@ -264,6 +264,30 @@ export interface ResolvedFit {
 }
 
 /**
+ * The steps that can be undone, and the requests in effect.
+ *
+ * constraints: by name of light, keys and values as in a lights file. ties: names on one dimmer.
+ * settings: those that were set. effective_settings: those in effect. poses: of moved lights, by
+ * name. added_lights: names of lights that the scene does not have. places: a text, equal for
+ * equal places of all lights; "" if all hang as in the scene. layers: of the painting. master:
+ * factor of all lights but fixed ones, by the master dimmer: a light shines at `master` times its
+ * weight. selection: the part of the painting that strokes keep to.
+ */
+export interface EditState {
+  history?: HistoryInfo;
+  constraints?: Record<string, Record<string, any>>;
+  ties?: string[][];
+  settings?: Record<string, any>;
+  poses?: Record<string, Record<string, any>>;
+  added_lights?: string[];
+  places?: string;
+  effective_settings?: ResolvedFit;
+  layers?: LayerList;
+  master?: number;
+  selection?: SelectionInfo;
+}
+
+/**
  * A constraint that keeps the lights from the paint and can be loosened.
  *
  * kind: of the constraint; `reach` if there is none, but moving lights may help. names: its
@@ -322,30 +346,6 @@ export interface Findings {
   delta_e_present?: number;
   sentences?: string[];
   closeness?: (Closeness | null)[];
-}
-
-/**
- * The steps that can be undone, and the requests in effect.
- *
- * constraints: by name of light, keys and values as in a lights file. ties: names on one dimmer.
- * settings: those that were set. effective_settings: those in effect. poses: of moved lights, by
- * name. added_lights: names of lights that the scene does not have. places: a text, equal for
- * equal places of all lights; "" if all hang as in the scene. layers: of the painting. master:
- * factor of all lights but fixed ones, by the master dimmer: a light shines at `master` times its
- * weight. selection: the part of the painting that strokes keep to.
- */
-export interface EditState {
-  history?: HistoryInfo;
-  constraints?: Record<string, Record<string, any>>;
-  ties?: string[][];
-  settings?: Record<string, any>;
-  poses?: Record<string, Record<string, any>>;
-  added_lights?: string[];
-  places?: string;
-  effective_settings?: ResolvedFit;
-  layers?: LayerList;
-  master?: number;
-  selection?: SelectionInfo;
 }
 
 /**

@@ -1,0 +1,70 @@
+"""Records inside events that say how close an answer is, and what each light does for it."""
+
+from dataclasses import dataclass, field
+
+from lightpaint.arrays import RGB
+from lightpaint.paint.protocol.base import OPTIONAL
+
+
+@dataclass(frozen=True)
+class Advice:
+    """A constraint that keeps the lights from the paint and can be loosened.
+
+    kind: of the constraint; `reach` if there is none, but moving lights may help. names: its
+    lights. gain: share of the error that disappears without it; null if more is needed. hold: the
+    weaker hold to set.
+    """
+
+    kind: str
+    names: tuple[str, ...]
+    gain: float | None
+    hold: float | None
+
+
+@dataclass(frozen=True)
+class Closeness:
+    """Closeness of an answer in one view. delta_e_present: ΔE of the current look."""
+
+    headline: str
+    help: Advice | None
+    delta_e: float
+    delta_e_present: float
+    sentences: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class LightAnswer:
+    """The answer for one light.
+
+    stops: relative to its current emission; null if it is, or was, off. kelvin: null for a colour
+    that is not white. share: of the light in the picture. error: its uncertainty, in words.
+    is_constrained: whether a constraint limits it. is_unreached: whether no paint depends on it.
+    """
+
+    emission: RGB
+    stops: float | None
+    kelvin: float | None
+    swatch: str
+    is_on: bool
+    share: float
+    error: str | None = field(default=None, metadata=OPTIONAL)
+    is_constrained: bool | None = field(default=None, metadata=OPTIONAL)
+    is_unreached: bool | None = field(default=None, metadata=OPTIONAL)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Findings:
+    """Properties of an answer; the sentences follow later than the lights.
+
+    lights: in the order of the state. shares: of each light, by view, if there are several.
+    closeness: of each view; null for unpainted views.
+    """
+
+    lights: tuple[LightAnswer, ...] | None = field(default=None, metadata=OPTIONAL)
+    shares: tuple[tuple[float, ...], ...] | None = field(default=None, metadata=OPTIONAL)
+    headline: str | None = field(default=None, metadata=OPTIONAL)
+    help: Advice | None = field(default=None, metadata=OPTIONAL)
+    delta_e: float | None = field(default=None, metadata=OPTIONAL)
+    delta_e_present: float | None = field(default=None, metadata=OPTIONAL)
+    sentences: tuple[str, ...] | None = field(default=None, metadata=OPTIONAL)
+    closeness: tuple[Closeness | None, ...] | None = field(default=None, metadata=OPTIONAL)
