@@ -198,6 +198,8 @@ def on_render_cancel(*_):
 @persistent
 def on_undo(*_):
     """Discard a preview that an undone step had taken along, so that one undo takes all back."""
+    if controller.session is not None:
+        controller.session.forget_places()
     for scene in bpy.data.scenes:
         discard_preview(scene)
 

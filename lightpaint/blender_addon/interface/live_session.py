@@ -9,11 +9,21 @@ import json
 
 import bpy
 
-from ..lamps.lamp_levels import PREVIEWS, grouped_places, show_factors
+from ..lamps.lamp_levels import (
+    PREVIEWS,
+    grouped_places,
+    named_places,
+    place_names,
+    show_factors,
+)
 from ..lamps.memory import recall, remember
 from ..painter.painter_link import PainterLink
 from ..painter.painter_messages import PainterState
 from ..painter.program import ProgramRun, paint_arguments, running_painter
+
+#: Words in errors of the painter that ask for another start: the session is of a picture of another
+#: size, or of other lights; or OpenColorIO, for Blender's own view, is not installed with it.
+NEW_SESSION, OTHER_VIEW = "--new", "ocio"
 
 #: Seconds in which a painter that listens has to answer.
 PATIENCE_S = 30.0
@@ -37,7 +47,8 @@ class LiveSession:
         self.state, self.message, self.is_over = PainterState(), "the painter starts …", False
         self._run: ProgramRun | None = None
         self._link: PainterLink | None = None
-        self._commands, self._shown, self._looks_known = [], None, None
+        self._commands, self._first_command, self._looks_known = {}, None, None
+        self._places: list[tuple[str, str, str, str]] | None = None
 
     def start(self, program, view, environment, fallback):
         """Start the painter, or connect to the one that serves this shot already.
@@ -46,13 +57,14 @@ class LiveSession:
         to try if lightpaint is there without what these need. Raises OSError.
         """
         shot, session = self.folder.render, self.folder.session
-        self._commands = [(program, paint_arguments(shot, session, view), environment)]
+        command = (program, paint_arguments(shot, session, view), environment)
+        self._commands = {NEW_SESSION: (program, [*command[1], "--new"], environment)}
         if fallback:
-            self._commands.append((program, paint_arguments(shot, session, fallback), {}))
+            self._commands[OTHER_VIEW] = (program, paint_arguments(shot, session, fallback), {})
         if found := running_painter(session):
-            self._link = PainterLink(*found)
+            self._link, self._first_command = PainterLink(*found), command
         else:
-            self._run = ProgramRun(*self._commands.pop(0))
+            self._run = ProgramRun(*command)
 
     @property
     def is_connected(self):
@@ -90,11 +102,22 @@ class LiveSession:
         view_layer = scene.view_layers.get(self.layer_name) if scene else None
         if view_layer is None or bpy.app.is_job_running("RENDER"):
             return
-        self._shown = self.state.factors
         shown = self.state.factors if factors is None else factors
         if not recall(scene).get(PREVIEWS) and self.state.is_new and are_one(shown):
             return  # nothing is painted yet
-        show_preview(scene, view_layer, shown)
+        show_preview(scene, view_layer, shown, self._groups(scene, view_layer))
+
+    def forget_places(self):
+        """Look for the lamps anew at the next answer."""
+        self._places = None
+
+    def _groups(self, scene, view_layer):
+        """Return the places of each group, which are looked for in the whole scene only once."""
+        groups = named_places(bpy.data, self._places) if self._places is not None else None
+        if groups is None:
+            groups = grouped_places(scene, view_layer)
+            self._places = place_names(groups)
+        return groups
 
     def end(self):
         """End the painter, if it was started here, and the connection to it."""
@@ -119,15 +142,16 @@ class LiveSession:
             return True
         if run.code is None:
             return False
-        if not self._start_next():
+        if not self._start_otherwise(run.error_text):
             self._end(run.error_text)
         return True
 
-    def _start_next(self):
-        """Start the next command that could serve the shot. Return whether there was one."""
-        if not self._commands:
+    def _start_otherwise(self, error):
+        """Start the painter in the way that its error asks for. Return whether there is one."""
+        reason = next((x for x in self._commands if x in error.lower()), None)
+        if reason is None:
             return False
-        self._link, self._run = None, ProgramRun(*self._commands.pop(0))
+        self._run = ProgramRun(*self._commands.pop(reason))
         return True
 
     def _after_end(self):
@@ -137,7 +161,10 @@ class LiveSession:
             return
         if link.is_connected:
             self._end(self.state.closing or ENDED_TEXT)
-        elif self._run is not None or not self._start_next():
+        elif self._first_command is not None:
+            self._link, self._run = None, ProgramRun(*self._first_command)
+            self._first_command = None
+        else:
             self.end()
             self.message = f"the painter does not answer ({link.error}): press Paint again"
 
@@ -158,9 +185,14 @@ def are_one(factors):
     return all(abs(value - 1) < UNCHANGED for factor in factors.values() for value in factor)
 
 
-def show_preview(scene, view_layer, factors):
-    """Set lamps to multipliers, as a preview that can be discarded. Return how many changed."""
-    changed = show_factors(grouped_places(scene, view_layer), factors)
+def show_preview(scene, view_layer, factors, groups=None):
+    """Set lamps to multipliers, as a preview that can be discarded. Return how many changed.
+
+    groups: the places of each group; None to look for them.
+    """
+    if groups is None:
+        groups = grouped_places(scene, view_layer)
+    changed = show_factors(groups, factors)
     memory = recall(scene)
     if changed and not memory.get(PREVIEWS):
         remember(scene, {**memory, PREVIEWS: True})

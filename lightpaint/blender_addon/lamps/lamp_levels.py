@@ -32,6 +32,33 @@ def present_levels(groups):
     return {(place.owner.name_full, place.slot): place.values() for place in _each(groups)}
 
 
+def place_names(groups):
+    """Return where the places of each group are by names, which outlive undo and deletion."""
+    return [
+        (name, owner_kind(place.owner), place.owner.name, place.slot)
+        for name, places in groups.items()
+        for place in places
+    ]
+
+
+def named_places(data, names):
+    """Return the places of each group again; None if one of them is no longer there."""
+    groups = {}
+    for group, kind, owner_name, slot in names:
+        owner = getattr(data, kind).get(owner_name)
+        place = _place(owner, slot) if owner is not None and owner.library is None else None
+        if place is None:
+            return None
+        groups.setdefault(group, []).append(place)
+    return groups
+
+
+def owner_kind(owner):
+    """Return the name of the list in which a lamp, a material or a world is."""
+    identifier = owner.bl_rna.identifier
+    return {"Material": "materials", "World": "worlds"}.get(identifier, "lights")
+
+
 def commit_base(groups, levels):
     """Take levels, as `present_levels` returned them, as those that are rendered."""
     for place in _each(groups):

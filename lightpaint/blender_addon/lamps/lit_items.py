@@ -44,7 +44,8 @@ class LitItem:
 
 def emitters(scene, view_layer):
     """Return all emitters that a render of a view layer has, in the order of their names."""
-    found = [emitter_of(item) for item in view_layer.objects if is_rendered(item)]
+    trees = {}
+    found = [emitter_of(item, trees) for item in view_layer.objects if is_rendered(item)]
     if scene.world is not None:
         found.append(world_emitter(scene.world))
     return sorted((x for x in found if x is not None), key=lambda x: x.name.casefold())
@@ -58,14 +59,19 @@ def is_rendered(item):
     )
 
 
-def emitter_of(item):
-    """Return an object's light; None for one that has none."""
+def emitter_of(item, trees):
+    """Return an object's light; None for one that has none.
+
+    trees: emission by name of material, for those that were looked at before.
+    """
     if item.type == "LIGHT":
         return _checked(LitItem(item, [LampEmission(item.data)]))
     places, hidden = [], []
     for slot in item.material_slots:
         if (material := slot.material) is not None and has_nodes(material):
-            its_places, its_hidden = tree_emission(material)
+            if material.name_full not in trees:
+                trees[material.name_full] = tree_emission(material)
+            its_places, its_hidden = trees[material.name_full]
             known = {place.owner for place in places}
             places += its_places if material not in known else []
             hidden += its_hidden

@@ -1,0 +1,155 @@
+"""The add-on's parts that need no Blender: arithmetic, names, frames, messages."""
+
+import socket
+import struct
+import threading
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from live_server import RunningServer
+
+from lightpaint.blender_addon.lamps.group_names import group_bytes, group_name, stem
+from lightpaint.blender_addon.lamps.lamp_units import are_equal, scaled, scaled_colour
+from lightpaint.blender_addon.painter import socket_client
+from lightpaint.blender_addon.painter.painter_messages import (
+    PROTOCOL_VERSION,
+    PainterState,
+    from_bytes,
+    to_bytes,
+)
+from lightpaint.blender_addon.painter.program import find_program
+from lightpaint.blender_addon.shot.shot_files import ShotFolder
+from lightpaint.paint.message_frames import from_frame, to_frame
+from lightpaint.paint.protocol import VERSION
+
+FACTORS = st.tuples(*[st.floats(0.001, 1000)] * 3)
+
+
+@given(FACTORS)
+def test_level_times_colour_takes_the_whole_factor(factor: tuple[float, ...]) -> None:
+    level, *colour = scaled([80.0, 1.0, 0.5, 0.25], factor)
+    wanted = [80.0 * c * f for c, f in zip((1.0, 0.5, 0.25), factor, strict=True)]
+    assert [level * c for c in colour] == pytest.approx(wanted)
+    assert level == pytest.approx(80.0 * sum(factor) / 3)
+
+
+def test_a_light_that_goes_out_keeps_its_colour() -> None:
+    assert scaled([80.0, 1.0, 0.5, 0.25], (0.0, 0.0, 0.0)) == [0.0, 1.0, 0.5, 0.25]
+    assert scaled([80.0, 1.0, 0.5, 0.25], (float("nan"), 1.0, 1.0))[0] == 0.0
+    assert scaled_colour([1.0, 1.0, 0.5, 0.25], (2.0, -1.0, 1.0)) == [1.0, 2.0, 0.0, 0.25]
+
+
+def test_a_change_of_brightness_alone_leaves_the_colour() -> None:
+    assert scaled([80.0, 1.0, 0.5, 0.25], (2.0, 2.0, 2.0)) == [160.0, 1.0, 0.5, 0.25]
+
+
+def test_levels_are_compared_as_float32() -> None:
+    rounded = struct.unpack("<f", struct.pack("<f", 0.1))[0]
+    assert are_equal([0.1, 1.0], [rounded, 1.0])
+    assert not are_equal([0.1, 1.0], [0.1001, 1.0])
+
+
+@given(st.lists(st.text(max_size=80), max_size=12), st.integers(8, 40))
+def test_names_of_groups_are_short_plain_and_apart(names: list[str], limit: int) -> None:
+    taken: list[str] = []
+    for name in names:
+        taken.append(group_name(name, taken, limit))
+    assert len({name.casefold() for name in taken}) == len(taken)
+    assert all(0 < len(name.encode()) <= limit for name in taken)
+    assert not [name for name in taken if set(name) & set('.\n"\\\0')]
+
+
+def test_channels_of_long_view_layers_leave_less_for_names() -> None:
+    assert group_bytes("ViewLayer") == 40
+    assert group_bytes("v" * 40) == 11
+    assert group_bytes("v" * 60) == 0
+    assert [stem(x) for x in ("Spot.001", "Spot", "a.b", ".001")] == ["Spot", "Spot", "a.b", ".001"]
+
+
+def test_frames_are_those_of_the_painter() -> None:
+    assert PROTOCOL_VERSION == VERSION
+    weights = struct.pack("<6d", *range(6))
+    described = [{"name": "weights", "dtype": "float64", "shape": [2, 3]}]
+    content = {"kind": "answer", "text": "Δ", "buffers": described}
+    frame = to_frame(content, [weights])
+    assert to_bytes(content, [weights]) == frame
+    found, buffers = from_bytes(frame)
+    assert found == from_frame(frame)[0]
+    assert buffers["weights"] == tuple(range(6))
+
+
+def test_fixed_lights_are_not_dimmed_by_the_master() -> None:
+    lights = [{"name": "a", "is_fixed": False}, {"name": "rest", "is_fixed": True}]
+    state = PainterState()
+    content: dict[str, Any] = {"kind": "state", "lights": lights, "looks": [], "master": 0.5}
+    assert state.receive(content, {"weights": (2.0, 2.0, 2.0, 1.0, 1.0, 1.0)})
+    assert state.factors == {"a": (1.0, 1.0, 1.0), "rest": (1.0, 1.0, 1.0)}
+    assert state.receive({"kind": "answer", "exact": False}, {"weights": (4.0,) * 6})
+    assert state.factors["a"] == (2.0, 2.0, 2.0)
+    assert not state.receive({"kind": "notice", "text": "soon"}, {})
+
+
+@pytest.mark.parametrize("size", [0, 125, 126, 65535, 65536])
+def test_a_socket_sends_and_receives_messages_of_any_size(size: int) -> None:
+    here, there = socket.socketpair()
+    client, data = socket_client.SocketClient(here, b""), bytes(range(256)) * (size // 256 + 1)
+    sender = threading.Thread(target=client.send, args=[data[:size]])
+    sender.start()
+    head = there.recv(2, socket.MSG_WAITALL)
+    length = head[1] & 0x7F
+    if length > 125:
+        width = 2 if length == 126 else 8
+        length = int.from_bytes(there.recv(width, socket.MSG_WAITALL), "big")
+    mask = there.recv(4, socket.MSG_WAITALL)
+    masked = there.recv(length, socket.MSG_WAITALL) if length else b""
+    assert bytes(b ^ mask[i % 4] for i, b in enumerate(masked)) == data[:size]
+    sender.join()
+    # A message in two frames, and a ping between them.
+    for frame in (b"\x02\x02ab", b"\x89\x00", b"\x80\x01c"):
+        there.sendall(frame)
+    assert client.receive() == b"abc"
+    there.close()
+    assert client.receive() is None
+    client.close()
+
+
+def test_a_painter_takes_the_connection_and_refuses_others() -> None:
+    serving = RunningServer()
+    try:
+        found = serving.server.connection
+        client = socket_client.SocketClient.open(found["address"], found["token"])
+        client.send(to_bytes({"kind": "observe", "seq": 1, "version": PROTOCOL_VERSION}))
+        assert from_bytes(client.receive())[0]["reply"] == 1
+        client.close()
+        with pytest.raises(ConnectionError, match="refused"):
+            socket_client.SocketClient.open(found["address"], "another")
+    finally:
+        serving.end()
+
+
+def test_a_shot_is_known_by_a_whole_render_only(tmp_path: Path) -> None:
+    folder = ShotFolder(tmp_path / "shot")
+    folder.check_writable()
+    assert folder.rendered_digest() == ""
+    folder.part.write_bytes(b"exr")
+    folder.finish_render("digest", ["Key"])
+    assert folder.rendered_digest() == "digest"
+    folder.render.write_bytes(b"ex")
+    assert folder.rendered_digest() == ""
+    folder.write_looks([("Evening", {"Key": (1.0, 2.0, 3.0)})])
+    assert folder.read_looks() == [("Evening", {"Key": (1.0, 2.0, 3.0)})]
+    folder.looks.write_text("[1]")
+    assert folder.read_looks() == []
+
+
+def test_a_program_that_is_missing_is_told_with_what_to_do(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(FileNotFoundError, match="pip install"):
+        find_program()
+    with pytest.raises(FileNotFoundError, match="correct it in the preferences"):
+        find_program("/nowhere/lightpaint")
