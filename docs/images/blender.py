@@ -15,7 +15,7 @@ from pathlib import Path
 from PIL import Image
 
 HERE = Path(__file__).parent
-TESTS = HERE.parent.parent / "tests" / "blender_addon"
+TESTS = HERE.parent.parent / "tests"
 sys.path.insert(0, str(TESTS))
 
 from blender_window import run_in_window  # noqa: E402
@@ -38,7 +38,9 @@ def main() -> None:
             "BROWSER": "true",
             "HOME": name,
         }
-        output = run_in_window(TESTS / "window.py", folder, folder, variables=variables)
+        output = run_in_window(
+            TESTS / "blender_addon" / "window.py", folder, folder, variables=variables
+        )
         found = json.loads((folder / "found.json").read_text())
         assert "error" not in found, found.get("error", "") + output
         for picture in sorted(folder.glob("*.png")):
