@@ -45,7 +45,7 @@ from lightpaint.report.measures import (
     relative_residual,
 )
 from lightpaint.report.page.diagnosis_section import maps_limit
-from lightpaint.report.rig.hung_lights import HungLights
+from lightpaint.report.rig.hung_lights import HungLights, placement_numbers
 from lightpaint.report.uncertainty_sentences import UNTOLD_HERE
 from lightpaint.target.target import Target
 from lightpaint.version import __version__
@@ -92,7 +92,7 @@ def report_numbers(
         "verification": None if verification is None else verification_numbers(verification),
         "suggestions": _suggestion_list(suggestions, solution.lighting.cd_per_unit),
         "turn": None if turn is None else _turn(turn),
-        "placement": None if hung is None else _placement(hung),
+        "placement": None if hung is None else placement_numbers(hung),
     }
     return json.dumps(finite(numbers), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
@@ -285,17 +285,6 @@ def verification_numbers(v: Verification) -> dict[str, Any]:
 
 def _turn(turn: MoveSuggestion) -> dict[str, Any]:
     return {name: getattr(turn, name) for name in ("name", "turn", "gain_share", "aim")}
-
-
-def _placement(hung: HungLights) -> dict[str, Any]:
-    return {
-        "missed_before": hung.missed_before,
-        "missed_after": hung.missed_after,
-        "looks": list(hung.looks),
-        "changes": [
-            {"name": change.name, "text": change.text, **change.numbers} for change in hung.changes
-        ],
-    }
 
 
 def _suggestion_list(

@@ -11,6 +11,7 @@ from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import NothingToUndoError, PaintError
+from lightpaint.paint import protocol
 from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.layers.layer_stack import LayerStack
 from lightpaint.paint.layers.selection import put_selection
@@ -36,6 +37,17 @@ MAX_REPEATED_STEPS = 32
 
 #: Bytes of pixels that are kept while a file is checked for damage, so that they are read once.
 MAX_KEPT_BYTES = 2**28
+
+#: Requests to go to another state, earlier, later or new.
+Travel = (
+    protocol.Undo
+    | protocol.Redo
+    | protocol.GoToStep
+    | protocol.ClearPainting
+    | protocol.StartOver
+    | protocol.ApplyPreset
+    | protocol.LookLike
+)
 
 #: Views, and the region of each that changed.
 Changes = Sequence[tuple[int, Region]]

@@ -27,7 +27,7 @@ from lightpaint.paint.layers.layered_paintings import LayeredPaintings
 from lightpaint.paint.protocol import AnswerUpdate, Message
 from lightpaint.paint.session.answer_messages import Judgement, answer_findings
 from lightpaint.paint.session.edit_messages import canvas_patches, edit_state, unpainted_headline
-from lightpaint.paint.session.history import Changes
+from lightpaint.paint.session.history import Changes, Travel
 from lightpaint.paint.session.moved_lights import NoPlaneSource, Placed, PlaneSource
 from lightpaint.paint.session.request_changes import (
     RequestChange,
@@ -35,7 +35,7 @@ from lightpaint.paint.session.request_changes import (
     move_lights,
     previewed_requests,
 )
-from lightpaint.paint.session.session_edits import SessionEdits, Travel
+from lightpaint.paint.session.session_edits import SessionEdits
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.database import DamagedError

@@ -18,7 +18,7 @@ from lightpaint.paint.layers.layered_paintings import LayeredPaintings
 from lightpaint.paint.layers.selection import selection_patch
 from lightpaint.paint.references.likeness_layers import open_request
 from lightpaint.paint.references.reference_table import ReferenceTable
-from lightpaint.paint.session.history import Changes, History, restore
+from lightpaint.paint.session.history import Changes, History, Travel, restore
 from lightpaint.paint.session.live_answer import LiveAnswer, weights_by_name
 from lightpaint.paint.session.moved_lights import MovedLights, Placed, PlaneSource
 from lightpaint.paint.store.canvas_pixels import Pixels
@@ -27,17 +27,6 @@ from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.store.stored_compositions import StoredComposition
 from lightpaint.pipeline.job.settings import Settings
-
-#: Requests to go to another state, earlier, later or new.
-Travel = (
-    protocol.Undo
-    | protocol.Redo
-    | protocol.GoToStep
-    | protocol.ClearPainting
-    | protocol.StartOver
-    | protocol.ApplyPreset
-    | protocol.LookLike
-)
 
 
 class SessionEdits:

@@ -110,3 +110,15 @@ def spoken_fraction(share: float) -> str:
     if abs(near - share) <= FRACTION_TOLERANCE * max(near, 0.25) / 0.25:
         return FRACTIONS[near]
     return spoken_percent(share)
+
+
+def placement_numbers(hung: HungLights) -> dict[str, Any]:
+    """Return what a search of places came to, for report.json."""
+    return {
+        "missed_before": hung.missed_before,
+        "missed_after": hung.missed_after,
+        "looks": list(hung.looks),
+        "changes": [
+            {"name": change.name, "text": change.text, **change.numbers} for change in hung.changes
+        ],
+    }
