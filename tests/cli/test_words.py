@@ -59,8 +59,13 @@ def _docstrings(file: Path) -> set[str]:
     return {text for text in docstrings if text}
 
 
+#: The command line, and Blender's add-on, which is no part of the library and calls the program.
+SPEAKS_OPTIONS = {"cli", "blender_addon"}
+
 LIBRARY = [
-    file for file in sorted(PACKAGE.rglob("*.py")) if "cli" not in file.relative_to(PACKAGE).parts
+    file
+    for file in sorted(PACKAGE.rglob("*.py"))
+    if not SPEAKS_OPTIONS & set(file.relative_to(PACKAGE).parts)
 ]
 
 
