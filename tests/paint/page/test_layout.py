@@ -429,3 +429,24 @@ def test_two_fingers_zoom_by_as_much_as_they_spread(painter: Painter) -> None:
         }"""
     )
     assert zoom == pytest.approx(2, rel=0.02)
+
+
+def test_what_a_press_moves_below_the_pointer_shows_no_tip(painter: Painter) -> None:
+    painter.button("Save look").hover()
+    painter.page.evaluate(
+        """() => {
+          const cover = document.createElement('div')
+          cover.dataset.tip = 'moved here'
+          cover.style = 'position: fixed; inset: 0; z-index: 99'
+          const add = () => document.querySelector('.lightpaint').append(cover)
+          addEventListener('pointerup', add, { once: true })
+        }"""
+    )
+    painter.page.mouse.down()
+    painter.page.mouse.up()
+    painter.page.wait_for_timeout(900)
+    assert painter.page.locator(".tip").count() == 0
+    painter.page.mouse.move(300, 300)
+    painter.page.evaluate("() => document.querySelector('[data-tip=\"moved here\"]').remove()")
+    painter.button("Save look").hover()
+    painter.page.locator(".tip").wait_for()

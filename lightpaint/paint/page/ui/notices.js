@@ -137,15 +137,19 @@ export function Tips({ root }) {
     const element = root();
     if (!element) return undefined;
     let timer = 0;
+    let pressedAt = ''; // where the pointer was pressed last
     const controller = new AbortController();
-    const hide = () => {
+    const hide = (/** @type {Event} */ event) => {
       clearTimeout(timer);
       setTip(null);
+      if (event.type === 'pointerdown') pressedAt = placeOf(event);
     };
     const show = (/** @type {Event} */ event) => {
       const target = /** @type {HTMLElement} */ (event.composedPath()[0]);
       const owner = /** @type {HTMLElement | null} */ (target.closest?.('[data-tip], [data-keys]'));
-      hide();
+      hide(event);
+      // What a press moves below a pointer that rests asks for no tip, which would lie over more.
+      if (event.type === 'pointerover' && placeOf(event) === pressedAt) return;
       if (!owner || (event.type === 'focusin' && !owner.matches(':focus-visible'))) return;
       timer = window.setTimeout(() => setTip(placeTip(owner, element)), TIP_DELAY_MS);
     };
@@ -165,6 +169,9 @@ export function Tips({ root }) {
     style=${{ left: `${tip.x}px`, top: `${tip.y}px` }}><span>${tip.text}</span>
     ${tip.keys && html`<kbd>${keysText(tip.keys)}</kbd>`}</div>`;
 }
+
+/** @param {any} event of a pointer */
+const placeOf = ({ clientX, clientY }) => `${clientX} ${clientY}`;
 
 /** @param {HTMLElement} owner @param {HTMLElement} root */
 function placeTip(owner, root) {
