@@ -9,6 +9,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from blender import in_blender
 from command import run, run_refused
 
 import lightpaint
@@ -71,3 +72,13 @@ def test_the_command_replaces_its_own_archives_only(tmp_path: Path) -> None:
     assert "--force" in run_refused(tmp_path, "blender", "-o", "mine.zip")
     assert (tmp_path / "mine.zip").read_bytes() == b"mine"
     assert run(tmp_path, "blender", "-o", "mine.zip", "--force").returncode == 0
+
+
+@pytest.mark.long
+def test_blender_installs_the_archive(
+    blender: list[str], tmp_path: Path, variables: dict[str, str]
+) -> None:
+    archive = tmp_path / "lightpaint-blender.zip"
+    archive.write_bytes(packed_addon())
+    script = Path(__file__).parent / "install.py"
+    in_blender(blender, script, archive, variables=variables)

@@ -88,7 +88,10 @@ class LIGHTPAINT_OT_render(ShotOperator):
         return self.execute(context)
 
     def run(self, context):
-        if not begin_shot(context, then_paint=False, again=self.again):
+        # Who paints goes on with the new picture.
+        session = controller.session
+        is_painting = session is not None and session.is_connected
+        if not begin_shot(context, then_paint=is_painting, again=self.again):
             return "the shot is rendered already (Shift: render it again)"
         return ""
 
