@@ -432,7 +432,7 @@ def test_two_fingers_zoom_by_as_much_as_they_spread(painter: Painter) -> None:
 
 
 def test_what_a_press_moves_below_the_pointer_shows_no_tip(painter: Painter) -> None:
-    painter.button("Save look").hover()
+    painter.button("Fit").hover()
     painter.page.evaluate(
         """() => {
           const cover = document.createElement('div')
