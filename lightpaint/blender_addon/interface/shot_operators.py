@@ -15,6 +15,8 @@ def prepare_shot(context):
     scene, view_layer = context.scene, context.view_layer
     if scene.library is not None:
         raise ValueError(f"the scene {scene.name} is linked from another file: open it there")
+    if not hasattr(scene, "cycles"):
+        raise ValueError("Cycles is switched off: enable it in Preferences > Add-ons")
     grouping = prepare(scene, view_layer, scene.lightpaint_settings.grouping)
     controller.left = grouping.left
     if not grouping.members:
