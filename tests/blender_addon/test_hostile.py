@@ -42,3 +42,12 @@ def test_hostile_shots_are_told_apart_and_put_back(
     assert found["many reverted"] == []
     messages = [value for value in found.values() if isinstance(value, str)]
     assert not [text for text in messages if "\n" in text or "Traceback" in text]
+
+
+@pytest.mark.long
+def test_a_painter_is_started_as_its_error_asks_for(
+    blender: list[str], tmp_path: Path, variables: dict[str, str]
+) -> None:
+    in_blender(blender, HERE / "other_starts.py", tmp_path, variables=variables)
+    # The session of the first size is kept under another name.
+    assert json.loads((tmp_path / "found.json").read_text()) == ["session-1.db", "session.db"]

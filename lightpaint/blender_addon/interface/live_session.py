@@ -47,7 +47,8 @@ class LiveSession:
         self.state, self.message, self.is_over = PainterState(), "the painter starts …", False
         self._run: ProgramRun | None = None
         self._link: PainterLink | None = None
-        self._commands, self._first_command, self._looks_known = {}, None, None
+        self._program, self._view, self._fallback, self._environment = "", [], None, {}
+        self._looks_known = None
         self._places: list[tuple[str, str, str, str]] | None = None
 
     def start(self, program, view, environment, fallback):
@@ -56,15 +57,12 @@ class LiveSession:
         view: options of its view transform, with variables of its environment; fallback: options
         to try if lightpaint is there without what these need. Raises OSError.
         """
-        shot, session = self.folder.render, self.folder.session
-        command = (program, paint_arguments(shot, session, view), environment)
-        self._commands = {NEW_SESSION: (program, [*command[1], "--new"], environment)}
-        if fallback:
-            self._commands[OTHER_VIEW] = (program, paint_arguments(shot, session, fallback), {})
-        if found := running_painter(session):
-            self._link, self._first_command = PainterLink(*found), command
+        self._program, self._view, self._environment = program, view, environment
+        self._fallback = fallback
+        if found := running_painter(self.folder.session):
+            self._link = PainterLink(*found)
         else:
-            self._run = ProgramRun(*command)
+            self._start_program()
 
     @property
     def is_connected(self):
@@ -148,11 +146,19 @@ class LiveSession:
 
     def _start_otherwise(self, error):
         """Start the painter in the way that its error asks for. Return whether there is one."""
-        reason = next((x for x in self._commands if x in error.lower()), None)
-        if reason is None:
+        if OTHER_VIEW in error.lower() and self._fallback:
+            self._view, self._environment, self._fallback = self._fallback, {}, None
+        elif NEW_SESSION in error and NEW_SESSION not in self._view:
+            self._view = [*self._view, NEW_SESSION]
+            self._fallback = self._fallback and [*self._fallback, NEW_SESSION]
+        else:
             return False
-        self._run = ProgramRun(*self._commands.pop(reason))
+        self._start_program()
         return True
+
+    def _start_program(self):
+        arguments = paint_arguments(self.folder.render, self.folder.session, self._view)
+        self._link, self._run = None, ProgramRun(self._program, arguments, self._environment)
 
     def _after_end(self):
         """Tell why the connection is over, or start a painter if an earlier one has gone."""
@@ -161,9 +167,8 @@ class LiveSession:
             return
         if link.is_connected:
             self._end(self.state.closing or ENDED_TEXT)
-        elif self._first_command is not None:
-            self._link, self._run = None, ProgramRun(*self._first_command)
-            self._first_command = None
+        elif self._run is None:  # an earlier painter, which was killed
+            self._start_program()
         else:
             self.end()
             self.message = f"the painter does not answer ({link.error}): press Paint again"
