@@ -1,7 +1,9 @@
 """Starts a window of Blender in a display of its own, with OpenGL in software."""
 
+import contextlib
 import os
 import shutil
+import signal
 import subprocess
 from pathlib import Path
 
@@ -29,12 +31,18 @@ def run_in_window(script: Path, *arguments: object, variables: dict[str, str]) -
     command = [*SCREEN, "blender", *OPTIONS, "--python-expr", splash, "--python", str(script)]
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
     environment |= {**variables, "LIBGL_ALWAYS_SOFTWARE": "1"}
-    completed = subprocess.run(
+    # All in one group of processes, so that nothing is left if a window never ends.
+    window = subprocess.Popen(
         [*command, "--", *map(str, arguments)],
-        capture_output=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
         text=True,
         env=environment,
-        timeout=WINDOW_S,
-        check=False,
+        start_new_session=True,
     )
-    return completed.stdout + completed.stderr
+    try:
+        output, _ = window.communicate(timeout=WINDOW_S)
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(window.pid, signal.SIGKILL)
+    return output
