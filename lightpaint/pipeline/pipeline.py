@@ -56,7 +56,7 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
         >>> from pathlib import Path
         >>> job = lp.Job((), (lp.Painting("painting.exr"),), Path("evening"), basis)
         >>> [look] = lp.run(job)
-        >>> np.round(look.lighting.emission["panel"], 3).tolist()
+        >>> np.round(look.lighting.emission["panel"], 2).tolist()
         [2.0, 1.5, 1.0]
     """
     listen = listener(progress)

@@ -28,6 +28,10 @@ from lightpaint.lighting.loss.pixel_bins import bin_pixels
 from lightpaint.lighting.problem import Problem
 
 PACKAGE = Path(lightpaint.__file__).parent
+
+#: The add-on's code runs within Blender, whose lists of pictures are called `images`.
+BLENDER = "blender_addon"
+
 N, SIZE = 3, (7, 5)
 
 
@@ -40,7 +44,7 @@ def test_nobody_outside_the_room_indexes_planes() -> None:
     violations = [
         f"{path.relative_to(PACKAGE)}:{node.lineno}"
         for path in PACKAGE.rglob("*.py")
-        if path.relative_to(PACKAGE).parts[0] != "basis"
+        if path.relative_to(PACKAGE).parts[0] not in ("basis", BLENDER)
         for node in ast.walk(ast.parse(path.read_text("utf-8")))
         if isinstance(node, ast.Attribute) and node.attr in ("images", "half_differences")
     ]

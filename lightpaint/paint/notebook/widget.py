@@ -93,7 +93,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         >>> told = []
         >>> painter.observe(lambda change: told.append(change.new), "lighting")
         >>> painter.constraints = lp.Constraints.of({"panel": {"lock": True}})
-        >>> np.round(painter.solution.lighting.emission["panel"], 3).tolist()
+        >>> np.round(painter.solution.lighting.emission["panel"], 2).tolist()
         [4.0, 3.0, 2.0]
         >>> painter.close()
     """
