@@ -36,6 +36,7 @@ def main() -> None:
             "ADDON_FOLDER": str(folder / "addon"),
             "PATH": f"{program.parent}:/usr/bin:/bin",
             "BROWSER": "true",
+            "SHOT_SCRIPT": str(HERE / "blender_still_life.py"),
             "HOME": name,
         }
         output = run_in_window(

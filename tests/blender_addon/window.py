@@ -1,10 +1,12 @@
 """The whole way in a window of Blender, by clicks and keys; it keeps pictures if asked to.
 
-Blender runs this with `--enable-event-simulate`, in a window of 1280 x 800.
+Blender runs this with `--enable-event-simulate`, in a window of 1280 x 800. The environment's
+SHOT_SCRIPT may name a file whose `new_shot` builds another scene.
 """
 
 import json
 import os
+import runpy
 import sys
 import traceback
 from collections.abc import Callable, Iterator
@@ -20,12 +22,20 @@ from scripted_painter import (
     has_answer,
     lightpaint_blender,
 )
-from shots import SIZE, new_shot
+from shots import new_shot
 
 folder, pictures = sys.argv[-2], sys.argv[-1]
 
+#: Builds the scene.
+build_shot = new_shot
+if script := os.environ.get("SHOT_SCRIPT"):
+    build_shot = runpy.run_path(script)["new_shot"]
+
 #: Places in the window, from its upper left corner: the add-on's tab, its buttons.
 TAB, PAINT, APPLY = (1044, 254), (931, 130), (896, 187)
+
+#: Seconds in which Cycles draws the viewport, where pictures are wanted.
+SECONDS_OF_VIEWPORT = 45.0
 
 #: Twentieths of a second that anything takes on a busy machine.
 PATIENCE = 2000
@@ -81,7 +91,6 @@ def show_camera() -> None:
     space.region_3d.view_perspective = "CAMERA"
     space.overlay.show_overlays = False
     if pictures != "-":
-        bpy.context.scene.cycles.preview_samples = 4
         space.shading.type = "RENDERED"
 
 
@@ -96,6 +105,8 @@ def walk(found: dict[str, Any]) -> Iterator[float]:
     yield 0.5
     before, rendered = contents(), energies()
     show_camera()
+    if pictures != "-":
+        yield SECONDS_OF_VIEWPORT
     press("N", (500, 400))
     yield 0.5
     yield from click(TAB)
@@ -108,14 +119,15 @@ def walk(found: dict[str, Any]) -> Iterator[float]:
     painter = ScriptedPainter()
     yield 0.5
     keep_picture("painter")
-    painter.brighten(*SIZE, gain=4.0)
+    render = bpy.context.scene.render
+    painter.brighten(render.resolution_x, render.resolution_y, gain=4.0)
     yield from until(has_answer, "an answer")
     yield from until(lambda: energies() != rendered, "lamps that follow")
     painter.ask("save_look", name="Evening")
     yield from until(lambda: controller.session.state.looks, "a look")
     if pictures != "-":
-        yield from until(lambda: "half way" in controller.session.message, "a sentence")
-        yield 6.0
+        yield from until(lambda: controller.session.message, "a sentence")
+        yield SECONDS_OF_VIEWPORT
     keep_picture("following")
     show_solid()
     painted = energies()
@@ -144,7 +156,7 @@ def main() -> None:
     """Prepare the file, then walk while Blender's own loop runs."""
     lightpaint_blender.register()
     with bpy.context.temp_override(window=window()):
-        scene = new_shot()
+        scene = build_shot()
     bpy.ops.wm.save_as_mainfile(filepath=os.path.join(folder, "shot.blend"))
     found: dict[str, Any] = {"view": scene.view_settings.view_transform}
     steps = walk(found)

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The panel, in the sidebar of the 3D view and in the render properties."""
 
-import textwrap
-
+import blf
 import bpy
 
 from .controller import controller, shot_folder
@@ -11,8 +10,11 @@ from .level_operators import known_looks
 #: Reasons that are listed at most; the rest is counted.
 MAX_REASONS = 8
 
-#: Pixels of one character, about, at Blender's usual size.
-CHARACTER_PIXELS = 6.5
+#: Pixels beside a sentence: borders, tabs and an icon, at Blender's usual size.
+BESIDE_PIXELS = 84
+
+#: Width of a panel in pixels where there is none to ask.
+USUAL_PIXELS = 300
 
 
 class LightpaintPanel:
@@ -96,12 +98,35 @@ class ShotPanel:
 
 def draw_text(layout, context, text, icon="NONE"):
     """Draw a sentence on as many lines as it needs."""
-    width = context.region.width if context.region else 300
-    scale = context.preferences.system.ui_scale * CHARACTER_PIXELS
-    lines = textwrap.wrap(text, max(16, int((width - 50) / scale))) or [""]
+    scale = context.preferences.system.ui_scale
+    width = context.region.width if context.region else USUAL_PIXELS * scale
+    lines = wrap(text, width - BESIDE_PIXELS * scale, context)
     column = layout.column(align=True)
     for number, line in enumerate(lines):
         column.label(text=line, icon=icon if number == 0 else "BLANK1", translate=False)
+
+
+def wrap(text, width, context):
+    """Return a text as lines of at most so many pixels; longer words, like paths, are cut."""
+    points = context.preferences.ui_styles[0].widget.points
+    blf.size(0, points * context.preferences.system.ui_scale)
+
+    def fits(line):
+        return len(line) == 1 or blf.dimensions(0, line)[0] <= width
+
+    lines = [""]
+    for word in text.split():
+        longer = f"{lines[-1]} {word}".strip()
+        if fits(longer):
+            lines[-1] = longer
+            continue
+        lines += [word] if lines[-1] else []
+        rest = word
+        while not fits(rest):
+            length = next(k for k in range(len(rest) - 1, 0, -1) if fits(rest[:k]))
+            lines[-1:] = [rest[:length], rest := rest[length:]]
+        lines[-1] = rest
+    return lines
 
 
 class LIGHTPAINT_PT_view(LightpaintPanel, bpy.types.Panel):
