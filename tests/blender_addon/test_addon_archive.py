@@ -46,7 +46,7 @@ def test_the_addon_is_under_its_licence_and_needs_no_library(path: Path) -> None
     text = path.read_text("utf-8")
     assert text.startswith("# SPDX-License-Identifier: GPL-3.0-or-later\n")
     tree = ast.parse(text, feature_version=(3, 10))  # the Python of Blender 3.4
-    known = {"bpy", "bpy_extras", *sys.stdlib_module_names}
+    known = {"bpy", "bpy_extras", "blf", *sys.stdlib_module_names}
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             assert {name.name.partition(".")[0] for name in node.names} <= known
