@@ -13,7 +13,8 @@ import re
 from functools import cache
 from importlib import resources
 
-from lightpaint.viewer.compaction import compact_styles, unindented
+import rcssmin
+import rjsmin
 
 _IMPORT = re.compile(
     r"^import\s+(?:(?P<names>[^;'\"]+?)\s+from\s+)?(?P<q>['\"])(?P<path>[^'\"]+)(?P=q);?[ \t]*$",
@@ -56,8 +57,24 @@ def _code(path: str) -> str:
 
 @cache
 def styles(*paths: str) -> str:
-    """Return style sheets joined, without their comments and spaces between rules."""
-    return "\n".join(compact_styles(source(path)) for path in paths)
+    """Return style sheets joined, without comments and space that has no meaning."""
+    return "\n".join(rcssmin.cssmin(source(path)) for path in paths)
+
+
+def compact_script(text: str) -> str:
+    """Return a script without comments and space that has no meaning; licences, `/*!`, stay.
+
+    Names stay, too, so that errors of a page name the source.
+    """
+    return str(rjsmin.jsmin(text, keep_bang_comments=True))
+
+
+def unindented(text: str) -> str:
+    """Return code without indentation and empty lines, which would be a tenth of a report.
+
+    Neither has a meaning, not even in the templates of these scripts.
+    """
+    return "\n".join(line.strip() for line in text.splitlines() if line.strip())
 
 
 @cache

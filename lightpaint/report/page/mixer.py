@@ -35,8 +35,7 @@ from lightpaint.report.basis_memo import cached_clean_planes, make_once, page_re
 from lightpaint.report.page.figures import CLEAN_REDUCTION, data_uri
 from lightpaint.report.page.lights_table import most_visible_lights
 from lightpaint.threads import parallel_map
-from lightpaint.viewer.bundle import bundled, source, styles
-from lightpaint.viewer.compaction import compact_script
+from lightpaint.viewer.bundle import bundled, compact_script, source, styles
 
 #: Colour temperatures of the sliders, in kelvin, evenly in mireds; and the distance from Planck's
 #: locus up to which a colour is one.

@@ -13,6 +13,8 @@ from importlib import resources
 from pathlib import Path
 from string import Template
 
+import rcssmin
+
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
@@ -49,8 +51,7 @@ from lightpaint.report.rig.hung_lights import HungLights
 from lightpaint.report.verdict import spoken_samples, verdict
 from lightpaint.report.visible_emitters import emitter_remarks
 from lightpaint.target.target import Target
-from lightpaint.viewer.bundle import styles
-from lightpaint.viewer.compaction import compact_script, compact_styles, unindented
+from lightpaint.viewer.bundle import compact_script, styles, unindented
 
 
 def report_page(
@@ -160,7 +161,7 @@ def _frame() -> str:
     text = unindented(template.read_text(encoding="utf-8"))
     head, style, body, script, end = re.split("</?(?:style|script)>", text)
     return (
-        f"{head}<style>{compact_styles(style)}{styles('viewer/mixer/wipe.css')}</style>{body}"
+        f"{head}<style>{rcssmin.cssmin(style)}{styles('viewer/mixer/wipe.css')}</style>{body}"
         f"<script>{compact_script(script)}</script>{end}"
     )
 
