@@ -1,9 +1,11 @@
 """Runs scripts in Blender."""
 
+import json
 import os
 import shutil
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -27,3 +29,11 @@ def in_blender(
     completed = subprocess.run(run, capture_output=True, text=True, env=environment, check=False)
     assert completed.returncode == 0, completed.stdout + completed.stderr
     return completed.stdout
+
+
+def found_in_blender(
+    blender: list[str], script: Path, folder: Path, variables: dict[str, str]
+) -> Any:
+    """What a script, which runs in Blender, has found and left in a folder as found.json."""
+    in_blender(blender, script, folder, variables=variables)
+    return json.loads((folder / "found.json").read_text())

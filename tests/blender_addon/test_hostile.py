@@ -1,10 +1,9 @@
 """Shots in which much is odd or missing: one sentence each, and reverting puts all back."""
 
-import json
 from pathlib import Path
 
 import pytest
-from blender import in_blender
+from blender import found_in_blender
 
 HERE = Path(__file__).parent
 
@@ -13,8 +12,7 @@ HERE = Path(__file__).parent
 def test_hostile_shots_are_told_apart_and_put_back(
     blender: list[str], tmp_path: Path, variables: dict[str, str]
 ) -> None:
-    in_blender(blender, HERE / "hostile.py", tmp_path, variables=variables)
-    found = json.loads((tmp_path / "found.json").read_text())
+    found = found_in_blender(blender, HERE / "hostile.py", tmp_path, variables)
     assert found["prepared"] == "15 light groups; 6 stay as they are"
     reasons = dict(line.split(": ", 1) for line in found["left"])
     assert reasons.keys() == {"Sphere", "dark", "driven", "keyed", "linked", "negative"}
@@ -48,6 +46,6 @@ def test_hostile_shots_are_told_apart_and_put_back(
 def test_a_painter_is_started_as_its_error_asks_for(
     blender: list[str], tmp_path: Path, variables: dict[str, str]
 ) -> None:
-    in_blender(blender, HERE / "other_starts.py", tmp_path, variables=variables)
+    sessions = found_in_blender(blender, HERE / "other_starts.py", tmp_path, variables)
     # The session of the first size is kept under another name.
-    assert json.loads((tmp_path / "found.json").read_text()) == ["session-1.db", "session.db"]
+    assert sessions == ["session-1.db", "session.db"]

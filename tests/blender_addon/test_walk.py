@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import OpenEXR
 import pytest
-from blender import in_blender
+from blender import found_in_blender, in_blender
 
 HERE = Path(__file__).parent
 
@@ -24,8 +24,7 @@ def walk_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_lamps_follow_a_painter_and_everything_comes_back(
     blender: list[str], walk_folder: Path, variables: dict[str, str]
 ) -> None:
-    in_blender(blender, HERE / "walk.py", walk_folder, variables=variables)
-    found = json.loads((walk_folder / "found.json").read_text())
+    found = found_in_blender(blender, HERE / "walk.py", walk_folder, variables)
     assert found["groups"] == ["Area", "Point", "Screen", "Sky", "Spot", "Sun", "Tube"]
     assert found["rendered once"]
     assert found["output is put back"]

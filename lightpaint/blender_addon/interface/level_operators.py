@@ -24,30 +24,30 @@ def apply_levels(scene, view_layer):
     remember(scene, {**recall(scene), PREVIEWS: False})
 
 
-class LIGHTPAINT_OT_apply(ShotOperator):
-    """Keep the lamps as the painter shows them: one step of undo"""
+class PreviewOperator(ShotOperator):
+    """An operator on the preview that the lamps show"""
 
-    bl_idname, bl_label = "lightpaint.apply", "Apply"
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context):
         return bool(recall(context.scene).get(PREVIEWS))
+
+
+class LIGHTPAINT_OT_apply(PreviewOperator):
+    """Keep the lamps as the painter shows them: one step of undo"""
+
+    bl_idname, bl_label = "lightpaint.apply", "Apply"
 
     def run(self, context):
         apply_levels(context.scene, context.view_layer)
         return "the lamps are as painted"
 
 
-class LIGHTPAINT_OT_discard(ShotOperator):
+class LIGHTPAINT_OT_discard(PreviewOperator):
     """Put the lamps back to what they were before this preview"""
 
     bl_idname, bl_label = "lightpaint.discard", "Discard"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context):
-        return bool(recall(context.scene).get(PREVIEWS))
 
     def run(self, context):
         discard_preview(context.scene)

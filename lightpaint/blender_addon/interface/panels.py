@@ -129,32 +129,39 @@ def wrap(text, width, context):
     return lines
 
 
-class LIGHTPAINT_PT_view(LightpaintPanel, bpy.types.Panel):
+class InView:
+    """The place of panels in the sidebar of the 3D view."""
+
     bl_space_type, bl_region_type, bl_category = "VIEW_3D", "UI", "lightpaint"
 
 
-class LIGHTPAINT_PT_view_image(ImagePanel, bpy.types.Panel):
-    bl_space_type, bl_region_type, bl_category = "VIEW_3D", "UI", "lightpaint"
-    bl_parent_id = "LIGHTPAINT_PT_view"
+class InRender:
+    """The place of panels in the render properties."""
 
-
-class LIGHTPAINT_PT_view_shot(ShotPanel, bpy.types.Panel):
-    bl_space_type, bl_region_type, bl_category = "VIEW_3D", "UI", "lightpaint"
-    bl_parent_id = "LIGHTPAINT_PT_view"
-
-
-class LIGHTPAINT_PT_render(LightpaintPanel, bpy.types.Panel):
     bl_space_type, bl_region_type, bl_context = "PROPERTIES", "WINDOW", "render"
+
+
+class LIGHTPAINT_PT_view(InView, LightpaintPanel, bpy.types.Panel):
+    pass
+
+
+class LIGHTPAINT_PT_view_image(InView, ImagePanel, bpy.types.Panel):
+    bl_parent_id = "LIGHTPAINT_PT_view"
+
+
+class LIGHTPAINT_PT_view_shot(InView, ShotPanel, bpy.types.Panel):
+    bl_parent_id = "LIGHTPAINT_PT_view"
+
+
+class LIGHTPAINT_PT_render(InRender, LightpaintPanel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
 
-class LIGHTPAINT_PT_render_image(ImagePanel, bpy.types.Panel):
-    bl_space_type, bl_region_type, bl_context = "PROPERTIES", "WINDOW", "render"
+class LIGHTPAINT_PT_render_image(InRender, ImagePanel, bpy.types.Panel):
     bl_parent_id = "LIGHTPAINT_PT_render"
 
 
-class LIGHTPAINT_PT_render_shot(ShotPanel, bpy.types.Panel):
-    bl_space_type, bl_region_type, bl_context = "PROPERTIES", "WINDOW", "render"
+class LIGHTPAINT_PT_render_shot(InRender, ShotPanel, bpy.types.Panel):
     bl_parent_id = "LIGHTPAINT_PT_render"
 
 
