@@ -187,6 +187,15 @@ def test_the_colour_panel(painter: Painter) -> None:
     painter.button("HSV", exact=True).click()
     painter.type("Saturation", "0")
     assert len({round(x, 9) for x in painter.ui("colour")}) == 1
+    wheel = painter.page.locator(".wheel").bounding_box()
+    middle = wheel["x"] + wheel["width"] / 2, wheel["y"] + wheel["height"] / 2
+    painter.page.mouse.move(*middle)
+    painter.page.mouse.down()
+    # A third of a turn clockwise from red, at the top, is green; further out than the rim is pure.
+    painter.page.mouse.move(middle[0] + 3**0.5 * wheel["width"], middle[1] + wheel["height"])
+    painter.page.mouse.up()
+    red, green, blue = painter.ui("colour")
+    assert (red, blue) == pytest.approx((0, 0), abs=1e-3 * green)
     painter.button("White", exact=True).click()
     painter.type("CCT", "6504")
     painter.type("Tint", "10")

@@ -213,6 +213,13 @@ def test_a_held_lamp_takes_any_colour_at_its_level(painter: Painter) -> None:
         assert last_locks(painter)["key"] @ LUMINANCE == pytest.approx(level)
     red, green, blue = last_locks(painter)["key"]
     assert (red, green) == pytest.approx((0, 0), abs=1e-6 * blue)
+    wheel = lamp.locator(".wheel").bounding_box()
+    painter.page.mouse.click(wheel["x"] + wheel["width"] / 2, wheel["y"] + wheel["height"] / 4)
+    # Half of the saturation of red, in encoded values: the other two channels are encoded 0.5.
+    red, green, blue = last_locks(painter)["key"]
+    assert green == pytest.approx(blue, rel=1e-3)
+    assert green / red == pytest.approx(0.2140, rel=0.03)  # of a pixel's rounding
+    assert last_locks(painter)["key"] @ LUMINANCE == pytest.approx(level)
     hex_field = lamp.get_by_role("textbox", name="Hex")
     hex_field.fill("#ff0000")
     hex_field.press("Enter")

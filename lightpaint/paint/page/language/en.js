@@ -135,6 +135,7 @@ export const en = {
   colourMixers: {
     white: 'White',
     hsv: 'HSV',
+    wheel: 'Hue around the wheel, saturation outwards',
     rgb: 'RGB',
     hex: 'Hex',
     tint: 'Tint',

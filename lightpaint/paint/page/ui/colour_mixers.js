@@ -1,4 +1,4 @@
-/** The controls of one colour: white, HSV, RGB and hex. */
+/** The controls of one colour: white, HSV with a wheel, RGB and hex. */
 
 import { html, useState } from '../vendor/preact.js';
 import {
@@ -11,6 +11,7 @@ import {
   toHsv,
   toKelvin,
 } from './paint_colour.js';
+import { ColourWheel } from './colour_wheel.js';
 import { Slider, useDraft } from './controls.js';
 import { KelvinSlider, gradient, clampKelvin } from './kelvin_slider.js';
 import { words } from '../language/language.js';
@@ -99,7 +100,17 @@ export function Hsv({ colour, set, hasValue = true }) {
       set(fromHsv(newHsv), isFinal);
     };
   const hues = Array.from({ length: 7 }, (_, i) => fromHsv([i * 60, 1, 1]));
-  return html`<${Slider} label=${words.colourMixers.hue} value=${hsv[0]} min=${0} max=${360} unit="°"
+  const setHue = (
+    /** @type {number} */ newHue,
+    /** @type {number} */ saturation,
+    /** @type {boolean} */ isFinal,
+  ) => {
+    const newHsv = /** @type {RGB} */ ([newHue, saturation, hsv[2]]);
+    setLastHsv(newHsv);
+    set(fromHsv(newHsv), isFinal);
+  };
+  return html`<${ColourWheel} hue=${hsv[0]} saturation=${hsv[1]} set=${setHue} />
+    <${Slider} label=${words.colourMixers.hue} value=${hsv[0]} min=${0} max=${360} unit="°"
       track=${gradient(hues)} change=${setChannel(0)} />
     <${Slider} label=${words.colourMixers.saturation} value=${100 * hsv[1]} min=${0} max=${100} unit="%"
       track=${gradient([fromHsv([hsv[0], 0, hsv[2]]), fromHsv([hsv[0], 1, hsv[2]])])}
