@@ -1,4 +1,4 @@
-"""What a file of light groups lacks is told with where its renderer is told to write it."""
+"""Remarks on missing groups and beauties name the renderer's setting that adds them."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What the page does while answers follow the hand: it draws what changes, once a frame."""
+"""The page while a light is dragged: each frame it draws once, and only what has changed."""
 
 from typing import Any
 
