@@ -98,3 +98,59 @@ def test_panels_follow_several_messages_of_a_frame_at_once(page: Any):
         }"""
     )
     assert counts == {"before": 0, "atOnce": 2, "seen": [{"a": 1, "b": 1}, {"a": 2, "b": 2}]}
+
+
+def test_a_change_that_can_wait_is_shown_with_the_next_or_soon(page: Any):
+    seen = page.evaluate(
+        """async () => {
+          const { Store } = await import('/ui/ui_store.js');
+          const store = new Store({ a: 0, b: 0 });
+          const seen = [], frame = () => new Promise((done) => requestAnimationFrame(done));
+          store.listen(() => seen.push({ ...store.value }));
+          store.setWithNext({ a: 1 });
+          await frame();
+          const waiting = seen.length;
+          store.setForFrame({ b: 1 });
+          await frame();
+          const withNext = seen.length;
+          store.setWithNext({ a: 2 });
+          await new Promise((done) => store.listen(done));
+          return { waiting, withNext, seen };
+        }"""
+    )
+    assert (seen["waiting"], seen["withNext"]) == (0, 1)
+    assert seen["seen"] == [{"a": 1, "b": 1}, {"a": 2, "b": 1}]
+
+
+LOADS = """async ({ isDropped }) => {
+  const { PictureLoader } = await import('/engine/picture_loader.js');
+  const { LightDrafts } = await import('/engine/light_drafts.js');
+  const fetched = [], used = [];
+  const host = { fetch: async (name) => (fetched.push(name), { data: new Uint16Array(3) }) };
+  const loader = new PictureLoader(host, (...fields) => used.push(fields.slice(0, 2)), () => {});
+  loader.setWanted([['plane 0', 'clean/0']]);
+  const drafts = new LightDrafts(loader);
+  const resources = { 'clean/0': 5, 'plane/0': 5 };
+  const arrays = { data: { data: new Uint16Array(3) } };
+  drafts.add({ light: 0, step: 1, resources, arrays }, [1, 1]);
+  if (isDropped) drafts.clear();
+  loader.addResources(resources);
+  const early = [...used];
+  drafts.show();
+  await new Promise((done) => setTimeout(done));
+  return { fetched, early, used };
+}"""
+
+
+def test_a_draft_is_shown_with_its_answer_and_not_fetched_as_well(page: Any):
+    assert page.evaluate(LOADS, {"isDropped": False}) == {
+        "fetched": [],
+        "early": [],
+        "used": [["plane 0", "clean/0"]],
+    }
+
+
+def test_a_draft_that_is_dropped_is_fetched(page: Any):
+    loads = page.evaluate(LOADS, {"isDropped": True})
+    assert loads["fetched"] == ["clean/0"]
+    assert loads["used"] == [["plane 0", "clean/0"]]

@@ -128,6 +128,21 @@ def test_lights_are_marked_dragged_and_taken_back(room: PaintedRoom) -> None:
     wait_until(lambda: room.mark("bulb") == pytest.approx(room.seen(bulb), abs=1))
 
 
+def test_a_mark_follows_the_pointer_before_the_answer_comes(room: PaintedRoom) -> None:
+    room.page.evaluate(f"() => {{ {PAINTER}.host.send = () => new Promise(() => {{}}); }}")
+    x, y = room.mark("bulb")
+    mouse = room.page.mouse
+    mouse.move(x, y)
+    mouse.down()
+    for dx in (20, 45):
+        mouse.move(x + dx, y)
+        assert room.mark("bulb") == pytest.approx((x + dx, y), abs=1)
+    # The rest of the page, which is drawn later, does not move it away.
+    room.page.wait_for_selector(".stage.is-dragging")
+    assert room.mark("bulb") == pytest.approx((x + 45, y), abs=1)
+    mouse.up()
+
+
 def test_a_spot_is_pointed_by_clicks_and_by_numbers(room: PaintedRoom, axe: str) -> None:
     row = room.page.locator('[data-light="beam"]')
     row.get_by_role("button", name="beam", exact=True).first.click()

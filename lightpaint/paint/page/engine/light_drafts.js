@@ -5,20 +5,36 @@ import { repeatPixels } from './message_frames.js';
 /** @typedef {import("./picture_loader.js").PictureLoader} PictureLoader */
 
 export class LightDrafts {
-  /** @type {Map<string, {resources: Record<string, number>, picture: Picture}>} */
+  /** Drafts by slot. @type {Map<string, {name: string, picture: Picture}>} */
   waiting = new Map();
 
-  /** @param {import("./messages.js").Events["dragged"]} draft
-   * @param {[height: number, width: number]} size of its view */
-  add({ light, step, resources, arrays }, size) {
-    const data = repeatPixels(arrays.data, step, size);
-    this.waiting.set(`plane ${light}`, { resources, picture: { ...arrays.data, data } });
+  /** @param {PictureLoader} loader */
+  constructor(loader) {
+    this.loader = loader;
   }
 
-  /** Show the drafts that wait. @param {PictureLoader} loader */
-  show(loader) {
-    for (const [slot, { resources, picture }] of this.waiting)
-      loader.take(slot, resources, picture);
+  /** Keep a draft until its answer. The message about all new pictures comes before that: nothing
+   * is fetched that is here.
+   * @param {import("./messages.js").Events["dragged"]} draft
+   * @param {[height: number, width: number]} size of its view */
+  add({ light, step, resources, arrays }, size) {
+    const slot = `plane ${light}`;
+    const name = this.loader.notePicture(slot, resources);
+    if (name === null) return;
+    const data = repeatPixels(arrays.data, step, size);
+    this.waiting.set(slot, { name, picture: { ...arrays.data, data } });
+  }
+
+  /** Show the drafts that wait. */
+  show() {
+    for (const [slot, { name, picture }] of this.waiting)
+      this.loader.use(slot, name, picture, true);
+    this.waiting.clear();
+  }
+
+  /** Drop the drafts that wait, since all pictures are listed anew. */
+  clear() {
+    this.loader.forget((slot) => this.waiting.has(slot));
     this.waiting.clear();
   }
 }

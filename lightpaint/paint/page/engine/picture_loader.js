@@ -45,15 +45,16 @@ export class PictureLoader {
     this.pump();
   }
 
-  /** Take the newest picture of a slot, which came unasked. @param {string} slot
-   * @param {Record<string, number>} resources its names @param {Picture} picture */
-  take(slot, resources, picture) {
-    this.resources = { ...this.resources, ...resources };
+  /** Note that the newest picture of a slot came unasked, so that it is not fetched. Returns its name,
+   * or null if another picture is wanted. @param {string} slot
+   * @param {Record<string, number>} resources its names @returns {string | null} */
+  notePicture(slot, resources) {
     const name = this.wantedNames.get(slot);
-    if (name === undefined || !(name in resources)) return this.pump();
-    this.loadedVersions.set(slot, this.versionOf(name));
-    this.use(slot, name, picture, true);
+    const isWanted = name !== undefined && name in resources;
+    this.resources = { ...this.resources, ...resources };
+    if (isWanted) this.loadedVersions.set(slot, this.versionOf(name));
     this.pump();
+    return isWanted ? name : null;
   }
 
   /** Replace the list of existing pictures. @param {Record<string, number>} resources */

@@ -47,7 +47,7 @@ export class SessionMirror extends PictureState {
     this.selections = null;
     /** Revision of the session in its last message. */
     this.version = -1;
-    this.drafts = new LightDrafts();
+    this.drafts = new LightDrafts(this.loader);
     /** Number of times that the session has sent the canvas. */
     this.patchCount = 0;
     /** Whether the canvas equals the session's. */
@@ -56,7 +56,7 @@ export class SessionMirror extends PictureState {
     this.hasLookPlanes = false;
     host.on('state', (message) => this.begin(message));
     host.on('answer', (message) => {
-      this.drafts.show(this.loader);
+      this.drafts.show();
       this.takeAnswer(message);
       if (!message.layers) return;
       this.layers.remember(message.layers);
@@ -80,7 +80,7 @@ export class SessionMirror extends PictureState {
   /** @param {Message} state */
   begin(state) {
     this.version = -1;
-    this.drafts.waiting.clear();
+    this.drafts.clear();
     this.layers.remember(state.layers);
     this.open(state, this.view);
     const isOther = state.is_back === false;

@@ -1,6 +1,6 @@
 /** Lights, marked where they hang in the pictures, with handles on the one that was chosen. */
 
-import { html, useEffect, useRef } from '../vendor/preact.js';
+import { html } from '../vendor/preact.js';
 import {
   dragInPlane,
   subtract,
@@ -12,6 +12,7 @@ import {
   clampToBox,
 } from './lamp_geometry.js';
 import { pressLight } from './lamps/light_selection.js';
+import { useMarkDrag } from './lamps/mark_drag.js';
 import { showsElsewhere } from './look_comparison.js';
 import { toHex } from './paint_colour.js';
 import { atFullBrightness, luminance } from './paint_colour.js';
@@ -75,6 +76,11 @@ function PaneMarks({ ui, app, pane, camera, isTwin }) {
     x: pane.left + projection.x * pane.scale,
     y: pane.top + projection.y * pane.scale,
   });
+  /** Return where the mark of a place is, or null behind the camera. @param {LightPlace} place */
+  const positionOf = (place) => {
+    const projection = markAt(camera, place);
+    return projection && clampToBox(toPage(projection), innerBox);
+  };
   const places = /** @type {LightPlace[]} */ (ui.rig?.lights ?? []);
   return html`
     <${Trials} ui=${ui} camera=${camera} box=${box} toPage=${toPage} />
@@ -82,10 +88,9 @@ function PaneMarks({ ui, app, pane, camera, isTwin }) {
     ${ui.lamp !== null && places[ui.lamp] && html`<${Beam} place=${placeOf(ui, ui.lamp)} camera=${camera} box=${box} toPage=${toPage} />`}
     ${places.map((_, k) => {
       const place = placeOf(ui, k);
-      const projection = markAt(camera, place);
-      if (!projection) return null;
+      if (!positionOf(place)) return null;
       return html`<${Mark} key=${k} ui=${ui} app=${app} light=${k} place=${place} pane=${pane}
-        camera=${camera} position=${clampToBox(toPage(projection), innerBox)} isTwin=${isTwin} />`;
+        camera=${camera} positionOf=${positionOf} isTwin=${isTwin} />`;
     })}
     ${
       ui.lamp !== null &&
@@ -115,9 +120,11 @@ function markAt(camera, { position, direction }) {
 
 /**
  * @param {{ui: Ui, app: App, light: number, place: LightPlace, pane: Pane, camera: Camera,
- *   position: {x: number, y: number, isInside: boolean, angle: number}, isTwin: boolean}} props
+ *   positionOf: (place: LightPlace) => {x: number, y: number, isInside: boolean, angle: number},
+ *   isTwin: boolean}} props
  */
-function Mark({ ui, app, light, place, pane, camera, position, isTwin }) {
+function Mark({ ui, app, light, place, pane, camera, positionOf, isTwin }) {
+  const position = positionOf(place);
   const { label } = ui.lights[light];
   const rgb = ui.weights[light] ?? ui.lights[light].present;
   const isOn = luminance(rgb) > 0;
@@ -127,7 +134,7 @@ function Mark({ ui, app, light, place, pane, camera, position, isTwin }) {
   const tip = place.immovable_reason
     ? fill(words.lampMarks.itStaysWhereItIs, { label, immovable_reason: place.immovable_reason })
     : fill(words.lampMarks.dragToMoveItWithShift, { label });
-  const drag = useDrag(app, pane, (x, y, isShift, start) => {
+  const drag = useMarkDrag(app, pane, (x, y, isShift, start) => {
     if (!canDrag || !place.position || !ui.rig) return null;
     const startPosition = /** @type {number[]} */ (start.place.position);
     const newPosition = place.rail
@@ -137,6 +144,7 @@ function Mark({ ui, app, light, place, pane, camera, position, isTwin }) {
         : dragInPlane(camera, startPosition, ui.rig.up, x, y);
     return {
       place: { position: newPosition },
+      mark: positionOf({ ...place, position: newPosition }),
       request: { kind: 'move', pose: { position: newPosition } },
     };
   });
@@ -174,9 +182,12 @@ const hasControl = ({ ctrlKey, metaKey }) => ctrlKey || metaKey;
  */
 function AimHandle({ ui, app, light, pane, camera, innerBox, toPage, isTwin }) {
   const place = placeOf(ui, light);
-  const drag = useDrag(app, pane, (x, y) => ({
+  const positionOf = (/** @type {{x: number, y: number, isAhead: boolean}} */ projection) =>
+    clampToBox(toPage(projection), innerBox);
+  const drag = useMarkDrag(app, pane, (x, y) => ({
     place: {},
     aimPixel: [x, y],
+    mark: positionOf({ x, y, isAhead: true }),
     request: { kind: 'point', mode: 'aim', pixel: [x, y], view: ui.view },
   }));
   if (!place.position || !place.direction || !place.target || place.immovable_reason) return null;
@@ -184,7 +195,7 @@ function AimHandle({ ui, app, light, pane, camera, innerBox, toPage, isTwin }) {
   const projection = aimPixel
     ? { x: aimPixel[0], y: aimPixel[1], isAhead: true }
     : project(camera, place.target);
-  const position = clampToBox(toPage(projection), innerBox);
+  const position = positionOf(projection);
   const { label } = ui.lights[light];
   return html`<button type="button" class=${`lamp-aim ${position.isInside ? '' : 'is-outside'}`}
     style=${{ left: `${position.x}px`, top: `${position.y}px` }} tabindex=${isTwin ? -1 : 0}
@@ -255,72 +266,4 @@ function Beam({ place, camera, box, toPage }) {
   return html`<svg class="lamp-beam" style=${style} width=${right - left} height=${bottom - top}
     aria-hidden="true"><line x1=${start.x - left} y1=${start.y - top} x2=${end.x - left}
       y2=${end.y - top} /></svg>`;
-}
-
-/**
- * A drag of a mark: it requests a place at every move, and keeps the last.
- * @param {App} app @param {Pane} pane
- * @param {(x: number, y: number, isShift: boolean, start: {place: LightPlace}) =>
- *   {place: Partial<LightPlace>, aimPixel?: [number, number],
- *    request: import("./lamp_moves.js").LampRequest} | null} resolveDrag from the place of the pointer, in pixels of the picture
- */
-function useDrag(app, pane, resolveDrag) {
-  const start = useRef(
-    /** @type {{light: number, place: LightPlace, dx: number, dy: number, isMoved: boolean,
-     *   lastRequest: import("./lamp_moves.js").LampRequest | null} | null} */ (null),
-  );
-  const inPicture = (/** @type {PointerEvent} */ event) => {
-    const { left, top } = app.engine.element.getBoundingClientRect();
-    return [
-      (event.clientX - left - pane.left) / pane.scale,
-      (event.clientY - top - pane.top) / pane.scale,
-    ];
-  };
-  const end = () => {
-    start.current = null;
-    app.engine.dragLight(null);
-    app.store.set({ drag: null });
-  };
-  // A mark that goes away while it is dragged hears of no end: pictures would stay drafts.
-  useEffect(() => () => void (start.current && end()), []);
-  const down = (
-    /** @type {PointerEvent} */ event,
-    /** @type {number} */ light,
-    /** @type {LightPlace} */ place,
-  ) => {
-    if (event.button !== 0) return;
-    event.stopPropagation();
-    const button = /** @type {HTMLElement} */ (event.currentTarget);
-    button.setPointerCapture(event.pointerId);
-    const { left, top, width, height } = button.getBoundingClientRect();
-    // The mark keeps its offset from the pointer.
-    const offset = { dx: event.clientX - left - width / 2, dy: event.clientY - top - height / 2 };
-    start.current = { light, place, ...offset, isMoved: false, lastRequest: null };
-  };
-  const move = (/** @type {PointerEvent} */ event) => {
-    const drag = start.current;
-    if (!drag) return;
-    event.stopPropagation();
-    const [x, y] = inPicture(event);
-    const result = resolveDrag(
-      x - drag.dx / pane.scale,
-      y - drag.dy / pane.scale,
-      event.shiftKey,
-      drag,
-    );
-    if (!result) return;
-    drag.isMoved = true;
-    drag.lastRequest = result.request;
-    app.store.set({ drag: { light: drag.light, place: result.place, aimPixel: result.aimPixel } });
-    app.session.lampMoves.drag(drag.light, result.request, app.engine);
-  };
-  const up = (/** @type {PointerEvent} */ event) => {
-    const drag = start.current;
-    if (!drag) return;
-    event.stopPropagation();
-    if (drag.isMoved && drag.lastRequest)
-      app.session.lampMoves.queue(drag.light, drag.lastRequest);
-    end();
-  };
-  return { down, move, up };
 }

@@ -106,9 +106,12 @@ export function RoomPlan({ ui, app }) {
     const zoom = WIDTH / box.width;
     const [x, y] = [(event.clientX - box.left) * zoom, (event.clientY - box.top) * zoom];
     const position = plan.toScene(x, y, place.position[rig.up]);
-    app.store.set({ drag: isFinal ? null : { light, place: { position } } });
     const request = /** @type {const} */ ({ kind: 'move', pose: { position } });
-    if (!isFinal) return app.session.lampMoves.drag(light, request, app.engine);
+    if (!isFinal) {
+      app.store.setForFrame({ drag: { light, place: { position } } });
+      return app.session.lampMoves.drag(light, request, app.engine);
+    }
+    app.store.set({ drag: null });
     app.engine.dragLight(null);
     app.session.lampMoves.queue(light, request);
   };

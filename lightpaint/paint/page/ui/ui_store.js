@@ -1,5 +1,8 @@
 /** A store for the interface state, which notifies listeners of changes. */
 
+/** Milliseconds until listeners are notified of a change that need not be shown at once. */
+const MAX_DELAY_MS = 100;
+
 /**
  * @template {object} T
  */
@@ -12,6 +15,9 @@ export class Store {
     /** Whether listeners wait to be notified. */
     this.isPending = false;
     this.isScheduled = false;
+    this.isFrameRequested = false;
+    /** @type {ReturnType<typeof setTimeout> | undefined} */
+    this.timer = undefined;
   }
 
   /**
@@ -32,9 +38,20 @@ export class Store {
   /** Change part of the state, and notify listeners together with what else changes until the next
    * frame. @param {Partial<T>} changes */
   setForFrame(changes) {
-    const isFirst = !this.isPending;
     this.change(changes);
-    if (isFirst) requestAnimationFrame(() => this.flush());
+    if (this.isFrameRequested) return;
+    this.isFrameRequested = true;
+    requestAnimationFrame(() => {
+      this.isFrameRequested = false;
+      this.flush();
+    });
+  }
+
+  /** Change part of the state, and notify listeners with the next change, or soon.
+   * @param {Partial<T>} changes */
+  setWithNext(changes) {
+    this.change(changes);
+    this.timer ??= setTimeout(() => this.flush(), MAX_DELAY_MS);
   }
 
   /** @param {Partial<T> | ((value: T) => Partial<T>)} changes */
@@ -48,6 +65,8 @@ export class Store {
   flush() {
     if (!this.isPending) return;
     this.isPending = false;
+    clearTimeout(this.timer);
+    this.timer = undefined;
     for (const listener of this.listeners) listener();
   }
 

@@ -1,0 +1,90 @@
+/** Drags of the marks of lights. */
+
+import { useEffect, useLayoutEffect, useRef } from '../../vendor/preact.js';
+
+/** @typedef {import("../engine_interface.js").Pane} Pane */
+/** @typedef {import("../shortcuts.js").App} App */
+/** @typedef {import("../../engine/messages.js").LightPlace} LightPlace */
+/** @typedef {import("../lamp_moves.js").LampRequest} LampRequest */
+
+/** A drag that goes on. dx, dy: from the mark's middle to the pointer. mark: where the mark belongs.
+ * @typedef {{button: HTMLElement, light: number, place: LightPlace, dx: number, dy: number,
+ *   mark: {x: number, y: number} | null, lastRequest: LampRequest | null}} Drag */
+
+/**
+ * A drag of a mark: it requests a place at every move, and keeps the last. The mark itself follows
+ * each move at once; what else shows the place is drawn with the answer, since frames of the whole
+ * page would take the time of the answers.
+ * @param {App} app @param {Pane} pane
+ * @param {(x: number, y: number, isShift: boolean, start: {place: LightPlace}) =>
+ *   {place: Partial<LightPlace>, aimPixel?: [number, number], mark: {x: number, y: number} | null,
+ *    request: LampRequest} | null} resolveDrag from the place of the pointer, in pixels of the picture
+ */
+export function useMarkDrag(app, pane, resolveDrag) {
+  const current = useRef(/** @type {Drag | null} */ (null));
+  const inPicture = (/** @type {PointerEvent} */ event) => {
+    const { left, top } = app.engine.element.getBoundingClientRect();
+    return [
+      (event.clientX - left - pane.left) / pane.scale,
+      (event.clientY - top - pane.top) / pane.scale,
+    ];
+  };
+  const end = () => {
+    if (current.current) current.current.button.style.translate = '';
+    current.current = null;
+    app.engine.dragLight(null);
+    app.store.set({ drag: null });
+  };
+  useLayoutEffect(() => void (current.current && shiftMark(current.current)));
+  // A mark that goes away while it is dragged hears of no end: pictures would stay drafts.
+  useEffect(() => () => void (current.current && end()), []);
+  const down = (
+    /** @type {PointerEvent} */ event,
+    /** @type {number} */ light,
+    /** @type {LightPlace} */ place,
+  ) => {
+    if (event.button !== 0) return;
+    event.stopPropagation();
+    const button = /** @type {HTMLElement} */ (event.currentTarget);
+    button.setPointerCapture(event.pointerId);
+    const { left, top, width, height } = button.getBoundingClientRect();
+    // The mark keeps its offset from the pointer.
+    const offset = { dx: event.clientX - left - width / 2, dy: event.clientY - top - height / 2 };
+    current.current = { button, light, place, ...offset, mark: null, lastRequest: null };
+  };
+  const move = (/** @type {PointerEvent} */ event) => {
+    const drag = current.current;
+    if (!drag) return;
+    event.stopPropagation();
+    const [x, y] = inPicture(event);
+    const result = resolveDrag(
+      x - drag.dx / pane.scale,
+      y - drag.dy / pane.scale,
+      event.shiftKey,
+      drag,
+    );
+    if (!result) return;
+    drag.mark = result.mark;
+    drag.lastRequest = result.request;
+    shiftMark(drag);
+    app.store.setWithNext({
+      drag: { light: drag.light, place: result.place, aimPixel: result.aimPixel },
+    });
+    app.session.lampMoves.drag(drag.light, result.request, app.engine);
+  };
+  const up = (/** @type {PointerEvent} */ event) => {
+    const drag = current.current;
+    if (!drag) return;
+    event.stopPropagation();
+    if (drag.lastRequest) app.session.lampMoves.queue(drag.light, drag.lastRequest);
+    end();
+  };
+  return { down, move, up };
+}
+
+/** Shift a mark from where it is drawn to where it belongs. @param {Drag} drag */
+function shiftMark({ button, mark }) {
+  if (!mark) return;
+  const [left, top] = [button.style.left, button.style.top].map(parseFloat);
+  button.style.translate = `${mark.x - left}px ${mark.y - top}px`;
+}
