@@ -11,7 +11,8 @@ from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.analysis import Analysis, analyse, with_findings
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
-from lightpaint.pipeline.job.job import Job, PaintedView
+from lightpaint.pipeline.job.job import Job
+from lightpaint.pipeline.job.painted_views import PaintedView
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job_bases import obtain_bases_of, view_listener
 from lightpaint.pipeline.move_advice import suggest_move

@@ -5,7 +5,7 @@ that no group contains becomes one more light, `rest`, which is not adjusted.
 """
 
 import hashlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -201,9 +201,7 @@ def _basis(
     for image, layer in zip(images, lights.values(), strict=False):
         image[:] = layer.in_rec709(without_holes(layer.image, holes))
     if rest is not None:
-        basis_lights.append(
-            _light(free_name(REST_NAME, lights), "beauty less the groups", "rest", is_fixed=True)
-        )
+        basis_lights.append(rest_light(lights))
         images[-1] = first.in_rec709(rest)
     unknown_noise = as_planes(np.zeros_like(images))
     indirect = _indirect_planes(roles, passes, images, holes)
@@ -232,6 +230,12 @@ def _indirect_planes(
         if part is not None:
             plane[:] = layer.in_rec709(without_holes(part, holes))
     return indirect
+
+
+def rest_light(names: Collection[str]) -> BasisLight:
+    """Return the light that holds what the lights of these names lack of the beauty."""
+    name = free_name(REST_NAME, names)
+    return _light(name, "beauty less the groups", "rest", is_fixed=True)
 
 
 def _light(name: str, layer: str, plugin: str, *, is_fixed: bool = False) -> BasisLight:

@@ -87,7 +87,7 @@ def variation_jobs(job: Job, words: Sequence[str]) -> dict[str, Job]:
         settings, constraints = vary(word, options, job.constraints, lights)
         folder = variation_folder(job.folder, word)
         fields = (job.scenes, job.targets, folder, job.basis, constraints, settings, job.by_sensor)
-        jobs[word] = Job(*fields, rigging=job.rigging)
+        jobs[word] = Job(*fields, rigging=job.rigging, sequence=job.sequence)
     return jobs
 
 

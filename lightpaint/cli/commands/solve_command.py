@@ -11,7 +11,8 @@ from lightpaint.cli.output.output_mode import CommandOutcome
 from lightpaint.cli.tolerances import Tolerances
 from lightpaint.display_text import some_of
 from lightpaint.errors import LOOK_ERRORS
-from lightpaint.pipeline.job.job import Job, PaintedView
+from lightpaint.pipeline.job.job import Job
+from lightpaint.pipeline.job.painted_views import PaintedView
 from lightpaint.pipeline.pipeline import run
 from lightpaint.pipeline.results.results import Look
 from lightpaint.placement.placement_record import PlacementRecord, record_of

@@ -13,13 +13,13 @@ from typing import Any
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.cached_render import check_same_view
+from lightpaint.basis.lightgroups.frame_sequence import FrameSequence
 from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.basis.lights import Lights
 from lightpaint.basis.render.render_origin import basis_lights
 from lightpaint.display_text import short_repr
 from lightpaint.errors import LightpaintError
 from lightpaint.files import check_writable
-from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
@@ -28,11 +28,16 @@ from lightpaint.lighting.unknowns.constraint_reduction import reduce_to
 from lightpaint.pipeline.job.job_checks import (
     check_inputs,
     check_painting_is_no_light,
-    check_same_picture,
-    check_target,
     rigging_for,
+    with_same_lights,
 )
 from lightpaint.pipeline.job.job_record import decode_job, encode_job
+from lightpaint.pipeline.job.painted_views import (
+    PaintedView,
+    names_of_views,
+    painted_views,
+    targets_over_looks,
+)
 from lightpaint.pipeline.job.remarks import (
     remarks_of_film,
     remarks_of_memory,
@@ -52,29 +57,17 @@ from lightpaint.pipeline.job.sources import (
 )
 from lightpaint.pipeline.results.answer_folder import answer_files
 from lightpaint.pipeline.results.result_folder import ResultFolder
-from lightpaint.pipeline.results.results import SOLVE_RESULTS, VIEW_RESULTS, view_names
+from lightpaint.pipeline.results.results import SOLVE_RESULTS, VIEW_RESULTS
 from lightpaint.placement.placement_record import PlacementRecord
 from lightpaint.placement.rigging.rigging import Rigging
 from lightpaint.placement.suggestions.light_search import check_suggestible
 from lightpaint.relit.export.nuke import spoken_unreadable
-from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.target.target import Target
 from lightpaint.threads import parallel_map
 
-
-@dataclass(frozen=True)
-class PaintedView:
-    """The view through one sensor: its painting, and the folder of its results.
-
-    scene: on the film of the basis; None if there is only a basis. target: of the size of the
-    basis. basis: None if it is still to be rendered.
-    """
-
-    scene: Scene | None
-    target: Target
-    folder: Path
-    basis: Basis | None = None
+#: A basis, or light groups of another renderer, in memory or in a file.
+AnyBasis = Basis | BasisFile | LightGroups | GroupsFile
 
 
 @keywords()
@@ -87,11 +80,13 @@ class Job:
             without a renderer.
         targets: The painting of each view.
         folder: Receives the results.
-        basis: Existing basis of a single view; taken from the cache or rendered if not given. With
-            another renderer's light groups `folder` also receives files for other programs.
+        basis: Existing basis, of several views a tuple with one for each; taken from the cache or
+            rendered if not given. With another renderer's light groups `folder` also receives files
+            for other programs.
         constraints: Constraints on the lights; they override those of the scene's lights file.
         settings: Settings of the solve.
         by_sensor: True to write the pictures to a folder for each sensor, as with several views.
+        sequence: The frames of the shot whose light groups are in `basis`.
         rigging: Lights that may move, and lights to add; needs a scene. It overrides that of the
             scene's lights file.
         placement: Places found earlier for several looks; then there is no search.
@@ -100,6 +95,8 @@ class Job:
         all_rigging: Set on creation: all rigging, the lights file's first.
         fit: Set on creation: the settings, including those that the paintings decide.
         remarks: Set on creation: remarks for the user, in plain text.
+        all_groups: Set on creation: the light groups of each view, all with the same lights; empty
+            without any.
         results: Set on creation: the folder, and the files that may be replaced there.
 
     Raises:
@@ -116,56 +113,64 @@ class Job:
     scenes: tuple[Scene | SceneFile, ...]
     targets: tuple[Target | Painting, ...]
     folder: Path
-    basis: Basis | BasisFile | LightGroups | GroupsFile | None = None
+    basis: AnyBasis | tuple[AnyBasis, ...] | None = None
     constraints: Constraints = field(default_factory=Constraints)
     settings: Settings = field(default_factory=Settings)
     by_sensor: bool = False
     rigging: Rigging = field(default_factory=Rigging)
     placement: PlacementRecord | PlacementFile | None = None
+    sequence: FrameSequence | None = None
     views: tuple[PaintedView, ...] = field(init=False, repr=False)
     all_constraints: Constraints = field(init=False, repr=False)
     all_rigging: Rigging = field(init=False, repr=False)
     fit: Settings = field(init=False, repr=False)
     remarks: tuple[str, ...] = field(init=False, repr=False)
+    all_groups: tuple[LightGroups, ...] = field(init=False, repr=False)
     results: ResultFolder = field(init=False, repr=False)
 
     __repr__ = short_repr
 
     def __post_init__(self) -> None:
-        check_inputs(self.scenes, self.targets, self.basis, self.constraints, self.settings)
+        given = self.given_bases
+        check_inputs(self.scenes, self.targets, given, self.constraints, self.settings)
         if not self.scenes:
-            check_nothing_unused(self.settings, self.basis)
-        # Paintings and basis are read in parallel; an error in a painting is reported first.
-        *targets, basis = parallel_map(content, [*self.targets, self.basis])
-        basis = basis.basis if isinstance(basis, LightGroups) else basis
-        if basis is not None and basis.origin.is_light_groups:
-            pairs = zip(self.targets, targets, strict=True)
-            targets = [_over_look(painting, target, basis) for painting, target in pairs]
+            check_nothing_unused(self.settings, given[0])
+        # Paintings and bases are read in parallel; an error in a painting is reported first.
+        contents = parallel_map(content, [*self.targets, *given])
+        targets, read = (
+            contents[: len(self.targets)],
+            with_same_lights(contents[len(self.targets) :]),
+        )
+        self._set(all_groups=tuple(x for x in read if isinstance(x, LightGroups)))
+        bases = [x.basis if isinstance(x, LightGroups) else x for x in read]
+        targets = targets_over_looks(self.targets, targets, bases)
         scenes = [content(scene) for scene in self.scenes]
         folders = [self.folder]
-        if self.by_sensor or len(scenes) > 1:
-            folders = [self.folder / name for name in view_names(scenes)]
-        check_painting_is_no_light(self.groups, self.targets)
-        source = scenes[0] if scenes else basis
+        if self.by_sensor or len(targets) > 1:
+            names = [self.sequence.numbers[x] for x in self.painted_frames] if self.sequence else []
+            names = names or names_of_views(scenes, bases, self.all_groups)
+            folders = [self.folder / name for name in names]
+        for basis, target in zip(given, self.targets, strict=False):
+            check_painting_is_no_light(basis, target)
+        source = scenes[0] if scenes else bases[0]
         all_constraints = self.constraints
         if isinstance(source, Scene | Basis):
             all_constraints = constraints_of(source.requests).and_then(all_constraints)
-        if scenes and basis is not None:
-            check_same_view(scenes[0], basis)
+        if scenes and bases:
+            check_same_view(scenes[0], bases[0])
         if self.placement is not None and not scenes:
             raise LightpaintError(
                 "lights can only hang elsewhere in their scene: give the scene, or leave "
                 "placement=... out"
             )
         # Reports impossible constraints before rendering.
-        reduce_to(all_constraints, self._lights(scenes, basis))
+        reduce_to(all_constraints, self._lights(scenes, bases))
         if self.settings.suggest:
             check_suggestible(scenes[0])
         all_rigging = rigging_for(self.rigging, scenes, self.settings)
-        views = tuple(
-            PaintedView(*self._with_equal_size(scene, target, basis), folder, basis)
-            for scene, target, folder in zip(scenes or [None], targets, folders, strict=True)
-        )
+        views = painted_views(scenes, targets, bases, folders, self.settings)
+        if self.all_groups:
+            views = tuple(x.without(y.holes) for x, y in zip(views, self.all_groups, strict=True))
         results = self._result_folder(views, scenes, targets)
         results.check()
         fit = resolve_for_targets(self.settings, [view.target for view in views])
@@ -173,17 +178,30 @@ class Job:
         self._set(all_rigging=all_rigging)
         self._set(remarks=tuple(self._remarks(targets, scenes)))
 
-    def _lights(self, scenes: Sequence[Scene], basis: Basis | None) -> Lights:
+    def _lights(self, scenes: Sequence[Scene], bases: Sequence[Basis]) -> Lights:
         """Return the lights of the answer: those of scene or basis, and those of given places."""
         if self.placement is not None:
             return basis_lights(content(self.placement).hung_in(scenes).scene)
-        return basis_lights(scenes[0]) if basis is None else basis.lights
+        return bases[0].lights if bases else basis_lights(scenes[0])
+
+    @property
+    def given_bases(self) -> tuple[AnyBasis, ...]:
+        """The given basis of each view, as given; empty without any."""
+        if self.basis is None:
+            return ()
+        return self.basis if isinstance(self.basis, tuple) else (self.basis,)
 
     @property
     def groups(self) -> LightGroups | None:
-        """The light groups that the job is solved from; None for another basis."""
-        basis = content(self.basis)
-        return basis if isinstance(basis, LightGroups) else None
+        """The light groups that the job is solved from, of the first view; None for others."""
+        return self.all_groups[0] if self.all_groups else None
+
+    @property
+    def painted_frames(self) -> tuple[int, ...]:
+        """The frame of each view in the sequence; empty without one."""
+        if self.sequence is None:
+            return ()
+        return tuple(self.sequence.frame_of(groups.path) for groups in self.all_groups)
 
     def with_moved_lights(self, scenes: Sequence[Scene], constraints: Constraints) -> "Job":
         """Return this job with moved lights.
@@ -215,6 +233,7 @@ class Job:
             by_sensor=self.by_sensor,
             rigging=self.rigging,
             placement=self.placement,
+            sequence=self.sequence,
         )
 
     @staticmethod
@@ -255,10 +274,10 @@ class Job:
             files += [view.folder / name for name in (VIEW_RESULTS if scenes else SOLVE_RESULTS)]
         reads = [file for target in targets for file in target.files]
         reads += [file for scene in scenes for file in scene.read_files]
-        others = (self.basis, self.placement)
+        others = (*self.given_bases, self.placement)
         reads += [Path(x.path) for x in others if isinstance(x, BasisFile | PlacementFile)]
-        if self.groups is not None:
-            reads += self.groups.files
+        for groups in self.all_groups:
+            reads += groups.files
         return ResultFolder(
             self.folder,
             tuple(dict.fromkeys(files)),
@@ -267,35 +286,13 @@ class Job:
             force=self.settings.force,
         )
 
-    def _with_equal_size(
-        self, scene: Scene | None, target: Target, basis: Basis | None
-    ) -> tuple[Scene | None, Target]:
-        """Return scene and target in the size that the basis has, or will have."""
-        check_target(target)
-        if scene is not None:
-            check_same_picture(target, scene)
-        if scene is not None and basis is None:
-            scene = on_film(scene, self.settings.quality, self._resolution(scene, target))
-        sized_source = scene if basis is None else basis
-        assert sized_source is not None
-        resized_target = target.fitted_to(sized_source.size, resize=self.settings.resize)
-        return scene, resized_target if self.groups is None else resized_target.without(
-            self.groups.holes
-        )
-
-    def _resolution(self, scene: Scene, target: Target) -> str | None:
-        """Return the resolution in the settings, else that of a smaller painted template."""
-        settings = self.settings
-        if settings.quality is not None or settings.resolution is not None or settings.resize:
-            return settings.resolution
-        factor = whole_factor(scene.size, target.size)
-        return f"1/{factor}" if target.content and factor and factor > 1 else None
-
     def _remarks(self, targets: Sequence[Target], scenes: Sequence[Scene]) -> list[str]:
         """Return remarks for the user before this runs. targets, scenes: as read."""
-        remarks = []
+        remarks: list[str] = []
+        for groups in self.all_groups:
+            remarks += groups.remarks
         if self.groups is not None:
-            remarks += [*self.groups.remarks, *spoken_unreadable(self.groups, self.folder)]
+            remarks += spoken_unreadable(self.groups, self.folder)
         rendered_scenes = [] if self.basis is not None else [x.scene for x in self.views if x.scene]
         if (first := self.views[0].scene) is not None:
             remarks += remarks_of_scene(first, is_rendered=bool(rendered_scenes))
@@ -305,10 +302,3 @@ class Job:
         for scene in rendered_scenes:
             remarks += [*remarks_of_film(scene, self.settings), *remarks_of_memory(scene)]
         return remarks + remarks_of_pictures()
-
-
-def _over_look(source: Target | Painting, target: Target, basis: Basis) -> Target:
-    """Return `target`, read as painted over the look of `basis` if it was."""
-    if not isinstance(source, Painting):
-        return target
-    return source.over(basis.current_look, f"the look of {basis.origin.scene}") or target

@@ -4,11 +4,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.lightgroups.frame_groups import with_equal_lights
 from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.errors import BasisError, ConstraintError, LightpaintError, TargetError
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.joined_views import check_same_lights
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.job.sources import Painting
+from lightpaint.pipeline.job.sources import Painting, content
 from lightpaint.placement.rigging.rigged_lights import rigged_lights
 from lightpaint.placement.rigging.rigging import Rigging, rigging_of
 from lightpaint.scene.scene import Scene
@@ -18,7 +21,7 @@ from lightpaint.target.target import Target
 def check_inputs(
     scenes: Sequence[Any],
     targets: Sequence[Any],
-    basis: object,
+    bases: Sequence[Any],
     constraints: object,
     settings: Settings,
 ) -> None:
@@ -27,13 +30,18 @@ def check_inputs(
         raise ConstraintError(
             f"the constraints are a {type(constraints).__name__}: pass Constraints.of(...)"
         )
-    if not scenes and basis is None:
+    if not scenes and not bases:
         raise LightpaintError("give a scene, a basis, or both")
     if not targets:
         raise TargetError("no painting to solve for: give a target")
-    has_several_views = len(targets) > 1 or len(scenes) > 1
-    if has_several_views and basis is not None:
-        raise BasisError("a basis has only one view: give the scene to solve for several")
+    if (
+        bases
+        and max(len(scenes), len(targets), len(bases)) > 1
+        and (scenes or len(bases) != len(targets))
+    ):
+        raise BasisError(
+            "a basis has only one view: give the scene to solve for several, or a basis for each"
+        )
     if scenes and len(targets) != len(scenes):
         raise TargetError(
             f"{len(targets)} targets for {len(scenes)} views: give one for each; "
@@ -41,19 +49,34 @@ def check_inputs(
         )
 
 
-def check_painting_is_no_light(
-    groups: LightGroups | None, targets: Sequence[Target | Painting]
-) -> None:
+def check_painting_is_no_light(basis: Any, target: Target | Painting) -> None:
     """Raise BasisError if a folder of light groups includes the painting as a light."""
-    if groups is None or not groups.path.is_dir():
+    groups = content(basis)
+    if not isinstance(groups, LightGroups) or not groups.path.is_dir():
         return
     files = {layer.file.resolve() for layer in groups.layers}
-    for target in targets:
-        if isinstance(target, Painting) and Path(target.path).resolve() in files:
-            raise BasisError(
-                f"the painting {target.path} is among the lights of {groups.path}: pass it to "
-                "read_light_groups in leave_out, or move it elsewhere"
-            )
+    if isinstance(target, Painting) and Path(target.path).resolve() in files:
+        raise BasisError(
+            f"the painting {target.path} is among the lights of {groups.path}: pass it to "
+            "read_light_groups in leave_out, or move it elsewhere"
+        )
+
+
+def with_same_lights(bases: Sequence[Basis | LightGroups]) -> list[Basis | LightGroups]:
+    """Return the bases of all views with the same lights.
+
+    Light groups that lack no part of the picture get a black `rest` if others do. Raises BasisError
+    if lights differ, and for light groups beside another basis.
+    """
+    groups = [basis for basis in bases if isinstance(basis, LightGroups)]
+    saved = [basis for basis in bases if isinstance(basis, Basis)]
+    if groups and saved:
+        raise BasisError(
+            f"{groups[0].path} has light groups and another view has a saved basis: give one kind"
+        )
+    for basis in saved[1:]:
+        check_same_lights(saved[0], basis)
+    return [*(with_equal_lights(groups) if groups else []), *saved]
 
 
 def check_target(target: object) -> None:

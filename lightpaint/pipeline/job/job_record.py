@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from lightpaint.basis.lightgroups.frame_sequence import FrameSequence, find_frames
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.pipeline.job.settings import Settings
@@ -31,7 +32,11 @@ BASIS_KINDS: Mapping[str, type[BasisFile] | type[GroupsFile]] = {
 
 @dataclass(frozen=True)
 class JobRecord:
-    """The fields of a job in JSON. basis: its fields, by the name of its kind."""
+    """The fields of a job in JSON.
+
+    basis: its fields, by the name of its kind; bases: the same of each of several views. sequence:
+    its pattern.
+    """
 
     scenes: tuple[SceneFile, ...]
     targets: tuple[Painting, ...]
@@ -42,6 +47,8 @@ class JobRecord:
     by_sensor: bool
     rigging: Rigging = field(default_factory=Rigging)
     placement: PlacementFile | None = None
+    bases: tuple[Mapping[str, Mapping[str, Any]], ...] = ()
+    sequence: str | None = None
 
 
 def encode_job(
@@ -55,26 +62,31 @@ def encode_job(
     by_sensor: bool,
     rigging: Rigging | None = None,
     placement: Any = None,
+    sequence: FrameSequence | None = None,
 ) -> str:
     """Return a job's fields as text. Raises LightpaintError for objects in memory."""
-    groups = [("scene", scenes), ("target", targets), ("basis", [basis] if basis else [])]
+    bases = basis if isinstance(basis, tuple) else (basis,) if basis else ()
+    groups: list[tuple[str, Sequence[Any]]]
+    groups = [("scene", scenes), ("target", targets), ("basis", bases)]
     groups.append(("placement", [placement] if placement else []))
     for kind, sources in groups:
         if not all(isinstance(source, File) for source in sources):
             raise LightpaintError(
                 f"this job cannot be sent: its {kind} is in memory; give the path of a file"
             )
-    basis_record = {type(basis).__name__: asdict(basis)} if basis else None
+    records = tuple({type(x).__name__: asdict(x)} for x in bases)
     record = JobRecord(
         tuple(scenes),
         tuple(targets),
-        basis_record,
+        records[0] if records and not isinstance(basis, tuple) else None,
         constraints,
         settings,
         folder,
         by_sensor,
         rigging or Rigging(),
         placement,
+        records if isinstance(basis, tuple) else (),
+        None if sequence is None else sequence.pattern,
     )
     # `item` makes NumPy's numbers Python's.
     data = {"format": FORMAT, **asdict(record)}
@@ -91,9 +103,11 @@ def decode_job(text: str) -> dict[str, Any]:
         command = data["settings"].pop("command", "")
         record = read_record(JobRecord, data, is_exact=True)
         fields = {name: getattr(record, name) for name in JobRecord.__dataclass_fields__}
+        bases, basis = tuple(map(_decode_basis, fields.pop("bases"))), _decode_basis(record.basis)
         return {
             **fields,
-            "basis": _decode_basis(record.basis),
+            "basis": bases or basis,
+            "sequence": None if record.sequence is None else find_frames(record.sequence),
             "settings": replace(record.settings, command=command),
             "folder": Path(record.folder),
         }

@@ -152,7 +152,11 @@ def view_names(scenes: Sequence[Scene]) -> list[str]:
 
     Raises SceneError for a repeated sensor, or one that cannot name a folder.
     """
-    names = [scene.sensor_names[scene.sensor] for scene in scenes]
+    return checked_names([scene.sensor_names[scene.sensor] for scene in scenes])
+
+
+def checked_names(names: list[str]) -> list[str]:
+    """Return the names of views. Raises SceneError for one that cannot name a folder of its own."""
     if len(set(names)) < len(names):
         raise SceneError(f"a view is given twice: {some_names(names)}; give each sensor once")
     for name in names:
