@@ -26,7 +26,8 @@ class LinearProblem:
     equations: M and b of the squares; corrected: the same without the share `noise_removed` of the
     noise, None if none was removed. constraints: on the lights. reduction: the unknowns that these
     leave; full: the same with the lights that `sparse` has not chosen. fit: with nothing left open.
-    dimming: see `weight_pull`.
+    dimming: see `weight_pull`. tether: a further pull on the weights, to lights at other frames;
+    None for a problem that stands alone.
     """
 
     equations: NormalEquations
@@ -37,6 +38,7 @@ class LinearProblem:
     full: Reduction
     fit: Fit
     dimming: Doubles | None
+    tether: NormalEquations | None
 
     if TYPE_CHECKING:  # properties of one kind of problem, fields of the other
 
@@ -102,8 +104,10 @@ class LinearProblem:
 
     @cached_property
     def pull(self) -> NormalEquations | None:
-        """The penalty for leaving the current lighting, or its colours; None if there is none."""
-        return weight_pull(
+        """The penalty for leaving the current lighting, its colours, or the lights at other frames;
+        None if there is none.
+        """
+        pull = weight_pull(
             self.power,
             self.lights.current_weights,
             self.fit,
@@ -112,6 +116,9 @@ class LinearProblem:
             keeps_color=self.keeps_color,
             dimming=self.dimming,
         )
+        if pull is None or self.tether is None:
+            return self.tether if pull is None else pull
+        return pull + self.tether
 
     def with_pull(self, equations: NormalEquations) -> NormalEquations:
         """Return `equations` with the pull on the weights, if there is one."""
@@ -153,6 +160,7 @@ class SummedProblem(LinearProblem):
     corrected: NormalEquations | None = None
     noise_removed: float = 0.0
     dimming: Doubles | None = None
+    tether: NormalEquations | None = None
 
     __repr__ = short_repr
 

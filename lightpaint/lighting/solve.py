@@ -169,6 +169,15 @@ def solve_again(solution: Solution, problem: Problem) -> Solution:
     return replace(result, tried=solution.tried, reweighting=reweighting)
 
 
+def solve_tethered(solution: Solution, problem: Problem) -> Solution:
+    """Solve `problem`, which differs from that of `solution` only in its tether."""
+    if not problem.is_linear:
+        return solve_again(solution, problem)
+    return replace(
+        _solve_under_reduction(problem, solution.weights, solution.reached), tried=solution.tried
+    )
+
+
 def _solve_squares(problem: Problem, start: Doubles) -> Solution:
     """Solve the squares; with `sparse`, for the best lights alone."""
     return _solution(solve_linear(problem, start))

@@ -11,6 +11,7 @@ from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.analysis import Analysis, analyse, with_findings
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
+from lightpaint.pipeline.animated_answer import animated_answer
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.painted_views import PaintedView
 from lightpaint.pipeline.job.settings import Settings
@@ -67,17 +68,22 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
     job, obtained, placement = place_lights(job, obtain_bases_of(job, bases, listen), listen)
     if job.settings.error is not None:
         obtained = add_needed_samples(job, obtained, listen)
-    problem = problem_of(job, obtained)
-    del obtained
-    if job.settings.report:
-        for basis in problem.views.bases:
-            make_ahead(basis, prepare_page)
-    solution = _reduce_noise(job, solution_of(problem), listen)
-    del problem  # some of its arrays are as large as the pictures
-    analyses = analyse(solution)
-    solution.problem.squares.release()
-    lighting, scene = with_findings(solution, analyses).lighting, job.views[0].scene
-    rig = _suggest(job, solution, placement, listen)
+    if job.settings.animate:
+        lighting, analyses = animated_answer(job, obtained, listen)
+        rig = _RigFindings(placement)
+    else:
+        problem = problem_of(job, obtained)
+        del obtained
+        if job.settings.report:
+            for basis in problem.views.bases:
+                make_ahead(basis, prepare_page)
+        solution = _reduce_noise(job, solution_of(problem), listen)
+        del problem  # some of its arrays are as large as the pictures
+        analyses = analyse(solution)
+        solution.problem.squares.release()
+        lighting = with_findings(solution, analyses).lighting
+        rig = _suggest(job, solution, placement, listen)
+    scene = job.views[0].scene
     with new_answer(job.results, lighting, scene=scene, groups=job.groups) as answer:
         looks = [
             _finish_view(job, answer, view, analysis, rig, view_listener(job, view, listen))

@@ -178,11 +178,11 @@ def _usd_of_groups(lighting: Lighting, source: Source, folder: Path, listen: Lis
     assert source.stage is not None
     assert source.light_groups is not None
     overridden = usd_multipliers(
-        {light.name: light.weight for light in lighting.lights if not light.is_fixed},
+        _free_weights(lighting),
         source.stage,
         folder,
-        about=f"lightpaint: lights of {source.light_groups.path.name} as solved for "
-        f"{lighting.target}",
+        by_frame={frame: _free_weights(lit) for frame, lit in lighting.by_frame.items()},
+        about=f"lightpaint: lights of {source.light_groups.name} as solved for {lighting.target}",
     )
     if overridden.left:
         listen.say(
@@ -190,6 +190,11 @@ def _usd_of_groups(lighting: Lighting, source: Source, folder: Path, listen: Lis
             f"{some_names(overridden.left)}, or it is animated: set it by hand"
         )
     return overridden.text
+
+
+def _free_weights(lighting: Lighting) -> dict[str, RGB]:
+    """Return the multipliers of adjusted lights, by their names."""
+    return {light.name: light.weight for light in lighting.lights if not light.is_fixed}
 
 
 def _of_groups(

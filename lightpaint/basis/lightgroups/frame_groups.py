@@ -9,7 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from lightpaint.basis.lightgroups.light_groups import LightGroups, rest_light
+from lightpaint.basis.lightgroups.frame_sequence import FrameSequence
+from lightpaint.basis.lightgroups.light_groups import LightGroups, read_light_groups, rest_light
 from lightpaint.basis.lights import Lights
 from lightpaint.basis.planes import IndirectLight, Planes, as_planes
 from lightpaint.display_text import some_names
@@ -34,6 +35,19 @@ def with_equal_lights(frames: Sequence[LightGroups]) -> list[LightGroups]:
     if not any(frame.has_rest for frame in frames):
         return list(frames)
     return [frame if frame.has_rest else with_black_rest(frame) for frame in frames]
+
+
+def first_frame(
+    sequence: FrameSequence, pattern: str | None = None, *, has_rest: bool
+) -> LightGroups:
+    """Return the light groups of the first frame of a shot, for exports of all of it.
+
+    pattern: as of `read_light_groups`. has_rest: whether the answer has a `rest`, which this frame
+    may lack.
+    """
+    groups = read_light_groups(sequence.path(sequence.frames[0]), pattern=pattern)
+    groups = replace(groups, sequence=sequence)
+    return with_black_rest(groups) if has_rest and not groups.has_rest else groups
 
 
 def group_names(groups: LightGroups) -> tuple[str, ...]:

@@ -8,13 +8,11 @@ length.
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import groupby
 from pathlib import Path
 
 from lightpaint.display_text import some_of, visible
 from lightpaint.errors import BasisError
-from lightpaint.keywords import keywords
 
 #: The signs for a frame number. Their number of characters, or the digit in them, is its least
 #: length.
@@ -23,26 +21,24 @@ SIGN = re.compile(r"#+|@+|%0?(\d*)d|\$F(\d?)|<F(\d?)>")
 #: A range of frames: `12`, `1-48`, or every second one of them, `1-48x2`.
 _RANGE = re.compile(r"(-?\d+)(?:-(-?\d+)(?:x(\d+))?)?")
 
-#: Largest number of files and folders that are looked at for frames.
-MAX_ENTRIES = 200_000
+#: Largest number of frames in one folder.
+MAX_FRAMES = 100_000
 
 
-@keywords()
 @dataclass(frozen=True)
 class FrameSequence:
     """The frames that exist of a sequence.
 
-    Attributes:
-        pattern: The path, with a sign such as `####` for the number.
-        numbers: The number of each frame as its path has it, `0012`, by frame, in order.
-
-    Examples:
-        >>> FrameSequence("shot.####.exr", {12: "0012"}).path(12).name
-        'shot.0012.exr'
+    pattern: the path, with a sign such as `####` for the number. folder: the part of it that has
+    no sign, although its name may look as if it had.
+    numbers: the number of each frame as its path has it, `0012`, by frame, in order.
+    files: the file or folder of each frame.
     """
 
     pattern: str
+    folder: Path
     numbers: Mapping[int, str]
+    files: Mapping[int, Path]
 
     @property
     def frames(self) -> tuple[int, ...]:
@@ -51,24 +47,28 @@ class FrameSequence:
 
     def path(self, frame: int) -> Path:
         """Return the file or folder of a frame. Raises BasisError if there is none."""
-        if frame not in self.numbers:
+        if frame not in self.files:
             raise BasisError(
                 f"{visible(self.pattern)} has no frame {frame}: it has {spoken_frames(self.frames)}"
             )
-        return Path(SIGN.sub(self.numbers[frame], self.pattern))
-
-    @cached_property
-    def paths(self) -> Mapping[Path, int]:
-        """The frames by their files or folders."""
-        return {self.path(frame): frame for frame in self.frames}
+        return self.files[frame]
 
     def frame_of(self, path: Path) -> int:
-        """Return the frame of a file or folder of this sequence."""
-        return self.paths[Path(path)]
+        """Return the frame of a file or folder of this sequence. Raises BasisError for others."""
+        for frame, file in self.files.items():
+            if file == Path(path):
+                return frame
+        raise BasisError(f"{visible(str(path))} is no frame of {visible(self.pattern)}")
 
-    def renamed(self, name: str) -> "FrameSequence":
-        """Return the sequence of files called `name`, with its own sign, of the same frames."""
-        return FrameSequence(name, self.numbers)
+    def with_hashes(self, file: Path, frame: int) -> Path:
+        """Return the path of a frame, or of a file in its folder, with `####` for the number."""
+        tail = Path(self.pattern).relative_to(self.folder).as_posix()
+        hashes = SIGN.sub(lambda sign: "#" * _length(sign), tail)
+        below = file.relative_to(self.path(frame)).as_posix()
+        sign = SIGN.search(tail)
+        assert sign is not None
+        number = re.compile(rf"(?<!\d){re.escape(self.numbers[frame])}(?!\d)")
+        return self.folder / hashes / number.sub("#" * _length(sign), below)
 
 
 def is_pattern(path: str | Path) -> bool:
@@ -78,19 +78,29 @@ def is_pattern(path: str | Path) -> bool:
 
 def find_frames(pattern: str | Path) -> FrameSequence:
     """Return the frames of a pattern. Raises BasisError if there are none."""
-    parts = Path(pattern).parts
-    expected = _regex(str(Path(pattern)))
-    found: dict[int, str] = {}
-    first = next(k for k, part in enumerate(parts) if SIGN.search(part))
-    for path in _walk(Path(*parts[:first]), parts[first:], str(pattern)):
-        if match := expected.fullmatch(str(path)):
-            found[int(match["frame"])] = match["frame"]
+    parts, literal = Path(pattern).parts, 0
+    # A folder that exists may have a sign in its name.
+    while literal < len(parts) - 1 and Path(*parts[: literal + 1]).is_dir():
+        literal += 1
+    folder, tail = Path(*parts[:literal]), parts[literal:]
+    found: dict[int, Path] = {}
+    numbers: dict[int, str] = {}
+    expected = _expression("/".join(tail))
+    for path in _walk(folder, tail, str(pattern)):
+        if match := expected.fullmatch(path.relative_to(folder).as_posix()):
+            found[int(match["frame"])], numbers[int(match["frame"])] = path, match["frame"]
     if not found:
         raise BasisError(
             f"no frame matches {visible(str(pattern))}: the sign stands for the number in the "
-            "names of files, such as shot.0012.exr"
+            "names of files, as #### in shot.####.exr for shot.0012.exr"
         )
-    return FrameSequence(str(Path(pattern)), {frame: found[frame] for frame in sorted(found)})
+    frames = sorted(found)
+    return FrameSequence(
+        str(Path(pattern)),
+        folder,
+        {x: numbers[x] for x in frames},
+        {x: found[x] for x in frames},
+    )
 
 
 def _walk(folder: Path, parts: Sequence[str], pattern: str) -> Iterable[Path]:
@@ -99,14 +109,14 @@ def _walk(folder: Path, parts: Sequence[str], pattern: str) -> Iterable[Path]:
     if not SIGN.search(first):
         paths = [folder / first]
     else:
-        expected = re.compile(_regex(first).pattern)
+        expected = _expression(first)
         try:
             paths = [path for path in folder.iterdir() if expected.fullmatch(path.name)]
         except OSError as error:
             reason = error.strerror or error
             raise BasisError(f"no frames of {visible(pattern)}: {folder}: {reason}") from None
-    if len(paths) > MAX_ENTRIES:
-        raise BasisError(f"more than {MAX_ENTRIES} files match {visible(pattern)}")
+    if len(paths) > MAX_FRAMES:
+        raise BasisError(f"more than {MAX_FRAMES} files match {visible(pattern)}: name fewer")
     for path in paths:
         if not remaining and path.exists():
             yield path
@@ -114,22 +124,27 @@ def _walk(folder: Path, parts: Sequence[str], pattern: str) -> Iterable[Path]:
             yield from _walk(path, remaining, pattern)
 
 
-def _regex(text: str) -> re.Pattern[str]:
+def _expression(text: str) -> re.Pattern[str]:
     """Return what paths of a pattern look like; a number that occurs twice is the same."""
     expression, end = "", 0
     for match in SIGN.finditer(text):
-        expression += re.escape(text[end : match.start()])
         is_first = "(?P<frame>" not in expression
-        expression += f"(?P<frame>{_digits(match)})" if is_first else "(?P=frame)"
+        number = f"(?P<frame>{_digits(match)})" if is_first else "(?P=frame)"
+        expression += re.escape(text[end : match.start()]) + number
         end = match.end()
     return re.compile(expression + re.escape(text[end:]))
 
 
+def _length(sign: re.Match[str]) -> int:
+    """Return the least number of digits that a sign stands for."""
+    sizes = [x for x in sign.groups() if x]
+    return max(int(sizes[0]), 1) if sizes else len(sign[0]) if sign[0][0] in "#@" else 1
+
+
 def _digits(sign: re.Match[str]) -> str:
     """Return the digits that a sign stands for: padded with zeros, and longer only without."""
-    text, sizes = sign[0], [x for x in sign.groups() if x]
-    length = int(sizes[0]) if sizes else len(text) if text[0] in "#@" else 1
-    return r"-?\d+" if length <= 1 else rf"-?(?:\d{{{length}}}|[1-9]\d{{{length},}})"
+    length = _length(sign)
+    return r"-?\d+" if length == 1 else rf"-?(?:\d{{{length}}}|[1-9]\d{{{length},}})"
 
 
 def parse_frames(text: str, sequence: FrameSequence) -> tuple[int, ...]:

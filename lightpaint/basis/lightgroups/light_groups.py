@@ -15,6 +15,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.denoising_passes import DenoisingPasses, split_passes
+from lightpaint.basis.lightgroups.frame_sequence import FrameSequence
 from lightpaint.basis.lightgroups.group_remarks import (
     REST_NAME,
     missing_light,
@@ -57,6 +58,7 @@ class LightGroups:
         holes: (h, w) bool, pixels where a layer is not finite. They are 0 in all images of the
             basis, so that they do not contribute to any sum.
         remarks: Messages for the user, one sentence each.
+        sequence: The frames of the shot of which this is one; None for a single picture.
 
     Examples:
         >>> groups = lp.read_light_groups("groups.exr")
@@ -73,6 +75,7 @@ class LightGroups:
     exceeding: float | None
     holes: npt.NDArray[np.bool_]
     remarks: tuple[str, ...]
+    sequence: FrameSequence | None = None
 
     __repr__ = short_repr
 
@@ -80,6 +83,11 @@ class LightGroups:
     def has_rest(self) -> bool:
         """True if the last light of the basis is the part of the beauty that the groups lack."""
         return len(self.basis.lights) > len(self.layers)
+
+    @property
+    def name(self) -> str:
+        """Name of the file, the folder, or the sequence of frames."""
+        return self.path.name if self.sequence is None else Path(self.sequence.pattern).name
 
     @property
     def files(self) -> list[Path]:

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from lightpaint.basis.lightgroups.frame_groups import first_frame
+from lightpaint.basis.lightgroups.frame_sequence import find_frames, is_pattern
 from lightpaint.cli.output import documents, terminal
 from lightpaint.cli.output.output_mode import CommandOutcome
 from lightpaint.errors import OutputError
@@ -26,7 +28,12 @@ def export(
     """Run `lightpaint export lighting.json --to FORM,FORM -o DIR`."""
     finish(lighting.parent)
     answer, folder = read_lighting(lighting), output or lighting.parent
-    source, listen = Source(content(scene), content(groups), stage), terminal.TerminalListener()
+    if groups is not None and is_pattern(groups.path):
+        has_rest = any(light.plugin == "rest" for light in answer.lights)
+        light_groups = first_frame(find_frames(groups.path), groups.pattern, has_rest=has_rest)
+    else:
+        light_groups = content(groups)
+    source, listen = Source(content(scene), light_groups, stage), terminal.TerminalListener()
     names = names_of_forms(forms, source)
     writers, remark = writers_of(names, answer, source, folder, listen)
     file_writers = {folder / name: make for name, make in writers.items()}

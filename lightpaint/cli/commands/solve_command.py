@@ -1,6 +1,7 @@
 """`lightpaint solve`: one painting or several, their variations, and a gallery of all."""
 
 from collections.abc import Sequence
+from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,7 @@ from lightpaint.cli.output.output_mode import CommandOutcome
 from lightpaint.cli.tolerances import Tolerances
 from lightpaint.display_text import some_of
 from lightpaint.errors import LOOK_ERRORS
+from lightpaint.pipeline.frame_pictures import frames_to_write, write_frames
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.painted_views import PaintedView
 from lightpaint.pipeline.pipeline import run
@@ -32,17 +34,21 @@ def solve(
     table: Table = "short",
     tolerances: Tolerances = NO_REQUIREMENTS,
     look_set: "LookSet | None" = None,
+    frames: str | None = None,
 ) -> CommandOutcome:
     """Run `lightpaint solve SCENE|BASIS TARGET...` or `SCENE --target SENSOR=TARGET...`.
 
-    look_set: the set of looks, if there are several.
+    look_set: the set of looks, if there are several. frames: the frames of a shot to write, as
+    `parse_frames` reads them.
     """
+    chosen_frames = [frames_to_write(job, frames) for job in jobs]
     listen, shared = terminal.TerminalListener(), _SharedWork()
     results: list[tuple[Job, PaintedView, Look]] = []
+    frame_files: list[Path] = []
     # The remarks of all jobs come before the first one runs; the listener drops repeats.
     for remark in (remark for job in jobs for remark in job.remarks):
         listen.say(remark)
-    for job in jobs:
+    for job, job_frames in zip(jobs, chosen_frames, strict=True):
         listen.note(f"files read; {spoken_settings(job.fit)}")
         is_variation = look_set is not None and job.folder in look_set.variation_names
         job = shared.prepare(job, is_variation=is_variation)
@@ -57,12 +63,26 @@ def solve(
                 raise
             continue
         _show(job, looks, table)
+        if job_frames:
+            frame_files += _write_frames(job, job_frames, listen)
         results += [(job, view, look) for view, look in zip(job.views, looks, strict=True)]
     if look_set is not None:
         look_set.show(shared.bases or [])
     if jobs and not jobs[0].scenes and jobs[0].groups is None:
         terminal.say("solved from a saved basis, without a render: lightpaint relight makes one")
-    return _outcome(results, tolerances, look_set)
+    return _outcome(results, tolerances, look_set, frame_files)
+
+
+def _write_frames(job: Job, frames: Sequence[int], listen: terminal.TerminalListener) -> list[Path]:
+    """Write frames of a shot, and print which."""
+    try:
+        with listen:
+            files = write_frames(job, frames=frames, progress=listen)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt("frames that are written stay; the same command goes on") from None
+    count = f" to {files[-1].name}, {len(files)} files" if len(files) > 1 else ""
+    terminal.write(f"frames: {files[0]}{count}")
+    return files
 
 
 class _SharedWork:
@@ -95,6 +115,7 @@ def _outcome(
     results: Sequence[tuple[Job, PaintedView, Look]],
     tolerances: Tolerances,
     look_set: "LookSet | None",
+    frame_files: Sequence[Path],
 ) -> CommandOutcome:
     """Print the requirements that are not met, and return the results for programs."""
     shortfalls = [
@@ -107,7 +128,11 @@ def _outcome(
     variations = [] if look_set is None else look_set.shifted_looks
 
     def document() -> dict[str, Any]:
-        results_document = {"results": [documents.result_document(*x, tolerances) for x in results]}
+        results_document: dict[str, Any] = {
+            "results": [documents.result_document(*x, tolerances) for x in results]
+        }
+        if frame_files:
+            results_document["frames"] = [str(file) for file in frame_files]
         return results_document | ({"variations": variations} if variations else {})
 
     has_failures = look_set is not None and look_set.failures
@@ -117,9 +142,9 @@ def _outcome(
 def _show(job: Job, looks: Sequence[Look], table: Table) -> None:
     """Print the results of one job."""
     for view, look in zip(job.views, looks, strict=True):
-        if job.by_sensor:
+        if job.by_sensor or len(looks) > 1:
             terminal.write("")
-            terminal.write(f"{look.basis.origin.sensor}:")
+            terminal.write(f"{'frame ' * bool(job.sequence)}{view.folder.name}:")
         show_look(look, view.folder, table=table)
         if look is not looks[-1]:
             continue

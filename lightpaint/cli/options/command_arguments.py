@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lightpaint.cli.options.argument_order import options_but
+from lightpaint.cli.options.frame_options import is_of_frames
 from lightpaint.cli.options.job_options import (
     constraints_of,
     folders_of,
@@ -111,7 +112,9 @@ def _solve_arguments(options: Namespace, settings: Settings) -> dict[str, Any]:
         "table": options.table,
         "tolerances": Tolerances(options.max_miss, options.min_fit),
     }
-    if len(options.targets) <= 1 and not options.variations:
+    if options.frames is not None:
+        arguments["frames"] = options.frames
+    if is_of_frames(options) or (len(options.targets) <= 1 and not options.variations):
         return {"jobs": jobs_of(options, settings), **arguments}
 
     # Imported late: a single look needs no gallery.

@@ -6,11 +6,19 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lightpaint.basis.lightgroups.frame_sequence import FrameSequence
+from lightpaint.cli.options.frame_options import (
+    groups_of_frames,
+    masks_by_frame,
+    name_without_frame,
+    paintings_by_frame,
+    sequence_of,
+)
 from lightpaint.cli.options.source_options import basis_of, scene_of
 from lightpaint.cli.output.vocabulary import BY_OPTION, from_any_folder
 from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.display_text import some_names
-from lightpaint.errors import LOOK_ERRORS, OutputError, TargetError
+from lightpaint.errors import LOOK_ERRORS, LightpaintError, OutputError, TargetError
 from lightpaint.files import check_files, is_name, is_utf_8, one_line
 from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
 from lightpaint.lighting.constraints.constraints_file import read_constraints
@@ -47,6 +55,8 @@ def jobs_of(
     # Imported late: jobs import much that other commands do not need.
     from lightpaint.pipeline.job.job import Job
 
+    if (sequence := sequence_of(options)) is not None:
+        return [_job_of_frames(options, settings, sequence)]
     basis = basis_of(options)
     if options.views and options.targets:
         raise TargetError("TARGET and --target at once: give every painting with its sensor")
@@ -89,6 +99,36 @@ def jobs_of(
         for job in jobs:  # if no scene has read it
             check_files(job.results.files, [Path(options.lights_file)])
     return jobs
+
+
+def _job_of_frames(options: Namespace, settings: Settings, sequence: FrameSequence) -> "Job":
+    """Return the job of a shot whose frames are views of one lighting."""
+    from lightpaint.pipeline.job.job import Job
+
+    if options.variations:
+        raise LightpaintError("--variations are of one picture: give one frame, or leave them out")
+    paintings = paintings_by_frame(options, sequence)
+    paths, frames = list(paintings.values()), tuple(paintings)
+    options.masks = masks_by_frame(options, frames)
+    constraints = constraints_of(options)
+    if options.lights_file:
+        constraints = read_constraints(options.lights_file).and_then(constraints)
+    given = (options.targets or paths)[0]
+    [folder] = folders_of(options.output and Path(options.output), [name_without_frame(given)])
+    job = Job(
+        (),
+        tuple(_paintings_of(options, paths)),
+        folder,
+        groups_of_frames(options, sequence, frames),
+        constraints,
+        settings,
+        rigging=rigging_of(options),
+        placement=placement_of(options),
+        sequence=sequence,
+    )
+    if options.lights_file:
+        check_files(job.results.files, [Path(options.lights_file)])
+    return job
 
 
 def _scenes_of_views(options: Namespace) -> tuple[SceneFile, ...]:

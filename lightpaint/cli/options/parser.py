@@ -26,6 +26,7 @@ from lightpaint.cli.options.option_groups import (
 from lightpaint.cli.options.solve_options import (
     add_error,
     add_fit,
+    add_frames,
     add_method,
     add_paintings,
     add_pattern,
@@ -122,8 +123,8 @@ def _solve(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "source",
         metavar="SCENE|BASIS|LIGHTS",
-        help="scene XML, a *.basis.exr, or light groups of another "
-        "renderer: an EXR or a folder of them",
+        help="scene XML, a *.basis.exr, or light groups of another renderer: an EXR, a folder of "
+        "them, or the frames of a shot, 'shot.####.exr'",
     )
     add_paintings(parser)
     add_output(parser, "DIR", "result folder (default: named after the target)")
@@ -137,6 +138,7 @@ def _solve(parser: argparse.ArgumentParser) -> None:
     )
     add_several(parser)
     add_variations(parser)
+    add_frames(parser)
     add_method(parser)
     add_verification(parser)
     add_tolerances(parser)
@@ -199,8 +201,8 @@ def _export(parser: argparse.ArgumentParser) -> None:
         "--lights",
         dest="groups",
         metavar="FILE.exr",
-        help="light groups of another renderer that the lighting was solved from: an EXR or a "
-        "folder of them",
+        help="light groups of another renderer that the lighting was solved from: an EXR, a folder "
+        "of them, or the frames of a shot",
     )
     add_pattern(parser)
     parser.add_argument(

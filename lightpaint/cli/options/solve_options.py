@@ -21,8 +21,8 @@ def add_paintings(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="SENSOR=TARGET",
-        help="painting of the view through this sensor, instead of TARGET; repeat it for several "
-        "views that share one lighting",
+        help="painting of the view through this sensor, or of this frame of a shot, instead of "
+        "TARGET; repeat it for several views that share one lighting",
     )
     parser.add_argument(
         "--mask",
@@ -59,6 +59,22 @@ def _add_template(parser: argparse.ArgumentParser) -> None:
         dest="find_template",
         action="store_false",
         help="do not look for a template",
+    )
+
+
+def add_frames(parser: argparse.ArgumentParser) -> None:
+    """Add the options for the frames of a shot."""
+    parser.add_argument(
+        "--animate",
+        action="store_true",
+        help="of a shot with several painted frames: find a lighting for each, and lights that "
+        "change smoothly between them (default: one lighting for all frames)",
+    )
+    parser.add_argument(
+        "--frames",
+        metavar="all|1-48x2,60",
+        help="of a shot: also write these frames with the new lighting, as relit.####.exr; frames "
+        "that are already written for this answer are skipped (default: none)",
     )
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 from lightpaint.basis.file.basis_file import is_basis_file
 from lightpaint.basis.lightgroups.folder_files import is_exr, is_light_groups, is_own_basis
+from lightpaint.basis.lightgroups.frame_sequence import find_frames, is_pattern, spoken_frames
 from lightpaint.errors import BasisError
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile, check_needed
 
@@ -93,13 +94,19 @@ def basis_of(options: Namespace) -> BasisFile | GroupsFile | None:
     """
     source, names = Path(options.source), options.lights
     light_list = ",".join(names or ())
+    for path in filter(is_pattern, (options.source, light_list)):
+        frame = find_frames(path)
+        raise BasisError(
+            f"{path} has the frames {spoken_frames(frame.frames)}: give one of them, like "
+            f"{frame.path(frame.frames[0])}"
+        )
     basis: BasisFile | GroupsFile
     if light_list and _is_file_to_be(light_list, source):
         _check_light_groups(light_list)
         options.targets = [options.source, *options.targets]
-        basis, names = _groups_file(light_list, options), None
+        basis, names = groups_file(light_list, options), None
     elif source.suffix.lower() != ".xml" and is_light_groups(source):
-        basis = _groups_file(options.source, options)
+        basis = groups_file(options.source, options)
     elif options.pattern:
         raise BasisError(
             f"--pattern names the layers of light groups, and {source} has none: leave it out, or "
@@ -114,6 +121,15 @@ def basis_of(options: Namespace) -> BasisFile | GroupsFile | None:
             f"--target cannot be used with {basis.path}, which has only one view: give the scene "
             "to solve for several"
         )
+    check_scene_options(options, basis, names)
+    return basis
+
+
+def check_scene_options(
+    options: Namespace, basis: BasisFile | GroupsFile, names: Sequence[str] | None
+) -> None:
+    """Raise BasisError for options that are useless without a scene. names: chosen lights."""
+    light_list = ",".join(names or ())
     is_groups = isinstance(basis, GroupsFile)
     unusable_options = [name for name in LOADING if getattr(options, name) and name != "lights"]
     check_needed([*unusable_options, *(["lights"] if names and not is_groups else [])], basis)
@@ -122,10 +138,9 @@ def basis_of(options: Namespace) -> BasisFile | GroupsFile | None:
             f"--lights {light_list} chooses lights of a scene: of light groups, keep the "
             "others as they are with --lock NAME"
         )
-    return basis
 
 
-def _groups_file(path: str, options: Namespace) -> GroupsFile:
+def groups_file(path: str, options: Namespace) -> GroupsFile:
     """Return light groups; paintings in their folder are not among them."""
     pictures = (*options.targets, *(options.masks or ()))
     return GroupsFile(path, options.pattern, leave_out=pictures)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 #: Options for the arguments that errors and remarks of the library name.
 OPTIONS = {
+    "animate": "--animate",
     "cd_per_unit": "--unit",
     "colors": "--colors",
     "emitters": "--emitters",
@@ -14,6 +15,7 @@ OPTIONS = {
     "folder": "-o",
     "error": "--error",
     "force": "--force",
+    "frames": "--frames",
     "groups": "--group",
     "hold": "--hold",
     "integrator": "--integrator",

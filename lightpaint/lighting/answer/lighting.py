@@ -18,6 +18,7 @@ from lightpaint.errors import LightingError, UnknownLightError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.certificate import Certificate
 from lightpaint.lighting.answer.light_setting import ALL_REACHED, LightSetting
+from lightpaint.lighting.answer.lighting_keys import LightingKey, check_keys, key_span, weights_at
 from lightpaint.scene.properties.site import EmitterPlace
 from lightpaint.validation import BRIGHTEST
 
@@ -36,6 +37,8 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         places: Where emitters of its scene are, those that were moved and new ones with all that
             `relight` needs; none without a scene.
         up: The direction in the scene that is up, for pan and tilt.
+        animation: The lights at painted frames of a shot over which they change, at least two, in
+            order; none for lights that stay the same. `lights` are then those of the first key.
 
     Examples:
         >>> lighting = lp.read_lighting("lighting.json")
@@ -54,6 +57,7 @@ class Lighting(Shown, Mapping[str, LightSetting]):
     cd_per_unit: float | None = None
     places: tuple[EmitterPlace, ...] = ()
     up: Position = (0.0, 1.0, 0.0)
+    animation: tuple[LightingKey, ...] = ()
 
     def __repr__(self) -> str:
         rgb = [" ".join(f"{v:.4g}" for v in light.emission) for light in self.lights]
@@ -76,6 +80,7 @@ class Lighting(Shown, Mapping[str, LightSetting]):
                 f"a radiance of 1 stands for {scale:g} cd/m²: need a number > 0, at most "
                 f"{BRIGHTEST:g}"
             )
+        check_keys(self.animation, len(self.lights))
 
     def __getitem__(self, name: str) -> LightSetting:
         """Return the light of that name. Raises UnknownLightError, a KeyError, if there is none."""
@@ -186,7 +191,20 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         # Somebody chose it, whatever the basis can tell of the light.
         chosen = replace(old.with_emission(emission), reached=ALL_REACHED, untold=False)
         lights = tuple(chosen if light is old else light for light in self.lights)
-        return replace(self, lights=lights, certificate=None)
+        return replace(self, lights=lights, animation=(), certificate=None)
+
+    def at_frame(self, frame: float) -> "Lighting":
+        """Return the lighting at a frame of its shot; unchanged if it is the same at all frames."""
+        if not self.animation:
+            return self
+        pairs = zip(self.lights, weights_at(self.animation, frame), strict=True)
+        lights = tuple(x if x.is_fixed else x.with_emission(as_rgb(w)) for x, w in pairs)
+        return replace(self, lights=lights, animation=(), certificate=None)
+
+    @cached_property
+    def by_frame(self) -> Mapping[int, "Lighting"]:
+        """The lighting at each frame from the first key to the last; none if it stays the same."""
+        return {x: self.at_frame(x) for x in key_span(self.animation)} if self.animation else {}
 
     def for_target(self, target: str) -> "Lighting":
         """Return the lighting as the answer to that target."""

@@ -1,7 +1,7 @@
 """The file of a lighting, lighting.json (docs/formats.md)."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.certificate import Certificate
 from lightpaint.lighting.answer.light_setting import ALL_REACHED, LightSetting
 from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.answer.lighting_keys import LightingKey
 from lightpaint.scene.properties.site import EmitterPlace
 from lightpaint.storage.json_records import fields_of, read_record, strict_json
 from lightpaint.version import __version__
@@ -70,6 +71,8 @@ def lighting_fields(lighting: Lighting) -> dict[str, Any]:
             for light in lighting.lights
         },
     }
+    if lighting.animation:
+        data["keys"] = [_key_fields(lighting, key) for key in lighting.animation]
     if lighting.places:
         data["up"] = lighting.up
         data["places"] = {place.name: _place_fields(place) for place in lighting.places}
@@ -119,11 +122,32 @@ def read_lighting(path: str | Path) -> Lighting:
             read_record(EmitterPlace, {**place, "name": name}, others=True)
             for name, place in data.get("places", {}).items()
         )
-        return replace(lighting, lights=lights, certificate=certificate, places=places)
+        keys = tuple(_read_key(key, lights) for key in data.get("keys", ()))
+        return replace(
+            lighting, lights=lights, certificate=certificate, places=places, animation=keys
+        )
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise LightingError(f"{path} is no complete lighting: {one_line(repr(error))}") from None
     except LightingError as error:
         raise LightingError(f"{path}: {one_line(str(error))}") from None
+
+
+def _key_fields(lighting: Lighting, key: LightingKey) -> dict[str, Any]:
+    """Return a key: its frame, its painting, and the weights of lights by their names."""
+    weights = dict(zip(lighting, key.weights, strict=True))
+    return {"frame": key.frame, "target": key.target, "weights": weights}
+
+
+def _read_key(data: Mapping[str, Any], lights: Sequence[LightSetting]) -> LightingKey:
+    """Return a key that `_key_fields` described."""
+    weights, frame = data["weights"], data["frame"]
+    if type(frame) is not int:
+        raise ValueError(f"the frame of a key is a whole number, not {frame!r}")
+    if set(weights) != {light.name for light in lights}:
+        raise ValueError(f"the key of frame {frame} is of other lights")
+    values = [weights[light.name] for light in lights]
+    key = read_record(LightingKey, {**data, "frame": 0, "weights": values}, others=True)
+    return replace(key, frame=frame)
 
 
 def _read_setting(name: str, data: Mapping[str, Any]) -> LightSetting:

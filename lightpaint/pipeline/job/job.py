@@ -26,6 +26,7 @@ from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.fit import resolve_for_targets
 from lightpaint.lighting.unknowns.constraint_reduction import reduce_to
 from lightpaint.pipeline.job.job_checks import (
+    check_animation,
     check_inputs,
     check_painting_is_no_light,
     rigging_for,
@@ -141,7 +142,8 @@ class Job:
             contents[: len(self.targets)],
             with_same_lights(contents[len(self.targets) :]),
         )
-        self._set(all_groups=tuple(x for x in read if isinstance(x, LightGroups)))
+        groups = (x for x in read if isinstance(x, LightGroups))
+        self._set(all_groups=tuple(replace(x, sequence=self.sequence) for x in groups))
         bases = [x.basis if isinstance(x, LightGroups) else x for x in read]
         targets = targets_over_looks(self.targets, targets, bases)
         scenes = [content(scene) for scene in self.scenes]
@@ -163,6 +165,7 @@ class Job:
                 "lights can only hang elsewhere in their scene: give the scene, or leave "
                 "placement=... out"
             )
+        check_animation(self.settings, all_constraints, len(self.painted_frames))
         # Reports impossible constraints before rendering.
         reduce_to(all_constraints, self._lights(scenes, bases))
         if self.settings.suggest:

@@ -79,6 +79,22 @@ def with_same_lights(bases: Sequence[Basis | LightGroups]) -> list[Basis | Light
     return [*(with_equal_lights(groups) if groups else []), *saved]
 
 
+def check_animation(settings: Settings, constraints: Constraints, views: int) -> None:
+    """Raise unless lights can change over the frames of a shot. views: its painted frames."""
+    if not settings.animate:
+        return
+    if views < 2:
+        raise TargetError(
+            "animate=True needs paintings of two frames of a shot, like 'shot.####.exr': there is "
+            f"{views or 'none'}"
+        )
+    if constraints.sparse is not None:
+        raise ConstraintError(
+            "sparse chooses the lights of one lighting, not of every frame apart: leave it or "
+            "animate=True out"
+        )
+
+
 def check_target(target: object) -> None:
     """Raise TargetError for anything but a target."""
     if not isinstance(target, Target):

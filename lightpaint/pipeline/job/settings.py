@@ -59,6 +59,8 @@ class Settings(Fit):
             improving the answer; needs a scene.
         suggest: Maximum number of point lights to suggest; needs a scene. All views count.
         move_lights: Whether to move the lights that may move.
+        animate: True to find a lighting for each painted frame of a shot, and lights that change
+            smoothly between them, instead of one lighting for all.
         cd_per_unit: cd/m² that a radiance of 1 stands for, for luminous quantities in the results.
         verify: Whether to render the relit scene and compare it with the prediction, with at most
             as many samples as the basis, so that it takes no longer.
@@ -92,6 +94,7 @@ class Settings(Fit):
     refine: int = 0
     suggest: int = 0
     move_lights: bool = True
+    animate: bool = False
     cd_per_unit: float | None = None
     verify: bool = True
     verify_spp: int | None = None
@@ -115,6 +118,7 @@ class Settings(Fit):
         "refine": whole(0, MAX_REFINE),
         "suggest": whole(0, MAX_SUGGEST),
         "move_lights": SWITCH,
+        "animate": SWITCH,
         "cd_per_unit": number("cd/m²"),
         "verify": SWITCH,
         "verify_spp": whole(2, MAX_SPP),
@@ -199,6 +203,7 @@ class SettingsByName(TypedDict, total=False):
     refine: int
     suggest: int
     move_lights: bool
+    animate: bool
     cd_per_unit: float | None
     verify: bool
     verify_spp: int | None

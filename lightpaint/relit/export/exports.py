@@ -1,22 +1,28 @@
 """Exports the answer for light groups: a table, Blender, Nuke, and an image."""
 
 import csv
+import hashlib
 import io
 import math
 import re
+from collections.abc import Iterable
 from importlib import resources
 from pathlib import Path
 from string import Template
 
 import numpy as np
 
+from lightpaint.arrays import Doubles
 from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.colour.color import luminance
+from lightpaint.display_text import some_names
+from lightpaint.errors import LightingError
 from lightpaint.files import write_text
 from lightpaint.images.formats.exr import ExrPart, rgb_channels, write_parts
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.light_setting import LightSetting
 from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.answer.lighting_keys import key_slopes
 from lightpaint.relit.export.nuke import LAYERS, copied_part, needs_copy, nuke_script
 
 #: All files that `write_exports` may write.
@@ -40,7 +46,8 @@ def write_exports(folder: str | Path, groups: LightGroups, lighting: Lighting) -
 
     The files are lights.csv, a table of multipliers; set_lights.py for Blender's light groups,
     unless another renderer wrote the file; relit.nk for Nuke, with relit_layers.exr if Nuke could
-    not distinguish the layers of the file; and relit.exr, the sum with these multipliers.
+    not distinguish the layers of the file; and relit.exr, the sum with these multipliers. Of a shot
+    the scripts are for all frames, and there is no relit.exr.
 
     Args:
         folder: Folder to write to.
@@ -64,10 +71,13 @@ def write_exports(folder: str | Path, groups: LightGroups, lighting: Lighting) -
     texts = {"lights.csv": lights_table(groups, lighting)}
     if groups.renderer.startswith(BLENDER):
         texts["set_lights.py"] = blender_script(groups, lighting)
-    texts["relit.nk"] = nuke_script(groups, lighting, folder)
-    parts = {"relit.exr": relit_part(groups, lighting)}
-    if needs_copy(groups):
-        parts[LAYERS] = copied_part(groups)
+    parts: dict[str, ExrPart] = {}
+    if groups.sequence is None:  # or each frame has its own picture
+        parts["relit.exr"] = relit_part(groups, lighting)
+        if needs_copy(groups):
+            parts[LAYERS] = copied_part(groups)
+    if groups.sequence is None or not needs_copy(groups):
+        texts["relit.nk"] = nuke_script(groups, lighting, folder)
     for name, text in texts.items():
         write_text(folder / name, text)
     for name, part in parts.items():
@@ -78,10 +88,22 @@ def write_exports(folder: str | Path, groups: LightGroups, lighting: Lighting) -
 def lights_table(groups: LightGroups, lighting: Lighting) -> str:
     """Return a CSV of names, layers and multipliers, with the resulting luminance of a white light.
 
-    Stops are `off` at 0, and `unknown` for lights that reach nothing painted.
+    Stops are `off` at 0, and `unknown` for lights that reach nothing painted. Of lights that change
+    over a shot there are rows for each frame, whose number comes first.
     """
     headings = ("light", "layer", "red", "green", "blue", "luminance", "stops", "kept", "unreached")
-    rows = [_row(*headings)]
+    if not lighting.animation:
+        rows = [headings, *_light_cells(groups, lighting)]
+    else:
+        rows = [("frame", *headings)]
+        for frame, lit in lighting.by_frame.items():
+            rows += [(str(frame), *cells) for cells in _light_cells(groups, lit)]
+    return "".join(_row(*cells) for cells in rows)
+
+
+def _light_cells(groups: LightGroups, lighting: Lighting) -> list[tuple[str, ...]]:
+    """Return the cells of each light's row."""
+    rows = []
     layers = {
         light.name: layer.name
         for light, layer in zip(groups.basis.lights, groups.layers, strict=False)
@@ -91,16 +113,17 @@ def lights_table(groups: LightGroups, lighting: Lighting) -> str:
         y = float(luminance(np.array(light.weight)))
         # Adding 0 removes the sign of a negative zero.
         stops = f"{round(math.log2(y), 3) + 0.0:+.3f}" if y > 0 else "off"
-        stops = "unknown" if light.name in unreached else stops
+        is_known = light.name not in unreached and any(light.reached)
+        stops = stops if is_known else "unknown"
         numbers = [f"{v:.9g}" for v in (*light.weight, y)]
         is_fixed_text = "yes" if light.is_fixed else "no"
         # Undetermined channels, whose multipliers are unchanged.
-        notes_html = "".join(
+        notes = "".join(
             c for c, is_reached in zip("RGB", light.reached, strict=True) if not is_reached
         )
         names = map(plain_cell, (light.name, layers.get(light.name, "")))
-        rows.append(_row(*names, *numbers, stops, is_fixed_text, notes_html))
-    return "".join(rows)
+        rows.append((*names, *numbers, stops, is_fixed_text, notes))
+    return rows
 
 
 def plain_cell(text: str) -> str:
@@ -121,21 +144,53 @@ def _row(*cells: str) -> str:
 
 def blender_script(groups: LightGroups, lighting: Lighting) -> str:
     """Return a Python script for Blender that multiplies the lights in each light group."""
-    rows = [f"    {light.name!r}: {_tuple(light)},\n" for light in _free(lighting)]
+    rows = [f"    {light.name!r}: {_rgb(light.weight)},\n" for light in _free(lighting)]
     template = resources.files("lightpaint.relit.export").joinpath("set_lights.py.in")
     return Template(template.read_text(encoding="utf-8")).substitute(
         target=_in_docstring(lighting.target),
-        source=_in_docstring(groups.path.name),
+        source=_in_docstring(groups.name),
         multipliers="{\n" + "".join(rows) + "}",
-        render=repr(groups.basis.origin.scene_identity),
+        keys="{\n" + "".join(_key_rows(lighting)) + "}",
+        render=repr(render_identity(groups)),
     )
+
+
+def render_identity(groups: LightGroups) -> str:
+    """Return the identity of the render that multipliers belong to.
+
+    It is the same for all frames of a shot, which are one render of one scene, whichever of them is
+    painted: that of the files of the first.
+    """
+    if groups.sequence is None:
+        return groups.basis.origin.scene_identity
+    path = groups.sequence.path(groups.sequence.frames[0])
+    digest = hashlib.sha256()
+    for file in sorted(path.iterdir()) if path.is_dir() else [path]:
+        if file.is_file():
+            with file.open("rb") as stream:
+                digest.update(hashlib.file_digest(stream, "sha256").digest())
+    return digest.hexdigest()[:32]
+
+
+def _key_rows(lighting: Lighting) -> list[str]:
+    """Return the keys of each adjusted light: frame, multipliers, and their slopes per frame."""
+    keys, rows = lighting.animation, []
+    slopes = key_slopes(keys) if keys else np.empty((0, 0, 3))
+    for i, light in enumerate(lighting.lights):
+        if light.is_fixed or not keys:
+            continue
+        rows.append(f"    {light.name!r}: [\n")
+        for key, slope in zip(keys, slopes, strict=True):
+            rows.append(f"        ({key.frame}, {_rgb(key.weights[i])}, {_rgb(slope[i])}),\n")
+        rows.append("    ],\n")
+    return rows
 
 
 def relit_part(groups: LightGroups, lighting: Lighting) -> ExrPart:
     """Return Σ multiplier × layer with the rest and the alpha of the beauty, in the file's
     precision.
     """
-    image = groups.basis.mix(lighting.weights_for(groups.basis))
+    image = groups.basis.mix(_weights(groups, lighting))
     channels = rgb_channels(image)
     if groups.beauty is not None and groups.beauty.alpha is not None:
         channels["A"] = groups.beauty.alpha.astype(np.float32)
@@ -147,12 +202,28 @@ def relit_part(groups: LightGroups, lighting: Lighting) -> ExrPart:
     return ExrPart("relit", channels)
 
 
+def _weights(groups: LightGroups, lighting: Lighting) -> Doubles:
+    """Return the weights (n, 3) of the lights of a frame, which may have a `rest` or lack it where
+    the lighting does not.
+    """
+    if groups.basis.names == tuple(lighting):
+        return lighting.weights_for(groups.basis)
+    names = groups.basis.names[: len(groups.layers)]
+    if sorted(names) != sorted(light.name for light in lighting.lights if light.plugin != "rest"):
+        raise LightingError(
+            f"{groups.path} has the light groups {some_names(names)}, the lighting is of "
+            f"{some_names(lighting)}: render all frames with the same groups"
+        )
+    lights = [lighting[name].weight for name in names]
+    return np.array([*lights, *([(1.0, 1.0, 1.0)] * groups.has_rest)], np.float64)
+
+
 def _free(lighting: Lighting) -> list[LightSetting]:
     return [light for light in lighting.lights if not light.is_fixed]
 
 
-def _tuple(light: LightSetting) -> str:
-    return "(" + ", ".join(f"{v:.9g}" for v in light.weight) + ")"
+def _rgb(values: Iterable[float]) -> str:
+    return "(" + ", ".join(f"{v:.9g}" for v in values) + ")"
 
 
 def _in_docstring(text: str) -> str:

@@ -10,7 +10,7 @@ import csv
 import io
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal
 
@@ -90,11 +90,26 @@ class Fixture:
 
 def fixtures_of(lighting: Lighting) -> list[Fixture]:
     """Return a fixture for every light of `lighting`, in the same order."""
+    full = _full_levels([lighting])
+    return [_fixture(lighting, light, full) for light in lighting.lights]
+
+
+def _fixtures_by_frame(lighting: Lighting) -> dict[int, list[Fixture]]:
+    """Return the fixtures at each frame of a shot, whose dimmers have one scale over all frames."""
+    full = _full_levels([*lighting.by_frame.values()])
+    return {
+        frame: [_fixture(lit, light, full) for light in lit.lights]
+        for frame, lit in lighting.by_frame.items()
+    }
+
+
+def _full_levels(lightings: Sequence[Lighting]) -> dict[str, float]:
+    """Return the brightest channel of adjusted lights by unit, for which a dimmer is at full."""
     full: dict[str, float] = {}
-    for light in lighting.lights:
+    for light in (light for lighting in lightings for light in lighting.lights):
         if not light.is_fixed:
             full[light.unit] = max(full.get(light.unit, 0.0), *light.emission)
-    return [_fixture(lighting, light, full) for light in lighting.lights]
+    return full
 
 
 def _fixture(lighting: Lighting, light: LightSetting, full: Mapping[str, float]) -> Fixture:
@@ -163,22 +178,32 @@ COLUMNS = (
 
 
 def fixtures_csv(lighting: Lighting) -> str:
-    """Return a table with a line for each fixture; undefined numbers are empty cells."""
+    """Return a table with a line for each fixture; undefined numbers are empty cells.
+
+    Of lights that change over a shot there are lines for each frame, whose number comes first.
+    """
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
-    table.writerow(COLUMNS)
-    for fixture in fixtures_of(lighting):
-        record = asdict(fixture)
-        dmx_values = record.pop("dmx") or dict.fromkeys(("dimmer", "red", "green", "blue"))
-        place = record.pop("place") or asdict(FixturePlace())
-        record["emitters"] = " ".join(fixture.emitters)
-        cells = (*record.values(), *dmx_values.values(), *place.values())
-        table.writerow([_cell(value) for value in cells])
+    if not lighting.animation:
+        table.writerows([COLUMNS, *map(_cells_of, fixtures_of(lighting))])
+        return text.getvalue()
+    table.writerow(("frame", *COLUMNS))
+    for frame, fixtures in _fixtures_by_frame(lighting).items():
+        table.writerows([[str(frame), *_cells_of(fixture)] for fixture in fixtures])
     return text.getvalue()
 
 
+def _cells_of(fixture: Fixture) -> list[str]:
+    """Return the cells of a fixture's line."""
+    record = asdict(fixture)
+    dmx_values = record.pop("dmx") or dict.fromkeys(("dimmer", "red", "green", "blue"))
+    place = record.pop("place") or asdict(FixturePlace())
+    record["emitters"] = " ".join(fixture.emitters)
+    return [_cell(x) for x in (*record.values(), *dmx_values.values(), *place.values())]
+
+
 def fixtures_json(lighting: Lighting) -> str:
-    """Return the fixtures as a JSON document."""
+    """Return the fixtures as a JSON document, of lights that change also those of each frame."""
     document: dict[str, Any] = {
         "format": FORMAT,
         "lightpaint": __version__,
@@ -186,6 +211,11 @@ def fixtures_json(lighting: Lighting) -> str:
         "cd_per_unit": lighting.cd_per_unit,
         "fixtures": [asdict(fixture) for fixture in fixtures_of(lighting)],
     }
+    if lighting.animation:
+        document["frames"] = [
+            {"frame": frame, "fixtures": [asdict(fixture) for fixture in fixtures]}
+            for frame, fixtures in _fixtures_by_frame(lighting).items()
+        ]
     return json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 

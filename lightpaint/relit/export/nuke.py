@@ -56,7 +56,8 @@ def nuke_script(groups: LightGroups, lighting: Lighting, folder: Path) -> str:
             lines.append(f"add_layer {{{name} {name}.red {name}.green {name}.blue {name}.alpha}}")
     lines += _node("StickyNote", inputs="0", name="lightpaint_note", label=quoted(_note(groups)))
     for k, file in enumerate(files):
-        lines += [*_node("Read", inputs="0", **_file_knobs(file), raw="true", name=f"Read_{k}")]
+        knobs = _file_knobs(file, groups)
+        lines += [*_node("Read", inputs="0", **knobs, raw="true", name=f"Read_{k}")]
         lines.append(f"set R{k} [stack 0]")
 
     # Multipliers refer to Rec.709; the result is converted back to the primaries of the file.
@@ -83,6 +84,11 @@ def nuke_script(groups: LightGroups, lighting: Lighting, folder: Path) -> str:
 
 def spoken_unreadable(groups: LightGroups, folder: Path) -> list[str]:
     """Return a remark if relit.nk in `folder` cannot name a file that it reads."""
+    if groups.sequence is not None and needs_copy(groups):
+        return [
+            f"Nuke cannot tell the layers of {one_line(str(groups.path))} apart, so there is no "
+            "relit.nk of its shot"
+        ]
     lights, beauty = _sources(groups, folder)
     files = dict.fromkeys(x.file for x in [*lights, *([beauty] if beauty is not None else [])])
     if not (bad := [file for file in files if _is_evaluated(file)]):
@@ -155,11 +161,18 @@ def _sources(groups: LightGroups, folder: Path) -> tuple[list[_Source], _Source 
     return sources, None if layer is None else _Source(layer.file, nuke_layer(layer))
 
 
-def _file_knobs(file: Path) -> dict[str, str]:
-    """Return the knobs for a file, or a request to choose it if Nuke would change its name."""
-    if not _is_evaluated(file):
+def _file_knobs(file: Path, groups: LightGroups) -> dict[str, str]:
+    """Return the knobs for a file, or a request to choose it if Nuke would change its name.
+
+    Of a shot they name all frames.
+    """
+    if _is_evaluated(file):
+        return {"file": '""', "label": quoted(f"choose by hand: {_plain(file.name)}")}
+    if (sequence := groups.sequence) is None:
         return {"file": quoted(_path(file))}
-    return {"file": '""', "label": quoted(f"choose by hand: {_plain(file.name)}")}
+    name = _path(sequence.with_hashes(file, sequence.frame_of(groups.path)))
+    first, last = sequence.frames[0], sequence.frames[-1]
+    return {"file": quoted(name), "first": str(first), "last": str(last)}
 
 
 def _is_evaluated(file: Path) -> bool:
@@ -185,20 +198,36 @@ def _sum(groups: LightGroups, lighting: Lighting, shuffled: Sequence[list[str]])
     each light.
     """
     lines: list[str] = []
-    settings, labels = {light.name: light for light in lighting.lights}, list[str]()
+    labels: list[str] = []
     for k, (light, nodes) in enumerate(zip(groups.basis.lights, shuffled, strict=False)):
-        r, g, b = (f"{v:.9g}" for v in settings[light.name].weight)
         labels.append(free_name(_plain(light.name), labels))
         lines += nodes + _node(
             "Multiply",
             channels="rgb",
-            value=f"{{{r} {g} {b} 1}}",
+            value=_multipliers(lighting, light.name),
             name=f"Light_{k}",
             label=quoted(labels[-1]),
         )
         if k or groups.has_rest:
             lines += _node("Merge2", inputs="2", operation="plus", name=f"Sum_{k}")
     return lines
+
+
+def _multipliers(lighting: Lighting, name: str) -> str:
+    """Return the multipliers of a light, of lights that change as curves with a key at each frame.
+
+    One more key at each end keeps a curve level there.
+    """
+    if not lighting.animation:
+        return "{" + " ".join(f"{v:.9g}" for v in (*lighting[name].weight, 1)) + "}"
+    span = lighting.by_frame
+    frames = [min(span) - 1, *span, max(span) + 1]
+    weights = [lighting.at_frame(frame)[name].weight for frame in frames]
+    curves = []
+    for c in range(3):
+        keys = [f"x{x} {rgb[c]:.9g}" for x, rgb in zip(frames, weights, strict=True)]
+        curves.append(f"{{curve {' '.join(keys)}}}")
+    return "{" + " ".join(curves) + " 1}"
 
 
 def _rest(lights: Sequence[_Source], beauty: _Source | None, files: Sequence[Path]) -> list[str]:
@@ -229,7 +258,7 @@ def _node(kind: str, **knobs: str) -> list[str]:
 
 def _note(groups: LightGroups) -> str:
     return (
-        f"lightpaint: light groups of {_plain(groups.path.name)}, multiplied as solved. "
+        f"lightpaint: light groups of {_plain(groups.name)}, multiplied as solved. "
         "Should a Shuffle show black, choose its layer by hand: its Multiply bears the name."
     )
 

@@ -17,7 +17,12 @@ TAG = "light:lpetag"
 
 
 def usd_multipliers(
-    multipliers: Mapping[str, RGB], stage: Path, folder: Path, *, about: str = ""
+    multipliers: Mapping[str, RGB],
+    stage: Path,
+    folder: Path,
+    *,
+    about: str = "",
+    by_frame: Mapping[int, Mapping[str, RGB]] | None = None,
 ) -> Overrides:
     """Return a layer that multiplies lights of a stage.
 
@@ -29,6 +34,8 @@ def usd_multipliers(
         stage: The USD file, which becomes a sublayer.
         folder: The folder of the layer.
         about: Text for the layer's comment.
+        by_frame: The multipliers at each frame, of lights that change over a shot: they become time
+            samples instead.
 
     Returns:
         The layer; its `left` has the groups without a light, and those whose lights are animated,
@@ -51,7 +58,11 @@ def usd_multipliers(
             left.append(group)
             continue
         for prim in members:
-            _multiply(layer_stage.OverridePrim(prim.GetPath()), prim, multiplier)
+            override = layer_stage.OverridePrim(prim.GetPath())
+            if not by_frame:
+                _multiply(override, prim, multiplier, Usd.TimeCode.Default())
+            for frame, at_frame in (by_frame or {}).items():
+                _multiply(override, prim, at_frame[group], Usd.TimeCode(frame))
     layer.subLayerPaths.append(Path(os.path.relpath(stage, folder)).as_posix())
     like_stage(layer, stage)
     return Overrides(layer.ExportToString(), tuple(left))
@@ -94,18 +105,18 @@ def _is_animated(prim: Any) -> bool:
     return any(attribute.ValueMightBeTimeVarying() for attribute in attributes)
 
 
-def _multiply(override: Any, prim: Any, multiplier: RGB) -> None:
-    """Scale intensity and colour. The greatest multiplier goes to the intensity, so that the colour
-    stays between 0 and 1 where it was.
+def _multiply(override: Any, prim: Any, multiplier: RGB, time: Any) -> None:
+    """Scale intensity and colour at a time. The greatest multiplier goes to the intensity, so that
+    the colour stays between 0 and 1 where it was.
     """
     from pxr import Gf, UsdLux
 
     present, light = UsdLux.LightAPI(prim), UsdLux.LightAPI(override)
     greatest = max(multiplier)
-    light.CreateIntensityAttr(present.GetIntensityAttr().Get() * max(greatest, 0.0))
+    intensity = present.GetIntensityAttr().Get() * max(greatest, 0.0)
+    light.CreateIntensityAttr().Set(intensity, time)
     if greatest <= 0:
         return
     color = present.GetColorAttr().Get()
-    light.CreateColorAttr(
-        Gf.Vec3f(*(c * m / greatest for c, m in zip(color, multiplier, strict=True)))
-    )
+    scaled = Gf.Vec3f(*(c * m / greatest for c, m in zip(color, multiplier, strict=True)))
+    light.CreateColorAttr().Set(scaled, time)
