@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from lightpaint.basis.basis import Basis as Basis
     from lightpaint.basis.file.basis_file import write_basis as write_basis
     from lightpaint.basis.file.basis_reader import read_basis as read_basis
+    from lightpaint.basis.lightgroups.frame_sequence import FrameSequence as FrameSequence
+    from lightpaint.basis.lightgroups.frame_sequence import find_frames as find_frames
     from lightpaint.basis.lightgroups.light_groups import LightGroups as LightGroups
     from lightpaint.basis.lightgroups.light_groups import read_light_groups as read_light_groups
     from lightpaint.basis.render.basis_render import render_basis as render_basis
@@ -71,6 +73,7 @@ if TYPE_CHECKING:
     from lightpaint.lighting.solution import Solution as Solution
     from lightpaint.lighting.solve import solve as solve
     from lightpaint.paint.notebook.widget import Painter as Painter
+    from lightpaint.pipeline.frame_pictures import relight_frames as relight_frames
     from lightpaint.pipeline.job.job import Job as Job
     from lightpaint.pipeline.job.settings import Settings as Settings
     from lightpaint.pipeline.job.sources import Painting as Painting
@@ -114,6 +117,7 @@ _HOMES = {
     "Diagnosis": "lighting.analysis.diagnosis",
     "Estimate": "images.estimate",
     "Fit": "lighting.fit",
+    "FrameSequence": "basis.lightgroups.frame_sequence",
     "Freedom": "placement.freedom",
     "Job": "pipeline.job.job",
     "LightGroups": "basis.lightgroups.light_groups",
@@ -147,6 +151,7 @@ _HOMES = {
     "diagnose": "lighting.analysis.diagnosis",
     "display_picture": "images.formats.png",
     "error_bars": "lighting.analysis.noise.uncertainty",
+    "find_frames": "basis.lightgroups.frame_sequence",
     "load_scene": "scene.scene_reader",
     "paint_with_light": "pipeline.one_call",
     "place": "placement.place",
@@ -157,6 +162,7 @@ _HOMES = {
     "read_target": "target.target_reader",
     "refine": "lighting.analysis.noise.refinement",
     "relight": "relit.relight",
+    "relight_frames": "pipeline.frame_pictures",
     "render_basis": "basis.render.basis_render",
     "render_template": "pipeline.templates",
     "template_of_basis": "pipeline.templates",

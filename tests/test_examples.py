@@ -37,7 +37,9 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     lp.write_lighting(folder / "lighting.json", lighting)
     (folder / "hall.lights.toml").write_text("[light.bulb]\noff = true\n", "utf-8")
     groups = zip(("fill", "key", "rim"), pictures(), strict=True)
-    interleaved(folder / "groups.exr", {f"RGBA_{name}": image for name, image in groups})
+    layers = {f"RGBA_{name}": image for name, image in groups}
+    for name in ("groups", "shot.0001", "shot.0002"):
+        interleaved(folder / f"{name}.exr", layers)
     return folder
 
 

@@ -19,8 +19,8 @@ from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of, solve_tethered
 
 #: Strength of the tie between two neighbouring keys, relative to the loss of a painted picture. On
-#: a shot of 24 frames (docs/method.md) it takes a fifth of the flicker out of four inexact
-#: paintings; ten times as much makes pictures of two worse by half.
+#: a shot of 24 frames (benchmarks/frames.py) it takes a third of the flicker out of four inexact
+#: paintings; ten times as much doubles the error of pictures between two.
 TIE = 1e-2
 
 #: Largest number of rounds over all frames, and the change of a weight, relative to the largest, at

@@ -80,8 +80,8 @@ class Problem(LinearProblem):
         refinement: The last step that improved an answer, if there was one.
         dimming: (n,), the factor by which an earlier answer dims lights, which strengthens the
             pull to their colours; None without one.
-        tether: A further pull on the weights, to those at other frames of a shot; None without.
         block_side: Pixels along the side of the blocks behind `corrected`; 1 for single pixels.
+        tether: A further pull on the weights, to those at other frames of a shot; None without.
 
     Examples:
         >>> problem = lp.Problem.of(basis, target)
@@ -103,8 +103,8 @@ class Problem(LinearProblem):
     noise_removed: float = 0.0
     refinement: Refinement | None = None
     dimming: Doubles | None = None
-    tether: NormalEquations | None = None
     block_side: int = 1
+    tether: NormalEquations | None = None
 
     __repr__ = short_repr
 

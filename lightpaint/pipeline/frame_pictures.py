@@ -45,7 +45,7 @@ def frames_to_write(job: Job, text: str | None) -> tuple[int, ...]:
 
 
 @keywords()
-def write_frames(
+def relight_frames(
     job: Job, *, frames: Sequence[int] | str = "all", progress: Progress = silent
 ) -> list[Path]:
     """Write relit.####.exr, the frames of a shot with the lighting that `run` found for it.
@@ -64,6 +64,16 @@ def write_frames(
     Raises:
         BasisError: If the job has no sequence, or that none of these frames.
         OutputError: For a file of such a name that is no such picture, unless `force` is set.
+
+    Examples:
+        >>> from pathlib import Path
+        >>> shot = lp.find_frames("shot.####.exr")
+        >>> first = lp.read_light_groups(shot.path(1))
+        >>> wish = lp.Target.of(2 * first.basis.current_look)
+        >>> job = lp.Job((), (wish,), Path("brighter"), first, sequence=shot)
+        >>> [look] = lp.run(job)
+        >>> [file.name for file in lp.relight_frames(job)]
+        ['relit.0001.exr', 'relit.0002.exr']
     """
     listen, lighting = listener(progress), read_lighting(job.folder / LIGHTING)
     frames = frames_to_write(job, frames) if isinstance(frames, str) else tuple(frames)

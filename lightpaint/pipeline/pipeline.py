@@ -8,22 +8,20 @@ from typing import Any
 from lightpaint.basis.basis import Basis
 from lightpaint.images.estimate import Estimate, write_estimate
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.analysis import Analysis, analyse, with_findings
+from lightpaint.lighting.analysis.analysis import Analysis
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solve import solution_of
-from lightpaint.pipeline.animated_answer import animated_answer
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.painted_views import PaintedView
 from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job_answer import answer_job
 from lightpaint.pipeline.job_bases import obtain_bases_of, view_listener
 from lightpaint.pipeline.move_advice import suggest_move
-from lightpaint.pipeline.needed_samples import add_needed_samples, problem_of, without_noise
+from lightpaint.pipeline.needed_samples import add_needed_samples
 from lightpaint.pipeline.placed_lights import place_lights
 from lightpaint.pipeline.results.answer_folder import (
     AnswerFolder,
     new_answer,
     reload_relit,
-    with_places,
 )
 from lightpaint.pipeline.results.results import Look, write_predicted, write_report
 from lightpaint.placement.placement import Placement
@@ -31,13 +29,10 @@ from lightpaint.placement.suggestions.light_search import suggest_lights
 from lightpaint.placement.suggestions.suggestion import MoveSuggestion, Suggestion
 from lightpaint.progress import Listener, Progress, listener, silent
 from lightpaint.relit.detection_power import LightShares, with_light_tests
-from lightpaint.relit.render_rounds import refine_by_rendering
 from lightpaint.relit.sample_budget import VerificationBudget, verification_budget
 from lightpaint.relit.sequential_verification import verify_in_stages
 from lightpaint.relit.verification import Verification
 from lightpaint.relit.verification_render import verify
-from lightpaint.report.basis_memo import make_ahead
-from lightpaint.report.page.page import prepare_page
 from lightpaint.scene.scene import Scene
 
 
@@ -68,26 +63,13 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
     job, obtained, placement = place_lights(job, obtain_bases_of(job, bases, listen), listen)
     if job.settings.error is not None:
         obtained = add_needed_samples(job, obtained, listen)
-    if job.settings.animate:
-        lighting, analyses = animated_answer(job, obtained, listen)
-        rig = _RigFindings(placement)
-    else:
-        problem = problem_of(job, obtained)
-        del obtained
-        if job.settings.report:
-            for basis in problem.views.bases:
-                make_ahead(basis, prepare_page)
-        solution = _reduce_noise(job, solution_of(problem), listen)
-        del problem  # some of its arrays are as large as the pictures
-        analyses = analyse(solution)
-        solution.problem.squares.release()
-        lighting = with_findings(solution, analyses).lighting
-        rig = _suggest(job, solution, placement, listen)
-    scene = job.views[0].scene
+    found = answer_job(job, obtained, listen)
+    rig = _suggest(job, found.solution, placement, listen)
+    lighting, scene = found.lighting, job.views[0].scene
     with new_answer(job.results, lighting, scene=scene, groups=job.groups) as answer:
         looks = [
             _finish_view(job, answer, view, analysis, rig, view_listener(job, view, listen))
-            for view, analysis in zip(job.views, analyses, strict=True)
+            for view, analysis in zip(job.views, found.analyses, strict=True)
         ]
     return [_reloaded(look) for look in looks] if answer.has_moved_paths else looks
 
@@ -99,24 +81,6 @@ class _RigFindings:
     placement: Placement | None
     suggestions: tuple[Suggestion, ...] | None = None
     move: MoveSuggestion | None = None
-
-
-def _reduce_noise(job: Job, solution: Solution, listen: Listener) -> Solution:
-    """Return the solution corrected for noise and refined by rendering, as the settings ask."""
-    settings, certificate = job.settings, solution.certificate
-    listen.note(
-        f"solved in {max(certificate.sweeps)} sweeps, to a KKT residual of "
-        f"{max(certificate.kkt_residual):.1e}"
-    )
-    solution = without_noise(job, solution)
-    pairs = zip((view.scene for view in job.views), solution.problem.views.bases, strict=True)
-    scenes = [(scene, basis) for scene, basis in pairs if scene is not None]
-    solution = refine_by_rendering(
-        scenes, solution, rounds=settings.refine, seed=settings.seed, progress=listen
-    )
-    lighting = replace(solution.lighting, cd_per_unit=settings.cd_per_unit)
-    lighting = with_places(lighting, job.views[0].scene)
-    return replace(solution, lighting=lighting)
 
 
 def _reloaded(look: Look) -> Look:

@@ -122,6 +122,7 @@ def test_every_word_of_the_table_is_an_argument_of_the_library() -> None:
     keywords |= {*inspect.signature(lightpaint.Job).parameters}
     keywords |= {*inspect.signature(paint_in_browser).parameters}
     keywords |= {*inspect.signature(Source).parameters, *inspect.signature(RunOptions).parameters}
+    keywords |= {*inspect.signature(lightpaint.relight_frames).parameters}
     assert {*NOT_IN_GROUPS, *LOADING} <= set(OPTIONS)
     assert {*OPTIONS, *(text.partition("=")[0] for text in SPELLINGS)} <= keywords
 

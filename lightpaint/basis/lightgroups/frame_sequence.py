@@ -13,6 +13,7 @@ from pathlib import Path
 
 from lightpaint.display_text import some_of, visible
 from lightpaint.errors import BasisError
+from lightpaint.keywords import keywords
 
 #: The signs for a frame number. Their number of characters, or the digit in them, is its least
 #: length.
@@ -25,14 +26,21 @@ _RANGE = re.compile(r"(-?\d+)(?:-(-?\d+)(?:x(\d+))?)?")
 MAX_FRAMES = 100_000
 
 
+@keywords()
 @dataclass(frozen=True)
 class FrameSequence:
-    """The frames that exist of a sequence.
+    """The frames that exist of a sequence, as `find_frames` returns them.
 
-    pattern: the path, with a sign such as `####` for the number. folder: the part of it that has
-    no sign, although its name may look as if it had.
-    numbers: the number of each frame as its path has it, `0012`, by frame, in order.
-    files: the file or folder of each frame.
+    Attributes:
+        pattern: The path, with a sign such as `####` for the number.
+        folder: The part of it that has no sign, although a name in it may look as if it had.
+        numbers: The number of each frame as its path has it, `0012`, by frame, in order.
+        files: The file or folder of each frame.
+
+    Examples:
+        >>> shot = lp.find_frames("shot.####.exr")
+        >>> shot.frames, shot.path(2).name
+        ((1, 2), 'shot.0002.exr')
     """
 
     pattern: str
@@ -76,8 +84,20 @@ def is_pattern(path: str | Path) -> bool:
     return SIGN.search(str(path)) is not None and not Path(path).exists()
 
 
+@keywords()
 def find_frames(pattern: str | Path) -> FrameSequence:
-    """Return the frames of a pattern. Raises BasisError if there are none."""
+    """Find the frames of a sequence.
+
+    Args:
+        pattern: Path with a sign for the number: `####`, `%04d`, `@@@@`, `$F4` or `<F4>`.
+
+    Raises:
+        BasisError: If there are none.
+
+    Examples:
+        >>> lp.find_frames("shot.%04d.exr").frames
+        (1, 2)
+    """
     parts, literal = Path(pattern).parts, 0
     # A folder that exists may have a sign in its name.
     while literal < len(parts) - 1 and Path(*parts[: literal + 1]).is_dir():

@@ -12,7 +12,7 @@ from lightpaint.cli.output.output_mode import CommandOutcome
 from lightpaint.cli.tolerances import Tolerances
 from lightpaint.display_text import some_of
 from lightpaint.errors import LOOK_ERRORS
-from lightpaint.pipeline.frame_pictures import frames_to_write, write_frames
+from lightpaint.pipeline.frame_pictures import frames_to_write, relight_frames
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.painted_views import PaintedView
 from lightpaint.pipeline.pipeline import run
@@ -77,7 +77,7 @@ def _write_frames(job: Job, frames: Sequence[int], listen: terminal.TerminalList
     """Write frames of a shot, and print which."""
     try:
         with listen:
-            files = write_frames(job, frames=frames, progress=listen)
+            files = relight_frames(job, frames=frames, progress=listen)
     except KeyboardInterrupt:
         raise KeyboardInterrupt("frames that are written stay; the same command goes on") from None
     count = f" to {files[-1].name}, {len(files)} files" if len(files) > 1 else ""

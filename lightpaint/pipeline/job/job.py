@@ -87,10 +87,10 @@ class Job:
         constraints: Constraints on the lights; they override those of the scene's lights file.
         settings: Settings of the solve.
         by_sensor: True to write the pictures to a folder for each sensor, as with several views.
-        sequence: The frames of the shot whose light groups are in `basis`.
         rigging: Lights that may move, and lights to add; needs a scene. It overrides that of the
             scene's lights file.
         placement: Places found earlier for several looks; then there is no search.
+        sequence: The frames of the shot whose light groups are in `basis`.
         views: Set on creation: the views, each with what it needs.
         all_constraints: Set on creation: all constraints, the lights file's first.
         all_rigging: Set on creation: all rigging, the lights file's first.

@@ -158,8 +158,8 @@ def blender_script(groups: LightGroups, lighting: Lighting) -> str:
 def render_identity(groups: LightGroups) -> str:
     """Return the identity of the render that multipliers belong to.
 
-    It is the same for all frames of a shot, which are one render of one scene, whichever of them is
-    painted: that of the files of the first.
+    Frames of a shot are one render of one scene, whichever is solved for: theirs is that of the
+    files of the first.
     """
     if groups.sequence is None:
         return groups.basis.origin.scene_identity
