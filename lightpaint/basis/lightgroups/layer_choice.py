@@ -121,7 +121,7 @@ def _by_convention(
     if len(views) > 1:
         remarks.append(
             f"of the view layers {some_names(views)} the first is taken: "
-            f"pattern='{views[1]}.Combined_{NAME_FIELD}' takes {views[1]}"
+            f"pattern='{views[1]}{convention.joint}Combined_{NAME_FIELD}' takes {views[1]}"
         )
     matches = [m for m in matches if (m.groupdict().get("view") or "") == view]
     _check_not_stereo([m[0] for m in matches], file_name)
@@ -131,7 +131,7 @@ def _by_convention(
     lights = {name: layer for name, layer in lights.items() if name not in whole}
     rest = [name for name in layers if name not in [*lights.values(), *whole.values()]]
     optional = [name for name in rest if name.casefold() in convention.optional]
-    first = convention.beauty.replace("{view}", f"{view}." if view else "")
+    first = convention.beauty.replace("{view}", f"{view}{convention.joint}" if view else "")
     return LayerChoice(
         convention.renderer,
         lights,

@@ -16,6 +16,10 @@ PREFIX_PATTERN = r"(?:(?P<prefix>.+?)[ ._-])??"
 #: Other versions of a layer, which would count a light twice. A pattern may still match them.
 OTHER_VERSION = re.compile(r".*[ _.](denoised?|denoising|variance|mse|noisy|albedo|normal)", re.I)
 
+#: Where Blender is told the group of a light, and to write the whole picture.
+CYCLES_GROUP = "Light Group in the properties of the object (under Shading) or of the world"
+CYCLES_BEAUTY = "Combined under Passes in the properties of the view layer"
+
 #: Characters that separate parts of a name.
 SEPARATORS = " ._-"
 
@@ -30,6 +34,7 @@ class Convention:
     whole: name of a group that contains all lights, if the renderer has one.
     optional: layers, in lower case, that belong to the sum in some versions and settings.
     light: template for the name of a light.
+    joint: what stands between a view layer and the rest of a name.
     group_setting: where the renderer is told the group of a light.
     beauty_setting: where it is told to write the whole picture beside the groups.
     """
@@ -40,6 +45,7 @@ class Convention:
     whole: str | None = None
     optional: tuple[str, ...] = ()
     light: str = NAME_FIELD
+    joint: str = "."
     group_setting: str = ""
     beauty_setting: str = ""
 
@@ -49,8 +55,17 @@ CONVENTIONS = (
         "Blender Cycles",
         re.compile(r"(?:(?P<view>.+)\.)?Combined_(?P<name>.+)"),
         "{view}Combined",
-        group_setting="Light Group in the properties of the object (under Shading) or of the world",
-        beauty_setting="Combined under Passes in the properties of the view layer",
+        group_setting=CYCLES_GROUP,
+        beauty_setting=CYCLES_BEAUTY,
+    ),
+    Convention(
+        # Nuke makes underscores of all characters but letters and digits, dots included.
+        "Blender Cycles, written by Nuke",
+        re.compile(r"(?!Combined_)(?P<view>\w+?)_Combined_(?P<name>\w+)", re.A),
+        "{view}Combined",
+        joint="_",
+        group_setting=CYCLES_GROUP,
+        beauty_setting=CYCLES_BEAUTY,
     ),
     Convention(
         "Arnold",

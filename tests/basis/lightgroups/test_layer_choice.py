@@ -32,6 +32,26 @@ CASES: list[tuple[str, list[str], dict[str, str], str | None]] = [
         "ViewLayer.Combined",
     ),
     ("Blender Cycles", ["Combined", "Combined_a"], {"a": "Combined_a"}, "Combined"),
+    ("Blender Cycles", ["Combined_a_Combined_b"], {"a_Combined_b": "Combined_a_Combined_b"}, None),
+    (
+        "Blender Cycles, written by Nuke",
+        ["View_Layer_Combined", "View_Layer_Combined_Key_Area", "View_Layer_Combined_sun"],
+        {"Key_Area": "View_Layer_Combined_Key_Area", "sun": "View_Layer_Combined_sun"},
+        "View_Layer_Combined",
+    ),
+    (
+        "Blender Cycles, written by Nuke",
+        ["", "ViewLayer_Combined_sun", "ViewLayer_Normal"],
+        {"sun": "ViewLayer_Combined_sun"},
+        "",
+    ),
+    # With "Split per LPE Tag" Karma splits its beauty, C, by the tags of lights.
+    (
+        "Karma",
+        ["", "C_Key", "C_Fill", "C_Rim", "beautyunshadowed"],
+        {"Key": "C_Key", "Fill": "C_Fill", "Rim": "C_Rim"},
+        "",
+    ),
     (
         "Arnold",
         ["", "RGBA_key", "RGBA_default", "diffuse_key", "N"],

@@ -1,6 +1,6 @@
 """Light groups of other renderers, as files: read, held against the beauty, solved on."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -430,3 +430,32 @@ def test_a_light_that_takes_light_away_is_named_first(tmp_path: Path, position: 
     images[position] = np.abs(images[position])
     images[position, ::3] *= -0.1
     read_light_groups(interleaved(tmp_path / "b.exr", _layers(images)))
+
+
+@pytest.mark.parametrize("in_parts", [False, True])
+@pytest.mark.parametrize(
+    ("layers", "names"),
+    [
+        (("ViewLayer_Combined_key", "ViewLayer_Combined_fill"), {"key", "fill"}),
+        (("RGBA_key", "RGBA_fill"), {"key", "fill"}),
+        (("C_key", "C_fill"), {"key", "fill"}),
+        (("VRayLightSelect_key", "VRayLightSelect_fill"), {"key", "fill"}),
+        (("RADIANCE_GROUP_0", "RADIANCE_GROUP_1"), {"group_0", "group_1"}),
+        (("Light_1", "Light_2"), {"light_1", "light_2"}),
+    ],
+)
+def test_layers_as_nuke_writes_them(
+    tmp_path: Path, layers: Sequence[str], names: set[str], in_parts: bool
+) -> None:
+    images = pictures(2)
+    colors = ("red", "green", "blue")
+    beauty = channels("", images.sum(axis=0))
+    parts = [(x, channels(x, y, names=colors)) for x, y in zip(layers, images, strict=True)]
+    if in_parts:
+        file = write(tmp_path / "nuke.exr", ("rgba", beauty), *parts)
+    else:
+        file = write(tmp_path / "nuke.exr", ("", beauty | parts[0][1] | parts[1][1]))
+    groups = read_light_groups(file)
+    assert set(groups.basis.names) == names
+    assert groups.beauty is not None
+    assert groups.missing == pytest.approx(0, abs=1e-6)
