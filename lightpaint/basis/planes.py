@@ -221,7 +221,8 @@ def joined_planes(
     views = []
     for part, (start, end) in zip(parts, pairwise(ends), strict=True):
         for plane, image in zip(joint[:, start:end], part, strict=True):
-            plane[...] = image.reshape(-1, 3)
+            if image.any():  # zeros that nobody writes, as of unknown noise, take no memory
+                plane[...] = image.reshape(-1, 3)
         views.append(MemoryPlanes(joint[:, start:end].reshape(n, *part.size, 3)))
     return MemoryPlanes(joint.reshape(n, rows, width, 3)), tuple(views)
 

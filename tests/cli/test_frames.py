@@ -67,9 +67,11 @@ def test_several_frames_are_views_of_one_lighting(tmp_path: Path) -> None:
     for frame in (1, 4):
         paint(tmp_path, frame, SET[1])
     paint(tmp_path, 2, SET[1], "other")
-    output = succeed(tmp_path, "solve", "shot.%04d.exr", "p.####.exr", "-o", "out")
-    assert "frame 0001:" in output
-    assert "frame 0004:" in output
+    completed = run(tmp_path, "solve", "shot.%04d.exr", "p.####.exr", "-o", "out")
+    assert completed.returncode == 0, completed.stderr
+    assert "one lighting for the frames 1, 4: --animate finds one for each" in completed.stderr
+    assert "frame 0001:" in completed.stdout
+    assert "frame 0004:" in completed.stdout
     np.testing.assert_allclose(weights_in(tmp_path / "out"), SET[1], atol=EXACT)
     assert (tmp_path / "out" / "0004" / "report.html").is_file()
     assert sorted(x.name for x in (tmp_path / "out").glob("relit.*.exr")) == [

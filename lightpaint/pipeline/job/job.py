@@ -13,7 +13,7 @@ from typing import Any
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.cached_render import check_same_view
-from lightpaint.basis.lightgroups.frame_sequence import FrameSequence
+from lightpaint.basis.lightgroups.frame_sequence import FrameSequence, spoken_frames
 from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.basis.lights import Lights
 from lightpaint.basis.render.render_origin import basis_lights
@@ -296,6 +296,11 @@ class Job:
             remarks += groups.remarks
         if self.groups is not None:
             remarks += spoken_unreadable(self.groups, self.folder)
+        if len(self.painted_frames) > 1 and not self.settings.animate:
+            remarks.append(
+                f"one lighting for the frames {spoken_frames(self.painted_frames)}: animate=True "
+                "finds one for each, and lights that change between them"
+            )
         rendered_scenes = [] if self.basis is not None else [x.scene for x in self.views if x.scene]
         if (first := self.views[0].scene) is not None:
             remarks += remarks_of_scene(first, is_rendered=bool(rendered_scenes))
