@@ -36,6 +36,7 @@ from lightpaint.scene.properties.film import Film, camera_named, reduced, reduct
 from lightpaint.scene.properties.integrator import Integrator, IntegratorChoice
 from lightpaint.scene.properties.pose import Pose, motion_of, upward_axis
 from lightpaint.scene.properties.site import EmitterPlace, Site
+from lightpaint.scene.runtime.kernel_threads import kernels
 from lightpaint.scene.runtime.mitsuba_errors import mitsuba_errors, render_errors
 from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.scene.scene_files import SceneFiles
@@ -310,7 +311,7 @@ class Scene(SceneFiles, Shown):
         """Return the result of `work` on the loaded scene, which is released afterwards."""
         loaded = self.load(emission, views=views)
         try:
-            with render_errors(self.path):
+            with render_errors(self.path), kernels():
                 return work(loaded)
         finally:
             del loaded
