@@ -47,6 +47,7 @@ def test_wheel_solves_the_demo_in_an_empty_folder(built: Path, tmp_path: Path):
     [wheel] = built.glob("*.whl")
     site, folder = tmp_path / "site", tmp_path / "empty"
     command = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index"]
+    command.append("--no-compile")  # what is imported is compiled then
     subprocess.run([*command, "--target", site, wheel], check=True)
     folder.mkdir()
     environment = {"PYTHONPATH": str(site), "LIGHTPAINT_CACHE": str(tmp_path / "cache")}
@@ -69,6 +70,7 @@ def test_wheel_solves_the_demo_in_an_empty_folder(built: Path, tmp_path: Path):
     assert len(answer) == 12
 
 
+@pytest.mark.long  # beside the one that takes long, for one worker builds for all three
 def test_source_distribution_has_all_that_the_checks_want(built: Path):
     [archive] = built.glob("*.tar.gz")
     with tarfile.open(archive) as file:
@@ -82,6 +84,7 @@ def test_source_distribution_has_all_that_the_checks_want(built: Path):
     assert all(x.isfile() for x in members.values())  # what was a link is a file
 
 
+@pytest.mark.long
 def test_wheel_has_no_more_than_it_needs(built: Path):
     [wheel] = built.glob("*.whl")
     names = zipfile.ZipFile(wheel).namelist()

@@ -115,21 +115,21 @@ def test_a_swatch_is_the_colour_that_is_named(
 
 def test_of_many_lights_the_ten_that_matter_and_what_the_others_do(tmp_path: Path, make_basis: Any):
     rng = np.random.default_rng(2)
-    power = np.where(np.arange(302) % 31 == 5, 1, 0.01)[:, None, None, None]
-    names = [f"light_{k:03d}" for k in range(302)]
-    images = power * rng.random((302, 8, 40, 3))
-    basis = make_basis(images=images, names=names, emission=[[0.1] * 3] * 302)
+    power = np.where(np.arange(125) % 13 == 5, 1, 0.01)[:, None, None, None]
+    names = [f"light_{k:03d}" for k in range(125)]
+    images = power * rng.random((125, 8, 40, 3))
+    basis = make_basis(images=images, names=names, emission=[[0.1] * 3] * 125)
     write_basis(tmp_path / "b.basis.exr", basis)
-    write_rgb(tmp_path / "p.exr", basis.mix(np.full((302, 3), 0.2)))
+    write_rgb(tmp_path / "p.exr", basis.mix(np.full((125, 3), 0.2)))
     output = succeed(tmp_path, *SOLVE)
     rows = [line for line in output.splitlines() if line.startswith("light_")]
-    assert [row.split()[0] for row in rows] == [f"light_{k:03d}" for k in range(5, 302, 31)]
-    [rest] = [line for line in output.splitlines() if line.startswith("and 292 more")]
+    assert [row.split()[0] for row in rows] == [f"light_{k:03d}" for k in range(5, 125, 13)]
+    [rest] = [line for line in output.splitlines() if line.startswith("and 115 more")]
     listed_share = sum(float(re.findall(r"([\d.]+) %", row)[-1]) for row in rows)
     stated_share = float(re.findall(r"together ([\d.]+) % of the picture", rest)[0])
     assert listed_share + stated_share == pytest.approx(100, abs=1.2)
     counts = re.findall(r"(\d+) (?:off|switched|fixed|brighter|dimmer|as)", rest)
-    assert sum(map(int, counts)) == 292
+    assert sum(map(int, counts)) == 115
 
 
 @pytest.mark.parametrize(
