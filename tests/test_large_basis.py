@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from nightly import nightly
 from PIL import Image
 
 import lightpaint as lp
@@ -102,7 +103,7 @@ def test_results_are_those_of_planes_in_memory(
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("grain", [0.02, NOISY])
+@pytest.mark.parametrize("grain", [0.02, nightly(NOISY)])
 def test_memory_of_a_large_film_is_that_of_a_few_pictures(
     tmp_path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch, grain: float
 ) -> None:

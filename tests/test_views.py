@@ -232,6 +232,7 @@ def test_the_same_view_twice_has_the_scatter_of_independent_ones(make_basis: Any
     assert (twice > single_errors * (np.sqrt(0.5) - 1e-9)).all()
 
 
+@pytest.mark.nightly  # by day, those of two views are those of their joint problem, above
 def test_error_bars_of_two_views_hold(room: Path) -> None:
     scenes = [load_scene(room, sensor=name) for name in ("camera", "close")]
     weights = np.random.default_rng(6).uniform(0.2, 2, (4, 3))

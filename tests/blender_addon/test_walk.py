@@ -8,6 +8,7 @@ import numpy as np
 import OpenEXR
 import pytest
 from blender import found_in_blender, in_blender
+from nightly import nightly
 
 HERE = Path(__file__).parent
 
@@ -80,7 +81,7 @@ def block_means(image: Any, side: int = 10) -> Any:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("view", ["Filmic", "AgX"])
+@pytest.mark.parametrize("view", [nightly("Filmic"), "AgX"])
 def test_known_lamps_are_found_from_a_picture_in_blenders_view(
     view: str, blender: list[str], tmp_path: Path, variables: dict[str, str]
 ) -> None:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from nightly import nightly
 from qp import least
 from scipy.optimize import nnls
 
@@ -107,7 +108,11 @@ def test_all_scenes_have_paintings() -> None:
     assert {name.partition("/")[0] for name in PAINTINGS} == scenes
 
 
-@pytest.mark.parametrize("name", PAINTINGS)
+#: By day sums of some, and the lightings of all.
+SUMMED = [name if k % 4 == 0 else nightly(name) for k, name in enumerate(PAINTINGS)]
+
+
+@pytest.mark.parametrize("name", SUMMED)
 def test_sums_over_pixels_are_those_of_numpy(planes: Planes, name: str) -> None:
     basis = planes(name)
     target = _painting(name, basis)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from nightly import nightly
 from renderer import write_room
 
 import lightpaint as lp
@@ -100,8 +101,8 @@ def test_nothing_is_added_where_nothing_is_missed(room: Scene, basis: lp.Basis) 
 @pytest.mark.parametrize(
     ("freedom", "distance"),
     [
-        (lp.Freedom(surfaces=("wall",), clear=0.2), lambda p: p[2] - (-1 + 0.2)),
-        (
+        nightly(lp.Freedom(surfaces=("wall",), clear=0.2), lambda p: p[2] - (-1 + 0.2)),
+        nightly(
             lp.Freedom(rails=(((-1, 1.4, 0.5), (1, 1.4, 0.5)), ((-1, 1.4, 0.5), (-1, 1.4, -0.5)))),
             lambda p: p[1] - 1.4,
         ),

@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 from conftest import BasisFactory
+from nightly import nightly
 from scipy.stats import kstest
 
 from lightpaint.images.estimate import Estimate
@@ -66,7 +67,7 @@ def judged(make_basis: BasisFactory, is_painted: bool) -> tuple[np.ndarray, np.n
     return np.array(z), np.einsum("sic,sic->s", deviation, np.array(errors)) / light
 
 
-@pytest.mark.parametrize("is_painted", [False, True])
+@pytest.mark.parametrize("is_painted", [nightly(False), True])
 def test_z_is_standard_normal_where_the_prediction_is_true(
     make_basis: BasisFactory, is_painted: bool
 ):
@@ -78,7 +79,7 @@ def test_z_is_standard_normal_where_the_prediction_is_true(
     assert kstest(z, "norm").pvalue > 1e-3
 
 
-@pytest.mark.parametrize("is_painted", [False, True])
+@pytest.mark.parametrize("is_painted", [nightly(False), True])
 def test_fitting_darkens_the_prediction_by_less_than_a_thousandth(
     make_basis: BasisFactory, is_painted: bool
 ):

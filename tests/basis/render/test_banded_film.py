@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from nightly import nightly
 from renderer import assert_equal_bits
 
 import lightpaint.scene.scene_render
@@ -78,7 +79,7 @@ def test_bands_have_the_bits_of_the_whole_film(
     assert len(band_memory) > 8
 
 
-@pytest.mark.parametrize("after", [2, 6, 11])
+@pytest.mark.parametrize("after", [nightly(2), 6, nightly(11)])
 def test_an_interrupted_band_goes_on_to_the_same_bits(
     small_room: Scene,
     whole_basis: Basis,

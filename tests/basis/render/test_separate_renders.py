@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from nightly import nightly
 from renderer import LIGHTS, SAME_SAMPLES, mitsuba_render, same_basis, write_room
 
 import lightpaint.scene.scene_render
@@ -76,8 +77,8 @@ def test_an_image_is_the_mean_of_renders_of_that_light_alone(scene: Scene) -> No
         assert np.abs(basis.images[k] - mean).max() <= 4 * SAME_SAMPLES * mean.max()
 
 
-@pytest.mark.parametrize("through_a_file", [True, False])
-@pytest.mark.parametrize("after", [1, 2, 5, 8, 11])
+@pytest.mark.parametrize("through_a_file", [True, nightly(False)])
+@pytest.mark.parametrize("after", [nightly(1), 2, nightly(5), nightly(8), 11])
 def test_interrupted_and_gone_on_is_as_if_never_interrupted(
     scene: Scene, tmp_path: Path, after: int, through_a_file: bool
 ) -> None:

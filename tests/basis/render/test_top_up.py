@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from nightly import nightly
 from renderer import LIGHTS, SAME_SAMPLES, render_in_parts, same_basis, write_room
 
 import lightpaint.scene.scene_render
@@ -140,7 +141,7 @@ def test_uniform_samples_go_on_after_a_top_up(small_room: Scene, counts: Any):
     same_basis(render_in_parts(small_room, spp=24, start=before), after)
 
 
-@pytest.mark.parametrize("most", [1, 7, 2**20])
+@pytest.mark.parametrize("most", [nightly(1), 7, 2**20])
 def test_batches_change_no_bit(
     small_room: Scene, counts: Any, monkeypatch: pytest.MonkeyPatch, most: int
 ):
