@@ -268,6 +268,7 @@ def test_a_worker_killed_in_the_middle_of_a_basis_costs_one_part(
     assert list(spool.iterdir()) == []
 
 
+@pytest.mark.nightly  # by day, one is killed in the middle of a basis
 def test_a_worker_killed_in_the_middle_of_a_look_costs_one_try(
     workers: Workers, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:

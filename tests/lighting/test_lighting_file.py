@@ -190,8 +190,8 @@ def test_no_lighting_at_all(tmp_path: Path, content: bytes):
 def test_a_file_cut_off_anywhere(good_file: tuple[Path, dict[str, Any]]):
     path, _ = good_file
     content = path.read_bytes()
-    # All but the final newline is needed.
-    for length in range(len(content) - 1):
+    # All but the final newline is needed; `test_damage` cuts another everywhere, by night.
+    for length in (*range(0, len(content) - 2, 7), len(content) - 2):
         path.write_bytes(content[:length])
         with pytest.raises(LightingError):
             read_lighting(path)

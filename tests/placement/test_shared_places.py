@@ -60,6 +60,7 @@ def painted_direction(room: Scene) -> np.ndarray:
     return np.array(moved_room.light("beam").members[0].site.direction)
 
 
+@pytest.mark.nightly  # by day, two looks share places above
 def test_a_look_given_twice_is_one_look(room: Scene, bases: tuple[Basis, Basis]) -> None:
     look, free = solved(bases, bulb=4, panel=0.2), {"bulb": lp.Freedom(within=1.5)}
     one, two = (lp.place(room, bases[0], looks, free) for looks in (look, [look, look]))

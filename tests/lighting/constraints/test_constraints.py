@@ -27,7 +27,7 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 SAME = 1e-9
 
 #: Random problems for each kind of constraint.
-PROBLEMS = list(seeds(20, 60))
+PROBLEMS = list(seeds(8, 60))
 
 
 def _problem(make_basis: Any, seed: int, n: int = 4, *, scalar: tuple[int, ...] = ()) -> Any:

@@ -230,7 +230,7 @@ def test_kkt_residual_by_hand():
     assert kkt_residual(np.array([-7.0, 0.0]), off_gradient, 2.0, 0.0, 4.0) == 0.5
 
 
-@pytest.mark.parametrize("seed", seeds(20, 60))
+@pytest.mark.parametrize("seed", seeds(8, 60))
 def test_lights_with_one_weight_agree_with_scipy_on_the_joint_problem(seed: int):
     rng = np.random.default_rng(seed)
     n, pixels = int(rng.integers(1, 9)), 80
