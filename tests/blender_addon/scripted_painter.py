@@ -38,7 +38,7 @@ class ScriptedPainter:
     def __init__(self) -> None:
         found = running_painter(controller.session.folder.session)
         self._socket, self._seq = SocketClient.open(*found), 0
-        self.ask("hello", version=3)
+        self.state = self.ask("hello", version=3)
 
     def ask(self, kind: str, covered: Any = None, **fields: Any) -> dict[str, Any]:
         """Send a request, and return its answer."""
@@ -56,13 +56,13 @@ class ScriptedPainter:
                 assert answer["kind"] != "failed", answer["text"]
                 return answer
 
-    def brighten(self, width: int, height: int, *, gain: float) -> None:
+    def brighten(self, width: int, height: int, *, gain: float, stroke: int = 1) -> None:
         """Ask for more light in the left third of the picture."""
         covered = array.array("f", [float(x < width // 3) for x in range(width)] * height)
         self.ask(
             "paint",
             covered,
-            stroke=1,
+            stroke=stroke,
             region=[0, height, 0, width],
             is_final=True,
             label="brighter",

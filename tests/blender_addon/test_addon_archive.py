@@ -13,7 +13,8 @@ from blender import in_blender
 from command import run, run_refused
 
 import lightpaint
-from lightpaint.cli.commands.blender_command import ADDON_NAME, packed_addon
+from lightpaint.blender_addon.painter.program import WRITER_FILE
+from lightpaint.cli.commands.blender_command import ADDON_NAME, own_program, packed_addon
 
 FOLDER = Path(lightpaint.__file__).parent / "blender_addon"
 MODULES = sorted(FOLDER.rglob("*.py"))
@@ -35,6 +36,15 @@ def test_the_archive_is_an_extension_and_an_addon() -> None:
     assert ast.literal_eval(addon)["blender"] == (3, 4, 0)
     version = ".".join(map(str, ast.literal_eval(addon)["version"]))
     assert version == manifest["version"] == lightpaint.__version__
+
+
+def test_the_archive_names_the_program_that_has_written_it() -> None:
+    packed = zipfile.ZipFile(io.BytesIO(packed_addon("/opt/light paint/bin/lightpaint")))
+    named = packed.read(f"{ADDON_NAME}/{WRITER_FILE.name}").decode()
+    assert named == "/opt/light paint/bin/lightpaint\n"
+    assert set(packed.namelist()) - {f"{ADDON_NAME}/{WRITER_FILE.name}"} == set(
+        zipfile.ZipFile(io.BytesIO(packed_addon())).namelist()
+    )
 
 
 def test_equal_sources_make_equal_archives() -> None:
@@ -67,7 +77,7 @@ def test_nothing_of_the_library_imports_the_addon() -> None:
 def test_the_command_replaces_its_own_archives_only(tmp_path: Path) -> None:
     assert run(tmp_path, "blender").returncode == 0
     assert run(tmp_path, "blender").returncode == 0
-    assert (tmp_path / "lightpaint-blender.zip").read_bytes() == packed_addon()
+    assert (tmp_path / "lightpaint-blender.zip").read_bytes() == packed_addon(own_program())
     (tmp_path / "mine.zip").write_bytes(b"mine")
     assert "--force" in run_refused(tmp_path, "blender", "-o", "mine.zip")
     assert (tmp_path / "mine.zip").read_bytes() == b"mine"
@@ -79,6 +89,6 @@ def test_blender_installs_the_archive(
     blender: list[str], tmp_path: Path, variables: dict[str, str]
 ) -> None:
     archive = tmp_path / "lightpaint-blender.zip"
-    archive.write_bytes(packed_addon())
+    archive.write_bytes(packed_addon("/opt/bin/lightpaint"))
     script = Path(__file__).parent / "install.py"
     in_blender(blender, script, archive, variables=variables)

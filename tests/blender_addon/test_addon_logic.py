@@ -13,7 +13,7 @@ from live_server import RunningServer
 
 from lightpaint.blender_addon.lamps.group_names import group_bytes, group_name, stem
 from lightpaint.blender_addon.lamps.lamp_units import are_equal, scaled, scaled_colour
-from lightpaint.blender_addon.painter import socket_client
+from lightpaint.blender_addon.painter import program, socket_client
 from lightpaint.blender_addon.painter.painter_messages import (
     PROTOCOL_VERSION,
     PainterState,
@@ -153,3 +153,23 @@ def test_a_program_that_is_missing_is_told_with_what_to_do(
         find_program()
     with pytest.raises(FileNotFoundError, match="correct it in the preferences"):
         find_program("/nowhere/lightpaint")
+
+
+def test_the_program_that_wrote_the_addon_comes_before_that_on_the_path(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    programs = {}
+    for name in ("writer", "path"):
+        programs[name] = tmp_path / name / "lightpaint"
+        programs[name].parent.mkdir()
+        programs[name].write_text("#!/bin/sh\n")
+        programs[name].chmod(0o755)
+    monkeypatch.setenv("PATH", str(programs["path"].parent))
+    monkeypatch.setattr(program, "WRITER_FILE", tmp_path / "PROGRAM")
+    assert find_program() == str(programs["path"])
+    program.WRITER_FILE.write_text(f"{programs['writer']}\n")
+    assert find_program() == str(programs["writer"])
+    # Of another machine, or uninstalled since.
+    programs["writer"].unlink()
+    assert find_program() == str(programs["path"])
+    assert find_program(str(programs["path"])) == str(programs["path"])

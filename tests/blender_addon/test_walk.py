@@ -29,7 +29,11 @@ def test_the_lamps_follow_a_painter_and_everything_comes_back(
     assert found["groups"] == ["Area", "Point", "Screen", "Sky", "Spot", "Sun", "Tube"]
     assert found["rendered once"]
     assert found["output is put back"]
+    # The painter shows the shot as Blender does, and that makes no difference to watts.
+    assert found["view"] in found["shown view"]["name"]
+    assert found["relit once"]
     assert np.allclose(found["still unpainted"], ENERGIES)
+    assert np.allclose(found["still discarded"], ENERGIES)
     assert found["lamps follow"]
     assert found["kept by the file"]
     assert found["painter has ended"]

@@ -18,8 +18,9 @@ from scripted_painter import (
 from shots import SIZE, new_shot
 
 folder = sys.argv[-1]
-found = {}
-new_shot()
+view = "AgX" if bpy.app.version >= (4, 0) else "Filmic"
+found = {"view": view}
+new_shot(view=view)
 start_addon(os.path.join(folder, "shot"))
 before = contents()
 
@@ -32,8 +33,15 @@ found["rendered once"] = os.stat(render_file).st_mtime_ns == written
 found["output is put back"] = contents()["output"] == before["output"]
 
 painter = open_painter()
+found["shown view"] = painter.state["transform"]
 found["still unpainted"] = [lamp.energy for lamp in bpy.data.lights]
-painter.brighten(*SIZE, gain=4.0)
+painter.brighten(*SIZE, gain=2.0)
+wait_until(lambda: bpy.ops.lightpaint.discard.poll(), "a preview")
+bpy.ops.lightpaint.discard()
+wait_until(has_answer, "an exact answer to what was discarded")
+found["still discarded"] = [lamp.energy for lamp in bpy.data.lights]
+painter.brighten(*SIZE, gain=4.0, stroke=2)
+wait_until(lambda: bpy.ops.lightpaint.discard.poll(), "a preview of what was painted since")
 wait_until(has_answer, "an exact answer")
 painter.ask("save_look", name="Evening")
 wait_until(lambda: controller.session.state.looks, "a look")
@@ -58,6 +66,9 @@ settings = bpy.context.scene.lightpaint_settings
 settings.folder = os.path.join(folder, "relit")
 bpy.context.scene.cycles.seed = 7
 bpy.ops.lightpaint.render()
+written = os.stat(relit_file := os.path.join(folder, "relit", "shot.exr")).st_mtime_ns
+bpy.ops.lightpaint.render()
+found["relit once"] = os.stat(relit_file).st_mtime_ns == written
 settings.folder = os.path.join(folder, "shot")
 
 bpy.context.scene.frame_set(10)

@@ -13,7 +13,7 @@ class LightpaintPreferences(bpy.types.AddonPreferences):
 
     program: bpy.props.StringProperty(
         name="Program",
-        description="The program lightpaint, if it is not on the PATH",
+        description="The program lightpaint, if Blender does not find it by itself",
         subtype="FILE_PATH",
     )
 

@@ -5,6 +5,7 @@ Nothing here is Blender's data, so undo and loading leave it alone.
 """
 
 import atexit
+import contextlib
 import os
 import traceback
 from typing import Any
@@ -16,7 +17,7 @@ from ..lamps.lamp_levels import PREVIEWS, discard_levels, grouped_places
 from ..lamps.memory import recall, remember
 from ..painter.program import find_program
 from ..shot.cycles_render import RENDERING, ShotRender, put_back_output
-from ..shot.shot_files import ShotFolder
+from ..shot.shot_home import home, move_image_paths, shot_folder
 from ..shot.view_options import plain_options, view_options
 from .live_session import LiveSession
 
@@ -40,27 +41,27 @@ class Controller:
         self.render: ShotRender | None = None
         self.session: LiveSession | None = None
         self.solve: Any = None
-        self.message, self.is_error, self.left, self._then_paint = "", False, [], False
+        self.message, self.is_error, self.left, self._then = "", False, [], None
 
     def say(self, text, *, is_error=False):
         """Show a sentence in the panel."""
         self.message, self.is_error = text, is_error
         redraw()
 
-    def begin_render(self, render, scene, *, then_paint):
-        """Start a render; the painter opens when it is done. Return whether it is done already."""
-        self.render, self._then_paint = render, then_paint
+    def begin_render(self, render, scene, *, then=None):
+        """Start a render. then: called with scene and view layer when it is done."""
+        self.render, self._then = render, then
         self.say("Cycles renders the light groups …")
         render.start(scene, waits=bpy.app.background)
         start_timer()
         if bpy.app.background:
             self.tick()
 
-    def begin_paint(self, scene, view_layer, folder):
+    def begin_paint(self, scene, view_layer):
         """Start the painter on a rendered shot. Raises OSError with what to do."""
         program = self.check_program()
         self.end_paint()
-        self.session = LiveSession(folder, scene, view_layer)
+        self.session = LiveSession(shot_folder(scene), scene, view_layer)
         view, variables = view_options(scene, ocio_path())
         self.session.start(program, view, variables, plain_options(scene) if variables else None)
         self.say("")
@@ -82,19 +83,46 @@ class Controller:
         if self.session is not None:
             self.session.end()
         self.session = None
+        self.follow_file()
+
+    @property
+    def is_painting(self):
+        """True while there is a painter, or one that starts."""
+        return self.session is not None and not self.session.is_over
+
+    @property
+    def is_busy(self):
+        """True while anything works on a shot's files."""
+        return self.render is not None or self.solve is not None or self.is_painting
+
+    def follow_file(self):
+        """Bring the shots to where the file's name asks for, once nothing works on them."""
+        if self.is_busy or not home.has_to_follow:
+            return
+        source = home.path
+        try:
+            home.follow()
+        except OSError as error:
+            text = error.strerror or error
+            self.say(f"the shot stays in {source}: {text}", is_error=True)
+            return
+        move_image_paths(source, home.path)
+        self.say(f"the shot is kept in {home.path.name}")
 
     def tick(self):
         """Look at all that runs. Return whether anything is left that could run."""
         if self.render is not None:
             self._look_at_render()
         if self.session is not None and self.session.tick():
+            if self.session.has_moved_lamps and self.solve is None and not self.is_error:
+                self.message = ""  # it was about lamps that have changed since
             redraw()
         if self.solve is not None and self.solve.tick():
             text, is_error = self.solve.result
             self.solve = None
             self.say(text, is_error=is_error)
-        has_session = self.session is not None and not self.session.is_over
-        return self.render is not None or self.solve is not None or has_session
+        self.follow_file()
+        return self.is_busy
 
     def _look_at_render(self):
         render = self.render
@@ -111,27 +139,14 @@ class Controller:
             push_undo("lightpaint Render")
         self.say(error or "the shot is rendered", is_error=bool(error))
         scene = bpy.data.scenes.get(render.scene_name)
-        if not error and self._then_paint and scene is not None:
+        if not error and self._then and scene is not None:
             try:
-                self.begin_paint(scene, scene.view_layers[render.layer_name], render.folder)
-            except OSError as failure:
+                self._then(scene, scene.view_layers[render.layer_name])
+            except (OSError, ValueError) as failure:
                 self.say(str(failure), is_error=True)
 
 
 controller = Controller()
-
-
-def shot_folder(scene):
-    """Return the folder of a scene's shot: the chosen one, or one beside the .blend."""
-    chosen = scene.lightpaint_settings.folder
-    if chosen:
-        return ShotFolder(bpy.path.abspath(chosen))
-    name = bpy.path.clean_name(scene.name) or "scene"
-    if bpy.data.filepath:
-        stem = os.path.splitext(bpy.data.filepath)[0]
-        return ShotFolder(os.path.join(f"{stem}.lightpaint", name))
-    # A file without a name has no folder of its own until it is saved.
-    return ShotFolder(os.path.join(bpy.app.tempdir, "lightpaint", name))
 
 
 def preferences_of():
@@ -152,7 +167,7 @@ def redraw():
     """Draw the panels again."""
     for window in bpy.context.window_manager.windows if bpy.context.window_manager else ():
         for area in window.screen.areas:
-            if area.type in ("VIEW_3D", "PROPERTIES"):
+            if area.type in ("VIEW_3D", "PROPERTIES", "IMAGE_EDITOR"):
                 area.tag_redraw()
 
 
@@ -200,6 +215,7 @@ def on_undo(*_):
     """Discard a preview that an undone step had taken along, so that one undo takes all back."""
     if controller.session is not None:
         controller.session.forget_places()
+        controller.session.hold_lamps()
     for scene in bpy.data.scenes:
         discard_preview(scene)
 
@@ -209,9 +225,19 @@ def on_load(*_):
     """End what belongs to another file, and put back what a render had set when this was saved."""
     controller.end_paint()
     controller.reset()
+    home.open(bpy.data.filepath)
     for scene in bpy.data.scenes:
         if scene.library is None and RENDERING in recall(scene):
             put_back_output(scene)
+
+
+@persistent
+def on_save(*_):
+    """Bring the shots beside a file that has another name now."""
+    if home.rename(bpy.data.filepath):
+        controller.follow_file()
+    if home.has_to_follow and controller.is_painting:
+        controller.say("the shot goes beside the file when the painter ends")
 
 
 def discard_preview(scene):
@@ -225,18 +251,27 @@ def discard_preview(scene):
     return True
 
 
+def _on_exit():
+    """End the painter, and let its shot follow the file; Blender's own data has gone by now."""
+    if controller.session is not None:
+        controller.session.end()
+    with contextlib.suppress(OSError):
+        home.follow()
+
+
 HANDLERS = (
     ("render_complete", on_render_complete),
     ("render_cancel", on_render_cancel),
     ("undo_post", on_undo),
     ("load_post", on_load),
+    ("save_post", on_save),
 )
 
 
 def register():
     for name, handler in HANDLERS:
         getattr(bpy.app.handlers, name).append(handler)
-    atexit.register(controller.end_paint)
+    atexit.register(_on_exit)
 
 
 def unregister():
@@ -245,6 +280,6 @@ def unregister():
         if handler in handlers:
             handlers.remove(handler)
     controller.end_paint()
-    atexit.unregister(controller.end_paint)
+    atexit.unregister(_on_exit)
     if bpy.app.timers.is_registered(_on_timer):
         bpy.app.timers.unregister(_on_timer)

@@ -8,13 +8,27 @@ from bpy_extras.io_utils import ImportHelper
 
 from ..painter.solves import AREAS, BackgroundWork, make_template, solve_like, solve_picture
 from ..shot.image_files import edited_image, image_file
+from ..shot.shot_home import shot_folder
 from ..shot.view_options import plain_options, view_options
-from .controller import controller, ocio_path, shot_folder
+from .controller import controller, ocio_path
 from .live_session import show_preview
-from .shot_operators import ShotOperator, is_rendered, prepare_shot
+from .shot_operators import ShotOperator, begin_shot
 
-#: Labels of the areas that are compared.
-NAMES = {"whole": "Whole", "regions": "Regions", "parts": "Same View"}
+#: Labels of the areas that are compared, and what they ask for.
+NAMES = {
+    "whole": ("Whole", "Its colour, and the light of its lit parts and its shadows"),
+    "regions": ("Regions", "Also the light of its top, its middle and its bottom"),
+    "parts": ("Same View", "The light of nine parts: for a picture of this scene from here"),
+}
+
+#: Name in Blender of the picture to paint over.
+IMAGE_NAME = "lightpaint painting"
+
+#: Seconds after which Blender knows how large a new window is.
+FIT_S = 0.3
+
+#: Number of thumbnails among Blender's ways to list files.
+THUMBNAILS = 3
 
 
 class PendingSolve:
@@ -47,16 +61,24 @@ class SolveOperator(ShotOperator):
     def poll(cls, context):
         return super().poll(context) and controller.solve is None
 
-    def begin(self, context, text, finish, function, *arguments):
-        """Start a function of `solves` with program and shot as its first arguments."""
-        program, folder = controller.check_program(), shot_folder(context.scene)
-        prepare_shot(context)
-        if not is_rendered(context.scene, context.view_layer, folder):
-            raise ValueError("the shot has changed, or is not rendered yet: press Render first")
-        folder.check_writable()
-        work = BackgroundWork(function, program, str(folder.render), *arguments)
-        pending = PendingSolve(work, finish, context.scene, context.view_layer)
-        controller.begin_solve(pending, text)
+    def begin(self, context, text, finish, function, arguments):
+        """Start a function of `solves` once the shot is rendered.
+
+        arguments: called with the path of the shot's folder, returns the function's arguments after
+        program and shot.
+        """
+        program = controller.check_program()
+
+        def start(scene, view_layer):
+            folder = shot_folder(scene)
+            folder.check_writable()
+            work = BackgroundWork(
+                function, program, str(folder.render), *arguments(str(folder.path))
+            )
+            controller.begin_solve(PendingSolve(work, finish, scene, view_layer), text)
+
+        if not begin_shot(context, then=start):
+            start(context.scene, context.view_layer)
         return ""
 
 
@@ -66,11 +88,13 @@ class LIGHTPAINT_OT_paint_over(SolveOperator):
     bl_idname, bl_label = "lightpaint.paint_over", "Paint Over in Blender"
 
     def run(self, context):
-        folder = os.path.join(shot_folder(context.scene).path, "template")
         views = views_of(context.scene)
-        return self.begin(
-            context, "the picture to paint over is made …", open_image, make_template, folder, views
-        )
+
+        def arguments(folder):
+            return os.path.join(folder, "template"), views
+
+        text = "lightpaint makes the picture to paint over …"
+        return self.begin(context, text, open_image, make_template, arguments)
 
 
 class LIGHTPAINT_OT_solve_image(SolveOperator):
@@ -82,14 +106,18 @@ class LIGHTPAINT_OT_solve_image(SolveOperator):
         image = edited_image(context)
         if image is None:
             raise ValueError("no image is open: open one in an image editor")
-        folder = shot_folder(context.scene)
-        template = os.path.join(folder.path, "template")
-        os.makedirs(template, exist_ok=True)
-        picture = image_file(image, template)
-        answer = os.path.join(folder.path, "answer")
-        text = f"lightpaint solves for {image.name} …"
-        views = views_of(context.scene)
-        return self.begin(context, text, show_answer, solve_picture, picture, answer, views)
+        name, views = image.name, views_of(context.scene)
+
+        def arguments(folder):
+            painted = bpy.data.images.get(name)
+            if painted is None:
+                raise ValueError(f"the image {name} is no longer there")
+            template = os.path.join(folder, "template")
+            os.makedirs(template, exist_ok=True)
+            return image_file(painted, template), os.path.join(folder, "answer"), views
+
+        text = f"lightpaint solves for {name} …"
+        return self.begin(context, text, show_answer, solve_picture, arguments)
 
 
 class LIGHTPAINT_OT_look_like(SolveOperator, ImportHelper):
@@ -101,18 +129,27 @@ class LIGHTPAINT_OT_look_like(SolveOperator, ImportHelper):
         default="*.png;*.jpg;*.jpeg;*.webp;*.tif;*.tiff;*.psd;*.exr;*.hdr", options={"HIDDEN"}
     )
     areas: bpy.props.EnumProperty(
-        name="Compared", items=[(name, NAMES[name], "") for name in AREAS], default="regions"
+        name="Compared", items=[(name, *NAMES[name]) for name in AREAS], default="regions"
     )
+    display_type: bpy.props.EnumProperty(
+        items=[("THUMBNAIL", "Thumbnails", "", THUMBNAILS)], options={"HIDDEN"}
+    )
+
+    def invoke(self, context, event):
+        if not self.filepath:  # Blender would propose the name of its own file
+            self.properties.filepath = os.path.join(os.path.dirname(bpy.data.filepath), "")
+        return super().invoke(context, event)
 
     def run(self, context):
         if not os.path.isfile(self.filepath):
             raise ValueError(f"there is no picture {self.filepath}")
-        session = os.path.join(shot_folder(context.scene).path, "reference")
-        name = os.path.basename(self.filepath)
-        text = f"lightpaint looks for the light of {name} …"
-        return self.begin(
-            context, text, show_answer, solve_like, self.filepath, session, self.areas
-        )
+        picture, areas = self.filepath, self.areas
+
+        def arguments(folder):
+            return picture, os.path.join(folder, "reference"), areas
+
+        text = f"lightpaint looks for the light of {os.path.basename(picture)} …"
+        return self.begin(context, text, show_answer, solve_like, arguments)
 
 
 def views_of(scene):
@@ -131,14 +168,44 @@ def open_image(scene, view_layer, path):
     """Open a picture in an image editor, if there is one. Return a sentence on where it is."""
     image = bpy.data.images.load(path, check_existing=True)
     image.reload()
-    image.name = "lightpaint painting"
+    image.name = IMAGE_NAME
+    image.use_view_as_render = True  # as the shot is shown
+    area = image_area()
+    if area is None:
+        return f"choose the image {image.name} in an image editor, and paint over it"
+    area.type = "IMAGE_EDITOR"
+    editor = area.spaces.active
+    editor.image, editor.ui_mode = image, "PAINT"
+    editor.show_region_ui = editor.show_region_tool_header = True
+    bpy.app.timers.register(fit_image, first_interval=FIT_S)
+    return "paint over the picture in the image editor, then press Solve for Image"
+
+
+def fit_image():
+    """Show the whole picture in its editors."""
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
-            if area.type == "IMAGE_EDITOR":
-                area.spaces.active.image = image
-                area.spaces.active.ui_mode = "PAINT"
-                return "paint over the picture in the image editor, then press Solve for Image"
-    return f"choose the image {image.name} in an image editor, and paint over it"
+            if area.type != "IMAGE_EDITOR" or area.spaces.active.image is None:
+                continue
+            region = next(region for region in area.regions if region.type == "WINDOW")
+            if area.spaces.active.image.name == IMAGE_NAME:
+                with bpy.context.temp_override(window=window, area=area, region=region):
+                    bpy.ops.image.view_all(fit_view=True)
+
+
+def image_area():
+    """Return the largest image editor, or the area of a new window; None if there are no windows.
+
+    The window in which Blender shows a render is none to paint in: the next render takes it.
+    """
+    windows = bpy.context.window_manager.windows
+    areas = [x for w in windows if not w.screen.is_temporary for x in w.screen.areas]
+    editors = [area for area in areas if area.type == "IMAGE_EDITOR"]
+    if editors or not windows or bpy.app.background:
+        return max(editors, key=lambda area: area.width * area.height, default=None)
+    with bpy.context.temp_override(window=windows[0]):
+        bpy.ops.wm.window_new()
+    return windows[-1].screen.areas[0]
 
 
 CLASSES = (LIGHTPAINT_OT_paint_over, LIGHTPAINT_OT_solve_image, LIGHTPAINT_OT_look_like)

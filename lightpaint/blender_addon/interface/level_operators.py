@@ -6,7 +6,8 @@ import bpy
 from ..lamps.lamp_levels import PREVIEWS, grouped_places, keep_levels, key_levels, show_factors
 from ..lamps.memory import MEMORY_KEY, recall, remember
 from ..shot.layer_setup import revert
-from .controller import controller, discard_preview, shot_folder
+from ..shot.shot_home import shot_folder
+from .controller import controller, discard_preview
 from .shot_operators import ShotOperator
 
 
@@ -51,6 +52,8 @@ class LIGHTPAINT_OT_discard(PreviewOperator):
 
     def run(self, context):
         discard_preview(context.scene)
+        if controller.session is not None:
+            controller.session.hold_lamps()
         return "the lamps are as before the preview"
 
 

@@ -33,6 +33,9 @@ UNCHANGED = 1e-9
 
 ENDED_TEXT = "the painter has ended: the lamps stay as they are until you apply or discard"
 
+#: What there is to do while nothing is painted.
+UNPAINTED_TEXT = "paint in the browser, and the lamps follow"
+
 
 class LiveSession:
     """A painter, from its start to its end.
@@ -40,6 +43,7 @@ class LiveSession:
     Attributes:
         state: What is known of its session.
         message: A sentence for the user about its state.
+        has_moved_lamps: Whether the last tick has changed lamps.
     """
 
     def __init__(self, folder, scene, view_layer):
@@ -50,6 +54,7 @@ class LiveSession:
         self._program, self._view, self._fallback, self._environment = "", [], None, {}
         self._looks_known = None
         self._places: list[tuple[str, str, str, str]] | None = None
+        self.has_moved_lamps, self._is_on_hold, self._discarded = False, False, None
 
     def start(self, program, view, environment, fallback):
         """Start the painter, or connect to the one that serves this shot already.
@@ -84,26 +89,52 @@ class LiveSession:
         for content, buffers in self._link.messages():
             is_lit |= self.state.receive(content, buffers)
             has_news = True
+        self.has_moved_lamps = bool(is_lit and not self._is_discarded() and self.show())
         if has_news:
-            self.message = self.state.headline or self.state.notice
+            self.message = self._sentence()
             self._keep_looks()
-        if is_lit:
-            self.show()
         if self._link.has_ended:
             self._after_end()
             return True
         return has_news
 
+    def _sentence(self):
+        state = self.state
+        if self._is_on_hold:
+            return ""  # it would be about an answer that was discarded
+        if state.is_open and state.is_exact and are_one(state.factors):
+            return UNPAINTED_TEXT
+        return state.headline or state.notice
+
+    def hold_lamps(self):
+        """Leave the lamps alone until something else is painted: the answer was discarded."""
+        self._is_on_hold, self.message = True, ""
+        self._discarded = dict(self.state.factors) if self.state.is_exact else None
+
+    def _is_discarded(self):
+        """Return whether the present answer is one to what had been painted before a discard."""
+        if not self._is_on_hold:
+            return False
+        if self._discarded is None:  # better answers come until the exact one
+            if self.state.is_exact:
+                self._discarded = dict(self.state.factors)
+            return True
+        self._is_on_hold = self.state.factors == self._discarded
+        return self._is_on_hold
+
     def show(self, factors=None):
-        """Make the lamps follow the painter's answer, or show other multipliers."""
+        """Make the lamps follow the painter's answer, or show other multipliers.
+
+        Return how many have changed.
+        """
         scene = bpy.data.scenes.get(self.scene_name)
         view_layer = scene.view_layers.get(self.layer_name) if scene else None
         if view_layer is None or bpy.app.is_job_running("RENDER"):
-            return
+            return 0
         shown = self.state.factors if factors is None else factors
         if not recall(scene).get(PREVIEWS) and self.state.is_new and are_one(shown):
-            return  # nothing is painted yet
-        show_preview(scene, view_layer, shown, self._groups(scene, view_layer))
+            return 0  # nothing is painted yet
+        return show_preview(scene, view_layer, shown, self._groups(scene, view_layer))
 
     def forget_places(self):
         """Look for the lamps anew at the next answer."""

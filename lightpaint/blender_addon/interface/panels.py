@@ -4,11 +4,23 @@
 import blf
 import bpy
 
-from .controller import controller, shot_folder
+from ..lamps.lamp_levels import PREVIEWS
+from ..lamps.memory import recall
+from ..shot.shot_home import is_kept, shot_folder
+from .controller import controller
 from .level_operators import known_looks
 
 #: Reasons that are listed at most; the rest is counted.
 MAX_REASONS = 8
+
+#: Words about a file without a name.
+UNSAVED_TEXT = "save this file to keep what you paint"
+
+#: Words about a preview that nothing else is said about.
+PREVIEW_TEXT = "the lamps show a preview: apply or discard it"
+
+#: Height of a line of a sentence, in buttons.
+LINE_HEIGHT = 0.75
 
 #: Pixels beside a sentence: borders, tabs and an icon, at Blender's usual size.
 BESIDE_PIXELS = 84
@@ -24,40 +36,19 @@ class LightpaintPanel:
 
     def draw(self, context):
         layout, scene = self.layout, context.scene
-        session = controller.session
-        is_painting = session is not None and not session.is_over
         column = layout.column(align=True)
         column.scale_y = 1.4
-        column.operator(
-            "lightpaint.paint", text="Open Page" if is_painting else "Paint", icon="BRUSH_DATA"
-        )
+        text = "Open Page" if controller.is_painting else "Paint"
+        column.operator("lightpaint.paint", text=text, icon="BRUSH_DATA")
         row = layout.row(align=True)
         row.operator("lightpaint.prepare", icon="LIGHT")
         row.operator("lightpaint.render", icon="RENDER_STILL")
-        # Always there, so that nothing jumps while somebody paints.
-        row = layout.row(align=True)
-        row.operator("lightpaint.apply", icon="CHECKMARK")
-        row.operator("lightpaint.discard", icon="LOOP_BACK")
-        self.draw_messages(layout, context, session)
+        draw_preview_buttons(layout)
+        draw_messages(layout, context)
         self.draw_looks(layout, scene)
         row = layout.row(align=True)
         row.operator("lightpaint.stop", icon="X")
         row.operator("lightpaint.revert", icon="TRASH")
-
-    def draw_messages(self, layout, context, session):
-        texts = [(controller.message, controller.is_error)]
-        if session is not None:
-            texts.append((session.message, session.is_over))
-        for text, is_error in texts:
-            if text:
-                draw_text(layout, context, text, icon="ERROR" if is_error else "INFO")
-        if controller.left:
-            box = layout.box()
-            box.label(text="In no light group:")
-            for reason in controller.left[:MAX_REASONS]:
-                draw_text(box, context, reason, icon="DOT")
-            if len(controller.left) > MAX_REASONS:
-                box.label(text=f"and {len(controller.left) - MAX_REASONS} more")
 
     def draw_looks(self, layout, scene):
         looks = known_looks(scene)
@@ -74,13 +65,26 @@ class LightpaintPanel:
 class ImagePanel:
     """Ways without the painter."""
 
-    bl_label, bl_options = "Without Painting", {"DEFAULT_CLOSED"}
+    bl_label, bl_options = "Without the Painter", {"DEFAULT_CLOSED"}
 
     def draw(self, context):
         column = self.layout.column(align=True)
         column.operator("lightpaint.paint_over", icon="IMAGE_DATA")
         column.operator("lightpaint.solve_image", icon="LIGHT_AREA")
         self.layout.operator("lightpaint.look_like", icon="IMAGE_REFERENCE")
+
+
+class EditorPanel:
+    """A panel beside an image that is painted over."""
+
+    bl_label = "lightpaint"
+
+    def draw(self, context):
+        column = self.layout.column()
+        column.scale_y = 1.4
+        column.operator("lightpaint.solve_image", icon="LIGHT_AREA")
+        draw_preview_buttons(self.layout)
+        draw_messages(self.layout, context)
 
 
 class ShotPanel:
@@ -96,12 +100,42 @@ class ShotPanel:
         draw_text(layout, context, str(shot_folder(context.scene).path), icon="FILE_FOLDER")
 
 
+def draw_preview_buttons(layout):
+    """Draw what ends a preview: always, so that nothing jumps while somebody paints."""
+    row = layout.row(align=True)
+    row.operator("lightpaint.apply", icon="CHECKMARK")
+    row.operator("lightpaint.discard", icon="LOOP_BACK")
+
+
+def draw_messages(layout, context):
+    """Draw what there is to say: on the file, the work, the painter, and what is in no group."""
+    session = controller.session
+    if not is_kept(context.scene):
+        draw_text(layout, context, UNSAVED_TEXT, icon="FILE_TICK")
+    texts = [(controller.message, controller.is_error)]
+    if session is not None:
+        texts.append((session.message, session.is_over))
+    if recall(context.scene).get(PREVIEWS) and not any(text for text, _ in texts):
+        texts.append((PREVIEW_TEXT, False))  # of a file that was saved with one
+    for text, is_error in texts:
+        if text:
+            draw_text(layout, context, text, icon="ERROR" if is_error else "INFO")
+    if controller.left:
+        box = layout.box()
+        box.label(text="In no light group:")
+        for reason in controller.left[:MAX_REASONS]:
+            draw_text(box, context, reason, icon="DOT")
+        if len(controller.left) > MAX_REASONS:
+            box.label(text=f"and {len(controller.left) - MAX_REASONS} more")
+
+
 def draw_text(layout, context, text, icon="NONE"):
     """Draw a sentence on as many lines as it needs."""
     scale = context.preferences.system.ui_scale
     width = context.region.width if context.region else USUAL_PIXELS * scale
     lines = wrap(text, width - BESIDE_PIXELS * scale, context)
     column = layout.column(align=True)
+    column.scale_y = LINE_HEIGHT if len(lines) > 1 else 1.0
     for number, line in enumerate(lines):
         column.label(text=line, icon=icon if number == 0 else "BLANK1", translate=False)
 
@@ -153,6 +187,10 @@ class LIGHTPAINT_PT_view_shot(InView, ShotPanel, bpy.types.Panel):
     bl_parent_id = "LIGHTPAINT_PT_view"
 
 
+class LIGHTPAINT_PT_image(EditorPanel, bpy.types.Panel):
+    bl_space_type, bl_region_type, bl_category = "IMAGE_EDITOR", "UI", "lightpaint"
+
+
 class LIGHTPAINT_PT_render(InRender, LightpaintPanel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
@@ -169,6 +207,7 @@ CLASSES = (
     LIGHTPAINT_PT_view,
     LIGHTPAINT_PT_view_image,
     LIGHTPAINT_PT_view_shot,
+    LIGHTPAINT_PT_image,
     LIGHTPAINT_PT_render,
     LIGHTPAINT_PT_render_image,
     LIGHTPAINT_PT_render_shot,

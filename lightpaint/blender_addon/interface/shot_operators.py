@@ -7,7 +7,8 @@ from ..lamps.lamp_levels import adopt_levels, grouped_places
 from ..lamps.memory import recall
 from ..shot.cycles_render import ShotRender, current_digest
 from ..shot.layer_setup import prepare
-from .controller import controller, shot_folder
+from ..shot.shot_home import shot_folder
+from .controller import controller
 
 
 def prepare_shot(context):
@@ -93,7 +94,8 @@ class LIGHTPAINT_OT_render(ShotOperator):
         # Who paints goes on with the new picture.
         session = controller.session
         is_painting = session is not None and session.is_connected
-        if not begin_shot(context, then_paint=is_painting, again=self.again):
+        then = controller.begin_paint if is_painting else None
+        if not begin_shot(context, then=then, again=self.again):
             return "the shot is rendered already (Shift: render it again)"
         return ""
 
@@ -108,9 +110,9 @@ class LIGHTPAINT_OT_paint(ShotOperator):
             if url := controller.session.page_url:
                 bpy.ops.wm.url_open(url=url)
             return ""
-        if not begin_shot(context, then_paint=True):
-            folder = shot_folder(context.scene)
-            controller.begin_paint(context.scene, context.view_layer, folder)
+        controller.check_program()
+        if not begin_shot(context, then=controller.begin_paint):
+            controller.begin_paint(context.scene, context.view_layer)
         return ""
 
 
@@ -128,20 +130,21 @@ class LIGHTPAINT_OT_stop(ShotOperator):
         return "the painter has ended; its session is kept in the shot's folder"
 
 
-def begin_shot(context, *, then_paint, again=False):
-    """Prepare and render a shot, unless that has been done. Return whether it has to render."""
+def begin_shot(context, *, then=None, again=False):
+    """Prepare and render a shot, unless that has been done. Return whether it has to render.
+
+    then: called with scene and view layer after a render.
+    """
     scene, view_layer = context.scene, context.view_layer
     check_camera(scene)
-    if then_paint:
-        controller.check_program()
     folder = shot_folder(scene)
     folder.check_writable()
     prepare_shot(context)
     if not again and is_rendered(scene, view_layer, folder):
         return False
-    controller.end_paint()
-    render = ShotRender(scene, view_layer, folder)
-    controller.begin_render(render, scene, then_paint=then_paint)
+    controller.end_paint()  # a shot whose file has another name now follows it
+    render = ShotRender(scene, view_layer, shot_folder(scene))
+    controller.begin_render(render, scene, then=then)
     return True
 
 

@@ -15,6 +15,9 @@ INSTALL_TEXT = (
     "in a terminal, or name the program in the add-on's preferences"
 )
 
+#: A file in the add-on's folder with the path of the program that has written the add-on.
+WRITER_FILE = Path(__file__).parent.parent / "PROGRAM"
+
 #: Lines of its errors that are kept.
 MAX_LINES = 200
 
@@ -23,19 +26,29 @@ BLENDER_VARIABLES = ("PYTHONPATH", "PYTHONHOME", "PYTHONSTARTUP", "LD_PRELOAD")
 
 
 def find_program(chosen=""):
-    """Return the path of the program. chosen: path in the preferences; "" for that on PATH.
+    """Return the path of the program.
 
-    Raises FileNotFoundError, with what to do, if there is none.
+    chosen: path in the preferences; "" for the program that has written this add-on, or else that
+    on the PATH. Raises FileNotFoundError, with what to do, if there is none.
     """
     if chosen:
         found = shutil.which(os.path.expanduser(chosen))
         if not found:
             raise FileNotFoundError(f"{chosen} is no program: correct it in the preferences")
         return found
-    found = shutil.which("lightpaint")
+    writer = writing_program()
+    found = (shutil.which(writer) if writer else None) or shutil.which("lightpaint")
     if not found:
         raise FileNotFoundError(INSTALL_TEXT)
     return found
+
+
+def writing_program():
+    """Return the path of the program that has written this add-on; "" if nobody knows it."""
+    try:
+        return WRITER_FILE.read_text(encoding="utf-8").strip()
+    except (OSError, ValueError):
+        return ""
 
 
 class ProgramRun:

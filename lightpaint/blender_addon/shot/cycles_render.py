@@ -42,7 +42,8 @@ class ShotRender:
     """A render of a shot. `is_done` once Blender has ended it, `is_cancelled` if somebody has."""
 
     def __init__(self, scene, view_layer, folder):
-        self.folder, self.digest = folder, current_digest(scene, view_layer)
+        # What is rendered are the present levels, a preview as well; these become the base.
+        self.folder, self.digest = folder, scene_digest(scene, view_layer)
         self.scene_name, self.layer_name = scene.name, view_layer.name
         groups = grouped_places(scene, view_layer)
         self.groups, self._levels = list(groups), present_levels(groups)

@@ -1,6 +1,8 @@
 """`lightpaint blender`: packs the add-on for Blender, a folder of its own that nothing imports."""
 
 import io
+import shutil
+import sysconfig
 import zipfile
 from importlib.resources import files
 from importlib.resources.abc import Traversable
@@ -13,6 +15,9 @@ from lightpaint.files import check_files, check_writable, write_bytes
 
 #: Folder in the archive: the add-on's name in Blender before 4.2. The library is called otherwise.
 ADDON_NAME = "lightpaint_blender"
+
+#: File in that folder with the path of the program: Blender seldom has the PATH of a terminal.
+PROGRAM_FILE = "PROGRAM"
 
 #: Time of every file in the archive, so that equal sources make equal archives.
 ARCHIVE_TIME = (1980, 1, 1, 0, 0, 0)
@@ -29,7 +34,7 @@ def blender(*, output: Path, force: bool) -> CommandOutcome:
     """Run `lightpaint blender -o F.zip`."""
     check_files([output], [])
     check_writable(output.parent)
-    data = packed_addon()
+    data = packed_addon(own_program())
     if output.exists() and not force and not is_addon(output):
         raise OutputError(
             f"{output} exists and is no add-on of lightpaint: name another file (output=...), or "
@@ -42,11 +47,23 @@ def blender(*, output: Path, force: bool) -> CommandOutcome:
     return CommandOutcome(lambda: documents.files_document(output.parent, [output]))
 
 
-def packed_addon() -> bytes:
-    """Return the archive of the add-on, an extension that older versions install as an add-on."""
+def own_program() -> str:
+    """Return the path of lightpaint as a program, this installation's if it has one; "" if none."""
+    scripts = sysconfig.get_path("scripts")
+    return shutil.which("lightpaint", path=scripts) or shutil.which("lightpaint") or ""
+
+
+def packed_addon(program: str = "") -> bytes:
+    """Return the archive of the add-on, an extension that older versions install as an add-on.
+
+    program: path that the add-on starts; "" for that on the PATH.
+    """
+    sources = _sources(files("lightpaint") / "blender_addon", ADDON_NAME)
+    if program:
+        sources.append((f"{ADDON_NAME}/{PROGRAM_FILE}", f"{program}\n".encode()))
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, data in sorted(_sources(files("lightpaint") / "blender_addon", ADDON_NAME)):
+        for name, data in sorted(sources):
             archive.writestr(zipfile.ZipInfo(name, ARCHIVE_TIME), data, zipfile.ZIP_DEFLATED)
     return buffer.getvalue()
 
