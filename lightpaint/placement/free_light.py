@@ -13,7 +13,7 @@ import numpy as np
 from lightpaint.arrays import Doubles, Floats, Position
 from lightpaint.errors import SceneError
 from lightpaint.placement.freedom import EDGE, Freedom
-from lightpaint.placement.paths.light_origin import PanelSite
+from lightpaint.placement.paths.panel_site import PanelSite
 from lightpaint.placement.space.free_space import as_position, far_apart
 from lightpaint.placement.space.permitted_places import (
     OVERSAMPLING,
@@ -110,8 +110,9 @@ class FreeLight:
         if site.direction is not None and start is not None and turn < 180:
             turned = _turned(start, site.direction, turn) if turn else start
             site = replace(site, direction=turned)
-        if isinstance(site, PanelSite) and self.sides is not None:
-            return replace(site, side=float(np.clip(site.side, *self.sides)))
+        if isinstance(site, PanelSite) and isinstance(self.site, PanelSite):
+            sides = self.sides or (self.site.side, self.site.side)
+            return replace(site, side=float(np.clip(site.side, *sides)))
         if self.freedom.cone is not None and site.cutoff is not None:
             site = self._opened(site, site.cutoff, (site.beam or 0.0) / site.cutoff)
         return site

@@ -12,8 +12,9 @@ from lightpaint.errors import NoPlaceError, SceneError
 from lightpaint.placement.free_light import FreeLight, places_of
 from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.movable import Movable
+from lightpaint.placement.movable_panels import is_panel, panel_site
 from lightpaint.placement.new_lights import NEW_CONE, MirroredPair, NewLights
-from lightpaint.placement.paths.light_origin import PanelSite
+from lightpaint.placement.paths.panel_site import PanelSite
 from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.placement.space.free_space import as_position
 from lightpaint.placement.space.permitted_places import BoxOfPlaces, Places
@@ -126,10 +127,14 @@ def why_not_searched(light: Light) -> str:
         return "is fixed"
     if len(light.members) > 1:
         return f"is a group of {len(light.members)} emitters"
-    if light.plugin not in SEARCHED:
-        return f"is of the kind {light.plugin}, and only {', '.join(SEARCHED)} can move"
+    if is_panel(light):
+        return ""
+    if light.plugin == "area" and light.unit != MULTIPLE:
+        return "is an area light, and only rectangles and disks can move"
+    if light.plugin not in SEARCHED and light.plugin != "area":
+        return f"is of the kind {light.plugin}, and only {', '.join(SEARCHED)} and panels can move"
     if light.unit == MULTIPLE:
-        return "has a picture in its beam"
+        return "shows a picture"
     return ""
 
 
@@ -137,7 +142,8 @@ def _site(scene: Scene, name: str) -> Site:
     light = scene.light(name)
     if reason := why_not_searched(light):
         raise SceneError(f"light {name!r} {reason}: no better place can be found for it")
-    return light.members[0].site
+    site = light.members[0].site
+    return panel_site(scene, light, site) if is_panel(light) else site
 
 
 def _places(

@@ -21,8 +21,9 @@ from lightpaint.placement.lights_to_place import (
     new_movables_of,
 )
 from lightpaint.placement.movable import Arrangement, Movable
+from lightpaint.placement.movable_panels import without_panels
 from lightpaint.placement.new_lights import MirroredPair, NewLights
-from lightpaint.placement.paths.light_origin import PanelSite
+from lightpaint.placement.paths.panel_site import PanelSite
 from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.placement.placement import AddedLight, Move, Placement, hung
 from lightpaint.placement.placement_fit import fit_of
@@ -72,7 +73,8 @@ def place(
         solution: The solution to improve. For several looks that share places, give the solution of
             each; each keeps its own weights. A look counts by its relative error; `bases` are of
             the views of all.
-        freedoms: Freedom of lights by name: points, spots and suns of one emitter each.
+        freedoms: Freedom of lights by name: points, spots, suns and panels of one emitter each. A
+            panel is a rectangle or disk; the search has it as a square of its area.
         new: Lights that may be added.
         pairs: Lights that stay mirror images of each other.
         constraints: Constraints on the new lights, by their generated names; those of the solution
@@ -98,7 +100,9 @@ def place(
     for name, freedom in freedoms.items():
         free_light(scene, name, freedom)
     lights, names = new_lights_of(scene, new), [light.name for light in view_bases[0].lights]
-    small, large = films_of(views)
+    # Only paths are traced in these: a panel that moves must not hide where it hung.
+    moving = {*freedoms, *(name for pair in pairs for name in pair.lights)}
+    small, large = ([without_panels(x, moving) for x in films] for films in films_of(views))
 
     def search(loaded: Any) -> _Result:
         paths = SearchPaths(small, large, loaded, seed=seed)
@@ -106,6 +110,7 @@ def place(
             raise NoPlaceError(f"the camera of {scene.path} sees nothing that light falls on")
         movables = movables_of(scene, names, freedoms, pairs, paths, seed=seed)
         slots = new_movables_of(scene, lights, len(names), paths, seed=seed)
+        with_panels = any(isinstance(x.light.site, PanelSite) for x in (*movables, *slots))
         coarse, fine = (
             fit_of(
                 view_bases,
@@ -113,6 +118,7 @@ def place(
                 [x.size for x in films],
                 [light.as_basis_light for light in lights],
                 constraints,
+                with_panels=with_panels,
                 with_noise=films is large,
             )
             for films in (small, large)
@@ -248,7 +254,8 @@ def _placement(
             if movable.mirror is not None:
                 names.append(scenes[0].lights[movable.columns[1]].name)
             for name, new_site in zip(names, movable.sites(site), strict=True):
-                moves.append(Move(name, scenes[0].light(name).members[0].site, new_site, **about))
+                old = scenes[0].light(name).members[0].site
+                moves.append(Move(name, old, new_site.without_shape, **about))
     moves.sort(key=lambda move: -move.gain_share)
     additions.sort(key=lambda light: -light.gain_share)
     placed = hung(scenes, moves, additions)

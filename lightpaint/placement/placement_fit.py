@@ -242,14 +242,15 @@ def fit_of(
     new: Sequence[BasisLight] = (),
     constraints: Constraints | None = None,
     *,
+    with_panels: bool = False,
     with_noise: bool = True,
 ) -> PlacementFit:
     """Return the fit of the last linear problem of each look on small films, one of each view.
 
     looks: solutions, and for each of their views its place among `bases`. new: lights whose
     columns, behind those of the basis, are black as yet. constraints: on these alone, besides
-    those of the solutions that are for all lights. with_noise: whether columns have half
-    differences.
+    those of the solutions that are for all lights. with_panels: whether panels move or are new,
+    whose columns also say what they hide. with_noise: whether columns have half differences.
     """
     current = np.concatenate(
         [
@@ -259,7 +260,7 @@ def fit_of(
         ],
         axis=1,
     )
-    if any(light.plugin == "area" for light in new):
+    if with_panels:
         current = np.pad(current, ((0, 0), (0, 0), (0, 1)))
     black = np.zeros((len(new), *current.shape[1:]), np.float32)
     goals = [goal_of(solution, views, sizes, new, constraints) for solution, views in looks]

@@ -2,7 +2,7 @@
 again.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from copy import copy
 from typing import Any
 
@@ -38,6 +38,22 @@ def darkened(parsed: ParsedScene, dark: Mapping[int, EmitterSetting]) -> ParsedS
     copied.state = mi.parser.ParserState(parsed.state)
     for node, setting in dark.items():
         set_emission(copied.state, node, setting, on_shape=node in parsed.shape_of)
+    return copied
+
+
+def without_emitters(parsed: ParsedScene, emitters: Collection[int]) -> ParsedScene:
+    """Return a copy of a scene without the emitters of these nodes, and the shapes of theirs."""
+    import mitsuba as mi
+
+    copied = copy(parsed)
+    copied.state = mi.parser.ParserState(parsed.state)
+    copied.emitter_nodes = [node for node in parsed.emitter_nodes if node not in emitters]
+    left_out = {*emitters, *(parsed.shape_of[node] for node in emitters if node in parsed.shape_of)}
+    reference = mi.Properties.Type.ResolvedReference
+    for node in copied.state.nodes:
+        for key in list(node.props):
+            if node.props.type(key) == reference and node.props[key].index() in left_out:
+                del node.props[key]
     return copied
 
 

@@ -85,7 +85,7 @@ def test_a_drag_computes_every_few_pixels_of_a_light_and_all_of_them_once_asked(
     assert np.abs(drag(POSITION, 1) - whole).max() < 1e-5 * scale
 
 
-def test_a_panel_of_the_scene_is_dragged_as_a_square_of_its_size(moving: MovingStudio) -> None:
+def test_a_panel_of_the_scene_is_dragged_with_its_outline(moving: MovingStudio) -> None:
     """On release its plane is rendered with its shape, which its place in the file follows."""
     site = moving.scene.light("panel").members[0].site
     assert site.position is not None

@@ -17,7 +17,7 @@ from lightpaint.arrays import Floats, Position
 from lightpaint.errors import SceneError
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.placement.paths.frozen_paths import FrozenPaths
-from lightpaint.placement.paths.light_origin import PanelSite
+from lightpaint.placement.paths.panel_site import PanelSite
 from lightpaint.placement.paths.path_sums import PathSums
 from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.scene.lights.new_emitter import NewEmitter
@@ -273,7 +273,9 @@ def test_a_panel_fills_pixels_by_its_area(room: Scene) -> None:
     def filled(paths: FrozenPaths, side: float, off: float, away: float, axis: int = -1) -> float:
         place = eye + away * ahead + (off, 0, 0)
         lines = paths.sight_lines.near(place.tolist(), side)
-        return float(lines.covered(place.tolist(), axis * ahead[None], side).sum())
+        direction = axis * ahead[None]
+        half_sides = PanelSite(side=side).half_sides_towards(direction)
+        return float(lines.covered(place.tolist(), direction, half_sides).sum())
 
     def check(paths: FrozenPaths) -> None:
         for side, off in (0.3, 0.0), (0.31, 0.04), (0.01, 0.017):

@@ -50,6 +50,31 @@ def test_a_lamp_is_found_where_the_painting_has_it(room: Scene) -> None:
     assert site.position == pytest.approx(placement.moves[0].new.position, rel=1e-6)
 
 
+def test_a_panel_is_found_where_the_painting_has_it(tmp_path: Path) -> None:
+    """A long one, so that its outline counts; the camera sees it, and what it hides."""
+    path = write_room(tmp_path)
+    path.write_text(path.read_text().replace('<scale value="0.3"/>', '<scale x="0.5" y="0.2"/>'))
+    room = load_scene(path)
+    there = lp.Pose(position=(0.5, 1.5, -0.3), target=(0.2, 0, 0))
+    painted = room.moved({"panel": there})
+    placement = placed(room, painted, {"panel": lp.Freedom(within=1.0, aim=40)})
+    [move] = placement.moves
+    assert move.new.position == pytest.approx(there.position, abs=0.1)
+    assert angle(move.new, painted.light("panel").members[0].site) < 6
+    assert placement.missed_after < 0.3 * placement.missed_before
+    site = placement.scene.light("panel").members[0].site
+    assert site.position == pytest.approx(move.new.position, rel=1e-5)
+
+
+def test_an_area_light_of_another_shape_stays(tmp_path: Path) -> None:
+    path = write_room(tmp_path)
+    old = '<shape type="rectangle" id="panel"'
+    path.write_text(path.read_text().replace(old, '<shape type="cube" id="panel"'))
+    room = load_scene(path).reduced("1/4")
+    with pytest.raises(SceneError, match="'panel' is an area light, and only rectangles and disks"):
+        placed(room, room, {"panel": lp.Freedom(within=1)})
+
+
 def test_a_spot_is_turned_to_where_the_painting_has_its_beam(room: Scene) -> None:
     painted = room.moved({"beam": lp.Pose(target=(-0.6, 0, -0.3))})
     placement = placed(room, painted, {"beam": lp.Freedom(aim=True)})
@@ -74,7 +99,7 @@ def test_nothing_moves_where_nothing_is_missed(
 @pytest.mark.parametrize(
     ("name", "freedom", "words"),
     [
-        ("panel", lp.Freedom(within=1), "'panel' is of the kind area"),
+        ("panel", lp.Freedom(cone=(10, 20)), "'panel' has no cone"),
         ("sky", lp.Freedom(aim=True), "'sky' is of the kind constant"),
         ("bulb", lp.Freedom(aim=10), "'bulb' has no direction"),
         ("bulb", lp.Freedom(cone=(10, 20)), "'bulb' has no cone"),

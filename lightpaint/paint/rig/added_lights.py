@@ -12,10 +12,9 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.errors import PaintError, SceneError
 from lightpaint.paint.rig.cameras import FirstHit
 from lightpaint.paint.rig.pointing import FreeLength
-from lightpaint.placement.paths.light_origin import PanelSite
-from lightpaint.scene.lights.light import Light
+from lightpaint.placement.paths.panel_site import PanelSite
 from lightpaint.scene.lights.new_emitter import PLUGIN_OF, NewEmitter
-from lightpaint.scene.properties.emission import MULTIPLE, PLUGINS
+from lightpaint.scene.properties.emission import PLUGINS
 from lightpaint.scene.properties.pose import Pose, Site
 
 #: Keys of a pose, and further keys of added lights.
@@ -74,21 +73,6 @@ def site_of_new(emitter: NewEmitter) -> Site:
         return site
     side = math.sqrt(emitter.size[0] * emitter.size[1])
     return PanelSite(site.position, site.direction, side=side)
-
-
-def is_panel(light: Light) -> bool:
-    """Return whether a light of the scene is a rectangle or disk of its own, in one colour."""
-    if light.plugin != "area" or light.is_fixed or len(light.members) > 1:
-        return False
-    [panel] = light.members
-    return light.unit != MULTIPLE and panel.site.direction is not None and bool(panel.unit_flux)
-
-
-def panel_site(panel: Light, site: Site) -> PanelSite:
-    """Return the place of a panel of the scene for frozen paths: a square of the same area."""
-    flux = panel.members[0].unit_flux
-    assert flux is not None
-    return PanelSite(site.position, site.direction, side=math.sqrt(flux / math.pi))
 
 
 def light_of_new(emitter: NewEmitter) -> BasisLight:

@@ -17,10 +17,8 @@ from lightpaint.errors import PaintError, SceneError
 from lightpaint.paint.protocol import Camera, LightPlace
 from lightpaint.paint.rig.added_lights import (
     POSE_KEYS,
-    is_panel,
     light_of_new,
     new_emitter,
-    panel_site,
     site_of_new,
 )
 from lightpaint.paint.rig.cameras import camera_of, in_this_thread
@@ -30,6 +28,7 @@ from lightpaint.paint.session.moved_lights import Placed, added_names
 from lightpaint.paint.subject import Subject
 from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.lights_to_place import why_not_searched
+from lightpaint.placement.movable_panels import is_panel, panel_site
 from lightpaint.placement.rigging.rigged_lights import freedoms_of, surfaces_of
 from lightpaint.placement.rigging.rigging import Rigging, rigging_of
 from lightpaint.scene.properties.pose import Pose, Site, motion_of
@@ -162,7 +161,7 @@ class LampRig:
         if values and "kind" in values:
             return ""
         light = scene.light(name)
-        return "" if is_panel(light) else why_not_searched(light)
+        return why_not_searched(light)
 
     def site(self, name: str, values: Mapping[str, Any]) -> Site:
         """Return the place of a light in a pose. Raises LightpaintError for an impossible one."""
@@ -176,7 +175,7 @@ class LampRig:
         site = light.members[0].site
         if values:
             site = motion_of(name, light.plugin, site, _pose(name, values)).site
-        return panel_site(light, site) if is_panel(light) else site
+        return panel_site(self.scene, light, site) if is_panel(light) else site
 
     def moved_scene(self, placed: Placed, view: int = 0) -> Scene:
         """Return the scene of a view with lights moved and added."""

@@ -82,12 +82,16 @@ class LightPlacer:
         return [TaskStarted(task="place")]
 
     def _freedoms(self, snapshot: SessionSnapshot) -> dict[str, Freedom]:
-        """Return the freedom of each movable light: from the lights file, or near its place."""
+        """Return the freedom of each movable light: from the lights file, or near its place.
+
+        Panels, such as windows and ceilings that shine, move only if the file says so.
+        """
         freedoms, placed = {}, snapshot.requests.placed
         for light in snapshot.bases[0].lights:
             is_held = any(key in snapshot.requests.lights.get(light.name, {}) for key in HOLD_KEYS)
             values = placed.get(light.name, {})
-            if is_held or light.plugin == "area" or self._rig.why_not(light.name, values):
+            is_panel_at_rest = light.plugin == "area" and light.name not in self._rig.freedoms
+            if is_held or is_panel_at_rest or self._rig.why_not(light.name, values):
                 continue
             site = self._rig.site(light.name, values)
             freedoms[light.name] = self._rig.freedoms.get(light.name) or Freedom(

@@ -32,9 +32,9 @@ from lightpaint.placement.paths.camera_paths import (
 from lightpaint.placement.paths.light_origin import (
     ORIGIN_VALUES,
     LightOrigin,
-    PanelSite,
     added_light,
 )
+from lightpaint.placement.paths.panel_site import PanelSite
 from lightpaint.placement.paths.panels_in_view import SightLines
 from lightpaint.placement.paths.shared_vertices import SharedVertices
 from lightpaint.placement.paths.spot_cones import away_from, share_in_cone
@@ -128,18 +128,19 @@ class FrozenPaths:
     def add_panel(self, image: Floats, site: Site) -> None:
         """Add a panel at unit radiance to an image (h · w, 3) in which it is seen itself."""
         if isinstance(site, PanelSite) and site.position and not self.hides_panels:
-            lines = self.sight_lines.near(site.position, site.side / math.sqrt(2))
+            lines = self.sight_lines.near(site.position, site.radius)
             axis = np.array([site.direction or (0.0, 0.0, 1.0)])
-            shares = lines.covered(site.position, axis, site.side)[0]
+            shares = lines.covered(site.position, axis, site.half_sides[None])[0]
             np.add.at(image, lines.pixels, shares[:, None])
 
     def hidden(self, site: Site) -> Floats:
         """Return the share of each pixel that a panel hides, with either side, (h · w,) float32."""
         shares = np.zeros(self.size[0] * self.size[1], np.float32)
         if isinstance(site, PanelSite) and site.position and not self.hides_panels:
-            lines = self.sight_lines.near(site.position, site.side / math.sqrt(2))
+            lines = self.sight_lines.near(site.position, site.radius)
             axis = np.array(site.direction or (0.0, 0.0, 1.0))
-            covered = lines.covered(site.position, np.stack([axis, -axis]), site.side)
+            both_sides = np.stack([site.half_sides] * 2)
+            covered = lines.covered(site.position, np.stack([axis, -axis]), both_sides)
             np.add.at(shares, lines.pixels, covered.sum(axis=0))
         return shares
 

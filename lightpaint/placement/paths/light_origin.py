@@ -8,7 +8,7 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.placement.paths.camera_paths import Vertices
-from lightpaint.scene.properties.rotation import across
+from lightpaint.placement.paths.panel_site import PanelSite
 from lightpaint.scene.properties.site import Site
 
 #: Shadow rays stop short of a light by this, relative to its distance, to miss its mounting
@@ -21,34 +21,30 @@ _POINT, _SUN, _PANEL = 0.0, 1.0, 2.0
 
 
 @dataclass(frozen=True)
-class PanelSite(Site):
-    """The place of a square panel, which shines to its front. side: in units of the scene."""
-
-    side: float = 0.0
-
-
-@dataclass(frozen=True)
 class LightOrigin:
-    """The parameters of a shadow ray: the origin of light, without the cone of a spot."""
+    """The parameters of a shadow ray: the origin of light, without the cone of a spot.
+
+    half_sides: of a panel, six numbers.
+    """
 
     position: tuple[float, ...]
     axis: tuple[float, ...]
-    side: float
     kind: float
+    half_sides: tuple[float, ...] = (0.0,) * 6
 
     @classmethod
     def of(cls, site: Site) -> "LightOrigin":
         if site.position is None:
-            return cls((0, 0, 0), site.direction or (0, 0, 1), 0, _SUN)
+            return cls((0, 0, 0), site.direction or (0, 0, 1), _SUN)
         if isinstance(site, PanelSite):
-            return cls(site.position, site.direction or (0, 0, 1), site.side, _PANEL)
-        return cls(site.position, (0, 0, 1), 0, _POINT)
+            half_sides = tuple(site.half_sides.ravel().tolist())
+            return cls(site.position, site.direction or (0, 0, 1), _PANEL, half_sides)
+        return cls(site.position, (0, 0, 1), _POINT)
 
     @property
     def row(self) -> Floats:
         """Its values for a launch."""
-        sides = across(self.axis) * self.side / 2
-        return np.array([*self.position, *self.axis, *sides.ravel(), self.kind], np.float32)
+        return np.array([*self.position, *self.axis, *self.half_sides, self.kind], np.float32)
 
 
 def added_light(

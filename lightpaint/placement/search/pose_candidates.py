@@ -13,7 +13,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.placement.free_light import FreeLight
-from lightpaint.placement.paths.light_origin import PanelSite
+from lightpaint.placement.paths.panel_site import PanelSite
 from lightpaint.placement.paths.spot_cones import away_from
 from lightpaint.placement.paths.view_paths import ViewPaths
 from lightpaint.placement.placement_fit import Ranking
@@ -107,12 +107,17 @@ class PoseCandidates:
         """Yield the gains of panels at one place; see `_spots`. added, cosine: at first hits."""
         sides = light.some_sides(SIDES)
         assert site.position is not None
-        radius = sides.max() / math.sqrt(2)
+        radius = replace(site, side=float(sides.max())).radius
         lines = [its.near(site.position, radius) for its in self._paths.sight_lines()]
         parts = [(its.some(SEEN_PIXELS), len(its.pixels)) for its in lines if len(its.pixels)]
         for side in sides if parts else sides[:1]:
+            half_sides = replace(site, side=float(side)).half_sides_towards(directions)
             seen = [
-                (its.pixels, its.covered(site.position, directions, side), count / len(its.pixels))
+                (
+                    its.pixels,
+                    its.covered(site.position, directions, half_sides),
+                    count / len(its.pixels),
+                )
                 for its, count in parts
             ]
             # From afar, a panel acts as a point whose light falls off with the cosine.

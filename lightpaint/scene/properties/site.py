@@ -31,6 +31,11 @@ class Site:
         (x, y, z), (i, j, k) = self.position or (0.0, 0.0, 0.0), self.direction
         return x + i, y + j, z + k
 
+    @property
+    def without_shape(self) -> "Site":
+        """The site alone, without what a kind of light adds to it."""
+        return Site(self.position, self.direction, self.cutoff, self.beam)
+
     def is_near(self, other: "Site") -> bool:
         """Return whether two sites differ only by the rounding in a file."""
         pairs = zip(self._numbers, other._numbers, strict=False)
