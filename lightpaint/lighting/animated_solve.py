@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lightpaint.arrays import Doubles
+from lightpaint.arrays import Bools, Doubles
 from lightpaint.lighting.loss.weight_penalty import pull_to_current
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
@@ -46,7 +46,19 @@ def solve_frames(
             solutions[k] = tied
         if change <= MAX_CHANGE:
             break
-    return solutions
+    reached = np.any([solution.reached for solution in solutions], axis=0)
+    return [_with_reached(solution, reached) for solution in solutions]
+
+
+def _with_reached(solution: Solution, reached: Bools) -> Solution:
+    """Return a solution whose lights are determined, in the channels (n, 3), by some frame."""
+    lights = tuple(
+        replace(light, reached=(bool(r), bool(g), bool(b)))
+        for light, (r, g, b) in zip(solution.lighting.lights, reached, strict=True)
+    )
+    names = tuple(light.name for light in lights if not any(light.reached))
+    solution = solution.with_certificate_fields(unreached=names)
+    return replace(solution, lighting=replace(solution.lighting, lights=lights))
 
 
 def _strengths(solutions: Sequence[Solution], frames: Sequence[int], tie: float) -> list[Doubles]:

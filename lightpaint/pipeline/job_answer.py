@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from lightpaint.arrays import as_rgb
 from lightpaint.basis.basis import Basis
 from lightpaint.lighting.analysis.analysis import Analysis, analyse, with_findings
@@ -90,14 +88,8 @@ def _with_keys(
     lighting: Lighting, frames: Sequence[int], solutions: Sequence[Solution]
 ) -> Lighting:
     """Return the lighting of the first frame with a key for each."""
-    # What one painting does not tell of a light, its neighbours do.
-    reached = np.any([solution.reached for solution in solutions], axis=0).tolist()
-    lights = tuple(
-        replace(light, reached=tuple(channels))
-        for light, channels in zip(lighting.lights, reached, strict=True)
-    )
     keys = []
     for frame, solution in zip(frames, solutions, strict=True):
         weights = tuple(as_rgb(rgb) for rgb in solution.weights)
         keys.append(LightingKey(frame, weights, solution.problem.name))
-    return replace(lighting, lights=lights, animation=tuple(keys))
+    return replace(lighting, animation=tuple(keys))

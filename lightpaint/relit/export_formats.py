@@ -204,6 +204,11 @@ def _of_groups(
     groups = source.light_groups
     assert groups is not None
     lighting.weights_for(groups.basis)
+    if lighting.animation and groups.sequence is None:
+        raise LightpaintError(
+            f"the lights change over a shot, and {groups.path} is one of its frames: give all, "
+            "like light_groups='shot.####.exr'"
+        )
     if form == "blender":
         return lambda: blender_script(groups, lighting)
     if form == "usd":

@@ -113,6 +113,8 @@ def test_lights_change_smoothly_between_painted_frames(tmp_path: Path) -> None:
     script = (tmp_path / "x" / "relit.nk").read_text()
     assert script == (tmp_path / "out" / "relit.nk").read_text()
     assert "shot.####.exr" in script
+    line = run_refused(tmp_path, *export[:-1], "y", "--lights", "shot.0001.exr")
+    assert "shot.0001.exr is one of its frames: give all, like --lights 'shot.####.exr'" in line
 
 
 def test_frames_of_this_answer_are_written_once(

@@ -93,10 +93,14 @@ def test_what_a_frame_does_not_show_comes_from_its_neighbours(make_basis: Any) -
     weights = [np.full((2, 3), x) for x in (1.0, 2.0, 3.0)]
     targets = [lp.Target.of(basis.mix(w)) for basis, w in zip(bases, weights, strict=True)]
     problems = [lp.Problem.of(*pair) for pair in zip(bases, targets, strict=True)]
-    alone = [solution.weights[1, 0] for solution in solve_frames(problems, (1, 2, 3), tie=0)]
-    tied = [solution.weights[1, 0] for solution in solve_frames(problems, (1, 2, 3))]
-    assert alone[1] == bases[1].current_weights[1, 0]
+    alone = solve_frames(problems, (1, 2, 3), tie=0)
+    assert alone[1].weights[1, 0] == bases[1].current_weights[1, 0]
+    assert alone[1].certificate.unreached == (bases[1].names[1],)
+    solutions = solve_frames(problems, (1, 2, 3))
+    tied = [solution.weights[1, 0] for solution in solutions]
     assert tied[1] == pytest.approx((tied[0] + tied[2]) / 2, rel=0.05)
+    assert solutions[1].certificate.unreached == ()
+    assert solutions[1].reached.all()
 
 
 def test_keys_are_read_as_they_were_written(tmp_path: Path, make_basis: Any) -> None:
