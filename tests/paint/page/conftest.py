@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import cache
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,8 @@ import pytest
 from axe import axe_source
 from painter_page import Painter
 from renderer import REPOSITORY
+
+from lightpaint.viewer import bundle
 
 PAGE = REPOSITORY / "lightpaint" / "paint" / "page"
 HERE = Path(__file__).parent
@@ -73,6 +76,28 @@ def site() -> Iterator[Site]:
     server.server_close()
 
 
+#: What serves the painter over the made-up session as one script, instead of `fake/index.html`.
+BUNDLE, BUNDLE_PAGE = "/fake/bundle.js", "/fake/bundled.html"
+
+
+@cache
+def fake_bundle() -> bytes:
+    """Return the script of that page with all that it imports.
+
+    A hundred modules, one by one, take more of each test than what it does. They load as a server
+    gives them in `test_real.py`, `test_language.py` and wherever else a test asks for them.
+    """
+    package_source = bundle.source
+
+    def source(path: str) -> str:
+        own = HERE / path.removeprefix("paint/page/")
+        return own.read_text(encoding="utf-8") if own.is_file() else package_source(path)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(bundle, "source", source)
+        return bundle.bundled("paint/page/fake/main.js").encode()
+
+
 def served_file(site: Site, path: str) -> tuple[dict[str, str], bytes]:
     """Headers and content; none for what there is not."""
     if path.startswith("/data/"):
@@ -83,6 +108,11 @@ def served_file(site: Site, path: str) -> tuple[dict[str, str], bytes]:
         return {"x-dtype": array.dtype.name, "x-shape": shape}, array.tobytes()
     if path == "/favicon.ico":
         return {"content-type": "image/x-icon"}, b""
+    if path == BUNDLE:
+        return {"content-type": KINDS[".js"]}, fake_bundle()
+    if path == BUNDLE_PAGE:
+        text = (HERE / "fake" / "index.html").read_text(encoding="utf-8")
+        return {"content-type": KINDS[".html"]}, text.replace("main.js", "bundle.js").encode()
     for folder in (PAGE, HERE, REPOSITORY / "lightpaint"):
         file = folder / path.lstrip("/")
         if file.is_file():
@@ -166,7 +196,8 @@ def new_painter(tabs: Tabs) -> Iterator[Any]:
 
     is_fresh: in a context of its own, for a test that changes what cannot be changed back, such as
     a clock. So is every painter with a script that runs first, or options beside the viewport.
-    prepare: what is done with the context before the page opens.
+    prepare: what is done with the context before the page opens. with_modules: load each module.
+    axe: the source of axe-core, once it is open; before, it would take a context of its own.
     """
     pages_in_use: list[tuple[Any, bool]] = []
     errors: list[str] = []
@@ -184,6 +215,8 @@ def new_painter(tabs: Tabs) -> Iterator[Any]:
         until: str = ".lightpaint .tag",
         *,
         is_fresh: bool = False,
+        with_modules: bool = False,
+        axe: str = "",
         prepare: Callable[[Any], None] | None = None,
         viewport: dict[str, int] = VIEWPORT,
         **options: Any,
@@ -201,8 +234,11 @@ def new_painter(tabs: Tabs) -> Iterator[Any]:
             page.add_init_script(init)
         if prepare:
             prepare(page.context)
-        page.goto(f"{tabs.site.url}/fake/index.html?{query}&size=48x27")
+        page_path = "/fake/index.html" if with_modules else BUNDLE_PAGE
+        page.goto(f"{tabs.site.url}{page_path}?{query}&size=48x27")
         page.wait_for_selector(until)
+        if axe:
+            page.evaluate(axe)
         return Painter(page)
 
     yield open_painter

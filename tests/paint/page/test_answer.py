@@ -3,6 +3,7 @@
 from typing import Any
 
 import pytest
+from nightly import nightly
 from painter_page import Painter
 
 
@@ -274,7 +275,7 @@ def test_a_render_of_before_is_offered_again(painter: Painter) -> None:
 
 
 #: Windows, a column beside panels, one without room for them.
-WITH_LOOKS = [(1280, 720), (1600, 900), (780, 600), (690, 560), (480, 640)]
+WITH_LOOKS = [(1280, 720), nightly((1600, 900)), nightly((780, 600)), (690, 560), (480, 640)]
 
 
 @pytest.mark.parametrize("size", WITH_LOOKS)

@@ -4,6 +4,7 @@ import re
 from typing import Any
 
 import pytest
+from nightly import nightly
 from painter_page import Painter
 
 
@@ -725,7 +726,7 @@ def test_zoom_is_said_in_pixels_of_the_picture(painter: Painter) -> None:
     assert zoom()[0] == "Fit"
 
 
-@pytest.mark.parametrize("width", [1600, 1280, 1024])
+@pytest.mark.parametrize("width", [nightly(1600), 1280, 1024])
 def test_what_is_under_the_pointer_has_room_beside_what_goes_on(
     new_painter: Any, width: int
 ) -> None:

@@ -4,13 +4,14 @@ from typing import Any
 
 import pytest
 from axe import violations
+from nightly import nightly
 from painter_page import Painter
 
 
 @pytest.fixture
 def painter(new_painter: Any, axe: str) -> Painter:
     """A painter with its history open, after three strokes."""
-    opened: Painter = new_painter(init=axe)
+    opened: Painter = new_painter(axe=axe)
     opened.button("History", exact=True).click()
     assert "Every step is listed here" in opened.page.locator(".is-history").inner_text()
     for _ in range(3):
@@ -78,7 +79,7 @@ def test_many_steps_are_listed_in_parts_and_reduced_to_milestones(painter: Paint
     assert len(rows(painter)) == 8
 
 
-@pytest.mark.parametrize("size", [(1280, 720), (820, 1180)])
+@pytest.mark.parametrize("size", [(1280, 720), nightly((820, 1180))])
 def test_nothing_in_the_history_is_cut_or_unnamed(painter: Painter, size: tuple[int, int]) -> None:
     painter.page.set_viewport_size({"width": size[0], "height": size[1]})
     painter.page.locator(".step").nth(1).click()
@@ -93,7 +94,7 @@ def test_nothing_in_the_history_is_cut_or_unnamed(painter: Painter, size: tuple[
     assert painter.page.evaluate(overflow) == 0
 
 
-@pytest.mark.parametrize("by", ["key", "button", "focus"])
+@pytest.mark.parametrize("by", ["key", "button", nightly("focus")])
 def test_the_answer_before_the_last_step_shows_while_a_key_or_button_is_held(
     painter: Painter, by: str
 ) -> None:

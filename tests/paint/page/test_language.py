@@ -147,7 +147,10 @@ def painter(new_painter: Any) -> Painter:
         )
 
     opened: Painter = new_painter(
-        "lights=5", init="localStorage.setItem('lightpaint.language', 'qq')", prepare=route
+        "lights=5",
+        init="localStorage.setItem('lightpaint.language', 'qq')",
+        prepare=route,
+        with_modules=True,
     )
     opened.page.evaluate("() => engine.makeLayers(3)")
     for _ in range(2):

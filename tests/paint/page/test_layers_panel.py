@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from axe import violations
+from nightly import nightly
 from painter_page import Painter
 
 import lightpaint as lp
@@ -369,9 +370,9 @@ def test_without_layers_the_panel_is_one_line(new_painter: Any) -> None:
     assert painter.page.locator(".layer").count() == 0
 
 
-@pytest.mark.parametrize("size", [(1280, 720), (820, 1180), (700, 500)])
+@pytest.mark.parametrize("size", [(1280, 720), nightly((820, 1180)), (700, 500)])
 def test_nothing_in_the_panel_is_cut_or_unnamed(new_painter: Any, axe: str, size: Any) -> None:
-    painter: Painter = new_painter(init=axe, viewport={"width": size[0], "height": size[1]})
+    painter: Painter = new_painter(axe=axe, viewport={"width": size[0], "height": size[1]})
     painter.page.evaluate(
         "() => { engine.makeLayers(8); painter.store.set({ side: true, openLayer: 1 }); }"
     )

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from axe import violations
+from nightly import nightly
 from painter_page import Painter
 
 #: Size and codes of the canvases, as text of their bytes: as numbers they would take ten seconds.
@@ -61,12 +62,17 @@ def open_looks(new_painter: Any) -> Any:
 
 @pytest.mark.parametrize(
     ("count", "size", "columns"),
-    [(2, (1280, 720), 2), (3, (1280, 720), 2), (4, (1280, 720), 2), (3, (820, 1180), 1)],
+    [
+        nightly(2, (1280, 720), 2),
+        nightly(3, (1280, 720), 2),
+        (4, (1280, 720), 2),
+        (3, (820, 1180), 1),
+    ],
 )
 def test_pictures_are_as_large_as_there_is_room(
     open_looks: Any, axe: str, count: int, size: tuple[int, int], columns: int
 ) -> None:
-    painter = open_looks(init=axe, viewport={"width": size[0], "height": size[1]})
+    painter = open_looks(axe=axe, viewport={"width": size[0], "height": size[1]})
     open_wall(painter, *[f"Look {k + 1}" for k in range(count)])
     shown = pictures(painter)
     assert len(shown) == count
@@ -220,7 +226,7 @@ def test_a_deleted_look_ends_it(open_looks: Any) -> None:
 
 
 def test_looks_of_the_strip_are_opened_by_keyboard(open_looks: Any, axe: str) -> None:
-    painter = open_looks(init=axe)
+    painter = open_looks(axe=axe)
     strip = painter.page.locator(".looks")
     assert strip.get_by_role("button", name="Side by side").count() == 0
     for name in ("Look 3", "Look 1"):

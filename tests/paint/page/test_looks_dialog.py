@@ -15,7 +15,7 @@ DIFFERENCE = """async ([first, second]) => {
 @pytest.fixture
 def painter(new_painter: Any, axe: str) -> Painter:
     """A painter with two looks: in the second the first lamp is a stop brighter."""
-    opened: Painter = new_painter("lights=5", init=axe)
+    opened: Painter = new_painter("lights=5", axe=axe)
     opened.button("Save look").click()
     opened.still()
     opened.page.evaluate(

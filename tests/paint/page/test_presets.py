@@ -7,7 +7,7 @@ from painter_page import Painter
 
 
 def test_a_click_asks_for_a_preset_about_the_chosen_object(new_painter: Any, axe: str) -> None:
-    painter: Painter = new_painter("lights=5", init=axe)
+    painter: Painter = new_painter("lights=5", axe=axe)
     painter.button("Presets").click()
     sheet = painter.page.locator(".sheet button")
     assert sheet.locator("strong").all_inner_texts() == ["Moonlight", "Only this object"]

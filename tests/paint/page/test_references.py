@@ -54,7 +54,7 @@ def at(page: Any, selector: str, x: float, y: float) -> tuple[float, float]:
 
 @pytest.fixture
 def room(new_painter: Any, axe: str) -> Painter:
-    painter: Painter = new_painter("lights=5", init=axe)
+    painter: Painter = new_painter("lights=5", axe=axe)
     return painter
 
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from axe import violations
+from nightly import nightly
 from painter_page import Painter
 
 
@@ -114,11 +115,11 @@ def test_adjustments_apply_to_what_is_selected_until_nothing_is(painter: Painter
     assert whole.inner_text() == "Whole picture"
 
 
-@pytest.mark.parametrize("size", [(1280, 720), (820, 1180), (700, 500)])
+@pytest.mark.parametrize("size", [(1280, 720), nightly((820, 1180)), (700, 500)])
 def test_the_panel_selects_by_numbers_and_nothing_of_it_is_cut(
     new_painter: Any, axe: str, size: Any
 ) -> None:
-    painter: Painter = new_painter(init=axe, viewport={"width": size[0], "height": size[1]})
+    painter: Painter = new_painter(axe=axe, viewport={"width": size[0], "height": size[1]})
     painter.page.evaluate(
         "() => painter.store.set({ side: true, tool: 'select', open: { select: true } })"
     )
@@ -245,11 +246,11 @@ def test_a_gradient_is_drawn_by_key_and_its_ends_are_moved(painter: Painter) -> 
     assert painter.calls("begin") == []
 
 
-@pytest.mark.parametrize("size", [(1280, 720), (820, 1180)])
+@pytest.mark.parametrize("size", [(1280, 720), nightly((820, 1180))])
 def test_a_gradient_is_changed_in_numbers_and_nothing_of_it_is_cut(
     new_painter: Any, axe: str, size: Any
 ) -> None:
-    painter: Painter = new_painter(init=axe, viewport={"width": size[0], "height": size[1]})
+    painter: Painter = new_painter(axe=axe, viewport={"width": size[0], "height": size[1]})
     add_gradient(painter)
     shown = "{ side: true, openLayer: 1, tool: 'gradient', open: { layers: true } }"
     painter.page.evaluate(f"() => painter.store.set({shown})")

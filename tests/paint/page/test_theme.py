@@ -136,7 +136,7 @@ FADED_IN = """() => Promise.all(document.getAnimations().filter(({ animationName
 @pytest.mark.parametrize("theme", ["dark", "light"])
 def test_axe_finds_enough_contrast_in_any_state(new_painter: Any, axe: str, theme: str) -> None:
     """That of WCAG AA. Its other rules know no theme."""
-    painter: Painter = new_painter("lights=5", init=axe, color_scheme=theme)
+    painter: Painter = new_painter("lights=5", axe=axe, color_scheme=theme)
     first = "window.painter.store.value"
     painter.page.evaluate(f"() => {{ window.first = {first}; }}")
     found = {}

@@ -4,6 +4,7 @@ from typing import Any
 
 import pytest
 from axe import violations
+from nightly import nightly
 from painter_page import Painter
 
 BUBBLE = ".tour"
@@ -27,10 +28,10 @@ def is_within(painter: Painter) -> bool:
     )
 
 
-@pytest.mark.parametrize("size", [(1280, 720), (820, 1180)])
+@pytest.mark.parametrize("size", [(1280, 720), nightly((820, 1180))])
 def test_five_steps_greet_a_person_once(new_painter: Any, axe: str, size: Any) -> None:
     viewport = {"width": size[0], "height": size[1]}
-    painter: Painter = new_painter("tour&lights=5", init=axe, viewport=viewport)
+    painter: Painter = new_painter("tour&lights=5", axe=axe, viewport=viewport)
     titles = []
     for number in range(5):
         titles.append(title(painter))

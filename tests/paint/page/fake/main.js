@@ -5,6 +5,7 @@
 
 import { mount } from '../app.js';
 import { ModelHost } from '../engine/notebook_host.js';
+import { openEngine } from '../engine/picture_engine.js';
 import { crowd } from './crowd.js';
 import { FakeEngine } from './engine.js';
 import { FakeHost } from './host.js';
@@ -32,14 +33,20 @@ if (asked.has('shadow')) {
 const model = new FakeModel(host);
 model.isTaken = asked.get('model') === 'taken';
 const session = asked.has('model') ? new ModelHost(model) : host;
-// `?engine`: the one that ships, over the same session.
-const engine = asked.has('engine')
-  ? (await import('../engine/picture_engine.js')).openEngine(session)
-  : new FakeEngine(session, room);
-const painter = await mount(element, session, {
-  global: !asked.has('shadow'),
-  engine,
-  isGuided: asked.has('tour'),
-});
-Object.assign(window, { painter, host, engine, model });
-session.open();
+
+async function start() {
+  // `?engine`: the one that ships, over the same session.
+  const engine = asked.has('engine')
+    ? openEngine(session)
+    : new FakeEngine(session, room);
+  const painter = await mount(element, session, {
+    global: !asked.has('shadow'),
+    engine,
+    isGuided: asked.has('tour'),
+  });
+  Object.assign(window, { painter, host, engine, model });
+  session.open();
+}
+
+// No module waits at its top: a bundle calls each as a function.
+start();
