@@ -16,6 +16,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
+from nightly import examples
 
 from lightpaint.errors import ImageError, OutputError
 from lightpaint.images.formats.exr import ExrPart, read_parts, rgb_channels, write_parts, write_rgb
@@ -42,7 +43,7 @@ def _parts(draw: Any) -> list[ExrPart]:
 
 
 @given(parts=_parts())
-@settings(max_examples=60)
+@settings(max_examples=examples(20, 60))
 def test_there_and_back_is_exact(tmp_path_factory: pytest.TempPathFactory, parts: list[ExrPart]):
     path = tmp_path_factory.getbasetemp() / "parts.exr"
     write_parts(path, parts)

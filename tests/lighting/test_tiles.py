@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from nightly import examples
 
 from lightpaint.errors import SizeError
 from lightpaint.lighting.live.tiles import MAX_SUM_BYTES, TiledEquations, tile_side
@@ -52,7 +53,7 @@ def test_equal_to_the_sums_over_the_whole_picture(side: int | None):
         np.testing.assert_allclose(actual, expected_sums, rtol=1e-12)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(40, 200), deadline=None)
 @given(seed=st.integers(0, 20), painted=strokes(), side=st.sampled_from([3, 8, 32]))
 def test_update_is_rebuild_and_undo_is_undone_bit_for_bit(
     seed: int, painted: list[tuple[slice, slice, int]], side: int

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from nightly import examples
 
 import lightpaint as lp
 from lightpaint.basis.lights import BasisLight
@@ -163,7 +164,7 @@ STROKES = st.lists(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(20, 60), deadline=None)
 @given(STROKES)
 def test_any_sequence_is_a_rebuild_and_never_says_it_of_paint(done: Any):
     basis = _basis()

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from nightly import examples
 from renderer import REPOSITORY
 
 import lightpaint as lp
@@ -257,7 +258,7 @@ DONE = st.one_of(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(20, 60), deadline=None)
 @given(actions=st.lists(DONE, max_size=14))
 def test_any_sequence_equals_a_rebuild(actions: list[Any]):
     bases = two_views()

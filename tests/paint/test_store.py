@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from nightly import examples
 from stored_sessions import IDENTITY, SIZE, Plain, big, content, look, patch, step, told
 
 from lightpaint.colour.display.view_transform import ViewTransform
@@ -54,7 +55,9 @@ def without_process_check(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("without_process_check")
-@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=examples(20, 40), suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 @given(ACTIONS)
 def test_any_sequence_is_there_again(
     tmp_path_factory: pytest.TempPathFactory, actions: list[tuple[str, int]]

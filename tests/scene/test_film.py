@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from nightly import examples
 from renderer import LIGHTS, write_room
 
 from lightpaint.basis.render.basis_render import _render_one_by_one, render_basis
@@ -97,7 +98,7 @@ FILMS = st.tuples(
 )
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(20, 60))
 @given(FILMS)
 def test_a_pixel_is_the_block_that_a_painting_is_averaged_over(drawn: object) -> None:
     """A painting of the whole film holds in each pixel where that is; and the camera agrees."""

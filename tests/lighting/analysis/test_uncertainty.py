@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from nightly import nightly
 from scipy.stats import t as student
 from scipy.stats import truncnorm
 
@@ -459,7 +460,7 @@ AT_BOUNDS: dict[str, tuple[dict[str, Any], int]] = {
 }
 
 
-@pytest.mark.parametrize("margin", [0.4, 1.2])
+@pytest.mark.parametrize("margin", [nightly(0.4), 1.2])
 @pytest.mark.parametrize("name", AT_BOUNDS)
 def test_intervals_at_bounds_hold_what_is_just_inside(make_basis: Any, name: str, margin: float):
     """Normal noise of little power, so that coverage is known: 95 % at least, by the binomial.

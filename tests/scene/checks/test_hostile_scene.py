@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from damaged_files import Case, damage, outcomes, wrong_outcomes
-from nightly import FIFTHS, fifth_of
+from nightly import FIFTHS, fifth_of, nightly
 from renderer import GLOSSY, LIGHTS, PATH, ROOM, write_room
 
 from lightpaint.errors import SceneError
@@ -250,7 +250,9 @@ def test_good_files_are_still_read(tmp_path: Path) -> None:
         load_scene(path)
 
 
-@pytest.mark.parametrize("name", ["entities", "deep", "include_dev_zero", "width_1000000000"])
+@pytest.mark.parametrize(
+    "name", ["entities", nightly("deep"), nightly("include_dev_zero"), "width_1000000000"]
+)
 def test_the_command_says_it_in_one_line(tmp_path: Path, name: str) -> None:
     path = tmp_path / f"{name}.xml"
     path.write_text(_hostile()[name], encoding="utf-8")
