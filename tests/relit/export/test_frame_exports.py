@@ -133,6 +133,9 @@ def test_keys_in_blender_follow_the_curves(
         np.testing.assert_allclose(found["once"][str(frame)], expected, rtol=1e-4, atol=1e-5)
         still = [lighting["key"].weight, lighting["rim"].weight]
         np.testing.assert_allclose(found["still"][str(frame)], still, rtol=1e-4, atol=1e-5)
+        key, rim = found["another"][str(frame)]
+        assert key == found["once"][str(frame)][0]
+        np.testing.assert_allclose(rim, np.square(lit["rim"].weight), rtol=1e-4, atol=1e-5)
     assert found["twice"] == found["once"]
     assert found["own"] == 10  # a lamp that somebody animates stays as it is
 
