@@ -25,7 +25,12 @@ def missing_programs() -> list[str]:
     return [name for name in ("blender", "xvfb-run") if shutil.which(name) is None]
 
 
-def run_in_window(script: Path, *arguments: object, variables: dict[str, str]) -> str:
+def run_in_window(
+    script: Path,
+    *arguments: object,
+    variables: dict[str, str],
+    patience_s: float = WINDOW_S,
+) -> str:
     """Run a script in a window, and return what Blender has printed."""
     splash = "import bpy; bpy.context.preferences.view.show_splash = False"
     command = [*SCREEN, "blender", *OPTIONS, "--python-expr", splash, "--python", str(script)]
@@ -41,7 +46,7 @@ def run_in_window(script: Path, *arguments: object, variables: dict[str, str]) -
         start_new_session=True,
     )
     try:
-        output, _ = window.communicate(timeout=WINDOW_S)
+        output, _ = window.communicate(timeout=patience_s)
     finally:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(window.pid, signal.SIGKILL)

@@ -92,8 +92,21 @@ bpy.data.objects["a.b"].name = "renamed"
 bpy.ops.lightpaint.prepare()
 found["kept on rename"] = contents()["groups"] == found["groups"]
 bpy.data.objects["renamed"].name = "a.b"
+scene.lightpaint_settings.grouping = "COLLECTIONS"
+bpy.ops.lightpaint.prepare()
+found["grouped"] = contents()["groups"]
+scene.lightpaint_settings.grouping = "LAMPS"
+bpy.ops.lightpaint.prepare()
+found["kept on regrouping"] = sorted(contents()["groups"]) == sorted(found["groups"])
 bpy.ops.lightpaint.render()
 found["rendered"] = controller.message
+scene.lightpaint_settings.grouping = "COLLECTIONS"
+bpy.ops.lightpaint.render()
+found["rendered in other groups"] = controller.message
+scene.lightpaint_settings.grouping = "LAMPS"
+bpy.ops.lightpaint.render()
+bpy.ops.lightpaint.render()
+found["rendered already"] = controller.message
 
 # No program, no folder, no camera.
 path = os.environ["PATH"]

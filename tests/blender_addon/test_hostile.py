@@ -26,7 +26,11 @@ def test_hostile_shots_are_told_apart_and_put_back(
     # Two objects with one lamp change together.
     assert found["shared"] == ["Point", "Point"]
     assert found["kept on rename"]
+    assert len(found["grouped"]) < 15
+    assert found["kept on regrouping"]
     assert found["rendered"] == "the shot is rendered"
+    assert found["rendered in other groups"] == "the shot is rendered"
+    assert "rendered already" in found["rendered already"]
     assert "pip install 'lightpaint[paint,ocio]'" in found["not installed"]
     assert "choose another folder" in found["no folder"]
     assert "no camera" in found["no camera"]

@@ -15,9 +15,10 @@ LAMPS, ALIKE, COLLECTIONS = "LAMPS", "ALIKE", "COLLECTIONS"
 class Grouping:
     """The light groups of a view layer.
 
-    members: emitters by name of group. left: sentences on what is in none.
+    by: its kind. members: emitters by name of group. left: sentences on what is in none.
     """
 
+    by: str = LAMPS
     members: dict = field(default_factory=dict)
     left: list = field(default_factory=list)
 
@@ -26,10 +27,10 @@ def plan_groups(scene, view_layer, by=LAMPS):
     """Return the groups that a scene's lights should be in; nothing is changed.
 
     Lights that share their data (a lamp's, or an emissive material) change together, so they are
-    in one group. A group keeps the name that it was given first.
+    in one group. A group keeps the name that it was given first, until they are grouped otherwise.
     """
     found = emitters(scene, view_layer)
-    grouping = Grouping(left=[f"{x.name}: {x.reason}" for x in found if x.reason])
+    grouping = Grouping(by, left=[f"{x.name}: {x.reason}" for x in found if x.reason])
     limit = group_bytes(view_layer.name)
     if not limit:
         raise ValueError(
@@ -37,7 +38,7 @@ def plan_groups(scene, view_layer, by=LAMPS):
             "for light groups in an EXR: shorten it to 40"
         )
     parts = _parts([x for x in found if not x.reason], by)
-    kept_names = [_kept_name(part, view_layer) for part in parts]
+    kept_names = [_kept_name(part, view_layer, by) for part in parts]
     for part, kept in zip(parts, kept_names, strict=True):
         name = kept if kept and kept not in grouping.members else ""
         if not name:
@@ -74,9 +75,10 @@ def _part_name(part, by):
     return stem(first.name) if len(part) > 1 else first.name
 
 
-def _kept_name(part, view_layer):
-    """Return the group that lightpaint gave to these emitters before; "" if it gave none."""
-    names = {x.item.lightgroup for x in part if "group" in recall(x.item)}
+def _kept_name(part, view_layer, by):
+    """Return the group that these emitters had, grouped like this; "" if they had none."""
+    memories = [(x.item, recall(x.item)) for x in part]
+    names = {item.lightgroup for item, memory in memories if memory.get("by") == by}
     [name] = names if len(names) == 1 else [""]
     return name if name in view_layer.lightgroups else ""
 
@@ -87,7 +89,7 @@ def assign_groups(grouping):
         for emitter in members:
             item, memory = emitter.item, recall(emitter.item)
             memory.setdefault("group", item.lightgroup)
-            remember(item, memory)
+            remember(item, {**memory, "by": grouping.by})
             if item.lightgroup != name:
                 item.lightgroup = name
 

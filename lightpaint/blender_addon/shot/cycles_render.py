@@ -1,9 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Renders a shot by Cycles into its folder, and leaves the scene's output settings as they were."""
 
+import hashlib
+
 import bpy
 
-from ..lamps.lamp_levels import commit_base, grouped_places, present_levels, rendered_levels
+from ..lamps.lamp_levels import (
+    commit_base,
+    grouped_places,
+    place_names,
+    present_levels,
+    rendered_levels,
+)
 from ..lamps.memory import recall, remember
 from .scene_digest import scene_digest
 
@@ -26,13 +34,21 @@ SETTINGS = (
 RENDERING = "rendering"
 
 
+def shot_digest(scene, view_layer, groups):
+    """Return a digest of a scene, and of which lights are in which group."""
+    members = [(name, sorted(place_names({name: places}))) for name, places in groups.items()]
+    text = f"{scene_digest(scene, view_layer)} {sorted(members)!r}"
+    return hashlib.sha256(text.encode("utf-8", "replace")).hexdigest()
+
+
 def current_digest(scene, view_layer):
     """Return the digest of a scene as it would be rendered but for what lightpaint has set."""
-    undo = rendered_levels(grouped_places(scene, view_layer))
+    groups = grouped_places(scene, view_layer)
+    undo = rendered_levels(groups)
     try:
         if undo:
             view_layer.update()
-        return scene_digest(scene, view_layer)
+        return shot_digest(scene, view_layer, groups)
     finally:
         for place, values in undo:
             place.assign(values)
@@ -42,10 +58,10 @@ class ShotRender:
     """A render of a shot. `is_done` once Blender has ended it, `is_cancelled` if somebody has."""
 
     def __init__(self, scene, view_layer, folder):
-        # What is rendered are the present levels, a preview as well; these become the base.
-        self.folder, self.digest = folder, scene_digest(scene, view_layer)
-        self.scene_name, self.layer_name = scene.name, view_layer.name
         groups = grouped_places(scene, view_layer)
+        # What is rendered are the present levels, a preview as well; these become the base.
+        self.folder, self.digest = folder, shot_digest(scene, view_layer, groups)
+        self.scene_name, self.layer_name = scene.name, view_layer.name
         self.groups, self._levels = list(groups), present_levels(groups)
         self.is_done = self.is_cancelled = False
 
