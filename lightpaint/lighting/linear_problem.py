@@ -1,16 +1,19 @@
 """Linear problems: squares, and all else that their solve needs, without pixels."""
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
+from operator import add
 from typing import TYPE_CHECKING, Self
 
 from lightpaint.arrays import Bools, Doubles
+from lightpaint.basis.light_images import texel_lights
 from lightpaint.basis.lights import Lights
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.display_text import short_repr
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.white_lights import whiten_open_lights
 from lightpaint.lighting.fit import Fit
+from lightpaint.lighting.loss.image_prior import image_prior
 from lightpaint.lighting.loss.weight_penalty import weight_pull
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.constraint_reduction import reduce_to
@@ -98,15 +101,17 @@ class LinearProblem:
     @property
     def keeps_color(self) -> Bools:
         """(n,), the lights with a pull to their colour: those free to leave it that reach
-        something.
+        something. Texels have an expectation of their own (image_prior.py).
         """
-        return self.full.is_free & self.equations.reached.any(axis=1)
+        is_lamp = ~texel_lights(self.lights)
+        return self.full.is_free & self.equations.reached.any(axis=1) & is_lamp
 
     @cached_property
     def pull(self) -> NormalEquations | None:
         """The penalty for leaving the current lighting, its colours, or the lights at other frames;
         None if there is none.
         """
+        prior = image_prior(self.lights, self.power, self.fit, self.painted_share)
         pull = weight_pull(
             self.power,
             self.lights.current_weights,
@@ -116,9 +121,8 @@ class LinearProblem:
             keeps_color=self.keeps_color,
             dimming=self.dimming,
         )
-        if pull is None or self.tether is None:
-            return self.tether if pull is None else pull
-        return pull + self.tether
+        pulls = [x for x in (pull, prior, self.tether) if x is not None]
+        return reduce(add, pulls) if pulls else None
 
     def with_pull(self, equations: NormalEquations) -> NormalEquations:
         """Return `equations` with the pull on the weights, if there is one."""
@@ -196,5 +200,7 @@ def reduce_lights(
     """
     if fit.colors == "white":
         constraints = whiten_open_lights(constraints, lights)
-    reduction = replace(reduce_to(constraints, lights), is_joined=fit.colors == "gentle")
+    # Pulls to the colours of lights and images couple the channels.
+    is_joined = fit.colors == "gentle" or bool(texel_lights(lights).any())
+    reduction = replace(reduce_to(constraints, lights), is_joined=is_joined)
     return reduction if gamuts is None else reduction.with_gamuts(gamuts)

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_images import texel_lights
 from lightpaint.basis.lights import Lights
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.display_text import short_repr
@@ -279,7 +280,8 @@ def gamuts_for(basis: Basis, views: Views, fit: Fit) -> Gamuts | None:
         (view_basis, target.image, _color_importance(target))
         for view_basis, target in zip(views.bases, views.targets, strict=True)
     ]
-    return Gamuts(partial(PaintedLight.of, views_of_paint), basis.power, basis.current_weights)
+    painted = partial(PaintedLight.of, views_of_paint)
+    return Gamuts(painted, basis.power, basis.current_weights, texel_lights(basis.lights))
 
 
 def _color_importance(target: Target) -> Floats:

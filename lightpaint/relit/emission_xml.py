@@ -42,6 +42,18 @@ class Changes:
             spelling = child.attributes["name"]
             self.xml.replace(child, text.replace(f'"{name}"', f'"{spelling}"', 1))
 
+    def has(self, name: str) -> bool:
+        """Return whether there is a child called `name`."""
+        return self._child_named(name) is not None
+
+    def replace(self, name: str, text: str) -> None:
+        """Put the XML `text` in the place of the child called `name`, or add it."""
+        child = self._child_named(name)
+        if child is None:
+            self._missing.append(text)
+        else:
+            self.xml.replace(child, text)
+
     def number(self, name: str, otherwise: float) -> float:
         """Return the number in the child called `name`, or `otherwise` if there is none."""
         child = self._child_named(name)
@@ -113,13 +125,35 @@ def set_emission(
     return {}
 
 
+def set_image(changes: Changes, emitter: Emitter, image: Floats, *, stem: str) -> dict[str, Floats]:
+    """Set the image of a light around the scene to (rows, columns, 3) radiances.
+
+    emitter: one of its texels. stem: prefix of the name of the image. Returns it by file name. A
+    light of one colour becomes an environment map.
+    """
+    assert emitter.texel is not None
+    name = f"{stem}.{_safe(emitter.texel.image)}.exr"
+    if emitter.plugin == "constant":
+        changes.replace("radiance", tag("string", name="filename", value=name))
+        changes.xml.set_attribute(changes.element, "type", "envmap")
+    else:
+        changes.set("string", "filename", name)
+        if changes.has("scale"):
+            changes.set("float", "scale", "1")
+    return {name: image}
+
+
+def _safe(name: str) -> str:
+    """Return the name of a light without characters that are unusual in file names."""
+    return re.sub(r"[^\w-]+", "_", name)
+
+
 def _scale_image(
     changes: Changes, scene: Scene, emitter: Emitter, parameter: str, rgb: RGB, stem: str
 ) -> dict[str, Floats]:
     """Scale the image of `emitter` by `rgb`, and refer to the scaled copy."""
     # The index distinguishes emitters whose names give the same file name.
-    safe = re.sub(r"[^\w-]+", "_", emitter.name)
-    name = f"{stem}.{scene.emitters.index(emitter)}.{safe}.exr"
+    name = f"{stem}.{scene.emitters.index(emitter)}.{_safe(emitter.name)}.exr"
     holder = changes if emitter.plugin == "envmap" else changes.child(parameter)
     holder.set("string", "filename", name)
     if holder is not changes:

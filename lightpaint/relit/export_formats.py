@@ -19,6 +19,7 @@ from lightpaint.relit.export.usd import check_usd, usd_overrides
 from lightpaint.relit.export.usd_groups import usd_multipliers
 from lightpaint.relit.relight import scene_of
 from lightpaint.relit.xml_patch import emitters_of, scene_patch
+from lightpaint.scene.lights.texels import images_of
 from lightpaint.scene.scene import Scene
 
 #: Name of the file in each format, for a scene and for light groups; None if not available.
@@ -134,12 +135,23 @@ def _writer_of(
     assert scene is not None
     if form == "mitsuba":
         return lambda: scene_patch(scene, lighting)
+    _check_no_images(form, lighting)
     emitters, name = emitters_of(scene, lighting), scene.files[0].name
     if form == "blender":
         return lambda: scene_script(
             lighting.target, name, emitters, places=lighting.places, up=lighting.up
         )
     return lambda: _usd_layer(lighting, source, emitters, folder, listen)
+
+
+def _check_no_images(form: str, lighting: Lighting) -> None:
+    """Raise LightpaintError for a lighting with texels in a format that has no images."""
+    members = [name for names in lighting.members.values() for name in names]
+    if images := images_of(members):
+        raise LightpaintError(
+            f"{form} cannot set the texels of {some_names(images)}: load the image that relight "
+            "writes beside its relit.xml, an EXR in linear light that any program takes as an HDRI"
+        )
 
 
 def _usd_layer(

@@ -6,6 +6,8 @@ and a diff shows the lights and nothing else.
 
 import os
 import re
+from collections.abc import Collection
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +20,9 @@ from lightpaint.images.formats.exr import write_rgb
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.relit_files import relit_files, settings_of
+from lightpaint.scene.lights.image_split import with_split
 from lightpaint.scene.lights.new_emitter import new_emitter_at
+from lightpaint.scene.lights.texels import images_of
 from lightpaint.scene.properties.emission import Scaling
 from lightpaint.scene.properties.pose import pose_of
 from lightpaint.scene.scene import Scene
@@ -67,8 +71,8 @@ def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
     relit = _loaded(path, scene)
     emissions = {emitter.name: emitter.emission for emitter in relit.emitters}
     for emitter, new_emission in settings_of(scene, lighting.emission):
-        if emitter.kind is None or emitter.kind.scaling is not Scaling.COLOUR:
-            continue  # a factor of 1 means as authored there
+        if emitter.texel or emitter.kind is None or emitter.kind.scaling is not Scaling.COLOUR:
+            continue  # a factor of 1 means as authored there, and texels are in an image
         if not np.array_equal(
             np.asarray(new_emission, np.float32), np.asarray(emissions[emitter.name], np.float32)
         ):
@@ -136,8 +140,8 @@ def scene_of(scene: Scene, lighting: Lighting) -> Scene:
     Raises LightingError unless it names exactly the emitters of `scene`, with each light in the
     scene's unit.
     """
-    scene = placed_scene(scene, lighting)
     emitter_names = {name for members in lighting.members.values() for name in members}
+    scene = _split_scene(placed_scene(scene, lighting), emitter_names)
     scene_names = {emitter.name for emitter in scene.emitters}
     if emitter_names != scene_names:
         raise LightingError(
@@ -154,6 +158,16 @@ def scene_of(scene: Scene, lighting: Lighting) -> Scene:
                 f"as it is now it would be {unit}: solve again"
             )
     return regrouped_scene
+
+
+def _split_scene(scene: Scene, names: Collection[str]) -> Scene:
+    """Return `scene` with those lights split into texels of which `names` has all."""
+    whole = {emitter.name for emitter in scene.emitters}
+    sizes = {image: size for image, size in images_of(names).items() if image in whole}
+    if not sizes:
+        return scene
+    facts = with_split({"emitters": scene.emitters}, scene.parsed, sizes)
+    return replace(scene, **facts, split={**scene.split, **sizes})
 
 
 def placed_scene(scene: Scene, lighting: Lighting) -> Scene:

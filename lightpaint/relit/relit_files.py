@@ -7,10 +7,11 @@ from pathlib import Path
 
 from lightpaint.arrays import RGB, Floats
 from lightpaint.errors import OutputError, SceneError
-from lightpaint.relit.emission_xml import Changes, set_emission
+from lightpaint.relit.emission_xml import Changes, set_emission, set_image
 from lightpaint.relit.xml_edit import XmlFile
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.lights.emitters import Emitter
+from lightpaint.scene.lights.image_split import texel_image
 from lightpaint.scene.scene import Scene
 
 
@@ -26,6 +27,8 @@ def settings_of(scene: Scene, emission: Mapping[str, RGB]) -> Iterator[tuple[Emi
 class _Edits:
     """The changes in one file. settings: settings of its emitters, by byte offset.
 
+    images: images of lights whose texels are set, with one of these and its sampling weight, by
+    byte offset.
     integrators: replacements of elements, by byte offset; None for an addition.
     moved: child elements to set in the elements of moved lights, by byte offset, as XML by name.
     added: lines of the elements of new lights.
@@ -33,6 +36,7 @@ class _Edits:
 
     original: Path
     settings: dict[int, tuple[Emitter, RGB, float | None]] = field(default_factory=dict)
+    images: dict[int, tuple[Emitter, Floats, float | None]] = field(default_factory=dict)
     integrators: dict[int | None, str] = field(default_factory=dict)
     moved: dict[int, Mapping[str, str]] = field(default_factory=dict)
     added: list[str] = field(default_factory=list)
@@ -76,6 +80,8 @@ def _edits_of(scene: Scene, emission: Mapping[str, RGB]) -> dict[Path, _Edits]:
             lines = added[emitter.name].lines(rgb, is_sampled=emitter in sampled)
             edits[root.resolve()].added += lines
     unchanged = [emitter for emitter in unchanged if emitter.name not in added]
+    _edit_images(scene, edits, settings, sampled)
+    settings = {emitter: rgb for emitter, rgb in settings.items() if emitter.texel is None}
     _edit_emitters(scene, edits, settings, unchanged, sampled)
     _edit_integrators(scene, edits)
     for file, offset, children in scene.moved_elements:
@@ -106,6 +112,23 @@ def _edit_emitters(
         edits_of_file = edits.get(file.resolve(), _Edits(file)).settings
         if emitter.offset in edits_of_file:
             raise _included_twice(file, edits_of_file[emitter.offset][0], emitter)
+
+
+def _edit_images(
+    scene: Scene,
+    edits: dict[Path, _Edits],
+    settings: Mapping[Emitter, RGB],
+    sampled: Collection[Emitter],
+) -> None:
+    """Add edits of the lights whose texels are among `settings`; other texels stay as they are."""
+    for node in {x.node for x in settings if x.texel is not None}:
+        texels = [x for x in scene.emitters if x.node == node]
+        image = texel_image({x.texel: settings.get(x, x.emission) for x in texels if x.texel})
+        is_sampled = bool(image.any()) or any(x in sampled for x in texels)
+        weight = _sampling_weight(texels[0], is_sampled=is_sampled)
+        file = scene.files[texels[0].file]
+        edits_of_file = edits.setdefault(file.resolve(), _Edits(file))
+        edits_of_file.images[texels[0].offset] = texels[0], image, weight
 
 
 def _edit_integrators(scene: Scene, edits: dict[Path, _Edits]) -> None:
@@ -181,7 +204,7 @@ def _edit(edit: _Edits, folder: Path, scene: Scene, stem: str) -> tuple[bytes, d
         if at is not None:
             xml.replace(xml.element_at(at), text)
     images: dict[str, Floats] = {}
-    for offset in sorted({*edit.settings, *edit.moved}):
+    for offset in sorted({*edit.settings, *edit.images, *edit.moved}):
         changes = Changes(xml, xml.element_at(offset))
         for name, text in edit.moved.get(offset, {}).items():
             changes.set_element(name, text)
@@ -190,5 +213,10 @@ def _edit(edit: _Edits, folder: Path, scene: Scene, stem: str) -> tuple[bytes, d
             if weight is not None:
                 changes.set("float", "sampling_weight", f"{weight:g}")
             images |= set_emission(changes, scene, emitter, rgb, stem=stem)
+        if offset in edit.images:
+            emitter, image, weight = edit.images[offset]
+            if weight is not None:
+                changes.set("float", "sampling_weight", f"{weight:g}")
+            images |= set_image(changes, emitter, image, stem=stem)
         changes.finish()
     return xml.edited(), images

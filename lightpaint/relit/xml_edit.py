@@ -82,6 +82,14 @@ class XmlFile:
         """Replace `element` by `text`."""
         self._edits.append((element.start, element.end, text.encode()))
 
+    def set_attribute(self, element: Element, name: str, value: str) -> None:
+        """Set an attribute of `element` that it has. value: text without special characters."""
+        tag_text = self.text[element.start : element.inner]
+        found = re.search(rf"\s{name}\s*=\s*(\"[^\"]*\"|'[^']*')".encode(), tag_text)
+        assert found is not None
+        start, end = (element.start + at for at in found.span(1))
+        self._edits.append((start + 1, end - 1, value.encode()))
+
     def insert_first(self, element: Element, lines: list[str]) -> None:
         """Insert `lines` before everything else in `element`, each on a separate line."""
         indent = _indent_before(self.text, element.start)

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from lightpaint.basis.light_images import TEXELS, joined_texels
 from lightpaint.colour.color import luminance
 from lightpaint.display_text import some_names, some_of
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
@@ -59,7 +60,10 @@ def spoken_lights(names: Sequence[str], *, start: bool = False) -> str:
 
     start: whether it begins a sentence. A long list is cut, with the number of other lights.
     """
+    names = joined_texels(names)
     names_text = some_of([name or "without a name" for name in names], room=MAX_NAME_CHARACTERS)
+    if all(TEXELS in name for name in names):
+        return names_text
     if all(re.search("light|lamp", name, re.IGNORECASE) for name in names):
         return names_text
     noun = "light" if len(names) == 1 else "lights"

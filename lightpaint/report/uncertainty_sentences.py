@@ -1,6 +1,7 @@
 """Sentences on the certainty of the answer, and on the samples that would raise it."""
 
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_images import joined_texels
 from lightpaint.display_text import some_of
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.light_setting import LightSetting
@@ -67,7 +68,7 @@ def partly_reached(lighting: Lighting) -> list[str]:
             by_channels.setdefault(unreached_channels(light), []).append(light.name)
     return [
         f"no painted pixel shows the {channels} of {some_of(names, room=200)}: left unchanged"
-        for channels, names in by_channels.items()
+        for channels, names in ((x, joined_texels(y)) for x, y in by_channels.items())
     ]
 
 

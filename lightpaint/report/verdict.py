@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from lightpaint.basis.light_images import joined_texels
 from lightpaint.colour.color import luminance
 from lightpaint.display_text import some_names
 from lightpaint.images.estimate import Estimate
@@ -225,8 +226,9 @@ def spoken_delta_e(appearance: Appearance, *, known: bool) -> str:
 
 def spoken_blindness(verification: Verification) -> str:
     """Name the least detectable lights: `The render would probably have missed … in bulb`."""
-    unseen, power = verification.unseen, verification.power or {}
-    other_names = [name for name in power if name not in unseen]
+    power = verification.power or {}
+    other_names = joined_texels(name for name in power if name not in verification.unseen)
+    unseen = joined_texels(verification.unseen)
     unnamed = len(unseen) - MAX_UNSEEN_NAMES
     if unnamed > 0 and len(other_names) <= MAX_UNSEEN_NAMES:
         names = "any light" + (

@@ -16,6 +16,7 @@ from lightpaint.display_text import Listed, Shown, some_of
 from lightpaint.keywords import keywords
 from lightpaint.scene.changed_emitters import darkened, with_elements, with_motions
 from lightpaint.scene.lights.emitters import Emitter
+from lightpaint.scene.lights.image_split import with_split
 from lightpaint.scene.lights.light import (
     Light,
     black_emitters,
@@ -23,6 +24,7 @@ from lightpaint.scene.lights.light import (
     emitter_named,
     light_named,
     lights_of,
+    regrouped,
     settings_for,
 )
 from lightpaint.scene.lights.lights_file import SceneRequests
@@ -32,6 +34,7 @@ from lightpaint.scene.lights.new_emitter import (
     moved_emitter,
     places_of,
 )
+from lightpaint.scene.lights.texels import GridSize
 from lightpaint.scene.properties.film import Film, camera_named, reduced, reduction
 from lightpaint.scene.properties.integrator import Integrator, IntegratorChoice
 from lightpaint.scene.properties.pose import Pose, motion_of, upward_axis
@@ -72,6 +75,7 @@ class Scene(SceneFiles, Shown):
         requests: The constraints in the lights file.
         parsed: The nodes from Mitsuba's parser; internal to this package.
         chosen: Names of the lights selected by `only`; empty if all are present.
+        split: Columns and rows of the images that are split into texels, by name of the light.
         added: Emitters added by `with_new_emitters`, which are in no file.
         old_sites: Sites in the file of the emitters that `moved` has moved, by name.
 
@@ -101,6 +105,7 @@ class Scene(SceneFiles, Shown):
     requests: SceneRequests
     parsed: ParsedScene
     chosen: tuple[str, ...] = ()
+    split: Mapping[str, GridSize] = field(default_factory=dict)
     added: tuple[NewEmitter, ...] = ()
     old_sites: Mapping[str, Site] = field(default_factory=dict)
 
@@ -117,7 +122,8 @@ class Scene(SceneFiles, Shown):
     def identity(self) -> str:
         """Identity of the basis of this scene: `content`, and how emitters are grouped."""
         # If all emitters are adjusted one by one, it is the content alone.
-        if all(x.member_names == (x.name,) and not x.is_fixed for x in self.lights):
+        is_single = all(x.member_names == (x.name,) and not x.is_fixed for x in self.lights)
+        if is_single and not self.split:
             return self.content
         structure = [(x.name, x.member_names, x.is_fixed) for x in self.lights]
         return hashlib.sha256(repr((self.content, structure)).encode()).hexdigest()[:32]
@@ -260,18 +266,9 @@ class Scene(SceneFiles, Shown):
         light yet.
         """
         with mitsuba_errors(self.path):
-            facts = inspect_scene(parsed, self.sensor)
-        members: dict[str, Sequence[str]] = {x.name: x.member_names for x in self.lights}
-        members |= {name: [name] for name in more}
-        fixed = [light.name for light in self.lights if light.is_fixed]
-        found_names = {light.name for light in self.lights if light.is_found}
-        lights = lights_of(facts["emitters"], members, fixed)
-        return replace(
-            self,
-            **facts | {"film": self.film},
-            lights=tuple(replace(x, is_found=x.name in found_names) for x in lights),
-            parsed=parsed,
-        )
+            facts = with_split(inspect_scene(parsed, self.sensor), parsed, self.split)
+        lights = regrouped(self.lights, facts["emitters"], more)
+        return replace(self, **facts | {"film": self.film}, lights=lights, parsed=parsed)
 
     @property
     def up(self) -> Position:
@@ -287,7 +284,11 @@ class Scene(SceneFiles, Shown):
 
     @MITSUBA.acquired()
     def load(
-        self, emission: Mapping[str, RGB] | None = None, *, views: Sequence["Scene"] = ()
+        self,
+        emission: Mapping[str, RGB] | None = None,
+        *,
+        views: Sequence["Scene"] = (),
+        evenly: bool = False,
     ) -> Any:
         """Load the `mi.Scene` with lights set to `emission`; other lights stay as they are.
 
@@ -295,9 +296,10 @@ class Scene(SceneFiles, Shown):
         verification alike. A light set to black is never sampled. The scene, and everything that
         refers to it, must be released before another is loaded. Image lights and the fixed light
         can only be black or as authored here: other multiples need files (see relight). views: this
-        scene through other sensors, whose films are replaced as well.
+        scene through other sensors, whose films are replaced as well. evenly: see `with_texels`.
         """
-        settings = settings_for(self.lights, self.emitters, emission or {}, scene=str(self.path))
+        named, scene = emission or {}, str(self.path)
+        settings = settings_for(self.lights, self.emitters, named, scene=scene, evenly=evenly)
         return self.parsed.instantiate(settings, self.film, *(view.film for view in views))
 
     @MITSUBA.acquired()

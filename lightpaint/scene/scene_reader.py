@@ -9,9 +9,11 @@ from lightpaint.keywords import keywords
 from lightpaint.scene.checks.old_scenes import explain_old_scene
 from lightpaint.scene.checks.xml_limits import MAX_XML
 from lightpaint.scene.lights.emitters import Emitter, check_emitters
+from lightpaint.scene.lights.image_split import with_split
 from lightpaint.scene.lights.light import Light
 from lightpaint.scene.lights.light_choice import choose_lights
 from lightpaint.scene.lights.lights_file import LightsFile, lights_file_for
+from lightpaint.scene.lights.texels import GridSize, parse_size
 from lightpaint.scene.properties.film import check_film, sensor_index
 from lightpaint.scene.properties.integrator import IntegratorChoice
 from lightpaint.scene.runtime.mitsuba_errors import mitsuba_errors
@@ -36,6 +38,7 @@ def load_scene(
     use_lights_file: bool = True,
     group_alike: bool = True,
     integrator: str | None = None,
+    split: Mapping[str, object] | None = None,
 ) -> Scene:
     """Read a Mitsuba scene XML and find its lights.
 
@@ -55,6 +58,9 @@ def load_scene(
             they are selected by their generated names. The lights file can disable this.
         integrator: Integrator to render with instead of the scene's own, such as `path`, `direct`
             or `path:max_depth=8`. It inherits max_depth, rr_depth and hide_emitters.
+        split: Name → columns and rows, such as `(16, 8)`: a light around the scene becomes an image
+            of that many texels, each a light `NAME.xCOLUMN.yROW`. By default those of the lights
+            file, which this replaces.
 
     Raises:
         SceneError: If the scene is invalid, with Mitsuba's own message if Mitsuba rejects it.
@@ -77,8 +83,9 @@ def load_scene(
     index = sensor_index(sensor, parsed.sensor_names, path)
     selection = lights_file_for(path, lights_file, beside_scene=use_lights_file)
     selection = selection.with_more(lights, groups)
+    sizes = _image_sizes(selection, split)
     with explain_old_scene(path), mitsuba_errors(path):
-        facts = inspect_scene(parsed, index)
+        facts = with_split(inspect_scene(parsed, index), parsed, sizes)
     check_film(path, facts["film"], facts["spp"])
     check_emitters(path, facts["emitters"])
     return Scene(
@@ -88,8 +95,16 @@ def load_scene(
         lights_file=selection.path,
         requests=selection.requests,
         parsed=parsed,
+        split=sizes,
         **facts,
     )
+
+
+def _image_sizes(selection: LightsFile, split: Mapping[str, object] | None) -> dict[str, GridSize]:
+    """Return columns and rows of images by name of the light: `split`, or those of the file."""
+    if split is None:
+        return selection.requests.split
+    return {name: parse_size(size, f"split: {name}") for name, size in split.items()}
 
 
 def _select_lights(

@@ -27,7 +27,7 @@ TRAINING_SPP, TRAINING_SPP_PER_EMITTER = 16, 0.5
 def training_samples(scene: Scene) -> tuple[int, ...]:
     """Return the numbers of camera samples in the training passes for `scene`."""
     height, width = scene.size
-    spp = max(TRAINING_SPP, TRAINING_SPP_PER_EMITTER * len(scene.emitters))
+    spp = max(TRAINING_SPP, TRAINING_SPP_PER_EMITTER * len({x.node for x in scene.emitters}))
     share = min(1.0, spp * height * width / sum(TRAINING_SAMPLES))
     return tuple(max(1, round(share * samples)) for samples in TRAINING_SAMPLES)
 

@@ -10,6 +10,8 @@ from lightpaint.basis.render.render_budget import half_of
 from lightpaint.basis.render.separate_renders import (
     plan_of_light,
 )
+from lightpaint.display_text import some_names
+from lightpaint.errors import SceneError
 from lightpaint.scene.scene import Scene
 
 ONE_PASS = "one pass, several questions"
@@ -72,8 +74,19 @@ def samples_for(scene: Scene, spp: int | None) -> int:
 
 
 def method_of(scene: Scene) -> str:
-    """Return the method for rendering a basis of `scene`: `ONE_PASS` or `SEPARATE`."""
-    return ONE_PASS if why_not_one_pass(scene) is None else SEPARATE
+    """Return the method for rendering a basis of `scene`: `ONE_PASS` or `SEPARATE`.
+
+    Raises SceneError for images in texels that one pass cannot render: Mitsuba does not sample a
+    map in which only texels at a pole are lit.
+    """
+    reason = why_not_one_pass(scene)
+    if reason is not None and scene.split:
+        raise SceneError(
+            f"{reason}, so that each light is rendered by itself, and {some_names(scene.split)} "
+            "cannot be split into texels: leave split out, or use integrator='path' and a variant "
+            "like llvm_ad_rgb"
+        )
+    return ONE_PASS if reason is None else SEPARATE
 
 
 def origin_of(

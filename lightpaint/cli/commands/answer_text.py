@@ -1,5 +1,6 @@
 """The text that `lightpaint solve` prints for an answer: short, or in full."""
 
+from collections.abc import Collection, Sequence
 from dataclasses import fields
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -7,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from lightpaint.basis.light_images import LightImage, joined_texels, light_images
 from lightpaint.basis.lights import BasisLight
 from lightpaint.cli.output import terminal
 from lightpaint.cli.output.tables import spoken_agreement
@@ -135,13 +137,19 @@ def undetermined_remark(look: Look) -> str:
     unreached = look.solution.certificate.unreached
     dark = [name for name in unreached if not look.basis.image(name).any()]
     notes = []
+    unseen = [name for name in unreached if name not in dark]
     if dark:
-        notes.append(f"the picture shows nothing of {some_names(dark)}: left unchanged")
-    if appearance := [name for name in unreached if name not in dark]:
-        notes.append(f"no painted pixel sees {some_names(appearance)}: left unchanged")
+        notes.append(f"the picture shows nothing of {_spoken(dark)}: left unchanged")
+    if unseen:
+        notes.append(f"no painted pixel sees {_spoken(unseen)}: left unchanged")
     notes += partly_reached(look.lighting)
     notes += [ambiguity.sentence for ambiguity in look.analysis.ambiguities]
     return f"the painting leaves lights open: {some_of(notes, joint='; ')}" if notes else ""
+
+
+def _spoken(names: Sequence[str]) -> str:
+    """Return names of lights, those of an image by their number."""
+    return some_names(joined_texels(names))
 
 
 def _show_short(look: Look) -> None:
@@ -149,8 +157,12 @@ def _show_short(look: Look) -> None:
     lights, current_lights = look.lighting.lights, look.basis.lights
     shares = energy_shares(look.basis, look.lighting)
     errors = spoken_errors(look.uncertainty, len(shares))
-    important = _important_lights(look)
+    images = [image for image in light_images(current_lights) if image.is_whole]
+    in_images = {int(k) for image in images for k in image.lights}
+    important = _important_lights(look, in_images)
     table, swatches = terminal.table("light", "stops", "colour", "±", "share"), []
+    for image in images:
+        swatches.append(_add_image_row(table, look, image, float(shares[image.lights].sum())))
     for k in important:
         change_text = change(current_lights[k], lights[k])
         is_off = change_text == "off"
@@ -166,20 +178,41 @@ def _show_short(look: Look) -> None:
     terminal.print_table(table, swatches)
     if note := untold_lights(look.lighting):
         terminal.tell(note)
-    if other_indices := sorted(set(range(len(lights))) - set(important)):
+    if other_indices := sorted(set(range(len(lights))) - set(important) - in_images):
         terminal.tell(_other_lights_text(look, other_indices))
     if any(lights[k].is_active for k in important):
         terminal.write("* limited by a constraint (--table full shows which)")
 
 
-def _important_lights(look: Look) -> list[int]:
-    """Return indices of the lights that matter or changed most in the picture, in order."""
+def _add_image_row(table: terminal.Rows, look: Look, image: LightImage, share: float) -> str | None:
+    """Add the row of an image in texels with the change of its mean, and return its colour."""
+    now, new = (image.mean(x) for x in (look.basis.current_weights, look.solution.weights))
+    color, (columns, rows) = rgb_to_hex(new), image.size
+    is_off = not new.any()
+    table.row(
+        f"{image.name}, {columns}x{rows} texels",
+        _stops(float(luminance(now)), float(luminance(new))),
+        "" if is_off else color or "",
+        "",
+        f"{100 * share:.1f} %",
+        room=NAME_WIDTH,
+    )
+    return None if is_off else color
+
+
+def _important_lights(look: Look, in_images: Collection[int]) -> list[int]:
+    """Return indices of the lights that matter or changed most in the picture, in order.
+
+    in_images: lights that are texels of an image with a row of its own.
+    """
     weights = look.solution.weights
-    if len(weights) <= MAX_FULL_LIGHTS:
-        return list(range(len(weights)))
+    single = np.array([k for k in range(len(weights)) if k not in in_images], int)
+    if len(single) <= MAX_FULL_LIGHTS:
+        return [int(k) for k in single]
     change_size = np.abs(weights - look.basis.current_weights)
-    power = (change_size + weights) * look.basis.totals @ LUMINANCE
-    return sorted(np.argsort(-power, kind="stable")[:SHORT_LIST_LIGHTS].tolist())
+    power = ((change_size + weights) * look.basis.totals @ LUMINANCE)[single]
+    order = np.argsort(-power, kind="stable")[:SHORT_LIST_LIGHTS]
+    return sorted(int(k) for k in single[order])
 
 
 def _other_lights_text(look: Look, other_indices: list[int]) -> str:
@@ -208,6 +241,11 @@ def change(light: BasisLight, setting: LightSetting) -> str:
     current_luminance, answer_luminance = (
         float(luminance(np.array(x.emission))) for x in (light, setting)
     )
+    return _stops(current_luminance, answer_luminance)
+
+
+def _stops(current_luminance: float, answer_luminance: float) -> str:
+    """Return the change of a luminance in stops, `on` or `off`."""
     if answer_luminance <= OFF_SHARE * current_luminance:
         return "off"
     if current_luminance == 0:

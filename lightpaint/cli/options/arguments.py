@@ -38,6 +38,16 @@ def group(text: str) -> tuple[str, list[str]]:
     return name.strip(), names_of(members)
 
 
+def image_size(text: str) -> tuple[str, str]:
+    """Parse a light and the size of its image, `NAME=16x8`; `none` for no images."""
+    if text.strip() == "none":
+        return "", ""
+    name, equals, size = text.rpartition("=")
+    if not name.strip() or not equals or not size.strip():
+        raise argparse.ArgumentTypeError(f"{text!r} is not NAME=COLUMNSxROWS, such as sky=16x8")
+    return name.strip(), size.strip()
+
+
 def light_value(text: str) -> tuple[str, Any]:
     """Parse a value for a light, `NAME=VALUE`."""
     name, equals, value = text.rpartition("=")

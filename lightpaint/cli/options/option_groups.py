@@ -90,6 +90,19 @@ def add_lights(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_split(parser: argparse.ArgumentParser) -> None:
+    """Add the option for lights that are images in texels."""
+    parser.add_argument(
+        "--split",
+        type=arguments.image_size,
+        action="append",
+        metavar="sky=16x8",
+        help="split a light around the scene, an envmap or constant, into an image of 16 by 8 "
+        "texels, each a light sky.xCOLUMN.yROW; --split none for no images (default: those of the "
+        "lights file)",
+    )
+
+
 def add_view_transform(parser: argparse.ArgumentParser, name: str, stops: str) -> None:
     """Add the options for the view transform. name, stops: their defaults in words."""
     parser.add_argument(

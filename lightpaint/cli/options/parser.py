@@ -17,6 +17,7 @@ from lightpaint.cli.options.option_groups import (
     add_sampling,
     add_scene,
     add_server,
+    add_split,
     add_spp,
     add_unit,
     add_variant,
@@ -68,6 +69,7 @@ def command_parser() -> argparse.ArgumentParser:
 def _lights(parser: argparse.ArgumentParser) -> None:
     add_scene(parser)
     add_lights(parser)
+    add_split(parser)
     add_unit(parser)
     output_group = parser.add_mutually_exclusive_group()
     add_output(output_group, "F.png", "picture of each light alone (default: lights.png)")
@@ -86,6 +88,7 @@ def _lights(parser: argparse.ArgumentParser) -> None:
 def _basis(parser: argparse.ArgumentParser) -> None:
     add_scene(parser)
     add_lights(parser)
+    add_split(parser)
     add_budget(parser)
     add_cache(parser)
     add_output(parser, "F.basis.exr", "file to write (default: <scene>.basis.exr)")
@@ -101,6 +104,7 @@ def _template(parser: argparse.ArgumentParser) -> None:
     )
     add_view(parser)
     add_lights(parser)
+    add_split(parser)
     add_pattern(parser)
     add_budget(parser)
     add_cache(parser)
@@ -144,6 +148,7 @@ def _solve(parser: argparse.ArgumentParser) -> None:
     add_tolerances(parser)
     add_unit(parser)
     add_lights(parser)
+    add_split(parser)
     add_pattern(parser)
     add_constraints(parser)
     add_rigging(parser)

@@ -43,10 +43,23 @@ def scene_of(options: Namespace, *, is_to_solve: bool = True, **fields: Any) -> 
             "lights_file": options.lights_file,
             "use_lights_file": options.use_lights_file,
             "group_alike": options.group_alike,
+            "split": _split_of(options),
         }
     loading = {"sensor": options.sensor, "variant": options.variant, **fields}
     loading["integrator"] = options.integrator
     return SceneFile(path, parameters=dict(options.parameters), **loading)
+
+
+def _split_of(options: Namespace) -> dict[str, str] | None:
+    """Return the sizes of images by name of the light; None for those of the lights file.
+
+    The painter shows a light around the scene as one light.
+    """
+    if options.command == "paint":
+        return {}
+    if options.split is None:
+        return None
+    return {name: size for name, size in options.split if name}
 
 
 def scene_to_export(options: Namespace) -> SceneFile | None:

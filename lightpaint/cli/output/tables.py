@@ -2,6 +2,9 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
+from lightpaint.arrays import as_rgb
 from lightpaint.basis.cache.cache import Entry
 from lightpaint.cli.output import terminal
 from lightpaint.colour.photometry import Photometry, photometry
@@ -11,7 +14,9 @@ from lightpaint.report.page.suggestion_section import spoken_position, spoken_su
 from lightpaint.report.phrases import spoken_percent
 from lightpaint.report.verdict import agreement
 from lightpaint.scene.lights.emitters import Emitter
+from lightpaint.scene.lights.image_split import TEXEL_KIND
 from lightpaint.scene.lights.light import Light
+from lightpaint.scene.lights.texels import image_of, images_of, solid_angles, texel_name
 from lightpaint.scene.properties.emission import MULTIPLE
 from lightpaint.scene.scene import Scene
 
@@ -22,7 +27,16 @@ def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
     # Lumens and candelas need a scale.
     amounts = () if cd_per_unit is None else ("luminous", "flux")
     table = terminal.table(*headings, *amounts)
+    images = images_of(light.name for light in scene.lights)
+    for image, (columns, rows) in images.items():
+        texels = [light.emission for light in scene.lights if image_of(light.name) == image]
+        mean = np.average(texels, axis=0, weights=solid_angles((columns, rows)).ravel())
+        plugin = scene.light(texel_name(image, 0, 0)).plugin
+        size = f"{columns}x{rows} texels {image}.xCOLUMN.yROW"
+        table.row(image, plugin, terminal.numbers(as_rgb(mean)), TEXEL_KIND.unit, size, "", "")
     for light in scene.lights:
+        if image_of(light.name) in images:
+            continue
         is_single = light.member_names == (light.name,) and not light.is_fixed
         if not is_single:
             state = "fixed" if light.is_fixed else terminal.numbers(light.emission)

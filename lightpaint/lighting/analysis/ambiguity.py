@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles
+from lightpaint.basis.light_images import texel_lights
 from lightpaint.lighting.algebra.quadratic import UNREACHED_POWER
 from lightpaint.lighting.solution import Solution
 
@@ -52,7 +53,8 @@ def ambiguities(solution: Solution) -> tuple[Ambiguity, ...]:
     Noise makes the images of two lights at one place differ by its share of their power.
     """
     basis = solution.basis
-    free = np.flatnonzero(~basis.is_fixed)
+    # Neighbouring texels are alike by nature, and the expectation of their image decides.
+    free = np.flatnonzero(~basis.is_fixed & ~texel_lights(basis.lights))
     noise, power = (planes.squares()[free] for planes in (basis.noise, basis.planes))
     shares = noise[power > 0] / power[power > 0]
     alike = max(ALIKE, 2 * float(np.median(shares))) if shares.size else ALIKE

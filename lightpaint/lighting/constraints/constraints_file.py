@@ -9,7 +9,7 @@ from lightpaint.files import one_line
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
 from lightpaint.lighting.constraints.values import check_keys, parse_strength
-from lightpaint.scene.lights.lights_file import MOVES, SceneRequests, read_keys
+from lightpaint.scene.lights.lights_file import MOVES, SPLIT, SceneRequests, read_keys
 
 #: Characters of an error, which names the file, the light and the key before it quotes.
 MAX_MESSAGE_LENGTH = 1000
@@ -52,13 +52,13 @@ def constraints_of(requests: SceneRequests) -> Constraints:
 
 
 def _without_moves(light: Any, source: str) -> Any:
-    """Return tables of lights without the keys for moves, which are no constraints."""
+    """Return tables of lights without the keys for moves and images, which are no constraints."""
     if not isinstance(light, Mapping):
         return light
     tables = {}
     for name, table in light.items():
-        check_keys(table, (*LIGHT_KEYS, *MOVES), f"{source}: light.{name}")
-        remaining = {key: value for key, value in table.items() if key not in MOVES}
+        check_keys(table, (*LIGHT_KEYS, *MOVES, SPLIT), f"{source}: light.{name}")
+        remaining = {key: value for key, value in table.items() if key not in (*MOVES, SPLIT)}
         if remaining or not table:
             tables[name] = remaining
     return tables

@@ -15,6 +15,7 @@ from lightpaint.lighting.constraints.constraints import (
     is_pattern,
     merge_tables,
 )
+from lightpaint.scene.lights.texels import image_of
 
 
 def constraints_by_light(
@@ -61,7 +62,9 @@ def tied_lights(
 def _match_lights(
     name: str, lights: Sequence[BasisLight], where: str, *, only_keeps: bool = False
 ) -> list[int]:
-    """Return the index of the light of this name, else of all that match it as a pattern."""
+    """Return the index of the light of this name, else of all that match it as a pattern, or of
+    the texels of the image of this name.
+    """
     names = [light.name for light in lights]
     for k, light in enumerate(lights):
         if name == light.name and not light.is_fixed:
@@ -80,7 +83,11 @@ def _match_lights(
                 f"{where}: {name!r} is part of the light {light.name!r}: constrain that light"
             )
     matching = fnmatchcase if is_pattern(name) else str.__eq__
-    matches = [k for k, x in enumerate(lights) if not x.is_fixed and matching(x.name, name)]
+    matches = [
+        k
+        for k, x in enumerate(lights)
+        if not x.is_fixed and (matching(x.name, name) or image_of(x.name) == name)
+    ]
     if not matches:
         adjustable = [light.name for light in lights if not light.is_fixed]
         close = difflib.get_close_matches(name, adjustable, n=1)

@@ -20,11 +20,13 @@ from typing import Any
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_images import texel_lights
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit, Space
 from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.live.live_sums import MAX_FILM_PIXELS, Films, SmallFilm
 from lightpaint.lighting.live.live_view import LiveView
+from lightpaint.lighting.loss.image_prior import image_prior
 from lightpaint.lighting.loss.painting import unpainted_weight
 from lightpaint.lighting.loss.pixel_bins import block_side
 from lightpaint.lighting.loss.weight_penalty import (
@@ -54,8 +56,10 @@ WHITE_WIDTH = 8
 #: Painted pixels that determine the colours lights may take, about.
 GAMUT_PIXELS = 2**8
 
-#: Views, with the pulls to the current lighting and to its colours.
-_Pulls = tuple[tuple[LiveView, ...], NormalEquations | None, NormalEquations | None]
+#: A pull on the weights, if there is one.
+_Pull = NormalEquations | None
+#: Views, with the pulls to the current lighting and to its colours, and what images should be.
+_Pulls = tuple[tuple[LiveView, ...], _Pull, _Pull, _Pull]
 
 
 class LiveSolver:
@@ -164,7 +168,8 @@ class LiveSolver:
         confined = self._within
         if confined.gamuts is None or self._gamuts_of != views:
             painted = partial(PaintedLight.of, [x.painting for x in views], max_pixels=GAMUT_PIXELS)
-            gamuts = Gamuts(painted, _power(views), self._basis.current_weights)
+            is_texel = texel_lights(self._basis.lights)
+            gamuts = Gamuts(painted, _power(views), self._basis.current_weights, is_texel)
             confined, self._gamuts_of = self._reduction.with_gamuts(gamuts), views
         else:
             confined.gamuts.refresh()
@@ -192,6 +197,7 @@ class LiveSolver:
         if self._pulls is None or self._pulls[0] != views:
             power = _power(views)
             keeps_color = self._reduction.is_free & power.any(axis=1)
+            keeps_color &= ~texel_lights(self._basis.lights)
             current, prefer = self._basis.current_weights, self._constraints.prefer_current
 
             def pull_to(prefer: float, share: float) -> NormalEquations | None:
@@ -204,15 +210,18 @@ class LiveSolver:
                     keeps_color=keeps_color,
                 )
 
-            self._pulls = views, pull_to(prefer, 0.0), pull_to(0.0, 1.0)
-        _, to_current, to_colors = self._pulls
-        if to_colors is None:
-            return to_current
+            prior = image_prior(self._basis.lights, power, self._fit, 1.0)
+            self._pulls = views, pull_to(prefer, 0.0), pull_to(0.0, 1.0), prior
+        _, to_current, to_colors, prior = self._pulls
         # The total importance, relative to the number of pixels.
         pixels = sum(view.pixels for view in views)
-        to_colors = to_colors.scaled(sum(float(view.counts[0]) for view in views) / pixels)
-        to_colors = strengthen(to_colors, dimming_factors(self._basis.current_weights, before))
-        return to_colors if to_current is None else to_current + to_colors
+        share = sum(float(view.counts[0]) for view in views) / pixels
+        if to_colors is not None:
+            dimming = dimming_factors(self._basis.current_weights, before)
+            to_colors = strengthen(to_colors.scaled(share), dimming)
+        prior = None if prior is None else prior.scaled(share)
+        pulls = [pull for pull in (to_current, to_colors, prior) if pull is not None]
+        return reduce(add, pulls) if pulls else None
 
     def _joint_films(self, views: tuple[LiveView, ...]) -> Films:
         if self._films is None or self._films[0] != views:

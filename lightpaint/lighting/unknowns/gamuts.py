@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats, Indices
+from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import luminance
 from lightpaint.colour.color_hull import (
@@ -123,11 +123,19 @@ class Gamuts:
     never do, and under the brush each answer would wait for it.
 
     light: samples the painted pixels; call `refresh` after strokes. power, current: (n, 3), ‖Φᵢ‖²
-    of the lamps' pictures, and their current weights.
+    of the lamps' pictures, and their current weights. exempt: (n,), lights of any
+    colour.
     """
 
-    def __init__(self, light: Callable[[], PaintedLight], power: Doubles, current: Doubles) -> None:
+    def __init__(
+        self,
+        light: Callable[[], PaintedLight],
+        power: Doubles,
+        current: Doubles,
+        exempt: Bools | None = None,
+    ) -> None:
         self._light, self._power, self._current = light, power, current
+        self._exempt = np.zeros(len(current), bool) if exempt is None else exempt
         self._own = np.where(luminance(current)[:, None] > 0, current, 1.0)
         # Its own colour is within its gamut, and not at the edge of it.
         own_reach = chromaticity(self._own) @ DIRECTIONS.T
@@ -173,6 +181,7 @@ class Gamuts:
         colors = weights[lights]
         room = np.einsum("mkc,mc->mk", self._sides[lights], colors)
         is_inside = (room >= -ROUND_OFF * colors.sum(axis=1, keepdims=True)).all(axis=1)
+        is_inside |= self._exempt[lights]
         return [k for k in lights[~is_inside].tolist() if not self[k].has(weights[k])]
 
 

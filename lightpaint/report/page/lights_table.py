@@ -10,6 +10,7 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, Indices
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_images import LightImage, light_images
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import luminance, rgb_to_hex
 from lightpaint.colour.photometry import Photometry
@@ -31,6 +32,7 @@ from lightpaint.report.clean_pictures import MAX_CLEAN_THUMBNAILS
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.figures import data_uri, thumbnail
 from lightpaint.report.page.html import breakable_name, fold, share_cell
+from lightpaint.report.page.image_rows import image_row
 from lightpaint.report.phrases import spoken_percent
 from lightpaint.report.uncertainty_sentences import (
     UNDETERMINED,
@@ -68,6 +70,8 @@ def lights_table(
     """
     is_clean = is_clean and len(basis.lights) <= MAX_CLEAN_THUMBNAILS
     rows = _rows(basis, solution, uncertainty, is_clean=is_clean)
+    if images := [image for image in light_images(basis.lights) if image.is_whole]:
+        return _table_with_images(images, rows, basis, solution)
     if len(rows) <= ROWS_SHOWN + SPARE_ROWS:
         return _table(rows, solution)
     shares = largest_shares(basis, solution.lighting)
@@ -83,6 +87,24 @@ def lights_table(
         + _table([rows[k] for k in visible_indices], solution)
         + fold(note, _table([rows[k] for k in other_indices], solution))
     )
+
+
+def _table_with_images(
+    images: Sequence[LightImage], rows: Sequence[str], basis: Basis, solution: Solution
+) -> str:
+    """Return a row for each image and each other light; the rows of texels are folded."""
+    shares = energy_shares(basis, solution.lighting)
+    in_images = {int(k) for image in images for k in image.lights}
+    shown = [image_row(image, basis, solution, shares) for image in images]
+    shown += [row for k, row in enumerate(rows) if k not in in_images]
+    folds = (
+        fold(
+            f"the {len(image.lights)} texels of {escape(image.name)}, row by row from the top",
+            _table([rows[k] for k in image.lights], solution),
+        )
+        for image in images
+    )
+    return _table(shown, solution) + "".join(folds)
 
 
 def _table(rows: list[str], solution: Solution) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 from lightpaint.arrays import RGB
 from lightpaint.colour.photometry import lambertian_flux, point_flux, spot_flux
 from lightpaint.errors import SceneError
+from lightpaint.scene.lights.texels import Texel
 from lightpaint.scene.plane_identity import EmitterDigest, SceneHasher
 from lightpaint.scene.properties.emission import (
     ENVIRONMENTS,
@@ -43,7 +44,7 @@ class Emitter:
     undefined. has_name: whether its author named it; otherwise the name is generated. belongs_to:
     name of the material, file or parent of an unnamed emitter, or "". digest: hashes of what its
     light depends on besides the scene; None if it is not in a file. site: its position, direction
-    and cone.
+    and cone. texel: its place in the image of the element, if that is split into texels.
     """
 
     name: str
@@ -61,6 +62,7 @@ class Emitter:
     belongs_to: str = ""
     digest: EmitterDigest | None = None
     site: Site = field(default_factory=Site)
+    texel: Texel | None = None
 
     def __repr__(self) -> str:
         return f"Emitter({self.name!r}, {self.plugin} {self.form})"

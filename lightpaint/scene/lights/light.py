@@ -8,6 +8,7 @@ from lightpaint.arrays import RGB
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.scene.lights.emitters import Emitter
+from lightpaint.scene.lights.image_split import with_texels
 from lightpaint.scene.plane_identity import combined_identity
 from lightpaint.scene.properties.emission import AS_AUTHORED, MULTIPLE, EmitterSetting, Scaling
 
@@ -161,6 +162,21 @@ def lights_of(
     return tuple(sorted(lights, key=lambda light: (light.is_fixed, light.members[0].node)))
 
 
+def regrouped(
+    lights: Sequence[Light], emitters: Sequence[Emitter], more: Iterable[str]
+) -> tuple[Light, ...]:
+    """Return `lights` with `emitters`, which have the names of theirs.
+
+    more: names of emitters that become lights of their own.
+    """
+    members: dict[str, Sequence[str]] = {light.name: light.member_names for light in lights}
+    members |= {name: [name] for name in more}
+    fixed = [light.name for light in lights if light.is_fixed]
+    found_names = {light.name for light in lights if light.is_found}
+    new_lights = lights_of(emitters, members, fixed)
+    return tuple(replace(light, is_found=light.name in found_names) for light in new_lights)
+
+
 def light_named(name: str, lights: Sequence[Light], *, scene: str) -> Light:
     """Return the light called `name`. Raises SceneError if it does not exist."""
     for light in lights:
@@ -175,19 +191,23 @@ def settings_for(
     emission: Mapping[str, RGB],
     *,
     scene: str,
+    evenly: bool = False,
 ) -> dict[int, EmitterSetting]:
-    """Return emitter settings by node. emission: emission by light name."""
-    settings: dict[int, EmitterSetting] = {}
+    """Return emitter settings by node. emission: emission by light name. evenly: see
+    `with_texels`.
+    """
+    by_name: dict[str, EmitterSetting] = {}
     for name, rgb in emission.items():
         light = light_named(name, lights, scene=scene)
         if not light.is_fixed:
-            settings |= {m.node: _setting(m, light.emission_of(m, rgb)) for m in light.members}
+            by_name |= {m.name: _setting(m, light.emission_of(m, rgb)) for m in light.members}
         elif not any(rgb):
-            settings |= {m.node: _setting(m, rgb) for m in light.members}
+            by_name |= {m.name: _setting(m, rgb) for m in light.members}
         elif tuple(rgb) != AS_AUTHORED:
             raise SceneError(
                 f"the fixed light can be loaded black or unchanged, not multiplied by {rgb}"
             )
+    settings = with_texels(by_name, emitters, evenly=evenly)
     sampling_weights = {emitter.node: emitter.sampling_weight for emitter in emitters}
     if not any(
         (sampling_weights | {node: x.sampling_weight for node, x in settings.items()}).values()
@@ -256,15 +276,18 @@ def black_emitters(
     # If nothing else may be sampled, black emitters are, since Mitsuba needs at least one.
     can_be_sampled = any(not m.hit_by_chance for light in lights for m in light.members)
     black = (0.0, 0.0, 0.0)
+    lit_nodes = {m.node for light in lights for m in light.members}
     settings = {
         x.node: EmitterSetting(x.kind, black, 0.0 if can_be_sampled else x.sampling_weight)
         for x in emitters
-        if x.name not in members
+        if x.node not in lit_nodes
     }
     all_emitters = tuple(
-        replace(x, emission=black, sampling_weight=settings[x.node].sampling_weight)
+        x
+        if x.name in members
+        else replace(x, emission=black, sampling_weight=settings[x.node].sampling_weight)
         if x.node in settings
-        else x
+        else replace(x, emission=black)  # a texel beside one that is lit
         for x in emitters
     )
     return all_emitters, settings

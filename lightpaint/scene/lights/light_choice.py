@@ -17,6 +17,7 @@ from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.lights.light import Light, check_adjustable, keep, tie
+from lightpaint.scene.lights.texels import image_of
 from lightpaint.scene.properties.emission import Scaling
 from lightpaint.validation import MAX_LISTED, MAX_NAME
 
@@ -217,12 +218,12 @@ def _chosen(
 
 
 def _matching(pattern: str, names: Sequence[str], place: str, scene: str) -> set[str]:
-    """Return the name itself, or else all names that match the pattern. Raises SceneError if none
-    do.
+    """Return the name itself, or else all names that match the pattern, and texels of the image of
+    that name. Raises SceneError if none do.
     """
     if pattern in names:
         return {pattern}
-    matches = {name for name in names if fnmatchcase(name, pattern)}
+    matches = {name for name in names if fnmatchcase(name, pattern) or image_of(name) == pattern}
     if not matches:
         close = difflib.get_close_matches(pattern, names, n=1)
         hint = f"did you mean {close[0]!r}? It" if close else "it"

@@ -13,6 +13,7 @@ from typing import Any
 from lightpaint.errors import SceneError
 from lightpaint.file_reading import read_text
 from lightpaint.files import one_line
+from lightpaint.scene.lights.texels import GridSize, parse_size
 from lightpaint.storage.json_records import strict_toml
 from lightpaint.validation import MAX_LISTED, MAX_NAME
 
@@ -23,6 +24,8 @@ CONSTRAINTS = ("light", "tie", "prefer_current", "sparse")
 OLDER = ("prefer",)
 #: Keys of permitted moves, and those of a light in `[light.NAME]`.
 RIGGING, MOVES = ("on", "new", "pair"), ("move", "aim", "cone")
+#: Key of a light in `[light.NAME]` for the size of its image.
+SPLIT = "split"
 KNOWN_KEYS = ("lights", "groups", "group_alike", *CONSTRAINTS, *RIGGING)
 
 #: Maximum size of a lights file in bytes.
@@ -44,6 +47,17 @@ class SceneRequests:
         """Return the requests among the keys of the lights file at `path`."""
         keys = (*CONSTRAINTS, *OLDER, *RIGGING)
         return cls({key: data[key] for key in keys if key in data}, str(path))
+
+    @property
+    def split(self) -> dict[str, GridSize]:
+        """Columns and rows of the images to split into texels, by name of the light."""
+        lights = self.keys.get("light")
+        tables = lights.items() if isinstance(lights, dict) else ()
+        return {
+            name: parse_size(table[SPLIT], f"{self.source}: light.{name}.{SPLIT}")
+            for name, table in tables
+            if isinstance(table, dict) and SPLIT in table
+        }
 
     @property
     def names(self) -> tuple[str, ...]:

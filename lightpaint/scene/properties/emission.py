@@ -120,12 +120,14 @@ def why_not_adjusted(plugin: str, kind: EmissionKind | None, emission: RGB) -> s
 class EmitterSetting:
     """Settings of an emitter: emission in the unit of `kind`, and sampling weight.
 
-    kind: None for an emitter that cannot be scaled but only be made black.
+    kind: None for an emitter that cannot be scaled but only be made black. image: the radiance of
+    a light around the scene, (rows, columns, 3), instead of its own; None to keep that.
     """
 
     kind: EmissionKind | None
     emission: RGB
     sampling_weight: float
+    image: Floats | None = None
 
 
 def set_emission(state: Any, node: int, setting: EmitterSetting, *, on_shape: bool) -> None:
@@ -139,7 +141,9 @@ def set_emission(state: Any, node: int, setting: EmitterSetting, *, on_shape: bo
     props["sampling_weight"] = setting.sampling_weight
     if kind is None:
         return
-    if kind.scaling is Scaling.COLOUR:
+    if setting.image is not None:
+        _set_image(props, setting.image)
+    elif kind.scaling is Scaling.COLOUR:
         props[kind.parameter] = mi.ScalarColor3f(*rgb)
     elif kind.scaling is Scaling.FACTORS:
         # The factors belong to the emitter or to its texture.
@@ -157,6 +161,24 @@ def set_emission(state: Any, node: int, setting: EmitterSetting, *, on_shape: bo
         raise SceneError(
             f"an image light can be loaded black or unchanged, not multiplied by {rgb}"
         )
+
+
+def _set_image(props: Any, image: Floats) -> None:
+    """Turn an emitter around the scene into one with another image, (rows, columns, 3)."""
+    import mitsuba as mi
+
+    for key in list(props):
+        if key not in ("to_world", "sampling_weight"):
+            del props[key]
+    if (image == image[0, 0]).all():
+        # Its samples are even over all directions.
+        props.set_plugin_name("constant")
+        if "to_world" in props:
+            del props["to_world"]
+        props["radiance"] = mi.ScalarColor3f(*image[0, 0].tolist())
+    else:
+        props.set_plugin_name("envmap")
+        props["bitmap"] = mi.Bitmap(np.ascontiguousarray(image, np.float32))
 
 
 def _darken(props: Any, *, on_shape: bool) -> None:

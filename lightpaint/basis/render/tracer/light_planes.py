@@ -13,6 +13,7 @@ import mitsuba as mi
 import numpy as np
 
 from lightpaint.arrays import Floats
+from lightpaint.basis.render.tracer.texel_table import TexelTable
 
 
 class LightPlanes:
@@ -22,7 +23,8 @@ class LightPlanes:
     which `add` indexes in row-major order. is_shared: whether several paths may add to a pixel at
     the same time, in an order that then affects the last bits; otherwise each pixel has a single
     path, which adds in order. is_split: whether direct and indirect light have separate planes.
-    start: initial sums, in the form returned by `sums`; None for zeros.
+    start: initial sums, in the form returned by `sums`; None for zeros. texels: the texels of
+    images; None if there are none.
 
     The sums are attributes of this object rather than variables of the tracing loop, because Dr.Jit
     rejects a loop variable that never changes, such as `seen` where all lights are points.
@@ -37,7 +39,9 @@ class LightPlanes:
         is_shared: bool = False,
         is_split: bool = False,
         start: Floats | None = None,
+        texels: TexelTable | None = None,
     ) -> None:
+        self._texels = texels
         self.count, self.size = lights * (2 if is_split else 1), size
         self._first_indirect = lights if is_split else 0
         pixels = size[0] * size[1]
@@ -52,25 +56,37 @@ class LightPlanes:
         self._seen = dr.zeros(mi.Float, pixels)
 
     @classmethod
-    def nowhere(cls, light_of: Any, lights: int, *, is_split: bool) -> "LightPlanes":
+    def nowhere(
+        cls, light_of: Any, lights: int, *, is_split: bool, texels: TexelTable | None
+    ) -> "LightPlanes":
         """Return planes that discard light, for paths from which the guide only learns.
 
-        lights, is_split: as in the planes of other paths, which then share the same kernel.
+        lights, is_split, texels: as in the planes of other paths, which then share the same kernel.
         """
-        nothing = cls(light_of, lights, (1, 1), is_split=is_split)
+        nothing = cls(light_of, lights, (1, 1), is_split=is_split, texels=texels)
         nothing._keeps = dr.opaque(mi.Bool, False)
         return nothing
 
-    def add(self, pixel, emitter, value, bounces, active):
+    def add(self, pixel, emitter, value, direction, bounces, active):
         """Add RGB values to the plane of the light that `emitter` belongs to.
 
+        direction: unit vector to the emitter, which decides between the texels of an image.
         bounces: number of surfaces that scattered the light; with more than one it is indirect.
         Values that are not finite are skipped: one path in a hundred million has them, and a single
         one would spoil all sums over the picture.
         """
         active = active & dr.all(dr.isfinite(value))
         instance = dr.reinterpret_array(mi.UInt32, emitter)
+        if self._texels is not None:
+            is_image = self._texels.is_image(instance, active)
+            for light, factor in self._texels.shares(instance, direction, is_image):
+                self._add_to_light(pixel, light, factor * value, bounces, is_image)
+            active &= ~is_image
         light = dr.gather(mi.UInt32, self._light_of, instance, active)
+        self._add_to_light(pixel, light, value, bounces, active)
+
+    def _add_to_light(self, pixel, light, value, bounces, active):
+        """Add RGB values to the plane of a light."""
         if self._first_indirect:
             light[bounces > 1] += self._first_indirect
         place = dr.fma(light, self._pixels, pixel) * 3

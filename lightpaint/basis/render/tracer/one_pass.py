@@ -32,6 +32,7 @@ from lightpaint.basis.render.tracer.emitter_guide import EmitterGuide
 from lightpaint.basis.render.tracer.light_planes import LightPlanes, lights_by_instance
 from lightpaint.basis.render.tracer.path_tracer import Rules, View, trace_paths, trace_samples
 from lightpaint.basis.render.tracer.sobol import SobolPairs
+from lightpaint.basis.render.tracer.texel_table import TexelTable
 from lightpaint.scene.runtime.kernel_threads import kernels
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, pass_seed
@@ -74,8 +75,9 @@ class Tracer:
     ) -> None:
         self.scene = scene
         unit = {light.name: (1.0, 1.0, 1.0) for light in scene.lights}
-        self.loaded = scene.load(unit, views=views) if loaded is None else loaded
-        self.light_of = lights_by_instance(self.loaded, scene.plane_of)
+        self.loaded = scene.load(unit, views=views, evenly=True) if loaded is None else loaded
+        self._texels = TexelTable.of(scene, self.loaded)
+        self.light_of = lights_by_instance(self.loaded, planes_by_emitter(scene))
         self.guide = EmitterGuide(self.loaded, self.light_of, scene.eye(self.loaded), guide_table)
         self.guide_table = guide_table
         if emitter_samples is None:
@@ -91,7 +93,7 @@ class Tracer:
         first: number of samples per pixel in earlier passes.
         """
         lights, is_split = len(self.scene.lights), has_indirect_planes(self.scene)
-        nowhere = LightPlanes.nowhere(self.light_of, lights, is_split=is_split)
+        nowhere = LightPlanes.nowhere(self.light_of, lights, is_split=is_split, texels=self._texels)
         with kernels():
             self._trace_rows(TRAINING_STREAM, nowhere, rows, first, spp)
             self.guide.evaluate()
@@ -114,14 +116,22 @@ class Tracer:
         start: initial sums of earlier samples, (planes, rows, columns, 3).
         """
         size = len(rows), self.scene.size[1]
-        is_split = has_indirect_planes(self.scene)
-        lights = len(self.scene.lights)
-        return LightPlanes(self.light_of, lights, size, is_split=is_split, start=start)
+        return self._light_planes(size, start)
 
     def pixel_planes(self, pixels: int) -> LightPlanes:
         """Return planes for a number of single pixels, without added samples."""
-        is_split = has_indirect_planes(self.scene)
-        return LightPlanes(self.light_of, len(self.scene.lights), (1, pixels), is_split=is_split)
+        return self._light_planes((1, pixels))
+
+    def _light_planes(self, size: tuple[int, int], start: Floats | None = None) -> LightPlanes:
+        """Return planes of a number of rows and columns of pixels. start: initial sums."""
+        return LightPlanes(
+            self.light_of,
+            len(self.scene.lights),
+            size,
+            is_split=has_indirect_planes(self.scene),
+            start=start,
+            texels=self._texels,
+        )
 
     def add(self, planes: LightPlanes, half: int, rows: range, first: int, spp: int) -> None:
         """Trace some samples of some rows for one half, and add their light to the `planes` of
@@ -149,7 +159,7 @@ class Tracer:
 
     def close(self) -> None:
         """Release the scene and everything that refers to it."""
-        del self.loaded, self.light_of, self.guide
+        del self.loaded, self.light_of, self.guide, self._texels
 
     def _trace_rows(
         self, stream: int, planes: LightPlanes, rows: range, first: int, spp: int
@@ -218,6 +228,13 @@ def rules_of(scene: Scene) -> Rules:
     )
 
 
+def planes_by_emitter(scene: Scene) -> dict[str, int]:
+    """Return the plane of each loaded emitter, by its name; of an image one of its texels'."""
+    planes = dict(scene.plane_of)
+    texels = {x.texel.image: planes[x.name] for x in scene.emitters if x.texel and x.name in planes}
+    return planes | texels
+
+
 def trace_plainly(scene: Scene, loaded: Any, *, seed: int, spp: int) -> Floats:
     """Render all planes with Mitsuba's own random numbers and choices, (n, h, w, 3).
 
@@ -231,9 +248,10 @@ def trace_plainly(scene: Scene, loaded: Any, *, seed: int, spp: int) -> Floats:
     pixels = view.width * view.height
     sampler.seed(seed, pixels * spp)
     pixel = dr.arange(mi.UInt32, pixels * spp) // dr.opaque(mi.UInt32, spp)
-    light_of = lights_by_instance(loaded, scene.plane_of)
+    light_of = lights_by_instance(loaded, planes_by_emitter(scene))
     size = view.height, view.width
-    planes = LightPlanes(light_of, len(scene.lights), size, is_shared=True)
+    texels = TexelTable.of(scene, loaded)
+    planes = LightPlanes(light_of, len(scene.lights), size, is_shared=True, texels=texels)
     rules = rules_of(scene)
     trace_paths(view, sampler, None, None, planes, rules, pixel, pixel, mi.UInt32(0))
     planes.evaluate()

@@ -272,7 +272,8 @@ def pseudo_inverse(M: Doubles) -> Doubles:
 
 def _roots(M: Doubles) -> tuple[Doubles, Doubles]:
     """Return R with R Rᵀ = M and its pseudo-inverse, without the directions that change nothing."""
-    scale = np.sqrt(np.diag(M))
+    # Less the power of its noise, that of a very dim light may be negative.
+    scale = np.sqrt(np.maximum(np.diag(M), 0))
     safe = np.where(scale > 0, scale, 1)
     values, vectors = eigh(M / safe[:, None] / safe)
     is_regular = values > NULL_EIGENVALUE * values.max(initial=0)

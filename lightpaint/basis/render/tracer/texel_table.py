@@ -1,0 +1,107 @@
+"""Tables on the device that divide the light of an image around the scene among its texels.
+
+Import this module after setting a Dr.Jit variant, since its array types do not exist before.
+"""
+
+# mypy: disable-error-code="no-untyped-def, no-untyped-call"
+
+from collections.abc import Iterator
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from lightpaint.scene.lights.emitters import Emitter
+from lightpaint.scene.scene import Scene
+
+#: First texel of an emitter that has none.
+NO_TEXELS = np.uint32(2**32 - 1)
+
+
+class TexelTable:
+    """The texels of all split images of a loaded scene, which shine in an even white.
+
+    A direction lies between four texels. Each gets the light from there, multiplied by the value of
+    its hat (see texels.py), and in units of the light that it belongs to.
+    """
+
+    def __init__(self, scene: Scene, loaded: Any) -> None:
+        instances = np.array(dr.reinterpret_array(mi.UInt32, loaded.emitters_dr())).tolist()
+        instance_of = {
+            emitter.id(): instance
+            for instance, emitter in zip(instances, loaded.emitters(), strict=True)
+        }
+        count = max(instances) + 1
+        firsts, sizes = np.full(count, NO_TEXELS), np.ones((2, count), np.uint32)
+        rotations = np.zeros((9, count), np.float32)
+        by_image: dict[str, list[Emitter]] = {}
+        for emitter in scene.emitters:
+            if emitter.texel is not None:
+                by_image.setdefault(emitter.texel.image, []).append(emitter)
+        texels: list[Emitter] = []
+        for image, emitters in by_image.items():
+            instance, texel = instance_of[image], emitters[0].texel
+            assert texel is not None
+            firsts[instance], sizes[:, instance] = len(texels), texel.size
+            rotations[:, instance] = _to_local(scene, emitters[0]).ravel()
+            texels += emitters
+        self._firsts = mi.UInt32(firsts)
+        self._columns, self._rows = (mi.UInt32(x) for x in sizes)
+        self._rotations = [mi.Float(x) for x in rotations]
+        self._lights = mi.UInt32(np.array([scene.plane_of.get(x.name, 0) for x in texels]))
+        self._factors = [mi.Float(x) for x in _factors(scene, texels).T]
+
+    @classmethod
+    def of(cls, scene: Scene, loaded: Any) -> "TexelTable | None":
+        """Return the table of a scene as loaded evenly; None without split images."""
+        return cls(scene, loaded) if scene.split else None
+
+    def is_image(self, instance, active):
+        """Return whether an emitter, by its instance, is a split image."""
+        return active & (dr.gather(mi.UInt32, self._firsts, instance, active) != NO_TEXELS)
+
+    def shares(self, instance, direction, active) -> Iterator[tuple[Any, Any]]:
+        """Yield light and RGB factor of each of the four texels around a direction.
+
+        direction: unit vector from the scene, in world space.
+        """
+        first = dr.gather(mi.UInt32, self._firsts, instance, active)
+        columns = dr.gather(mi.UInt32, self._columns, instance, active)
+        rows = dr.gather(mi.UInt32, self._rows, instance, active)
+        r = [dr.gather(mi.Float, x, instance, active) for x in self._rotations]
+        x, y, z = direction
+        local_x, local_y, local_z = (r[k] * x + r[k + 1] * y + r[k + 2] * z for k in (0, 3, 6))
+        # As in Mitsuba's envmap.cpp.
+        u = dr.atan2(local_x, -local_z) * dr.inv_two_pi
+        v = dr.safe_acos(local_y) * dr.inv_pi
+        across = dr.fma(u - dr.floor(u), mi.Float(columns), -0.5)
+        down = v * mi.Float(rows - 1)
+        left, top = dr.floor(across), dr.clip(dr.floor(down), 0, mi.Float(rows - 2))
+        right, lower, top = across - left, down - top, mi.UInt32(top)
+        left_column = mi.UInt32(dr.select(left < 0, mi.Float(columns - 1), left))
+        right_column = dr.select(left_column + 1 == columns, 0, left_column + 1)
+        for column, width in ((left_column, 1 - right), (right_column, right)):
+            for row, height in ((top, 1 - lower), (top + 1, lower)):
+                texel = dr.fma(row, columns, column) + first
+                factors = (dr.gather(mi.Float, x, texel, active) for x in self._factors)
+                light = dr.gather(mi.UInt32, self._lights, texel, active)
+                yield light, mi.Color3f(*factors) * (width * height)
+
+
+def _to_local(scene: Scene, emitter: Emitter) -> Any:
+    """Return the matrix (3, 3) from world space to the space of an image."""
+    props = scene.parsed.state.nodes[emitter.node].props
+    if "to_world" not in props or emitter.plugin == "constant":
+        return np.eye(3)
+    return np.array(props["to_world"].inverse().matrix, dtype=float).reshape(4, 4)[:3, :3]
+
+
+def _factors(scene: Scene, texels: list[Emitter]) -> Any:
+    """Return the radiance of each texel when its light is at unit emission, (texels, 3)."""
+    factors = {x.name: (0.0, 0.0, 0.0) for x in texels}
+    for light in scene.lights:
+        for member in light.members:
+            unit = light.emission_of(member, (1.0, 1.0, 1.0))
+            factors[member.name] = member.emission if light.is_fixed else unit
+    return np.array([factors[x.name] for x in texels], np.float32)

@@ -1,0 +1,86 @@
+"""Rows of the report's table of lights for images: one for each, with its map."""
+
+from collections.abc import Sequence
+from html import escape
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_images import LightImage
+from lightpaint.colour.color import luminance
+from lightpaint.colour.srgb import encode_display, to_8_bit
+from lightpaint.lighting.solution import Solution
+from lightpaint.report.page.figures import data_uri
+from lightpaint.report.page.html import breakable_name, share_cell
+from lightpaint.scene.lights.texels import interpolated
+
+#: Width of the map of an image in pixels; its height is half of that, as of all around.
+MAP_WIDTH = 144
+#: Share of the directions that the map may show too bright to tell.
+CLIPPED_SHARE = 0.02
+
+
+def image_row(image: LightImage, basis: Basis, solution: Solution, shares: Doubles) -> str:
+    """Return the row of an image that is whole. shares: (n,), see `energy_shares`."""
+    weights = solution.weights
+    current = basis.current_weights
+    stops = map_stops(image_of_weights(image, weights))
+    maps = "".join(
+        _map(f"{image.name} {label}", image_of_weights(image, radiances), stops)
+        for label, radiances in (("now", current), ("solved", weights))
+    )
+    columns, rows = image.size
+    plugin = basis.lights[int(image.lights[0])].plugin
+    now, new = (image.mean(radiances) for radiances in (current, weights))
+    share = float(shares[image.lights].sum())
+    return (
+        f'<tr><td class="thumb">{maps}</td>'
+        f'<th scope="row" class="name">{breakable_name(image.name)}'
+        f"<small>{escape(plugin)} · {columns}x{rows} texels</small></th>"
+        '<td class="colour"></td>'
+        f'<td class="rgb now">{_rgb(now)}</td><td class="rgb new">{_rgb(new)}</td>'
+        '<td class="unit">radiance <small>W/(m² sr), mean over all directions</small></td>'
+        f'<td class="rgb amount"></td><td class="change">{spoken_change(now, new)}</td>'
+        f"{share_cell(f'{100 * share:.1f} %', share)}</tr>"
+    )
+
+
+def image_of_weights(image: LightImage, weights: Doubles) -> Doubles:
+    """Return the radiances of an image that is whole, (rows, columns, 3). weights: (n, 3)."""
+    return np.asarray(weights[image.places])
+
+
+def map_stops(radiances: Floats) -> float:
+    """Return the exposure that shows an image, all but its brightest directions."""
+    bright = float(np.quantile(luminance(radiances), 1 - CLIPPED_SHARE))
+    return -float(np.log2(bright)) if bright > 0 else 0.0
+
+
+def map_picture(radiances: Floats, stops: float, width: int) -> Floats:
+    """Return an image as Mitsuba interpolates it in display values, (width / 2, width, 3)."""
+    return encode_display(2.0**stops * interpolated(radiances, (width, width // 2)))
+
+
+def _map(label: str, radiances: Floats, stops: float) -> str:
+    picture = to_8_bit(map_picture(radiances, stops, MAP_WIDTH))
+    caption = escape(f"{label}, all around, shown at {stops:+.1f} stops")
+    return (
+        f'<img src="{data_uri(picture)}" width="{MAP_WIDTH}" height="{MAP_WIDTH // 2}" '
+        f'alt="{caption}" title="{caption}">'
+    )
+
+
+def _rgb(color: Sequence[float] | Doubles) -> str:
+    return " <br>".join(f"{v:.4g}" for v in color) if any(color) else "off"
+
+
+def spoken_change(now: Doubles, new: Doubles) -> str:
+    """Return the change of the mean luminance as a ratio and in stops. now, new: (3,)."""
+    before, after = (float(luminance(color)) for color in (now, new))
+    if after == 0:
+        return "off" if before > 0 else "stays off"
+    if before == 0:
+        return "was off, now on"
+    stops = f"{np.log2(after / before):+.2f} stops".replace("-", "−")
+    return f"×{after / before:.3g} <small>{stops}</small>"

@@ -1,0 +1,109 @@
+"""A sky is split into texels on the command line, and comes back as an image."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command import run, run_refused, succeed
+from renderer import LIGHTS, write_room
+
+from lightpaint.images.formats.exr import write_rgb
+from lightpaint.scene.lights.texels import texel_names
+from lightpaint.scene.properties.emission import read_emitted_image
+from lightpaint.scene.scene_reader import load_scene
+from lightpaint.scene.scene_render import Stream, render
+
+SPLIT = "--split", "sky=4x3"
+
+
+@pytest.fixture(scope="module")
+def solved(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Solve for the sky of a room, half of which turned red, and return the folder."""
+    folder = tmp_path_factory.mktemp("image_lights")
+    room = write_room(folder, lights=LIGHTS["sky"] + LIGHTS["bulb"])
+    image = np.full((3, 4, 3), (0.1, 0.2, 0.3), np.float32)
+    image[1, :2] = (1.5, 0.3, 0.1)
+    write_rgb(folder / "red.exr", image)
+    red = LIGHTS["sky"].replace("constant", "envmap")
+    red = red.replace(
+        '<rgb name="radiance" value="0.1 0.2 0.3"/>', '<string name="filename" value="red.exr"/>'
+    )
+    target = load_scene(write_room(folder, lights=red + LIGHTS["bulb"], name="red.xml"))
+    write_rgb(folder / "target.exr", render(target, spp=512, stream=Stream.TEMPLATE).image)
+    output = succeed(folder, "solve", room, "target.exr", *SPLIT, "--spp", 128, "-o", "out")
+    (folder / "stdout.txt").write_text(output)
+    return folder
+
+
+def test_the_answer_is_one_row_and_an_image(solved: Path) -> None:
+    output = (solved / "stdout.txt").read_text()
+    rows = [line for line in output.splitlines() if line.startswith(("sky", "bulb"))]
+    assert len(rows) == 2
+    assert rows[0].startswith("sky, 4x3 texels")
+    assert "A render confirms it" in output
+    image = read_emitted_image(solved / "out" / "relit.sky.exr", is_linear=True)
+    assert image.shape == (3, 4, 3)
+    middle = image[1]
+    assert middle[:2, 0].min() > 2 * middle[2:, 0].max()
+
+
+def test_the_report_shows_the_map_and_folds_the_texels(solved: Path) -> None:
+    page = (solved / "out" / "report.html").read_text()
+    assert page.count("sky now, all around") == 2  # alt and title
+    assert page.count("sky solved, all around") == 2
+    assert "the 12 texels of sky, row by row from the top" in page
+
+
+def test_the_results_are_written_and_verified_again(solved: Path) -> None:
+    assert run(solved, "verify", "out").returncode == 0
+    succeed(solved, "relight", "room.xml", "out/lighting.json", "-o", "again", "--spp", 2)
+    again = (solved / "again" / "relit.sky.exr").read_bytes()
+    assert again == (solved / "out" / "relit.sky.exr").read_bytes()
+
+
+def test_programs_without_images_are_told_to_load_it(solved: Path) -> None:
+    arguments = ["export", "out/lighting.json", "--scene", "room.xml", "--to"]
+    error = run_refused(solved, *arguments, "blender", "-o", "exported")
+    assert "blender cannot set the texels of sky: load the image" in error
+    assert (
+        "sky.x0.y0"
+        in succeed(solved, *arguments, "csv", "-o", "exported")
+        + (solved / "exported" / "fixtures.csv").read_text()
+    )
+
+
+def test_the_list_of_lights_has_one_row_for_the_image(solved: Path) -> None:
+    output = succeed(solved, "lights", "room.xml", *SPLIT, "--no-sheet")
+    assert [line.split()[0] for line in output.splitlines()] == ["light", "sky", "bulb"]
+    document = json.loads(succeed(solved, "lights", "room.xml", *SPLIT, "--json"))
+    names = [light["name"] for light in document["lights"]]
+    assert names == [*texel_names("sky", (4, 3)), "bulb"]
+
+
+def test_none_ignores_what_the_lights_file_splits(solved: Path) -> None:
+    (solved / "split.toml").write_text("[light.sky]\nsplit = [4, 3]\n")
+    arguments = ["lights", "room.xml", "--lights-file", "split.toml", "--no-sheet"]
+    assert "4x3 texels" in succeed(solved, *arguments)
+    assert "texels" not in succeed(solved, *arguments, "--split", "none")
+
+
+@pytest.mark.parametrize(
+    ("split", "part"),
+    [
+        ("sky=1x1", "split: sky is 1x1: an image around the scene has at least"),
+        ("sky=400x250", "at most 4,096"),
+        ("moon=8x4", "has no light 'moon' to split into texels; it has sky"),
+        ("bulb=8x4", "is a point emitter: only lights around the scene"),
+        ("sky", "is not NAME=COLUMNSxROWS, such as sky=16x8"),
+    ],
+)
+def test_a_wrong_split_is_one_line(solved: Path, split: str, part: str) -> None:
+    assert part in run_refused(solved, "lights", "room.xml", "--split", split, "--no-sheet")
+
+
+def test_an_image_that_does_not_load_is_one_line(solved: Path) -> None:
+    (solved / "broken.exr").write_bytes(b"no image")
+    sky = '<emitter type="envmap" id="sky"><string name="filename" value="broken.exr"/></emitter>'
+    write_room(solved, lights=sky, name="broken.xml")
+    assert "broken" in run_refused(solved, "lights", "broken.xml", *SPLIT, "--no-sheet")
