@@ -16,7 +16,7 @@ from lightpaint.errors import BasisError
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile, check_needed
 
 #: Options for loading a scene, by their Python names.
-LOADING = ("sensor", "parameters", "variant", "lights", "groups", "integrator")
+LOADING = ("sensor", "parameters", "variant", "lights", "groups", "integrator", "split")
 
 
 def source_of_template(options: Namespace) -> SceneFile | BasisFile | GroupsFile:
@@ -144,7 +144,9 @@ def check_scene_options(
     """Raise BasisError for options that are useless without a scene. names: chosen lights."""
     light_list = ",".join(names or ())
     is_groups = isinstance(basis, GroupsFile)
-    unusable_options = [name for name in LOADING if getattr(options, name) and name != "lights"]
+    unusable_options = [
+        name for name in LOADING if getattr(options, name, None) and name != "lights"
+    ]
     check_needed([*unusable_options, *(["lights"] if names and not is_groups else [])], basis)
     if names:
         raise BasisError(
