@@ -75,4 +75,19 @@ note("out of the way")
 bpy.ops.wm.read_homefile(use_empty=True)
 scene = bpy.context.scene
 note("new file")
+
+
+class RunningPainter:
+    """A painter that works on the shot until Blender ends."""
+
+    is_over = False
+
+    def end(self) -> None:
+        (folder / "painter-ended").write_text("")
+
+
+keep_look("last")
+controller.session = RunningPainter()
+save("last.blend")
+note("during a painter")
 (folder / "found.json").write_text(json.dumps(found))

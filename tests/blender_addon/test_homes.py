@@ -37,4 +37,7 @@ def test_a_shot_goes_where_its_file_goes(
     ]
     # The next file without a name does not find what was painted in the one before.
     assert found["new file"][1] == []
+    assert "when the painter ends" in found["during a painter"][2]
+    assert (tmp_path / "painter-ended").exists()
+    assert "last" in Path(tmp_path, "last.lightpaint", "Scene", "looks.json").read_text()
     assert not list(tmp_path.glob("*.part"))

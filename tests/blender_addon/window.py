@@ -10,15 +10,12 @@ sys.path.insert(0, os.path.dirname(__file__))
 import bpy
 from scripted_painter import ScriptedPainter, contents, controller, has_answer
 from window_steps import (
-    SECONDS_OF_VIEWPORT,
     click,
-    keep_picture,
+    keep_rendered_picture,
     open_tab,
-    pictures,
     press,
     run_steps,
     show_camera,
-    show_solid,
     until,
 )
 
@@ -35,28 +32,22 @@ def walk(found: dict[str, Any]) -> Iterator[float]:
     yield 0.5
     before, rendered = contents(), energies()
     show_camera()
-    if pictures != "-":
-        yield SECONDS_OF_VIEWPORT
     yield from open_tab()
-    keep_picture("panel")
+    yield from keep_rendered_picture("panel")
     yield from click(PAINT)
     yield from until(lambda: controller.render is not None, "a render")
     yield from until(lambda: controller.session and controller.session.state.is_open, "a painter")
     found["unpainted"] = energies() == rendered
+    yield from keep_rendered_picture("painter")
     painter = ScriptedPainter()
-    yield 0.5
-    keep_picture("painter")
     render = bpy.context.scene.render
     painter.brighten(render.resolution_x, render.resolution_y, gain=4.0)
     yield from until(has_answer, "an answer")
     yield from until(lambda: energies() != rendered, "lamps that follow")
     painter.ask("save_look", name="Evening")
     yield from until(lambda: controller.session.state.looks, "a look")
-    if pictures != "-":
-        yield from until(lambda: controller.session.message, "a sentence")
-        yield SECONDS_OF_VIEWPORT
-    keep_picture("following")
-    show_solid()
+    yield from until(lambda: controller.session.message, "a sentence")
+    yield from keep_rendered_picture("following")
     painted = energies()
     yield from click(APPLY)
     yield from until(lambda: controller.message == "the lamps are as painted", "what is applied")

@@ -79,14 +79,18 @@ def show_camera() -> None:
     space = area.spaces.active
     space.region_3d.view_perspective = "CAMERA"
     space.overlay.show_overlays = False
+
+
+def keep_rendered_picture(name: str) -> Iterator[float]:
+    """Keep a picture in which Cycles has drawn the view, if pictures are wanted."""
     if pictures != "-":
-        space.shading.type = "RENDERED"
-
-
-def show_solid() -> None:
-    """Show no render: Cycles would slow down all that follows."""
-    [area] = [x for x in window().screen.areas if x.type == "VIEW_3D"]
-    area.spaces.active.shading.type = "SOLID"
+        shading = max(
+            (x for x in window().screen.areas if x.type == "VIEW_3D"), key=lambda area: area.x
+        ).spaces.active.shading
+        shading.type = "RENDERED"
+        yield SECONDS_OF_VIEWPORT
+        keep_picture(name)
+        shading.type = "SOLID"  # a render would slow down all that follows
 
 
 def open_tab() -> Iterator[float]:

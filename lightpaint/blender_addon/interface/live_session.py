@@ -31,7 +31,7 @@ PATIENCE_S = 30.0
 #: Distance from 1 of a multiplier that changes nothing.
 UNCHANGED = 1e-9
 
-ENDED_TEXT = "the painter has ended: the lamps stay as they are until you apply or discard"
+ENDED_TEXT = "the painter has ended: Paint opens it again, with what you painted"
 
 #: What there is to do while nothing is painted.
 UNPAINTED_TEXT = "paint in the browser, and the lamps follow"

@@ -115,8 +115,9 @@ def draw_messages(layout, context):
     texts = [(controller.message, controller.is_error)]
     if session is not None:
         texts.append((session.message, session.is_over))
-    if recall(context.scene).get(PREVIEWS) and not any(text for text, _ in texts):
-        texts.append((PREVIEW_TEXT, False))  # of a file that was saved with one
+    is_idle = not controller.message and not controller.is_busy
+    if recall(context.scene).get(PREVIEWS) and is_idle:
+        texts.append((PREVIEW_TEXT, False))  # a painter has ended, or the file was saved with one
     for text, is_error in texts:
         if text:
             draw_text(layout, context, text, icon="ERROR" if is_error else "INFO")
