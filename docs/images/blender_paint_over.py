@@ -25,9 +25,6 @@ from window_steps import (
     window,
 )
 
-#: The head of the panel *Without the Painter*, from the window's upper left corner.
-OTHER_WAYS = (918, 246)
-
 #: The brush: its colour, its radius in pixels, and strokes on the wall left of the head.
 BLUE, RADIUS, STRENGTH = (0.08, 0.16, 0.9), 26, 0.5
 STROKES = (((60, 330), (110, 350), (150, 320)), ((50, 380), (100, 395), (135, 370)))
@@ -88,7 +85,6 @@ def walk(found: dict[str, Any]) -> Iterator[float]:
     yield 0.5
     yield from click(TAB)
     yield 0.5
-    yield from click(OTHER_WAYS)
     yield from paint_over()
     with bpy.context.temp_override(window=window(), area=right):
         bpy.ops.lightpaint.solve_image()
