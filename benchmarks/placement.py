@@ -113,7 +113,7 @@ def one_room(folder: Path, kind: str, seed: int, *, with_rivals: bool) -> tuple[
         flush=True,
     )
     if with_rivals:
-        show_rivals(room, scene, placement, solution, folder)
+        show_rivals(room, scene, kind, count, solution, folder)
     is_at_floor = excess < FOUND
     return is_at_floor, is_at_floor and max(position_errors) < NEAR, seconds
 
@@ -166,12 +166,9 @@ def distances(truth: Scene, placement: lp.Placement) -> tuple[list[float], list[
 
 
 def show_rivals(
-    room: ClosedRoom, scene: Scene, placement: lp.Placement, solution: lp.Solution, folder: Path
+    room: ClosedRoom, scene: Scene, kind: Any, count: int, solution: lp.Solution, folder: Path
 ) -> None:
     """Print what rivals leave of the same room. They are told the kind and number of lights."""
-    if not placement.additions:
-        return
-    kind, count = placement.additions[0].emitter.kind, len(placement.additions)
     painted = solution.problem.views.targets[0].image
     start = cpu_s()
     lights = chosen_candidates(room, scene, kind, count, painted)
