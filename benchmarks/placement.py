@@ -252,7 +252,9 @@ def gallery_shares(scene: Scene, target: lp.Target) -> str:
     lighting = lp.solve(bases[0], lp.Target.of(painted), space="linear", hold=0).lighting
     with tempfile.TemporaryDirectory() as folder:
         relit = lp.relight(scene, lighting, Path(folder) / "relit.xml")
-        picture = rendered(relit, seed=7, spp=GALLERY_SPP)
+        # It is written with the size of the scene's file.
+        picture = rendered(relit, seed=7, spp=GALLERY_SPP // 8)
+    picture = block_mean(picture, picture.shape[0] // painted.shape[0])
     shares = missed_by_best(bases, painted), missed_by_best(bases[:1] * 2, painted)
     exact, noisy, plain = (math.sqrt(share) for share in (*shares, missed(picture, painted)))
     return f"{exact:.3f}, with noise {noisy:.3f}, rendered {plain:.3f}"
