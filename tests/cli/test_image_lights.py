@@ -9,6 +9,8 @@ from command import run, run_refused, succeed
 from renderer import LIGHTS, write_room
 
 from lightpaint.images.formats.exr import write_rgb
+from lightpaint.pipeline.job.job import Job
+from lightpaint.pipeline.job.sources import Painting, SceneFile
 from lightpaint.scene.lights.texels import texel_names
 from lightpaint.scene.properties.emission import read_emitted_image
 from lightpaint.scene.scene_reader import load_scene
@@ -107,3 +109,11 @@ def test_an_image_that_does_not_load_is_one_line(solved: Path) -> None:
     sky = '<emitter type="envmap" id="sky"><string name="filename" value="broken.exr"/></emitter>'
     write_room(solved, lights=sky, name="broken.xml")
     assert "broken" in run_refused(solved, "lights", "broken.xml", *SPLIT, "--no-sheet")
+
+
+def test_a_job_with_a_split_is_sent_elsewhere(solved: Path) -> None:
+    scene = SceneFile(str(solved / "room.xml"), split={"sky": "4x3"})
+    job = Job((scene,), (Painting(str(solved / "target.exr")),), solved / "elsewhere")
+    sent = Job.from_json(job.to_json())
+    assert sent == job
+    assert len(scene.content.lights) == 13

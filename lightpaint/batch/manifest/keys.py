@@ -47,10 +47,6 @@ def _is_plain(value: Any) -> bool:
     return isinstance(value, str | int | float)
 
 
-def _is_size_of_image(value: Any) -> bool:
-    return isinstance(value, str | list)
-
-
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < BRIGHTEST
 
@@ -87,7 +83,10 @@ SOURCE_KEYS: dict[str, Check] = {
     "use_lights_file": SWITCH,
     "group_alike": SWITCH,
     "integrator": TEXT,
-    "split": (_table_of(_is_size_of_image), 'a table of sizes, { sky = "16x8" }'),
+    "split": (
+        _table_of(lambda v: isinstance(v, str) and v != ""),
+        'a table of sizes, { sky = "16x8" }',
+    ),
 }
 
 #: Keys for reading a painting.

@@ -40,6 +40,7 @@ OPTIONS = {
     "sensor": "-s",
     "shared_fs": "--shared-fs",
     "space": "--space",
+    "split": "--split",
     "spp": "--spp",
     "stage": "--stage",
     "suggest": "--suggest",

@@ -62,7 +62,7 @@ class SceneFile(ReadOnce):
         use_lights_file: False to ignore that one.
         group_alike: False to adjust similar emitters without names one by one.
         integrator: Integrator to use instead of the scene's own.
-        split: Columns and rows of lights that are images, by name.
+        split: Columns and rows of lights that are images, `16x8`, by name.
 
     Examples:
         >>> lp.SceneFile("room.xml").content.size
@@ -79,7 +79,7 @@ class SceneFile(ReadOnce):
     use_lights_file: bool = True
     group_alike: bool = True
     integrator: str | None = None
-    split: Mapping[str, object] | None = None
+    split: Mapping[str, str] | None = None
 
     @cached_property
     def content(self) -> Scene:
