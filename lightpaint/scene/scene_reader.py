@@ -85,13 +85,20 @@ def load_scene(
     selection = selection.with_more(lights, groups)
     sizes = _image_sizes(selection, split)
     with explain_old_scene(path), mitsuba_errors(path):
-        facts = with_split(inspect_scene(parsed, index), parsed, sizes)
+        whole = inspect_scene(parsed, index)
+        facts = with_split(whole, parsed, sizes)
     check_film(path, facts["film"], facts["spp"])
     check_emitters(path, facts["emitters"])
+    chosen = _select_lights(path, facts["emitters"], selection, group_alike=group_alike)
+    if len(adjusted := _adjusted_images(chosen)) < len(sizes):
+        # An image of which nothing is adjusted stays as it is, in full detail.
+        sizes = {name: size for name, size in sizes.items() if name in adjusted}
+        facts = with_split(whole, parsed, sizes)
+        chosen = _select_lights(path, facts["emitters"], selection, group_alike=group_alike)
     return Scene(
         path=path,
         parameters=values,
-        lights=_select_lights(path, facts["emitters"], selection, group_alike=group_alike),
+        lights=chosen,
         lights_file=selection.path,
         requests=selection.requests,
         parsed=parsed,
@@ -105,6 +112,12 @@ def _image_sizes(selection: LightsFile, split: Mapping[str, object] | None) -> d
     if split is None:
         return selection.requests.split
     return {name: parse_size(size, f"split: {name}") for name, size in split.items()}
+
+
+def _adjusted_images(lights: Sequence[Light]) -> set[str]:
+    """Return the names of the images of which some texel is adjusted."""
+    members = (member for light in lights if not light.is_fixed for member in light.members)
+    return {member.texel.image for member in members if member.texel is not None}
 
 
 def _select_lights(

@@ -96,6 +96,14 @@ def test_texels_that_are_not_adjusted_stay_in_the_written_image(tmp_path: Path) 
     assert verify(combine(basis, lighting), relit, spp=128).agrees
 
 
+def test_a_sky_that_is_not_adjusted_is_not_split(tmp_path: Path) -> None:
+    map_file(tmp_path)
+    path = write_room(tmp_path, lights=ROTATED + LIGHTS["bulb"])
+    scene = load_scene(path, split={"sky": "6x4"}, lights=["bulb"])
+    assert not scene.split
+    assert [light.member_names for light in scene.lights] == [("bulb",), ("sky",)]
+
+
 def test_a_sky_can_be_dimmed_as_one_light_beside_its_texels(tmp_path: Path) -> None:
     map_file(tmp_path)
     path = write_room(tmp_path, lights=ROTATED)
