@@ -28,7 +28,7 @@ if script := os.environ.get("SHOT_SCRIPT"):
 TAB = (1044, 254)
 
 #: Seconds in which Cycles draws the viewport, where pictures are wanted.
-SECONDS_OF_VIEWPORT = 45.0
+SECONDS_OF_VIEWPORT = 100.0
 
 #: Twentieths of a second that anything takes on a busy machine.
 PATIENCE = 2000
@@ -88,6 +88,8 @@ def keep_rendered_picture(name: str) -> Iterator[float]:
             (x for x in window().screen.areas if x.type == "VIEW_3D"), key=lambda area: area.x
         ).spaces.active.shading
         shading.type = "RENDERED"
+        # A button under the mouse would look as it did when it was pressed.
+        window().event_simulate(type="MOUSEMOVE", value="NOTHING", x=500, y=120)
         yield SECONDS_OF_VIEWPORT
         keep_picture(name)
         shading.type = "SOLID"  # a render would slow down all that follows
