@@ -27,8 +27,8 @@ def settings_of(scene: Scene, emission: Mapping[str, RGB]) -> Iterator[tuple[Emi
 class _Edits:
     """The changes in one file. settings: settings of its emitters, by byte offset.
 
-    images: images of lights whose texels are set, with one of these and its sampling weight, by
-    byte offset.
+    texel_images: images of lights whose texels are set, with one of these and its sampling weight,
+    by byte offset.
     integrators: replacements of elements, by byte offset; None for an addition.
     moved: child elements to set in the elements of moved lights, by byte offset, as XML by name.
     added: lines of the elements of new lights.
@@ -36,7 +36,7 @@ class _Edits:
 
     original: Path
     settings: dict[int, tuple[Emitter, RGB, float | None]] = field(default_factory=dict)
-    images: dict[int, tuple[Emitter, Floats, float | None]] = field(default_factory=dict)
+    texel_images: dict[int, tuple[Emitter, Floats, float | None]] = field(default_factory=dict)
     integrators: dict[int | None, str] = field(default_factory=dict)
     moved: dict[int, Mapping[str, str]] = field(default_factory=dict)
     added: list[str] = field(default_factory=list)
@@ -128,7 +128,7 @@ def _edit_images(
         weight = _sampling_weight(texels[0], is_sampled=is_sampled)
         file = scene.files[texels[0].file]
         edits_of_file = edits.setdefault(file.resolve(), _Edits(file))
-        edits_of_file.images[texels[0].offset] = texels[0], image, weight
+        edits_of_file.texel_images[texels[0].offset] = texels[0], image, weight
 
 
 def _edit_integrators(scene: Scene, edits: dict[Path, _Edits]) -> None:
@@ -204,7 +204,7 @@ def _edit(edit: _Edits, folder: Path, scene: Scene, stem: str) -> tuple[bytes, d
         if at is not None:
             xml.replace(xml.element_at(at), text)
     images: dict[str, Floats] = {}
-    for offset in sorted({*edit.settings, *edit.images, *edit.moved}):
+    for offset in sorted({*edit.settings, *edit.texel_images, *edit.moved}):
         changes = Changes(xml, xml.element_at(offset))
         for name, text in edit.moved.get(offset, {}).items():
             changes.set_element(name, text)
@@ -213,8 +213,8 @@ def _edit(edit: _Edits, folder: Path, scene: Scene, stem: str) -> tuple[bytes, d
             if weight is not None:
                 changes.set("float", "sampling_weight", f"{weight:g}")
             images |= set_emission(changes, scene, emitter, rgb, stem=stem)
-        if offset in edit.images:
-            emitter, image, weight = edit.images[offset]
+        if offset in edit.texel_images:
+            emitter, image, weight = edit.texel_images[offset]
             if weight is not None:
                 changes.set("float", "sampling_weight", f"{weight:g}")
             images |= set_image(changes, emitter, image, stem=stem)

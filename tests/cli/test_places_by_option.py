@@ -45,7 +45,7 @@ def run_refused(folder: Path, *options: str) -> str:
         ("--move bulb=0", "--move bulb is 0.0: expected a distance > 0"),
         ("--move bulb=1e30", "--move bulb is 1e+30: expected"),
         ("--move bulb=@nowhere", "--move bulb: no rail, surface or shape 'nowhere'"),
-        ("--move panel=1", "--move panel: light 'panel' is of the kind area"),
+        ("--cone panel=10:20", "--cone panel: light 'panel' has no cone"),
         ("--move sky=1", "--move sky: light 'sky' is of the kind constant"),
         ("--aim nobody=30", "--aim nobody: no light 'nobody'; there are panel"),
         ("--aim beem=30", "did you mean 'beam'?"),

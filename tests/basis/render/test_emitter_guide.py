@@ -114,7 +114,8 @@ def test_a_small_picture_trains_with_as_many_samples_as_suit_it() -> None:
     assert abs(sum(few) - guide_training.TRAINING_SPP * 64 * 36) <= len(few)
     assert few[1] == few[2] == pytest.approx(2 * few[0], abs=1)
     # Where many emitters are to choose from, each wants some.
-    crowd = replace(small, emitters=small.emitters * 10)
+    nodes = range(10 * len(small.emitters))
+    crowd = replace(small, emitters=tuple(replace(small.emitters[0], node=k) for k in nodes))
     expected = guide_training.TRAINING_SPP_PER_EMITTER * len(crowd.emitters) * 64 * 36
     assert abs(sum(guide_training.training_samples(crowd)) - expected) <= 3
     assert guide_training.training_samples(replace(crowd, film=scene.film)) == whole

@@ -86,5 +86,5 @@ export function useMarkDrag(app, pane, resolveDrag) {
 function shiftMark({ button, mark }) {
   if (!mark) return;
   const [left, top] = [button.style.left, button.style.top].map(parseFloat);
-  button.style.translate = `${mark.x - left}px ${mark.y - top}px`;
+  button.style.translate = [mark.x - left, mark.y - top].map((offset) => `${offset}px`).join(' ');
 }
