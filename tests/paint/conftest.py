@@ -28,3 +28,13 @@ def moving(tmp_path: Path) -> Iterator[MovingStudio]:
     studio = MovingStudio(tmp_path)
     yield studio
     studio.close()
+
+
+@pytest.fixture
+def without_reasons(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out why an answer is not closer, which takes most of the time of an exact answer.
+
+    For tests in which nobody is told of it.
+    """
+    reasons_of = "lightpaint.lighting.analysis.appearance.appearance.reasons_of"
+    monkeypatch.setattr(reasons_of, lambda _: ())

@@ -187,6 +187,7 @@ def test_a_drag_is_answered_while_a_search_runs_which_then_moves_nothing(
 ) -> None:
     stroke(moving)
     opened_rig(moving)
+    moving.send(protocol.ConstrainLights({name: {"lock": True} for name in ("bulb", "beam")}))
     moving.send(protocol.PlaceLights())
     moving.wait(lambda: [m for m in moving.messages if m.kind == "trial"])
     for is_final in (False, False, True):
