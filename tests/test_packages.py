@@ -59,11 +59,11 @@ def test_wheel_solves_the_demo_in_an_empty_folder(built: Path, tmp_path: Path):
     results = {"lighting.json", "relit.xml", "predicted.exr", "verified.exr", "comparison.png"}
     results |= {"report.html", "report.json", "result.json"}
     assert {file.name for file in (demo_folder / "evening").iterdir()} == results
-    # The very command that it says it runs has the same answer.
+    # The very command that it says it runs has the same answer, which is verified already.
     [solve_command] = re.findall(r"lightpaint: lightpaint (solve .*)", completed.stderr)
     assert solve_command in (demo_folder / "evening" / "report.html").read_text("utf-8")
     answer = weights(demo_folder / "evening")
-    second = lightpaint(folder, environment, *solve_command.split())
+    second = lightpaint(folder, environment, *solve_command.split(), "--no-verify")
     assert second.returncode == 0, second.stderr
     assert "kept from an earlier run" in second.stderr
     assert weights(demo_folder / "evening") == answer

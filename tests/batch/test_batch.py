@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from batches import LOOKS, NAMES, contents, kill_batch, run_whole_batch, small_basis, write_batch
 from command import run, succeed
+from nightly import nightly
 
 from lightpaint.batch.distribution import engine
 from lightpaint.batch.distribution.processes import Processes
@@ -395,14 +396,15 @@ def test_workers_make_the_same_and_one_that_dies_costs_nothing(
     assert contents(batch_folder / "out") == reference_batch[1]
 
 
-def test_killed_at_twenty_moments_it_ends_as_if_undisturbed(
-    batch_folder: Path, reference_batch: tuple[Path, dict[str, bytes]]
+@pytest.mark.parametrize("moments", [5, nightly(20)])
+def test_killed_at_many_moments_it_ends_as_if_undisturbed(
+    batch_folder: Path, reference_batch: tuple[Path, dict[str, bytes]], moments: int
 ) -> None:
     chance, kills, batches = random.Random(1), 0, 0
     begun_s = time.monotonic()
     assert kill_batch(batch_folder / "looks.toml", batch_folder / "first", 60) == 0
     run_s = time.monotonic() - begun_s
-    while kills < 20:
+    while kills < moments:
         folder, batches = batch_folder / f"out{batches}", batches + 1
         while kill_batch(batch_folder / "looks.toml", folder, chance.uniform(0, 0.6 * run_s)):
             kills += 1
@@ -512,7 +514,9 @@ def test_small_pictures_that_are_damaged_are_made_again(
     assert {path: path.read_bytes() for path in pictures} == before
 
 
-@pytest.mark.parametrize("message", ['{"lights": 3}', '{"lights": [1]}', '{"lights": []}', "junk"])
+@pytest.mark.parametrize(
+    "message", [nightly('{"lights": 3}'), '{"lights": [1]}', nightly('{"lights": []}'), "junk"]
+)
 def test_planes_that_are_damaged_cost_no_gallery(batch_folder: Path, message: str) -> None:
     run_item(batch_folder)
     for path in (batch_folder / "out" / "thumbnails").glob("*.planes.json"):

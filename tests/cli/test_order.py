@@ -10,9 +10,11 @@ from command import run_refused
 
 from lightpaint.cli.options.parser import command_parser
 
+PARSER = command_parser()
+
 
 def parse(*line: str) -> dict[str, Any]:
-    return vars(command_parser().parse_args(line))
+    return vars(PARSER.parse_args(line))
 
 
 PIECES = [

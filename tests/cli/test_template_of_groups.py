@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from command import run, run_refused, succeed
 from light_groups import interleaved
+from nightly import nightly
 from PIL import Image
 
 from lightpaint.basis.file.basis_file import write_basis
@@ -68,7 +69,7 @@ def test_light_groups_are_painted_on_and_answered(shot: Path, tmp_path: Path):
     assert report["lights"]["key"]["stops"] > 0.3
 
 
-@pytest.mark.parametrize("view", [ViewTransform(), ViewTransform("filmic", 1.0)])
+@pytest.mark.parametrize("view", [nightly(ViewTransform()), ViewTransform("filmic", 1.0)])
 def test_a_painting_over_the_beauty_is_known_as_such(
     shot: Path, tmp_path: Path, view: ViewTransform
 ):

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from renderer import assert_equal_bits, same_basis, write_room
+from renderer import LIGHTS, assert_equal_bits, same_basis, write_room
 
 import lightpaint.scene.scene_render
 from lightpaint.basis.basis import Basis
@@ -99,7 +99,8 @@ def test_an_interrupt_between_the_halves_of_a_step_waits_for_the_second(
 
 @pytest.mark.parametrize("integrator", ["path", "volpathmis"])
 def test_what_goes_on_has_the_bits_of_one_render(tmp_path: Path, integrator: str) -> None:
-    scene = load_scene(write_room(tmp_path, integrator=f'<integrator type="{integrator}"/>'))
+    options = {"integrator": f'<integrator type="{integrator}"/>'}
+    scene = load_scene(write_room(tmp_path, lights=LIGHTS["panel"] + LIGHTS["beam"], **options))
     single_render = render_basis(scene, spp=40)
     # Separate renders draw other numbers where their passes end elsewhere.
     rungs = (2, 8, 24) if integrator == "path" else (16, 32)

@@ -172,7 +172,7 @@ def mutation(name: str) -> Any:
     }[name]
 
 
-@pytest.mark.parametrize("fault", ["one sample by chance", "weights that do not add up"])
+@pytest.mark.parametrize("fault", ["one sample by chance", nightly("weights that do not add up")])
 def test_a_wrong_weight_is_found(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: str
 ) -> None:
