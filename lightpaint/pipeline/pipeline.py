@@ -127,7 +127,8 @@ def _finish_view(
         placement=rig.placement,
         move_suggestion=rig.move,
     )
-    write_report(folder, look, command=settings.command, is_shown=settings.report)
+    # The files of the relit scene come to its final folder together with the report.
+    write_report(folder, look, command=settings.command, relit=relit, is_shown=settings.report)
     listen.note("report written")
     for remark in look.remarks:
         listen.say(remark if len(job.views) == 1 else f"{view.folder.name}: {remark}")

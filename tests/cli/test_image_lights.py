@@ -64,6 +64,14 @@ def test_the_results_are_written_and_verified_again(solved: Path) -> None:
     assert again == (solved / "out" / "relit.sky.exr").read_bytes()
 
 
+def test_the_report_of_a_smaller_basis_reads_the_image_where_it_is(solved: Path) -> None:
+    """Features of the larger film are rendered before the results are in their folder."""
+    small = "--resolution", "1/2", "--spp", 8
+    output = succeed(solved, "solve", "room.xml", "target.exr", *SPLIT, *small, "-o", "small")
+    assert "sky, 4x3 texels" in output
+    assert (solved / "small" / "relit.sky.exr").exists()
+
+
 def test_programs_without_images_are_told_to_load_it(solved: Path) -> None:
     arguments = ["export", "out/lighting.json", "--scene", "room.xml", "--to"]
     error = run_refused(solved, *arguments, "blender", "-o", "exported")

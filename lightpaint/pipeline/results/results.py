@@ -187,23 +187,25 @@ def write_predicted(
     write_estimate(path, predicted, {VIEW_KEY: json.dumps(view)})
 
 
-def write_report(folder: Path, look: Look, *, command: str, is_shown: bool = True) -> None:
+def write_report(
+    folder: Path, look: Look, *, command: str, relit: Scene | None = None, is_shown: bool = True
+) -> None:
     """Write the pictures and the report page, denoised, and their numbers.
 
-    These are comparison.png, report.html and report.json. is_shown: False to write only the
-    numbers.
+    These are comparison.png, report.html and report.json. relit: the relit scene where its files
+    are now; by default that of `look`. is_shown: False to write only the numbers.
     """
+    relit = relit or look.relit
     arguments = _report_arguments(look, command)
     if not is_shown:
         write_text(folder / "report.json", report_numbers(**arguments))
         return
     verified = look.verification.verified.image if look.verification else None
     larger_features = None
-    if look.relit is not None and verified is not None:
+    if relit is not None and verified is not None:
         height, width = size = verified.shape[:2]
         if size != look.basis.size:
-            is_whole = size == look.relit.size
-            film = look.relit if is_whole else look.relit.reduced(f"{width}x{height}")
+            film = relit if size == relit.size else relit.reduced(f"{width}x{height}")
             larger_features = render_features(film)
     weights, predicted = look.solution.weights, look.predicted.image
     looks = CleanLooks.clean(look.basis, weights, predicted, verified, larger=larger_features)
