@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 from command import as_from_a_terminal, run, run_refused
 from light_groups import interleaved, pictures
+from nightly import nightly
 from raw_message import RawMessage
 from server_key import key_of, offered
 from websockets.exceptions import ConnectionClosedError
@@ -282,7 +283,7 @@ def test_the_observer_of_the_document_hears_the_state(work_folder: Path) -> None
                 observer.kill()
 
 
-@pytest.mark.parametrize("second", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("second", [signal.SIGINT, nightly(signal.SIGTERM)])
 def test_who_asks_twice_for_the_end_gets_one(work_folder: Path, second: signal.Signals) -> None:
     with start_painting(work_folder, "room.basis.exr") as (process, url), connect_page(url):
         process.send_signal(signal.SIGINT)

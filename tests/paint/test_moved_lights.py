@@ -179,6 +179,7 @@ def test_a_drag_that_is_given_up_moves_nothing(moving: MovingStudio) -> None:
     assert moving.studio.session.requests.poses == {}
 
 
+@pytest.mark.usefixtures("without_reasons")
 def test_exports_and_verification_have_the_new_places(moving: MovingStudio) -> None:
     moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}))
     stroke(moving)
@@ -363,6 +364,7 @@ def dim_room(tmp_path: Path) -> Iterator[MovingStudio]:
     room.close()
 
 
+@pytest.mark.usefixtures("without_reasons")
 def test_lights_that_may_move_come_closer_in_one_step(dim_room: MovingStudio) -> None:
     """The painting is the look with the bulb elsewhere."""
     moving = dim_room
@@ -497,6 +499,7 @@ def test_the_number_of_a_deleted_look_does_not_return(moving: MovingStudio) -> N
     assert [look.id for look in moving.studio.state().looks] == [2]
 
 
+@pytest.mark.usefixtures("without_reasons")
 def test_exported_places_give_the_same_lamps_in_the_terminal(moving: MovingStudio) -> None:
     """Up to the noise of 16 samples; unpainted parts are held near the look before the move."""
     moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}))

@@ -1,11 +1,13 @@
 """Area lights that are moved: they light from a new place, and block the light of others there."""
 
 import shlex
+from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
 from moving import MovingStudio, exact_answer, stroke
-from renderer import mitsuba_render
+from renderer import LIGHTS, mitsuba_render
 
 from lightpaint.cli import main
 from lightpaint.cli.commands.paint_command import command_for_paintings
@@ -18,6 +20,7 @@ from lightpaint.scene.scene_reader import load_scene
 POSE = {"position": [-0.4, 0.6, 0.4], "target": [0.1, 0.0, 0.2]}
 
 
+@pytest.mark.usefixtures("without_reasons")
 def test_a_moved_panel_is_solved_for_where_it_hangs(moving: MovingStudio) -> None:
     """Plain Mitsuba makes of relit.xml what is predicted, with the shadow that is new."""
     moving.send(protocol.MoveLights({"panel": POSE}))
@@ -47,7 +50,17 @@ def test_a_moved_panel_is_solved_for_where_it_hangs(moving: MovingStudio) -> Non
     assert error(without_shadow) > 3 * error(predicted)
 
 
-def test_a_verification_names_panels_whose_shadow_is_new(moving: MovingStudio) -> None:
+@pytest.fixture
+def two_lights(tmp_path: Path) -> Iterator[MovingStudio]:
+    """The room with a panel, and a bulb whose light it can take."""
+    room = MovingStudio(tmp_path, LIGHTS["panel"] + LIGHTS["bulb"])
+    yield room
+    room.close()
+
+
+@pytest.mark.usefixtures("without_reasons")
+def test_a_verification_names_panels_whose_shadow_is_new(two_lights: MovingStudio) -> None:
+    moving = two_lights
     moving.send(protocol.MoveLights({"panel": POSE, "bulb": {"position": [-0.4, 1.2, 0.4]}}))
     stroke(moving)
     moving.send(protocol.Verify())
