@@ -34,6 +34,10 @@ from lightpaint.pipeline.job.sources import BasisFile
 
 H, W, N = 54, 96, 3
 
+#: Of pages whose test does not ask for another: of half the pixels that people have, which the
+#: processor has to draw here.
+VIEWPORT = {"width": 800, "height": 600}
+
 #: What goes wrong in the page and is none of its: a picture that a test reads has to be waited for.
 OURS = "ReadPixels"
 
@@ -229,7 +233,7 @@ def subject(basis: lp.Basis, tmp_path: Path) -> Subject:
 
 
 @pytest.fixture
-def served_painter(subject: Subject) -> Iterator[ServedPainter]:
+def served_painter(subject: Subject, without_reasons: None) -> Iterator[ServedPainter]:
     """A painter of it."""
     painter = ServedPainter(subject)
     yield painter
@@ -248,7 +252,7 @@ def open_page(browser: Any) -> Iterator[Callable[..., PainterUser]]:
         beside: PainterUser | None = None,
         **options: Any,
     ) -> PainterUser:
-        context_options = {"viewport": {"width": 1280, "height": 720}, **options}
+        context_options = {"viewport": VIEWPORT, **options}
         context = beside.page.context if beside else browser.new_context(**context_options)
         contexts.append(context)
         context.set_default_timeout(60_000)
@@ -326,7 +330,7 @@ def fill_and_ask(user: PainterUser) -> None:
 
 
 def test_a_light_is_held_and_moved_and_left(served_painter: ServedPainter, open_page: Any) -> None:
-    user = open_page(served_painter).ready()
+    user = open_page(served_painter, viewport={"width": 1280, "height": 720}).ready()
     session = served_painter.studio.session
     user.press("0").stroke((60, 30), (80, 30)).still("brush")
     slider = user.page.get_by_role("slider", name="light 1, stops from now", exact=True).first
@@ -692,7 +696,7 @@ def test_one_waits_for_the_first_picture_and_paints_while_it_gets_better(
     folder.events = threading.Event(), threading.Event(), threading.Event()
     painter = ServedPainter(Rendering("room.xml", folder, basis=basis))
     try:
-        user = open_page(painter)
+        user = open_page(painter, viewport={"width": 1280, "height": 720})
         user.page.get_by_text("Rendering the first picture …").wait_for()
         full_size = user.page.get_by_role("button", name="1:1", exact=True)
         assert full_size.get_attribute("aria-pressed") != "true"  # there is no picture yet
