@@ -25,10 +25,18 @@ def nightly(*values: Any) -> Any:
 #: Parameters of a test of thousands of cases: the first fifth in every check, the rest at night.
 FIFTHS = seeds(1, 5)
 
+#: The same for those of which a tenth are hundreds, too.
+TENTHS = seeds(1, 10)
+
 
 def fifth_of(cases: Iterable[Case], fifth: int) -> list[Case]:
     """Return every fifth case, of whatever there are, from that of the number `fifth` on."""
     return list(cases)[fifth::5]
+
+
+def tenth_of(cases: Iterable[Case], tenth: int) -> list[Case]:
+    """Return every tenth case, of whatever there are, from that of the number `tenth` on."""
+    return list(cases)[tenth::10]
 
 
 def examples(few: int, many: int) -> int:

@@ -16,7 +16,7 @@ import OpenEXR
 import pytest
 import tifffile
 from damaged_files import Case, damage, outcomes, read_despite_cut, wrong_outcomes
-from nightly import FIFTHS, fifth_of
+from nightly import TENTHS, tenth_of
 from picture_files import P3, SRGB_CURVE, icc, layered, luminance_chroma, para, png, psd
 from PIL import Image
 
@@ -102,7 +102,7 @@ def _exrs() -> dict[str, bytes]:
 
 
 def _outcomes(
-    samples: dict[str, bytes], folder: Path, each: int, fifth: int, *right: str
+    samples: dict[str, bytes], folder: Path, each: int, tenth: int, *right: str
 ) -> list[tuple[Case, str]]:
     """Every one is refused or right; of those that are cut, only what lacks nothing is read."""
     cases = [
@@ -110,28 +110,28 @@ def _outcomes(
         for k, (name, content) in enumerate(samples.items())
         for case in damage(name, content, k, each, each)
     ]
-    results = outcomes("picture", samples, fifth_of(cases, fifth), folder)
+    results = outcomes("picture", samples, tenth_of(cases, tenth), folder)
     assert wrong_outcomes(results, ("same", "refused", *right)) == []
     assert read_despite_cut(results) == []
     assert len(results) > 300
     return results
 
 
-@pytest.mark.parametrize("fifth", FIFTHS)
-def test_what_has_checksums(tmp_path: Path, fifth: int):
-    _outcomes(_checked_files(), tmp_path, 250, fifth)
+@pytest.mark.parametrize("tenth", TENTHS)
+def test_what_has_checksums(tmp_path: Path, tenth: int):
+    _outcomes(_checked_files(), tmp_path, 250, tenth)
 
 
-@pytest.mark.parametrize("fifth", FIFTHS)
-def test_what_has_none(tmp_path: Path, fifth: int):
-    results = _outcomes(_unchecked_files(), tmp_path, 120, fifth, "agreed", "alone")
+@pytest.mark.parametrize("tenth", TENTHS)
+def test_what_has_none(tmp_path: Path, tenth: int):
+    results = _outcomes(_unchecked_files(), tmp_path, 120, tenth, "agreed", "alone")
     # Few are such that the other reader has no opinion.
     assert sum(outcome == "alone" for _, outcome in results) < len(results) / 50
 
 
-@pytest.mark.parametrize("fifth", FIFTHS)
-def test_exr(tmp_path: Path, fifth: int):
-    results = _outcomes(_exrs(), tmp_path, 100, fifth, "agreed", "alone")
+@pytest.mark.parametrize("tenth", TENTHS)
+def test_exr(tmp_path: Path, tenth: int):
+    results = _outcomes(_exrs(), tmp_path, 100, tenth, "agreed", "alone")
     # The other reader has none of luminance and chroma.
     unharmed = [
         case for case, outcome in results if outcome == "alone" and case.file != "chroma.exr"
@@ -139,8 +139,8 @@ def test_exr(tmp_path: Path, fifth: int):
     assert len(unharmed) < len(results) / 50
 
 
-@pytest.mark.parametrize("fifth", FIFTHS)
-def test_masks(tmp_path: Path, fifth: int):
+@pytest.mark.parametrize("tenth", TENTHS)
+def test_masks(tmp_path: Path, tenth: int):
     samples = {
         **_checked_files(),
         **{k: v for k, v in _exrs().items() if k in ("ZIP.exr", "parts.exr")},
@@ -151,18 +151,18 @@ def test_masks(tmp_path: Path, fifth: int):
         for k, (name, content) in enumerate(samples.items())
         for case in damage(name, content, k, 60, 60)
     ]
-    results = outcomes("mask", masks, fifth_of(cases, fifth), tmp_path)
+    results = outcomes("mask", masks, tenth_of(cases, tenth), tmp_path)
     assert wrong_outcomes(results) == []
     assert read_despite_cut(results) == []
 
 
-@pytest.mark.parametrize("fifth", FIFTHS)
-def test_estimates(tmp_path: Path, fifth: int):
+@pytest.mark.parametrize("tenth", TENTHS)
+def test_estimates(tmp_path: Path, tenth: int):
     rng = np.random.default_rng(0)
     estimate = Estimate(*(rng.random((2, 6, 5, 3), np.float32)))
     write_estimate(tmp_path / "predicted.exr", estimate, {"lightpaint.view": "{}"})
     content = (tmp_path / "predicted.exr").read_bytes()
-    cases = fifth_of(damage("predicted.exr", content, 1, 150, 150), fifth)
+    cases = tenth_of(damage("predicted.exr", content, 1, 150, 150), tenth)
     renamed = content.replace(b"half_difference.G", b"half_difference.X")
     cases += [
         Case("predicted.exr", "no green", content.replace(b"\0G\0", b"\0Q\0")),

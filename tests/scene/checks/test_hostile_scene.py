@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from damaged_files import Case, damage, outcomes, wrong_outcomes
-from nightly import FIFTHS, fifth_of, nightly
+from nightly import TENTHS, nightly, tenth_of
 from renderer import GLOSSY, LIGHTS, PATH, ROOM, write_room
 
 from lightpaint.errors import SceneError
@@ -104,15 +104,15 @@ def test_hostile_scenes(tmp_path: Path) -> None:
     assert wrong_outcomes(results, ("refused",)) == []
 
 
-@pytest.mark.parametrize("fifth", FIFTHS)
-def test_damage_of_the_text(tmp_path: Path, fifth: int) -> None:
+@pytest.mark.parametrize("tenth", TENTHS)
+def test_damage_of_the_text(tmp_path: Path, tenth: int) -> None:
     content = write_room(tmp_path).read_bytes()
     cases = [
         case
         for case in damage("bent.xml", content, 1, 150, 60)
         if not case.done.startswith("cut") or int(case.done[-1]) % 2
     ]
-    cases = fifth_of(cases, fifth)
+    cases = tenth_of(cases, tenth)
     bent = content.replace(b'id="bulb"', b'id="\xff\xfe"')
     cases += [
         Case("bent.xml", "no UTF-8", bent),
@@ -145,16 +145,16 @@ def _serialized(vertices: int, faces: int, index: int) -> bytes:
     return struct.pack("<HH", 0x041C, 4) + zlib.compress(mesh) + struct.pack("<QI", 0, 1)
 
 
-def _assets(folder: Path, fifth: int = 0) -> list[tuple[str, bytes]]:
+def _assets(folder: Path, tenth: int = 0) -> list[tuple[str, bytes]]:
     """Endings of files, and what no plugin should be given, beside what it may be given."""
     write_rgb(folder / "t.exr", np.random.default_rng(0).random((8, 8, 3)).astype(np.float32))
     exr = (folder / "t.exr").read_bytes()
     wide = struct.pack(">HBHHB", 11, 8, 65500, 65500, 1) + b"\1\x11\0"
     return [
-        *(("exr", case.content) for case in fifth_of(damage("", exr, 1, 60, 60), fifth)),
+        *(("exr", case.content) for case in tenth_of(damage("", exr, 1, 60, 60), tenth)),
         *(("ply", _ply(3, index)) for index in (-1, 3, 2_000_000, -2_000_000)),
         *(("ply", _ply(3, index, ascii=True)) for index in (3, 2_000_000)),
-        *(("ply", x.content) for x in fifth_of(damage("", _ply(3, 2), 2, 40, 40), fifth)),
+        *(("ply", x.content) for x in tenth_of(damage("", _ply(3, 2), 2, 40, 40), tenth)),
         ("ply", _ply(4_000_000_000, 2)),
         ("serialized", _serialized(3, 1, 2_000_000)),
         ("serialized", _serialized(3, 2**30, 2)),
@@ -167,10 +167,10 @@ def _assets(folder: Path, fifth: int = 0) -> list[tuple[str, bytes]]:
     ]
 
 
-@pytest.mark.parametrize("fifth", FIFTHS)
-def test_hostile_files_of_a_scene(tmp_path: Path, fifth: int) -> None:
+@pytest.mark.parametrize("tenth", TENTHS)
+def test_hostile_files_of_a_scene(tmp_path: Path, tenth: int) -> None:
     cases = []
-    for k, (ending, content) in enumerate(_assets(tmp_path, fifth)):
+    for k, (ending, content) in enumerate(_assets(tmp_path, tenth)):
         file = f"asset_{k}.{ending}"
         (tmp_path / file).write_bytes(content)
         name = f'<string name="filename" value="{file}"/>'
