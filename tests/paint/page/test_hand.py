@@ -306,9 +306,11 @@ def test_what_was_used_in_painters_beside_each_other_is_remembered(painter: Pain
     second_painter.page.wait_for_selector(".lightpaint .tag")
     second_painter.type("Hex", "#445566")
     second_painter.stroke()
+    painter.page.bring_to_front()  # a page behind another answers slowly
     painter.stroke()
     painter.type("Hex", "#778899")
     painter.stroke()
+    second_painter.page.bring_to_front()
     reopen(second_painter)
     recent_colours = second_painter.page.get_by_role("group", name="Recent colours").get_by_role(
         "button"
