@@ -34,6 +34,6 @@ def in_blender(
 def found_in_blender(
     blender: list[str], script: Path, folder: Path, variables: dict[str, str]
 ) -> Any:
-    """What a script, which runs in Blender, has found and left in a folder as found.json."""
+    """Run a script in Blender, and return the contents of the found.json that it writes."""
     in_blender(blender, script, folder, variables=variables)
     return json.loads((folder / "found.json").read_text())

@@ -115,7 +115,7 @@ def _damaged(content: bytes, file: str, seed: int) -> Iterator[Case]:
 
 
 def _bent(content: bytes, file: str) -> Iterator[Case]:
-    """What editors and copies do to a file as a whole."""
+    """Yield a file as editors and copies damage it as a whole."""
     half = len(content) // 2
     for damage, damaged_content in {
         "twice": content * 2,

@@ -8,6 +8,7 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.basis.lights import BasisLight
 from lightpaint.scene.lights.texels import (
+    SPLIT_PLUGINS,
     GridSize,
     image_of,
     images_of,
@@ -17,9 +18,6 @@ from lightpaint.scene.lights.texels import (
 
 #: The middle of a phrase for several texels of an image.
 TEXELS = " texels of "
-
-#: Plugins of lights that can be split into texels.
-_AROUND = {"envmap", "constant"}
 
 
 @dataclass(frozen=True)
@@ -63,7 +61,7 @@ def light_images(lights: Sequence[BasisLight]) -> list[LightImage]:
         places = np.array([index.get(texel, -1) for texel in texel_names(name, size)])
         # A name like that of a texel may be that of a light in another renderer's file.
         plugins = {lights[k].plugin for k in places[places >= 0]}
-        if plugins and plugins <= _AROUND:
+        if plugins and plugins <= {*SPLIT_PLUGINS}:
             images.append(LightImage(name, places.reshape(size[::-1])))
     return images
 

@@ -104,7 +104,7 @@ def test_none_ignores_what_the_lights_file_splits(solved: Path) -> None:
         ("sky=1x1", "split: sky is 1x1: an image around the scene has at least"),
         ("sky=400x250", "at most 4,096"),
         ("moon=8x4", "has no light 'moon' to split into texels; it has sky"),
-        ("bulb=8x4", "is a point emitter: only lights around the scene"),
+        ("bulb=8x4", "is of the kind point: only lights around the scene"),
         ("sky", "is not NAME=COLUMNSxROWS, such as sky=16x8"),
     ],
 )

@@ -1,4 +1,4 @@
-"""What an image in texels should be where a painting does not tell."""
+"""Texels that a painting does not show: they are smooth, keep their colours, or stay."""
 
 from dataclasses import replace
 

@@ -41,7 +41,7 @@ def image_row(image: LightImage, basis: Basis, solution: Solution, shares: Doubl
         '<td class="colour"></td>'
         f'<td class="rgb now">{_rgb(now)}</td><td class="rgb new">{_rgb(new)}</td>'
         '<td class="unit">radiance <small>W/(m² sr), mean over all directions</small></td>'
-        f'<td class="rgb amount"></td><td class="change">{spoken_change(now, new)}</td>'
+        f'<td class="rgb amount"></td><td class="change">{luminance_change(now, new)}</td>'
         f"{share_cell(f'{100 * share:.1f} %', share)}</tr>"
     )
 
@@ -75,8 +75,8 @@ def _rgb(color: Sequence[float] | Doubles) -> str:
     return " <br>".join(f"{v:.4g}" for v in color) if any(color) else "off"
 
 
-def spoken_change(now: Doubles, new: Doubles) -> str:
-    """Return the change of the mean luminance as a ratio and in stops. now, new: (3,)."""
+def luminance_change(now: Doubles, new: Doubles) -> str:
+    """Return the change of luminance from `now` to `new`, (3,) each, as a ratio and in stops."""
     before, after = (float(luminance(color)) for color in (now, new))
     if after == 0:
         return "off" if before > 0 else "stays off"

@@ -12,7 +12,7 @@ from lightpaint.arrays import RGB, Doubles, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.light_images import LightImage, light_images
 from lightpaint.basis.lights import BasisLight
-from lightpaint.colour.color import luminance, rgb_to_hex
+from lightpaint.colour.color import rgb_to_hex
 from lightpaint.colour.photometry import Photometry
 from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.bands import in_turns
@@ -32,7 +32,7 @@ from lightpaint.report.clean_pictures import MAX_CLEAN_THUMBNAILS
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.figures import data_uri, thumbnail
 from lightpaint.report.page.html import breakable_name, fold, share_cell
-from lightpaint.report.page.image_rows import image_row
+from lightpaint.report.page.image_rows import image_row, luminance_change
 from lightpaint.report.phrases import spoken_percent
 from lightpaint.report.uncertainty_sentences import (
     UNDETERMINED,
@@ -196,14 +196,8 @@ def change(light: BasisLight, setting: LightSetting) -> str:
 
 def _changed(light: BasisLight, setting: LightSetting) -> str:
     is_reached = np.array(setting.reached)
-    current_luminance = float(luminance(np.where(is_reached, light.emission, 0)))
-    answer_luminance = float(luminance(np.where(is_reached, setting.emission, 0)))
-    if answer_luminance == 0:
-        return "off" if current_luminance > 0 else "stays off"
-    if current_luminance == 0:
-        return "was off, now on"
-    stops = f"{np.log2(answer_luminance / current_luminance):+.2f} stops".replace("-", "−")
-    return f"×{answer_luminance / current_luminance:.3g} <small>{stops}</small>"
+    now, new = (np.where(is_reached, rgb, 0) for rgb in (light.emission, setting.emission))
+    return luminance_change(now, new)
 
 
 def _constraint_note(setting: LightSetting) -> str:

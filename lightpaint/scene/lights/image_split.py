@@ -10,7 +10,7 @@ from lightpaint.arrays import RGB, Doubles, Floats, as_rgb
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.scene.lights.emitters import Emitter
-from lightpaint.scene.lights.texels import GridSize, Texel, coarse_image, texel_names
+from lightpaint.scene.lights.texels import SPLIT_PLUGINS, GridSize, Texel, coarse_image, texel_names
 from lightpaint.scene.plane_identity import EmitterDigest
 from lightpaint.scene.properties.emission import (
     EmissionKind,
@@ -19,9 +19,6 @@ from lightpaint.scene.properties.emission import (
     read_emitted_image,
 )
 from lightpaint.scene.scene_tree import ParsedScene
-
-#: Lights that can be split: an image around the scene, or one colour that becomes such an image.
-SPLIT_PLUGINS = ("envmap", "constant")
 
 #: The emission of a texel is its radiance.
 TEXEL_KIND = EmissionKind(Scaling.COLOUR, "radiance", "W/(m² sr)")
@@ -60,7 +57,7 @@ def _index_of(name: str, emitters: Sequence[Emitter], scene: str) -> int:
     emitter = emitters[names.index(name)]
     if emitter.plugin not in SPLIT_PLUGINS:
         raise SceneError(
-            f"split: light {name!r} is a {emitter.plugin} emitter: only lights around the scene, "
+            f"split: light {name!r} is of the kind {emitter.plugin}: only lights around the scene, "
             f"{' and '.join(SPLIT_PLUGINS)}, can be split into texels"
         )
     return names.index(name)

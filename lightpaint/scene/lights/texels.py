@@ -18,6 +18,9 @@ from lightpaint.arrays import Doubles, Floats, Position
 from lightpaint.errors import SceneError
 from lightpaint.files import one_line
 
+#: Lights that can be split: an image around the scene, or one colour that becomes such an image.
+SPLIT_PLUGINS = ("envmap", "constant")
+
 #: Columns and rows of an image.
 GridSize = tuple[int, int]
 

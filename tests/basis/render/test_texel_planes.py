@@ -138,7 +138,7 @@ def test_separate_renders_refuse_texels_in_one_line(tmp_path: Path) -> None:
     ("split", "part"),
     [
         ({"sun": "8x4"}, "has no light 'sun' to split into texels; it has sky"),
-        ({"bulb": "8x4"}, "light 'bulb' is a point emitter: only lights around the scene"),
+        ({"bulb": "8x4"}, "light 'bulb' is of the kind point: only lights around the scene"),
     ],
 )
 def test_other_lights_are_refused_in_one_line(

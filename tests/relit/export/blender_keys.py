@@ -40,7 +40,7 @@ group(sky, "rim")
 
 
 def lights():
-    """What the lamp and the world give at each frame, over what they gave."""
+    """Return the light of the lamp and the world at each frame, relative to their first light."""
     found = {}
     for frame in range(0, 27):
         scene.frame_set(frame)
