@@ -6,6 +6,11 @@ import bpy
 SAMPLES, SIZE = 16, (160, 90)
 
 
+def available_view(view):
+    """Return a view transform of this Blender: before 4.0 there is no AgX, but Filmic."""
+    return "Filmic" if view == "AgX" and bpy.app.version < (4, 0) else view
+
+
 def new_shot(*, view: str = "Standard") -> bpy.types.Scene:
     """Empty the file, and build a corner with one lamp of each kind, meshes that emit, a world."""
     for kind in ("objects", "meshes", "lights", "materials", "cameras", "worlds"):
@@ -18,7 +23,7 @@ def new_shot(*, view: str = "Standard") -> bpy.types.Scene:
     scene.cycles.sample_clamp_indirect = 0
     scene.render.resolution_x, scene.render.resolution_y = SIZE
     scene.render.resolution_percentage = 100
-    scene.view_settings.view_transform = view
+    scene.view_settings.view_transform = available_view(view)
     add_room(scene)
     add_lamps()
     add_emitting_meshes(scene)

@@ -15,10 +15,10 @@ from scripted_painter import (
     start_addon,
     wait_until,
 )
-from shots import SIZE, new_shot
+from shots import SIZE, available_view, new_shot
 
 folder = sys.argv[-1]
-view = "AgX" if bpy.app.version >= (4, 0) else "Filmic"
+view = available_view("AgX")
 found = {"view": view}
 new_shot(view=view)
 start_addon(os.path.join(folder, "shot"))
