@@ -30,7 +30,7 @@ from lightpaint.basis.light_images import LightImage, light_images
 from lightpaint.colour.color import luminance
 from lightpaint.colour.color_difference import delta_e
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.scene.lights.texels import coarse_image, parse_size, solid_angles
+from lightpaint.scene.lights.texels.texel import parse_size
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, render
 
@@ -118,7 +118,7 @@ def map_error(
     image: LightImage, basis: Basis, solved: Doubles, known: Doubles
 ) -> tuple[float, float]:
     """Return relative error and correlation of two maps, (rows, columns, 3), where seen."""
-    angles = solid_angles(image.size)
+    angles = image.domain.shares(image.size)
     seen = np.sqrt(basis.power[image.lights].sum(axis=1)).reshape(angles.shape) / angles
     weight = (angles * np.minimum(seen / np.median(seen), 1))[..., None] * np.ones(3)
     error = np.sqrt((weight * (solved - known) ** 2).sum() / (weight * known**2).sum())
@@ -147,7 +147,7 @@ def rows_of(folder: Path, material: str, sizes: list[str], spp: int) -> Iterator
             agrees = lp.verify(predicted, relit, spp=CHECK_SPP).agrees
             maps_text = "– | –"
             for image in light_images(basis.lights):
-                known = coarse_image(maps[sky], parse_size(label, "size"))
+                known = image.domain.coarse(maps[sky], parse_size(label, "size"))
                 solved = solution.weights[image.places]
                 maps_text = "{:.2f} | {:.2f}".format(*map_error(image, basis, solved, known))
             checked = missed(check, target, counted)[0]

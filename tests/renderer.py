@@ -8,6 +8,9 @@ import numpy as np
 
 from lightpaint.arrays import RGB
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.render.basis_render import render_basis
+from lightpaint.images.formats.exr import write_rgb
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.scene.scene import Scene
 
 REPOSITORY = Path(__file__).parent.parent
@@ -176,3 +179,19 @@ def assert_equal_bits(a: Basis, b: Basis) -> None:
         for part in ("planes", "noise"):
             actual, other = (getattr(x.indirect, part).array() for x in (a, b))
             np.testing.assert_array_equal(actual, other, err_msg=f"indirect {part}")
+
+
+def map_file(folder: Path) -> None:
+    """Write a map whose pixels all differ, `map.exr`."""
+    image = np.random.default_rng(0).random((16, 32, 3)).astype(np.float32)
+    write_rgb(folder / "map.exr", image)
+
+
+def painted(scene: Scene, seed: int = 3) -> Lighting:
+    """Return a lighting in which all lights differ, but for the fixed one."""
+    lighting = Lighting.current(render_basis(scene, spp=2))
+    values = np.random.default_rng(seed).random((len(scene.lights), 3)) * 2
+    for light, rgb in zip(scene.lights, values.tolist(), strict=True):
+        if not light.is_fixed:
+            lighting = lighting.with_emission(light.name, tuple(rgb))
+    return lighting

@@ -1,4 +1,4 @@
-"""Images among lights: lights that are the texels of one light around the scene."""
+"""Images among lights: lights that are the texels of one light that was split."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -7,14 +7,9 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.basis.lights import BasisLight
-from lightpaint.scene.lights.texels import (
-    SPLIT_PLUGINS,
-    GridSize,
-    image_of,
-    images_of,
-    solid_angles,
-    texel_names,
-)
+from lightpaint.scene.lights.texels.domains import DOMAINS, domain_of
+from lightpaint.scene.lights.texels.image_domain import GridSize, ImageDomain
+from lightpaint.scene.lights.texels.texel import image_of, images_of, texel_names
 
 #: The middle of a phrase for several texels of an image.
 TEXELS = " texels of "
@@ -25,11 +20,13 @@ class LightImage:
     """An image of lights.
 
     name: of the light that was split. places: (rows, columns), the index of the light that is each
-    texel alone; −1 for a texel that is not adjusted, or adjusted together with others.
+    texel alone; −1 for a texel that is not adjusted, or adjusted together with others. domain: what
+    it covers.
     """
 
     name: str
     places: Indices
+    domain: ImageDomain
 
     @property
     def size(self) -> GridSize:
@@ -48,21 +45,22 @@ class LightImage:
         return self.places[self.places >= 0]
 
     def mean(self, radiances: Doubles) -> Doubles:
-        """Return the mean over all directions, (3,). radiances: (n, 3), those of all lights."""
-        angles = solid_angles(self.size)[self.places >= 0]
-        return np.asarray(angles @ radiances[self.lights] / angles.sum())
+        """Return the mean over its domain, (3,). radiances: (n, 3), those of all lights."""
+        shares = self.domain.shares(self.size)[self.places >= 0]
+        return np.asarray(shares @ radiances[self.lights] / shares.sum())
 
 
 def light_images(lights: Sequence[BasisLight]) -> list[LightImage]:
-    """Return the images around the scene that have texels among `lights`."""
+    """Return the images that have texels among `lights`."""
     index = {light.name: k for k, light in enumerate(lights) if not light.is_fixed}
     images = []
     for name, size in images_of(name for light in lights for name in light.members).items():
         places = np.array([index.get(texel, -1) for texel in texel_names(name, size)])
         # A name like that of a texel may be that of a light in another renderer's file.
         plugins = {lights[k].plugin for k in places[places >= 0]}
-        if plugins and plugins <= {*SPLIT_PLUGINS}:
-            images.append(LightImage(name, places.reshape(size[::-1])))
+        if len(plugins) == 1 and plugins <= DOMAINS.keys():
+            domain = domain_of(plugins.pop())
+            images.append(LightImage(name, places.reshape(size[::-1]), domain))
     return images
 
 

@@ -126,21 +126,37 @@ def set_emission(
 
 
 def set_image(changes: Changes, emitter: Emitter, image: Floats, *, stem: str) -> dict[str, Floats]:
-    """Set the image of a light around the scene to (rows, columns, 3) radiances.
+    """Set the image of a light to (rows, columns, 3) emissions.
 
     emitter: one of its texels. stem: prefix of the name of the image. Returns it by file name. A
-    light of one colour becomes an environment map.
+    sky of one colour becomes an environment map.
     """
     assert emitter.texel is not None
-    name = f"{stem}.{_safe(emitter.texel.image)}.exr"
-    if emitter.plugin == "constant":
+    domain, name = emitter.texel.domain, f"{stem}.{_safe(emitter.texel.image)}.exr"
+    if domain.has_texture:
+        changes.replace(domain.parameter, _bitmap(domain.parameter, name))
+        if changes.has("scale"):
+            changes.set("float", "scale", "1")
+    elif emitter.plugin == "constant":
         changes.replace("radiance", tag("string", name="filename", value=name))
         changes.xml.set_attribute(changes.element, "type", "envmap")
     else:
         changes.set("string", "filename", name)
         if changes.has("scale"):
             changes.set("float", "scale", "1")
-    return {name: image}
+    return {name: domain.as_stored(image)}
+
+
+def _bitmap(parameter: str, name: str) -> str:
+    """Return the XML of a texture with a file of linear values, which stay as they are beyond its
+    outermost pixels.
+    """
+    settings = (
+        tag("string", name="filename", value=name),
+        tag("boolean", name="raw", value="true"),
+        tag("string", name="wrap_mode", value="clamp"),
+    )
+    return f'<texture type="bitmap" name="{parameter}">{"".join(settings)}</texture>'
 
 
 def _safe(name: str) -> str:

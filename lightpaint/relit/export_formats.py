@@ -19,7 +19,7 @@ from lightpaint.relit.export.usd import check_usd, usd_overrides
 from lightpaint.relit.export.usd_groups import usd_multipliers
 from lightpaint.relit.relight import scene_of
 from lightpaint.relit.xml_patch import emitters_of, scene_patch
-from lightpaint.scene.lights.texels import images_of
+from lightpaint.scene.lights.texels.texel import images_of
 from lightpaint.scene.scene import Scene
 
 #: Name of the file in each format, for a scene and for light groups; None if not available.

@@ -22,7 +22,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.relit_files import relit_files, settings_of
 from lightpaint.scene.lights.image_split import with_split
 from lightpaint.scene.lights.new_emitter import new_emitter_at
-from lightpaint.scene.lights.texels import images_of
+from lightpaint.scene.lights.texels.texel import images_of
 from lightpaint.scene.properties.emission import Scaling
 from lightpaint.scene.properties.pose import pose_of
 from lightpaint.scene.scene import Scene

@@ -34,7 +34,7 @@ from lightpaint.scene.lights.new_emitter import (
     moved_emitter,
     places_of,
 )
-from lightpaint.scene.lights.texels import GridSize
+from lightpaint.scene.lights.texels.image_domain import GridSize
 from lightpaint.scene.properties.film import Film, camera_named, reduced, reduction
 from lightpaint.scene.properties.integrator import Integrator, IntegratorChoice
 from lightpaint.scene.properties.pose import Pose, motion_of, upward_axis

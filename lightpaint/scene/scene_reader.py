@@ -13,7 +13,8 @@ from lightpaint.scene.lights.image_split import with_split
 from lightpaint.scene.lights.light import Light
 from lightpaint.scene.lights.light_choice import choose_lights
 from lightpaint.scene.lights.lights_file import LightsFile, lights_file_for
-from lightpaint.scene.lights.texels import GridSize, parse_size
+from lightpaint.scene.lights.texels.image_domain import GridSize
+from lightpaint.scene.lights.texels.texel import parse_size
 from lightpaint.scene.properties.film import check_film, sensor_index
 from lightpaint.scene.properties.integrator import IntegratorChoice
 from lightpaint.scene.runtime.mitsuba_errors import mitsuba_errors
@@ -58,9 +59,9 @@ def load_scene(
             they are selected by their generated names. The lights file can disable this.
         integrator: Integrator to render with instead of the scene's own, such as `path`, `direct`
             or `path:max_depth=8`. It inherits max_depth, rr_depth and hide_emitters.
-        split: Name → columns and rows, such as `(16, 8)`: a light around the scene becomes an image
-            of that many texels, each a light `NAME.xCOLUMN.yROW`. By default those of the lights
-            file, which this replaces.
+        split: Name → columns and rows, such as `(16, 8)`: a sky, an area light or a projector
+            becomes an image of that many texels, each a light `NAME.xCOLUMN.yROW`. By default those
+            of the lights file, which this replaces.
 
     Raises:
         SceneError: If the scene is invalid, with Mitsuba's own message if Mitsuba rejects it.

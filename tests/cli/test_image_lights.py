@@ -11,7 +11,7 @@ from renderer import LIGHTS, write_room
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.sources import Painting, SceneFile
-from lightpaint.scene.lights.texels import texel_names
+from lightpaint.scene.lights.texels.texel import texel_names
 from lightpaint.scene.properties.emission import read_emitted_image
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.scene_render import Stream, render
@@ -104,7 +104,7 @@ def test_none_ignores_what_the_lights_file_splits(solved: Path) -> None:
         ("sky=1x1", "split: sky is 1x1: an image around the scene has at least"),
         ("sky=400x250", "at most 4,096"),
         ("moon=8x4", "has no light 'moon' to split into texels; it has sky"),
-        ("bulb=8x4", "is of the kind point: only lights around the scene"),
+        ("bulb=8x4", "is of the kind point: only envmap, constant, area and projector lights"),
         ("sky", "is not NAME=COLUMNSxROWS, such as sky=16x8"),
     ],
 )

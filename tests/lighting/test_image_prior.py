@@ -15,7 +15,8 @@ from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.loss import image_prior as prior_module
 from lightpaint.lighting.loss.image_prior import image_prior
 from lightpaint.lighting.solve import solve
-from lightpaint.scene.lights.texels import solid_angles, texel_names
+from lightpaint.scene.lights.texels.sky import solid_angles
+from lightpaint.scene.lights.texels.texel import texel_names
 from lightpaint.target.target import Target
 
 FREE = Fit(colors="free")

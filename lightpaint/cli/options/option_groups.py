@@ -97,9 +97,9 @@ def add_split(parser: argparse.ArgumentParser) -> None:
         type=arguments.image_size,
         action="append",
         metavar="sky=16x8",
-        help="split a light around the scene, an envmap or constant, into an image of 16 by 8 "
-        "texels, each a light sky.xCOLUMN.yROW; --split none for no images (default: those of the "
-        "lights file)",
+        help="split a light (envmap, constant, area or projector) into an image of 16 by 8 texels, "
+        "each a light sky.xCOLUMN.yROW; --split none for no images (default: those of the lights "
+        "file)",
     )
 
 

@@ -14,9 +14,9 @@ from lightpaint.report.page.suggestion_section import spoken_position, spoken_su
 from lightpaint.report.phrases import spoken_percent
 from lightpaint.report.verdict import agreement
 from lightpaint.scene.lights.emitters import Emitter
-from lightpaint.scene.lights.image_split import TEXEL_KIND
 from lightpaint.scene.lights.light import Light
-from lightpaint.scene.lights.texels import image_of, images_of, solid_angles, texel_name
+from lightpaint.scene.lights.texels.domains import domain_of
+from lightpaint.scene.lights.texels.texel import image_of, images_of, texel_name
 from lightpaint.scene.properties.emission import MULTIPLE
 from lightpaint.scene.scene import Scene
 
@@ -30,10 +30,11 @@ def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
     images = images_of(light.name for light in scene.lights)
     for image, (columns, rows) in images.items():
         texels = [light.emission for light in scene.lights if image_of(light.name) == image]
-        mean = np.average(texels, axis=0, weights=solid_angles((columns, rows)).ravel())
-        plugin = scene.light(texel_name(image, 0, 0)).plugin
+        light = scene.light(texel_name(image, 0, 0))
+        shares = domain_of(light.plugin).shares((columns, rows))
+        mean = np.average(texels, axis=0, weights=shares.ravel())
         size = f"{columns}x{rows} texels {image}.xCOLUMN.yROW"
-        table.row(image, plugin, terminal.numbers(as_rgb(mean)), TEXEL_KIND.unit, size, "", "")
+        table.row(image, light.plugin, terminal.numbers(as_rgb(mean)), light.unit, size, "", "")
     for light in scene.lights:
         if image_of(light.name) in images:
             continue

@@ -15,7 +15,7 @@ from lightpaint.lighting.constraints.constraints import (
     is_pattern,
     merge_tables,
 )
-from lightpaint.scene.lights.texels import image_of
+from lightpaint.scene.lights.texels.texel import image_of
 
 
 def constraints_by_light(

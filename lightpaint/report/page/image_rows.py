@@ -13,11 +13,10 @@ from lightpaint.colour.srgb import encode_display, to_8_bit
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.page.figures import data_uri
 from lightpaint.report.page.html import breakable_name, share_cell
-from lightpaint.scene.lights.texels import interpolated
 
-#: Width of the map of an image in pixels; its height is half of that, as of all around.
+#: Width of the map of an image in pixels.
 MAP_WIDTH = 144
-#: Share of the directions that the map may show too bright to tell.
+#: Share of its pixels that the map may show too bright to tell.
 CLIPPED_SHARE = 0.02
 
 
@@ -27,11 +26,11 @@ def image_row(image: LightImage, basis: Basis, solution: Solution, shares: Doubl
     current = basis.current_weights
     stops = map_stops(image_of_weights(image, weights))
     maps = "".join(
-        _map(f"{image.name} {label}", image_of_weights(image, radiances), stops)
+        _map(f"{image.name} {label}", image, image_of_weights(image, radiances), stops)
         for label, radiances in (("now", current), ("solved", weights))
     )
     columns, rows = image.size
-    plugin = basis.lights[int(image.lights[0])].plugin
+    plugin, domain = basis.lights[int(image.lights[0])].plugin, image.domain
     now, new = (image.mean(radiances) for radiances in (current, weights))
     share = float(shares[image.lights].sum())
     return (
@@ -40,7 +39,8 @@ def image_row(image: LightImage, basis: Basis, solution: Solution, shares: Doubl
         f"<small>{escape(plugin)} · {columns}x{rows} texels</small></th>"
         '<td class="colour"></td>'
         f'<td class="rgb now">{_rgb(now)}</td><td class="rgb new">{_rgb(new)}</td>'
-        '<td class="unit">radiance <small>W/(m² sr), mean over all directions</small></td>'
+        f'<td class="unit">{domain.parameter} '
+        f"<small>{domain.unit}, mean over {domain.whole}</small></td>"
         f'<td class="rgb amount"></td><td class="change">{luminance_change(now, new)}</td>'
         f"{share_cell(f'{100 * share:.1f} %', share)}</tr>"
     )
@@ -52,21 +52,22 @@ def image_of_weights(image: LightImage, weights: Doubles) -> Doubles:
 
 
 def map_stops(radiances: Floats) -> float:
-    """Return the exposure that shows an image, all but its brightest directions."""
+    """Return the exposure that shows an image, all but its brightest parts."""
     bright = float(np.quantile(luminance(radiances), 1 - CLIPPED_SHARE))
     return -float(np.log2(bright)) if bright > 0 else 0.0
 
 
-def map_picture(radiances: Floats, stops: float, width: int) -> Floats:
-    """Return an image as Mitsuba interpolates it in display values, (width / 2, width, 3)."""
-    return encode_display(2.0**stops * interpolated(radiances, (width, width // 2)))
+def map_picture(image: LightImage, radiances: Floats, stops: float, width: int) -> Floats:
+    """Return an image as Mitsuba interpolates it in display values, (height, width, 3)."""
+    size = image.domain.picture_size(image.size, width)
+    return encode_display(2.0**stops * image.domain.interpolated(radiances, size))
 
 
-def _map(label: str, radiances: Floats, stops: float) -> str:
-    picture = to_8_bit(map_picture(radiances, stops, MAP_WIDTH))
-    caption = escape(f"{label}, all around, shown at {stops:+.1f} stops")
+def _map(label: str, image: LightImage, radiances: Floats, stops: float) -> str:
+    picture = to_8_bit(map_picture(image, radiances, stops, MAP_WIDTH))
+    caption = escape(f"{label}, {image.domain.extent}, shown at {stops:+.1f} stops")
     return (
-        f'<img src="{data_uri(picture)}" width="{MAP_WIDTH}" height="{MAP_WIDTH // 2}" '
+        f'<img src="{data_uri(picture)}" width="{MAP_WIDTH}" height="{len(picture)}" '
         f'alt="{caption}" title="{caption}">'
     )
 

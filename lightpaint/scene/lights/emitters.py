@@ -12,7 +12,7 @@ import numpy as np
 from lightpaint.arrays import RGB
 from lightpaint.colour.photometry import lambertian_flux, point_flux, spot_flux
 from lightpaint.errors import SceneError
-from lightpaint.scene.lights.texels import Texel
+from lightpaint.scene.lights.texels.texel import Texel
 from lightpaint.scene.plane_identity import EmitterDigest, SceneHasher
 from lightpaint.scene.properties.emission import (
     ENVIRONMENTS,

@@ -1,27 +1,25 @@
-"""Splits lights that surround the scene into texels, each an emitter of its own."""
+"""Splits lights that show an image into texels, each an emitter of its own."""
 
+import gc
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import RGB, Doubles, Floats, as_rgb
+from lightpaint.arrays import RGB, Floats, as_rgb
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.scene.lights.emitters import Emitter
-from lightpaint.scene.lights.texels import SPLIT_PLUGINS, GridSize, Texel, coarse_image, texel_names
+from lightpaint.scene.lights.texels.current_image import current_image
+from lightpaint.scene.lights.texels.domains import DOMAINS, domain_of
+from lightpaint.scene.lights.texels.image_domain import GridSize, ImageDomain
+from lightpaint.scene.lights.texels.texel import Texel, texel_names
+from lightpaint.scene.lights.texels.wall_coordinates import MESHES, why_no_image
 from lightpaint.scene.plane_identity import EmitterDigest
-from lightpaint.scene.properties.emission import (
-    EmissionKind,
-    EmitterSetting,
-    Scaling,
-    read_emitted_image,
-)
+from lightpaint.scene.properties.emission import EmissionKind, EmittedImage, EmitterSetting, Scaling
+from lightpaint.scene.properties.site import Site
 from lightpaint.scene.scene_tree import ParsedScene
-
-#: The emission of a texel is its radiance.
-TEXEL_KIND = EmissionKind(Scaling.COLOUR, "radiance", "W/(m² sr)")
 
 
 def with_split(
@@ -51,38 +49,72 @@ def _index_of(name: str, emitters: Sequence[Emitter], scene: str) -> int:
     """Return the index of an emitter that can be split. Raises SceneError without one."""
     names = [x.name for x in emitters]
     if name not in names:
-        surrounding = [x.name for x in emitters if x.plugin in SPLIT_PLUGINS]
-        hint = f"it has {some_names(surrounding)}" if surrounding else "none of its lights can be"
+        possible = [x.name for x in emitters if x.plugin in DOMAINS]
+        hint = f"it has {some_names(possible)}" if possible else "none of its lights can be"
         raise SceneError(f"split: {scene} has no light {name!r} to split into texels; {hint}")
     emitter = emitters[names.index(name)]
-    if emitter.plugin not in SPLIT_PLUGINS:
+    if emitter.plugin not in DOMAINS:
+        *others, last = DOMAINS
         raise SceneError(
-            f"split: light {name!r} is of the kind {emitter.plugin}: only lights around the scene, "
-            f"{' and '.join(SPLIT_PLUGINS)}, can be split into texels"
+            f"split: light {name!r} is of the kind {emitter.plugin}: only {', '.join(others)} and "
+            f"{last} lights can be split into texels"
         )
     return names.index(name)
 
 
 def _texels(emitter: Emitter, size: GridSize, parsed: ParsedScene) -> list[Emitter]:
-    """Return the texels of an emitter as emitters, row by row, at their current radiance."""
+    """Return the texels of an emitter as emitters, row by row, at their current emission."""
+    shape = parsed.shape_plugin(emitter.node)
+    domain = domain_of(emitter.plugin, shape)
     if emitter.obstacle:
         raise SceneError(f"light {emitter.name!r} {emitter.obstacle}, so it cannot be split")
-    current, (columns, rows) = _current_image(emitter, size, parsed), size
-    texels = (Texel(emitter.name, x, y, size) for y in range(rows) for x in range(columns))
+    assert emitter.kind is not None
+    if emitter.kind.scaling is Scaling.FACTORS:
+        raise SceneError(
+            f"light {emitter.name!r} has an emission that is neither a bitmap nor a single colour, "
+            "so it cannot be split"
+        )
+    if shape and (reason := _why_no_image(emitter, shape, parsed)):
+        raise SceneError(
+            f"light {emitter.name!r} {reason}, so it cannot be split: give it a rectangle, or a "
+            "mesh with texture coordinates (uv) for one flat image"
+        )
+    current = current_image(emitter.node, emitter.kind, emitter.emission, domain, size, parsed)
+    columns, rows = size
+    texels = (Texel(emitter.name, x, y, size, domain) for y in range(rows) for x in range(columns))
     return [
         replace(
             emitter,
             name=texel.name,
-            kind=TEXEL_KIND,
+            kind=kind_of(domain),
             emission=as_rgb(current[texel.row, texel.column]),
             form=_form(texel),
             digest=_digest(emitter.digest, texel),
             has_name=True,
             unit_flux=None,
+            # A texel cannot move without the others.
+            site=Site(),
             texel=texel,
         )
         for texel in texels
     ]
+
+
+def _why_no_image(emitter: Emitter, shape: str, parsed: ParsedScene) -> str:
+    """Return why the shape of an emitter cannot show an image; "" if it can."""
+    if shape not in MESHES:
+        return why_no_image(shape, None)
+    reason = _why_no_image_on_mesh(parsed.names[emitter.node], shape, parsed.instantiate({}))
+    gc.collect()  # no other scene may be loaded before this one is gone
+    return reason
+
+
+def _why_no_image_on_mesh(name: str, shape: str, loaded: Any) -> str:
+    """Return why the mesh of an emitter in a loaded scene cannot show an image."""
+    for mesh in loaded.shapes():
+        if mesh.emitter() is not None and mesh.emitter().id() == name:
+            return why_no_image(shape, mesh)
+    raise SceneError(f"light {name!r} is on a shape that is not loaded")
 
 
 def _digest(digest: EmitterDigest | None, texel: Texel) -> EmitterDigest | None:
@@ -95,23 +127,9 @@ def _form(texel: Texel) -> str:
     return f"texel {texel.column}, {texel.row} of {columns}x{rows}"
 
 
-def _current_image(emitter: Emitter, size: GridSize, parsed: ParsedScene) -> Doubles:
-    """Return the radiance that each texel has now, (rows, columns, 3), with the same total
-    light.
-    """
-    columns, rows = size
-    if emitter.plugin == "constant":
-        return np.broadcast_to(np.array(emitter.emission), (rows, columns, 3)).copy()
-    assert emitter.kind is not None
-    path, is_linear = parsed.image_file(emitter.node, emitter.kind.parameter)
-    scale = float(parsed.state.nodes[emitter.node].props.get("scale", 1.0))
-    image = scale * read_emitted_image(path, is_linear).astype(np.float64)
-    if not np.isfinite(image).all() or image.min() < 0:
-        raise SceneError(
-            f"light {emitter.name!r} has an image with values that are negative or not finite, "
-            f"{path.name}, so it cannot be split"
-        )
-    return coarse_image(image, size)
+def kind_of(domain: ImageDomain) -> EmissionKind:
+    """Return how the texels of an image are scaled."""
+    return EmissionKind(Scaling.COLOUR, domain.parameter, domain.unit)
 
 
 def texel_image(radiances: Mapping[Texel, RGB]) -> Floats:
@@ -143,5 +161,9 @@ def with_texels(
             weight = 0.0
         elif evenly:
             image = np.ones_like(image)
-        by_node[node] = EmitterSetting(TEXEL_KIND, (0.0, 0.0, 0.0), weight, image)
+        domain = next(x.texel.domain for x in texels if x.texel)
+        shown = EmittedImage(
+            domain.as_stored(image), domain.parameter, domain.has_texture, domain.has_proportions
+        )
+        by_node[node] = EmitterSetting(kind_of(domain), (0.0, 0.0, 0.0), weight, shown)
     return by_node

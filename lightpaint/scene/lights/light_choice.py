@@ -17,7 +17,7 @@ from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.lights.light import Light, check_adjustable, keep, tie
-from lightpaint.scene.lights.texels import image_of
+from lightpaint.scene.lights.texels.texel import image_of
 from lightpaint.scene.properties.emission import Scaling
 from lightpaint.validation import MAX_LISTED, MAX_NAME
 

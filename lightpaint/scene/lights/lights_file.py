@@ -13,7 +13,8 @@ from typing import Any
 from lightpaint.errors import SceneError
 from lightpaint.file_reading import read_text
 from lightpaint.files import one_line
-from lightpaint.scene.lights.texels import GridSize, parse_size
+from lightpaint.scene.lights.texels.image_domain import GridSize
+from lightpaint.scene.lights.texels.texel import parse_size
 from lightpaint.storage.json_records import strict_toml
 from lightpaint.validation import MAX_LISTED, MAX_NAME
 

@@ -117,17 +117,31 @@ def why_not_adjusted(plugin: str, kind: EmissionKind | None, emission: RGB) -> s
 
 
 @dataclass(frozen=True)
+class EmittedImage:
+    """An image that an emitter shows.
+
+    pixels: (rows, columns, 3), as in Mitsuba's files. parameter: of the emitter, for a texture or a
+    colour. has_texture, has_proportions: see `ImageDomain`.
+    """
+
+    pixels: Floats
+    parameter: str
+    has_texture: bool
+    has_proportions: bool
+
+
+@dataclass(frozen=True)
 class EmitterSetting:
     """Settings of an emitter: emission in the unit of `kind`, and sampling weight.
 
-    kind: None for an emitter that cannot be scaled but only be made black. image: the radiance of
-    a light around the scene, (rows, columns, 3), instead of its own; None to keep that.
+    kind: None for an emitter that cannot be scaled but only be made black. image: an image in the
+    place of its own emission; None to keep that.
     """
 
     kind: EmissionKind | None
     emission: RGB
     sampling_weight: float
-    image: Floats | None = None
+    image: EmittedImage | None = None
 
 
 def set_emission(state: Any, node: int, setting: EmitterSetting, *, on_shape: bool) -> None:
@@ -163,22 +177,31 @@ def set_emission(state: Any, node: int, setting: EmitterSetting, *, on_shape: bo
         )
 
 
-def _set_image(props: Any, image: Floats) -> None:
-    """Turn an emitter around the scene into one with another image, (rows, columns, 3)."""
+def _set_image(props: Any, image: EmittedImage) -> None:
+    """Give an emitter another image. An even one becomes a colour, where that is the same light:
+    its samples are even over what it covers.
+    """
     import mitsuba as mi
 
+    pixels = np.ascontiguousarray(image.pixels, np.float32)
+    is_even = bool((pixels == pixels[0, 0]).all()) and not image.has_proportions
+    color, bitmap = mi.ScalarColor3f(*pixels[0, 0].tolist()), mi.Bitmap(pixels)
+    if image.has_texture:
+        settings = {"type": "bitmap", "bitmap": bitmap, "raw": True, "wrap_mode": "clamp"}
+        props[image.parameter] = color if is_even else mi.load_dict(settings)
+        if "scale" in props:
+            props["scale"] = 1.0
+        return
     for key in list(props):
         if key not in ("to_world", "sampling_weight"):
             del props[key]
-    if (image == image[0, 0]).all():
-        # Its samples are even over all directions.
-        props.set_plugin_name("constant")
-        if "to_world" in props:
-            del props["to_world"]
-        props["radiance"] = mi.ScalarColor3f(*image[0, 0].tolist())
+    props.set_plugin_name("constant" if is_even else "envmap")
+    if is_even and "to_world" in props:
+        del props["to_world"]
+    if is_even:
+        props[image.parameter] = color
     else:
-        props.set_plugin_name("envmap")
-        props["bitmap"] = mi.Bitmap(np.ascontiguousarray(image, np.float32))
+        props["bitmap"] = bitmap
 
 
 def _darken(props: Any, *, on_shape: bool) -> None:

@@ -620,9 +620,8 @@ def test_what_is_no_number_is_left_out(small_room: Scene) -> None:
     planes = LightPlanes(tracer.light_of, len(small_room.lights), (1, 3))
     emitter = dr.gather(mi.EmitterPtr, tracer.loaded.emitters_dr(), mi.UInt32(0, 0, 0))
     value = mi.Color3f(mi.Float(1, np.nan, 2), mi.Float(1, 1, np.inf), mi.Float(1, 1, 1))
-    planes.add(
-        mi.UInt32(0, 1, 2), emitter, value, mi.Vector3f(0, 0, 1), mi.UInt32(0), mi.Bool(True)
-    )
+    way, uv = mi.Vector3f(0, 0, 1), mi.Point2f(0)
+    planes.add(mi.UInt32(0, 1, 2), emitter, value, way, uv, mi.UInt32(0), mi.Bool(True))
     planes.evaluate()
     np.testing.assert_array_equal(planes.sums().sum(axis=0)[0], [[1] * 3, [0] * 3, [0] * 3])
     tracer.close()

@@ -4,11 +4,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from renderer import LIGHTS, SAME_SAMPLES, mitsuba_render, one_pass, write_room
+from renderer import (
+    LIGHTS,
+    SAME_SAMPLES,
+    map_file,
+    mitsuba_render,
+    one_pass,
+    painted,
+    write_room,
+)
 
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.errors import SceneError
-from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.problem import Problem
@@ -24,25 +31,10 @@ ROTATED = """<emitter type="envmap" id="sky"><string name="filename" value="map.
 SHORT = '<integrator type="path"><integer name="max_depth" value="1"/></integrator>'
 
 
-def map_file(folder: Path) -> None:
-    """Write a map whose pixels all differ."""
-    image = np.random.default_rng(0).random((16, 32, 3)).astype(np.float32)
-    write_rgb(folder / "map.exr", image)
-
-
 def split_room(folder: Path, sky: str, *, size: str = "6x4", **options: str) -> Scene:
     """Return a room under a sky in texels."""
     map_file(folder)
     return load_scene(write_room(folder, lights=sky, **options), split={"sky": size})
-
-
-def painted(scene: Scene, seed: int = 3) -> Lighting:
-    """Return a lighting in which all texels differ."""
-    lighting = Lighting.current(render_basis(scene, spp=2))
-    values = np.random.default_rng(seed).random((len(scene.lights), 3)) * 2
-    for name, rgb in zip(lighting, values.tolist(), strict=True):
-        lighting = lighting.with_emission(name, tuple(rgb))
-    return lighting
 
 
 def test_the_pictures_of_all_texels_sum_to_that_of_an_even_sky(tmp_path: Path) -> None:
@@ -138,7 +130,10 @@ def test_separate_renders_refuse_texels_in_one_line(tmp_path: Path) -> None:
     ("split", "part"),
     [
         ({"sun": "8x4"}, "has no light 'sun' to split into texels; it has sky"),
-        ({"bulb": "8x4"}, "light 'bulb' is of the kind point: only lights around the scene"),
+        (
+            {"bulb": "8x4"},
+            "light 'bulb' is of the kind point: only envmap, constant, area",
+        ),
     ],
 )
 def test_other_lights_are_refused_in_one_line(

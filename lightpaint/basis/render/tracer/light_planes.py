@@ -67,19 +67,20 @@ class LightPlanes:
         nothing._keeps = dr.opaque(mi.Bool, False)
         return nothing
 
-    def add(self, pixel, emitter, value, direction, bounces, active):
+    def add(self, pixel, emitter, value, direction, uv, bounces, active):
         """Add RGB values to the plane of the light that `emitter` belongs to.
 
-        direction: unit vector to the emitter, which decides between the texels of an image.
-        bounces: number of surfaces that scattered the light; with more than one it is indirect.
-        Values that are not finite are skipped: one path in a hundred million has them, and a single
-        one would spoil all sums over the picture.
+        direction: unit vector to the emitter. uv: texture coordinates of the place on its surface,
+        or on its slide. One of the two decides between the texels of an image. bounces: number of
+        surfaces that scattered the light; with more than one it is indirect. Values that are not
+        finite are skipped: one path in a hundred million has them, and a single one would spoil all
+        sums over the picture.
         """
         active = active & dr.all(dr.isfinite(value))
         instance = dr.reinterpret_array(mi.UInt32, emitter)
         if self._texels is not None:
             is_image = self._texels.is_image(instance, active)
-            for light, factor in self._texels.shares(instance, direction, is_image):
+            for light, factor in self._texels.shares(instance, direction, uv, is_image):
                 self._add_to_light(pixel, light, factor * value, bounces, is_image)
             active &= ~is_image
         light = dr.gather(mi.UInt32, self._light_of, instance, active)

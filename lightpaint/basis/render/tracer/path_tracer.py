@@ -159,7 +159,7 @@ def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term
         emission = emitter.eval(si, hit & (previous_pdf > 0))
         carried = weight * throughput
         emitted = carried * emission * _mis(previous_pdf, pdf)
-        planes.add(place, emitter, emitted, ray.d, depth, hit)
+        planes.add(place, emitter, emitted, ray.d, si.uv, depth, hit)
         planes.note_seen(place, hit & looks_through)
 
         # Next-event estimation: sample emitters.
@@ -173,7 +173,7 @@ def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term
             bsdf_value, bsdf_pdf = bsdf.eval_pdf(mi.BSDFContext(), si, wo, lit)
             mis = dr.select(ds.delta, 1, _mis(ds.pdf, bsdf_pdf))
             arriving = carried * bsdf_value * radiance * mis
-            planes.add(place, ds.emitter, arriving, ds.d, depth + 1, lit)
+            planes.add(place, ds.emitter, arriving, ds.d, ds.uv, depth + 1, lit)
         else:
             cell = guide.cell(si)
             number = numbers.at_vertex(term, depth, 0)
@@ -272,7 +272,8 @@ def _sample_emitters(
         lit &= dr.any(contribution != 0)
         lit &= ~scene.ray_test(si.spawn_ray_to(ds.p), lit)
         guide.learn(cell, chosen, contribution, is_sampled=active, lit=lit)
-        planes.add(place, emitter, contribution * dr.rcp(expected), ds.d, depth + 1, lit)
+        arriving = contribution * dr.rcp(expected)
+        planes.add(place, emitter, arriving, ds.d, ds.uv, depth + 1, lit)
         k += 1
         active &= k < count
 

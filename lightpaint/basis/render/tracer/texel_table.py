@@ -1,18 +1,22 @@
-"""Tables on the device that divide the light of an image around the scene among its texels.
+"""Tables on the device that divide the light of an image among its texels.
 
 Import this module after setting a Dr.Jit variant, since its array types do not exist before.
 """
 
 # mypy: disable-error-code="no-untyped-def, no-untyped-call"
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, ClassVar
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
 from lightpaint.scene.lights.emitters import Emitter
+from lightpaint.scene.lights.texels.flat_images import FlatDomain
+from lightpaint.scene.lights.texels.image_domain import ImageDomain
+from lightpaint.scene.lights.texels.sky import Sky
 from lightpaint.scene.scene import Scene
 
 #: First texel of an emitter that has none.
@@ -22,8 +26,8 @@ NO_TEXELS = np.uint32(2**32 - 1)
 class TexelTable:
     """The texels of all split images of a loaded scene, which shine in an even white.
 
-    A direction lies between four texels. Each gets the light from there, multiplied by the value of
-    its hat (see texels.py), and in units of the light that it belongs to.
+    A place in an image lies between four texels. Each gets the light from there, multiplied by the
+    value of its hat (see texel.py), and in units of the light that it belongs to.
     """
 
     def __init__(self, scene: Scene, loaded: Any) -> None:
@@ -34,21 +38,23 @@ class TexelTable:
         }
         count = max(instances) + 1
         firsts, sizes = np.full(count, NO_TEXELS), np.ones((2, count), np.uint32)
-        rotations = np.zeros((9, count), np.float32)
         by_image: dict[str, list[Emitter]] = {}
         for emitter in scene.emitters:
             if emitter.texel is not None:
                 by_image.setdefault(emitter.texel.image, []).append(emitter)
         texels: list[Emitter] = []
+        grids = [grid(scene, count) for grid in (_SkyGrid, _FlatGrid)]
         for image, emitters in by_image.items():
             instance, texel = instance_of[image], emitters[0].texel
             assert texel is not None
             firsts[instance], sizes[:, instance] = len(texels), texel.size
-            rotations[:, instance] = _to_local(scene, emitters[0]).ravel()
+            next(x for x in grids if isinstance(texel.domain, x.domain)).add(emitters[0], instance)
             texels += emitters
         self._firsts = mi.UInt32(firsts)
         self._columns, self._rows = (mi.UInt32(x) for x in sizes)
-        self._rotations = [mi.Float(x) for x in rotations]
+        self._grids = [grid for grid in grids if grid.instances]
+        for grid in self._grids:
+            grid.freeze()
         self._lights = mi.UInt32(np.array([scene.plane_of.get(x.name, 0) for x in texels]))
         self._factors = [mi.Float(x) for x in _factors(scene, texels).T]
 
@@ -61,24 +67,20 @@ class TexelTable:
         """Return whether an emitter, by its instance, is a split image."""
         return active & (dr.gather(mi.UInt32, self._firsts, instance, active) != NO_TEXELS)
 
-    def shares(self, instance, direction, active) -> Iterator[tuple[Any, Any]]:
-        """Yield light and RGB factor of each of the four texels around a direction.
+    def shares(self, instance, direction, uv, active) -> Iterator[tuple[Any, Any]]:
+        """Yield light and RGB factor of each of the four texels around a place in an image.
 
-        direction: unit vector from the scene, in world space.
+        direction: unit vector from the scene, in world space. uv: texture coordinates. A sky has
+        its places by direction, other images by texture coordinates.
         """
         first = dr.gather(mi.UInt32, self._firsts, instance, active)
         columns = dr.gather(mi.UInt32, self._columns, instance, active)
         rows = dr.gather(mi.UInt32, self._rows, instance, active)
-        r = [dr.gather(mi.Float, x, instance, active) for x in self._rotations]
-        x, y, z = direction
-        local_x, local_y, local_z = (r[k] * x + r[k + 1] * y + r[k + 2] * z for k in (0, 3, 6))
-        # As in Mitsuba's envmap.cpp.
-        u = dr.atan2(local_x, -local_z) * dr.inv_two_pi
-        v = dr.safe_acos(local_y) * dr.inv_pi
-        across = dr.fma(u - dr.floor(u), mi.Float(columns), -0.5)
-        down = v * mi.Float(rows - 1)
-        left, top = dr.floor(across), dr.clip(dr.floor(down), 0, mi.Float(rows - 2))
+        across, down = self._place(instance, direction, uv, columns, rows, active)
+        left = dr.minimum(dr.floor(across), mi.Float(columns - 1))
+        top = dr.clip(dr.floor(down), 0, mi.Float(rows - 2))
         right, lower, top = across - left, down - top, mi.UInt32(top)
+        # Only the columns of a sky wrap around; in others the place lies between the outermost.
         left_column = mi.UInt32(dr.select(left < 0, mi.Float(columns - 1), left))
         right_column = dr.select(left_column + 1 == columns, 0, left_column + 1)
         for column, width in ((left_column, 1 - right), (right_column, right)):
@@ -87,6 +89,105 @@ class TexelTable:
                 factors = (dr.gather(mi.Float, x, texel, active) for x in self._factors)
                 light = dr.gather(mi.UInt32, self._lights, texel, active)
                 yield light, mi.Color3f(*factors) * (width * height)
+
+    def _place(self, instance, direction, uv, columns, rows, active):
+        """Return how many texels a place is right of the leftmost and below the top ones."""
+        across, down = mi.Float(0), mi.Float(0)
+        for grid in self._grids:
+            its_across, its_down = grid.place(instance, direction, uv, columns, rows, active)
+            if len(self._grids) == 1:
+                return its_across, its_down
+            is_its = grid.has(instance, active)
+            across = dr.select(is_its, its_across, across)
+            down = dr.select(is_its, its_down, down)
+        return across, down
+
+
+class _Grid(ABC):
+    """Where the texels of some images lie, on the device.
+
+    domain: of these images. instances: of their emitters. count: number of all instances.
+    """
+
+    domain: ClassVar[type[ImageDomain]]
+
+    def __init__(self, scene: Scene, count: int) -> None:
+        self.scene = scene
+        self.instances: list[int] = []
+        self._is_its = np.zeros(count, bool)
+
+    def add(self, emitter: Emitter, instance: int) -> None:
+        """Add the image that `emitter` is a texel of."""
+        self.instances.append(instance)
+        self._is_its[instance] = True
+
+    def freeze(self) -> None:
+        """Copy the tables of all images to the device."""
+        self._is_its = mi.Bool(self._is_its)
+
+    def has(self, instance, active):
+        """Return whether an emitter is one of these images."""
+        return dr.gather(mi.Bool, self._is_its, instance, active)
+
+    @abstractmethod
+    def place(self, instance, direction, uv, columns, rows, active):
+        """Return how many texels a place is right of the leftmost and below the top ones."""
+
+
+class _SkyGrid(_Grid):
+    """Skies, of which a direction is a place."""
+
+    domain = Sky
+
+    def __init__(self, scene: Scene, count: int) -> None:
+        super().__init__(scene, count)
+        self._rotations: Any = np.zeros((9, count), np.float32)
+
+    def add(self, emitter: Emitter, instance: int) -> None:
+        super().add(emitter, instance)
+        self._rotations[:, instance] = _to_local(self.scene, emitter).ravel()
+
+    def freeze(self) -> None:
+        super().freeze()
+        self._rotations = [mi.Float(x) for x in self._rotations]
+
+    def place(self, instance, direction, uv, columns, rows, active):
+        r = [dr.gather(mi.Float, x, instance, active) for x in self._rotations]
+        x, y, z = direction
+        local_x, local_y, local_z = (r[k] * x + r[k + 1] * y + r[k + 2] * z for k in (0, 3, 6))
+        # As in Mitsuba's envmap.cpp.
+        u = dr.atan2(local_x, -local_z) * dr.inv_two_pi
+        v = dr.safe_acos(local_y) * dr.inv_pi
+        return dr.fma(u - dr.floor(u), mi.Float(columns), -0.5), v * mi.Float(rows - 1)
+
+
+class _FlatGrid(_Grid):
+    """Walls and slides, of which texture coordinates are a place."""
+
+    domain = FlatDomain
+
+    def __init__(self, scene: Scene, count: int) -> None:
+        super().__init__(scene, count)
+        self._is_upside_down: Any = np.zeros(count, bool)
+
+    def add(self, emitter: Emitter, instance: int) -> None:
+        super().add(emitter, instance)
+        assert emitter.texel is not None
+        assert isinstance(emitter.texel.domain, FlatDomain)
+        self._is_upside_down[instance] = emitter.texel.domain.is_upside_down
+
+    def freeze(self) -> None:
+        super().freeze()
+        self._is_upside_down = mi.Bool(self._is_upside_down)
+
+    def place(self, instance, direction, uv, columns, rows, active):
+        is_upside_down = dr.gather(mi.Bool, self._is_upside_down, instance, active)
+        v = dr.select(is_upside_down, 1 - uv.y, uv.y)
+        # As in Mitsuba's bitmap.cpp, clamped.
+        return (
+            dr.clip(dr.fma(uv.x, mi.Float(columns), -0.5), 0, mi.Float(columns - 1)),
+            dr.clip(dr.fma(v, mi.Float(rows), -0.5), 0, mi.Float(rows - 1)),
+        )
 
 
 def _to_local(scene: Scene, emitter: Emitter) -> Any:

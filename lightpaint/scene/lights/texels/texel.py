@@ -1,0 +1,92 @@
+"""Texels: the pixels of a coarse image of a light, each of which is a light of its own.
+
+Mitsuba interpolates the pixels of an image bilinearly, so a texel shines as a hat: it is 1 at its
+own place and falls to 0 towards its neighbours. Hats sum to one, so an image with a value for each
+texel is the sum of their lights. Where texels lie depends on the kind of light (image_domain.py).
+"""
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from lightpaint.errors import SceneError
+from lightpaint.files import one_line
+from lightpaint.scene.lights.texels.image_domain import GridSize, ImageDomain
+
+#: Most texels of an image: each is a light with pictures of its own.
+MAX_TEXELS = 4096
+
+_SIZE = re.compile(r"(\d{1,9})\s*[x×,]\s*(\d{1,9})")
+_NAME = re.compile(r"(.+)\.x(\d{1,4})\.y(\d{1,4})", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Texel:
+    """A texel of the image of a light.
+
+    image: name of the light. column, row: its place, from the left and from the top. size: of the
+    image. domain: where it lies.
+    """
+
+    image: str
+    column: int
+    row: int
+    size: GridSize
+    domain: ImageDomain
+
+    @property
+    def name(self) -> str:
+        """Its name as a light: those of its image, its column and its row."""
+        return texel_name(self.image, self.column, self.row)
+
+
+def texel_name(image: str, column: int, row: int) -> str:
+    """Return the name of a texel, from the name of its image."""
+    return f"{image}.x{column}.y{row}"
+
+
+def image_of(name: str) -> str:
+    """Return the name of the image that a texel of this name belongs to; "" for other names."""
+    found = _NAME.fullmatch(name)
+    return "" if found is None else found[1]
+
+
+def images_of(names: Iterable[str]) -> dict[str, GridSize]:
+    """Return the images of which `names` has all texels, with their sizes."""
+    places: dict[str, set[tuple[int, int]]] = {}
+    for name in names:
+        if (found := _NAME.fullmatch(name)) is not None:
+            places.setdefault(found[1], set()).add((int(found[2]), int(found[3])))
+    sizes = {
+        image: (max(x for x, _ in texels) + 1, max(y for _, y in texels) + 1)
+        for image, texels in places.items()
+    }
+    return {
+        image: size for image, size in sizes.items() if len(places[image]) == size[0] * size[1] > 1
+    }
+
+
+def texel_names(image: str, size: GridSize) -> list[str]:
+    """Return the names of all texels of an image, row by row."""
+    columns, rows = size
+    return [texel_name(image, x, y) for y in range(rows) for x in range(columns)]
+
+
+def parse_size(value: object, where: str) -> GridSize:
+    """Return columns and rows from `16x8` or [16, 8]. where: their place, for errors."""
+    size: GridSize | None = None
+    if isinstance(value, str) and (found := _SIZE.fullmatch(value.strip())) is not None:
+        size = int(found[1]), int(found[2])
+    if isinstance(value, list | tuple) and len(value) == 2 and all(type(v) is int for v in value):
+        size = value[0], value[1]
+    if size is None:
+        raise SceneError(
+            f"{where} is {one_line(repr(value))}: expected columns and rows, such as 16x8"
+        )
+    columns, rows = size
+    if columns * rows > MAX_TEXELS:
+        raise SceneError(
+            f"{where} is {columns}x{rows}, {columns * rows:,} texels: expected at most "
+            f"{MAX_TEXELS:,}, each of which is a light with pictures of its own"
+        )
+    return columns, rows
