@@ -103,8 +103,8 @@ class TexelTable:
         return across, down
 
 
-class _Grid(ABC):
-    """Where the texels of some images lie, on the device.
+class _TexelGrid(ABC):
+    """The places of the texels of some images, on the device.
 
     domain: of these images. instances: of their emitters. count: number of all instances.
     """
@@ -134,7 +134,7 @@ class _Grid(ABC):
         """Return how many texels a place is right of the leftmost and below the top ones."""
 
 
-class _SkyGrid(_Grid):
+class _SkyGrid(_TexelGrid):
     """Skies, of which a direction is a place."""
 
     domain = Sky
@@ -161,7 +161,7 @@ class _SkyGrid(_Grid):
         return dr.fma(u - dr.floor(u), mi.Float(columns), -0.5), v * mi.Float(rows - 1)
 
 
-class _FlatGrid(_Grid):
+class _FlatGrid(_TexelGrid):
     """Walls and slides, of which texture coordinates are a place."""
 
     domain = FlatDomain

@@ -1,4 +1,4 @@
-"""Which lights can be split, and what their images cover."""
+"""The lights that can be split, and what their images cover."""
 
 from lightpaint.scene.lights.texels.flat_images import Slide, Wall
 from lightpaint.scene.lights.texels.image_domain import ImageDomain

@@ -18,7 +18,7 @@ Neighbours = tuple[GridPlace, GridPlace, float]
 
 
 class ImageDomain(ABC):
-    """What the image of a light covers: all directions, a surface, or the slide of a projector.
+    """A domain that the image of a light covers: all directions, a surface, or a projector's slide.
 
     noun: of its image, for errors. extent: where the image is seen, for captions. whole: what its
     mean is taken over. parameter, unit: of the emission of a texel. min_size: fewest columns and

@@ -1,4 +1,4 @@
-"""Which shapes can show an image: those of whose texture coordinates each has one place."""
+"""Shapes that can show an image: those of whose texture coordinates each has one place."""
 
 from typing import Any
 
