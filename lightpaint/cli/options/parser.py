@@ -175,6 +175,7 @@ def _paint(parser: argparse.ArgumentParser) -> None:
     add_fit(parser)
     add_view_transform(parser, "srgb", "metered like a camera; 0 with --view")
     add_lights(parser)
+    add_split(parser)
     add_pattern(parser)
     add_constraints(parser)
     add_budget(parser)

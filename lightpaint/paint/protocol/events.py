@@ -16,6 +16,7 @@ from lightpaint.paint.protocol.base import OPTIONAL, Message
 from lightpaint.paint.protocol.message_parts import (
     Camera,
     EditState,
+    ImageInfo,
     LightInfo,
     LightPlace,
     LookInfo,
@@ -79,6 +80,7 @@ class SessionState(EditState, Message, kind="state"):
     size: tuple[int, int]
     objects: tuple[str, ...]
     lights: tuple[LightInfo, ...]
+    images: tuple[ImageInfo, ...]
     views: tuple[ViewInfo, ...]
     transforms: tuple[str, ...]
     transform: TransformInfo

@@ -34,6 +34,21 @@ class LightInfo:
     scale: float
 
 
+@dataclass(frozen=True)
+class ImageInfo:
+    """A light that is an image: its texels are lights.
+
+    places: index of the light that each texel is, row by row from the top; -1 for one that is not
+    adjusted, or only together with others. shares: part of the image that each texel covers, which
+    add up to 1. aspect: width of its map over the height.
+    """
+
+    name: str
+    places: tuple[tuple[int, ...], ...]
+    shares: tuple[tuple[float, ...], ...]
+    aspect: float
+
+
 #: Three coordinates in units of the scene.
 Place = tuple[float, ...]
 

@@ -2,9 +2,11 @@
 
 from typing import Any
 
+from lightpaint.basis.light_images import LightImage, light_images
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.paint.presets.presets import PRESETS
 from lightpaint.paint.protocol import (
+    ImageInfo,
     PresetInfo,
     ReferenceInfo,
     SampleCount,
@@ -17,6 +19,9 @@ from lightpaint.paint.session.look_library import LookLibrary
 from lightpaint.paint.session.picture_table import PictureTable
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.view_pictures import view_info
+
+#: Width in pixels of a map whose proportions are told.
+ASPECT_PIXELS = 2**12
 
 
 def state_fields(
@@ -32,6 +37,7 @@ def state_fields(
         "size": views[0].size,
         "objects": views[0].objects,
         "lights": tuple(map(light_info, basis.lights, views[0].scales)),
+        "images": tuple(map(image_info, light_images(basis.lights))),
         "views": views,
         "transforms": tuple(transform.name for transform in offered_transforms(session)),
         "transform": TransformInfo(session.transform.name, session.transform.stops),
@@ -50,6 +56,17 @@ def state_fields(
         "is_new": not session.store.steps,
         "stroke": session.stroke,
     }
+
+
+def image_info(image: LightImage) -> ImageInfo:
+    """Return the description of an image for clients."""
+    width, height = image.domain.picture_size(image.size, ASPECT_PIXELS)
+    return ImageInfo(
+        name=image.name,
+        places=tuple(map(tuple, image.places.tolist())),
+        shares=tuple(map(tuple, image.domain.shares(image.size).tolist())),
+        aspect=width / height,
+    )
 
 
 def offered_transforms(session: Session) -> list[ViewTransform]:

@@ -74,6 +74,20 @@ export interface LightInfo {
 }
 
 /**
+ * A light that is an image: its texels are lights.
+ *
+ * places: index of the light that each texel is, row by row from the top; -1 for one that is not
+ * adjusted, or only together with others. shares: part of the image that each texel covers, which
+ * add up to 1. aspect: width of its map over the height.
+ */
+export interface ImageInfo {
+  name: string;
+  places: number[][];
+  shares: number[][];
+  aspect: number;
+}
+
+/**
  * The place of a light, and its target.
  *
  * position: null for one at infinity, or without a place. direction: unit vector along its axis;
@@ -382,6 +396,7 @@ export interface SessionState {
   size: [number, number];
   objects: string[];
   lights: LightInfo[];
+  images: ImageInfo[];
   views: ViewInfo[];
   transforms: string[];
   transform: TransformInfo;

@@ -6,6 +6,7 @@ import { Button, Select, TruncatedText } from './controls.js';
 import { toggleLights } from './lamps/light_selection.js';
 import {
   MAX_ROWS_WITH_SLIDERS,
+  countRows,
   groupKey,
   groupLights,
   isGroupOpen,
@@ -18,6 +19,7 @@ import { constraintsOf, lockedLights, findTie } from './tied_lights.js';
 import { lightCountText, percentText } from './format.js';
 import { Icon } from './icons.js';
 import { comparedAnswer, isAnswerHidden } from './look_actions.js';
+import { ImageRow } from './images/image_row.js';
 import { LightRow } from './light_row.js';
 import { fill, words } from '../language/language.js';
 
@@ -38,7 +40,7 @@ export function LightList({ ui, app }) {
   const indices = sortLights(ui, searchLights(ui));
   const areSelected = indices.length > 0 && indices.every((k) => ui.selectedLights.includes(k));
   const groups = groupLights(ui, indices);
-  const isMany = ui.lights.length > MAX_ROWS_WITH_SLIDERS;
+  const isMany = countRows(ui) > MAX_ROWS_WITH_SLIDERS;
   const selectFound = (/** @type {any} */ { key }) =>
     key === 'Enter' && indices.length && store.set({ selectedLights: indices });
   return html`<div class=${`lights ${isAnswerHidden(ui) ? 'is-unseen' : ''}`}>
@@ -60,8 +62,10 @@ export function LightList({ ui, app }) {
     }
     <${SelectionPanel} ui=${ui} app=${app} />
     ${ui.ready && !indices.length && html`<p class="faint">${words.lightList.noLightHasThisName}</p>`}
-    ${groups.map(({ name, members }) =>
-      name === null
+    ${groups.map(({ name, members, image }) =>
+      image
+        ? html`<${ImageRow} key=${`image ${image.name}`} image=${image} ui=${ui} app=${app} />`
+        : name === null
         ? members.map((k) => renderRow(ui, app, k, isMany))
         : html`<${Group} key=${`group ${name}`} name=${name} ui=${ui} app=${app}
           members=${members} isMany=${isMany} />`,

@@ -153,7 +153,7 @@ export class LightRow extends Component {
     };
     const text = luminance(rgb) > 0 ? stopsText(stops) : words.lightRow.off;
     return html`<div class=${`dimmer ${constraints?.lock !== undefined ? 'is-held' : ''}`}>
-      <${Slider} plain label=${fill(words.lightRow.stopsFromNow, { label: light.label })} value=${clamp(stops)}
+      <${Slider} plain label=${fill(words.lightRow.stopsFromNow, { label: light.label })} value=${clampStops(stops)}
         min=${DIMMER_MIN_STOPS} max=${DIMMER_MAX_STOPS} step=${0.05} resetValue=${0} text=${text}
         disabled=${Boolean(constraints?.off)} change=${move} />
       <${LevelField} light=${light} rgb=${rgb} disabled=${Boolean(constraints?.off)}
@@ -182,7 +182,7 @@ function Name({ name }) {
 const shareText = (share) => (share === undefined ? '' : percentText(share));
 
 /** @param {{share: number, pointerShare?: number}} props */
-function Share({ share, pointerShare }) {
+export function Share({ share, pointerShare }) {
   const isAtPointer = pointerShare !== undefined;
   const value = isAtPointer ? pointerShare : share;
   return html`<span class=${`share ${isAtPointer ? 'is-here' : ''}`}
@@ -245,8 +245,8 @@ function listRemarks({ light, answer, constraints = {}, tie }) {
   return remarks.filter(([applies]) => applies).map(([, ...texts]) => texts);
 }
 
-/** @param {number} stops */
-const clamp = (stops) => Math.min(DIMMER_MAX_STOPS, Math.max(DIMMER_MIN_STOPS, stops));
+/** Return stops within the ends of the dimmer. @param {number} stops */
+export const clampStops = (stops) => Math.min(DIMMER_MAX_STOPS, Math.max(DIMMER_MIN_STOPS, stops));
 
 /** Return the same colour at a number of stops from the current level; the left end is off.
  * @param {RGB} rgb @param {Light} light @param {number} stops @returns {RGB} */

@@ -1,5 +1,6 @@
 /** Turns actions of a person into requests to the session. */
 
+import { ImageActions } from './images/image_actions.js';
 import { LampMoves } from './lamp_moves.js';
 import { ManyLights } from './lamps/many_lights.js';
 import { SessionLink } from './session_link.js';
@@ -13,6 +14,7 @@ import { fill, words } from '../language/language.js';
 export class SessionController extends SessionLink {
   lampMoves = new LampMoves(this);
   many = new ManyLights(this);
+  images = new ImageActions(this);
 
   /**
    * Set the constraints on a light.

@@ -7,6 +7,7 @@
 
 import { stateOfView } from '../engine/message_frames.js';
 import { comparedLooks, resetMix } from './look_comparison.js';
+import { withLights } from './images/light_images.js';
 import { words } from '../language/language.js';
 
 /** State of requested tasks while none is running.
@@ -44,6 +45,7 @@ export function stateUpdate(message, /** @type {import('./ui_state.js').Ui} */ p
     view,
     views,
     lights,
+    images: withLights(message.images ?? []),
     constraints: message.constraints ?? {},
     ties: message.ties ?? [],
     settings: message.settings ?? {},

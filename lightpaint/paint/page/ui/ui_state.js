@@ -1,5 +1,6 @@
 /** The state of the interface: data from the session, and settings of the page itself. */
 
+import { INITIAL_IMAGES } from './images/image_state.js';
 import { INITIAL_LAMPS } from './lamps/lamp_state.js';
 import { fromKelvin } from './paint_colour.js';
 import { DEFAULT_PREFERENCES } from './preferences.js';
@@ -39,7 +40,8 @@ import { initialSelection } from './selection/selection_settings.js';
 
 /**
  * @typedef {import("./lamps/lamp_state.js").LampState & import("./preferences.js").Preferences
- *   & import("./references/reference_state.js").ReferenceState & BaseUi} Ui
+ *   & import("./references/reference_state.js").ReferenceState
+ *   & import("./images/image_state.js").ImageState & BaseUi} Ui
  *
  * @typedef {object} BaseUi
  * @property {boolean} ready whether the session has said what there is
@@ -283,6 +285,7 @@ export function initialState() {
     sort: 'scene',
     openLights: [],
     ...INITIAL_LAMPS,
+    ...INITIAL_IMAGES,
     ...DEFAULT_PREFERENCES,
     ...INITIAL_REFERENCES,
   };

@@ -1,5 +1,6 @@
 /** Which lights are selected, for one action on all of them. */
 
+import { imageOf } from '../images/light_images.js';
 import { listedLights } from './listed_lights.js';
 import { shortenName } from '../format.js';
 import { fill, words } from '../../language/language.js';
@@ -42,9 +43,15 @@ export function toggleLights(store, lights) {
   store.set({ selectedLights: areSelected ? others : [...others, ...lights] });
 }
 
-/** Return lights in words: two by name, more by their number. @param {Ui} ui
- * @param {number[]} lights */
+/** Return lights in words: two by name, more by their number, an image by its name.
+ * @param {Ui} ui @param {number[]} lights */
 export function lightsText(ui, lights) {
+  const image = imageOf(ui.images, lights[0]);
+  if (image && lights.length > 1 && lights.every((k) => imageOf(ui.images, k) === image)) {
+    if (lights.length === image.lights.length) return shortenName(image.name, 24);
+    const name = shortenName(image.name, 24);
+    return fill(words.lightSelection.texels, { count: lights.length, name });
+  }
   if (lights.length > 2) return fill(words.lightSelection.lights, { count: lights.length });
   return lights.map((k) => shortenName(ui.lights[k].label, 24)).join(words.lightSelection.and);
 }

@@ -1,10 +1,14 @@
 /** The lights as the list shows them: found, sorted, and in groups. */
 
+import { imageOf, meanOf } from '../images/light_images.js';
 import { luminance } from '../paint_colour.js';
 import { findTie } from '../tied_lights.js';
 import { fill, words } from '../../language/language.js';
 
 /** @typedef {import("../ui_state.js").Ui} Ui */
+/** Lights that the list shows together: one row of its own, a group by name, or an image.
+ * @typedef {{name: string | null, members: number[],
+ *   image?: import("../images/image_state.js").LightImage}} ListedGroup */
 
 /** Number of lights above which names that begin alike make groups, and only unfolded rows have a
  * slider. */
@@ -66,15 +70,26 @@ export const groupKey = (name) => `group ${name}`;
 
 /** @param {Ui} ui @param {number[]} indices @returns {number[]} */
 export function sortLights(ui, indices) {
-  const name = (/** @type {number} */ k) => ui.lights[k].label;
-  const share = (/** @type {number} */ k) => ui.lightAnswers[k]?.share ?? 0;
-  const change = (/** @type {number} */ k) => {
-    const [a, b] = [
-      luminance(ui.lightAnswers[k]?.emission ?? ui.lights[k].present),
-      luminance(ui.lights[k].present),
-    ];
-    return Math.abs(Math.log2((a + 1e-9) / (b + 1e-9)));
-  };
+  if (ui.sort === 'scene') return indices;
+  const ownShare = (/** @type {number} */ k) => ui.lightAnswers[k]?.share ?? 0;
+  const answer = (/** @type {number} */ k) => ui.lightAnswers[k]?.emission ?? ui.lights[k].present;
+  const present = (/** @type {number} */ k) => ui.lights[k].present;
+  const changeOf = (/** @type {number[]} */ before, /** @type {number[]} */ after) =>
+    Math.abs(Math.log2((luminance(after) + 1e-9) / (luminance(before) + 1e-9)));
+  const values = new Map(
+    indices.map((k) => [
+      k,
+      { name: ui.lights[k].label, share: ownShare(k), change: changeOf(present(k), answer(k)) },
+    ]),
+  );
+  for (const image of ui.images) {
+    const share = image.lights.reduce((sum, k) => sum + ownShare(k), 0);
+    const change = changeOf(meanOf(image, present), meanOf(image, answer));
+    for (const k of image.lights) values.set(k, { name: image.name, share, change });
+  }
+  const name = (/** @type {number} */ k) => values.get(k)?.name ?? '';
+  const share = (/** @type {number} */ k) => values.get(k)?.share ?? 0;
+  const change = (/** @type {number} */ k) => values.get(k)?.change ?? 0;
   const sortedIndices = [...indices];
   if (ui.sort === 'name') {
     sortedIndices.sort((a, b) => name(a).localeCompare(name(b), undefined, { numeric: true }));
@@ -85,20 +100,29 @@ export function sortLights(ui, indices) {
 }
 
 /** Group lights that belong together under one name, at the place of the first.
- * @param {Ui} ui @param {number[]} indices @returns {{name: string | null, members: number[]}[]} */
+ * @param {Ui} ui @param {number[]} indices @returns {ListedGroup[]} */
 export function groupLights(ui, indices) {
   const names = ui.lights.map((_, k) => groupOf(ui, k));
-  /** @type {{name: string | null, members: number[]}[]} */
-  const groups = [];
+  /** @type {Map<string | null, number>} */
+  const counts = new Map();
+  for (const name of names) counts.set(name, (counts.get(name) ?? 0) + 1);
+  /** @type {Map<unknown, ListedGroup>} */
+  const groups = new Map();
   for (const k of indices) {
-    const count = names.filter((other) => other === names[k]).length;
-    const name = count >= (isPrefixGroup(ui, k) ? MIN_PREFIX_GROUP : 2) ? names[k] : null;
-    const existingGroup = name === null ? undefined : groups.find((group) => group.name === name);
-    if (existingGroup) existingGroup.members.push(k);
-    else groups.push({ name, members: [k] });
+    const image = imageOf(ui.images, k);
+    const minCount = isPrefixGroup(ui, k) ? MIN_PREFIX_GROUP : 2;
+    const name = image || (counts.get(names[k]) ?? 0) < minCount ? null : names[k];
+    const key = image ?? name ?? k;
+    const group = groups.get(key);
+    if (group) group.members.push(k);
+    else groups.set(key, { name, members: [k], image });
   }
-  return groups;
+  return [...groups.values()];
 }
+
+/** Return the number of lights, with each image as one. @param {Ui} ui */
+export const countRows = ({ lights, images }) =>
+  images.reduce((count, image) => count + 1 - image.lights.length, lights.length);
 
 /** Smallest number of lights with a common prefix that are folded together. */
 const MIN_PREFIX_GROUP = 3;
@@ -107,11 +131,13 @@ const MIN_PREFIX_GROUP = 3;
  * @param {Ui} ui @param {number} k @returns {string | null} */
 function groupOf(ui, k) {
   const { name, group } = ui.lights[k];
+  const image = imageOf(ui.images, k);
+  if (image) return image.name;
   const tie = findTie(ui, k);
   const otherNames =
     tie && (tie.length === 2 ? tie[1] : fill(words.listedLights.more, { count: tie.length - 1 }));
   if (tie) return fill(words.listedLights.andTied, { value: tie[0], otherNames });
-  return group ?? (ui.lights.length > MAX_ROWS_WITH_SLIDERS ? namePrefix(name) : null);
+  return group ?? (countRows(ui) > MAX_ROWS_WITH_SLIDERS ? namePrefix(name) : null);
 }
 
 /** @param {Ui} ui @param {number} k */

@@ -1,0 +1,37 @@
+/** The picture of an image, a pixel for each texel, as it is lit now. */
+
+import { encode } from '../../../../viewer/drawing/colour.js';
+import { html, useLayoutEffect, useRef } from '../../vendor/preact.js';
+import { mapStops } from './light_images.js';
+
+/** @typedef {import("../engine_interface.js").RGB} RGB */
+/** @typedef {import("./image_state.js").LightImage} LightImage */
+
+/** Draw an image on a canvas; texels that are no lights stay transparent.
+ * @param {HTMLCanvasElement} canvas @param {LightImage} image @param {RGB[]} weights
+ * @param {number} stops exposure */
+export function drawMap(canvas, { places }, weights, stops) {
+  const [height, width] = [places.length, places[0].length];
+  if (canvas.width !== width) canvas.width = width;
+  if (canvas.height !== height) canvas.height = height;
+  const pixels = new ImageData(width, height);
+  const gain = 2 ** stops;
+  places.flat().forEach((k, i) => {
+    if (k < 0) return;
+    const rgb = weights[k] ?? [0, 0, 0];
+    // What is too bright keeps its hue, by which it is recognised where it was painted.
+    const shown = Math.min(gain, 1 / Math.max(...rgb, 1e-30));
+    for (let c = 0; c < 3; c += 1) pixels.data[4 * i + c] = 255 * encode(shown * rgb[c]);
+    pixels.data[4 * i + 3] = 255;
+  });
+  canvas.getContext('2d')?.putImageData(pixels, 0, 0);
+}
+
+/** The picture of an image in its row. @param {{image: LightImage, weights: RGB[]}} props */
+export function ImageMap({ image, weights }) {
+  const ref = useRef(/** @type {HTMLCanvasElement | null} */ (null));
+  useLayoutEffect(() => {
+    if (ref.current) drawMap(ref.current, image, weights, mapStops(image, weights));
+  });
+  return html`<canvas class="thumb image-map" ref=${ref} aria-hidden="true"></canvas>`;
+}

@@ -1,0 +1,136 @@
+/** A row of the light list for a light that is an image: its map, solo, mute, lock and brightness. */
+
+import { html } from '../../vendor/preact.js';
+import { Button, Slider } from '../controls.js';
+import { numberText, stopsText, whiteText } from '../format.js';
+import { Icon } from '../icons.js';
+import {
+  DIMMER_MAX_STOPS,
+  DIMMER_MIN_STOPS,
+  LevelField,
+  presentLevel,
+  stopsOf,
+} from '../level_field.js';
+import { Share, clampStops } from '../light_row.js';
+import { isSelecting, toggleLights } from '../lamps/light_selection.js';
+import { atFullBrightness, luminance, toHex, toKelvin } from '../paint_colour.js';
+import { fill, fillCount, words } from '../../language/language.js';
+import { heldTexels } from './image_actions.js';
+import { ImageMap } from './image_map.js';
+import { meanOf, wholeLight } from './light_images.js';
+import { TexelMap } from './texel_map.js';
+
+/** @typedef {import("../engine_interface.js").RGB} RGB */
+/** @typedef {import("../ui_state.js").Ui} Ui */
+/** @typedef {import("../shortcuts.js").App} App */
+/** @typedef {import("./image_state.js").LightImage} LightImage */
+
+/** Key of an image among what is unfolded. @param {LightImage} image */
+const imageKey = ({ name }) => `image ${name}`;
+
+/** @param {{image: LightImage, ui: Ui, app: App}} props */
+export function ImageRow({ image, ui, app }) {
+  const { store } = app;
+  const { name, lights } = image;
+  const isOpen = ui.open[imageKey(image)] ?? false;
+  const isSelected = lights.every((k) => ui.selectedLights.includes(k));
+  const isMute = lights.every((k) => ui.mute.includes(k));
+  const share = sum(lights, (k) => ui.lightAnswers[k]?.share ?? 0);
+  const pointerShare = ui.probe ? sum(lights, (k) => ui.probe?.shares[k] ?? 0) : undefined;
+  const held = heldTexels(ui, image);
+  const press = (/** @type {MouseEvent} */ event) =>
+    isSelecting(event)
+      ? toggleLights(store, lights)
+      : store.set({ open: { ...ui.open, [imageKey(image)]: !isOpen } });
+  const size = `${image.places[0].length}x${image.places.length}`;
+  const heldText = fillCount(words.images.texelsLocked, held.length);
+  return html`<div class=${`light is-image ${isMute ? 'is-dim' : ''} ${isOpen ? 'is-open' : ''} ${isSelected ? 'is-selected' : ''}`}
+      role="group" aria-label=${name} data-light=${name}>
+    <div class="light-thumb">
+      <${ImageMap} image=${image} weights=${ui.weights} />
+      <${Share} share=${share} pointerShare=${pointerShare} />
+      ${held.length > 0 && html`<span class="badge" data-tip=${heldText}>${fill(words.images.locked, { count: held.length })}</span>`}
+      <button type="button" class="pick" role="checkbox" aria-checked=${String(isSelected)}
+        aria-label=${fill(words.lightRow.select, { label: name })} onClick=${() => toggleLights(store, lights)}
+        data-tip=${words.lightRow.selectForOneActionOnSeveral}>${isSelected && html`<${Icon} name="check" />`}</button>
+    </div>
+    <div class="light-main">
+      <div class="light-head">
+        <button type="button" class="light-name" aria-expanded=${String(isOpen)} aria-label=${name}
+          onClick=${press} data-tip=${fill(words.images.texels, { name, size })}>
+          <${Icon} name="fold" /><span class="its-name"><span>${name}</span></span></button>
+        <${Buttons} image=${image} ui=${ui} app=${app} held=${held} />
+      </div>
+      <${Numbers} image=${image} ui=${ui} />
+      <${Brightness} image=${image} ui=${ui} app=${app} isHeld=${held.length === lights.length} />
+    </div>
+    ${isOpen && html`<${TexelMap} image=${image} ui=${ui} app=${app} held=${held} />`}
+  </div>`;
+}
+
+/** @param {number[]} lights @param {(light: number) => number} value */
+const sum = (lights, value) => lights.reduce((total, k) => total + value(k), 0);
+
+/** Buttons for the display; then, apart, those for the solve.
+ * @param {{image: LightImage, ui: Ui, app: App, held: number[]}} props */
+function Buttons({ image, ui, app, held }) {
+  const { name: label, lights } = image;
+  const { store, session } = app;
+  const areIn = (/** @type {"solo" | "mute"} */ key) => lights.every((k) => ui[key].includes(k));
+  const toggle = (/** @type {"solo" | "mute"} */ key) => () => {
+    const others = ui[key].filter((k) => !lights.includes(k));
+    store.set({ [key]: areIn(key) ? others : [...others, ...lights] });
+  };
+  const isLocked = held.length === lights.length;
+  const lock = () => void (isLocked ? session.many.unlock(lights) : session.many.lock(lights));
+  return html`<span class="marks" role="group" aria-label=${words.lightRow.display}>
+      <${Button} label=${words.lightRow.s} class="letter" pressed=${areIn('solo')} act=${toggle('solo')}
+        tip=${fill(words.lightRow.soloShowAloneTheAnswerDoes, { label })} />
+      <${Button} label=${words.lightRow.m} class="letter" pressed=${areIn('mute')} act=${toggle('mute')}
+        tip=${fill(words.lightRow.muteShowThePictureWithoutThe, { label })} />
+    </span>
+    <span class="marks is-solve" role="group" aria-label=${words.lightRow.solve}>
+      <${Button} icon="undo" disabled=${!held.length} act=${() => session.images.reset(image)}
+        tip=${fill(words.images.reset, { label })} />
+      <${Button} icon="lock" pressed=${isLocked} act=${lock}
+        tip=${fill(isLocked ? words.lightRow.unlockTheSolveSetsItAgain : words.lightRow.lockAsItIsInThe, { label })} />
+    </span>`;
+}
+
+/** The mean of an image. @param {{image: LightImage, ui: Ui}} props */
+function Numbers({ image, ui }) {
+  const rgb = meanOf(image, (k) => ui.weights[k] ?? ui.lights[k].present);
+  const level = luminance(rgb);
+  const match = toKelvin(rgb);
+  const white = match && whiteText(match.kelvin, match.green);
+  const value = [white, numberText(level)].filter(Boolean).join(' · ');
+  const { unit } = ui.lights[image.lights[0]];
+  return html`<div class="light-numbers">
+    <span class=${`dot ${level > 0 ? '' : 'is-off'}`} aria-hidden="true"
+      style=${{ background: level > 0 ? toHex(atFullBrightness(rgb)) : 'none' }}></span>
+    <span class="values" data-tip=${level > 0 ? fill(words.images.mean, { value, unit }) : undefined}
+      >${level > 0 ? value : words.lightRow.off}</span>
+  </div>`;
+}
+
+/** @param {{image: LightImage, ui: Ui, app: App, isHeld: boolean}} props */
+function Brightness({ image, ui, app, isHeld }) {
+  const { images } = app.session;
+  const light = wholeLight(image, ui.lights);
+  const rgb = meanOf(image, (k) => ui.weights[k] ?? ui.lights[k].present);
+  const stops = stopsOf(rgb, light) ?? DIMMER_MIN_STOPS;
+  const move = (/** @type {number} */ newStops, /** @type {boolean} */ isFinal) =>
+    images.scale(
+      image,
+      newStops <= DIMMER_MIN_STOPS ? 0 : presentLevel(light) * 2 ** newStops,
+      isFinal,
+    );
+  return html`<div class=${`dimmer ${isHeld ? 'is-held' : ''}`}>
+    <${Slider} plain label=${fill(words.lightRow.stopsFromNow, { label: image.name })} value=${clampStops(stops)}
+      min=${DIMMER_MIN_STOPS} max=${DIMMER_MAX_STOPS} step=${0.05} resetValue=${0}
+      text=${luminance(rgb) > 0 ? stopsText(stops) : words.lightRow.off} change=${move} />
+    <${LevelField} light=${light} rgb=${rgb} disabled=${false}
+      say=${(/** @type {string} */ text) => app.session.toast(text)}
+      change=${(/** @type {RGB} */ newRgb) => images.scale(image, luminance(newRgb), true)} />
+  </div>`;
+}

@@ -1,0 +1,61 @@
+/** Lights that are images: their texels, their mean, and how they are exposed. */
+
+import { luminance } from '../paint_colour.js';
+
+/** @typedef {import("../engine_interface.js").RGB} RGB */
+/** @typedef {import("../ui_state.js").Light} Light */
+/** @typedef {import("./image_state.js").LightImage} LightImage */
+
+/** Part of the texels that a map may show too bright to tell. */
+const CLIPPED_SHARE = 0.02;
+
+/** @type {WeakMap<LightImage[], Map<number, LightImage>>} */
+const owners = new WeakMap();
+
+/** Return images with the list of their texels. @param {import("../../engine/messages.js").ImageInfo[]} infos
+ * @returns {LightImage[]} */
+export const withLights = (infos) =>
+  infos.map((info) => ({ ...info, lights: info.places.flat().filter((k) => k >= 0) }));
+
+/** Return the image that a light is a texel of. @param {LightImage[]} images @param {number} light
+ * @returns {LightImage | undefined} */
+export function imageOf(images, light) {
+  let owner = owners.get(images);
+  if (!owner) {
+    owner = new Map(images.flatMap((image) => image.lights.map((k) => [k, image])));
+    owners.set(images, owner);
+  }
+  return owner.get(light);
+}
+
+/** Return the mean of an image, each texel by the part that it covers.
+ * @param {LightImage} image @param {(light: number) => RGB} radiance @returns {RGB} */
+export function meanOf({ places, shares }, radiance) {
+  const sum = [0, 0, 0];
+  let total = 0;
+  places.forEach((row, y) =>
+    row.forEach((k, x) => {
+      if (k < 0) return;
+      total += shares[y][x];
+      radiance(k).forEach((value, c) => (sum[c] += shares[y][x] * value));
+    }),
+  );
+  return /** @type {RGB} */ (sum.map((value) => value / (total || 1)));
+}
+
+/** Return an image as one light, for what shows the level of a light. @param {LightImage} image
+ * @param {Light[]} lights @returns {Light} */
+export function wholeLight(image, lights) {
+  const present = meanOf(image, (k) => lights[k].present);
+  return { ...lights[image.lights[0]], name: image.name, label: image.name, present };
+}
+
+/** Return the exposure in stops that shows an image, all but its brightest texels.
+ * @param {LightImage} image @param {RGB[]} weights */
+export function mapStops({ lights }, weights) {
+  const levels = lights.map((k) => luminance(weights[k] ?? [0, 0, 0])).sort((a, b) => a - b);
+  const place = (1 - CLIPPED_SHARE) * (levels.length - 1);
+  const [low, high] = [levels[Math.floor(place)], levels[Math.ceil(place)]];
+  const level = low + (high - low) * (place - Math.floor(place));
+  return level > 0 ? -Math.log2(level) : 0;
+}

@@ -1,0 +1,223 @@
+/** The texels of an image, to be painted, locked and released on its map. */
+
+import { Hex, Hsv, MIXERS, Rgb, White } from '../colour_mixers.js';
+import { Choice, Slider, useId } from '../controls.js';
+import { signedText, whiteText } from '../format.js';
+import { presentLevel, stopsOf } from '../level_field.js';
+import { scaled } from '../lamps/lamp_colours.js';
+import { atFullBrightness, luminance, toHex, toKelvin } from '../paint_colour.js';
+import { html, useLayoutEffect, useRef, useState } from '../../vendor/preact.js';
+import { fill, words } from '../../language/language.js';
+import { drawMap } from './image_map.js';
+import { mapStops, wholeLight } from './light_images.js';
+
+/** @typedef {import("../engine_interface.js").RGB} RGB */
+/** @typedef {import("../ui_state.js").Ui} Ui */
+/** @typedef {import("../shortcuts.js").App} App */
+/** @typedef {import("./image_state.js").LightImage} LightImage */
+/** @typedef {[row: number, column: number]} Place */
+
+const TOOLS = [
+  { value: 'paint', label: words.images.paint, tip: words.images.paintTexels },
+  { value: 'lock', label: words.images.lock, tip: words.images.lockTexels },
+  { value: 'release', label: words.images.release, tip: words.images.releaseTexels },
+];
+
+/** Ends of the brightness of paint, in stops from the mean of the image in the scene. */
+const [MIN_STOPS, MAX_STOPS] = [-8, 12];
+
+/** @param {{image: LightImage, ui: Ui, app: App, held: number[]}} props */
+export function TexelMap({ image, ui, app, held }) {
+  const [place, setPlace] = useState(/** @type {Place | null} */ (null));
+  return html`<div class="texels">
+    <${Grid} image=${image} ui=${ui} app=${app} held=${held} place=${place} setPlace=${setPlace} />
+    <p class="faint texel-text">${place ? texelText(image, ui, held, place) : words.images.dragToPaint}</p>
+    <${Choice} label=${words.images.drag} value=${ui.texelTool} choices=${TOOLS}
+      change=${(/** @type {Ui["texelTool"]} */ texelTool) => app.store.set({ texelTool })} />
+    ${ui.texelTool === 'paint' && html`<${Paint} ui=${ui} app=${app} />`}
+  </div>`;
+}
+
+/** The colour and the brightness of the paint. @param {{ui: Ui, app: App}} props */
+function Paint({ ui, app }) {
+  const { texelColour: colour, texelMixer: mixer, texelStops } = ui;
+  const set = (/** @type {RGB} */ newColour) => {
+    if (Math.max(...newColour) > 0) app.store.set({ texelColour: atFullBrightness(newColour) });
+  };
+  return html`<div class="lamp-colour colour" role="group" aria-label=${words.images.paintOfTexels}>
+    <div class="colour-row">
+      <span class="dot" aria-hidden="true" style=${{ background: toHex(colour) }}></span>
+      <${Hex} colour=${colour} set=${set} />
+      <${Choice} label=${words.lampColour.colourModel} value=${mixer} choices=${MIXERS}
+        change=${(/** @type {Ui["texelMixer"]} */ texelMixer) => app.store.set({ texelMixer })} />
+    </div>
+    ${mixer === 'white' && html`<${White} colour=${colour} set=${set} isPure />`}
+    ${mixer === 'hsv' && html`<${Hsv} colour=${colour} set=${set} hasValue=${false} />`}
+    ${mixer === 'rgb' && html`<${Rgb} colour=${colour} set=${set} />`}
+    <${Slider} label=${words.images.brightness} value=${texelStops} min=${MIN_STOPS} max=${MAX_STOPS} step=${0.1}
+      digits=${1} resetValue=${0} unit=${words.images.st} tip=${words.images.stopsFromTheMean}
+      change=${(/** @type {number} */ stops) => app.store.set({ texelStops: stops })} />
+  </div>`;
+}
+
+/** The map, on which the pointer and the keys reach each texel.
+ * @param {{image: LightImage, ui: Ui, app: App, held: number[], place: Place | null,
+ *   setPlace: (place: Place | null) => void}} props */
+function Grid({ image, ui, app, held, place, setPlace }) {
+  const id = useId();
+  const canvas = useRef(/** @type {HTMLCanvasElement | null} */ (null));
+  const [key, setKey] = useState(/** @type {Place} */ ([0, 0]));
+  /** The stroke in progress, with the exposure at its start, which would change under the brush.
+   * @type {{current: {texels: Set<number>, last: Place, stops: number} | null}} */
+  const stroke = useRef(null);
+  const [rows, columns] = [image.places.length, image.places[0].length];
+  useLayoutEffect(() => {
+    if (!canvas.current) return;
+    drawMap(canvas.current, image, ui.weights, stroke.current?.stops ?? mapStops(image, ui.weights));
+  });
+  const placeAt = (/** @type {PointerEvent} */ event) => {
+    const box = /** @type {Element} */ (event.currentTarget).getBoundingClientRect();
+    const along = (/** @type {number} */ share, /** @type {number} */ count) =>
+      Math.min(count - 1, Math.max(0, Math.floor(share * count)));
+    return /** @type {Place} */ ([
+      along((event.clientY - box.top) / box.height, rows),
+      along((event.clientX - box.left) / box.width, columns),
+    ]);
+  };
+  const texelAt = (/** @type {Place} */ [row, column]) => image.places[row][column];
+  const apply = (/** @type {boolean} */ isFinal) =>
+    applyTool(image, ui, app, [...(stroke.current?.texels ?? [])], isFinal);
+  const begin = (/** @type {PointerEvent} */ event) => {
+    if (event.button !== 0) return;
+    event.preventDefault();
+    const start = placeAt(event);
+    if (event.altKey) return pick(image, ui, app, texelAt(start));
+    const element = /** @type {HTMLElement} */ (event.currentTarget);
+    element.setPointerCapture(event.pointerId);
+    element.focus({ preventScroll: true });
+    setKey(start);
+    const texels = new Set([texelAt(start)].filter((k) => k >= 0));
+    stroke.current = { texels, last: start, stops: mapStops(image, ui.weights) };
+    return apply(false);
+  };
+  const move = (/** @type {PointerEvent} */ event) => {
+    const next = placeAt(event);
+    if (String(next) !== String(place)) setPlace(next);
+    const current = stroke.current;
+    if (!current || String(next) === String(current.last)) return;
+    for (const passed of placesBetween(current.last, next))
+      if (texelAt(passed) >= 0) current.texels.add(texelAt(passed));
+    current.last = next;
+    setKey(next);
+    apply(false);
+  };
+  const end = () => {
+    if (!stroke.current) return;
+    apply(true);
+    stroke.current = null;
+  };
+  const press = (/** @type {KeyboardEvent} */ event) => {
+    const step = KEY_STEPS[event.key];
+    const isApplied = event.key === 'Enter' || event.key === ' ';
+    if (!step && !isApplied) return;
+    event.preventDefault();
+    event.stopPropagation();
+    if (step) {
+      const next = /** @type {Place} */ ([
+        Math.min(rows - 1, Math.max(0, key[0] + step[0])),
+        Math.min(columns - 1, Math.max(0, key[1] + step[1])),
+      ]);
+      setKey(next);
+      setPlace(next);
+    } else if (event.altKey) pick(image, ui, app, texelAt(key));
+    else applyTool(image, ui, app, [texelAt(key)].filter((k) => k >= 0), true);
+  };
+  const cell = (/** @type {Place} */ [row, column]) => ({
+    left: `${(100 * column) / columns}%`,
+    top: `${(100 * row) / rows}%`,
+    width: `${100 / columns}%`,
+    height: `${100 / rows}%`,
+  });
+  const cellId = `${id}-${key.join('-')}`;
+  return html`<div class="texel-map" role="grid" tabindex="0" aria-label=${fill(words.images.map, { name: image.name })}
+    aria-rowcount=${rows} aria-colcount=${columns} aria-activedescendant=${cellId}
+    style=${{ aspectRatio: String(image.aspect) }} onKeyDown=${press}
+    onFocus=${() => setPlace(key)} onBlur=${() => setPlace(null)}
+    onPointerDown=${begin} onPointerMove=${move} onPointerUp=${end} onPointerCancel=${end}
+    onPointerLeave=${() => !stroke.current && setPlace(null)}>
+    <canvas class="image-map" ref=${canvas} aria-hidden="true"></canvas>
+    ${image.places.map((places, row) =>
+      places.map(
+        (k, column) =>
+          held.includes(k) &&
+          html`<i key=${k} class="texel-lock" aria-hidden="true" style=${cell([row, column])}></i>`,
+      ),
+    )}
+    ${place && html`<i class="texel-here" aria-hidden="true" style=${cell(place)}></i>`}
+    <div role="row" aria-rowindex=${key[0] + 1}>
+      <div key=${cellId} id=${cellId} role="gridcell" class="texel-key" aria-colindex=${key[1] + 1}
+        aria-label=${texelText(image, ui, held, key)} style=${cell(key)}></div>
+    </div>
+  </div>`;
+}
+
+/** Steps of the keys, in rows and columns. @type {Record<string, Place>} */
+const KEY_STEPS = {
+  ArrowUp: [-1, 0],
+  ArrowDown: [1, 0],
+  ArrowLeft: [0, -1],
+  ArrowRight: [0, 1],
+  Home: [0, -Infinity],
+  End: [0, Infinity],
+};
+
+/** Return the places from one to another, without the first. @param {Place} from @param {Place} to
+ * @returns {Place[]} */
+function placesBetween(from, to) {
+  const [rows, columns] = [to[0] - from[0], to[1] - from[1]];
+  const count = Math.max(Math.abs(rows), Math.abs(columns));
+  return Array.from({ length: count }, (_, i) => [
+    Math.round(from[0] + (rows * (i + 1)) / count),
+    Math.round(from[1] + (columns * (i + 1)) / count),
+  ]);
+}
+
+/** @param {LightImage} image @param {Ui} ui @param {App} app @param {number[]} texels
+ * @param {boolean} isFinal */
+function applyTool(image, ui, app, texels, isFinal) {
+  const { images, many } = app.session;
+  if (!texels.length) return;
+  if (ui.texelTool === 'paint') {
+    const level = presentLevel(wholeLight(image, ui.lights)) * 2 ** ui.texelStops;
+    images.paint(texels, scaled(ui.texelColour, level / luminance(ui.texelColour)), isFinal);
+  } else if (isFinal && ui.texelTool === 'lock') many.lock(texels);
+  else if (isFinal) void many.unlock(texels);
+}
+
+/** Take the light of a texel as paint. @param {LightImage} image @param {Ui} ui @param {App} app
+ * @param {number} k */
+function pick(image, ui, app, k) {
+  const rgb = ui.weights[k];
+  if (!rgb || !(luminance(rgb) > 0)) return;
+  const stops = stopsOf(rgb, wholeLight(image, ui.lights)) ?? 0;
+  const texelStops = Math.min(MAX_STOPS, Math.max(MIN_STOPS, stops));
+  app.store.set({ texelColour: atFullBrightness(rgb), texelStops, texelTool: 'paint' });
+}
+
+/** Return a texel in words. @param {LightImage} image @param {Ui} ui @param {number[]} held
+ * @param {Place} place */
+function texelText(image, ui, held, [row, column]) {
+  const k = image.places[row][column];
+  const where = { column: column + 1, row: row + 1 };
+  if (k < 0) return fill(words.images.notAdjusted, where);
+  const rgb = ui.weights[k] ?? ui.lights[k].present;
+  const stops = stopsOf(rgb, wholeLight(image, ui.lights));
+  const white = toKelvin(rgb);
+  const colour = white ? whiteText(white.kelvin, white.green) : toHex(atFullBrightness(rgb));
+  const light =
+    stops === null
+      ? words.lightRow.off
+      : `${colour} · ${fill(words.manyLights.st, { signed: signedText(stops) })}`;
+  const text = fill(words.images.texel, { ...where, light });
+  return held.includes(k) ? fill(words.images.texelLocked, { text }) : text;
+}
