@@ -96,7 +96,7 @@ def main() -> None:
     scene = lp.load_scene(asked.scene, sensor=asked.sensor, parameters=parameters)
     basis = lp.render_basis(scene, spp=asked.spp)
     surfaces = see(asked.scene, size=(width, height), sensor=asked.sensor)
-    channels = {"RGB": denoise(basis.mix(basis.present_weights), surfaces)}
+    channels = {"RGB": denoise(basis.mix(basis.current_weights), surfaces)}
     for layer, image in surfaces.layers.items():
         for k, name in enumerate(LAYERS[layer]):
             channels[f"{layer}.{name}"] = np.ascontiguousarray(image[..., k])
