@@ -1,5 +1,5 @@
 /** The interface over a session and an engine that are made up: `?lights=N`, `?shadow`, `?first`,
- * `?elsewhere`; `?crowd`: as much of everything as there may be, and as long;
+ * `?elsewhere`; `?image=4x3`: the last of the lights are texels of an image, `sky`; `?crowd`: as much of everything as there may be, and as long;
  * `?tour`: as for people, whom the tour greets at their first visit;
  * `?model`: that of a notebook, `?model=taken`: at a place that loses the painter at once. */
 
@@ -10,6 +10,7 @@ import { crowd } from './crowd.js';
 import { FakeEngine } from './engine.js';
 import { FakeHost } from './host.js';
 import { FakeModel } from './model.js';
+import { split } from './image.js';
 import { makeRoom } from './room.js';
 
 const asked = new URLSearchParams(location.search);
@@ -19,6 +20,7 @@ const host = new FakeHost(room, {
   isElsewhere: asked.has('elsewhere'),
 });
 if (asked.has('crowd')) crowd(host);
+if (asked.has('image')) split(host, asked.get('image') ?? '');
 let element = /** @type {HTMLElement} */ (document.getElementById('lightpaint'));
 if (asked.has('shadow')) {
   const shadow = element.attachShadow({ mode: 'open' });

@@ -1,0 +1,135 @@
+"""Lights that are images, on a painter's page: one row with a map, whose texels are painted."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from axe import violations
+from painter_page import Painter
+
+#: Three lights, and an image of 4 by 3 texels behind them.
+QUERY, FIRST, COLUMNS, ROWS = "lights=15&image=4x3", 3, 4, 3
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+@pytest.fixture
+def painter(new_painter: Any) -> Painter:
+    return new_painter(QUERY)  # type: ignore[no-any-return]
+
+
+def weights(painter: Painter) -> Any:
+    """Return the weights of the texels, (12, 3)."""
+    return np.array(painter.ui("weights"))[FIRST:]
+
+
+def last_request(painter: Painter) -> dict[str, Any]:
+    return painter.requests("constrain_lights")[-1]
+
+
+def unfold(painter: Painter) -> None:
+    painter.button("sky", exact=True).click()
+    painter.still()
+
+
+def drag(painter: Painter, *places: tuple[int, int], modifier: str = "") -> None:
+    """Drag over the middles of texels, given by column and row."""
+    painter.page.locator(".texel-map").scroll_into_view_if_needed()
+    box = painter.page.locator(".texel-map").bounding_box()
+    if modifier:
+        painter.page.keyboard.down(modifier)
+    for k, (column, row) in enumerate(places):
+        x = box["x"] + (column + 0.5) / COLUMNS * box["width"]
+        y = box["y"] + (row + 0.5) / ROWS * box["height"]
+        painter.page.mouse.move(x, y, steps=1 if k == 0 else 6)
+        if k == 0:
+            painter.page.mouse.down()
+    painter.page.mouse.up()
+    if modifier:
+        painter.page.keyboard.up(modifier)
+
+
+def test_an_image_is_one_row_with_its_map(painter: Painter) -> None:
+    page = painter.page
+    assert page.locator(".light").count() == 4
+    row = page.get_by_role("group", name="sky", exact=True)
+    assert row.locator("canvas.image-map").evaluate("map => [map.width, map.height]") == [4, 3]
+    row.get_by_role("button", name="Solo: show sky alone").click()
+    assert painter.ui("solo") == list(range(FIRST, 15))
+    row.get_by_role("button", name="Lock sky as it is in the answer").click()
+    assert last_request(painter)["label"] == "lock sky"
+    assert len(last_request(painter)["constraints"]) == 12
+    assert row.get_by_text("12 locked").is_visible()
+    row.get_by_role("button", name="Reset sky").click()
+    assert set(map(str, last_request(painter)["constraints"].values())) == {"{}"}
+    page.get_by_role("searchbox", name="Search lights").fill("sky.x0.*")
+    painter.still()
+    assert page.locator(".light").count() == 1
+
+
+def test_the_slider_scales_all_texels_in_one_step(painter: Painter) -> None:
+    before = weights(painter)
+    painter.type("sky, level", "+1")
+    np.testing.assert_allclose(weights(painter), 2 * before, rtol=1e-9)
+    assert last_request(painter)["label"] == "sky, +1.0 st"
+    assert painter.ui("history")["count"] == 1
+    painter.type("sky, level", "off")
+    assert not weights(painter).any()
+    painter.type("sky, level", "as now")
+    np.testing.assert_allclose(weights(painter), before, rtol=1e-9)
+
+
+def test_texels_are_painted_locked_and_released_in_one_step_each(painter: Painter) -> None:
+    unfold(painter)
+    page = painter.page
+    painter.page.get_by_role("group", name="Paint of texels").get_by_label("Hex").fill("#ff0000")
+    page.keyboard.press("Enter")
+    slider = page.get_by_role("slider", name="Brightness").last
+    slider.focus()
+    slider.press("ArrowRight")
+    before = weights(painter)
+    mean = float(before.mean(axis=0) @ LUMINANCE)
+    drag(painter, (0, 1), (2, 1))
+    painter.still()
+    painted = weights(painter)
+    np.testing.assert_allclose(painted[4:7] @ LUMINANCE, mean * 2**0.1, rtol=1e-6)
+    assert not painted[4:7, 1:].any()
+    np.testing.assert_array_equal(np.delete(painted, [4, 5, 6], 0), np.delete(before, [4, 5, 6], 0))
+    requests = painter.requests("constrain_lights")
+    assert [one["is_final"] for one in requests].count(True) == 1
+    assert list(requests[-1]["constraints"]) == ["sky.x0.y1", "sky.x1.y1", "sky.x2.y1"]
+    assert requests[-1]["label"] == "3 texels of sky, painted"
+    assert painter.ui("history")["count"] == 1
+    assert page.locator(".texel-lock").count() == 3
+    painter.button("Release", exact=True).click()
+    drag(painter, (0, 1), (1, 1))
+    assert page.locator(".texel-lock").count() == 1
+    page.get_by_role("group", name="Drag over the map").get_by_role("button", name="Lock").click()
+    drag(painter, (3, 2))
+    assert last_request(painter)["constraints"]["sky.x3.y2"]["lock"] == list(painted[11])
+    assert page.locator(".texel-lock").count() == 2
+
+
+def test_a_texel_gives_its_light_as_paint(painter: Painter) -> None:
+    unfold(painter)
+    drag(painter, (1, 0), modifier="Alt")
+    painter.still()
+    assert not painter.requests("constrain_lights")
+    drag(painter, (2, 2))
+    painter.still()
+    np.testing.assert_allclose(weights(painter)[10], weights(painter)[1], rtol=1e-6)
+
+
+def test_keys_reach_each_texel_and_readers_hear_of_it(new_painter: Any, axe: str) -> None:
+    painter = new_painter(QUERY, axe=axe)
+    unfold(painter)
+    page = painter.page
+    page.get_by_role("grid", name="Texels of sky").focus()
+    for key in ("ArrowDown", "End", "ArrowLeft"):
+        page.keyboard.press(key)
+    cell = page.get_by_role("gridcell")
+    assert (cell.get_attribute("aria-label") or "").startswith("Column 3, row 2: ")
+    page.keyboard.press("Enter")
+    painter.still()
+    assert list(last_request(painter)["constraints"]) == ["sky.x2.y1"]
+    assert (cell.get_attribute("aria-label") or "").endswith(", locked")
+    assert violations(page, ".light.is-image") == []

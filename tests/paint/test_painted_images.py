@@ -1,0 +1,83 @@
+"""A session whose sky is an image: its texels are painted, undone, kept, and exported."""
+
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from renderer import LIGHTS, write_room
+
+from lightpaint.paint import protocol
+from lightpaint.paint.protocol import Message
+from lightpaint.paint.store.store import Store
+from lightpaint.paint.studio.studio import Studio
+from lightpaint.paint.subject_factory import make_subject
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.sources import SceneFile
+from lightpaint.scene.properties.emission import read_emitted_image
+
+#: The radiance of a painted texel.
+ORANGE = (1.5, 0.5, 0.1)
+
+
+class SkyStudio:
+    """A studio of a room under a sky of 4 by 3 texels, and all that it says."""
+
+    def __init__(self, folder: Path) -> None:
+        path = folder / "room.xml"
+        if not path.exists():
+            write_room(folder, lights=LIGHTS["sky"] + LIGHTS["bulb"])
+        scene = SceneFile(str(path), split={"sky": "4x3"})
+        subject = make_subject(scene, folder / "session", settings=Settings(spp=4))
+        (folder / "session").mkdir(exist_ok=True)
+        self.messages: list[Message] = []
+        self.studio = Studio([subject], lambda x: Store.open(folder / "session" / "session.db", x))
+        self.studio.on_message = self.messages.append
+        self.studio.start()
+        self.wait(lambda m: m.kind == "state" and m.fields["basis"]["is_complete"])
+
+    def wait(self, is_match: Any) -> Message:
+        """Return the first message, from now or from before, that matches."""
+        end = time.monotonic() + 60
+        while time.monotonic() < end:
+            for message in list(self.messages):
+                if is_match(message):
+                    return message
+            time.sleep(0.02)
+        raise AssertionError([m.fields.get("text", m.kind) for m in self.messages])
+
+    def close(self) -> None:
+        self.studio.close()
+        self.studio.wait()
+
+
+@pytest.mark.usefixtures("without_reasons")
+@pytest.mark.filterwarnings("ignore:.*samples.*")
+def test_painted_texels_are_undone_kept_and_exported(tmp_path: Path) -> None:
+    sky = SkyStudio(tmp_path)
+    [image] = sky.studio.state().fields["images"]
+    lights = sky.studio.state().fields["lights"]
+    assert image["name"] == "sky"
+    assert [lights[k]["name"] for k in image["places"][1]] == [f"sky.x{x}.y1" for x in range(4)]
+    assert np.sum(image["shares"]) == pytest.approx(1)
+    assert image["aspect"] == 2
+    k = image["places"][1][2]
+    before = sky.studio.session.weights.copy()
+    locks = {name: {"lock": list(ORANGE)} for name in ("sky.x2.y1", "sky.x3.y1")}
+    sky.studio.handle(protocol.ConstrainLights(locks, label="2 texels of sky, painted"), {})
+    np.testing.assert_allclose(sky.studio.session.weights[k], ORANGE)
+    sky.studio.handle(protocol.Undo(), {})
+    np.testing.assert_allclose(sky.studio.session.weights, before)
+    sky.studio.handle(protocol.Redo(), {})
+    sky.close()
+
+    again = SkyStudio(tmp_path)
+    np.testing.assert_allclose(again.studio.session.weights[k], ORANGE)
+    assert again.studio.state().fields["history"]["undo"] == ["2 texels of sky, painted"]
+    again.studio.handle(protocol.Export(("lighting", "relit")), {})
+    again.wait(lambda m: m.kind == "exported")
+    written = read_emitted_image(tmp_path / "session" / "relit.sky.exr", is_linear=True)
+    np.testing.assert_allclose(written[1, 2:], [ORANGE, ORANGE], rtol=1e-3)  # halves
+    np.testing.assert_allclose(written[1, 0], before[image["places"][1][0]], rtol=1e-3)
+    again.close()
