@@ -115,6 +115,7 @@ export class FakeHost {
         is_scalar: false,
         group: room.n > 12 && k >= 8 ? `Row ${'ABCDEFG'[Math.floor((k - 8) / 8)]}` : null,
       })),
+      images: [],
       objects: room.objects,
       transforms: ['srgb', 'filmic', 'agx', 'linear'],
       transform: { name: 'srgb', stops: 0 },
