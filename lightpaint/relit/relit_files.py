@@ -5,6 +5,8 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from lightpaint.arrays import RGB, Floats
 from lightpaint.errors import OutputError, SceneError
 from lightpaint.relit.emission_xml import Changes, set_emission, set_image
@@ -12,6 +14,7 @@ from lightpaint.relit.xml_edit import XmlFile
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.lights.image_split import texel_image
+from lightpaint.scene.lights.texels.image_domain import GridSize
 from lightpaint.scene.scene import Scene
 
 
@@ -124,11 +127,31 @@ def _edit_images(
     for node in {x.node for x in settings if x.texel is not None}:
         texels = [x for x in scene.emitters if x.node == node]
         image = texel_image({x.texel: settings.get(x, x.emission) for x in texels if x.texel})
+        if scene.map_size is not None:
+            image = _enlarged(image, texels[0], scene.map_size)
         is_sampled = bool(image.any()) or any(x in sampled for x in texels)
         weight = _sampling_weight(texels[0], is_sampled=is_sampled)
         file = scene.files[texels[0].file]
         edits_of_file = edits.setdefault(file.resolve(), _Edits(file))
         edits_of_file.texel_images[texels[0].offset] = texels[0], image, weight
+
+
+def _enlarged(image: Floats, emitter: Emitter, map_size: GridSize) -> Floats:
+    """Return the image of a light at the size in which it is written, as Mitsuba interpolates it.
+
+    emitter: one of its texels. Raises SceneError if that is smaller than the image.
+    """
+    assert emitter.texel is not None
+    texel, size = emitter.texel, map_size
+    if texel.domain.has_proportions:
+        size = texel.domain.picture_size(texel.size, size[0])
+    if size[0] < texel.size[0] or size[1] < texel.size[1]:
+        columns, rows = texel.size
+        raise SceneError(
+            f"the map size is {size[0]}x{size[1]}: expected at least {columns}x{rows}, a pixel for "
+            f"each texel of {texel.image!r}"
+        )
+    return texel.domain.interpolated(image, size).astype(np.float32)
 
 
 def _edit_integrators(scene: Scene, edits: dict[Path, _Edits]) -> None:

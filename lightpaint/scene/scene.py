@@ -76,6 +76,7 @@ class Scene(SceneFiles, Shown):
         parsed: The nodes from Mitsuba's parser; internal to this package.
         chosen: Names of the lights selected by `only`; empty if all are present.
         split: Columns and rows of the images that are split into texels, by name of the light.
+        map_size: Size of their images as written; None for a pixel per texel.
         added: Emitters added by `with_new_emitters`, which are in no file.
         old_sites: Sites in the file of the emitters that `moved` has moved, by name.
 
@@ -106,6 +107,7 @@ class Scene(SceneFiles, Shown):
     parsed: ParsedScene
     chosen: tuple[str, ...] = ()
     split: Mapping[str, GridSize] = field(default_factory=dict)
+    map_size: GridSize | None = None
     added: tuple[NewEmitter, ...] = ()
     old_sites: Mapping[str, Site] = field(default_factory=dict)
 
@@ -120,8 +122,7 @@ class Scene(SceneFiles, Shown):
 
     @property
     def identity(self) -> str:
-        """Identity of the basis of this scene: `content`, and how emitters are grouped."""
-        # If all emitters are adjusted one by one, it is the content alone.
+        """Identity of its basis: `content`, and how emitters are grouped, kept or split, if any."""
         is_single = all(x.member_names == (x.name,) and not x.is_fixed for x in self.lights)
         if is_single and not self.split:
             return self.content
@@ -293,13 +294,12 @@ class Scene(SceneFiles, Shown):
         """Load the `mi.Scene` with lights set to `emission`; other lights stay as they are.
 
         The film is replaced by a box-filtered RGB float32 film of the same size, for basis and
-        verification alike. A light set to black is never sampled. The scene, and everything that
-        refers to it, must be released before another is loaded. Image lights and the fixed light
-        can only be black or as authored here: other multiples need files (see relight). views: this
-        scene through other sensors, whose films are replaced as well. evenly: see `with_texels`.
+        verification alike. A light set to black is never sampled. The scene and what refers to it
+        must be released before another is loaded. Image lights and the rest are black or as
+        authored: other multiples need files. views: other sensors' films. evenly: `with_texels`.
         """
-        named, scene = emission or {}, str(self.path)
-        settings = settings_for(self.lights, self.emitters, named, scene=scene, evenly=evenly)
+        named, path = emission or {}, str(self.path)
+        settings = settings_for(self.lights, self.emitters, named, scene=path, evenly=evenly)
         return self.parsed.instantiate(settings, self.film, *(view.film for view in views))
 
     @MITSUBA.acquired()

@@ -14,7 +14,7 @@ from lightpaint.scene.lights.light import Light
 from lightpaint.scene.lights.light_choice import choose_lights
 from lightpaint.scene.lights.lights_file import LightsFile, lights_file_for
 from lightpaint.scene.lights.texels.image_domain import GridSize
-from lightpaint.scene.lights.texels.texel import parse_size
+from lightpaint.scene.lights.texels.texel import parse_map_size, parse_size
 from lightpaint.scene.properties.film import check_film, sensor_index
 from lightpaint.scene.properties.integrator import IntegratorChoice
 from lightpaint.scene.runtime.mitsuba_errors import mitsuba_errors
@@ -40,6 +40,7 @@ def load_scene(
     group_alike: bool = True,
     integrator: str | None = None,
     split: Mapping[str, object] | None = None,
+    map_size: object = None,
 ) -> Scene:
     """Read a Mitsuba scene XML and find its lights.
 
@@ -62,6 +63,8 @@ def load_scene(
         split: Name → columns and rows, such as `(16, 8)`: a sky, an area light or a projector
             becomes an image of that many texels, each a light `NAME.xCOLUMN.yROW`. By default those
             of the lights file, which this replaces.
+        map_size: Columns and rows, such as `(1024, 512)`, at which `relight` writes the images of
+            split lights; by default one pixel for each texel.
 
     Raises:
         SceneError: If the scene is invalid, with Mitsuba's own message if Mitsuba rejects it.
@@ -104,6 +107,7 @@ def load_scene(
         requests=selection.requests,
         parsed=parsed,
         split=sizes,
+        map_size=None if map_size is None else parse_map_size(map_size),
         **facts,
     )
 

@@ -13,6 +13,7 @@ from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.sources import Painting, SceneFile
 from lightpaint.scene.lights.texels.texel import texel_names
 from lightpaint.scene.properties.emission import read_emitted_image
+from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.scene_render import Stream, render
 
@@ -62,6 +63,29 @@ def test_the_results_are_written_and_verified_again(solved: Path) -> None:
     succeed(solved, "relight", "room.xml", "out/lighting.json", "-o", "again", "--spp", 2)
     again = (solved / "again" / "relit.sky.exr").read_bytes()
     assert again == (solved / "out" / "relit.sky.exr").read_bytes()
+
+
+def test_a_larger_map_is_what_mitsuba_interpolates(solved: Path) -> None:
+    """An odd multiple of the columns, and one of the spaces between rows, is the same function."""
+    arguments = ["relight", "room.xml", "out/lighting.json", "--spp", 2]
+    succeed(solved, *arguments, "--map-size", "12x5", "-o", "large")
+    small, large = (solved / name / "relit.sky.exr" for name in ("out", "large"))
+    assert read_emitted_image(large, is_linear=True).shape == (5, 12, 3)
+    use_variant()
+    import drjit as dr
+    import mitsuba as mi
+
+    directions = np.random.default_rng(0).normal(size=(500, 3)).astype(np.float32)
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    seen = []
+    for path in (small, large):
+        si = dr.zeros(mi.SurfaceInteraction3f, len(directions))
+        si.wi = -mi.Vector3f(directions.T)
+        seen.append(np.array(mi.load_dict({"type": "envmap", "filename": str(path)}).eval(si)))
+    # Differences of float32 in the image's coordinates.
+    np.testing.assert_allclose(seen[1], seen[0], atol=1e-5 * seen[0].max())
+    error = run_refused(solved, *arguments, "--map-size", "2x2", "-o", "small_map")
+    assert "the map size is 2x2: expected at least 4x3, a pixel for each texel of 'sky'" in error
 
 
 def test_the_report_of_a_smaller_basis_reads_the_image_where_it_is(solved: Path) -> None:

@@ -7,7 +7,13 @@ from hypothesis import strategies as st
 
 from lightpaint.errors import SceneError
 from lightpaint.scene.lights.texels.sky import Sky, solid_angles, texel_direction
-from lightpaint.scene.lights.texels.texel import image_of, images_of, parse_size, texel_names
+from lightpaint.scene.lights.texels.texel import (
+    image_of,
+    images_of,
+    parse_map_size,
+    parse_size,
+    texel_names,
+)
 from lightpaint.scene.runtime.variant import use_variant
 
 SIZES = st.tuples(st.integers(2, 24), st.integers(3, 24))
@@ -77,6 +83,20 @@ def test_names_tell_the_image_and_its_size() -> None:
 )
 def test_a_size_is_a_text_or_two_numbers(value: object, size: tuple[int, int]) -> None:
     assert parse_size(value, "split") == size
+
+
+@pytest.mark.parametrize(
+    ("value", "part"),
+    [
+        ("large", "the map size is 'large': expected columns and rows, such as 1024x512"),
+        ("0x512", "the map size is 0x512: expected from 1 to 8192 columns and rows"),
+        ([20000, 10000], "expected from 1 to 8192"),
+    ],
+)
+def test_a_wrong_map_size_is_one_line(value: object, part: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        parse_map_size(value)
+    assert part in str(caught.value)
 
 
 @pytest.mark.parametrize(

@@ -103,6 +103,16 @@ def add_split(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_map_size(parser: argparse.ArgumentParser) -> None:
+    """Add the option for the size of written images of texels."""
+    parser.add_argument(
+        "--map-size",
+        metavar="1024x512",
+        help="size of the images of split lights beside relit.xml, interpolated as Mitsuba does it "
+        "(default: a pixel per texel)",
+    )
+
+
 def add_view_transform(parser: argparse.ArgumentParser, name: str, stops: str) -> None:
     """Add the options for the view transform. name, stops: their defaults in words."""
     parser.add_argument(

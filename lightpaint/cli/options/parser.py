@@ -12,6 +12,7 @@ from lightpaint.cli.options.option_groups import (
     add_cache,
     add_force,
     add_lights,
+    add_map_size,
     add_output,
     add_output_mode,
     add_sampling,
@@ -149,6 +150,7 @@ def _solve(parser: argparse.ArgumentParser) -> None:
     add_unit(parser)
     add_lights(parser)
     add_split(parser)
+    add_map_size(parser)
     add_pattern(parser)
     add_constraints(parser)
     add_rigging(parser)
@@ -237,6 +239,7 @@ def _relight(parser: argparse.ArgumentParser) -> None:
         "lightings", metavar="lighting.json", nargs="+", help="files that solve wrote"
     )
     add_sampling(parser)
+    add_map_size(parser)
     add_output(parser, "DIR", "result folder (default: named after the lighting's target)")
     add_force(parser)
 

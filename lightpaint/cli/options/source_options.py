@@ -16,7 +16,7 @@ from lightpaint.errors import BasisError
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile, check_needed
 
 #: Options for loading a scene, by their Python names.
-LOADING = ("sensor", "parameters", "variant", "lights", "groups", "integrator", "split")
+LOADING = ("sensor", "parameters", "variant", "lights", "groups", "integrator", "split", "map_size")
 
 
 def source_of_template(options: Namespace) -> SceneFile | BasisFile | GroupsFile:
@@ -47,6 +47,7 @@ def scene_of(options: Namespace, *, is_to_solve: bool = True, **fields: Any) -> 
         }
     loading = {"sensor": options.sensor, "variant": options.variant, **fields}
     loading["integrator"] = options.integrator
+    loading["map_size"] = getattr(options, "map_size", None)
     return SceneFile(path, parameters=dict(options.parameters), **loading)
 
 

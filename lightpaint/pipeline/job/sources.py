@@ -63,6 +63,7 @@ class SceneFile(ReadOnce):
         group_alike: False to adjust similar emitters without names one by one.
         integrator: Integrator to use instead of the scene's own.
         split: Columns and rows of lights that are images, `16x8`, by name.
+        map_size: Columns and rows of their images in the relit scene, `1024x512`.
 
     Examples:
         >>> lp.SceneFile("room.xml").content.size
@@ -80,6 +81,7 @@ class SceneFile(ReadOnce):
     group_alike: bool = True
     integrator: str | None = None
     split: Mapping[str, str] | None = None
+    map_size: str | None = None
 
     @cached_property
     def content(self) -> Scene:

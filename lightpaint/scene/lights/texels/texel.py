@@ -13,6 +13,8 @@ from lightpaint.errors import SceneError
 from lightpaint.files import one_line
 from lightpaint.scene.lights.texels.image_domain import GridSize, ImageDomain
 
+#: Longest side of a written image, in pixels: a larger one is a typing error.
+MAX_MAP_SIDE = 8192
 #: Most texels of an image: each is a light with pictures of its own.
 MAX_TEXELS = 4096
 
@@ -73,7 +75,28 @@ def texel_names(image: str, size: GridSize) -> list[str]:
 
 
 def parse_size(value: object, where: str) -> GridSize:
-    """Return columns and rows from `16x8` or [16, 8]. where: their place, for errors."""
+    """Return columns and rows of texels from `16x8` or [16, 8]. where: their place, for errors."""
+    columns, rows = _parsed_size(value, where, "16x8")
+    if columns * rows > MAX_TEXELS:
+        raise SceneError(
+            f"{where} is {columns}x{rows}, {columns * rows:,} texels: expected at most "
+            f"{MAX_TEXELS:,}, each of which is a light with pictures of its own"
+        )
+    return columns, rows
+
+
+def parse_map_size(value: object) -> GridSize:
+    """Return columns and rows of written images from `1024x512` or [1024, 512]."""
+    columns, rows = _parsed_size(value, "the map size", "1024x512")
+    if not 1 <= min(columns, rows) <= max(columns, rows) <= MAX_MAP_SIDE:
+        raise SceneError(
+            f"the map size is {columns}x{rows}: expected from 1 to {MAX_MAP_SIDE} columns and rows"
+        )
+    return columns, rows
+
+
+def _parsed_size(value: object, where: str, example: str) -> GridSize:
+    """Return columns and rows from a text or two numbers."""
     size: GridSize | None = None
     if isinstance(value, str) and (found := _SIZE.fullmatch(value.strip())) is not None:
         size = int(found[1]), int(found[2])
@@ -81,12 +104,6 @@ def parse_size(value: object, where: str) -> GridSize:
         size = value[0], value[1]
     if size is None:
         raise SceneError(
-            f"{where} is {one_line(repr(value))}: expected columns and rows, such as 16x8"
+            f"{where} is {one_line(repr(value))}: expected columns and rows, such as {example}"
         )
-    columns, rows = size
-    if columns * rows > MAX_TEXELS:
-        raise SceneError(
-            f"{where} is {columns}x{rows}, {columns * rows:,} texels: expected at most "
-            f"{MAX_TEXELS:,}, each of which is a light with pictures of its own"
-        )
-    return columns, rows
+    return size
