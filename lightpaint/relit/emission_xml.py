@@ -132,7 +132,7 @@ def set_image(changes: Changes, emitter: Emitter, image: Floats, *, stem: str) -
     sky of one colour becomes an environment map.
     """
     assert emitter.texel is not None
-    domain, name = emitter.texel.domain, f"{stem}.{_safe(emitter.texel.image)}.exr"
+    domain, name = emitter.texel.domain, f"{stem}.{safe_name(emitter.texel.image)}.exr"
     if domain.has_texture:
         changes.replace(domain.parameter, _bitmap(domain.parameter, name))
         if changes.has("scale"):
@@ -159,7 +159,7 @@ def _bitmap(parameter: str, name: str) -> str:
     return f'<texture type="bitmap" name="{parameter}">{"".join(settings)}</texture>'
 
 
-def _safe(name: str) -> str:
+def safe_name(name: str) -> str:
     """Return the name of a light without characters that are unusual in file names."""
     return re.sub(r"[^\w-]+", "_", name)
 
@@ -169,7 +169,7 @@ def _scale_image(
 ) -> dict[str, Floats]:
     """Scale the image of `emitter` by `rgb`, and refer to the scaled copy."""
     # The index distinguishes emitters whose names give the same file name.
-    name = f"{stem}.{scene.emitters.index(emitter)}.{_safe(emitter.name)}.exr"
+    name = f"{stem}.{scene.emitters.index(emitter)}.{safe_name(emitter.name)}.exr"
     holder = changes if emitter.plugin == "envmap" else changes.child(parameter)
     holder.set("string", "filename", name)
     if holder is not changes:

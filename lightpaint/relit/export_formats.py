@@ -1,13 +1,18 @@
 """The formats in which an answer can be exported: their requirements, and their texts."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
-from lightpaint.arrays import RGB
+import numpy as np
+
+from lightpaint.arrays import RGB, Floats
 from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError, OutputError
+from lightpaint.files import write_text
+from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.progress import Listener
 from lightpaint.relit.export.colors import with_own_colors
@@ -15,10 +20,11 @@ from lightpaint.relit.export.exports import blender_script
 from lightpaint.relit.export.fixtures import fixtures_csv, fixtures_json
 from lightpaint.relit.export.nuke import needs_copy, nuke_script, spoken_unreadable
 from lightpaint.relit.export.scene_script import scene_script
+from lightpaint.relit.export.sky_maps import SkyMap
 from lightpaint.relit.export.usd import check_usd, usd_overrides
 from lightpaint.relit.export.usd_groups import usd_multipliers
 from lightpaint.relit.relight import scene_of
-from lightpaint.relit.xml_patch import emitters_of, scene_patch
+from lightpaint.relit.xml_patch import emitters_of, scene_patch, sky_maps_of
 from lightpaint.scene.lights.texels.texel import images_of
 from lightpaint.scene.scene import Scene
 
@@ -31,6 +37,10 @@ FORMS: dict[str, tuple[str | None, str | None]] = {
     "blender": ("set_scene.py", "set_lights.py"),
     "nuke": (None, "relit.nk"),
 }
+
+
+#: Formats that refer to maps of skies.
+WITH_MAPS = ("usd", "blender")
 
 
 @dataclass(frozen=True)
@@ -86,8 +96,8 @@ def names_of_forms(forms: Iterable[str], source: Source) -> dict[str, str]:
 
 def writers_of(
     names: Mapping[str, str], lighting: Lighting, source: Source, folder: Path, listen: Listener
-) -> tuple[dict[str, Callable[[], str]], str]:
-    """Return a function that makes the text of each file, by file name, and a remark or "".
+) -> tuple[dict[str, Callable[[], str | Floats]], str]:
+    """Return a function that makes the text or image of each file, by name, and a remark or "".
 
     names: file names by format, from `names_of_forms`. folder: folder of the files. listen:
     receives remarks on what a format leaves out. Mitsuba gets the lighting itself, other programs
@@ -96,10 +106,40 @@ def writers_of(
     elsewhere, remark = lighting, ""
     if set(names) != {"mitsuba"}:
         elsewhere, remark = _exported(lighting, source)
-    return {
-        name: _writer_of(form, lighting if form == "mitsuba" else elsewhere, source, folder, listen)
+    maps = _maps(names, elsewhere, source)
+    writers: dict[str, Callable[[], str | Floats]] = {
+        name: _writer_of(
+            form, lighting if form == "mitsuba" else elsewhere, source, folder, listen, maps
+        )
         for form, name in names.items()
-    }, remark
+    }
+    return writers | {one.file: partial(np.asarray, one.image) for one in maps}, remark
+
+
+def write_content(path: Path, content: str | Floats) -> None:
+    """Write what a writer has made."""
+    if isinstance(content, str):
+        write_text(path, content)
+    else:
+        write_rgb(path, content)
+
+
+def _maps(names: Collection[str], lighting: Lighting, source: Source) -> list[SkyMap]:
+    """Return the maps of skies that some of the formats refer to.
+
+    Raises LightpaintError for other images, which these formats do not have.
+    """
+    forms = [form for form in names if form in WITH_MAPS]
+    if not forms or source.scene is None:
+        return []
+    maps = sky_maps_of(source.scene, lighting)
+    members = [name for names in lighting.members.values() for name in names]
+    if others := sorted({*images_of(members)} - {x.name for x in maps}):
+        raise LightpaintError(
+            f"{forms[0]} cannot set the texels of {some_names(others)}: load the image that "
+            "relight writes beside its relit.xml, an EXR in linear light"
+        )
+    return maps
 
 
 def _exported(lighting: Lighting, source: Source) -> tuple[Lighting, str]:
@@ -124,7 +164,12 @@ def _exported(lighting: Lighting, source: Source) -> tuple[Lighting, str]:
 
 
 def _writer_of(
-    form: str, lighting: Lighting, source: Source, folder: Path, listen: Listener
+    form: str,
+    lighting: Lighting,
+    source: Source,
+    folder: Path,
+    listen: Listener,
+    maps: Sequence[SkyMap],
 ) -> Callable[[], str]:
     """Return a function that makes the text of one format. See `writers_of` for the arguments."""
     if form in ("csv", "json"):
@@ -135,23 +180,13 @@ def _writer_of(
     assert scene is not None
     if form == "mitsuba":
         return lambda: scene_patch(scene, lighting)
-    _check_no_images(form, lighting)
     emitters, name = emitters_of(scene, lighting), scene.files[0].name
+    skies = {one.name: one.file for one in maps}
     if form == "blender":
         return lambda: scene_script(
-            lighting.target, name, emitters, places=lighting.places, up=lighting.up
+            lighting.target, name, emitters, places=lighting.places, up=lighting.up, skies=skies
         )
-    return lambda: _usd_layer(lighting, source, emitters, folder, listen)
-
-
-def _check_no_images(form: str, lighting: Lighting) -> None:
-    """Raise LightpaintError for a lighting with texels in a format that has no images."""
-    members = [name for names in lighting.members.values() for name in names]
-    if images := images_of(members):
-        raise LightpaintError(
-            f"{form} cannot set the texels of {some_names(images)}: load the image that relight "
-            "writes beside its relit.xml, an EXR in linear light that any program takes as an HDRI"
-        )
+    return lambda: _usd_layer(lighting, source, emitters, folder, listen, skies)
 
 
 def _usd_layer(
@@ -160,6 +195,7 @@ def _usd_layer(
     emitters: Sequence[tuple[str, str, RGB]],
     folder: Path,
     listen: Listener,
+    skies: Mapping[str, str],
 ) -> str:
     """Return a layer of USD with these emitters, and say which of them its stage lacks."""
     assert source.scene is not None
@@ -170,6 +206,7 @@ def _usd_layer(
         folder,
         places=lighting.places,
         up=lighting.up,
+        skies=skies,
         about=f"lightpaint: the lights of {name} as solved for {lighting.target}",
     )
     stage_name = source.stage or "USD"

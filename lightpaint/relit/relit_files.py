@@ -123,10 +123,8 @@ def _edit_images(
     settings: Mapping[Emitter, RGB],
     sampled: Collection[Emitter],
 ) -> None:
-    """Add edits of the lights whose texels are among `settings`; other texels stay as they are."""
-    for node in {x.node for x in settings if x.texel is not None}:
-        texels = [x for x in scene.emitters if x.node == node]
-        image = texel_image({x.texel: settings.get(x, x.emission) for x in texels if x.texel})
+    """Add edits of the lights whose texels are among `settings`."""
+    for texels, image in images_of_texels(scene, settings):
         if scene.map_size is not None:
             image = _enlarged(image, texels[0], scene.map_size)
         is_sampled = bool(image.any()) or any(x in sampled for x in texels)
@@ -134,6 +132,21 @@ def _edit_images(
         file = scene.files[texels[0].file]
         edits_of_file = edits.setdefault(file.resolve(), _Edits(file))
         edits_of_file.texel_images[texels[0].offset] = texels[0], image, weight
+
+
+def images_of_texels(
+    scene: Scene, settings: Mapping[Emitter, RGB]
+) -> Iterator[tuple[list[Emitter], Floats]]:
+    """Yield the texels of each light that has some among `settings`, and its image.
+
+    Its other texels stay as they are.
+    """
+    for node in dict.fromkeys(x.node for x in settings if x.texel is not None):
+        texels = [x for x in scene.emitters if x.node == node]
+        yield (
+            texels,
+            texel_image({x.texel: settings.get(x, x.emission) for x in texels if x.texel}),
+        )
 
 
 def _enlarged(image: Floats, emitter: Emitter, map_size: GridSize) -> Floats:

@@ -96,10 +96,13 @@ def test_the_report_of_a_smaller_basis_reads_the_image_where_it_is(solved: Path)
     assert (solved / "small" / "relit.sky.exr").exists()
 
 
-def test_programs_without_images_are_told_to_load_it(solved: Path) -> None:
+def test_other_programs_get_a_map_of_the_sky(solved: Path) -> None:
     arguments = ["export", "out/lighting.json", "--scene", "room.xml", "--to"]
-    error = run_refused(solved, *arguments, "blender", "-o", "exported")
-    assert "blender cannot set the texels of sky: load the image" in error
+    output = succeed(solved, *arguments, "blender", "-o", "exported", "--map-size", "64x32")
+    assert "sky.latlong.exr" in output
+    written = read_emitted_image(solved / "exported" / "sky.latlong.exr", is_linear=True)
+    assert written.shape == (32, 64, 3)
+    assert "'sky': 'sky.latlong.exr'" in (solved / "exported" / "set_scene.py").read_text()
     assert (
         "sky.x0.y0"
         in succeed(solved, *arguments, "csv", "-o", "exported")

@@ -27,7 +27,7 @@ from lightpaint.batch.work.work_items import (
 )
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import LightpaintError
-from lightpaint.files import first_line, one_line, write_text
+from lightpaint.files import first_line, one_line
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import read_lighting
@@ -40,7 +40,7 @@ from lightpaint.pipeline.relit_renders import relight_look, relit_folder
 from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.pipeline.results.results import view_names
 from lightpaint.progress import Listener
-from lightpaint.relit.export_formats import Source, names_of_forms, writers_of
+from lightpaint.relit.export_formats import Source, names_of_forms, write_content, writers_of
 from lightpaint.scene.scene import Scene
 
 #: Error numbers of a full disk.
@@ -207,14 +207,14 @@ def _export(task: Task, cache: WorkerCache, listen: Listener) -> None:
         Path(task.handover.stage) if task.handover.stage else None,
     )
     names = names_of_forms(task.handover.to, source)
-    files, input_files = tuple(folder / name for name in names.values()), (lighting, *source.files)
+    answer = read_lighting(lighting)
+    writers, remark = writers_of(names, answer, source, folder, listen)
+    files, input_files = tuple(folder / name for name in writers), (lighting, *source.files)
     force = fields["settings"].force
     results = ResultFolder(folder, files, input_files, (lighting,), force=force)
     results.check()
-    answer = read_lighting(lighting)
-    writers, remark = writers_of(names, answer, source, folder, listen)
     if remark:
         listen.say(remark)
     with results.filled() as stage:
         for name, make in writers.items():
-            write_text(stage / name, make())
+            write_content(stage / name, make())

@@ -8,10 +8,10 @@ from lightpaint.basis.lightgroups.frame_sequence import find_frames, is_pattern
 from lightpaint.cli.output import documents, terminal
 from lightpaint.cli.output.output_mode import CommandOutcome
 from lightpaint.errors import OutputError
-from lightpaint.files import check_files, check_writable, write_text
+from lightpaint.files import check_files, check_writable
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.pipeline.job.sources import GroupsFile, SceneFile, content
-from lightpaint.relit.export_formats import Source, names_of_forms, writers_of
+from lightpaint.relit.export_formats import Source, names_of_forms, write_content, writers_of
 from lightpaint.storage.staging import finish
 
 
@@ -43,9 +43,9 @@ def export(
         raise OutputError(
             f"{existing_files[0]} exists: name another folder (folder=...), or pass force=True"
         )
-    texts = {file: make() for file, make in file_writers.items()}
-    for file, text in texts.items():
-        write_text(file, text)
+    contents = {file: make() for file, make in file_writers.items()}
+    for file, content_made in contents.items():
+        write_content(file, content_made)
         terminal.write(str(file))
     if remark:
         listen.say(remark)

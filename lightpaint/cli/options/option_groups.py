@@ -108,8 +108,8 @@ def add_map_size(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--map-size",
         metavar="1024x512",
-        help="size of the images of split lights beside relit.xml, interpolated as Mitsuba does it "
-        "(default: a pixel per texel)",
+        help="size of written images of split lights, interpolated as Mitsuba does it (default: a "
+        "pixel per texel; for other programs more)",
     )
 
 

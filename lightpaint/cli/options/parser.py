@@ -219,6 +219,7 @@ def _export(parser: argparse.ArgumentParser) -> None:
         help="for usd: stage whose lights the layer overrides, found by their names in the scene "
         "(default: new prims below /lights)",
     )
+    add_map_size(parser)
     add_view(parser)
     add_output(parser, "DIR", "folder for the files (default: that of lighting.json)")
     add_force(parser)

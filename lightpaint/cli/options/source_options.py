@@ -64,6 +64,7 @@ def scene_to_export(options: Namespace) -> SceneFile | None:
         return None
     parameters = dict(options.parameters)
     fields: dict[str, Any] = {"sensor": options.sensor, "variant": options.variant}
+    fields["map_size"] = options.map_size
     return SceneFile(options.scene, parameters=parameters, use_lights_file=False, **fields)
 
 

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources
 from string import Template
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from lightpaint.relit.export.export_places import (
     is_changed,
     old_position,
 )
+from lightpaint.relit.export.sky_maps import blender_axes
 from lightpaint.scene.properties.site import EmitterPlace
 
 #: Blender's quantity for each parameter of Mitsuba's emitters.
@@ -40,11 +42,12 @@ def scene_script(
     *,
     places: Sequence[EmitterPlace] = (),
     up: Position = (0.0, 1.0, 0.0),
+    skies: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
     """Return the script, which leaves emitters without a plain colour, such as a sky, to the user.
 
     emitters: name, Mitsuba's parameter and emission of each adjusted emitter. places: places of all
-    emitters in the answer. up: the scene's up axis.
+    emitters in the answer. up: the scene's up axis. skies: file of each sky's map, by its name.
     """
     rows, unset_names = [], []
     for name, parameter, emission in emitters:
@@ -59,6 +62,8 @@ def scene_script(
         source=_in_docstring(source),
         lights="{\n" + "".join(rows) + "}",
         left=repr(tuple(unset_names)),
+        skies=_table(skies),
+        sky_axes=repr(np.round(blender_axes(up), 12).tolist()),
         **_placed(places, up),
     )
 

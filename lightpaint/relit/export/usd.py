@@ -10,11 +10,13 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from lightpaint.arrays import RGB, Position
 from lightpaint.errors import OutputError
 from lightpaint.files import one_line
+from lightpaint.relit.export.sky_maps import map_axes
 from lightpaint.relit.export.usd_places import UsdPlaces
 from lightpaint.scene.properties.site import EmitterPlace
 
@@ -58,6 +60,7 @@ def usd_overrides(
     *,
     places: Sequence[EmitterPlace] = (),
     up: Position = (0.0, 1.0, 0.0),
+    skies: Mapping[str, str] = MappingProxyType({}),
     about: str = "",
 ) -> Overrides:
     """Return the layer.
@@ -71,6 +74,7 @@ def usd_overrides(
         places: Places of all emitters in the answer. Those that moved or are new are written to the
             layer, in the stage's axes and the scene's units.
         up: The scene's up axis.
+        skies: File of each sky's map beside the layer, by its name.
         about: Text for the layer's comment.
 
     Raises OutputError if the library is not installed, or cannot read the stage.
@@ -83,7 +87,7 @@ def usd_overrides(
     layer.comment = about
     # The layer's own stage is closed when this call returns: while open, it would look for
     # sublayers as soon as there are any, starting from a layer without a path.
-    unset_names, unplaced = _write_lights(layer, opened_stage, list(emitters), places, up)
+    unset_names, unplaced = _write_lights(layer, opened_stage, list(emitters), places, up, skies)
     if stage is not None:
         layer.subLayerPaths.append(Path(os.path.relpath(stage, folder)).as_posix())
         like_stage(layer, stage)
@@ -96,12 +100,13 @@ def _write_lights(
     emitters: Sequence[tuple[str, str, RGB]],
     places: Sequence[EmitterPlace],
     up: Position,
+    skies: Mapping[str, str],
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Write all lights into the layer; return `left` and `unplaced`, as in `Overrides`."""
     from pxr import Usd
 
     layer_stage = Usd.Stage.Open(layer)
-    names = dict.fromkeys([*(name for name, _, _ in emitters), *(x.name for x in places)])
+    names = dict.fromkeys([*(name for name, _, _ in emitters), *(x.name for x in places), *skies])
     if opened_stage is None:
         new = {place.name for place in places if place.new}
         prims = _assumed_prims(name for name in names if name not in new)
@@ -109,14 +114,22 @@ def _write_lights(
         prims = _prims_of(opened_stage, names)
     writer = UsdPlaces(layer_stage, opened_stage, prims, places, up)
     light_prims = {**prims, **writer.add_new(_scope(opened_stage))}
-    unset_names = []
+    unset_names, unturned = [], []
+    for name, file in skies.items():
+        path, kind = light_prims.get(name, ("", ""))
+        if opened_stage is not None and not kind.startswith("DomeLight"):
+            unset_names.append(name)
+            continue
+        _override(layer_stage.OverridePrim(path), kind, "radiance", (1.0, 1.0, 1.0))
+        if not writer.place_sky(path, map_axes(up), file):
+            unturned.append(name)
     for name, parameter, emission in emitters:
         if parameter not in NORMALIZED or name not in light_prims:
             unset_names.append(name)
             continue
         path, kind = light_prims[name]
         _override(layer_stage.OverridePrim(path), kind, parameter, emission)
-    return tuple(unset_names), writer.move()
+    return tuple(unset_names), (*unturned, *writer.move())
 
 
 def _assumed_prims(names: Iterable[str]) -> dict[str, tuple[str, str]]:

@@ -60,7 +60,7 @@ class UsdPlaces:
             name: self._world(path)[3, :3] for name, (path, _) in prims.items() if stage is not None
         }
         rotations = axis_conversions(up, UP_AXES[token])
-        self._conversion = conversion_of(places, rotations, positions)
+        self._conversion, self._up = conversion_of(places, rotations, positions), token
         if stage is None and self._changed:
             UsdGeom.SetStageUpAxis(layer_stage, token)
 
@@ -111,6 +111,33 @@ class UsdPlaces:
             else:
                 unmoved.append(place.name)
         return tuple(unmoved)
+
+    def place_sky(self, path: str, axes: Doubles, file: str) -> bool:
+        """Give a dome its map, and turn it; return whether the stage's axes are known.
+
+        axes: (3, 3), rotation from the scene's axes to the map's. file: beside the layer. Without a
+        stage the dome is a new prim.
+        """
+        from pxr import Sdf, UsdGeom
+
+        prim = self._layer_stage.OverridePrim(path)
+        if self._stage is None:
+            prim = self._defined(str(Sdf.Path(path).GetParentPath()), path, "DomeLight")
+            UsdGeom.SetStageUpAxis(self._layer_stage, self._up)
+        elif self._stage.GetPrimAtPath(path).GetTypeName() == "DomeLight_1":
+            prim.CreateAttribute("poleAxis", Sdf.ValueTypeNames.Token, custom=False).Set("Y")
+        for name, kind, value in (
+            ("file", Sdf.ValueTypeNames.Asset, f"./{file}"),
+            ("format", Sdf.ValueTypeNames.Token, "latlong"),
+        ):
+            prim.CreateAttribute(f"inputs:texture:{name}", kind, custom=False).Set(value)
+        if not self._conversion.is_known:
+            return False
+        world = np.eye(4)
+        # The rows of a transform are the axes, here those of the map.
+        world[:3, :3] = axes @ self._conversion.rotation.T
+        _write_transform(prim, *self._local(path, world))
+        return True
 
     def _defined(self, scope: str, path: str, schema: str) -> Any:
         """Return a new prim below `scope`, defining the scope too if the stage has none."""

@@ -76,6 +76,22 @@ class Sky(ImageDomain):
         lower_row = image[lower][:, left] * (1 - beside) + image[lower][:, right] * beside
         return np.asarray(upper_row * (1 - below) + lower_row * below, np.float64)
 
+    def seen(self, image: Floats, directions: Doubles) -> Doubles:
+        """Return the radiance from directions in the light's own space, as Mitsuba interpolates it.
+
+        image: (rows, columns, 3). directions: unit vectors (..., 3). Returns (..., 3).
+        """
+        rows, columns = image.shape[:2]
+        azimuth = np.arctan2(directions[..., 0], -directions[..., 2]) / (2 * np.pi)
+        polar = np.arccos(np.clip(directions[..., 1], -1, 1)) / np.pi
+        x, y = azimuth * columns - 0.5, polar * (rows - 1)
+        left, top = np.floor(x).astype(int), np.minimum(np.floor(y).astype(int), rows - 2)
+        beside, below = (x - left)[..., None], (y - top)[..., None]
+        first, second = left % columns, (left + 1) % columns
+        upper = image[top, first] * (1 - beside) + image[top, second] * beside
+        lower = image[top + 1, first] * (1 - beside) + image[top + 1, second] * beside
+        return np.asarray(upper * (1 - below) + lower * below, np.float64)
+
     def picture_size(self, size: GridSize, width: int) -> GridSize:
         """See ImageDomain: twice as wide as high, whatever the texels."""
         return width, width // 2
