@@ -1,7 +1,6 @@
 """The sums behind answers under a brush: of light by tiles, and of a display over a small film."""
 
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import nullcontext
 from functools import cached_property
 from math import ceil
 
@@ -16,7 +15,7 @@ from lightpaint.lighting.loss.channel_loss import PaintedPixels, join_pixels
 from lightpaint.lighting.loss.loss import STRIP_PIXELS
 from lightpaint.lighting.loss.reweighting import interpolate
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.threads import one_thread
+from lightpaint.threads import one_thread, parallel_map
 
 #: Maximum number of pixels of an averaged picture in display space: those of one strip.
 MAX_FILM_PIXELS = STRIP_PIXELS
@@ -242,10 +241,17 @@ class Films:
         start, picture, value = starts[k], mixed[k], values[k]
         squares = pixels.squares(picture, from_clipping=False)
         image, weight = (x.astype(np.float32) for x in squares)
-        # With few lights, threads of BLAS would mostly wait for each other.
-        with one_thread() if len(start) <= MAX_CHEAP_LIGHTS else nullcontext():
-            M = np.stack([(r * w) @ r.T for r, w in zip(self._rows, weight, strict=True)])
-        b = np.stack([r @ x for r, x in zip(self._rows, weight * image, strict=True)])
+
+        def gram(channel: int) -> Floats:
+            rows = self._rows[channel]
+            return np.asarray((rows * weight[channel]) @ rows.T)
+
+        # Threads of BLAS wait for each other, the longer the busier the machine: many lights take
+        # a thread for each channel instead.
+        with one_thread():
+            is_cheap = len(start) <= MAX_CHEAP_LIGHTS
+            M = np.stack(list(map(gram, range(3))) if is_cheap else parallel_map(gram, range(3)))
+            b = np.stack([r @ x for r, x in zip(self._rows, weight * image, strict=True)])
         norm2 = np.square(image) * weight
         equations = NormalEquations(
             M.astype(np.float64), b.astype(np.float64), norm2.sum(axis=1, dtype=np.float64)
@@ -263,7 +269,8 @@ class Films:
     def _mixed(self, weights: Doubles) -> Doubles:
         """Return the picture of these weights, (3, p)."""
         w = weights.astype(np.float32)
-        mixed = np.stack([w[:, c] @ rows for c, rows in enumerate(self._rows)])
+        with one_thread():
+            mixed = np.stack([w[:, c] @ rows for c, rows in enumerate(self._rows)])
         return mixed.astype(np.float64)
 
 
