@@ -6,8 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.analysis.appearance.appearance import compare_appearance
+from lightpaint.lighting.analysis.appearance.constraint_kinds import ConstraintsByLight
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
@@ -76,3 +78,27 @@ def test_the_first_reason_removes_the_share_that_is_said(studio: Any, kind: str)
     )
     assert gained > 0.1
     assert reason.share == pytest.approx(gained, abs=1e-9)
+
+
+def test_texels_of_an_image_are_released_together():
+    names = [f"sky.x{x}.y{y}" for y in range(3) for x in range(2)]
+    texels = [BasisLight(x, "envmap", "radiance", "W/(m² sr)", (1.0, 1.0, 1.0)) for x in names]
+    bulbs = [BasisLight(x, "point", "intensity", "W/sr", (1.0, 1.0, 1.0)) for x in ("a", "b")]
+    lights = [bulbs[0], *texels, bulbs[1]]
+    by_light = ConstraintsByLight.of(Constraints(), lights)
+    assert by_light.units([0, 1, 2, 5, 7]) == [[0], [1, 2, 5], [7]]
+
+
+def test_with_many_lights_the_cost_of_a_lock_is_gained_by_the_weights_of_the_sample(
+    studio: Any, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(
+        "lightpaint.lighting.analysis.appearance.limiting_reasons.MAX_SOLVED_LIGHTS", 2
+    )
+    basis, target = studio
+    locked = solve(basis, target, constraints=Constraints.of({"left": {"lock": True}}), hold=0.0)
+    reason = next(x for x in compare_appearance(locked).reasons if x.kind == "lock")
+    free = solve(basis, target, hold=0.0)
+    gained = 1 - _error(free, target) / _error(locked, target)
+    # The sample's weights gain a little less than the best ones.
+    assert 0.9 * gained < reason.share < 1.001 * gained

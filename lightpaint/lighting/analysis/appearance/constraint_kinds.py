@@ -4,6 +4,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
+from lightpaint.basis.light_images import light_images
 from lightpaint.basis.lights import BasisLight
 from lightpaint.lighting.constraints.constraints import COLOR_KEYS, Constraints
 from lightpaint.lighting.constraints.light_patterns import tables_by_light, tied_lights
@@ -57,6 +58,14 @@ class ConstraintsByLight:
         by_kind["sparse"] = all_lights if self.constraints.sparse is not None else ()
         by_kind["prefer_current"] = all_lights if self.constraints.prefer_current else ()
         return {kind: table for kind, table in by_kind.items() if table}
+
+    def units(self, lights: Sequence[int]) -> list[list[int]]:
+        """Return lights that are released together: all texels of an image, or a single light."""
+        images = {k: i for i, image in enumerate(light_images(self.lights)) for k in image.lights}
+        units: dict[tuple[int, int], list[int]] = {}
+        for k in lights:
+            units.setdefault((images.get(k, -1), -1 if k in images else k), []).append(k)
+        return list(units.values())
 
     def without(self, kind: ConstraintKind, lights: Collection[int]) -> Constraints:
         """Return the constraints without one kind, for lights at these places."""

@@ -13,9 +13,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.images.bands import is_large
-from lightpaint.lighting.analysis.appearance.constraint_kinds import (
-    ConstraintKind,
-)
+from lightpaint.lighting.analysis.appearance.constraint_kinds import ConstraintKind
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.analysis.appearance.pixel_sample import LimitGroup, PixelSample
 from lightpaint.lighting.analysis.appearance.unpainted_change import (
@@ -45,6 +43,10 @@ FEW_LIGHTS_SHARE, MAX_FEW_LIGHTS = 0.75, 3
 #: Share of the gain without hold that a weaker one must have. Measured (docs/benchmarks.md): in the
 #: mean of two scenes a half leads closer to the intended picture than any other share tried.
 LOOSENED_SHARE = 0.5
+
+#: Most lights whose release is solved with all pixels. The texels of an image are more, and take
+#: the weights of the sample: those are allowed, too, and all pixels measure what they gain.
+MAX_SOLVED_LIGHTS = 64
 
 #: Steps in the search of the hold, between itself and the share of it that has no effect.
 HOLD_STEPS, NO_HOLD = 6, 1e-3
@@ -141,14 +143,27 @@ def _measure(solution: Solution, sample: PixelSample, reason: Reason) -> Reason 
         loosening = _find_loosening(solution, sample, reason.share)
         return None if loosening.share < MIN_SHARE else replace(reason, loosening=loosening)
     if reason.kind == "colors":
-        weights = released_weights(solution, fit=replace(problem.fit, colors="free"))
+        weights = (
+            sample.solve(["colors"], sample.other_views)
+            if _is_for_sample(problem)
+            else released_weights(solution, fit=replace(problem.fit, colors="free"))
+        )
     else:
         names = [light.name for light in sample.by_light.lights]
         places = [names.index(name) for name in reason.names]
         released = sample.by_light.without(reason.kind, places)
-        weights = released_weights(solution, constraints=released)
+        weights = (
+            sample.solve((), sample.other_views, constraints=released)
+            if _is_for_sample(problem)
+            else released_weights(solution, constraints=released)
+        )
     share = _share_removed(solution, weights)
     return None if share < MIN_SHARE else replace(reason, share=share)
+
+
+def _is_for_sample(problem: Problem) -> bool:
+    """Return True for more lights than are solved with all pixels again."""
+    return len(problem.basis.lights) > MAX_SOLVED_LIGHTS
 
 
 def _share_removed(solution: Solution, weights: Doubles) -> float:
@@ -181,12 +196,13 @@ def _constraint_reasons(sample: PixelSample) -> list[Reason]:
             reasons.append(Reason(kind, (), whole))
             continue
         chosen, gained = lights, whole
-        likely = sorted(lights, key=lambda k: -sample.pull[k])
+        units = by_light.units(lights)
+        likely = sorted(units, key=lambda unit: -float(sample.pull[unit].max()))
         # One by one, beginning with those of the largest effect.
-        alone = [(sample.share_without(kind, [k]), k) for k in likely[: 2 * MAX_FEW_LIGHTS]]
-        best = [k for _, k in sorted(alone, key=lambda gain: -gain[0])]
-        for count in range(1, min(MAX_FEW_LIGHTS, len(lights) - 1) + 1):
-            few = sorted(best[:count])
+        alone = [(sample.share_without(kind, unit), unit) for unit in likely[: 2 * MAX_FEW_LIGHTS]]
+        best = [unit for _, unit in sorted(alone, key=lambda gain: -gain[0])]
+        for count in range(1, min(MAX_FEW_LIGHTS, len(units) - 1) + 1):
+            few = sorted(k for unit in best[:count] for k in unit)
             part = max(alone)[0] if count == 1 else sample.share_without(kind, few)
             if part >= FEW_LIGHTS_SHARE * whole:
                 chosen, gained = tuple(few), part
@@ -218,7 +234,11 @@ def _joint_reasons(sample: PixelSample, everything: float) -> tuple[Reason, ...]
 def _find_loosening(solution: Solution, sample: PixelSample, full_gain: float) -> Loosening:
     """Find and measure the strongest hold with `LOOSENED_SHARE` of `full_gain`, that of none."""
     hold = _weaker_hold(sample, LOOSENED_SHARE * full_gain)
-    weights = released_weights(solution, fit=replace(sample.problem.fit, hold=hold))
+    weights = (
+        sample.solve((), sample.other_views, hold=hold)
+        if _is_for_sample(sample.problem)
+        else released_weights(solution, fit=replace(sample.problem.fit, hold=hold))
+    )
     [target] = solution.problem.views.targets
     basis = solution.basis
     image, loosened_image = basis.mix(solution.weights), basis.mix(weights)

@@ -4,6 +4,7 @@ import { html, useEffect, useRef } from '../vendor/preact.js';
 import { Button, Dialog } from './controls.js';
 import { numberText, shortenName } from './format.js';
 import { Icon } from './icons.js';
+import { texelsText } from './lamps/light_selection.js';
 import { drawPicture } from './thumbnail.js';
 import { fill, words } from '../language/language.js';
 
@@ -40,14 +41,15 @@ const ALL_LIGHTS_WORDS = {
 /** Characters of a light's name on a button, which shares its line with a sentence. */
 const BUTTON_NAME_MAX_LENGTH = 14;
 
-/** Return the button text with the names of its lights. @param {Cause} cause
+/** Return the button text with the names of its lights. @param {Cause} cause @param {Ui} ui
  * @param {number} [maxLength] characters of a light's name */
-function nameOf({ kind, names }, maxLength = Infinity) {
+function nameOf({ kind, names }, ui, maxLength = Infinity) {
   if (kind in ALL_LIGHTS_WORDS) return ALL_LIGHTS_WORDS[kind];
+  const indices = names.map((name) => ui.lights.findIndex((light) => light.name === name));
   const lights =
     names.length === 1
       ? shortenName(names[0], maxLength)
-      : fill(words.advice.lights, { count: names.length });
+      : (texelsText(ui, indices) ?? fill(words.advice.lights, { count: names.length }));
   return `${BUTTON_WORDS[kind][names.length === 1 ? 0 : 1]} ${lights}`;
 }
 
@@ -100,10 +102,10 @@ export function AdviceButton({ ui, app }) {
   if (advice?.kind === 'reach') return html`<${MoveButton} ui=${ui} app=${app} />`;
   const change = advice && changeOf(advice, ui, app.session);
   if (!advice || !change) return null;
-  const name = nameOf(advice);
+  const name = nameOf(advice, ui);
   const gain =
     advice.gain === null ? '' : fill(words.advice.closer, { value: Math.round(100 * advice.gain) });
-  return html`<${Button} label=${`${nameOf(advice, BUTTON_NAME_MAX_LENGTH)}${gain}`} class="help"
+  return html`<${Button} label=${`${nameOf(advice, ui, BUTTON_NAME_MAX_LENGTH)}${gain}`} class="help"
     tip=${fill(words.advice.showsAPreviewFirst, { name, gain })}
     act=${() => app.session.preview(titleOf(advice, name), change)} />`;
 }

@@ -46,12 +46,18 @@ export function toggleLights(store, lights) {
 /** Return lights in words: two by name, more by their number, an image by its name.
  * @param {Ui} ui @param {number[]} lights */
 export function lightsText(ui, lights) {
-  const image = imageOf(ui.images, lights[0]);
-  if (image && lights.length > 1 && lights.every((k) => imageOf(ui.images, k) === image)) {
-    if (lights.length === image.lights.length) return shortenName(image.name, 24);
-    const name = shortenName(image.name, 24);
-    return fill(words.lightSelection.texels, { count: lights.length, name });
-  }
+  const texels = texelsText(ui, lights);
+  if (texels !== null) return texels;
   if (lights.length > 2) return fill(words.lightSelection.lights, { count: lights.length });
   return lights.map((k) => shortenName(ui.lights[k].label, 24)).join(words.lightSelection.and);
+}
+
+/** Return several texels of one image in words: all by its name. @param {Ui} ui
+ * @param {number[]} lights @returns {string | null} null for other lights */
+export function texelsText({ images }, lights) {
+  const image = imageOf(images, lights[0]);
+  if (!image || lights.length < 2 || lights.some((k) => imageOf(images, k) !== image)) return null;
+  const name = shortenName(image.name, 24);
+  if (lights.length === image.lights.length) return name;
+  return fill(words.lightSelection.texels, { count: lights.length, name });
 }
