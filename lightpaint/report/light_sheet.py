@@ -1,4 +1,7 @@
-"""The contact sheet of a scene's lights: each light alone, with its name and share."""
+"""The contact sheet of a scene's lights: each light alone, with its name and share.
+
+A light that is an image has its map instead, all texels together.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,6 +12,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from lightpaint.arrays import Doubles, Floats, Position
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_images import LightImage, light_images
 from lightpaint.colour.srgb import encode_display, to_8_bit
 from lightpaint.display_text import visible
 from lightpaint.images.denoiser import denoised
@@ -17,6 +21,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.report.comparison import shorten_to_width
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.figures import exposure_of
+from lightpaint.report.page.image_rows import map_picture, map_stops
 from lightpaint.report.phrases import spoken_percent
 from lightpaint.report.rig.hung_lights import HungLight
 from lightpaint.report.rig.rig_drawing import rig_drawing
@@ -95,15 +100,27 @@ def light_sheet(
     """Draw each light alone, (H, W, 3) uint8 sRGB, denoised, with its name and share.
 
     Each is at its current emission, or at a white one if it is off, with an exposure of its own:
-    brightness does not compare between pictures. Lights stand in their order; of more than MOST,
-    those with the largest shares, and a line tells the share of the others. Below them is a plan of
-    the room, and an elevation, with `lights`; up: the axis of the scene that is up.
+    brightness does not compare between pictures. Lights stand in their order; of more than
+    MAX_LIGHTS, those with the largest shares, and a line tells the share of the others. Below them
+    is a plan of the room, and an elevation, with `lights`; up: the axis of the scene that is up.
     """
-    shares = energy_shares(basis, Lighting.current(basis))
+    shown = _lights_and_images(basis)
+    light_shares = energy_shares(basis, Lighting.current(basis))
+    shares = np.array(
+        [
+            light_shares[one.lights].sum() if isinstance(one, LightImage) else light_shares[one]
+            for one in shown
+        ]
+    )
     shown_indices = sorted(np.argsort(-shares, kind="stable")[:MAX_LIGHTS].tolist())
     grid = _grid(len(shown_indices), basis.size)
     factor = max(1, min(basis.size[1] // grid.width, min(basis.size)))
-    cells = [_cell(basis, k, float(shares[k]), factor) for k in shown_indices]
+    cells = [
+        _image_cell(basis, one, share, grid)
+        if isinstance(one, LightImage)
+        else _cell(basis, one, share, factor)
+        for one, share in ((shown[i], float(shares[i])) for i in shown_indices)
+    ]
     foot = _rest_sentence(shares, shown_indices)
     sheet = Image.new("RGB", grid.size(has_foot=bool(foot)), GROUND)
     draw, large = ImageDraw.Draw(sheet), ImageFont.load_default(round(1.1 * grid.text))
@@ -128,6 +145,22 @@ def light_sheet(
 def _with_plan(sheet: npt.NDArray[np.uint8], plan: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
     """Return the sheet with the plan below it."""
     return np.concatenate([sheet, plan])
+
+
+def _lights_and_images(basis: Basis) -> list[int | LightImage]:
+    """Return lights by their index, and each image at the place of its first texel."""
+    images = {int(k): image for image in light_images(basis.lights) for k in image.lights}
+    firsts = {int(image.lights[0]): image for image in images.values()}
+    return [firsts.get(k, k) for k in range(len(basis.lights)) if k in firsts or k not in images]
+
+
+def _image_cell(basis: Basis, image: LightImage, share: float, grid: _Grid) -> _Cell:
+    """Draw the cell of an image: its map as it is, black where a texel is not adjusted alone."""
+    radiances = np.where((image.places >= 0)[..., None], basis.current_weights[image.places], 0)
+    columns, rows = image.size
+    picture = map_picture(image, radiances, map_stops(radiances), grid.width)
+    text = spoken_percent(share) if radiances.any() else "off"
+    return _Cell(visible(f"{image.name} ({columns}x{rows})"), text, picture)
 
 
 def _cell(basis: Basis, k: int, share: float, factor: int) -> _Cell:

@@ -82,3 +82,21 @@ def test_names_cannot_break_it(make_basis: Any) -> None:
         x, y = grid.corner(k)
         assert np.array_equal(*(s[y : y + grid.height, x : x + grid.width] for s in sheets))
         assert (sheets[0][grid.head :, x - grid.gap + 1 : x - 1] == GROUND).all()
+
+
+def test_an_image_is_one_picture_its_map(make_basis: Any) -> None:
+    names = ["bulb", *(f"sky.x{x}.y{y}" for y in range(3) for x in range(4)), "key"]
+    radiances = [[1, 1, 1], *([[0.1, 0.1, 0.1]] * 4), *([[1, 0, 0]] * 4), *([[0.1] * 3] * 4)]
+    basis = make_basis(14, size=(24, 32), names=names, emission=[*radiances, [1, 1, 1]])
+    lights = [
+        replace(light, plugin="envmap") if light.name.startswith("sky") else light
+        for light in basis.lights
+    ]
+    basis = replace(basis, lights=basis.lights.__class__(tuple(lights), basis.lights.requests))
+    sheet = light_sheet(basis, title="")
+    grid = _grid(3, basis.size)
+    assert sheet.shape[1] == grid.size(has_foot=False)[0]
+    x, y = grid.corner(1)
+    red = sheet[y + grid.height // 2, x + grid.width // 2]
+    assert red[0] > 200
+    assert red[1:].max() < 60
