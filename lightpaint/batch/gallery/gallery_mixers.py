@@ -58,7 +58,7 @@ def _mixer(folder: Path, name: str, record: Mapping[str, Any], rows: Sequence[Su
         "planes": record["planes"],
         "lights": lights,
         "shown": _strongest_lights(record, rows),
-        "rest": None,
+        "joint": [],
         "kelvins": kelvin_colors(),
         "gels": packed_gels(),
         "transform": transform_data(ViewTransform()),

@@ -250,10 +250,15 @@ def largest_shares(basis: Basis, lighting: Lighting) -> Doubles:
     return np.maximum(energy_shares(basis, lighting), current_shares)
 
 
-def most_visible_lights(basis: Basis, lighting: Lighting) -> Indices:
-    """Return places of the lights to show of many, those with the largest shares; all of few."""
-    count = len(basis.lights)
-    if count <= ROWS_SHOWN + SPARE_ROWS:
-        return np.arange(count)
-    shares = largest_shares(basis, lighting)
-    return np.sort(np.argsort(-shares, kind="stable")[:ROWS_SHOWN])
+def most_visible_lights(
+    basis: Basis, lighting: Lighting, *, among: Indices | None = None
+) -> Indices:
+    """Return places of the lights to show of many, those with the largest shares; all of few.
+
+    among: places of the lights to choose from, in order; all by default.
+    """
+    candidates = np.arange(len(basis.lights)) if among is None else among
+    if len(candidates) <= ROWS_SHOWN + SPARE_ROWS:
+        return candidates
+    shares = largest_shares(basis, lighting)[candidates]
+    return np.sort(candidates[np.argsort(-shares, kind="stable")[:ROWS_SHOWN]])

@@ -1,8 +1,8 @@
 """The light mixer of a page, which sets lights by hand, without a server.
 
-The page contains a small, compact plane for each light that matters and one for all others. The
-painter's own browser modules mix them, so that a page sent by mail is a mixer in any browser,
-offline.
+The page contains a small, compact plane for each light that matters, and two for those that share
+a row (joint_lights.py). The painter's own browser modules mix them, so that a page sent by mail is
+a mixer in any browser, offline.
 """
 
 import base64
@@ -33,7 +33,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import lighting_fields
 from lightpaint.report.basis_memo import cached_clean_planes, make_once, page_reduction
 from lightpaint.report.page.figures import CLEAN_REDUCTION, data_uri
-from lightpaint.report.page.lights_table import most_visible_lights
+from lightpaint.report.page.joint_lights import JointLights, rows_of_mixer
 from lightpaint.threads import parallel_map
 from lightpaint.viewer.bundle import bundled, compact_script, source, styles
 
@@ -70,14 +70,14 @@ def mixer_html(
         is_clean: Whether to denoise planes.
         scene: For the command line; None without a scene to relight.
     """
-    shown = most_visible_lights(basis, lighting)
-    size, planes = _shown_planes(basis, lighting, shown, is_clean=is_clean)
+    shown, joint = rows_of_mixer(basis, lighting)
+    size, planes = _shown_planes(basis, lighting, shown, joint, is_clean=is_clean)
     transform = transform or ViewTransform()
     data = {
         "size": size,
         "planes": planes,
         "lights": [_light(basis, lighting, k) for k in shown],
-        "rest": _rest(basis, lighting, shown),
+        "joint": [lights.data(basis, lighting) for lights in joint],
         "kelvins": kelvin_colors(),
         "gels": packed_gels(),
         "transform": transform_data(transform),
@@ -102,17 +102,18 @@ def mixer_assets() -> str:
 
 
 def _shown_planes(
-    basis: Basis, lighting: Lighting, shown: Indices, *, is_clean: bool
+    basis: Basis,
+    lighting: Lighting,
+    shown: Indices,
+    joint: Sequence[JointLights],
+    *,
+    is_clean: bool,
 ) -> tuple[list[int], list[dict[str, Any]]]:
-    """Return size and planes of each light; then of all others, in the answer and in the scene."""
-    other_indices = np.setdiff1d(np.arange(len(basis.lights)), shown)
-    if not other_indices.size:
+    """Return size and planes of each light; then of joint ones, in the answer and in the scene."""
+    if not joint:
         return planes_for_page(basis, is_clean=is_clean)
-    looks = [
-        np.where(np.isin(np.arange(len(x)), other_indices)[:, None], x, 0)
-        for x in (lighting.weights_for(basis), basis.current_weights)
-    ]
-    return _compact_planes(basis, shown, looks, is_clean=is_clean)
+    mixes = [mix for lights in joint for mix in lights.mixes(lighting, basis)]
+    return _compact_planes(basis, shown, mixes, is_clean=is_clean)
 
 
 def planes_for_page(basis: Basis, *, is_clean: bool) -> tuple[list[int], list[dict[str, Any]]]:
@@ -187,21 +188,6 @@ def _kelvin(emission: Any, unit: str) -> float | None:
         and abs(light_photometry.duv) <= WHITE
     )
     return light_photometry.kelvin if is_white else None
-
-
-def _rest(basis: Basis, lighting: Lighting, shown: Indices) -> dict[str, Any] | None:
-    other_indices = np.setdiff1d(np.arange(len(basis.lights)), shown)
-    if not other_indices.size:
-        return None
-
-    def by_name(weights: Doubles) -> dict[str, list[float]]:
-        return {basis.names[k]: weights[k].tolist() for k in other_indices if not basis.is_fixed[k]}
-
-    return {
-        "label": f"{len(other_indices)} more lights together",
-        "answer": by_name(lighting.weights_for(basis)),
-        "present": by_name(basis.current_weights),
-    }
 
 
 def kelvin_colors() -> dict[str, Any]:

@@ -42,22 +42,17 @@ class Mixer {
     this.rows.forEach((row, k) => (row.plane = k));
     const { shown } = data;
     if (shown) this.rows = this.rows.filter((row) => shown.includes(row.plane));
-    if (data.rest) {
-      const unit = /** @type {RGB} */ ([1, 1, 1]);
-      const light = {
-        name: data.rest.label,
-        unit: '',
-        isFixed: false,
-        isScalar: true,
-        isRest: true,
-        present: unit,
-        answer: unit,
-        kelvin: { present: null, answer: null },
-      };
-      const restRow = new Row(light, kelvins, redraw);
-      restRow.plane = this.rows.length;
-      this.rows.push(restRow);
-    }
+    data.joint.forEach((joint, k) => {
+      const { label: name, levels } = joint;
+      const [answer, present] = [levels.answer, levels.present].map(
+        (x) => /** @type {RGB} */ ([x, x, x]),
+      );
+      const kelvin = { present: null, answer: null };
+      const kind = { unit: '', isFixed: false, isScalar: true };
+      const row = new Row({ name, joint, answer, present, kelvin, ...kind }, kelvins, redraw);
+      row.plane = data.lights.length + 2 * k;
+      this.rows.push(row);
+    });
     this.selection = new Selection(this.rows, redraw);
     addGels(this.selection, gels);
     const view = this.createStage();
@@ -158,8 +153,8 @@ class Mixer {
         currentWeights.set(this.dimmed(this.data.lights[k][this.look]), 3 * k);
     for (const row of this.rows) {
       const isOn = isSolo ? row.isSolo : !row.isMute;
-      // The rest has a plane per look; the last reset chose it.
-      const plane = row.light.isRest && this.look === 'present' ? row.plane + 1 : row.plane;
+      // Joint lights have a plane per look; the last reset chose it.
+      const plane = row.light.joint && this.look === 'present' ? row.plane + 1 : row.plane;
       if (isOn) currentWeights.set(row.light.isFixed ? row.rgb : this.dimmed(row.rgb), 3 * plane);
     }
     return currentWeights;
@@ -182,21 +177,28 @@ class Mixer {
     });
   }
 
-  /** Draw the small picture of one light alone. @param {Row} row */
-  drawThumb(row) {
-    const [height, width] = this.data.size;
-    const mix = new Mix(this.data.size);
-    mix.weights = new Float64Array(3 * this.planes.length);
-    const { rgb } = row;
-    mix.weights.set(luminance(rgb) > 0 ? rgb : [1, 1, 1], 3 * row.plane);
-    mix.update(this.planes, 1, false);
-    const levels = mix.light.filter((x) => x > 0).sort();
+  /** Draw the small picture of one light alone, or the map of an image as in the answer.
+   * @param {Row} row */
+  drawThumb({ light: { joint }, rgb, plane, thumb }) {
+    let { size } = this.data;
+    /** @type {Float32Array} */
+    let light;
+    if (joint?.columns) {
+      light = Float32Array.from(Object.values(joint.answer).flat());
+      size = [light.length / 3 / joint.columns, joint.columns];
+    } else {
+      const mix = new Mix(size);
+      mix.weights = new Float64Array(3 * this.planes.length);
+      mix.weights.set(luminance(rgb) > 0 ? rgb : [1, 1, 1], 3 * plane);
+      mix.update(this.planes, 1, false);
+      light = mix.light;
+    }
+    const levels = light.filter((x) => x > 0).sort();
     const white = levels[Math.floor(WHITE_SHARE * (levels.length - 1))] || 1;
-    const canvas = canvasOfSize(this.data.size);
-    drawLight(canvas, mix.light, new Encoder(SRGB, -Math.log2(white)));
-    const { thumb } = row;
+    const canvas = canvasOfSize(size);
+    drawLight(canvas, light, new Encoder(SRGB, -Math.log2(white)));
     thumb.width = THUMBNAIL_WIDTH;
-    thumb.height = Math.max(1, Math.round((THUMBNAIL_WIDTH * height) / width));
+    thumb.height = Math.max(1, Math.round((THUMBNAIL_WIDTH * size[0]) / size[1]));
     const context = contextOf(thumb);
     context.imageSmoothingQuality = 'high';
     context.drawImage(canvas, 0, 0, thumb.width, thumb.height);
@@ -215,9 +217,9 @@ class Mixer {
       add(light.name, light[this.look]);
     }
     for (const { light, rgb } of this.rows) {
-      if (!light.isRest) add(light.name, rgb);
-      else if (this.data.rest)
-        for (const [name, emission] of Object.entries(this.data.rest[this.look]))
+      if (!light.joint) add(light.name, rgb);
+      else
+        for (const [name, emission] of Object.entries(light.joint[this.look]))
           add(name, /** @type {RGB} */ (emission.map((x, c) => x * rgb[c])));
     }
     for (const { light } of this.rows)

@@ -8,12 +8,17 @@ import { inflate, unpack } from './packed_picture.js';
 /** @typedef {import("./mixer_light.js").Light} Light */
 /** @typedef {import("../drawing/colour.js").RGB} RGB */
 
+/** Lights that share a row, such as the texels of an image. levels: brightness in each look. answer,
+ * present: the emission of each of them at the level 1, by name, which two planes show, behind those
+ * of single lights. columns: of the map that these make; 0 for none.
+ * @typedef {{label: string, columns: number, levels: {answer: number, present: number},
+ *   answer: Record<string, RGB>, present: Record<string, RGB>}} Joint */
+
 /** lights: those with their own plane, in the order of the planes. shown: indices of those with
- * sliders; the others stay as in the look. rest: all other lights together, as in the answer and as
- * in the scene: two more planes. gels: the table of filters, packed. lighting: the
+ * sliders; the others stay as in the look. joint: lights that share a row. gels: the table of filters, packed. lighting: the
  * answer's file.
  * @typedef {{size: [number, number], planes: Compact[], lights: Light[], shown?: number[],
- *   rest: {label: string, answer: Record<string, RGB>, present: Record<string, RGB>} | null,
+ *   joint: Joint[],
  *   kelvins: {coolest: number, warmest: number, colors: RGB[]}, gels: string,
  *   transform: {stops: number, low: number, high: number,
  *   curve: number[] | null, lattice: Compact | null}, painting: string | null,

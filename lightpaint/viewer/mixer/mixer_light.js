@@ -7,7 +7,9 @@ import { createElement, createSlider } from './page_elements.js';
 
 /** @typedef {import("../drawing/colour.js").RGB} RGB */
 /** kelvin: if the look's colour is white, else null.
- * @typedef {{name: string, unit: string, isFixed: boolean, isScalar: boolean, isRest?: boolean,
+ * joint: lights that share this row.
+ * @typedef {{name: string, unit: string, isFixed: boolean, isScalar: boolean,
+ *   joint?: import("./mixer_data.js").Joint,
  *   present: RGB, answer: RGB, kelvin: {present: number | null, answer: number | null}}} Light */
 
 /** Ends of the dimmer, in stops from the current level; the left one is off. */

@@ -3,6 +3,7 @@
 import json
 import zlib
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -332,12 +333,38 @@ def test_of_hundreds_of_lights_the_rest_is_one(make_basis: Any, open_file: Any) 
     page.get_by_text("Reset to now").click()
     check(page, codes(basis, basis.current_weights, transform))
     data = json.loads(page.locator(".mixer script").inner_text())
-    assert len(data["rest"]["answer"]) == 60 - ROWS_SHOWN
-    remaining = [basis.names.index(name) for name in data["rest"]["present"]]
+    [rest] = data["joint"]
+    assert len(rest["answer"]) == 60 - ROWS_SHOWN
+    remaining = [basis.names.index(name) for name in rest["present"]]
     weights = basis.current_weights.copy()
     weights[remaining] *= 2
     move(page, ROWS_SHOWN, 0, 1)
     check(page, codes(basis, weights, transform))
+
+
+def test_an_image_is_one_row_with_its_map(make_basis: Any, open_file: Any) -> None:
+    names = ["bulb", *(f"sky.x{x}.y{y}" for y in range(3) for x in range(4))]
+    basis = light_basis(make_basis, 13, names=names)
+    lights = [
+        replace(x, plugin="envmap" if x.name.startswith("sky") else "point") for x in basis.lights
+    ]
+    basis = replace(basis, lights=tuple(lights))
+    transform, answer = transform_of_report(basis), solve_painting(basis)[1].weights
+    page = open_file(report(basis))
+    assert page.locator(".mixer-light").count() == 2
+    check(page, codes(basis, answer, transform))
+    page.get_by_text("Reset to now").click()
+    check(page, codes(basis, basis.current_weights, transform))
+    weights = basis.current_weights.copy()
+    weights[1:] *= 2
+    move(page, 1, 0, 1)
+    check(page, codes(basis, weights, transform))
+    thumb = page.locator(".mixer-light canvas").nth(1)
+    assert thumb.evaluate("map => [map.width, map.height]") == [88, 66]
+    page.evaluate("navigator.clipboard.writeText = async (text) => { window.copied = text; }")
+    page.get_by_text("Copy as lighting.json").click()
+    copied = json.loads(page.evaluate("window.copied"))["lights"]
+    np.testing.assert_allclose(copied["sky.x2.y1"]["emission"], weights[7], rtol=1e-9)
 
 
 def test_the_wipe(make_basis: Any, open_file: Any) -> None:
