@@ -19,9 +19,9 @@ TEXELS = " texels of "
 class LightImage:
     """An image of lights.
 
-    name: of the light that was split. places: (rows, columns), the index of the light that is each
-    texel alone; −1 for a texel that is not adjusted, or adjusted together with others. domain: what
-    it covers.
+    name: of the light that was split. places: (rows, columns), the index of each texel's light,
+    which it has alone or, in a symmetric image, with its mirror image; −1 for a texel that is not
+    adjusted, or adjusted together with others. domain: what it covers.
     """
 
     name: str
@@ -36,23 +36,30 @@ class LightImage:
 
     @property
     def is_whole(self) -> bool:
-        """True if every texel is a light of its own."""
+        """True if every texel is a light of its own, or one with its mirror image."""
         return bool((self.places >= 0).all())
 
     @property
     def lights(self) -> Indices:
-        """Indices of its lights, row by row."""
-        return self.places[self.places >= 0]
+        """Indices of its lights, each once, row by row."""
+        return np.array([*dict.fromkeys(self.places[self.places >= 0].tolist())], dtype=np.intp)
 
     def mean(self, radiances: Doubles) -> Doubles:
         """Return the mean over its domain, (3,). radiances: (n, 3), those of all lights."""
-        shares = self.domain.shares(self.size)[self.places >= 0]
-        return np.asarray(shares @ radiances[self.lights] / shares.sum())
+        found = self.places >= 0
+        shares = self.domain.shares(self.size)[found]
+        return np.asarray(shares @ radiances[self.places[found]] / shares.sum())
 
 
 def light_images(lights: Sequence[BasisLight]) -> list[LightImage]:
     """Return the images that have texels among `lights`."""
-    index = {light.name: k for k, light in enumerate(lights) if not light.is_fixed}
+    # A light of several texels that has the name of one is symmetric; others are groups.
+    index = {
+        texel: k
+        for k, light in enumerate(lights)
+        if not light.is_fixed
+        for texel in (light.members if light.name in light.members else (light.name,))
+    }
     images = []
     for name, size in images_of(name for light in lights for name in light.members).items():
         places = np.array([index.get(texel, -1) for texel in texel_names(name, size)])

@@ -22,7 +22,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.relit_files import relit_files, settings_of
 from lightpaint.scene.lights.image_split import with_split
 from lightpaint.scene.lights.new_emitter import new_emitter_at
-from lightpaint.scene.lights.texels.texel import images_of
+from lightpaint.scene.lights.texels.texel import image_of, images_of
 from lightpaint.scene.properties.emission import Scaling
 from lightpaint.scene.properties.pose import pose_of
 from lightpaint.scene.scene import Scene
@@ -141,7 +141,7 @@ def scene_of(scene: Scene, lighting: Lighting) -> Scene:
     scene's unit.
     """
     emitter_names = {name for members in lighting.members.values() for name in members}
-    scene = _split_scene(placed_scene(scene, lighting), emitter_names)
+    scene = _split_scene(placed_scene(scene, lighting), lighting, emitter_names)
     scene_names = {emitter.name for emitter in scene.emitters}
     if emitter_names != scene_names:
         raise LightingError(
@@ -160,14 +160,19 @@ def scene_of(scene: Scene, lighting: Lighting) -> Scene:
     return regrouped_scene
 
 
-def _split_scene(scene: Scene, names: Collection[str]) -> Scene:
-    """Return `scene` with those lights split into texels of which `names` has all."""
+def _split_scene(scene: Scene, lighting: Lighting, names: Collection[str]) -> Scene:
+    """Return `scene` with those lights split into texels of which `names`, of emitters of the
+    lighting, has all.
+    """
     whole = {emitter.name for emitter in scene.emitters}
     sizes = {image: size for image, size in images_of(names).items() if image in whole}
     if not sizes:
         return scene
-    facts = with_split({"emitters": scene.emitters}, scene.parsed, sizes)
-    return replace(scene, **facts, split={**scene.split, **sizes})
+    # Only lights of texels and their mirror images have the name of one of their members.
+    mirrored = {image_of(name) for name, x in lighting.members.items() if len(x) > 1 and name in x}
+    facts = with_split({"emitters": scene.emitters}, scene.parsed, sizes, mirrored)
+    symmetric = scene.symmetric | mirrored.intersection(sizes)
+    return replace(scene, **facts, split={**scene.split, **sizes}, symmetric=symmetric)
 
 
 def placed_scene(scene: Scene, lighting: Lighting) -> Scene:

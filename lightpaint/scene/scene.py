@@ -76,6 +76,7 @@ class Scene(SceneFiles, Shown):
         parsed: The nodes from Mitsuba's parser; internal to this package.
         chosen: Names of the lights selected by `only`; empty if all are present.
         split: Columns and rows of the images that are split into texels, by name of the light.
+        symmetric: Those of these lights whose images are equal to their mirror images.
         map_size: Size of their images as written; None for a pixel per texel.
         added: Emitters added by `with_new_emitters`, which are in no file.
         old_sites: Sites in the file of the emitters that `moved` has moved, by name.
@@ -107,6 +108,7 @@ class Scene(SceneFiles, Shown):
     parsed: ParsedScene
     chosen: tuple[str, ...] = ()
     split: Mapping[str, GridSize] = field(default_factory=dict)
+    symmetric: frozenset[str] = frozenset()
     map_size: GridSize | None = None
     added: tuple[NewEmitter, ...] = ()
     old_sites: Mapping[str, Site] = field(default_factory=dict)
@@ -169,8 +171,7 @@ class Scene(SceneFiles, Shown):
         """Return this scene on a smaller film, on which each pixel is the mean of a square block.
 
         resolution: `1/4`, or `320x180`. Pixels at the right and bottom that do not fill a block are
-        left out. Raises SceneError, listing possible sizes, if no square blocks result in that
-        size.
+        left out. Raises SceneError, listing possible sizes, if no blocks give that size.
         """
         return replace(self, film=reduced(self.film, reduction(self.film, resolution)))
 
@@ -263,11 +264,10 @@ class Scene(SceneFiles, Shown):
         return replace(extended, added=(*self.added, *emitters))
 
     def _inspected(self, parsed: ParsedScene, more: Sequence[str]) -> "Scene":
-        """Return this scene with another parsed form. more: names of emitters that belong to no
-        light yet.
-        """
+        """Return this scene with another parsed form. more: names of emitters without a light."""
         with mitsuba_errors(self.path):
-            facts = with_split(inspect_scene(parsed, self.sensor), parsed, self.split)
+            facts = inspect_scene(parsed, self.sensor)
+            facts = with_split(facts, parsed, self.split, self.symmetric)
         lights = regrouped(self.lights, facts["emitters"], more)
         return replace(self, **facts | {"film": self.film}, lights=lights, parsed=parsed)
 
@@ -296,7 +296,7 @@ class Scene(SceneFiles, Shown):
         The film is replaced by a box-filtered RGB float32 film of the same size, for basis and
         verification alike. A light set to black is never sampled. The scene and what refers to it
         must be released before another is loaded. Image lights and the rest are black or as
-        authored: other multiples need files. views: other sensors' films. evenly: `with_texels`.
+        authored, since other multiples need files. views: other sensors. evenly: `with_texels`.
         """
         named, path = emission or {}, str(self.path)
         settings = settings_for(self.lights, self.emitters, named, scene=path, evenly=evenly)

@@ -1,6 +1,7 @@
 """Reads a Mitsuba scene and chooses the lights to adjust."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from lightpaint.errors import SceneError
@@ -14,7 +15,7 @@ from lightpaint.scene.lights.light import Light
 from lightpaint.scene.lights.light_choice import choose_lights
 from lightpaint.scene.lights.lights_file import LightsFile, lights_file_for
 from lightpaint.scene.lights.texels.image_domain import GridSize
-from lightpaint.scene.lights.texels.texel import parse_map_size, parse_size
+from lightpaint.scene.lights.texels.texel import mirrored_pairs, parse_map_size, parse_size
 from lightpaint.scene.properties.film import check_film, sensor_index
 from lightpaint.scene.properties.integrator import IntegratorChoice
 from lightpaint.scene.runtime.mitsuba_errors import mitsuba_errors
@@ -40,6 +41,7 @@ def load_scene(
     group_alike: bool = True,
     integrator: str | None = None,
     split: Mapping[str, object] | None = None,
+    symmetric: Iterable[str] | None = None,
     map_size: object = None,
 ) -> Scene:
     """Read a Mitsuba scene XML and find its lights.
@@ -63,6 +65,9 @@ def load_scene(
         split: Name → columns and rows, such as `(16, 8)`: a sky, an area light or a projector
             becomes an image of that many texels, each a light `NAME.xCOLUMN.yROW`. By default those
             of the lights file, which this replaces.
+        symmetric: Names of split lights whose images are equal to their mirror images, so that two
+            texels, left and right, are one light, called like the left one. By default those of the
+            lights file, which this replaces.
         map_size: Columns and rows, such as `(1024, 512)`, at which `relight` writes the images of
             split lights; by default one pixel for each texel.
 
@@ -88,16 +93,21 @@ def load_scene(
     selection = lights_file_for(path, lights_file, beside_scene=use_lights_file)
     selection = selection.with_more(lights, groups)
     sizes = _image_sizes(selection, split)
+    mirrored = _symmetric_images(selection, symmetric, sizes)
+    for name in mirrored:
+        pairs = mirrored_pairs(name, sizes[name])
+        selection = replace(selection, groups={**pairs, **selection.groups})
     with explain_old_scene(path), mitsuba_errors(path):
         whole = inspect_scene(parsed, index)
-        facts = with_split(whole, parsed, sizes)
+        facts = with_split(whole, parsed, sizes, mirrored)
     check_film(path, facts["film"], facts["spp"])
     check_emitters(path, facts["emitters"])
     chosen = _select_lights(path, facts["emitters"], selection, group_alike=group_alike)
     if len(adjusted := _adjusted_images(chosen)) < len(sizes):
         # An image of which nothing is adjusted stays as it is, in full detail.
         sizes = {name: size for name, size in sizes.items() if name in adjusted}
-        facts = with_split(whole, parsed, sizes)
+        facts = with_split(whole, parsed, sizes, mirrored)
+        selection = selection.without_groups_of(set(mirrored) - adjusted)
         chosen = _select_lights(path, facts["emitters"], selection, group_alike=group_alike)
     return Scene(
         path=path,
@@ -107,6 +117,7 @@ def load_scene(
         requests=selection.requests,
         parsed=parsed,
         split=sizes,
+        symmetric=frozenset(sizes).intersection(mirrored),
         map_size=None if map_size is None else parse_map_size(map_size),
         **facts,
     )
@@ -117,6 +128,18 @@ def _image_sizes(selection: LightsFile, split: Mapping[str, object] | None) -> d
     if split is None:
         return selection.requests.split
     return {name: parse_size(size, f"split: {name}") for name, size in split.items()}
+
+
+def _symmetric_images(
+    selection: LightsFile, symmetric: Iterable[str] | None, sizes: Mapping[str, GridSize]
+) -> list[str]:
+    """Return the names of symmetric images: `symmetric`, or those of the file that are split."""
+    if symmetric is None:
+        return sorted(selection.requests.symmetric & sizes.keys())
+    names = sorted(set(symmetric))
+    if whole := [name for name in names if name not in sizes]:
+        raise SceneError(f"symmetric: {whole[0]!r} is not split into texels: split it")
+    return names
 
 
 def _adjusted_images(lights: Sequence[Light]) -> set[str]:

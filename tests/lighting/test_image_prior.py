@@ -16,7 +16,7 @@ from lightpaint.lighting.loss import image_prior as prior_module
 from lightpaint.lighting.loss.image_prior import image_prior
 from lightpaint.lighting.solve import solve
 from lightpaint.scene.lights.texels.sky import solid_angles
-from lightpaint.scene.lights.texels.texel import texel_names
+from lightpaint.scene.lights.texels.texel import mirrored_pairs, texel_names
 from lightpaint.target.target import Target
 
 FREE = Fit(colors="free")
@@ -149,3 +149,33 @@ def test_what_no_pixel_sees_stays_as_it_is(make_basis: BasisFactory) -> None:
     solution = solve(basis, Target.of(picture), colors="free", space="linear")
     weights = np.array([x.emission for x in solution.lighting.lights])
     np.testing.assert_allclose(weights[unseen], current.reshape(-1, 3)[unseen])
+
+
+@pytest.mark.parametrize("size", [(6, 4), (5, 3)])
+def test_a_symmetric_image_costs_as_much_as_one_that_happens_to_be(size: tuple[int, int]) -> None:
+    """Where the picture of two texels is twice that of one, as if both were at one place."""
+    columns, rows = size
+    pairs = mirrored_pairs("sky", size)
+    lights = Lights(
+        tuple(
+            BasisLight(
+                name, "envmap", "radiance", "W/(m² sr)", (1.0, 1.0, 1.0), members=(*members,)
+            )
+            for name, members in pairs.items()
+        )
+    )
+    [image] = light_images(lights)
+    assert image.is_whole
+    np.testing.assert_array_equal(image.places, image.places[:, ::-1])
+    assert texel_lights(lights).all()
+    counts = np.array([len(members) for members in pairs.values()])
+    power = even_power(size)
+    even = power.reshape(rows, columns, 3)[:, : (columns + 1) // 2].reshape(-1, 3)
+    prior = image_prior(lights, even * counts[:, None] ** 2, FREE, 1.0)
+    whole = image_prior(sky_lights(size), power, FREE, 1.0)
+    assert prior is not None
+    assert whole is not None
+    half = np.random.default_rng(3).uniform(0.2, 3, (len(pairs), 3))
+    radiances = half[image.places].reshape(-1, 3)
+    np.testing.assert_allclose(prior.objective(half), whole.objective(radiances), rtol=1e-12)
+    np.testing.assert_allclose(image.mean(half), light_images(sky_lights(size))[0].mean(radiances))

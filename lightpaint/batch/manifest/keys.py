@@ -87,6 +87,7 @@ SOURCE_KEYS: dict[str, Check] = {
         _table_of(lambda v: isinstance(v, str) and v != ""),
         'a table of sizes, { sky = "16x8" }',
     ),
+    "symmetric": TEXTS,
     "map_size": TEXT,
 }
 

@@ -101,6 +101,13 @@ def add_split(parser: argparse.ArgumentParser) -> None:
         "each a light sky.xCOLUMN.yROW; --split none for no images (default: those of the lights "
         "file)",
     )
+    parser.add_argument(
+        "--symmetric",
+        action="append",
+        metavar="sky",
+        help="make the image of a split light equal to its mirror image, left and right (default: "
+        "those of the lights file)",
+    )
 
 
 def add_map_size(parser: argparse.ArgumentParser) -> None:

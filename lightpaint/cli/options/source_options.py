@@ -16,7 +16,17 @@ from lightpaint.errors import BasisError
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile, check_needed
 
 #: Options for loading a scene, by their Python names.
-LOADING = ("sensor", "parameters", "variant", "lights", "groups", "integrator", "split", "map_size")
+LOADING = (
+    "sensor",
+    "parameters",
+    "variant",
+    "lights",
+    "groups",
+    "integrator",
+    "split",
+    "symmetric",
+    "map_size",
+)
 
 
 def source_of_template(options: Namespace) -> SceneFile | BasisFile | GroupsFile:
@@ -44,6 +54,7 @@ def scene_of(options: Namespace, *, is_to_solve: bool = True, **fields: Any) -> 
             "use_lights_file": options.use_lights_file,
             "group_alike": options.group_alike,
             "split": _split_of(options),
+            "symmetric": getattr(options, "symmetric", None),
         }
     loading = {"sensor": options.sensor, "variant": options.variant, **fields}
     loading["integrator"] = options.integrator

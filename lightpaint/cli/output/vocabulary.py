@@ -41,6 +41,7 @@ OPTIONS = {
     "shared_fs": "--shared-fs",
     "space": "--space",
     "split": "--split",
+    "symmetric": "--symmetric",
     "map_size": "--map-size",
     "spp": "--spp",
     "stage": "--stage",

@@ -9,7 +9,7 @@ from lightpaint.files import one_line
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
 from lightpaint.lighting.constraints.values import check_keys, parse_strength
-from lightpaint.scene.lights.lights_file import MOVES, SPLIT, SceneRequests, read_keys
+from lightpaint.scene.lights.lights_file import IMAGE_KEYS, MOVES, SceneRequests, read_keys
 
 #: Characters of an error, which names the file, the light and the key before it quotes.
 MAX_MESSAGE_LENGTH = 1000
@@ -57,8 +57,8 @@ def _without_moves(light: Any, source: str) -> Any:
         return light
     tables = {}
     for name, table in light.items():
-        check_keys(table, (*LIGHT_KEYS, *MOVES, SPLIT), f"{source}: light.{name}")
-        remaining = {key: value for key, value in table.items() if key not in (*MOVES, SPLIT)}
+        check_keys(table, (*LIGHT_KEYS, *MOVES, *IMAGE_KEYS), f"{source}: light.{name}")
+        remaining = {key: value for key, value in table.items() if key not in (*MOVES, *IMAGE_KEYS)}
         if remaining or not table:
             tables[name] = remaining
     return tables

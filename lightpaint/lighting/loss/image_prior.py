@@ -44,12 +44,14 @@ def image_prior(
     M, shares = np.zeros((3, n, n)), np.zeros((n, 3))
     for image in images:
         at, found = image.places, image.places >= 0
-        amplitudes, areas = np.sqrt(power[image.lights]), image.domain.shares(image.size)[found]
+        in_image, areas = at[found], image.domain.shares(image.size)[found]
+        # Texels of a symmetric image share a light, whose picture is that of both.
+        amplitudes = np.sqrt(power[in_image]) / np.bincount(in_image)[in_image, None]
         # Pictures of texels overlap, so the energy of their sum is about this.
         energy = strength * amplitudes.sum(axis=0) ** 2
-        shares[image.lights] = energy * areas[:, None]
+        np.add.at(shares, in_image, energy * areas[:, None])
         seen_share = amplitudes.sum(axis=1) / amplitudes.sum() / areas
-        seen = np.where(np.isin(at, image.lights[seen_share > SEEN_SHARE]), at, -1)
+        seen = np.where(np.isin(at, in_image[seen_share > SEEN_SHARE]), at, -1)
         for one, other, stiffness in image.domain.neighbours(image.size):
             first, second = int(seen[one]), int(seen[other])
             if first < 0 or second < 0 or first == second:

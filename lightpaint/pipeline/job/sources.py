@@ -63,6 +63,7 @@ class SceneFile(ReadOnce):
         group_alike: False to adjust similar emitters without names one by one.
         integrator: Integrator to use instead of the scene's own.
         split: Columns and rows of lights that are images, `16x8`, by name.
+        symmetric: Names of those whose images are symmetric.
         map_size: Columns and rows of their images in the relit scene, `1024x512`.
 
     Examples:
@@ -81,6 +82,7 @@ class SceneFile(ReadOnce):
     group_alike: bool = True
     integrator: str | None = None
     split: Mapping[str, str] | None = None
+    symmetric: Sequence[str] | None = None
     map_size: str | None = None
 
     @cached_property

@@ -1,7 +1,7 @@
 """Splits lights that show an image into texels, each an emitter of its own."""
 
 import gc
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -23,11 +23,15 @@ from lightpaint.scene.scene_tree import ParsedScene
 
 
 def with_split(
-    facts: Mapping[str, Any], parsed: ParsedScene, split: Mapping[str, GridSize]
+    facts: Mapping[str, Any],
+    parsed: ParsedScene,
+    split: Mapping[str, GridSize],
+    symmetric: Collection[str] = (),
 ) -> dict[str, Any]:
     """Return the facts of `inspect_scene` with some emitters split into texels.
 
-    split: columns and rows by name of an emitter. Raises SceneError for a light that does not exist
+    split: columns and rows by name of an emitter. symmetric: names of those whose images become
+    their means with their mirror images. Raises SceneError for a light that does not exist
     or cannot be split.
     """
     if not split:
@@ -41,7 +45,7 @@ def with_split(
                 f"{parsed.path} has lights with the names of texels of {name!r}, "
                 f"{some_names(clash)}: rename them"
             )
-        emitters[k : k + 1] = _texels(emitters[k], size, parsed)
+        emitters[k : k + 1] = _texels(emitters[k], size, parsed, is_symmetric=name in symmetric)
     return {**facts, "emitters": tuple(emitters)}
 
 
@@ -62,7 +66,9 @@ def _index_of(name: str, emitters: Sequence[Emitter], scene: str) -> int:
     return names.index(name)
 
 
-def _texels(emitter: Emitter, size: GridSize, parsed: ParsedScene) -> list[Emitter]:
+def _texels(
+    emitter: Emitter, size: GridSize, parsed: ParsedScene, *, is_symmetric: bool
+) -> list[Emitter]:
     """Return the texels of an emitter as emitters, row by row, at their current emission."""
     shape = parsed.shape_plugin(emitter.node)
     domain = domain_of(emitter.plugin, shape)
@@ -80,6 +86,8 @@ def _texels(emitter: Emitter, size: GridSize, parsed: ParsedScene) -> list[Emitt
             "mesh with texture coordinates (uv) for one flat image"
         )
     current = current_image(emitter.node, emitter.kind, emitter.emission, domain, size, parsed)
+    if is_symmetric:
+        current = (current + current[:, ::-1]) / 2
     columns, rows = size
     texels = (Texel(emitter.name, x, y, size, domain) for y in range(rows) for x in range(columns))
     return [

@@ -5,7 +5,7 @@ moves are stored unparsed; lighting/constraints/constraints_file.py and placemen
 them.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from lightpaint.errors import SceneError
 from lightpaint.file_reading import read_text
 from lightpaint.files import one_line
 from lightpaint.scene.lights.texels.image_domain import GridSize
-from lightpaint.scene.lights.texels.texel import parse_size
+from lightpaint.scene.lights.texels.texel import image_of, parse_size
 from lightpaint.storage.json_records import strict_toml
 from lightpaint.validation import MAX_LISTED, MAX_NAME
 
@@ -27,6 +27,10 @@ OLDER = ("prefer",)
 RIGGING, MOVES = ("on", "new", "pair"), ("move", "aim", "cone")
 #: Key of a light in `[light.NAME]` for the size of its image.
 SPLIT = "split"
+#: Key of a light in `[light.NAME]` for an image that is equal to its mirror image.
+SYMMETRIC = "symmetric"
+#: Keys of a light for its image.
+IMAGE_KEYS = (SPLIT, SYMMETRIC)
 KNOWN_KEYS = ("lights", "groups", "group_alike", *CONSTRAINTS, *RIGGING)
 
 #: Maximum size of a lights file in bytes.
@@ -61,6 +65,22 @@ class SceneRequests:
         }
 
     @property
+    def symmetric(self) -> frozenset[str]:
+        """Names of the lights whose images are symmetric."""
+        lights = self.keys.get("light")
+        tables = lights.items() if isinstance(lights, dict) else ()
+        names = set()
+        for name, table in tables:
+            value = table.get(SYMMETRIC, False) if isinstance(table, dict) else False
+            if not isinstance(value, bool):
+                raise SceneError(
+                    f"{self.source}: light.{name}.{SYMMETRIC} is {one_line(repr(value))}: expected "
+                    "true or false"
+                )
+            names |= {name} if value else set()
+        return frozenset(names)
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names and patterns of lights with constraints."""
         lights, ties = self.keys.get("light"), self.keys.get("tie")
@@ -93,6 +113,13 @@ class LightsFile:
             # A group given as an argument is meant to be adjusted.
             lights = (*self.lights, *groups)
         return replace(self, lights=lights, groups={**self.groups, **groups})
+
+    def without_groups_of(self, images: Collection[str]) -> "LightsFile":
+        """Return the content without the pairs of texels of images that are not split."""
+        groups = {
+            name: names for name, names in self.groups.items() if image_of(name) not in images
+        }
+        return replace(self, groups=groups)
 
 
 def lights_file_beside(scene: Path) -> Path:

@@ -74,6 +74,18 @@ def texel_names(image: str, size: GridSize) -> list[str]:
     return [texel_name(image, x, y) for y in range(rows) for x in range(columns)]
 
 
+def mirrored_pairs(image: str, size: GridSize) -> dict[str, list[str]]:
+    """Return the texels of an image, row by row, by the name of the left one of each pair that are
+    mirror images of each other; one in the middle is alone.
+    """
+    columns, rows = size
+    return {
+        texel_name(image, x, y): [texel_name(image, k, y) for k in sorted({x, columns - 1 - x})]
+        for y in range(rows)
+        for x in range((columns + 1) // 2)
+    }
+
+
 def parse_size(value: object, where: str) -> GridSize:
     """Return columns and rows of texels from `16x8` or [16, 8]. where: their place, for errors."""
     columns, rows = _parsed_size(value, where, "16x8")
