@@ -1,5 +1,6 @@
 """The gallery in a browser: failures first, filter, order, two under a border, lights, mixer."""
 
+import io
 import json
 from collections.abc import Iterator
 from dataclasses import replace
@@ -174,6 +175,45 @@ def test_of_many_lights_those_that_do_most_have_sliders(page: Any, tmp_path: Pat
     page.locator(".mixer-light").first.wait_for()
     assert page.locator(".mixer-light").count() == 40
     assert page.locator(".mixer-name").first.text_content() == "lamp 20"
+
+
+def test_an_image_is_one_row_of_the_mixer_and_one_column(page: Any, tmp_path: Path) -> None:
+    small = small_basis()
+    names = ["lamp", *(f"sky.x{x}.y{y}" for y in range(3) for x in range(4))]
+    lights = tuple(replace(small.lights[0], name=name) for name in names)
+    images = np.repeat(small.images[:1], 13, 0)
+    basis = replace(small, lights=lights, planes=images, noise=0 * images)
+    key = '{"view": 0}'
+    write_planes(tmp_path, key, basis)
+    run_whole_batch(str(write_batch(tmp_path)), str(tmp_path / "out"))
+    (tmp_path / "sky").mkdir()
+    text = (tmp_path / "out" / "p0" / "lighting.json").read_text(encoding="utf-8")
+    (tmp_path / "sky" / "lighting.json").write_text(text, encoding="utf-8")
+    levels = [1.0, *([0.02] * 4), *([0.06] * 4), *([0.01] * 4)]
+    light_rows = tuple(LightRow(x, y, (y, y, y)) for x, y in zip(names, levels, strict=True))
+    rows = [SummaryRow("sky", "done", "", "sky", lights=light_rows)]
+    page_text = gallery_page(tmp_path, "sky", rows, {"sky": planes_name(tmp_path, key)})
+    (tmp_path / "index.html").write_text(page_text, encoding="utf-8")
+    page.goto((tmp_path / "index.html").as_uri())
+    page.get_by_role("tab", name="Lights").click()
+    heads = page.locator("#lights-head th").all_text_contents()
+    assert heads == ["look", "lamp", "sky"]
+    assert page.locator("#lights-body td").last.text_content() == "0.03"
+    page.get_by_role("tab", name="Mixer").click()
+    page.locator(".mixer-light").first.wait_for()
+    assert page.locator(".mixer-name").all_text_contents() == ["lamp", "sky"]
+
+    def brightness() -> float:
+        picture = page.locator(".mixer-mix").screenshot()
+        return float(np.asarray(Image.open(io.BytesIO(picture)).convert("RGB")).mean())
+
+    slider = page.get_by_role("slider", name="sky: stops from now")
+    levels_seen = []
+    for stops in (-8, 0, 1):  # off, as in the look, twice as bright
+        slider.evaluate(f"x => {{ x.value = '{stops}'; x.dispatchEvent(new Event('input')) }}")
+        page.wait_for_timeout(60)
+        levels_seen.append(brightness())
+    assert levels_seen[0] < levels_seen[1] < levels_seen[2]
 
 
 def two_mixers(folder: Path) -> tuple[Path, dict[str, str]]:

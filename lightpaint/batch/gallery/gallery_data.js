@@ -2,7 +2,7 @@
 import { createElement } from '../../viewer/mixer/page_elements.js';
 
 /** @typedef {import("../../viewer/drawing/colour.js").RGB} RGB */
-/** @typedef {import("../../viewer/mixer/mixer.js").Look["transform"]} Transform */
+/** @typedef {import("../../viewer/mixer/mixer_data.js").Data["transform"]} Transform */
 /** @typedef {{name: string, y: number, emission?: RGB, hex?: string, kelvin?: number, duv?: number,
  *   stops?: number}} LookLight */
 /** links: name and address. basis: of its mixer. view: transform and stops.
@@ -22,6 +22,31 @@ const jsonOf = (id) => JSON.parse(elementOf(id).textContent ?? '');
 export const looks = jsonOf('looks');
 /** @type {Record<string, Transform>} */
 export const transforms = jsonOf('transforms');
+
+/** Lights of a look as its tables list them. @type {Map<Look, LookLight[]>} */
+const listedLights = new Map();
+
+/** Return the lights of a look for a table: of an image one, the mean of its texels.
+ * @param {Look} look */
+export function lightsOf(look) {
+  const known = listedLights.get(look);
+  if (known) return known;
+  /** @type {Map<string, LookLight[]>} */
+  const groups = new Map();
+  for (const light of look.lights ?? []) {
+    const name = light.name.replace(/\.x\d+\.y\d+$/, '');
+    const key = name === light.name ? `${name} alone` : name;
+    groups.set(key, [...(groups.get(key) ?? []), light]);
+  }
+  const listed = [...groups].map(([name, lights]) => {
+    if (lights.length < 2) return lights[0];
+    const mean = (/** @type {(light: LookLight) => number} */ value) =>
+      lights.reduce((sum, light) => sum + value(light), 0) / lights.length;
+    return { name, y: mean(({ y }) => y) };
+  });
+  listedLights.set(look, listed);
+  return listed;
+}
 
 /** @param {Look} look */
 export const titleOf = (look) =>

@@ -6,6 +6,7 @@ import {
   headRow,
   inputOf,
   lightCell,
+  lightsOf,
   luminanceText,
   stopsText,
   titleOf,
@@ -158,8 +159,8 @@ export class LookComparison {
 /** List the lights of one or both looks, those that change most first.
  * @param {Look} a @param {Look | null} b */
 function listLights(a, b) {
-  const lightsOfB = new Map((b?.lights ?? []).map((light) => [light.name, light]));
-  const rows = (a.lights ?? []).map((light) => {
+  const lightsOfB = new Map((b ? lightsOf(b) : []).map((light) => [light.name, light]));
+  const rows = lightsOf(a).map((light) => {
     const lightOfB = lightsOfB.get(light.name);
     const [y, z] = [light.y, lightOfB?.y ?? 0];
     const stops = y > 0 && z > 0 ? Math.log2(z / y) : y > 0 || z > 0 ? Infinity : 0;

@@ -5,6 +5,7 @@ import {
   headRow,
   inputOf,
   lightCell,
+  lightsOf,
   looks,
   luminanceText,
   stopsText,
@@ -22,7 +23,7 @@ export class LightsTable {
     /** The largest luminance of each light in any look. @type {Map<string, number>} */
     this.brightest = new Map();
     for (const look of this.looks)
-      for (const { name, y } of look.lights ?? [])
+      for (const { name, y } of lightsOf(look))
         this.brightest.set(name, Math.max(y, this.brightest.get(name) ?? 0));
     /** @type {Map<Look, HTMLElement>} */
     this.rows = new Map();
@@ -51,7 +52,7 @@ export class LightsTable {
     head.title = titleOf(look);
     head.scope = 'row';
     row.append(head);
-    const lights = new Map((look.lights ?? []).map((light) => [light.name, light]));
+    const lights = new Map(lightsOf(look).map((light) => [light.name, light]));
     const isStops = inputOf('unit').value === 'stops';
     for (const [name, brightest] of this.brightest) {
       const light = lights.get(name);

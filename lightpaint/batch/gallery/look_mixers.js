@@ -49,10 +49,31 @@ export class LookMixers {
 function startOf(look) {
   const [view, stops] = look.view ?? ['srgb', 0];
   const lights = look.lights ?? [];
+  const lightsByName = new Map(lights.map((light) => [light.name, light]));
+  const transform = { ...(transforms[view] ?? transforms.srgb), stops };
   return {
-    name: look.look,
-    emission: new Map(lights.map((light) => [light.name, light.emission ?? [0, 0, 0]])),
-    kelvin: new Map(lights.map((light) => [light.name, (isWhite(light) && light.kelvin) || null])),
-    transform: { ...(transforms[view] ?? transforms.srgb), stops },
+    start(data) {
+      const started = data.lights.map((light) => {
+        const found = lightsByName.get(light.name);
+        const answer = found ? (found.emission ?? [0, 0, 0]) : light.present;
+        const kelvin = (found && isWhite(found) && found.kelvin) || null;
+        return { ...light, answer, kelvin: { ...light.kelvin, answer: kelvin } };
+      });
+      const joint = data.joint.map((one) => withEmissions(one, started));
+      const lighting = { ...data.lighting, target: `${look.look}-mix` };
+      return { ...data, lights: started, joint, lighting, transform };
+    },
+  };
+}
+
+/** Return joint lights with the emissions of their members.
+ * @param {import("../../viewer/mixer/mixer_data.js").Joint} joint
+ * @param {import("../../viewer/mixer/mixer_light.js").Light[]} lights */
+function withEmissions(joint, lights) {
+  const members = (joint.members ?? []).map((k) => lights[k]);
+  return {
+    ...joint,
+    answer: Object.fromEntries(members.map(({ name, answer }) => [name, answer])),
+    present: Object.fromEntries(members.map(({ name, present }) => [name, present])),
   };
 }

@@ -16,9 +16,8 @@ import { createElement, createSlider, followDrag } from './page_elements.js';
 /** @typedef {import("./mixer_data.js").Data} Data */
 /** @typedef {import("../drawing/colour.js").RGB} RGB */
 
-/** A look from which a mixer begins.
- * @typedef {{name: string, emission: Map<string, RGB>, kelvin: Map<string, number | null>,
- *   transform: Data['transform']}} Look */
+/** A look from which a mixer begins. start: returns its data from those of its basis.
+ * @typedef {{start: (data: Data) => Data}} Look */
 
 /** Width of a light's picture in its row, and the share of its pixels that are at most white. */
 const [THUMBNAIL_WIDTH, WHITE_SHARE] = [88, 0.98];
@@ -155,15 +154,21 @@ class Mixer {
       const isOn = isSolo ? row.isSolo : !row.isMute;
       // Joint lights have a plane per look; the last reset chose it.
       const plane = row.light.joint && this.look === 'present' ? row.plane + 1 : row.plane;
-      if (isOn) currentWeights.set(row.light.isFixed ? row.rgb : this.dimmed(row.rgb), 3 * plane);
+      const rgb = row.light.isFixed ? row.rgb : this.dimmed(row.rgb);
+      if (!isOn) continue;
+      for (const k of row.light.joint?.members ?? [])
+        currentWeights.set(product(this.data.lights[k][this.look], rgb), 3 * k);
+      if (!row.light.joint?.members) currentWeights.set(rgb, 3 * plane);
     }
     return currentWeights;
   }
 
   /** Lights with a plane but without sliders. @returns {number[]} */
   hiddenLights() {
-    const { shown, lights } = this.data;
-    return shown ? lights.map((_, k) => k).filter((k) => !shown.includes(k)) : [];
+    const { shown, lights, joint } = this.data;
+    if (!shown) return [];
+    const rows = [...shown, ...joint.flatMap(({ members }) => members ?? [])];
+    return lights.map((_, k) => k).filter((k) => !rows.includes(k));
   }
 
   draw() {
@@ -220,7 +225,7 @@ class Mixer {
       if (!light.joint) add(light.name, rgb);
       else
         for (const [name, emission] of Object.entries(light.joint[this.look]))
-          add(name, /** @type {RGB} */ (emission.map((x, c) => x * rgb[c])));
+          add(name, product(emission, rgb));
     }
     for (const { light } of this.rows)
       if (light.isFixed)
@@ -247,6 +252,9 @@ class Mixer {
     }
   }
 }
+
+/** @param {RGB} a @param {RGB} b */
+const product = (a, b) => /** @type {RGB} */ (a.map((x, c) => x * b[c]));
 
 /** @param {string} text @param {string} title @param {() => void} act */
 function createButton(text, title, act) {
@@ -277,15 +285,7 @@ export async function begin(root, look, isWanted = () => true) {
 /** @param {HTMLElement} body @param {HTMLElement} root @param {Look} [look] */
 async function buildMixer(body, root, look) {
   let [data, planes, gels] = await unpackMixer(root);
-  if (look) {
-    const lights = data.lights.map((light) => {
-      const answer = look.emission.get(light.name) ?? light.present;
-      const kelvin = { ...light.kelvin, answer: look.kelvin.get(light.name) ?? null };
-      return { ...light, answer, kelvin };
-    });
-    const lighting = { ...data.lighting, target: `${look.name}-mix` };
-    data = { ...data, lights, lighting, transform: look.transform };
-  }
+  if (look) data = look.start(data);
   return new Mixer(body, [data, planes, gels], await lutOf(data.transform));
 }
 
