@@ -6,12 +6,14 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_images import joined_texels, texel_lights
 from lightpaint.colour.color import luminance
 from lightpaint.display_text import some_of
 from lightpaint.images.bands import sum_by_bands
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.loss.painting import ignored_paint
 from lightpaint.lighting.solution import Solution
+from lightpaint.scene.lights.texels.texel import image_of
 from lightpaint.target.target import Target
 
 #: Ratio to the painted brightness from which an emitter that does not count is worth a warning.
@@ -77,8 +79,8 @@ def _known_by_sight_alone(solution: Solution, ignored: Bools) -> list[str]:
         return []
     pronoun, clause = ("it", "it is") if len(names) == 1 else ("them", "they are")
     return [
-        f"WARNING: too few samples show the light of {some_of(names, room=300)} on surfaces, but "
-        f'the camera sees {pronoun}: emitters="count" solves {pronoun} by how bright '
+        f"WARNING: too few samples show the light of {some_of(joined_texels(names), room=300)} on "
+        f'surfaces, but the camera sees {pronoun}: emitters="count" solves {pronoun} by how bright '
         f"{clause} painted"
     ]
 
@@ -103,14 +105,15 @@ def _too_bright(
     predicted_light, painted_light = (
         np.asarray(luminance(x[ignored])) for x in (predicted.image, target.image)
     )
+    is_texel = texel_lights(basis.lights)
+    names = [image_of(x) if is_texel[k] else x for k, x in enumerate(basis.names)]
     texts = []
-    for k in np.unique(brightest_light):
-        reached, goal = (
-            predicted_light[brightest_light == k].sum(),
-            np.maximum(painted_light[brightest_light == k], 0).sum(),
-        )
-        if reached > MIN_RATIO * goal and not basis.is_fixed[k]:
-            texts.append(f"{basis.names[k]} ({_times(float(reached), float(goal))})")
+    for name in dict.fromkeys(names[k] for k in np.unique(brightest_light)):
+        lights = [k for k, x in enumerate(names) if x == name and not basis.is_fixed[k]]
+        is_its = np.isin(brightest_light, lights)
+        reached, goal = predicted_light[is_its].sum(), np.maximum(painted_light[is_its], 0).sum()
+        if reached > MIN_RATIO * goal:
+            texts.append(f"{name} ({_times(float(reached), float(goal))})")
     if not texts:
         return []
     return [
