@@ -11,6 +11,8 @@ writes beside itself
     placement.jpg   the gallery's evening with spots that may turn and slide on their two tracks, as
                     a report draws it; it also prints what moved, and the processor's seconds
     table.jpg       the table's painting of sunset, the answer, and the sky that was found for it
+    led-wall.jpg    the stage with the picture that its wall of LEDs shows for the sunset, which is
+                    in a corner
 
 Each scene's basis is rendered once at 1280 x 720, the table's of 130 lights at 640 x 360, and kept
 in FOLDER for the next time if there is one. Each look is the sum of that basis for the lighting
@@ -42,10 +44,14 @@ from lightpaint.images.denoiser import denoised  # noqa: E402
 from lightpaint.report.page.placement_section import aim_picture  # noqa: E402
 from lightpaint.report.rig.hung_lights import hung_lights  # noqa: E402
 from lightpaint.report.rig.rig_drawing import rig_drawing  # noqa: E402
+from lightpaint.scene.scene_render import Stream, render  # noqa: E402
 
 SIZE = (1280, 720)
 CELL, INSET, GAP = (640, 360), (176, 99), 8
-PICTURES = ("gallery", "stage", "six-looks", "placement", "table")
+PICTURES = ("gallery", "stage", "six-looks", "placement", "table", "led-wall")
+
+#: Columns and rows of the wall of LEDs, and the size of the picture of it.
+WALL, WALL_SIZE = (16, 9), (960, 540)
 
 #: The two tracks of the gallery, the spots that may turn and slide on each, and spots to add.
 TRACKS = {
@@ -204,6 +210,35 @@ def table(spp: int) -> Image.Image:
     return sheet
 
 
+def led_wall(spp: int) -> Image.Image:
+    """The stage in front of a wall of LEDs, with the picture that the wall shows in a corner."""
+    path = ROOT / "scenes" / "stage" / "led_wall.xml"
+    size = {"width": WALL_SIZE[0], "height": WALL_SIZE[1]}
+    with tempfile.TemporaryDirectory() as folder:
+        look = lp.paint_with_light(
+            lp.load_scene(path, split={"wall": WALL}),
+            ROOT / "targets" / "stage" / "sunset.exr",
+            Path(folder) / "look",
+            spp=spp,
+            resolution="1/2",
+            resize=True,
+            emitters="count",
+            report=False,
+        )
+        relit = lp.load_scene(Path(folder) / "look" / "relit.xml", parameters=size)
+        rendered = render(relit, spp=spp, stream=Stream.TEMPLATE).image
+    print(f"stage with a wall of LEDs: {look.verdict}", flush=True)
+    sheet = shown(denoise(rendered, see(path, size=WALL_SIZE)))
+    [wall] = light_images(look.basis.lights)
+    weights = look.lighting.weights_for(look.basis)
+    small = shown(wall.domain.interpolated(weights[wall.places], INSET))
+    left, top = 10, WALL_SIZE[1] - INSET[1] - 10
+    draw = ImageDraw.Draw(sheet)
+    draw.rectangle((left - 2, top - 2, left + INSET[0] + 1, top + INSET[1] + 1), fill="white")
+    sheet.paste(small, (left, top))
+    return sheet
+
+
 def cpu_s() -> float:
     """Seconds of the processor that this process has taken."""
     usage = resource.getrusage(resource.RUSAGE_SELF)
@@ -231,6 +266,8 @@ def main() -> None:
         made["placement"] = placement()
     if "table" in wanted:
         made["table"] = table(asked.spp)
+    if "led-wall" in wanted:
+        made["led-wall"] = led_wall(asked.spp)
     for name, picture in made.items():
         picture.save(HERE / f"{name}.jpg", quality=88, optimize=True, progressive=True)
 

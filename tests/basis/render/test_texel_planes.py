@@ -28,6 +28,9 @@ from lightpaint.target.target import Target
 ROTATED = """<emitter type="envmap" id="sky"><string name="filename" value="map.exr"/>
     <float name="scale" value="2"/><transform name="to_world"><rotate x="1" angle="40"/>
     <rotate y="1" angle="70"/></transform></emitter>"""
+#: A pane of glass before the camera.
+PANE = """<shape type="rectangle"><transform name="to_world"><scale value="0.6"/>
+    <translate x="-0.3" y="0.9" z="1.6"/></transform><bsdf type="thindielectric"/></shape>"""
 SHORT = '<integrator type="path"><integer name="max_depth" value="1"/></integrator>'
 
 
@@ -154,3 +157,10 @@ def test_the_lights_file_splits_a_sky_and_constrains_all_its_texels(tmp_path: Pa
     basis = render_basis(scene, spp=2)
     problem = Problem.of(basis, Target.of(np.ones((*basis.size, 3))))
     assert not problem.reduction.is_free.any()
+
+
+def test_a_sky_behind_a_window_is_confirmed_by_a_render(tmp_path: Path) -> None:
+    scene = split_room(tmp_path, ROTATED + PANE)
+    lighting = painted(scene)
+    predicted = combine(render_basis(scene, spp=256), lighting)
+    assert verify(predicted, relight(scene, lighting, tmp_path / "relit.xml"), spp=256).agrees
