@@ -50,7 +50,9 @@ class JointLights:
     def data(self, basis: Basis, lighting: Lighting) -> dict[str, Any]:
         """Return its record for the page. columns: of its map; 0 without one."""
         answer, current = lighting.weights_for(basis), basis.current_weights
-        is_whole = self.image is not None and self.image.is_whole
+        image = self.image
+        # The map has a texel for each light, which a symmetric image has not.
+        has_map = image is not None and len(image.lights) == image.places.size
 
         def by_name(weights: Doubles) -> dict[str, list[float]]:
             lights = [k for k in self.lights if not basis.is_fixed[k]]
@@ -58,7 +60,7 @@ class JointLights:
 
         return {
             "label": self.label,
-            "columns": self.image.size[0] if self.image is not None and is_whole else 0,
+            "columns": image.size[0] if image is not None and has_map else 0,
             "levels": {"answer": self.level(answer, current), "present": 1.0},
             "answer": by_name(answer / self.level(answer, current)),
             "present": by_name(current),

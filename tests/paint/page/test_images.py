@@ -133,3 +133,20 @@ def test_keys_reach_each_texel_and_readers_hear_of_it(new_painter: Any, axe: str
     assert list(last_request(painter)["constraints"]) == ["sky.x2.y1"]
     assert (cell.get_attribute("aria-label") or "").endswith(", locked")
     assert violations(page, ".light.is-image") == []
+
+
+def test_in_a_symmetric_image_two_texels_are_one_light(painter: Painter) -> None:
+    """Of the left and the right column, and of the two between them."""
+    painter.page.evaluate(
+        """() => {
+          const state = window.host.state();
+          const [image] = state.images;
+          image.places = image.places.map(([a, b]) => [a, b, b, a]);
+          window.host.tell({ ...state, reply: 0 });
+        }"""
+    )
+    unfold(painter)
+    drag(painter, (3, 1))
+    painter.still()
+    assert list(last_request(painter)["constraints"]) == ["sky.x0.y1"]
+    assert painter.page.locator(".texel-lock").count() == 2

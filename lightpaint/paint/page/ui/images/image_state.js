@@ -2,7 +2,7 @@
 
 import { fromKelvin } from '../paint_colour.js';
 
-/** A light that is an image. lights: indices of its texels, row by row.
+/** A light that is an image. lights: indices of its texels, each once, row by row.
  * @typedef {import("../../engine/messages.js").ImageInfo & {lights: number[]}} LightImage */
 /** What a drag over the map of an image does to its texels.
  * @typedef {"paint" | "lock" | "release"} TexelTool */

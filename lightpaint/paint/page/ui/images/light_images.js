@@ -12,10 +12,13 @@ const CLIPPED_SHARE = 0.02;
 /** @type {WeakMap<LightImage[], Map<number, LightImage>>} */
 const owners = new WeakMap();
 
-/** Return images with the list of their texels. @param {import("../../engine/messages.js").ImageInfo[]} infos
+/** Return images with the list of their lights; in a symmetric one two texels are one light. @param {import("../../engine/messages.js").ImageInfo[]} infos
  * @returns {LightImage[]} */
 export const withLights = (infos) =>
-  infos.map((info) => ({ ...info, lights: info.places.flat().filter((k) => k >= 0) }));
+  infos.map((info) => ({
+    ...info,
+    lights: [...new Set(info.places.flat().filter((k) => k >= 0))],
+  }));
 
 /** Return the image that a light is a texel of. @param {LightImage[]} images @param {number} light
  * @returns {LightImage | undefined} */

@@ -150,7 +150,7 @@ function Grid({ image, ui, app, held, place, setPlace }) {
       places.map(
         (k, column) =>
           held.includes(k) &&
-          html`<i key=${k} class="texel-lock" aria-hidden="true" style=${cell([row, column])}></i>`,
+          html`<i key=${`${row} ${column}`} class="texel-lock" aria-hidden="true" style=${cell([row, column])}></i>`,
       ),
     )}
     ${place && html`<i class="texel-here" aria-hidden="true" style=${cell(place)}></i>`}
