@@ -12,8 +12,10 @@ import pytest
 from command import run, run_refused, succeed
 
 import lightpaint as lp
+from lightpaint.basis.lights import Lights
 from lightpaint.images.formats.exr import ExrPart, rgb_channels, write_parts
 from lightpaint.report.visible_emitters import emitter_remarks
+from lightpaint.scene.lights.texels.texel import texel_names
 
 SIZE = (12, 10)
 TIMES = 350.0
@@ -72,6 +74,24 @@ def test_which_pixels_count(
     assert 'emitters="count"' in remark
     assert warning.startswith("WARNING")
     assert "bulb (350 times)" in warning
+
+
+def test_a_wall_in_texels_is_named_once(make_basis: Any):
+    """Each of its texels is seen in one pixel, and lights a quarter of the room."""
+    images, seen = np.full((4, *SIZE, 3), 0.001), np.zeros(SIZE, bool)
+    for k in range(4):
+        images[k, 3 * k : 3 * k + 3] = 0.01
+        images[k, 3 * k, 0], seen[3 * k, 0] = 1.0, True
+    basis = make_basis(images=images, names=texel_names("led", (2, 2)), seen=seen)
+    lights = Lights(tuple(replace(x, plugin="area") for x in basis.lights))
+    basis = replace(basis, lights=lights)
+    room = basis.mix(np.full((4, 3), TIMES))
+    target = lp.Target.of(np.where(seen[..., None], 1, room).astype(np.float32))
+    solution = lp.solve(basis, target)
+    remarks = emitter_remarks(target, solution, lp.combine(basis, solution.lighting))
+    [warning] = (x for x in remarks if "brighter than painted" in x)
+    assert "led (3" in warning
+    assert "led.x" not in warning
 
 
 def test_a_bulb_as_painted_is_no_warning(basis: lp.Basis):

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from lightpaint.arrays import RGB, Floats
+from lightpaint.basis.light_images import joined_texels
 from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError, OutputError
@@ -158,8 +159,8 @@ def _exported(lighting: Lighting, source: Source) -> tuple[Lighting, str]:
     if not names:
         return tied_lighting, ""
     return tied_lighting, (
-        f"the painting does not tell the colour of {some_names(names)}: other programs get the "
-        "one in the scene"
+        f"the painting does not tell the colour of {some_names(joined_texels(names))}: other "
+        "programs get the one in the scene"
     )
 
 
