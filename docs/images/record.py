@@ -14,6 +14,7 @@ writes beside itself
     painter-presets.jpg, painter-looks.jpg, painter-history.jpg  what is asked for at a click, the
                         looks that were kept, and the steps that led to them
     painter-lamps.jpg   spots dimmed together, two of them with a gel, under a master
+    painter-sky.jpg     the table under a sky in texels, some of which are painted on its map
     painter-side-by-side.jpg   three looks side by side, in the light theme
     painter-tour.jpg, painter-keys.jpg, painter-settings.jpg, painter-analysis.jpg  a step of the
                         tour, the shortcuts, the settings, and why an answer is no closer
@@ -256,6 +257,31 @@ def many_lamps(hand: Hand) -> None:
     _type(page, "Filter", "201")
     page.get_by_role("textbox", name="Filter", exact=True).fill("")  # lists all
     _type(page, "Master", "70")
+    page.mouse.move(5, 5)
+    hand.wait()
+
+
+def painted_sky(hand: Hand) -> None:
+    """A sun and a blue half, painted on the map of a sky; the room shows it."""
+    page = hand.page
+    page.locator(".is-colour .fold-head button").first.click()
+    page.get_by_role("button", name="sky", exact=True).click()
+    paint = page.get_by_role("group", name="Paint of texels")
+    sky = page.get_by_role("grid", name="Texels of sky")
+    strokes = (
+        ("#ff7a30", "2.5", (0.03, 0.43), (0.28, 0.43)),
+        ("#3050ff", "0.5", (0.53, 0.32), (0.97, 0.32)),
+    )
+    for color, stops, *places in strokes:
+        paint.get_by_label("Hex").fill(color)
+        page.keyboard.press("Enter")
+        paint.get_by_role("textbox", name="Brightness").fill(stops)
+        page.keyboard.press("Enter")
+        sky.scroll_into_view_if_needed()
+        box = sky.bounding_box()
+        assert box is not None
+        hand.drag(*((box["x"] + u * box["width"], box["y"] + v * box["height"]) for u, v in places))
+    page.get_by_role("slider", name="sky, stops from now").scroll_into_view_if_needed()
     page.mouse.move(5, 5)
     hand.wait()
 
@@ -510,6 +536,7 @@ def main() -> None:
         "layers",
         "selection",
         "lamps",
+        "sky",
         "lights",
         "reference",
         "looks",
@@ -530,6 +557,10 @@ def main() -> None:
         with painter("gallery", asked.spp, asked.port) as url, using(url) as hand:
             many_lamps(hand)
             hand.page.screenshot(path=HERE / "painter-lamps.jpg", type="jpeg", quality=88)
+    if asked.only in (None, "sky"):
+        with painter("table", asked.spp, asked.port) as url, using(url) as hand:
+            painted_sky(hand)
+            hand.page.screenshot(path=HERE / "painter-sky.jpg", type="jpeg", quality=88)
     if asked.only in (None, "reference"):
         with painter("gallery", asked.spp, asked.port) as url, using(url) as hand:
             page = hand.page
