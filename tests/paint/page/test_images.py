@@ -150,3 +150,29 @@ def test_in_a_symmetric_image_two_texels_are_one_light(painter: Painter) -> None
     painter.still()
     assert list(last_request(painter)["constraints"]) == ["sky.x0.y1"]
     assert painter.page.locator(".texel-lock").count() == 2
+
+
+def test_lists_of_lights_have_an_image_once(painter: Painter) -> None:
+    page = painter.page
+    page.evaluate(
+        """() => painter.store.set({ probe: {
+          object: 'floor', index: 2, light: [1, 1, 1], shares: [0.4, 0, 0, ...Array(12).fill(0.05)]
+        } })"""
+    )
+    painter.still()
+    status = page.locator("#lp-status").inner_text()
+    assert "sky60 %" in status
+    assert "sky.x" not in status
+    rows = page.evaluate(
+        """async () => {
+          const { rowsOf } = await import('/ui/lamp_table.js');
+          const ui = painter.store.value;
+          const lights = ui.lights.map(({ name }) => name);
+          const looks = [1, 2].map((factor) => ({
+            lights, weights: ui.weights.map((rgb, k) => rgb.map((x) => (k < 3 ? x : factor * x)))
+          }));
+          return rowsOf(ui, ...looks).map(({ name, text }) => [name, text]);
+        }"""
+    )
+    assert rows[0] == ["sky", "+1.0 st"]
+    assert len(rows) == 4

@@ -4,6 +4,7 @@ import { html } from '../vendor/preact.js';
 import { AdviceButton } from './advice.js';
 import { Button, TruncatedText, reveal } from './controls.js';
 import { lightText, numberText, shortenName } from './format.js';
+import { imageOf } from './images/light_images.js';
 import { pointingHint } from './lamp_fields.js';
 import { isAnswerHidden, saveLook } from './look_actions.js';
 import { toolHint } from './tools.js';
@@ -101,8 +102,7 @@ export function PointerStatus({ ui }) {
   }
   const { object, shares, light } = ui.probe;
   const exposedLight = light.map((x) => x * 2 ** exposureOf(ui.state));
-  const largestShares = (isAnswerHidden(ui) ? [] : shares)
-    .map((share, k) => ({ share, k }))
+  const largestShares = sharesByName(ui, isAnswerHidden(ui) ? [] : shares)
     .filter(({ share }) => share >= 0.01)
     .sort((a, b) => b.share - a.share)
     .slice(0, 5);
@@ -111,7 +111,21 @@ export function PointerStatus({ ui }) {
       ui.tool === 'pick' && html` · RGB ${exposedLight.map((x) => numberText(x, 3)).join(' ')}`
     }</span>
     ${largestShares.map(
-      ({ share, k }) => html`<span key=${k}>${shortenName(ui.lights[k]?.label ?? '', 24)}
+      ({ share, key, name }) => html`<span key=${key}>${shortenName(name, 24)}
       <b>${Math.round(100 * share)} %</b></span>`,
     )}</p>`;
+}
+
+/** Return the share of each light, and of each image that of all its texels.
+ * @param {Ui} ui @param {number[]} shares */
+function sharesByName(ui, shares) {
+  /** @type {Map<unknown, {key: string, name: string, share: number}>} */
+  const sums = new Map();
+  shares.forEach((share, k) => {
+    const image = imageOf(ui.images, k);
+    const name = image?.name ?? ui.lights[k]?.label ?? '';
+    const sum = sums.get(image ?? k) ?? { key: image ? `image ${name}` : `${k}`, name, share: 0 };
+    sums.set(image ?? k, { ...sum, share: sum.share + share });
+  });
+  return [...sums.values()];
 }

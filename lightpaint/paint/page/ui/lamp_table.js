@@ -2,6 +2,7 @@
 
 import { html } from '../vendor/preact.js';
 import { signedText, whiteText } from './format.js';
+import { meanOf, wholeLight } from './images/light_images.js';
 import { atFullBrightness, luminance, toHex, toKelvin } from './paint_colour.js';
 import { fill, words } from '../language/language.js';
 
@@ -18,6 +19,7 @@ const [MIN_STOPS, MIN_MIRED] = [0.05, 3];
 export function LampTable({ ui, first, second }) {
   const rows = rowsOf(ui, first, second);
   const presents = new Map(ui.lights.map(({ name, present }) => [name, present]));
+  for (const image of ui.images) presents.set(image.name, wholeLight(image, ui.lights).present);
   return html`<div class="lamp-table" tabindex="0" role="group" aria-label=${words.lampTable.lampsOfTwoLooks}><table>
     <thead><tr><th scope="col">${words.lampTable.lamp}</th><th scope="col">${first.name}</th>
       <th scope="col">${second.name}</th><th scope="col">${words.lampTable.difference}</th></tr></thead>
@@ -33,7 +35,7 @@ export function LampTable({ ui, first, second }) {
 }
 
 /** @param {Ui} ui @param {Look} first @param {Look} second @returns {Row[]} */
-export function rowsOf({ lights }, first, second) {
+export function rowsOf({ lights, images }, first, second) {
   const names = [
     ...new Set([...lights.map(({ name }) => name), ...first.lights, ...second.lights]),
   ];
@@ -41,11 +43,21 @@ export function rowsOf({ lights }, first, second) {
     const k = look.lights.indexOf(name);
     return k < 0 ? null : look.weights[k];
   };
-  const rows = names.map((name) => {
+  const texels = new Set(images.flatMap((image) => image.lights.map((k) => lights[k].name)));
+  const rows = names.filter((name) => !texels.has(name)).map((name) => {
     const emissions = [emission(first, name), emission(second, name)];
     const label = lights.find((light) => light.name === name)?.label ?? name;
     return { name, label, emissions, ...differenceOf(emissions) };
   });
+  for (const image of images) {
+    const emissions = [first, second].map((look) => {
+      const texel = (/** @type {number} */ k) => emission(look, lights[k].name);
+      if (!image.lights.every(texel)) return null;
+      return meanOf(image, (k) => texel(k) ?? [0, 0, 0]);
+    });
+    const { name } = image;
+    rows.push({ name, label: name, emissions, ...differenceOf(emissions) });
+  }
   return rows.sort((a, b) => b.difference - a.difference);
 }
 
