@@ -84,6 +84,13 @@ def test_a_symmetric_sky_keeps_to_its_limits_and_whites(folder: Path) -> None:
     assert again == (folder / "out" / "relit.sky.exr").read_bytes()
 
 
+def test_the_list_of_lights_has_the_whole_image(folder: Path) -> None:
+    options = ["--split", "sky=5x4", "--symmetric", "sky", "--no-sheet"]
+    output = succeed(folder, "lights", "sky.xml", *options)
+    assert "5x4 texels sky.xCOLUMN.yROW, symmetric" in output
+    assert [line.split()[0] for line in output.splitlines()] == ["light", "sky", "bulb"]
+
+
 def test_an_image_that_is_not_split_cannot_be_symmetric(folder: Path) -> None:
     error = run_refused(folder, "lights", "sky.xml", "--symmetric", "sky", "--no-sheet")
     assert "symmetric: 'sky' is not split into texels" in error

@@ -27,13 +27,15 @@ def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
     # Lumens and candelas need a scale.
     amounts = () if cd_per_unit is None else ("luminous", "flux")
     table = terminal.table(*headings, *amounts)
-    images = images_of(light.name for light in scene.lights)
+    adjusted = (x for x in scene.lights if not x.is_fixed and image_of(x.name))
+    images = images_of(name for light in adjusted for name in light.member_names)
     for image, (columns, rows) in images.items():
-        texels = [light.emission for light in scene.lights if image_of(light.name) == image]
+        texels = [x.emission for x in scene.emitters if x.texel and x.texel.image == image]
         light = scene.light(texel_name(image, 0, 0))
         shares = domain_of(light.plugin).shares((columns, rows))
         mean = np.average(texels, axis=0, weights=shares.ravel())
-        size = f"{columns}x{rows} texels {image}.xCOLUMN.yROW"
+        symmetric = ", symmetric" if image in scene.symmetric else ""
+        size = f"{columns}x{rows} texels {image}.xCOLUMN.yROW{symmetric}"
         table.row(image, light.plugin, terminal.numbers(as_rgb(mean)), light.unit, size, "", "")
     for light in scene.lights:
         if image_of(light.name) in images:
