@@ -1,6 +1,6 @@
 """Measure how well known skies come back from pictures of a ball that they light.
 
-    python benchmarks/image_lights.py [--sizes 8x4 16x8 32x16] [--spp 256] [--time-only]
+    python benchmarks/image_lights.py [--sizes 8x4 16x8 32x16] [--spp 256] [--time-only] [--rivals]
 
 A ball on a checkered plane, 96 x 72 pixels, diffuse, glossy or a mirror. It is lit by an overcast
 sky; the target is a long render under another sky, known as a map of 128 x 64 pixels. For each size
@@ -12,6 +12,10 @@ of the image that is solved for, and for the sky as one light, it prints
   their correlation, weighted by solid angle where the picture shows the sky.
 - check: the same share for a plain render of the written image, and whether it agrees.
 
+With --rivals, Adam through Mitsuba's differentiable renderer has the same texels, from the overcast
+sky, for as much of the processor as basis and solve take together, and for four times as much: the
+better of two step sizes, judged like the check, by a plain render.
+
 And it prints the processor's time of a basis relative to an ordinary render of as many samples.
 """
 
@@ -22,6 +26,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from image_light_rivals import adam
 
 import lightpaint as lp
 from lightpaint.arrays import Doubles, Floats
@@ -59,6 +64,8 @@ SCENE = """<scene version="3.0.0">
 """
 #: Samples per pixel of targets and of checks.
 TARGET_SPP, CHECK_SPP = 1024, 512
+#: Steps of Adam, in radiance, and how often it has the time of basis and solve.
+STEP_SIZES, TIMES = (0.03, 0.1), (1, 4)
 
 
 def directions(width: int, height: int) -> Doubles:
@@ -127,19 +134,58 @@ def map_error(
     return float(error), float((weight * a * b).sum() / np.sqrt(spread))
 
 
-def rows_of(folder: Path, material: str, sizes: list[str], spp: int) -> Iterator[str]:
+def rival_row(
+    folder: Path, material: str, sky: str, label: str, basis: Basis, target: Floats, budget_s: float
+) -> str:
+    """Return the row of Adam for an image. budget_s: of the processor, for each step size."""
+    maps, size = skies(), parse_size(label, "size")
+    counted, rows = ~basis.emitters_seen, []
+    [image] = light_images(basis.lights)
+    overcast = image.domain.coarse(maps["overcast"], size)
+    write_rgb(folder / "start.exr", overcast.astype(np.float32))
+    start = scene_file(folder, material, "start")
+    for step_size in STEP_SIZES:
+        found, steps = adam(
+            start, target, counted, size=size, budget_s=budget_s, step_size=step_size
+        )
+        write_rgb(folder / "adam.exr", found.astype(np.float32))
+        relit = lp.load_scene(scene_file(folder, material, "adam"))
+        check = render(relit, spp=CHECK_SPP, seed=9, stream=Stream.VERIFICATION).image
+        share, difference = missed(check, target, counted)
+        known = image.domain.coarse(maps[sky], size)
+        error, likeness = map_error(image, basis, found, known)
+        rows.append(
+            (
+                share,
+                f"| {material} | {sky} | {label}, Adam, {steps} steps in {budget_s:.1f} s | "
+                f"{share:.4f} | {difference:.1f} | {error:.2f} | {likeness:.2f} | "
+                f"{share:.4f} |",
+            )
+        )
+    return min(rows)[1]
+
+
+def rows_of(
+    folder: Path, material: str, sizes: list[str], spp: int, *, has_rivals: bool
+) -> Iterator[str]:
     """Yield the table rows of one material."""
     maps = skies()
     plain = lp.load_scene(scene_file(folder, material, "overcast"))
     splits: dict[str, Scene] = {"one light": plain}
     splits |= {size: lp.load_scene(plain.path, split={"sky": size}) for size in sizes}
-    bases = {label: lp.render_basis(scene, spp=spp) for label, scene in splits.items()}
+    bases, spent_s = {}, {}
+    for label, scene in splits.items():
+        lp.render_basis(scene, spp=2)  # compiles the kernels
+        begin_s = time.process_time()
+        bases[label] = lp.render_basis(scene, spp=spp)
+        spent_s[label] = time.process_time() - begin_s
     for sky in ("sunset", "studio"):
         lit = lp.load_scene(scene_file(folder, material, sky))
         target = render(lit, spp=TARGET_SPP, seed=5, stream=Stream.TEMPLATE).image
         for label, scene in splits.items():
-            basis = bases[label]
+            basis, begin_s = bases[label], time.process_time()
             solution = lp.solve(basis, lp.Target.of(target), space="linear", colors="free")
+            budget_s = spent_s[label] + time.process_time() - begin_s
             predicted, counted = lp.combine(basis, solution.lighting), ~basis.emitters_seen
             share, difference = missed(predicted.image, target, counted)
             relit = lp.relight(scene, solution.lighting, folder / "relit.xml")
@@ -155,6 +201,9 @@ def rows_of(folder: Path, material: str, sizes: list[str], spp: int) -> Iterator
                 f"| {material} | {sky} | {label} | {share:.4f} | {difference:.1f} | {maps_text} | "
                 f"{checked:.4f}, {'agrees' if agrees else 'DISAGREES'} |"
             )
+            if has_rivals and scene.split:
+                for times in TIMES:
+                    yield rival_row(folder, material, sky, label, basis, target, times * budget_s)
 
 
 def times_of(folder: Path, sizes: list[str], spp: int) -> Iterator[str]:
@@ -188,6 +237,7 @@ def main() -> None:
     parser.add_argument("--materials", nargs="+", default=list(MATERIALS))
     parser.add_argument("--spp", type=int, default=256)
     parser.add_argument("--time-only", action="store_true")
+    parser.add_argument("--rivals", action="store_true")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -201,7 +251,9 @@ def main() -> None:
         print("\n| ball | sky | image | missed | ΔE | map error | correlation | check |")
         print("|---|---|---|---|---|---|---|---|")
         for material in options.materials:
-            for row in rows_of(folder, material, options.sizes, options.spp):
+            for row in rows_of(
+                folder, material, options.sizes, options.spp, has_rivals=options.rivals
+            ):
                 print(row, flush=True)
 
 
