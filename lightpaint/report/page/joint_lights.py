@@ -48,7 +48,7 @@ class JointLights:
         return [np.where(is_its, x, 0) for x in (answer / level, current)]
 
     def data(self, basis: Basis, lighting: Lighting) -> dict[str, Any]:
-        """Return its record for the page. columns: of its map; 0 without one."""
+        """Return its record for the page, whose `columns` are those of its map, 0 without one."""
         answer, current = lighting.weights_for(basis), basis.current_weights
         image = self.image
         # The map has a texel for each light, which a symmetric image has not.
