@@ -1,6 +1,7 @@
 """A session whose sky is an image: its texels are painted, undone, kept, and exported."""
 
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,8 +9,10 @@ import numpy as np
 import pytest
 from renderer import LIGHTS, write_room
 
+from lightpaint.errors import PaintError
 from lightpaint.paint import protocol
 from lightpaint.paint.protocol import Message
+from lightpaint.paint.session_file import session_identity
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject_factory import make_subject
@@ -81,3 +84,7 @@ def test_painted_texels_are_undone_kept_and_exported(tmp_path: Path) -> None:
     np.testing.assert_allclose(written[1, 2:], [ORANGE, ORANGE], rtol=1e-3)  # halves
     np.testing.assert_allclose(written[1, 0], before[image["places"][1][0]], rtol=1e-3)
     again.close()
+    whole = make_subject(SceneFile(str(tmp_path / "room.xml")), settings=Settings(spp=4))
+    identity = session_identity([replace(whole, basis=next(whole.bases()))])
+    with pytest.raises(PaintError, match=r"lights 12 texels of sky, bulb, and .* has sky, bulb:"):
+        Store.open(tmp_path / "session" / "session.db", identity)

@@ -12,6 +12,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
 
+from lightpaint.basis.light_images import joined_texels
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError, OutputError, PaintError
 from lightpaint.files import first_line, flush
@@ -139,9 +140,10 @@ def _check_identity(database: sqlite3.Connection, path: Path | None, identity: I
         for old, new in zip(stored.views, identity.views, strict=False):
             _check_view(path, identity.scene, old, new)
         if stored.lights != identity.lights:
+            old_names, names = map(joined_texels, (stored.lights, identity.lights))
             raise PaintError(
-                f"{path} is a session of the lights {some_names(stored.lights)}, and "
-                f"{identity.scene} has {some_names(identity.lights)}: {START_AFRESH}"
+                f"{path} is a session of the lights {some_names(old_names)}, and "
+                f"{identity.scene} has {some_names(names)}: {START_AFRESH}"
             )
 
 

@@ -176,3 +176,12 @@ def test_lists_of_lights_have_an_image_once(painter: Painter) -> None:
     )
     assert rows[0] == ["sky", "+1.0 st"]
     assert len(rows) == 4
+
+
+def test_a_notebook_paints_texels_too(new_painter: Any) -> None:
+    painter = new_painter(f"{QUERY}&model")
+    unfold(painter)
+    drag(painter, (1, 1))
+    painter.still()
+    assert list(last_request(painter)["constraints"]) == ["sky.x1.y1"]
+    assert painter.page.locator(".texel-lock").count() == 1
