@@ -75,22 +75,13 @@ function Grid({ image, ui, app, held, place, setPlace }) {
     if (!canvas.current) return;
     drawMap(canvas.current, image, ui.weights, stroke.current?.stops ?? mapStops(image, ui.weights));
   });
-  const placeAt = (/** @type {PointerEvent} */ event) => {
-    const box = /** @type {Element} */ (event.currentTarget).getBoundingClientRect();
-    const along = (/** @type {number} */ share, /** @type {number} */ count) =>
-      Math.min(count - 1, Math.max(0, Math.floor(share * count)));
-    return /** @type {Place} */ ([
-      along((event.clientY - box.top) / box.height, rows),
-      along((event.clientX - box.left) / box.width, columns),
-    ]);
-  };
   const texelAt = (/** @type {Place} */ [row, column]) => image.places[row][column];
   const apply = (/** @type {boolean} */ isFinal) =>
     applyTool(image, ui, app, [...(stroke.current?.texels ?? [])], isFinal);
   const begin = (/** @type {PointerEvent} */ event) => {
     if (event.button !== 0) return;
     event.preventDefault();
-    const start = placeAt(event);
+    const start = placeAt(event, rows, columns);
     if (event.altKey) return pick(image, ui, app, texelAt(start));
     const element = /** @type {HTMLElement} */ (event.currentTarget);
     element.setPointerCapture(event.pointerId);
@@ -101,7 +92,7 @@ function Grid({ image, ui, app, held, place, setPlace }) {
     return apply(false);
   };
   const move = (/** @type {PointerEvent} */ event) => {
-    const next = placeAt(event);
+    const next = placeAt(event, rows, columns);
     if (String(next) !== String(place)) setPlace(next);
     const current = stroke.current;
     if (!current || String(next) === String(current.last)) return;
@@ -124,20 +115,14 @@ function Grid({ image, ui, app, held, place, setPlace }) {
     event.stopPropagation();
     if (step) {
       const next = /** @type {Place} */ ([
-        Math.min(rows - 1, Math.max(0, key[0] + step[0])),
-        Math.min(columns - 1, Math.max(0, key[1] + step[1])),
+        clamp(key[0] + step[0], rows),
+        clamp(key[1] + step[1], columns),
       ]);
       setKey(next);
       setPlace(next);
     } else if (event.altKey) pick(image, ui, app, texelAt(key));
     else applyTool(image, ui, app, [texelAt(key)].filter((k) => k >= 0), true);
   };
-  const cell = (/** @type {Place} */ [row, column]) => ({
-    left: `${(100 * column) / columns}%`,
-    top: `${(100 * row) / rows}%`,
-    width: `${100 / columns}%`,
-    height: `${100 / rows}%`,
-  });
   const cellId = `${id}-${key.join('-')}`;
   return html`<div class="texel-map" role="grid" tabindex="0" aria-label=${fill(words.images.map, { name: image.name })}
     aria-rowcount=${rows} aria-colcount=${columns} aria-activedescendant=${cellId}
@@ -146,19 +131,50 @@ function Grid({ image, ui, app, held, place, setPlace }) {
     onPointerDown=${begin} onPointerMove=${move} onPointerUp=${end} onPointerCancel=${end}
     onPointerLeave=${() => !stroke.current && setPlace(null)}>
     <canvas class="image-map" ref=${canvas} aria-hidden="true"></canvas>
-    ${image.places.map((places, row) =>
-      places.map(
-        (k, column) =>
-          held.includes(k) &&
-          html`<i key=${`${row} ${column}`} class="texel-lock" aria-hidden="true" style=${cell([row, column])}></i>`,
-      ),
-    )}
-    ${place && html`<i class="texel-here" aria-hidden="true" style=${cell(place)}></i>`}
+    <${Locks} image=${image} held=${held} />
+    ${place && html`<i class="texel-here" aria-hidden="true" style=${cellStyle(image, place)}></i>`}
     <div role="row" aria-rowindex=${key[0] + 1}>
       <div key=${cellId} id=${cellId} role="gridcell" class="texel-key" aria-colindex=${key[1] + 1}
-        aria-label=${texelText(image, ui, held, key)} style=${cell(key)}></div>
+        aria-label=${texelText(image, ui, held, key)} style=${cellStyle(image, key)}></div>
     </div>
   </div>`;
+}
+
+/** A mark on each locked texel. @param {{image: LightImage, held: number[]}} props */
+function Locks({ image, held }) {
+  const locked = new Set(held);
+  return image.places.map((places, row) =>
+    places.map(
+      (k, column) =>
+        locked.has(k) &&
+        html`<i key=${`${row} ${column}`} class="texel-lock" aria-hidden="true"
+        style=${cellStyle(image, [row, column])}></i>`,
+    ),
+  );
+}
+
+/** Return where a texel lies on the map. @param {LightImage} image @param {Place} place */
+function cellStyle({ places }, [row, column]) {
+  const [rows, columns] = [places.length, places[0].length];
+  return {
+    left: `${(100 * column) / columns}%`,
+    top: `${(100 * row) / rows}%`,
+    width: `${100 / columns}%`,
+    height: `${100 / rows}%`,
+  };
+}
+
+/** Return the nearest of `count` indices. @param {number} index @param {number} count */
+const clamp = (index, count) => Math.min(count - 1, Math.max(0, Math.floor(index)));
+
+/** Return the texel under the pointer. @param {PointerEvent} event @param {number} rows
+ * @param {number} columns @returns {Place} */
+function placeAt(event, rows, columns) {
+  const box = /** @type {Element} */ (event.currentTarget).getBoundingClientRect();
+  return [
+    clamp((rows * (event.clientY - box.top)) / box.height, rows),
+    clamp((columns * (event.clientX - box.left)) / box.width, columns),
+  ];
 }
 
 /** Steps of the keys, in rows and columns. @type {Record<string, Place>} */
