@@ -264,6 +264,28 @@ def test_a_panel_that_the_camera_sees_is_in_its_column(tmp_path: Path) -> None:
     assert np.square(column - plane).sum() < 0.005 * np.square(plane).sum()  # noise
 
 
+def test_the_back_of_a_panel_is_dark_and_in_the_way(tmp_path: Path) -> None:
+    """It hides the wall that it lights, and absorbs light that comes back from there."""
+    room = load_scene(write_room(tmp_path, film='<rfilter type="box"/>'))
+    emitter, site = panel((0.0, 1.0, -0.6), (0.0, 1.0, -2.0), 0.8)
+    basis = lp.render_basis(room.with_new_emitters([emitter]), spp=1024)
+    plane = basis.image("seen")
+
+    def columns(paths: FrozenPaths) -> tuple[Floats, Floats]:
+        column = paths.columns([site])[0]
+        image = np.array(PathSums(paths, paths.direct)(site))
+        assert paths.indirect is not None
+        image += np.array(PathSums(paths, paths.indirect)(site))
+        paths.add_panel(image.reshape(-1, 3), site)
+        return column, image.reshape(column.shape)
+
+    for column in along_paths(room, columns, first_hits=144, bounces=64):
+        assert plane[10, 12].max() == 0
+        # Precision: a pixel at the edge has the mean of the light on all of the wall behind it.
+        assert column.mean() == pytest.approx(plane.mean(), rel=0.045)
+        assert np.square(column - plane).sum() < 0.012 * np.square(plane).sum()
+
+
 def test_a_panel_fills_pixels_by_its_area(room: Scene) -> None:
     """In closed form, for one that is parallel to the picture, however it lies on the pixels."""
     width = 2 * math.tan(math.radians(25)) / 24  # of a pixel, at a distance of 1

@@ -1,15 +1,17 @@
 """Paths of a camera, traced once: the points on surfaces where a light may add to the picture."""
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Floats, aligned
+from lightpaint.arrays import Bools, Floats, Indices, aligned
+from lightpaint.placement.paths.panel_site import PanelSite
+from lightpaint.placement.paths.path_segments import PathSegments
 from lightpaint.scene.scene import Scene
 
 #: Longest paths, in vertices, of integrators without a limit of their own; their light is frozen
@@ -21,12 +23,14 @@ MOST_VERTICES = 16
 class Vertices:
     """Vertices of paths: interactions and throughputs as Dr.Jit arrays of one width.
 
-    pixels: (v,), the index of each one's pixel, ascending.
+    pixels: (v,), the index of each one's pixel, ascending. segments: that lead to them; None for
+    first hits.
     """
 
     interaction: Any
     throughput: Any
     pixels: npt.NDArray[np.int64]
+    segments: PathSegments | None = field(default=None, kw_only=True)
 
     def __len__(self) -> int:
         return len(self.pixels)
@@ -54,13 +58,22 @@ class Vertices:
         """Their places, (v, 3) float32."""
         return np.array(self.interaction.p, dtype=np.float32).reshape(3, -1).T.copy()
 
-    def pixel_sums(self, light: Floats, count: int) -> Floats:
-        """Return sums over the vertices of each of `count` pixels, (…, h · w). light: (…, v)."""
+    def pixel_sums(self, light: Floats, count: int, blocked: Bools | None = None) -> Floats:
+        """Return sums over the vertices of each of `count` pixels, (…, h · w).
+
+        light: (…, v). blocked: vertices that do not count, (v,).
+        """
+        if blocked is not None:
+            light = light * ~blocked
         pixels, starts = self.first_of_pixel
         sums = np.zeros((*light.shape[:-1], count), np.float32)
         if len(pixels):
             sums[..., pixels] = np.add.reduceat(light, starts, axis=-1)
         return sums
+
+    def blocked(self, site: PanelSite) -> Bools | None:
+        """Return the vertices that a panel cuts off, (v,); None if there are none."""
+        return None if self.segments is None else self.segments.blocked(site)
 
 
 def longest_path(scene: Scene) -> int:
@@ -74,7 +87,7 @@ def first_hits_of(
 ) -> Vertices:
     """Return first hits in a grid of side x side cells in each pixel, one in each cell."""
     rays, weight, pixels = _camera_rays(camera, size, side, rng)
-    return _compressed(loaded.ray_intersect(rays), weight, pixels)
+    return _compressed(loaded.ray_intersect(rays), weight, pixels)[0]
 
 
 def later_vertices_of(
@@ -93,16 +106,16 @@ def later_vertices_of(
     import mitsuba as mi
 
     side = max(1, math.isqrt(paths))
-    vertices, rounds = [], max(1, round(paths / side**2))
+    found, rounds = _Hits(), max(1, round(paths / side**2))
     for _ in range(rounds):
         rays, weight, pixels = _camera_rays(camera, size, side, rng)
         weight /= rounds
-        for depth in range(longest):
-            hits = _compressed(loaded.ray_intersect(rays), weight, pixels)
+        hits: Vertices | None = None
+        for _ in range(longest):
+            last, (hits, which) = hits, _compressed(loaded.ray_intersect(rays), weight, pixels)
             if not len(hits):
                 break
-            if depth:
-                vertices.append(hits)
+            found.add(hits, which if last is not None else None)
             lobe, *direction = _floats(rng.random((3, len(hits)), dtype=np.float32))
             bsdf_sample, bsdf_weight = hits.interaction.bsdf().sample(
                 mi.BSDFContext(),
@@ -114,7 +127,7 @@ def later_vertices_of(
             rays, weight = si.spawn_ray(si.to_world(bsdf_sample.wo)), hits.throughput * bsdf_weight
             pixels = hits.pixels
             dr.make_opaque(rays, weight)
-    return _joined(vertices)
+    return found.vertices()
 
 
 def _camera_rays(
@@ -148,8 +161,10 @@ def _floats(rows: Iterable[Floats]) -> list[Any]:
     return [mi.Float(aligned(row, np.float32)) for row in rows]
 
 
-def _compressed(si: Any, weight: Any, pixels: npt.NDArray[np.int64]) -> Vertices:
-    """Return the selected interactions, in order."""
+def _compressed(
+    si: Any, weight: Any, pixels: npt.NDArray[np.int64]
+) -> tuple[Vertices, npt.NDArray[np.int64]]:
+    """Return the interactions that light may add to, in order, and which of `si` these are."""
     import drjit as dr
     import mitsuba as mi
 
@@ -158,31 +173,62 @@ def _compressed(si: Any, weight: Any, pixels: npt.NDArray[np.int64]) -> Vertices
     dr.make_opaque(si, weight)
     is_lit = dr.compress(si.is_valid() & (dr.max(weight) > 0))
     if not dr.width(is_lit):
-        return Vertices(si, weight, pixels[:0])
+        return Vertices(si, weight, pixels[:0]), np.zeros(0, np.int64)
     si = dr.gather(mi.SurfaceInteraction3f, si, is_lit)
     weight = dr.gather(mi.Color3f, weight, is_lit)
     dr.make_opaque(si, weight)
-    return Vertices(si, weight, pixels[np.array(is_lit, dtype=np.int64)])
+    which = np.array(is_lit, dtype=np.int64)
+    return Vertices(si, weight, pixels[which]), which
 
 
-def _joined(parts: Sequence[Vertices]) -> Vertices | None:
-    """Return all vertices of several sets, ordered by pixel; None if there are none."""
-    import drjit as dr
-    import mitsuba as mi
+class _Hits:
+    """The hits of paths, from the camera on."""
 
-    if not parts:
-        return None
-    pixels = np.concatenate([part.pixels for part in parts])
-    order = np.argsort(pixels, kind="stable")
-    place = np.empty(len(order), np.uint32)
-    place[order] = np.arange(len(order))
-    si = dr.zeros(mi.SurfaceInteraction3f, len(order))
-    throughput = dr.zeros(mi.Color3f, len(order))
-    start = 0
-    for part in parts:
-        part_places = mi.UInt32(aligned(place[start : start + len(part)], np.uint32))
-        dr.scatter(si, part.interaction, part_places)
-        dr.scatter(throughput, part.throughput, part_places)
-        dr.eval(si, throughput)
-        start += len(part)
-    return Vertices(si, throughput, pixels[order])
+    def __init__(self) -> None:
+        self._parts = list[Vertices]()
+        self._points, self._starts, self._blocks = list[Floats](), list[Indices](), list[slice]()
+        self._count = 0
+
+    def add(self, hits: Vertices, before: Indices | None) -> None:
+        """Add the next hits of the paths of the last ones. before: which of those each follows,
+        (v,); None for first hits.
+        """
+        block = slice(self._count, self._count + len(hits))
+        if before is None:
+            self._starts.append(np.arange(block.start, block.stop))
+        else:
+            self._parts.append(hits)
+            self._starts.append(self._blocks[-1].start + before)
+        self._blocks.append(block)
+        self._points.append(hits.points)
+        self._count = block.stop
+
+    def vertices(self) -> Vertices | None:
+        """Return the hits after the first ones, ordered by pixel; None if there are none."""
+        import drjit as dr
+        import mitsuba as mi
+
+        if not self._parts:
+            return None
+        pixels = np.concatenate([part.pixels for part in self._parts])
+        order = np.argsort(pixels, kind="stable")
+        place = np.empty(len(order), np.uint32)
+        place[order] = np.arange(len(order))
+        si = dr.zeros(mi.SurfaceInteraction3f, len(order))
+        throughput = dr.zeros(mi.Color3f, len(order))
+        start = 0
+        for part in self._parts:
+            part_places = mi.UInt32(aligned(place[start : start + len(part)], np.uint32))
+            dr.scatter(si, part.interaction, part_places)
+            dr.scatter(throughput, part.throughput, part_places)
+            dr.eval(si, throughput)
+            start += len(part)
+        starts = np.concatenate(self._starts)
+        is_later = starts < np.arange(len(starts))
+        segments = PathSegments(
+            np.concatenate(self._points),
+            starts,
+            [block for block in self._blocks if is_later[block.start]],
+            np.flatnonzero(is_later)[order],
+        )
+        return Vertices(si, throughput, pixels[order], segments=segments)

@@ -113,9 +113,11 @@ class FrozenPaths:
         sites: of points and spots at intensity 1 W/sr, of panels at radiance 1 W/(m² sr) and,
         without a position, of suns at 1 W/m².
         """
-        images = self.direct_images(sites).reshape(-1, *self.size, 3)
+        images = self._sums(self.direct, sites).reshape(-1, *self.size, 3)
         if self.indirect is not None:
             images += self.indirect_images(sites)
+        for image, site in zip(images, sites, strict=True):
+            self.add_panel(image.reshape(-1, 3), site)
         return images
 
     def direct_images(self, sites: Sequence[Site]) -> Floats:
@@ -126,22 +128,31 @@ class FrozenPaths:
         return images
 
     def add_panel(self, image: Floats, site: Site) -> None:
-        """Add a panel at unit radiance to an image (h · w, 3) in which it is seen itself."""
+        """Add a panel itself, at unit radiance, to the image (h · w, 3) of what it lights.
+
+        Its front shines; its back hides what is behind it, too.
+        """
         if isinstance(site, PanelSite) and site.position and not self.hides_panels:
-            lines = self.sight_lines.near(site.position, site.radius)
-            axis = np.array([site.direction or (0.0, 0.0, 1.0)])
-            shares = lines.covered(site.position, axis, site.half_sides[None])[0]
-            np.add.at(image, lines.pixels, shares[:, None])
+            front, back = self._covered(site)
+            image *= 1 - (front + back)[:, None]
+            image += front[:, None]
 
     def hidden(self, site: Site) -> Floats:
         """Return the share of each pixel that a panel hides, with either side, (h · w,) float32."""
-        shares = np.zeros(self.size[0] * self.size[1], np.float32)
         if isinstance(site, PanelSite) and site.position and not self.hides_panels:
-            lines = self.sight_lines.near(site.position, site.radius)
-            axis = np.array(site.direction or (0.0, 0.0, 1.0))
-            both_sides = np.stack([site.half_sides] * 2)
-            covered = lines.covered(site.position, np.stack([axis, -axis]), both_sides)
-            np.add.at(shares, lines.pixels, covered.sum(axis=0))
+            return np.asarray(self._covered(site).sum(axis=0))
+        return np.zeros(self.size[0] * self.size[1], np.float32)
+
+    def _covered(self, site: PanelSite) -> Floats:
+        """Return the shares of pixels that the front and the back of a panel fill, (2, h · w)."""
+        shares = np.zeros((2, self.size[0] * self.size[1]), np.float32)
+        assert site.position is not None
+        lines = self.sight_lines.near(site.position, site.radius)
+        axis = np.array(site.direction or (0.0, 0.0, 1.0))
+        both_sides = np.stack([site.half_sides] * 2)
+        covered = lines.covered(site.position, np.stack([axis, -axis]), both_sides)
+        for row, filled in zip(shares, covered, strict=True):
+            np.add.at(row, lines.pixels, filled)
         return shares
 
     @cached_property
@@ -183,7 +194,9 @@ class FrozenPaths:
             batch = distinct[start : start + at_once]
             for origin, shone in zip(batch, self._shone(vertices, batch), strict=True):
                 for k in by_origin[origin]:
-                    sums[k] = vertices.pixel_sums(shone.towards(sites[k]), count).T
+                    light, site = shone.towards(sites[k]), sites[k]
+                    blocked = vertices.blocked(site) if isinstance(site, PanelSite) else None
+                    sums[k] = vertices.pixel_sums(light, count, blocked).T
         return sums
 
     def _shone(self, vertices: Vertices, origins: Sequence[LightOrigin]) -> "list[_Shone]":

@@ -16,6 +16,7 @@ from lightpaint.arrays import Floats, aligned
 from lightpaint.placement.paths.camera_paths import Vertices
 from lightpaint.placement.paths.frozen_paths import FrozenPaths
 from lightpaint.placement.paths.light_origin import ORIGIN_VALUES, LightOrigin, added_light
+from lightpaint.placement.paths.panel_site import PanelSite
 from lightpaint.scene.properties.site import Site
 from lightpaint.scene.runtime.render_lock import tracing
 
@@ -56,7 +57,11 @@ class PathSums:
             dr.make_opaque(sums, row)
             if not len(vertices):
                 return sums
-            paths = vertices.interaction, vertices.throughput
+            throughput = vertices.throughput
+            if isinstance(site, PanelSite) and (blocked := vertices.blocked(site)) is not None:
+                throughput = dr.select(mi.Bool(blocked), 0, throughput)
+                dr.make_opaque(throughput)
+            paths = vertices.interaction, throughput
             sums = self._add(self._loaded, *paths, self._panel_points, self._first, row, sums)
             dr.eval(sums)
         return sums

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats, Indices, aligned
+from lightpaint.arrays import Bools, Doubles, Floats, Indices, aligned
 from lightpaint.placement.paths.camera_paths import Vertices
+from lightpaint.placement.paths.panel_site import PanelSite
 
 #: Share of vertices on either side whose distance does not count for the size of cells, and the
 #: number of faces of the box of the others.
@@ -53,14 +54,21 @@ class SharedVertices(Vertices):
         ones = mi.Color3f(1.0) + dr.zeros(mi.Color3f, len(chosen))
         dr.make_opaque(interaction, ones)
         # Only the throughput of the others counts from here on.
-        others = Vertices(None, throughput, paths.pixels)
+        others = Vertices(None, throughput, paths.pixels, segments=paths.segments)
         return cls(interaction, ones, np.zeros(len(chosen), np.int64), others, cells)
 
-    def pixel_sums(self, light: Floats, count: int) -> Floats:
-        """Return the sums of the light of all paths of each pixel, (3, h · w). light: (3, v)."""
+    def pixel_sums(self, light: Floats, count: int, blocked: Bools | None = None) -> Floats:
+        """Return the sums of the light of all paths of each pixel, (3, h · w).
+
+        light: (3, v). blocked: vertices of paths that do not count, (p,).
+        """
         of_paths = np.take(light, self.cells, axis=1)
         of_paths *= self.paths.throughput
-        return self.paths.pixel_sums(of_paths, count)
+        return self.paths.pixel_sums(of_paths, count, blocked)
+
+    def blocked(self, site: PanelSite) -> Bools | None:
+        """Return the vertices of paths that a panel cuts off, (p,); None if there are none."""
+        return self.paths.blocked(site)
 
 
 def _cells(vertices: Vertices, most: int, rng: np.random.Generator) -> Indices:
