@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Bools, Floats, Indices, aligned
+from lightpaint.arrays import Floats, Indices, aligned
 from lightpaint.placement.paths.panel_site import PanelSite
 from lightpaint.placement.paths.path_segments import PathSegments
 from lightpaint.scene.scene import Scene
@@ -58,21 +58,22 @@ class Vertices:
         """Their places, (v, 3) float32."""
         return np.array(self.interaction.p, dtype=np.float32).reshape(3, -1).T.copy()
 
-    def pixel_sums(self, light: Floats, count: int, blocked: Bools | None = None) -> Floats:
+    def pixel_sums(self, light: Floats, count: int, blocked: Indices | None = None) -> Floats:
         """Return sums over the vertices of each of `count` pixels, (…, h · w).
 
-        light: (…, v). blocked: vertices that do not count, (v,).
+        light: (…, v). blocked: indices of vertices that do not count.
         """
-        if blocked is not None:
-            light = light * ~blocked
+        if blocked is not None and len(blocked):
+            light = light.copy()
+            light[..., blocked] = 0
         pixels, starts = self.first_of_pixel
         sums = np.zeros((*light.shape[:-1], count), np.float32)
         if len(pixels):
             sums[..., pixels] = np.add.reduceat(light, starts, axis=-1)
         return sums
 
-    def blocked(self, site: PanelSite) -> Bools | None:
-        """Return the vertices that a panel cuts off, (v,); None if there are none."""
+    def blocked(self, site: PanelSite) -> Indices | None:
+        """Return the indices of vertices that a panel cuts off; None for first hits."""
         return None if self.segments is None else self.segments.blocked(site)
 
 
@@ -225,10 +226,8 @@ class _Hits:
             start += len(part)
         starts = np.concatenate(self._starts)
         is_later = starts < np.arange(len(starts))
-        segments = PathSegments(
-            np.concatenate(self._points),
-            starts,
-            [block for block in self._blocks if is_later[block.start]],
-            np.flatnonzero(is_later)[order],
-        )
+        vertices = np.full(len(starts), -1)
+        vertices[is_later] = place
+        later_blocks = [block for block in self._blocks if is_later[block.start]]
+        segments = PathSegments(np.concatenate(self._points), starts, later_blocks, vertices)
         return Vertices(si, throughput, pixels[order], segments=segments)

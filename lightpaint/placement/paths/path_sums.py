@@ -58,8 +58,11 @@ class PathSums:
             if not len(vertices):
                 return sums
             throughput = vertices.throughput
-            if isinstance(site, PanelSite) and (blocked := vertices.blocked(site)) is not None:
-                throughput = dr.select(mi.Bool(blocked), 0, throughput)
+            blocked = vertices.blocked(site) if isinstance(site, PanelSite) else None
+            if blocked is not None and len(blocked):
+                shown = np.ones(len(vertices), np.float32)
+                shown[blocked] = 0
+                throughput = throughput * mi.Float(shown)
                 dr.make_opaque(throughput)
             paths = vertices.interaction, throughput
             sums = self._add(self._loaded, *paths, self._panel_points, self._first, row, sums)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lightpaint.arrays import Bools, Doubles, Floats, Indices, aligned
+from lightpaint.arrays import Doubles, Floats, Indices, aligned
 from lightpaint.placement.paths.camera_paths import Vertices
 from lightpaint.placement.paths.panel_site import PanelSite
 
@@ -57,17 +57,17 @@ class SharedVertices(Vertices):
         others = Vertices(None, throughput, paths.pixels, segments=paths.segments)
         return cls(interaction, ones, np.zeros(len(chosen), np.int64), others, cells)
 
-    def pixel_sums(self, light: Floats, count: int, blocked: Bools | None = None) -> Floats:
+    def pixel_sums(self, light: Floats, count: int, blocked: Indices | None = None) -> Floats:
         """Return the sums of the light of all paths of each pixel, (3, h · w).
 
-        light: (3, v). blocked: vertices of paths that do not count, (p,).
+        light: (3, v). blocked: indices of the vertices of paths that do not count.
         """
         of_paths = np.take(light, self.cells, axis=1)
         of_paths *= self.paths.throughput
         return self.paths.pixel_sums(of_paths, count, blocked)
 
-    def blocked(self, site: PanelSite) -> Bools | None:
-        """Return the vertices of paths that a panel cuts off, (p,); None if there are none."""
+    def blocked(self, site: PanelSite) -> Indices | None:
+        """Return the indices of vertices of paths that a panel cuts off."""
         return self.paths.blocked(site)
 
 
