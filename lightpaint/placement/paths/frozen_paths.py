@@ -31,6 +31,7 @@ from lightpaint.placement.paths.camera_paths import (
 )
 from lightpaint.placement.paths.light_origin import (
     ORIGIN_VALUES,
+    SPREAD,
     LightOrigin,
     added_light,
 )
@@ -48,9 +49,6 @@ LANES = 2**20
 
 #: Number of cached values at vertices, which limits the number of cached origins.
 KEPT_VALUES = 2**24
-
-#: Steps of the sequence that spreads points over a panel: the reciprocals of the plastic number.
-_SPREAD = np.array([0.7548776662466927, 0.5698402909980532])
 
 
 class FrozenPaths:
@@ -221,7 +219,7 @@ class FrozenPaths:
         import mitsuba as mi
 
         if count not in self._panel_points:
-            start = np.arange(count)[:, None] * _SPREAD + self._shift
+            start = np.arange(count)[:, None] * np.array(SPREAD) + self._shift
             u, v = (mi.Float(aligned(x, np.float32)) for x in (2 * (start % 1) - 1).T)
             self._panel_points[count] = u, v
         return self._panel_points[count]
