@@ -7,7 +7,7 @@ caller certifies the result, so a failure costs nothing but time.
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Indices
+from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.lighting.algebra.clipped_newton import RIDGE, solve_ridged
 from lightpaint.lighting.algebra.quadratic import EPSILON, Quadratic, kkt_residual
 from lightpaint.progress import cancellation_check
@@ -50,7 +50,19 @@ def capped_newton(q: Quadratic, x: Doubles, *, tolerance: float) -> tuple[Double
         at_lower |= value < q.cap_lower - room
         at_upper |= (value > q.cap_upper + room) & ~at_lower
         multipliers = np.where(at_lower | at_upper, multipliers, 0)
-    return x, residual, step
+    return _on_caps(q, x, at_lower, at_upper), residual, step
+
+
+def _on_caps(q: Quadratic, x: Doubles, at_lower: Bools, at_upper: Bools) -> Doubles:
+    """Return x, (n,), without the round-off of a step in the sums under held caps.
+
+    Otherwise a cap that x misses by round-off would count as having slack.
+    """
+    between = q.A * ((x > q.lower) & (x < q.upper))
+    power = np.square(between).sum(axis=1)
+    goal = np.where(at_lower, q.cap_lower, np.where(at_upper, q.cap_upper, 0.0))
+    off = np.where((at_lower | at_upper) & (power > 0), goal - q.A @ x, 0.0)
+    return np.asarray(x + (off / np.where(power > 0, power, 1.0)) @ between)
 
 
 def _newton(

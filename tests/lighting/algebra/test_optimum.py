@@ -175,6 +175,19 @@ def test_no_sweep_raises_the_objective_under_caps():
         assert np.diff(trace).max() <= 1e-13 * np.abs(trace).max()
 
 
+def test_many_caps_take_few_steps():
+    """As for texels of a wall that is limited: none fails by the round-off of a sum."""
+    for seed in range(8):
+        rng = np.random.default_rng([seed, 7])
+        A, y = _pixels(rng, 120, "plain")
+        luminance = (0.2126, 0.7152, 0.0722)
+        caps = [Cap((3 * k, 3 * k + 1, 3 * k + 2), luminance, upper=0.1) for k in range(40)]
+        optimum = minimise(A.T @ A, A.T @ (3 * y), caps=caps)
+        assert optimum.converged
+        assert optimum.cap_multipliers.any()
+        assert optimum.steps <= 20
+
+
 def test_caps_of_four_unknowns_and_of_one():
     rng = np.random.default_rng(5)
     for _ in range(40):
