@@ -9,6 +9,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.lighting.algebra.clipped_newton import RIDGE, solve_ridged
+from lightpaint.lighting.algebra.interior_point import NearOptimum
 from lightpaint.lighting.algebra.quadratic import EPSILON, Quadratic, kkt_residual
 from lightpaint.progress import cancellation_check
 
@@ -16,13 +17,20 @@ from lightpaint.progress import cancellation_check
 MAX_STEPS = 20
 
 
-def capped_newton(q: Quadratic, x: Doubles, *, tolerance: float) -> tuple[Doubles, float, int]:
+def capped_newton(
+    q: Quadratic, x: Doubles, *, tolerance: float, near: NearOptimum | None = None
+) -> tuple[Doubles, float, int]:
     """Find the optimum from x, (n,), and return (x, KKT residual, steps). The result is of no use
     if its residual is above `tolerance`.
+
+    near: a point near the optimum, from which it starts instead, and the caps that hold there.
     """
-    multipliers = q.cap_multipliers(x, q.gradient(x))
-    at_lower, at_upper = q.active_caps(x)
-    at_lower, at_upper = at_lower & (multipliers > 0), at_upper & (multipliers < 0)
+    if near is not None:
+        x, multipliers, at_lower, at_upper = near.x, near.multipliers, near.at_lower, near.at_upper
+    else:
+        multipliers = q.cap_multipliers(x, q.gradient(x))
+        at_lower, at_upper = q.active_caps(x)
+        at_lower, at_upper = at_lower & (multipliers > 0), at_upper & (multipliers < 0)
     check = cancellation_check()
     for step in range(MAX_STEPS + 1):
         check()

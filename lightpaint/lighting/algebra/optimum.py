@@ -12,6 +12,7 @@ from lightpaint.lighting.algebra.active_set import polish
 from lightpaint.lighting.algebra.capped_newton import capped_newton
 from lightpaint.lighting.algebra.clipped_newton import clipped_newton
 from lightpaint.lighting.algebra.gauss_seidel import sweep
+from lightpaint.lighting.algebra.interior_point import interior_point
 from lightpaint.lighting.algebra.nearest_optimum import nearest_equal
 from lightpaint.lighting.algebra.quadratic import UNREACHED_POWER, Cap, Quadratic, scaled
 from lightpaint.progress import cancellation_check
@@ -25,6 +26,9 @@ NO_CAPS = np.zeros(0)
 
 #: Unknowns up to which numpy solves several problems in one call; larger ones get a thread each.
 MAX_BATCHED_UNKNOWNS = 64
+
+#: Caps above which an interior-point method is tried where Newton's steps on all limits cycle.
+MANY_CAPS = 8
 
 #: Sweeps before a polish is tried again, if one was not enough.
 SWEEPS_BETWEEN = 50
@@ -215,6 +219,11 @@ def _solve_polished(
         solved, kkt, steps = capped_newton(q, x, tolerance=tolerance)
         if kkt <= tolerance and q.violations(solved)[2] <= tolerance:
             return solved, 0, steps
+        if len(q.groups) > MANY_CAPS and (near := interior_point(q, x)) is not None:
+            solved, kkt, more_steps = capped_newton(q, x, tolerance=tolerance, near=near)
+            steps += more_steps
+            if kkt <= tolerance and q.violations(solved)[2] <= tolerance:
+                return solved, 0, steps
     elif residual > tolerance and max_sweeps > 0:
         trial, residuals, steps, _ = clipped_newton(
             q.M[None],
