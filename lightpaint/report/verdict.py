@@ -173,10 +173,11 @@ def spoken_holding(reason: Reason) -> str:
     singular, plural = REASON_CLAUSES[reason.kind]
     if len(reason.names) > MAX_NAMES and reason.kind == "views":
         return "other views ask for different light"
-    if len(reason.names) > MAX_NAMES:
+    names = joined_texels(reason.names)
+    if len(names) > MAX_NAMES:
         lights = f"{len(reason.names)} lights"
     else:
-        *first_phrases, last = [some_names([name]) for name in reason.names] or [""]
+        *first_phrases, last = [some_names([name]) for name in names] or [""]
         lights = f"{', '.join(first_phrases)} and {last}" if first_phrases else last
     return (singular if len(reason.names) == 1 else plural).format(lights)
 
@@ -204,8 +205,8 @@ def _are_kept(appearance: Appearance) -> bool:
 
 
 def _spoken_some(names: tuple[str, ...]) -> tuple[str, bool]:
-    """Return the first two names, and whether there is only one."""
-    return some_names(names[:2], joint=" and "), len(names) == 1
+    """Return the first two names, texels of an image as one, and whether there is one light."""
+    return some_names(joined_texels(names)[:2], joint=" and "), len(names) == 1
 
 
 def is_darker(appearance: Appearance) -> bool:

@@ -112,6 +112,16 @@ def _seen(missed_delta_e: float, asked_delta_e: float = 20.0, **fields: Any) -> 
             "Part of the way, but the darker shade on the left is out of reach: sky lights it too.",
         ),
         (
+            _seen(5.0, reasons=(Reason("limits", ("wall.x0.y0", "wall.x1.y0", "wall.x1.y1")),)),
+            "Part of the way, but the brighter light in the middle is missing: 3 texels of wall "
+            "are at their limits.",
+        ),
+        (
+            _seen(5.0, local_lights=("wall.x1.y0", "wall.x1.y1", "lamp")),
+            "Part of the way, but the brighter light in the middle is out of reach: 2 texels of "
+            "wall and lamp would light too much else.",
+        ),
+        (
             Appearance(14.0, 0.0, 20.0),
             "These lights cannot match this: too much of what was painted is out of reach.",
         ),
