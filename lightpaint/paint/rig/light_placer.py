@@ -43,6 +43,10 @@ MAX_NEW = 4
 WATCH_S = 0.15
 
 
+class _OutdatedError(Exception):
+    """Signal that lights have been moved since the search began, so its result is of no use."""
+
+
 class LightPlacer:
     """Places the lights of a session by its painting, and adds others.
 
@@ -116,14 +120,18 @@ class LightPlacer:
         return NewLights(kind, count=request.max_count, freedom=freedom, name=name)
 
     def _run(self, request: PlaceLights) -> None:
+        snapshot = self._access.snapshot()
+
         def check() -> None:
             if self._request is not request:
                 raise StoppedError
+            if self._access.session.requests.placed != snapshot.requests.placed:
+                raise _OutdatedError
             MITSUBA.let_others()  # a user who drags a light meanwhile gets answers at once
 
         try:
             with cancellable(check), MITSUBA.low_priority():
-                snapshot, solution, placement = self._searched(request, check)
+                solution, placement = self._searched(request, snapshot, check)
                 placed = {
                     move.name: pose_values(move, snapshot.requests.poses.get(move.name, {}))
                     for move in placement.moves
@@ -134,6 +142,9 @@ class LightPlacer:
         except StoppedError:
             if self._request is None:  # otherwise a page would wait for the next one
                 self._publish("Stopped: every light stays where it was.")
+            return
+        except _OutdatedError:
+            self._publish(_outdated(request))
             return
         except LightpaintError as error:
             self._publish(f"No light was {_done(request)}: {error}")
@@ -153,7 +164,7 @@ class LightPlacer:
             return
         label = f"{'move' if request.new_type is None else 'add'} {', '.join(placed)}"
         if not self._hang_lights(label, placed, snapshot.requests.placed):
-            self._publish(f"No light was {_done(request)}: somebody moved lights meanwhile.")
+            self._publish(_outdated(request))
             return
         summary = "; ".join(map(str, (*placement.moves, *placement.additions)))
         self._publish(f"{summary}.", tuple(placed))
@@ -178,9 +189,9 @@ class LightPlacer:
         self._publisher.publish(PlacingResult(text=text, names=names))
 
     def _searched(
-        self, request: PlaceLights, check: Callable[[], None]
-    ) -> tuple[SessionSnapshot, Solution, Placement]:
-        """Return the paintings of the search, their exact answer, and the result of the search."""
+        self, request: PlaceLights, snapshot: SessionSnapshot, check: Callable[[], None]
+    ) -> tuple[Solution, Placement]:
+        """Return the exact answer of the paintings, and the result of the search."""
 
         def report(label: str, done: int, total: int, unit: str = "passes") -> None:
             del label, unit
@@ -196,7 +207,6 @@ class LightPlacer:
                 last_s = now_s
                 self._publisher.publish(_trial(sites))
 
-        snapshot = self._access.snapshot()
         self._rig.open(snapshot.bases)
         if request.new_type is None:
             freedoms, new = self._freedoms(snapshot), []
@@ -216,7 +226,7 @@ class LightPlacer:
         placement = place(
             scenes, moved.bases, solution, freedoms, new=new, progress=report, watch=watch
         )
-        return snapshot, solution, placement
+        return solution, placement
 
 
 def _trial(sites: Mapping[str, Site]) -> TrialPlaces:
@@ -229,6 +239,10 @@ def _trial(sites: Mapping[str, Site]) -> TrialPlaces:
 
 def _done(request: PlaceLights) -> str:
     return "moved" if request.new_type is None else "added"
+
+
+def _outdated(request: PlaceLights) -> str:
+    return f"No light was {_done(request)}: somebody moved lights meanwhile."
 
 
 def pose_values(move: Move, before: Mapping[str, Any]) -> dict[str, Any]:
