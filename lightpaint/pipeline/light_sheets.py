@@ -12,6 +12,7 @@ from lightpaint.images.formats.png import png_bytes, png_has_text
 from lightpaint.progress import Progress, silent
 from lightpaint.report.light_sheet import light_sheet
 from lightpaint.report.rig.hung_lights import HungLight
+from lightpaint.scene.lights.texels.texel import image_of
 from lightpaint.scene.quality_presets import Preset
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
@@ -60,7 +61,8 @@ def render_sheet(scene: Scene, path: Path, progress: Progress = silent) -> str:
         )
         small_scene = scene.reduced(f"1/{Preset(SHEET.spp, pixels).reduction(scene.film)}")
         basis = obtain_basis(small_scene, spp=SHEET.spp, seed=SHEET_SEED, progress=progress)
-    title = f"{Path(*scene.path.parts[-2:])} through {sensor}, {len(scene.lights)} lights"
+    count = len({image_of(light.name) or light.name for light in scene.lights})
+    title = f"{Path(*scene.path.parts[-2:])} through {sensor}, {count} lights"
     texts = denoiser_text(basis.features, raw=f"basis of {basis.origin.spp} samples per pixel")
     emissions = {member.name: member.emission for member in scene.emitters}
     lights = [HungLight(place, emissions[place.name]) for place in scene.emitter_places]
