@@ -43,6 +43,7 @@ def fake_state(resources: dict[str, int], **fields: Any) -> SessionState:
         "size": (2, 3),
         "objects": (),
         "lights": (),
+        "images": (),
         "views": (ViewInfo("", (2, 3), (), ()),),
         "transforms": ("srgb",),
         "transform": TransformInfo("srgb", 0.0),
