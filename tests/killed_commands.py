@@ -120,8 +120,10 @@ class Stage:
             stderr = process.communicate()[1]
         kind = self.what_is_there()
         finish(self.look)
-        if kind in ("earlier", "new") and self.what_is_there() != kind:
-            kind = f"{kind}, and another when finished"
+        # Killed between the record of a new result and its first file, it has the earlier one yet.
+        later = self.what_is_there()
+        if kind in ("earlier", "new") and later not in (kind, "new"):
+            kind = f"{kind}, and {later} when finished"
         leftovers = [path.name for path in self.hidden]
         return Outcome(
             f"{kind}, with {leftovers}" if leftovers else kind, process.returncode, stderr
