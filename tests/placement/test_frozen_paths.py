@@ -240,7 +240,7 @@ def test_cones_are_those_of_mitsuba(room: Scene) -> None:
         pixels, starts = vertices.first_of_pixel
         image = np.zeros((paths.size[0] * paths.size[1], 3))
         image[pixels] = np.add.reduceat(light, starts, axis=0)
-        return paths.direct_images([beam])[0], image
+        return paths.columns([beam])[0].reshape(-1, 3), image
 
     full_image, image = along_paths(room, render_pair, bounces=0)
     np.testing.assert_allclose(image, full_image, atol=2e-4 * full_image.max())  # single precision
@@ -316,7 +316,7 @@ def test_hidden_emitters_are_not_seen(tmp_path: Path) -> None:
     ]
     _, site = panel((-0.3, 1.2, 0.3), (-0.1, 0.9, 2.0), 0.3)
     seen, hidden = (
-        along_paths(room, lambda p: p.direct_images([site])[0].max(), bounces=0) for room in rooms
+        along_paths(room, lambda p: p.columns([site])[0].max(), bounces=0) for room in rooms
     )
     assert hidden < 0.5 < seen
 

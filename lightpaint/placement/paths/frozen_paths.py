@@ -118,13 +118,6 @@ class FrozenPaths:
             self.add_panel(image.reshape(-1, 3), site)
         return images
 
-    def direct_images(self, sites: Sequence[Site]) -> Floats:
-        """Return the images of direct light alone, (k, h · w, 3) float32; see `columns`."""
-        images = self._sums(self.direct, sites)
-        for image, site in zip(images, sites, strict=True):
-            self.add_panel(image, site)
-        return images
-
     def add_panel(self, image: Floats, site: Site) -> None:
         """Add a panel itself, at unit radiance, to the image (h · w, 3) of what it lights.
 

@@ -49,7 +49,7 @@ def _unit(directions: Any) -> Any:
 
 
 def _radiance(scene: Scene, folder: Path, lighting: Lighting) -> Any:
-    """What Mitsuba sees of the relit sky, (n, 3)."""
+    """Return the radiance of the relit sky from DIRECTIONS, (n, 3), as Mitsuba evaluates it."""
     relit = lp.relight(scene, lighting, folder / "relit.xml")
     import drjit as dr
     import mitsuba as mi

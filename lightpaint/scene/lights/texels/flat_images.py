@@ -4,7 +4,7 @@ Texels lie between the borders of the image, half of one away from each, and bey
 ones the image stays as it is there ("clamp"). So all hats have the same share of the image.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -45,19 +45,11 @@ class FlatDomain(ImageDomain):
 
     def coarse(self, image: Floats, size: GridSize) -> Doubles:
         """See ImageDomain."""
-        columns, rows = size
-        height, width = image.shape[:2]
-        down, across = _hats(height, rows), _hats(width, columns)
-        mean = np.einsum("rh,hwc,kw->rkc", down, image, across, optimize=True)
-        return np.asarray(mean, np.float64)
+        return _resampled(image, size, _hats)
 
     def interpolated(self, image: Floats, size: GridSize) -> Doubles:
         """See ImageDomain."""
-        columns, rows = size
-        height, width = image.shape[:2]
-        down, across = _interpolation(height, rows), _interpolation(width, columns)
-        shown = np.einsum("rh,hwc,kw->rkc", down, image, across, optimize=True)
-        return np.asarray(shown, np.float64)
+        return _resampled(image, size, _interpolation)
 
     def picture_size(self, size: GridSize, width: int) -> GridSize:
         """See ImageDomain: the shape of the image, whose texels are squares."""
@@ -94,6 +86,18 @@ class Slide(FlatDomain):
     parameter: ClassVar[str] = "irradiance"
     unit: ClassVar[str] = "W/m²"
     has_proportions: ClassVar[bool] = True
+
+
+def _resampled(image: Floats, size: GridSize, weights: Callable[[int, int], Doubles]) -> Doubles:
+    """Return an image (h, w, 3) at another size, (rows, columns, 3).
+
+    weights: returns those of some pixels in a row at some places, (places, pixels).
+    """
+    columns, rows = size
+    height, width = image.shape[:2]
+    down, across = weights(height, rows), weights(width, columns)
+    shown = np.einsum("rh,hwc,kw->rkc", down, image, across, optimize=True)
+    return np.asarray(shown, np.float64)
 
 
 def _hats(pixels: int, texels: int) -> Doubles:
