@@ -18,6 +18,7 @@ from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solve
 from lightpaint.report.verdict import headline
+from lightpaint.scene.lights.texels.texel import texel_names
 from lightpaint.target.target import Target
 
 SIZE = (24, 48)
@@ -309,6 +310,18 @@ def test_where_no_light_gets(make_basis: Any):
     top, left, bottom, right = appearance.place.box
     assert 16 <= top < bottom <= 24
     assert 32 <= left < right <= 48
+
+
+def test_texels_of_an_image_light_a_place_together(make_basis: Any):
+    """Each by itself is a sixteenth of its light."""
+    names = texel_names("wall", (4, 4))
+    basis = make_basis(
+        images=np.full((16, *SIZE, 3), 1 / 16), names=names, emission=[[0.2] * 3] * 16
+    )
+    target = _paint_over(_look(basis), (slice(None), slice(0, 24)), 0.02)
+    appearance = compare_appearance(solve(basis, target))
+    assert appearance.place is not None
+    assert set(appearance.local_lights) == set(names)
 
 
 def test_noise_that_the_painting_does_not_share_is_told_from_a_miss(make_basis: Any):

@@ -3,6 +3,7 @@
 import numpy as np
 
 from lightpaint.arrays import Doubles, as_rgb
+from lightpaint.basis.light_images import light_images
 from lightpaint.colour.color import luminance
 from lightpaint.colour.color_difference import ciede2000
 from lightpaint.images.object_map import Objects
@@ -103,8 +104,9 @@ def object_with_most_error(
 def lights_at(solution: Solution, place: Place) -> tuple[tuple[str, ...], bool]:
     """Return the lights that reach a place, and whether one contributes much there.
 
-    If it is too bright, the sources of most of its light; else lights by their effect there
-    relative to their brightest pixels, which does not depend on their strength.
+    If it is too bright, the sources of most of its light, texels of an image together; else lights
+    by their effect there relative to their brightest pixels, which does not depend on their
+    strength.
     """
     basis = solution.basis
     top, left, bottom, right = place.box
@@ -114,6 +116,8 @@ def lights_at(solution: Solution, place: Place) -> tuple[tuple[str, ...], bool]:
     if luminance(np.array(place.painted)) < luminance(np.array(place.reached)):
         part, enough = luminance(local_light * solution.weights), DOES_MUCH
         whole = np.full(len(part), part.sum())
+        for image in light_images(basis.lights):  # no texel alone does much
+            part[image.lights] = part[image.lights].sum()
     else:
         part, enough = np.where(basis.is_fixed, 0, luminance(local_light)), GETS_THERE
         # One light at a time: the brightness of all lights would take half of the memory of their
