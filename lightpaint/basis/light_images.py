@@ -2,17 +2,33 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
-from lightpaint.basis.lights import BasisLight
 from lightpaint.scene.lights.texels.domains import DOMAINS, domain_of
 from lightpaint.scene.lights.texels.image_domain import GridSize, ImageDomain
 from lightpaint.scene.lights.texels.texel import image_of, images_of, texel_names
 
 #: The middle of a phrase for several texels of an image.
 TEXELS = " texels of "
+
+
+class NamedLight(Protocol):
+    """A light of a basis or of a lighting; see `BasisLight`."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def plugin(self) -> str: ...
+
+    @property
+    def is_fixed(self) -> bool: ...
+
+    @property
+    def members(self) -> tuple[str, ...]: ...
 
 
 @dataclass(frozen=True)
@@ -44,6 +60,20 @@ class LightImage:
         """Indices of its lights, each once, row by row."""
         return np.array([*dict.fromkeys(self.places[self.places >= 0].tolist())], dtype=np.intp)
 
+    @property
+    def light_shares(self) -> Doubles:
+        """Share of its domain that each of its `lights` covers."""
+        found = self.places >= 0
+        lights, index = np.unique(self.places[found], return_inverse=True)
+        shares = np.bincount(index, self.domain.shares(self.size)[found], len(lights))
+        return np.asarray(shares[np.searchsorted(lights, self.lights)])
+
+    @property
+    def map_order(self) -> list[int]:
+        """The number among its `lights` of each texel of an image that is whole, row by row."""
+        number = {int(k): i for i, k in enumerate(self.lights)}
+        return [number[k] for k in self.places.ravel().tolist()]
+
     def mean(self, radiances: Doubles) -> Doubles:
         """Return the mean over its domain, (3,). radiances: (n, 3), those of all lights."""
         found = self.places >= 0
@@ -51,7 +81,7 @@ class LightImage:
         return np.asarray(shares @ radiances[self.places[found]] / shares.sum())
 
 
-def light_images(lights: Sequence[BasisLight]) -> list[LightImage]:
+def light_images(lights: Sequence[NamedLight]) -> list[LightImage]:
     """Return the images that have texels among `lights`."""
     # A light of several texels that has the name of one is symmetric; others are groups.
     index = {
@@ -71,7 +101,7 @@ def light_images(lights: Sequence[BasisLight]) -> list[LightImage]:
     return images
 
 
-def texel_lights(lights: Sequence[BasisLight]) -> Bools:
+def texel_lights(lights: Sequence[NamedLight]) -> Bools:
     """Return which lights are single texels of an image, (n,)."""
     is_texel = np.zeros(len(lights), bool)
     for image in light_images(lights):

@@ -14,10 +14,11 @@ from batches import NAMES, run_whole_batch, small_basis, write_batch
 from command import succeed
 from PIL import Image
 
+from lightpaint.basis.lights import BasisLight
 from lightpaint.batch.gallery import summary
 from lightpaint.batch.gallery.gallery import gallery_page
 from lightpaint.batch.gallery.small_planes import planes_name, read_planes, write_planes
-from lightpaint.batch.gallery.summary import NARROW, WIDE, LightRow, SummaryRow
+from lightpaint.batch.gallery.summary import NARROW, WIDE, LightRow, SummaryRow, lights_of_answer
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.estimate import Estimate, write_estimate
@@ -180,7 +181,7 @@ def test_of_many_lights_those_that_do_most_have_sliders(page: Any, tmp_path: Pat
 def test_an_image_is_one_row_of_the_mixer_and_one_column(page: Any, tmp_path: Path) -> None:
     small = small_basis()
     names = ["lamp", *(f"sky.x{x}.y{y}" for y in range(3) for x in range(4))]
-    lights = tuple(replace(small.lights[0], name=name) for name in names)
+    lights = tuple(replace(small.lights[0], name=name, members=(name,)) for name in names)
     images = np.repeat(small.images[:1], 13, 0)
     basis = replace(small, lights=lights, planes=images, noise=0 * images)
     key = '{"view": 0}'
@@ -214,6 +215,48 @@ def test_an_image_is_one_row_of_the_mixer_and_one_column(page: Any, tmp_path: Pa
         page.wait_for_timeout(60)
         levels_seen.append(brightness())
     assert levels_seen[0] < levels_seen[1] < levels_seen[2]
+
+
+def symmetric_sky() -> tuple[BasisLight, ...]:
+    """Lights of a symmetric sky of 4x3 texels."""
+    pairs = [[f"sky.x{x}.y{y}", f"sky.x{3 - x}.y{y}"] for y in range(3) for x in range(2)]
+    light = replace(small_basis().lights[0], plugin="envmap", is_fixed=False)
+    return tuple(replace(light, name=pair[0], members=tuple(pair)) for pair in pairs)
+
+
+def test_a_symmetric_image_shows_both_halves(page: Any, tmp_path: Path) -> None:
+    small, lights, key = small_basis(), symmetric_sky(), '{"view": 0}'
+    images = np.repeat(small.images[:1], 6, 0)
+    basis = replace(small, lights=lights, planes=images, noise=0 * images)
+    write_planes(tmp_path, key, basis)
+    (tmp_path / "sky").mkdir()
+    write_lighting(tmp_path / "sky" / "lighting.json", Lighting.current(basis))
+    levels = [1.0, 0.1, 0.5, 0.5, 0.5, 0.5]
+    light_rows = tuple(LightRow(x.name, y, (y, y, y)) for x, y in zip(lights, levels, strict=True))
+    rows = [SummaryRow("sky", "done", "", "sky", lights=light_rows)]
+    page_text = gallery_page(tmp_path, "sky", rows, {"sky": planes_name(tmp_path, key)})
+    (tmp_path / "index.html").write_text(page_text, encoding="utf-8")
+    page.goto((tmp_path / "index.html").as_uri())
+    page.get_by_role("tab", name="Mixer").click()
+    canvas = page.locator(".mixer-light canvas").first
+    canvas.wait_for()
+    pixels = canvas.evaluate(
+        "x => [x.width, x.height, [...x.getContext('2d').getImageData(0, 0, x.width, 1).data]]"
+    )
+    width, height, top = pixels[0], pixels[1], np.array(pixels[2]).reshape(-1, 4)[:, 0]
+    assert height == round(width * 3 / 4)
+    np.testing.assert_allclose(top, top[::-1], atol=2)
+    assert top[0] > top[width // 2 - 1]
+
+
+def test_the_mean_of_an_image_is_over_what_it_covers(tmp_path: Path) -> None:
+    small, lights = small_basis(), symmetric_sky()
+    images = np.repeat(small.images[:1], 6, 0)
+    basis = replace(small, lights=lights, planes=images, noise=0 * images)
+    write_lighting(tmp_path / "lighting.json", Lighting.current(basis))
+    shares = [row.share for row in lights_of_answer(tmp_path, {})]
+    pole = (1 - 2 / np.pi) / 2 / 2  # two of the four texels at a pole
+    np.testing.assert_allclose(shares, [pole, pole, *([0.5 - 2 * pole] * 2), pole, pole])
 
 
 def two_mixers(folder: Path) -> tuple[Path, dict[str, str]]:

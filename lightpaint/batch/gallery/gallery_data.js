@@ -4,7 +4,7 @@ import { createElement } from '../../viewer/mixer/page_elements.js';
 /** @typedef {import("../../viewer/drawing/colour.js").RGB} RGB */
 /** @typedef {import("../../viewer/mixer/mixer_data.js").Data["transform"]} Transform */
 /** @typedef {{name: string, y: number, emission?: RGB, hex?: string, kelvin?: number, duv?: number,
- *   stops?: number}} LookLight */
+ *   stops?: number, share?: number}} LookLight */
 /** links: name and address. basis: of its mixer. view: transform and stops.
  * @typedef {{look: string, state: 'failed' | 'waiting' | 'done', folder: string, why?: string,
  *   sensor?: string, scene?: string, target?: string, variation?: string, delta_e?: number,
@@ -26,7 +26,7 @@ export const transforms = jsonOf('transforms');
 /** Lights of a look as its tables list them. @type {Map<Look, LookLight[]>} */
 const listedLights = new Map();
 
-/** Return the lights of a look for a table: of an image one, the mean of its texels.
+/** Return the lights of a look for a table: of an image one, the mean over what it covers.
  * @param {Look} look */
 export function lightsOf(look) {
   const known = listedLights.get(look);
@@ -34,15 +34,16 @@ export function lightsOf(look) {
   /** @type {Map<string, LookLight[]>} */
   const groups = new Map();
   for (const light of look.lights ?? []) {
-    const name = light.name.replace(/\.x\d+\.y\d+$/, '');
+    const name = light.name.replace(/(\.sun\d)?\.x\d+\.y\d+$/, '');
     const key = name === light.name ? `${name} alone` : name;
     groups.set(key, [...(groups.get(key) ?? []), light]);
   }
   const listed = [...groups].map(([name, lights]) => {
     if (lights.length < 2) return lights[0];
-    const mean = (/** @type {(light: LookLight) => number} */ value) =>
-      lights.reduce((sum, light) => sum + value(light), 0) / lights.length;
-    return { name, y: mean(({ y }) => y) };
+    const sum = (/** @type {(light: LookLight) => number} */ value) =>
+      lights.reduce((total, light) => total + value(light), 0);
+    const y = sum((light) => light.y * (light.share ?? 1)) / sum(({ share }) => share ?? 1);
+    return { name, y };
   });
   listedLights.set(look, listed);
   return listed;

@@ -18,7 +18,6 @@ from lightpaint.report.page.mixer import (
     packed_gels,
     transform_data,
 )
-from lightpaint.scene.lights.texels.texel import image_of, images_of, texel_names
 
 #: Maximum number of mixers of a page (each may take two megabytes), and most lights of a mixer with
 #: sliders.
@@ -59,7 +58,9 @@ def _mixer(folder: Path, name: str, record: Mapping[str, Any], rows: Sequence[Su
         "planes": record["planes"],
         "lights": lights,
         "shown": _strongest_lights(record, rows),
-        "joint": _images(lights),
+        "joint": [
+            {**image, "levels": {"answer": 1.0, "present": 1.0}} for image in record["images"]
+        ],
         "kelvins": kelvin_colors(),
         "gels": packed_gels(),
         "transform": transform_data(ViewTransform()),
@@ -71,27 +72,13 @@ def _mixer(folder: Path, name: str, record: Mapping[str, Any], rows: Sequence[Su
     return f'<section class="mixer" data-ready data-basis="{name}" hidden>{text}</section>'
 
 
-def _images(lights: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return the images among lights, each with the indices of its texels, row by row."""
-    index = {light["name"]: k for k, light in enumerate(lights)}
-    return [
-        {
-            "label": name,
-            "columns": size[0],
-            "levels": {"answer": 1.0, "present": 1.0},
-            "members": [index[texel] for texel in texel_names(name, size)],
-        }
-        for name, size in images_of(index).items()
-    ]
-
-
 def _strongest_lights(record: Mapping[str, Any], rows: Sequence[SummaryRow]) -> list[int]:
     """Return the lights that get sliders, by their index in the basis: all, if they are few, but
     for the texels of images.
     """
     names = [light["name"] for light in record["lights"]]
-    images = images_of(names)
-    singles = [k for k, name in enumerate(names) if image_of(name) not in images]
+    texels = {k for image in record["images"] for k in image["members"]}
+    singles = [k for k in range(len(names)) if k not in texels]
     if len(singles) <= MAX_LIGHTS:
         return singles
     power = dict.fromkeys(names, 0.0)

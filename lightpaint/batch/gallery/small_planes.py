@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_images import light_images
 from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.batch.manifest.folder_names import THUMBNAILS
 from lightpaint.batch.work.item_execution import job_fields
@@ -27,6 +28,9 @@ from lightpaint.version import __version__
 
 #: Suffix of the files' names.
 SUFFIX = ".planes.json"
+
+#: Number of the format, which changes with its fields.
+FORMAT = 2
 
 #: Longest file that is read, in bytes.
 MAX_BYTES = 2**27
@@ -58,6 +62,16 @@ def write_planes(folder: Path, key: str, basis: Basis) -> None:
         "totals": [float(sum(total)) for total in basis.totals],
         "lights": [
             {**light_data(x), "present": list(map(float, x.emission))} for x in basis.lights
+        ],
+        "images": [
+            {
+                "label": image.name,
+                "columns": image.size[0],
+                "members": image.lights.tolist(),
+                "places": image.map_order,
+            }
+            for image in light_images(basis.lights)
+            if image.is_whole
         ],
         "planes": planes,
     }
@@ -92,7 +106,7 @@ def drop_planes(folder: Path, used_names: Collection[str]) -> None:
 def _identity(basis: Basis) -> str:
     """Return a hash of everything that is shown of a basis: equal hashes mean equal samples."""
     lights = [(light.name, light.unit, list(light.emission)) for light in basis.lights]
-    record = [__version__, basis.origin.scene_identity, basis.origin.halves, lights]
+    record = [__version__, FORMAT, basis.origin.scene_identity, basis.origin.halves, lights]
     text = json.dumps([*record, basis.totals.tolist()], default=str)
     return hashlib.sha256(text.encode()).hexdigest()
 

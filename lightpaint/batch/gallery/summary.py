@@ -14,6 +14,7 @@ import numpy as np
 from PIL import Image
 
 from lightpaint.arrays import RGB
+from lightpaint.basis.light_images import light_images
 from lightpaint.batch.manifest.folder_names import SUMMARY_FORMAT, THUMBNAILS
 from lightpaint.batch.plan.journal import JournalLine
 from lightpaint.batch.plan.plan import Plan, PlannedLook
@@ -61,7 +62,11 @@ State = Literal["done", "failed", "waiting"]
 
 @dataclass(frozen=True)
 class LightRow:
-    """A light in a look. y: luminance of its emission, in the scene's unit. hex: its colour."""
+    """A light in a look.
+
+    y: luminance of its emission, in the scene's unit. hex: its colour. share: of its image, if it
+    is a texel.
+    """
 
     name: str
     y: float
@@ -70,6 +75,7 @@ class LightRow:
     kelvin: float | None = None
     duv: float | None = None
     stops: float | None = None
+    share: float | None = None
 
 
 @dataclass(frozen=True)
@@ -171,22 +177,26 @@ def _row(plan: Plan, look: PlannedLook, folder: Path, state: State, reason: str)
         closeness.get("share_met"),
         (report.get("verification") or {}).get("agrees"),
         (view["name"], view["stops"]) if "name" in view else None,
-        _lights(look.folder, report) if state == "done" else (),
+        lights_of_answer(look.folder, report) if state == "done" else (),
         tuple(x.relative_to(plan.folder).as_posix() for x in result_files)
         if state == "done"
         else (),
     )
 
 
-def _lights(folder: Path, report: Mapping[str, Any]) -> tuple[LightRow, ...]:
+def lights_of_answer(folder: Path, report: Mapping[str, Any]) -> tuple[LightRow, ...]:
+    """Return the lights of an answer in a folder. report: its report.json."""
     with suppress(LightpaintError):
         lighting = read_lighting(folder / "lighting.json")
+        shares = dict[int, float]()
+        for image in light_images(lighting.lights):
+            shares |= zip(image.lights.tolist(), image.light_shares.tolist(), strict=True)
         rows = []
-        for light in lighting.lights:
+        for k, light in enumerate(lighting.lights):
             measures = lighting.photometry(light)
             stops = (report.get("lights") or {}).get(light.name, {}).get("stops")
             values = (light.emission, measures.hex, measures.kelvin, measures.duv, stops)
-            rows.append(LightRow(light.name, measures.y, *values))
+            rows.append(LightRow(light.name, measures.y, *values, share=shares.get(k)))
         return tuple(rows)
     return ()
 

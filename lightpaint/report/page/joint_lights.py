@@ -48,11 +48,9 @@ class JointLights:
         return [np.where(is_its, x, 0) for x in (answer / level, current)]
 
     def data(self, basis: Basis, lighting: Lighting) -> dict[str, Any]:
-        """Return its record for the page, whose `columns` are those of its map, 0 without one."""
+        """Return its record for the page. `columns` and `places` are those of its map, if any."""
         answer, current = lighting.weights_for(basis), basis.current_weights
-        image = self.image
-        # The map has a texel for each light, which a symmetric image has not.
-        has_map = image is not None and len(image.lights) == image.places.size
+        image = self.image if self.image is not None and self.image.is_whole else None
 
         def by_name(weights: Doubles) -> dict[str, list[float]]:
             lights = [k for k in self.lights if not basis.is_fixed[k]]
@@ -60,7 +58,8 @@ class JointLights:
 
         return {
             "label": self.label,
-            "columns": image.size[0] if image is not None and has_map else 0,
+            "columns": 0 if image is None else image.size[0],
+            "places": [] if image is None else image.map_order,
             "levels": {"answer": self.level(answer, current), "present": 1.0},
             "answer": by_name(answer / self.level(answer, current)),
             "present": by_name(current),

@@ -189,7 +189,8 @@ class Mixer {
     /** @type {Float32Array} */
     let light;
     if (joint?.columns) {
-      light = Float32Array.from(Object.values(joint.answer).flat());
+      const radiances = Object.values(joint.answer);
+      light = Float32Array.from(joint.places.flatMap((k) => radiances[k]));
       size = [light.length / 3 / joint.columns, joint.columns];
     } else {
       const mix = new Mix(size);

@@ -10,9 +10,11 @@ import { inflate, unpack } from './packed_picture.js';
 
 /** Lights that share a row, such as the texels of an image. levels: brightness in each look. answer,
  * present: the emission of each of them at the level 1, by name, which two planes show, behind those
- * of single lights. columns: of the map that these make; 0 for none. members: instead of these
- * emissions and planes, the indices of lights that have their own.
- * @typedef {{label: string, columns: number, levels: {answer: number, present: number},
+ * of single lights. columns: of the map that these make; 0 for none. places: which of them each
+ * place of the map is, row by row. members: instead of these emissions and planes, the indices of
+ * lights that have their own.
+ * @typedef {{label: string, columns: number, places: number[],
+ *   levels: {answer: number, present: number},
  *   answer: Record<string, RGB>, present: Record<string, RGB>, members?: number[]}} Joint */
 
 /** lights: those with their own plane, in the order of the planes. shown: indices of those with
