@@ -3,17 +3,21 @@
     LightpaintError
     ├── BackendError     Mitsuba or LLVM cannot run here
     ├── SceneError       the scene XML, a sensor, a light
+    │   └── NoPlaceError … or a new light for which no place is free
     ├── ImageError       an image file that cannot be read as what it should be
-    │   └── ViewError    … or an unknown view transform to decode it with ├── KeywordError     an
-    argument name that a function does not have; also a TypeError ├── ColorError       an invalid
-    colour: hexadecimal digits, a temperature ├── BasisError a basis file that is damaged, or does
-    not fit the scene or target ├── TargetError      a painting or mask that cannot be solved for │
-    └── SizeError    … because its size differs from the basis ├── ConstraintError  a constraint on
-    a light that is invalid or impossible ├── PaintError a message of a page that the painter cannot
-    understand or obey ├── BatchError       a manifest of looks; it may list several mistakes, one
-    per line ├── LightingError    a lighting.json, or weights that are invalid │   └──
-    UnknownLightError … or a name that none of its lights has; also a KeyError └── OutputError a
-    file or folder that cannot be written
+    │   └── ViewError    … or an unknown view transform to decode it with
+    ├── KeywordError     an argument name that a function does not have; also a TypeError
+    ├── ColorError       an invalid colour: hexadecimal digits, a temperature
+    ├── BasisError       a basis file that is damaged, or does not fit the scene or target
+    ├── TargetError      a painting or mask that cannot be solved for
+    │   └── SizeError    … because its size differs from the basis
+    ├── ConstraintError  a constraint on a light that is invalid or impossible
+    ├── PaintError       a message of a page that the painter cannot understand or obey
+    │   └── NothingToUndoError  … or an undo with nothing to undo
+    ├── BatchError       a manifest of looks; it may list several mistakes, one per line
+    ├── LightingError    a lighting.json, or weights that are invalid
+    │   └── UnknownLightError  … or a name that none of its lights has; also a KeyError
+    └── OutputError      a file or folder that cannot be written
 
 Each message is one line: what came, what was expected, and what to do. The command
 line prints it and exits with 2.

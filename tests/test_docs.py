@@ -32,7 +32,12 @@ from lightpaint.target.template import PLAIN_FILES
 from lightpaint.validation import MAX_NAME
 
 ROOT = Path(__file__).parent.parent
-DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+#: Of the root, the documentation and its tutorials.
+DOCUMENTS = [
+    path
+    for folder in (".", "docs", "docs/tutorials")
+    for path in sorted((ROOT / folder).glob("*.md"))
+]
 FILES = {"/" + path.relative_to(ROOT).as_posix() for path in ROOT.glob("[a-z]*/**/*.py")}
 
 #: A file that is written, and an option of another program.

@@ -33,7 +33,8 @@ PINNED = {
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the source distribution, and the wheel that was built of that."""
     folder = tmp_path_factory.mktemp("built")
-    left_out = shutil.ignore_patterns(".*_cache", "__pycache__", "*.egg-info", ".git", "*.exr.tmp")
+    made = (".*_cache", "__pycache__", "_build", "*.egg-info", "*.exr.tmp")
+    left_out = shutil.ignore_patterns(".git", *made)
     # A build leaves things beside the sources.
     shutil.copytree(REPOSITORY, folder / "copy", ignore=left_out, symlinks=True)
     command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", "."]

@@ -8,7 +8,7 @@ and it imports nothing from there.
 bl_info = {
     "name": "lightpaint",
     "author": "lightpaint",
-    "version": (0, 1, 0),
+    "version": (1, 0, 0),
     "blender": (3, 4, 0),
     "location": "3D View > Sidebar > lightpaint; Properties > Render",
     "description": "Paint how the shot should look; the lamps follow",

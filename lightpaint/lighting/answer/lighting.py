@@ -131,8 +131,9 @@ class Lighting(Shown, Mapping[str, LightSetting]):
     def to_dataframe(self) -> Any:
         """Return a pandas.DataFrame with a row for each light, by its name.
 
-        red, green, blue: its emission, linear Rec.709 in `unit`, with error_… and the ends
-        lower_… and upper_… of the 95 % interval where they are known. y: luminance of the emission.
+        red, green, blue: its emission, linear Rec.709 in `unit`; where they are known also
+        `error_red` and the ends `lower_red`, `upper_red` of the 95 % interval, and those of the
+        other channels. y: luminance of the emission.
         kelvin, duv, hex: its colour, where it has one. Raises LightpaintError without pandas.
         """
         rows = [self._row(light) for light in self.lights]

@@ -1,0 +1,67 @@
+"""Sphinx's configuration of the site; `docs/build` stages the sources and runs it."""
+
+import sys
+from pathlib import Path
+
+DOCS = Path(__file__).resolve().parent
+sys.path.insert(0, str(DOCS.parent))
+
+from lightpaint.version import __version__  # noqa: E402
+
+project = "lightpaint"
+author = "The lightpaint authors"
+project_copyright = "The lightpaint authors"
+version = release = __version__
+
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx_copybutton",
+    "sphinx_design",
+]
+
+# Documents are written for GitHub: its anchors, no directives but on the front page.
+myst_enable_extensions = ["colon_fence"]
+myst_heading_anchors = 4
+nb_execution_mode = "off"  # notebooks keep their outputs
+# Widgets need a kernel, and scripts of another site; what a cell shows beside them does not.
+nb_ipywidgets_js: dict[str, dict[str, str]] = {}
+nb_mime_priority_overrides = [["html", "application/vnd.jupyter.widget-view+json", None]]
+
+default_role = "code"  # docstrings have code in single backticks, like the documents
+highlight_language = "text"
+smartquotes = False  # "--" begins an option
+add_module_names = False
+python_maximum_signature_line_length = 80
+autodoc_member_order = "bysource"
+autodoc_typehints_format = "short"
+autodoc_preserve_defaults = True
+napoleon_use_rtype = False
+
+exclude_patterns = ["files"]
+
+html_theme = "furo"
+html_title = "lightpaint"
+html_static_path = ["_static", "../lightpaint/paint/page/icon.svg"]
+html_logo = "../lightpaint/paint/page/icon.svg"
+html_favicon = "../lightpaint/paint/page/icon.svg"
+html_extra_path = ["_build/extra"]
+html_css_files = ["site.css"]
+html_js_files = ["site.js"]
+html_copy_source = False
+html_show_sphinx = False
+# A page opened from a disk may not read its neighbours.
+html_show_search_summary = False
+html_theme_options = {
+    "light_css_variables": {
+        "color-brand-primary": "#8a5100",
+        "color-brand-content": "#8a5100",
+        "color-brand-visited": "#6d4a75",
+    },
+    "dark_css_variables": {
+        "color-brand-primary": "#f2b55c",
+        "color-brand-content": "#f2b55c",
+        "color-brand-visited": "#d3b3dc",
+    },
+}

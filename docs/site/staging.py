@@ -1,0 +1,125 @@
+"""The sources of the site: the documents, with links that lead out of docs/ led into the site.
+
+On GitHub a document links to notebooks, scenes and the files of the root by their places in the
+repository. The site has pages of some of these; of other files it offers a copy to download, and a
+link to a folder becomes plain text.
+"""
+
+import re
+import shutil
+from os.path import relpath
+from pathlib import Path
+
+DOCS = Path(__file__).resolve().parent.parent
+ROOT = DOCS.parent
+
+#: Documents of the root, and their pages.
+ROOT_PAGES = {
+    "README.md": "index.md",
+    "CHANGELOG.md": "changelog.md",
+    "CONTRIBUTING.md": "contributing.md",
+    "SECURITY.md": "security.md",
+}
+
+_LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
+_FENCE = re.compile(r"(^ *(?:```|~~~).*?^ *(?:```|~~~) *$)", re.MULTILINE | re.DOTALL)
+
+
+def stage(source: Path) -> None:
+    """Write the documents, notebooks and pictures into a new folder `source`."""
+    for document in sorted(DOCS.glob("*.md")):
+        _write(source, document, source / document.name)
+    for name, page in ROOT_PAGES.items():
+        if page != "index.md":
+            _write(source, ROOT / name, source / page)
+    for notebook in sorted((ROOT / "notebooks").glob("*.ipynb")):
+        _write(source, notebook, source / "notebooks" / notebook.name)
+    _list_notebooks(source / "notebooks")
+    shutil.copytree(DOCS / "images", source / "images", ignore=shutil.ignore_patterns("*.py"))
+    _stage_tutorials(source)
+
+
+def _stage_tutorials(source: Path) -> None:
+    """Write the tutorials, and a page that lists them; their files go along with them."""
+    titles = []
+    for path in sorted((DOCS / "tutorials").rglob("*")):
+        place = source / path.relative_to(DOCS)
+        if path.suffix == ".md":
+            _write(source, path, place)
+            if path.stem != "index":
+                titles.append(path.relative_to(DOCS / "tutorials").with_suffix("").as_posix())
+        elif path.is_file() and path.suffix not in (".py", ".pyc"):
+            place.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(path, place)
+    page = source / "tutorials" / "index.md"
+    if not page.exists():
+        page.parent.mkdir(parents=True, exist_ok=True)
+        page.write_text(_TUTORIALS + _toctree(titles), encoding="utf-8")
+
+
+def _list_notebooks(folder: Path) -> None:
+    """Write the page that lists the notebooks."""
+    names = sorted(path.stem for path in folder.glob("*.ipynb"))
+    (folder / "index.md").write_text(_NOTEBOOKS + _toctree(names), encoding="utf-8")
+
+
+_NOTEBOOKS = """# Notebooks
+
+`notebooks/` in the repository has these. Each runs from its first cell to its last.
+"""
+
+_TUTORIALS = """# Tutorials
+
+Each tutorial is a whole job, from the files it begins with to a picture that you can show.
+"""
+
+
+def _toctree(names: list[str]) -> str:
+    if not names:
+        return "\nNone is here yet; [first look](../first-look.md) is the place to start.\n"
+    return "\n```{toctree}\n:maxdepth: 1\n\n" + "\n".join(names) + "\n```\n"
+
+
+def _write(source: Path, original: Path, place: Path) -> None:
+    place.parent.mkdir(parents=True, exist_ok=True)
+    text = original.read_text(encoding="utf-8")
+
+    def led(match: re.Match[str]) -> str:
+        return _led(match, source, original, place)
+
+    # Of a notebook, all is JSON; of a document, code between fences stays as it is.
+    parts = [text] if original.suffix == ".ipynb" else _FENCE.split(text)
+    is_code = [part.lstrip().startswith(("```", "~~~")) for part in parts]
+    place.write_text(
+        "".join(
+            part if code else _LINK.sub(led, part)
+            for part, code in zip(parts, is_code, strict=True)
+        ),
+        encoding="utf-8",
+    )
+
+
+def _led(match: re.Match[str], source: Path, original: Path, place: Path) -> str:
+    """Return a link as the page at `place` has to have it."""
+    mark, text, link = match.groups()
+    path, hash_, anchor = link.partition("#")
+    if "://" in link or link.startswith("mailto:") or not path:
+        return match[0]
+    file = (original.parent / path).resolve()
+    if file.is_dir():
+        return text
+    if not file.is_relative_to(ROOT):
+        raise ValueError(f"{original.name} links to {link}, which is outside of the repository")
+    name = file.relative_to(ROOT).as_posix()
+    if name in ROOT_PAGES:
+        target = source / ROOT_PAGES[name]
+    elif file.is_relative_to(DOCS):
+        target = source / file.relative_to(DOCS)
+    elif file.suffix == ".ipynb":
+        target = source / name
+    else:
+        target = source / "files" / name
+        if not target.exists():
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(file, target)
+    return f"{mark}[{text}]({Path(relpath(target, place.parent)).as_posix()}{hash_}{anchor})"

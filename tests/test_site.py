@@ -1,0 +1,96 @@
+"""The site: what stands in the repository is led into it, and what is wrong with it is found."""
+
+import json
+import re
+import sys
+from pathlib import Path
+
+import pytest
+from renderer import REPOSITORY
+
+import lightpaint as lp
+from lightpaint.cli.options.parser import command_parser
+
+sys.path.insert(0, str(REPOSITORY / "docs" / "site"))
+
+from api_pages import GROUPS
+from command_pages import GUIDES, write_commands
+from schema_pages import schemas
+from site_check import check_site
+from staging import stage
+
+
+@pytest.fixture(scope="module")
+def staged(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    source = tmp_path_factory.mktemp("site") / "source"
+    stage(source)
+    return source
+
+
+def test_every_public_name_has_one_place_in_the_reference() -> None:
+    names = [name for _, _, names in GROUPS.values() for name in names]
+    assert sorted(names) == sorted({*lp.__all__, *lp._EXTRAS} - {"__version__"})
+
+
+def test_every_option_of_every_command_is_in_the_reference(tmp_path: Path) -> None:
+    write_commands(tmp_path / "commands")
+    [commands] = (x for x in command_parser()._actions if isinstance(x.choices, dict))
+    assert set(GUIDES) == set(commands.choices)
+    for name, parser in commands.choices.items():
+        page = (tmp_path / "commands" / f"{name}.rst").read_text("utf-8")
+        shown = " ".join(re.findall(r"^\.\. option:: (.*)$", page, re.MULTILINE))
+        options = [x for action in parser._actions for x in action.option_strings]
+        assert [x for x in options if not re.search(rf"(?<![\w-]){x}(?![\w-])", shown)] == []
+
+
+def test_links_out_of_the_documents_lead_into_the_site(staged: Path) -> None:
+    assert "](changelog.md)" in (staged / "stability.md").read_text("utf-8")
+    assert "](decisions.md#58-" in (staged / "security.md").read_text("utf-8")
+    lights = (staged / "lights.md").read_text("utf-8")
+    assert "](notebooks/01_constraints.ipynb)" in lights
+    for page in staged.rglob("*.md"):
+        text = re.sub(r"```.*?```", "", page.read_text("utf-8"), flags=re.DOTALL)
+        for link in re.findall(r"\]\(([^)\s#]+)", text):
+            if "://" not in link:
+                assert (page.parent / link).resolve().is_relative_to(staged), (page, link)
+
+
+def test_a_page_that_is_broken_is_found(tmp_path: Path) -> None:
+    (tmp_path / "whole.html").write_text(
+        '<h1 id="top">x</h1><a href="#top">x</a><a href="https://example.org">x</a>', "utf-8"
+    )
+    assert check_site(tmp_path) == []
+    (tmp_path / "broken.html").write_text(
+        '<a href="whole.html#bottom">x</a><a href="lost.html">x</a><img src="whole.html">'
+        '<script src="https://example.org/x.js"></script>',
+        "utf-8",
+    )
+    problems = check_site(tmp_path)
+    assert [problem.partition(": ")[2].partition(" ")[0] for problem in problems] == [
+        "dead",
+        "dead",
+        "loads",
+        "no",
+    ]
+
+
+def test_a_lighting_that_is_written_fits_its_schema(tmp_path: Path) -> None:
+    jsonschema = pytest.importorskip("jsonschema", reason="jsonschema")
+    schema = schemas()["lighting"][1]
+    jsonschema.Draft202012Validator.check_schema(schema)
+    light = {"plugin": "point", "parameter": "intensity", "unit": "W/sr"}
+    light |= {"emission": [1.0, 0.5, 0.25], "weight": [1.0, 0.5, 0.25]}
+    text = json.dumps({"format": "lightpaint-lighting 1", "lights": {"lamp": light}})
+    (tmp_path / "first.json").write_text(text, "utf-8")
+    lp.write_lighting(tmp_path / "second.json", lp.read_lighting(tmp_path / "first.json"))
+    written = json.loads((tmp_path / "second.json").read_text("utf-8"))
+    jsonschema.validate(written, schema)
+    for damage in ({"format": "other"}, {"lights": {"lamp": {**light, "emission": [1.0]}}}):
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate({**written, **damage}, schema)
+
+
+def test_every_schema_is_one() -> None:
+    jsonschema = pytest.importorskip("jsonschema", reason="jsonschema")
+    for _, schema in schemas().values():
+        jsonschema.Draft202012Validator.check_schema(schema)
