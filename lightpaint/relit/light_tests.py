@@ -83,7 +83,8 @@ def light_tests(
     first, second = difference + half, difference - half
     scatter = [_scatter(half_sums) + floor for half_sums in (first, second)]
     counts = [_pixels_that_count(half_sums) for half_sums in (first, second)]
-    inverses = [np.linalg.inv(_smooth(x)) for x in scatter]
+    # Means over neighbours round what is tiny to zero: black blocks need the floor again.
+    inverses = [np.linalg.inv(_smooth(x) + floor) for x in scatter]
     sums = block_sums(first), block_sums(second)
     tests = []
     for light_blocks, its_half in zip(blocks.astype(np.float64), half_differences, strict=True):

@@ -80,6 +80,18 @@ def test_z_of_each_light_strays_no_further_than_a_normal_number_where_all_is_tru
             assert np.mean(np.abs(z_of_light) > limit) < tail + 4 * np.sqrt(tail / SEEDS)
 
 
+def test_what_is_black_in_both_renders_says_nothing() -> None:
+    """As below a stage: no light reaches the lower half, which is exactly 0."""
+    rng = np.random.default_rng(1)
+    images = pictures() + 1.0
+    images[:, SIZE[0] // 2 :] = 0
+    parts, verified = render(images, 2.0, rng), total(render(images, 2.0, rng))
+    lights = shares(parts)
+    tests = light_tests(total(parts), verified, lights.blocks, lights.noise)
+    assert np.isfinite(tests.z).all()
+    assert np.abs(tests.z).max() < LIMIT
+
+
 def test_z_is_no_standard_normal_where_a_light_is_off():
     """A test above can see what it is for."""
     z, _ = found("smooth", ERROR)
