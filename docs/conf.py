@@ -2,6 +2,9 @@
 
 import sys
 from pathlib import Path
+from typing import Any
+
+from docutils import nodes
 
 DOCS = Path(__file__).resolve().parent
 sys.path.insert(0, str(DOCS.parent))
@@ -33,6 +36,7 @@ default_role = "code"  # docstrings have code in single backticks, like the docu
 highlight_language = "text"
 smartquotes = False  # "--" begins an option
 add_module_names = False
+toc_object_entries = False
 python_maximum_signature_line_length = 80
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
@@ -65,3 +69,15 @@ html_theme_options = {
         "color-brand-visited": "#d3b3dc",
     },
 }
+
+
+def setup(app: Any) -> None:
+    """Register what is done to every page."""
+    app.connect("doctree-resolved", dash_fields)
+
+
+def dash_fields(app: Any, doctree: nodes.document, name: str) -> None:
+    """Write a dash between an argument and what it is, as typography has it."""
+    for text in list(doctree.findall(nodes.Text)):
+        if text == " -- ":
+            text.parent.replace(text, nodes.Text(" – "))

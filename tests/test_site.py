@@ -1,8 +1,10 @@
 """The site: what stands in the repository is led into it, and what is wrong with it is found."""
 
+import ast
 import json
 import re
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -94,3 +96,31 @@ def test_every_schema_is_one() -> None:
     jsonschema = pytest.importorskip("jsonschema", reason="jsonschema")
     for _, schema in schemas().values():
         jsonschema.Draft202012Validator.check_schema(schema)
+
+
+def test_messages_that_are_explained_are_those_of_the_code() -> None:
+    """`…` stands for what differs; each piece between has to stand in one literal."""
+    page = (REPOSITORY / "docs" / "troubleshooting.md").read_text("utf-8")
+    messages = [" ".join(x.split()) for x in re.findall(r"\*\*`([^`]+)`\*\*", page)]
+    assert len(messages) > 80
+    literals = "\n".join(_literals())
+    missing = [
+        piece
+        for message in messages
+        for piece in re.split(r"\s*…\s*", message)
+        if len(piece) > 3 and piece.strip(":; ") not in literals
+    ]
+    assert missing == []
+
+
+def _literals() -> Iterator[str]:
+    """Yield the texts of the package: its own literals, with … for each expression in them."""
+    for path in (REPOSITORY / "lightpaint").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.JoinedStr):
+                yield "".join(
+                    str(x.value) if isinstance(x, ast.Constant) else "…" for x in node.values
+                )
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+                yield node.value
+    yield (REPOSITORY / "lightpaint/paint/page/language/en.js").read_text("utf-8")

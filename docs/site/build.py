@@ -20,6 +20,7 @@ sys.path.insert(0, str(DOCS / "site"))
 
 from api_pages import write_api  # noqa: E402
 from command_pages import write_commands  # noqa: E402
+from page_repair import mend_pages  # noqa: E402
 from schema_pages import write_schemas  # noqa: E402
 from site_check import check_site  # noqa: E402
 from staging import stage  # noqa: E402
@@ -38,6 +39,7 @@ def main() -> int:
     places = ["-c", str(DOCS), "-d", str(BUILD / "doctrees"), str(source), str(html)]
     if code := build_main([*options, *places]):
         return code
+    mend_pages(html)
     if problems := check_site(html):
         print(*problems, sep="\n", file=sys.stderr)
         return 1
