@@ -189,7 +189,7 @@ def test_numbers_of_settings_are_the_same_in_documents_and_on_the_page():
 
 
 def test_which_files_are_painted_over_is_said_alike():
-    """In the README, in the document on targets, and by `lightpaint template` itself."""
+    """In the first look, in the document on targets, and by `lightpaint template` itself."""
     listed = {
         match[1]
         for line in template_lines(
@@ -197,8 +197,8 @@ def test_which_files_are_painted_over_is_said_alike():
         )
         if (match := re.match(r"template/(\S+): .*paint over", line))
     }
-    readme = (ROOT / "README.md").read_text()
-    [section] = re.findall(r"The first command writes (.*?)Paint over one of the two", readme, re.S)
+    look = (ROOT / "docs" / "first-look.md").read_text()
+    [section] = re.findall(r"The first command writes (.*?)Paint over one of the two", look, re.S)
     files = re.findall(r"`(\w+\.(?:png|exr))`", section)
     targets = (ROOT / "docs" / "targets.md").read_text()
     [targets_named] = re.findall(

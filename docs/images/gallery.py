@@ -1,4 +1,4 @@
-"""Makes the picture of a batch's gallery that the README shows.
+"""Makes the picture of a batch's gallery that docs/gallery.md shows.
 
     python docs/images/gallery.py [--spp 64] [--to looks.webp]
 
