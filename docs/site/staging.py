@@ -48,7 +48,7 @@ def _stage_tutorials(source: Path) -> None:
             _write(source, path, place)
             if path.stem != "index":
                 titles.append(path.relative_to(DOCS / "tutorials").with_suffix("").as_posix())
-        elif path.is_file() and path.suffix not in (".py", ".pyc"):
+        elif path.is_file() and path.suffix != ".pyc":
             place.parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(path, place)
     page = source / "tutorials" / "index.md"
