@@ -123,7 +123,8 @@ def one_pass(scene: Scene, *, seed: int, spp: int, plain: bool = True) -> np.nda
     from lightpaint.basis.render.tracer.one_pass import Tracer, trace_plainly
 
     if plain:
-        loaded = scene.load({light.name: (1.0, 1.0, 1.0) for light in scene.lights})
+        unit = {light.name: (1.0, 1.0, 1.0) for light in scene.lights}
+        loaded = scene.load(unit, evenly=True)
         planes = trace_plainly(scene, loaded, seed=seed, spp=spp)
         del loaded
         gc.collect()

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -9,7 +10,8 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.scene.lights.texels.domains import DOMAINS, domain_of
 from lightpaint.scene.lights.texels.image_domain import GridSize, ImageDomain
-from lightpaint.scene.lights.texels.texel import image_of, images_of, texel_names
+from lightpaint.scene.lights.texels.texel import image_of, layouts_of, node_name
+from lightpaint.scene.lights.texels.texel_layout import TexelLayout
 
 #: The middle of a phrase for several texels of an image.
 TEXELS = " texels of "
@@ -35,50 +37,89 @@ class NamedLight(Protocol):
 class LightImage:
     """An image of lights.
 
-    name: of the light that was split. places: (rows, columns), the index of each texel's light,
-    which it has alone or, in a symmetric image, with its mirror image; −1 for a texel that is not
-    adjusted, or adjusted together with others. domain: what it covers.
+    name: of the light that was split. layout: of its texels. index: (nodes,), the index of each
+    texel's light, which it has alone or, in a symmetric image, with its mirror image; −1 for a
+    texel that is not adjusted, or adjusted together with others. domain: what it covers.
     """
 
     name: str
-    places: Indices
+    layout: TexelLayout
+    index: Indices
     domain: ImageDomain
 
     @property
     def size(self) -> GridSize:
-        """Columns and rows."""
-        rows, columns = self.places.shape
-        return columns, rows
+        """Columns and rows of its coarsest grid."""
+        return self.layout.size
+
+    @property
+    def size_text(self) -> str:
+        """Its size for people."""
+        columns, rows = self.size
+        finer = sum(1 for node in self.layout.nodes if node[0])
+        return f"{columns}x{rows} texels" + (f" and {finer} finer ones" if finer else "")
+
+    @cached_property
+    def places(self) -> Indices:
+        """(rows, columns) of its coarsest grid, the index of the light of the texel there."""
+        columns, rows = self.size
+        numbers = [
+            self.layout.number_of[self.layout.texel_at((0, x, y))]
+            for y in range(rows)
+            for x in range(columns)
+        ]
+        return np.asarray(self.index[numbers].reshape(rows, columns))
+
+    @property
+    def is_split(self) -> Bools:
+        """(rows, columns) of its coarsest grid, the texels that are split again."""
+        columns, rows = self.size
+        is_split = np.zeros((rows, columns), bool)
+        for level, column, row in self.layout.splits:
+            if level == 0:
+                is_split[row, column] = True
+        return is_split
 
     @property
     def is_whole(self) -> bool:
         """True if every texel is a light of its own, or one with its mirror image."""
-        return bool((self.places >= 0).all())
+        return bool((self.index >= 0).all())
 
     @property
     def lights(self) -> Indices:
         """Indices of its lights, each once, row by row."""
-        return np.array([*dict.fromkeys(self.places[self.places >= 0].tolist())], dtype=np.intp)
+        return np.array([*dict.fromkeys(self.index[self.index >= 0].tolist())], dtype=np.intp)
+
+    @cached_property
+    def shares(self) -> Doubles:
+        """Share of its domain under the hat of each texel, (nodes,)."""
+        return self.layout.sums(self.domain.shares(self.layout.finest))
 
     @property
     def light_shares(self) -> Doubles:
         """Share of its domain that each of its `lights` covers."""
-        found = self.places >= 0
-        lights, index = np.unique(self.places[found], return_inverse=True)
-        shares = np.bincount(index, self.domain.shares(self.size)[found], len(lights))
-        return np.asarray(shares[np.searchsorted(lights, self.lights)])
+        found = self.index >= 0
+        shares = np.bincount(self.index[found], self.shares[found])
+        return np.asarray(shares[self.lights])
 
     @property
     def map_order(self) -> list[int]:
-        """The number among its `lights` of each texel of an image that is whole, row by row."""
+        """The number among its `lights` of each place of an image that is whole, row by row."""
         number = {int(k): i for i, k in enumerate(self.lights)}
         return [number[k] for k in self.places.ravel().tolist()]
 
+    def radiances(self, weights: Doubles) -> Doubles:
+        """Return the image that lights make, (rows, columns, 3) of its finest grid.
+
+        weights: (n, 3), of all lights. A texel without a light is black.
+        """
+        return self.layout.image(np.where((self.index >= 0)[:, None], weights[self.index], 0))
+
     def mean(self, radiances: Doubles) -> Doubles:
         """Return the mean over its domain, (3,). radiances: (n, 3), those of all lights."""
-        found = self.places >= 0
-        shares = self.domain.shares(self.size)[found]
-        return np.asarray(shares @ radiances[self.places[found]] / shares.sum())
+        found = self.index >= 0
+        shares = self.shares[found]
+        return np.asarray(shares @ radiances[self.index[found]] / shares.sum())
 
 
 def light_images(lights: Sequence[NamedLight]) -> list[LightImage]:
@@ -91,13 +132,12 @@ def light_images(lights: Sequence[NamedLight]) -> list[LightImage]:
         for texel in (light.members if light.name in light.members else (light.name,))
     }
     images = []
-    for name, size in images_of(name for light in lights for name in light.members).items():
-        places = np.array([index.get(texel, -1) for texel in texel_names(name, size)])
+    for name, layout in layouts_of(name for light in lights for name in light.members).items():
+        places = np.array([index.get(node_name(name, node), -1) for node in layout.nodes])
         # A name like that of a texel may be that of a light in another renderer's file.
         plugins = {lights[k].plugin for k in places[places >= 0]}
         if len(plugins) == 1 and plugins <= DOMAINS.keys():
-            domain = domain_of(plugins.pop())
-            images.append(LightImage(name, places.reshape(size[::-1]), domain))
+            images.append(LightImage(name, layout, places, domain_of(plugins.pop())))
     return images
 
 

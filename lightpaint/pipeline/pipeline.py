@@ -24,6 +24,7 @@ from lightpaint.pipeline.results.answer_folder import (
     reload_relit,
 )
 from lightpaint.pipeline.results.results import Look, write_predicted, write_report
+from lightpaint.pipeline.sun_search import find_suns
 from lightpaint.placement.placement import Placement
 from lightpaint.placement.suggestions.light_search import suggest_lights
 from lightpaint.placement.suggestions.suggestion import MoveSuggestion, Suggestion
@@ -61,6 +62,7 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
     for remark in job.remarks:
         listen.say(remark)
     job, obtained, placement = place_lights(job, obtain_bases_of(job, bases, listen), listen)
+    job, obtained = find_suns(job, obtained, listen)
     if job.settings.error is not None:
         obtained = add_needed_samples(job, obtained, listen)
     found = answer_job(job, obtained, listen)

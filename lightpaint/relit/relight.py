@@ -22,7 +22,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.relit_files import relit_files, settings_of
 from lightpaint.scene.lights.image_split import with_split
 from lightpaint.scene.lights.new_emitter import new_emitter_at
-from lightpaint.scene.lights.texels.texel import image_of, images_of
+from lightpaint.scene.lights.texels.texel import image_of, layouts_of
 from lightpaint.scene.properties.emission import Scaling
 from lightpaint.scene.properties.pose import pose_of
 from lightpaint.scene.scene import Scene
@@ -165,7 +165,7 @@ def _split_scene(scene: Scene, lighting: Lighting, names: Collection[str]) -> Sc
     lighting, has all.
     """
     whole = {emitter.name for emitter in scene.emitters}
-    sizes = {image: size for image, size in images_of(names).items() if image in whole}
+    sizes = {image: size for image, size in layouts_of(names).items() if image in whole}
     if not sizes:
         return scene
     # Only lights of texels and their mirror images have the name of one of their members.

@@ -157,9 +157,9 @@ def _enlarged(image: Floats, emitter: Emitter, map_size: GridSize) -> Floats:
     assert emitter.texel is not None
     texel, size = emitter.texel, map_size
     if texel.domain.has_proportions:
-        size = texel.domain.picture_size(texel.size, size[0])
-    if size[0] < texel.size[0] or size[1] < texel.size[1]:
-        columns, rows = texel.size
+        size = texel.domain.picture_size(texel.layout.size, size[0])
+    columns, rows = texel.layout.finest
+    if size[0] < columns or size[1] < rows:
         raise SceneError(
             f"the map size is {size[0]}x{size[1]}: expected at least {columns}x{rows}, a pixel for "
             f"each texel of {texel.image!r}"

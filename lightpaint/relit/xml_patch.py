@@ -11,7 +11,7 @@ from lightpaint.arrays import RGB
 from lightpaint.errors import OutputError, SceneError
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.emission_xml import safe_name
-from lightpaint.relit.export.sky_maps import MAP_SIZE, SkyMap, lat_long, map_axes
+from lightpaint.relit.export.sky_maps import SkyMap, lat_long, map_axes, map_size_for
 from lightpaint.relit.relight import scene_of
 from lightpaint.relit.relit_files import images_of_texels, relit_files, settings_of
 from lightpaint.scene.checks.tokens import tag
@@ -80,7 +80,7 @@ def sky_maps_of(scene: Scene, lighting: Lighting) -> list[SkyMap]:
             if "to_world" in props:
                 to_world = np.array(props["to_world"].matrix, float).reshape(4, 4)[:3, :3]
             to_light = np.linalg.inv(to_world) @ from_map
-            shown = lat_long(image, to_light, scene.map_size or MAP_SIZE)
+            shown = lat_long(image, to_light, scene.map_size or map_size_for(image))
             maps.append(SkyMap(name, f"{safe_name(name)}.latlong.exr", shown))
     return maps
 

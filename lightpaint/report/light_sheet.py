@@ -156,7 +156,7 @@ def _lights_and_images(basis: Basis) -> list[int | LightImage]:
 
 def _image_cell(basis: Basis, image: LightImage, share: float, grid: _Grid) -> _Cell:
     """Draw the cell of an image: its map as it is, black where a texel is not adjusted alone."""
-    radiances = np.where((image.places >= 0)[..., None], basis.current_weights[image.places], 0)
+    radiances = image.radiances(basis.current_weights)
     columns, rows = image.size
     picture = map_picture(image, radiances, map_stops(radiances), grid.width)
     text = spoken_percent(share) if radiances.any() else "off"

@@ -35,6 +35,7 @@ from lightpaint.scene.lights.new_emitter import (
     places_of,
 )
 from lightpaint.scene.lights.texels.image_domain import GridSize
+from lightpaint.scene.lights.texels.texel_layout import TexelLayout
 from lightpaint.scene.properties.film import Film, camera_named, reduced, reduction
 from lightpaint.scene.properties.integrator import Integrator, IntegratorChoice
 from lightpaint.scene.properties.pose import Pose, motion_of, upward_axis
@@ -75,8 +76,8 @@ class Scene(SceneFiles, Shown):
         requests: The constraints in the lights file.
         parsed: The nodes from Mitsuba's parser; internal to this package.
         chosen: Names of the lights selected by `only`; empty if all are present.
-        split: Columns and rows of the images that are split into texels, by name of the light.
-        symmetric: Those of these lights whose images are equal to their mirror images.
+        split: Columns and rows, or layouts, of images that are split into texels, by light.
+        symmetric: Those whose images are equal to their mirror images.
         map_size: Size of their images as written; None for a pixel per texel.
         added: Emitters added by `with_new_emitters`, which are in no file.
         old_sites: Sites in the file of the emitters that `moved` has moved, by name.
@@ -107,7 +108,7 @@ class Scene(SceneFiles, Shown):
     requests: SceneRequests
     parsed: ParsedScene
     chosen: tuple[str, ...] = ()
-    split: Mapping[str, GridSize] = field(default_factory=dict)
+    split: Mapping[str, GridSize | TexelLayout] = field(default_factory=dict)
     symmetric: frozenset[str] = frozenset()
     map_size: GridSize | None = None
     added: tuple[NewEmitter, ...] = ()

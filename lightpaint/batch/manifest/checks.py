@@ -169,6 +169,12 @@ def check_sequence(mistakes: Mistakes, table: Table) -> None:
 def settings_of(mistakes: Mistakes, label: str, look: Mapping[str, Any]) -> Settings:
     values = mistakes.settings(look.get("settings", {}), label)
     steps = look.get("want", SOLVE_STEPS)
+    if values.get("sun"):
+        mistakes.add(
+            label, "sun adds texels for one look, and looks share their basis: solve it alone"
+        )
+    if "scene" in look:
+        values["sun"] = 0  # also instead of that in a lights file
     return Settings(**values, verify="verify" in steps, report="report" in steps)
 
 

@@ -187,10 +187,10 @@ def _show_short(look: Look) -> None:
 def _add_image_row(table: terminal.Rows, look: Look, image: LightImage, share: float) -> str | None:
     """Add the row of an image in texels with the change of its mean, and return its colour."""
     now, new = (image.mean(x) for x in (look.basis.current_weights, look.solution.weights))
-    color, (columns, rows) = rgb_to_hex(new), image.size
+    color = rgb_to_hex(new)
     is_off = not new.any()
     table.row(
-        f"{image.name}, {columns}x{rows} texels",
+        f"{image.name}, {image.size_text}",
         _stops(float(luminance(now)), float(luminance(new))),
         "" if is_off else color or "",
         "",

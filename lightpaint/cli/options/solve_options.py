@@ -149,6 +149,15 @@ def add_method(parser: argparse.ArgumentParser) -> None:
         "before the optimum, it says so (default: %(default)s)",
     )
     parser.add_argument(
+        "--sun",
+        type=arguments.at_least(0, maximum=4096),
+        nargs="?",
+        const=72,
+        metavar="N",
+        help="find a sun in a sky that is split: split its texels again where the painting gains "
+        "most by it, into N (72) more at most, 24 at a time (default: as the lights file says)",
+    )
+    parser.add_argument(
         "--suggest",
         type=arguments.at_least(1, maximum=32),
         nargs="?",

@@ -42,6 +42,7 @@ OPTIONS = {
     "space": "--space",
     "split": "--split",
     "symmetric": "--symmetric",
+    "sun": "--sun",
     "map_size": "--map-size",
     "spp": "--spp",
     "stage": "--stage",

@@ -15,7 +15,7 @@ from lightpaint.lighting.constraints.constraints import (
     is_pattern,
     merge_tables,
 )
-from lightpaint.scene.lights.texels.texel import image_of
+from lightpaint.scene.lights.texels.texel import coarse_name, image_of
 
 
 def constraints_by_light(
@@ -82,15 +82,18 @@ def _match_lights(
             raise ConstraintError(
                 f"{where}: {name!r} is part of the light {light.name!r}: constrain that light"
             )
-    matching = fnmatchcase if is_pattern(name) else str.__eq__
-    matches = [
-        k
-        for k, x in enumerate(lights)
-        if not x.is_fixed and (matching(x.name, name) or image_of(x.name) == name)
-    ]
+    matches = [k for k, x in enumerate(lights) if not x.is_fixed and _is_meant(x.name, name)]
     if not matches:
         adjustable = [light.name for light in lights if not light.is_fixed]
         close = difflib.get_close_matches(name, adjustable, n=1)
         hint = f"did you mean {close[0]!r}? There" if close else "there"
         raise ConstraintError(f"{where}: no light {name!r}; {hint} are {some_names(adjustable)}")
     return matches
+
+
+def _is_meant(light: str, name: str) -> bool:
+    """Return whether a name or pattern means a light: its image, or the coarse texel in whose place
+    a finer one is, mean it too.
+    """
+    matching = fnmatchcase if is_pattern(name) else str.__eq__
+    return name in (light, image_of(light)) or matching(coarse_name(light) or light, name)

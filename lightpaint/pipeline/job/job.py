@@ -30,6 +30,8 @@ from lightpaint.pipeline.job.job_checks import (
     check_inputs,
     check_painting_is_no_light,
     rigging_for,
+    sky_for_sun,
+    wanted_sun,
     with_same_lights,
 )
 from lightpaint.pipeline.job.job_record import decode_job, encode_job
@@ -168,6 +170,8 @@ class Job:
         check_animation(self.settings, all_constraints, len(self.painted_frames))
         # Reports impossible constraints before rendering.
         reduce_to(all_constraints, self._lights(scenes, bases))
+        if scenes and (count := wanted_sun(self.settings, scenes)):
+            sky_for_sun(scenes[0], count)
         if self.settings.suggest:
             check_suggestible(scenes[0])
         all_rigging = rigging_for(self.rigging, scenes, self.settings)
@@ -216,6 +220,10 @@ class Job:
             all_constraints=self.all_constraints.and_then(constraints),
             views=tuple(replace(x, scene=scene, basis=None) for x, scene in views),
         )
+
+    def with_scenes(self, scenes: Sequence[Scene]) -> "Job":
+        """Return this job with another scene for each view, on the same film."""
+        return self.with_moved_lights(scenes, Constraints())
 
     def with_placement(self, placement: PlacementRecord) -> "Job":
         """Return this job with the places of lights found for another look."""

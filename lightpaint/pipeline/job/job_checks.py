@@ -7,13 +7,21 @@ from typing import Any
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.frame_groups import with_equal_lights
 from lightpaint.basis.lightgroups.light_groups import LightGroups
-from lightpaint.errors import BasisError, ConstraintError, LightpaintError, TargetError
+from lightpaint.errors import (
+    BasisError,
+    ConstraintError,
+    LightpaintError,
+    SceneError,
+    TargetError,
+)
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.joined_views import check_same_lights
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import Painting, content
 from lightpaint.placement.rigging.rigged_lights import rigged_lights
 from lightpaint.placement.rigging.rigging import Rigging, rigging_of
+from lightpaint.scene.lights.texels.sky import Sky
+from lightpaint.scene.lights.texels.texel_layout import CHILDREN
 from lightpaint.scene.scene import Scene
 from lightpaint.target.target import Target
 
@@ -123,3 +131,43 @@ def rigging_for(rigging: Rigging, scenes: Sequence[Scene], settings: Settings) -
     if all_rigging:
         rigged_lights(all_rigging, scenes[0])
     return all_rigging
+
+
+def wanted_sun(settings: Settings, scenes: Sequence[Scene]) -> int:
+    """Return how many finer texels a sky may get for a sun: as set, or as the lights file says."""
+    if settings.sun is not None or not scenes:
+        return settings.sun or 0
+    return max(scenes[0].requests.sun.values(), default=0)
+
+
+def sky_for_sun(scene: Scene, count: int) -> str:
+    """Return the name of the sky of a scene that is split into texels.
+
+    count: how many it may get more. Raises SceneError if it cannot have finer ones.
+    """
+    names = {x.texel.image: x.texel for x in scene.emitters if x.texel}
+    skies = [name for name, texel in names.items() if isinstance(texel.domain, Sky)]
+    if not skies:
+        others = f": the texels of {', '.join(names)} are not split again" if names else ""
+        raise SceneError(
+            f"sun={count} finds a sun in a sky that is split into texels, and {scene.path} has "
+            f"none{others}"
+        )
+    [image] = skies
+    if count < CHILDREN - 1:
+        raise SceneError(
+            f"sun={count}: a texel that is split again becomes {CHILDREN}, expected at least "
+            f"{CHILDREN - 1} more"
+        )
+    if image in scene.symmetric:
+        raise SceneError(
+            f"sun={count}: {image} is symmetric, and a sun is on one side of it: "
+            "leave one of the two out"
+        )
+    single = {x.name for x in scene.lights if not x.is_fixed and x.member_names == (x.name,)}
+    if not all(x.name in single for x in scene.emitters if x.texel and x.texel.image == image):
+        raise SceneError(
+            f"sun={count}: each texel of {image} must be a light of its own, and some are in a "
+            "group or not adjusted"
+        )
+    return image

@@ -8,6 +8,7 @@ from lightpaint.errors import LightpaintError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.algebra.optimum import Method
 from lightpaint.lighting.fit import Colors, Emitters, Fit, Space
+from lightpaint.scene.lights.texels.texel import MAX_TEXELS
 from lightpaint.scene.properties.film import MAX_SPP, check_resolution
 from lightpaint.scene.quality_presets import Quality, samples
 from lightpaint.validation import SWITCH, Check, a, between, number, one_of, whole
@@ -58,6 +59,8 @@ class Settings(Fit):
         refine: Rounds of rendering the solved scene, with as many samples as the basis, and
             improving the answer; needs a scene.
         suggest: Maximum number of point lights to suggest; needs a scene. All views count.
+        sun: How many texels a sky that is split may get more, finer ones where a sun is; None for
+            as many as the lights file says, by default none.
         move_lights: Whether to move the lights that may move.
         animate: True to find a lighting for each painted frame of a shot, and lights that change
             smoothly between them, instead of one lighting for all.
@@ -93,6 +96,7 @@ class Settings(Fit):
     noise_correction: bool | None = None
     refine: int = 0
     suggest: int = 0
+    sun: int | None = None
     move_lights: bool = True
     animate: bool = False
     cd_per_unit: float | None = None
@@ -117,6 +121,7 @@ class Settings(Fit):
         "noise_correction": SWITCH,
         "refine": whole(0, MAX_REFINE),
         "suggest": whole(0, MAX_SUGGEST),
+        "sun": whole(0, MAX_TEXELS),
         "move_lights": SWITCH,
         "animate": SWITCH,
         "cd_per_unit": number("cd/m²"),
@@ -202,6 +207,7 @@ class SettingsByName(TypedDict, total=False):
     noise_correction: bool | None
     refine: int
     suggest: int
+    sun: int | None
     move_lights: bool
     animate: bool
     cd_per_unit: float | None

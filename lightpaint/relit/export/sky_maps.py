@@ -45,6 +45,15 @@ def blender_axes(up: Position) -> Doubles:
     return np.asarray(_TO_BLENDER @ map_axes(up))
 
 
+def map_size_for(image: Floats) -> GridSize:
+    """Return columns and rows of the map of an image: MAP_SIZE, or its first multiple in which a
+    texel is at least four pixels wide.
+    """
+    columns, rows = MAP_SIZE
+    factor = max(1, -(-4 * image.shape[1] // columns))
+    return factor * columns, factor * rows
+
+
 def lat_long(texels: Floats, to_light: Doubles, size: GridSize) -> Floats:
     """Return the map of a sky, (rows, columns, 3) of `size`, as Mitsuba interpolates its texels.
 

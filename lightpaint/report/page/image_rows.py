@@ -24,19 +24,18 @@ def image_row(image: LightImage, basis: Basis, solution: Solution, shares: Doubl
     """Return the row of an image that is whole. shares: (n,), see `energy_shares`."""
     weights = solution.weights
     current = basis.current_weights
-    stops = map_stops(image_of_weights(image, weights))
+    stops = map_stops(image.radiances(weights))
     maps = "".join(
-        _map(f"{image.name} {label}", image, image_of_weights(image, radiances), stops)
+        _map(f"{image.name} {label}", image, image.radiances(radiances), stops)
         for label, radiances in (("now", current), ("solved", weights))
     )
-    columns, rows = image.size
     plugin, domain = basis.lights[int(image.lights[0])].plugin, image.domain
     now, new = (image.mean(radiances) for radiances in (current, weights))
     share = float(shares[image.lights].sum())
     return (
         f'<tr><td class="thumb">{maps}</td>'
         f'<th scope="row" class="name">{breakable_name(image.name)}'
-        f"<small>{escape(plugin)} · {columns}x{rows} texels</small></th>"
+        f"<small>{escape(plugin)} · {image.size_text}</small></th>"
         '<td class="colour"></td>'
         f'<td class="rgb now">{_rgb(now)}</td><td class="rgb new">{_rgb(new)}</td>'
         f'<td class="unit">{domain.parameter} '
@@ -44,11 +43,6 @@ def image_row(image: LightImage, basis: Basis, solution: Solution, shares: Doubl
         f'<td class="rgb amount"></td><td class="change">{luminance_change(now, new)}</td>'
         f"{share_cell(f'{100 * share:.1f} %', share)}</tr>"
     )
-
-
-def image_of_weights(image: LightImage, weights: Doubles) -> Doubles:
-    """Return the radiances of an image that is whole, (rows, columns, 3). weights: (n, 3)."""
-    return np.asarray(weights[image.places])
 
 
 def map_stops(radiances: Floats) -> float:

@@ -14,7 +14,9 @@ from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.lights.texels.current_image import current_image
 from lightpaint.scene.lights.texels.domains import DOMAINS, domain_of
 from lightpaint.scene.lights.texels.image_domain import GridSize, ImageDomain
-from lightpaint.scene.lights.texels.texel import Texel, texel_names
+from lightpaint.scene.lights.texels.sky import Sky
+from lightpaint.scene.lights.texels.texel import Texel, node_name
+from lightpaint.scene.lights.texels.texel_layout import RATIO, TexelLayout
 from lightpaint.scene.lights.texels.wall_coordinates import MESHES, why_no_image
 from lightpaint.scene.plane_identity import EmitterDigest
 from lightpaint.scene.properties.emission import EmissionKind, EmittedImage, EmitterSetting, Scaling
@@ -25,27 +27,28 @@ from lightpaint.scene.scene_tree import ParsedScene
 def with_split(
     facts: Mapping[str, Any],
     parsed: ParsedScene,
-    split: Mapping[str, GridSize],
+    split: Mapping[str, GridSize | TexelLayout],
     symmetric: Collection[str] = (),
 ) -> dict[str, Any]:
     """Return the facts of `inspect_scene` with some emitters split into texels.
 
-    split: columns and rows by name of an emitter. symmetric: names of those whose images become
-    their means with their mirror images. Raises SceneError for a light that does not exist
-    or cannot be split.
+    split: columns and rows, or a layout of texels, by name of an emitter. symmetric: names of those
+    whose images become their means with their mirror images. Raises SceneError for a light that
+    does not exist or cannot be split.
     """
     if not split:
         return dict(facts)
     emitters: list[Emitter] = list(facts["emitters"])
     for name, size in split.items():
+        layout = size if isinstance(size, TexelLayout) else TexelLayout(size)
         k = _index_of(name, emitters, str(parsed.path))
         taken = {x.name for x in emitters}
-        if clash := sorted(taken.intersection(texel_names(name, size))):
+        if clash := sorted(taken.intersection(node_name(name, x) for x in layout.nodes)):
             raise SceneError(
                 f"{parsed.path} has lights with the names of texels of {name!r}, "
                 f"{some_names(clash)}: rename them"
             )
-        emitters[k : k + 1] = _texels(emitters[k], size, parsed, is_symmetric=name in symmetric)
+        emitters[k : k + 1] = _texels(emitters[k], layout, parsed, is_symmetric=name in symmetric)
     return {**facts, "emitters": tuple(emitters)}
 
 
@@ -67,7 +70,7 @@ def _index_of(name: str, emitters: Sequence[Emitter], scene: str) -> int:
 
 
 def _texels(
-    emitter: Emitter, size: GridSize, parsed: ParsedScene, *, is_symmetric: bool
+    emitter: Emitter, layout: TexelLayout, parsed: ParsedScene, *, is_symmetric: bool
 ) -> list[Emitter]:
     """Return the texels of an emitter as emitters, row by row, at their current emission."""
     shape = parsed.shape_plugin(emitter.node)
@@ -85,18 +88,21 @@ def _texels(
             f"light {emitter.name!r} {reason}, so it cannot be split: give it a rectangle, or a "
             "mesh with texture coordinates (uv) for one flat image"
         )
-    current = current_image(emitter.node, emitter.kind, emitter.emission, domain, size, parsed)
+    if layout.splits and not isinstance(domain, Sky):
+        raise SceneError(f"light {emitter.name!r} is no sky: only its texels can be split again")
+    current = current_image(
+        emitter.node, emitter.kind, emitter.emission, domain, layout.size, parsed
+    )
     if is_symmetric:
         current = (current + current[:, ::-1]) / 2
-    columns, rows = size
-    texels = (Texel(emitter.name, x, y, size, domain) for y in range(rows) for x in range(columns))
+    texels = (Texel(emitter.name, node, layout, domain) for node in layout.nodes)
     return [
         replace(
             emitter,
             name=texel.name,
             kind=kind_of(domain),
-            emission=as_rgb(current[texel.row, texel.column]),
-            form=_form(texel),
+            emission=as_rgb(radiance),
+            form=texel.form,
             digest=_digest(emitter.digest, texel),
             has_name=True,
             unit_flux=None,
@@ -104,7 +110,7 @@ def _texels(
             site=Site(),
             texel=texel,
         )
-        for texel in texels
+        for texel, radiance in zip(texels, layout.values(current), strict=True)
     ]
 
 
@@ -126,13 +132,8 @@ def _why_no_image_on_mesh(name: str, shape: str, loaded: Any) -> str:
 
 
 def _digest(digest: EmitterDigest | None, texel: Texel) -> EmitterDigest | None:
-    place = f"texel {texel.column} {texel.row} of {texel.size}"
+    place = texel.identity
     return digest and EmitterDigest(f"{digest.unit} {place}", f"{digest.as_is} {place}")
-
-
-def _form(texel: Texel) -> str:
-    columns, rows = texel.size
-    return f"texel {texel.column}, {texel.row} of {columns}x{rows}"
 
 
 def kind_of(domain: ImageDomain) -> EmissionKind:
@@ -142,11 +143,11 @@ def kind_of(domain: ImageDomain) -> EmissionKind:
 
 def texel_image(radiances: Mapping[Texel, RGB]) -> Floats:
     """Return the image of texels with these radiances, (rows, columns, 3); others are black."""
-    columns, rows = next(iter(radiances)).size
-    image = np.zeros((rows, columns, 3), np.float32)
+    layout = next(iter(radiances)).layout
+    values = np.zeros((len(layout.nodes), 3))
     for texel, rgb in radiances.items():
-        image[texel.row, texel.column] = rgb
-    return image
+        values[layout.number_of[texel.node]] = rgb
+    return layout.image(values).astype(np.float32)
 
 
 def with_texels(
@@ -156,7 +157,7 @@ def with_texels(
 
     settings: by name of the emitter. Texels without a setting keep their radiance; an image of
     which no texel has one stays as authored. evenly: whether the images of all texels, also these,
-    become an even white, unless they are black.
+    become even ones (`even_image`), unless they are black.
     """
     by_node = {x.node: settings[x.name] for x in emitters if x.name in settings and not x.texel}
     nodes = {x.node for x in emitters if x.texel and (evenly or x.name in settings)}
@@ -168,10 +169,28 @@ def with_texels(
         if not image.any():
             weight = 0.0
         elif evenly:
-            image = np.ones_like(image)
+            image = np.repeat(even_image(texels, settings)[..., None], 3, axis=2)
         domain = next(x.texel.domain for x in texels if x.texel)
         shown = EmittedImage(
             domain.as_stored(image), domain.parameter, domain.has_texture, domain.has_proportions
         )
         by_node[node] = EmitterSetting(kind_of(domain), (0.0, 0.0, 0.0), weight, shown)
     return by_node
+
+
+def even_image(texels: Sequence[Emitter], lit: Collection[str]) -> Floats:
+    """Return the image of white light in which all texels are sampled alike, (rows, columns).
+
+    It is even, but where some texels are split again it is as much brighter as they are smaller,
+    and black where nothing is lit. texels: of one image. lit: names of those that are lit; others
+    with a radiance are, too.
+    """
+    layout = texels[0].texel.layout if texels[0].texel else TexelLayout((1, 1))
+    if not layout.splits:
+        return np.ones(layout.size[::-1], np.float32)
+    brightness, is_lit = np.zeros((2, len(layout.nodes), 1))
+    for k, (texel, node) in enumerate(zip(texels, layout.nodes, strict=True)):
+        brightness[k] = RATIO ** (2 * node[0])
+        is_lit[k] = texel.name in lit or any(texel.emission)
+    shown = layout.image(brightness) * (layout.image(is_lit) > 0)
+    return np.asarray(shown[..., 0], np.float32)

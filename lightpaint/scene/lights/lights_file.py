@@ -29,8 +29,10 @@ RIGGING, MOVES = ("on", "new", "pair"), ("move", "aim", "cone")
 SPLIT = "split"
 #: Key of a light in `[light.NAME]` for an image that is equal to its mirror image.
 SYMMETRIC = "symmetric"
+#: Key of a light in `[light.NAME]` for the number of finer texels with which a sun is found.
+SUN = "sun"
 #: Keys of a light for its image.
-IMAGE_KEYS = (SPLIT, SYMMETRIC)
+IMAGE_KEYS = (SPLIT, SYMMETRIC, SUN)
 KNOWN_KEYS = ("lights", "groups", "group_alike", *CONSTRAINTS, *RIGGING)
 
 #: Maximum size of a lights file in bytes.
@@ -79,6 +81,22 @@ class SceneRequests:
                 )
             names |= {name} if value else set()
         return frozenset(names)
+
+    @property
+    def sun(self) -> dict[str, int]:
+        """Number of texels that a sky may get more where a sun is, by name of the light."""
+        lights = self.keys.get("light")
+        tables = lights.items() if isinstance(lights, dict) else ()
+        counts = dict[str, int]()
+        for name, table in tables:
+            count = table.get(SUN, 0) if isinstance(table, dict) else 0
+            if isinstance(count, bool) or not isinstance(count, int) or count < 0:
+                raise SceneError(
+                    f"{self.source}: light.{name}.{SUN} is {one_line(repr(count))}: expected how "
+                    "many texels more the sky may get, such as 72"
+                )
+            counts |= {name: count} if count else {}
+        return counts
 
     @property
     def names(self) -> tuple[str, ...]:

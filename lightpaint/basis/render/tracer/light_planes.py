@@ -80,8 +80,8 @@ class LightPlanes:
         instance = dr.reinterpret_array(mi.UInt32, emitter)
         if self._texels is not None:
             is_image = self._texels.is_image(instance, active)
-            for light, factor in self._texels.shares(instance, direction, uv, is_image):
-                self._add_to_light(pixel, light, factor * value, bounces, is_image)
+            for light, factor, part in self._texels.shares(instance, direction, uv, is_image):
+                self._add_to_light(pixel, light, factor * value, bounces, part)
             active &= ~is_image
         light = dr.gather(mi.UInt32, self._light_of, instance, active)
         self._add_to_light(pixel, light, value, bounces, active)

@@ -12,6 +12,13 @@ from dataclasses import dataclass
 from lightpaint.errors import SceneError
 from lightpaint.files import one_line
 from lightpaint.scene.lights.texels.image_domain import GridSize, ImageDomain
+from lightpaint.scene.lights.texels.texel_layout import (
+    CHILDREN,
+    MAX_LEVEL,
+    Node,
+    TexelLayout,
+    coarsest,
+)
 
 #: Longest side of a written image, in pixels: a larger one is a typing error.
 MAX_MAP_SIDE = 8192
@@ -19,27 +26,41 @@ MAX_MAP_SIDE = 8192
 MAX_TEXELS = 4096
 
 _SIZE = re.compile(r"(\d{1,9})\s*[x×,]\s*(\d{1,9})")
-_NAME = re.compile(r"(.+)\.x(\d{1,4})\.y(\d{1,4})", re.DOTALL)
+_NAME = re.compile(r"(.+?)(?:\.sun([1-9]))?\.x(\d{1,6})\.y(\d{1,6})", re.DOTALL)
 
 
 @dataclass(frozen=True)
 class Texel:
     """A texel of the image of a light.
 
-    image: name of the light. column, row: its place, from the left and from the top. size: of the
-    image. domain: where it lies.
+    image: name of the light. node: its place. layout: of all texels of the image. domain: where
+    they lie.
     """
 
     image: str
-    column: int
-    row: int
-    size: GridSize
+    node: Node
+    layout: TexelLayout
     domain: ImageDomain
 
     @property
     def name(self) -> str:
         """Its name as a light: those of its image, its column and its row."""
-        return texel_name(self.image, self.column, self.row)
+        return node_name(self.image, self.node)
+
+    @property
+    def form(self) -> str:
+        """Its place as text."""
+        level, column, row = self.node
+        columns, rows = self.layout.grid(level)
+        return f"texel {column}, {row} of {columns}x{rows}"
+
+    @property
+    def identity(self) -> str:
+        """Everything that its hat depends on."""
+        level, column, row = self.node
+        finer = self.layout.finer_under.get(self.node)
+        without = f" without {finer}" if finer else ""
+        return f"texel {column} {row} of {self.layout.grid(level)}{without}"
 
 
 def texel_name(image: str, column: int, row: int) -> str:
@@ -47,25 +68,60 @@ def texel_name(image: str, column: int, row: int) -> str:
     return f"{image}.x{column}.y{row}"
 
 
+def node_name(image: str, node: Node) -> str:
+    """Return the name of a texel of any level, from the name of its image."""
+    level, column, row = node
+    return texel_name(f"{image}.sun{level}" if level else image, column, row)
+
+
 def image_of(name: str) -> str:
     """Return the name of the image that a texel of this name belongs to; "" for other names."""
+    found = _node_of(name)
+    return "" if found is None else found[0]
+
+
+def coarse_name(name: str) -> str:
+    """Return the name of the texel of the coarsest grid in whose place a texel is; "" for other
+    names.
+    """
+    found = _node_of(name)
+    return "" if found is None else node_name(found[0], coarsest(found[1]))
+
+
+def _node_of(name: str) -> tuple[str, Node] | None:
+    """Return image and place of the texel of this name; None for other names."""
     found = _NAME.fullmatch(name)
-    return "" if found is None else found[1]
+    if found is None:
+        return None
+    return found[1], (int(found[2] or 0), int(found[3]), int(found[4]))
+
+
+def layouts_of(names: Iterable[str]) -> dict[str, TexelLayout]:
+    """Return the images of which `names` has all texels."""
+    nodes: dict[str, set[Node]] = {}
+    for name in names:
+        if (found := _node_of(name)) is not None:
+            nodes.setdefault(found[0], set()).add(found[1])
+    return {
+        image: layout
+        for image, present in nodes.items()
+        if len(present) > 1 and (layout := _layout_of(present)) is not None
+    }
+
+
+def _layout_of(present: set[Node]) -> TexelLayout | None:
+    """Return the layout that has these texels and no others; None if some are missing."""
+    columns, rows = TexelLayout.of_nodes(present).size
+    # No larger one has as few texels, and its texels need not be listed.
+    if columns * rows > len(present) * CHILDREN or max(x[0] for x in present) > MAX_LEVEL:
+        return None
+    layout = TexelLayout.of_nodes(present)
+    return layout if present == set(layout.nodes) else None
 
 
 def images_of(names: Iterable[str]) -> dict[str, GridSize]:
-    """Return the images of which `names` has all texels, with their sizes."""
-    places: dict[str, set[tuple[int, int]]] = {}
-    for name in names:
-        if (found := _NAME.fullmatch(name)) is not None:
-            places.setdefault(found[1], set()).add((int(found[2]), int(found[3])))
-    sizes = {
-        image: (max(x for x, _ in texels) + 1, max(y for _, y in texels) + 1)
-        for image, texels in places.items()
-    }
-    return {
-        image: size for image, size in sizes.items() if len(places[image]) == size[0] * size[1] > 1
-    }
+    """Return the images of which `names` has all texels, with their sizes on the coarsest grid."""
+    return {image: layout.size for image, layout in layouts_of(names).items()}
 
 
 def texel_names(image: str, size: GridSize) -> list[str]:

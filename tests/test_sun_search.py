@@ -1,0 +1,163 @@
+"""A sun in a sky of coarse texels gets finer ones, if the painting gains by it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command import run_refused
+
+from lightpaint.basis.light_images import light_images
+from lightpaint.colour.color import luminance
+from lightpaint.errors import LightpaintError
+from lightpaint.images.formats.exr import write_rgb
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.pipeline.job.job import Job
+from lightpaint.pipeline.one_call import paint_with_light
+from lightpaint.pipeline.results.results import Look
+from lightpaint.progress import Listener
+from lightpaint.scene.lights.texels.texel import coarse_name
+from lightpaint.scene.properties.emission import read_emitted_image
+from lightpaint.scene.scene_reader import load_scene
+from lightpaint.scene.scene_render import Stream, render
+from lightpaint.target.target import Target
+
+SCENE = """<scene version="3.0.0">
+    <integrator type="path"><integer name="max_depth" value="3"/></integrator>
+    <sensor type="perspective"><transform name="to_world"><lookat origin="0, 3, 3"
+        target="0, 0, 0" up="0, 1, 0"/></transform><film type="hdrfilm">
+        <integer name="width" value="40"/><integer name="height" value="30"/></film></sensor>
+    <shape type="rectangle"><transform name="to_world"><scale value="3"/>
+        <rotate x="1" angle="-90"/></transform></shape>
+    <shape type="cube"><transform name="to_world"><scale x="0.1" y="0.6" z="0.1"/>
+        <translate y="0.6"/></transform></shape>
+    <emitter type="envmap" id="sky"><string name="filename" value="{map}.exr"/></emitter>
+    {more}
+</scene>"""
+WALL = """<shape type="rectangle" id="panel"><transform name="to_world"><translate y="5"/>
+    </transform><emitter type="area" id="wall"><rgb name="radiance" value="1"/></emitter></shape>"""
+SPLIT = {"sky": "8x5"}
+
+
+class Remarks(Listener):
+    """Remembers what is said."""
+
+    def __init__(self) -> None:
+        self.said: list[str] = []
+
+    def say(self, text: str) -> None:
+        self.said.append(text)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A post on a plane below an even sky, below one with a small sun, and below a softer one."""
+    folder = tmp_path_factory.mktemp("suns")
+    even = np.full((61, 120, 3), 0.4, np.float32)
+    sunny, soft = even.copy(), np.full((5, 8, 3), 0.4, np.float32)
+    sunny[20:22, 40:42] = 300.0, 240.0, 180.0
+    soft[1, 2] *= 2
+    for name, image in (("even", even), ("sunny", sunny), ("soft", soft)):
+        write_rgb(folder / f"{name}.exr", image)
+        (folder / f"{name}.xml").write_text(SCENE.format(map=name, more=""))
+    (folder / "wall.xml").write_text(SCENE.format(map="even", more=WALL))
+    return folder
+
+
+def target_under(folder: Path, sky: str) -> Target:
+    """Return a long render under a sky."""
+    lit = load_scene(folder / f"{sky}.xml")
+    return Target.of(render(lit, spp=512, stream=Stream.TEMPLATE).image)
+
+
+def answered(folder: Path, sky: str, sun: int, remarks: Remarks, **options: object) -> Look:
+    """Return the answer to a sky from the even one, split, with a sun of that many texels."""
+    scene = load_scene(folder / "even.xml", split=SPLIT)
+    return paint_with_light(
+        scene,
+        target_under(folder, sky),
+        folder / f"{sky}-{sun}",
+        sun=sun,
+        spp=64,
+        colors="free",
+        space="linear",
+        report=False,
+        progress=remarks,
+        **options,
+    )
+
+
+def missed(look: Look) -> float:
+    """Return the missed share of the energy of the painting, for the answer as rendered."""
+    goal = look.target.image
+    return float(((look.predicted.image - goal) ** 2).sum() / (goal**2).sum())
+
+
+def test_a_sun_is_found_and_casts_its_shadow(folder: Path) -> None:
+    remarks = Remarks()
+    coarse, finer = (answered(folder, "sunny", sun, remarks) for sun in (0, 50))
+    assert missed(finer) < 0.4 * missed(coarse)
+    assert finer.verification is not None
+    assert finer.verification.agrees
+    assert 24 <= len(finer.basis.lights) - len(coarse.basis.lights) <= 50
+    [image] = light_images(finer.basis.lights)
+    shown = image.radiances(finer.solution.weights).sum(axis=2)
+    row, column = np.unravel_index(int(shown.argmax()), shown.shape)
+    columns, rows = image.layout.finest
+    # Within a texel of the first finer grid; the sun is at 41 of 120 columns, 20.5 of 60 rows.
+    assert (column + 0.5) / columns == pytest.approx(41 / 120, abs=1 / 24)
+    assert row / (rows - 1) == pytest.approx(20.5 / 60, abs=1 / 12)
+    written = read_emitted_image(folder / "sunny-50" / "relit.sky.exr", is_linear=True)
+    assert written.shape == (rows, columns, 3)
+    assert any("finer texels of sky" in text for text in remarks.said)
+
+
+def test_where_nothing_is_gained_the_texels_stay_as_they_are(folder: Path) -> None:
+    remarks = Remarks()
+    look = answered(folder, "soft", 24, remarks)
+    assert len(look.basis.lights) == 40
+    assert any(text.startswith("no sun:") for text in remarks.said)
+
+
+def test_constraints_on_a_texel_hold_for_the_finer_ones_in_its_place(folder: Path) -> None:
+    constraints = Constraints.of({"sky.*.y1": {"limits": {"max": 5}}})
+    look = answered(folder, "sunny", 24, Remarks(), constraints=constraints)
+    assert len(look.basis.lights) > 40
+    its_row = [coarse_name(name).endswith(".y1") for name in look.basis.names]
+    assert sum(its_row) == 8 - 1 + 15  # three rows of the finer grid are nearest to it
+    assert np.max(luminance(look.solution.weights)[its_row]) == pytest.approx(5, rel=1e-6)
+
+
+def test_the_lights_file_may_ask_for_a_sun(folder: Path) -> None:
+    path = folder / "asks.xml"
+    path.write_text((folder / "even.xml").read_text())
+    lights = folder / "asks.lights.toml"
+    lights.write_text("[light.sky]\nsplit = [8, 5]\nsun = 3\n")
+    with pytest.raises(LightpaintError, match="sun=3: a texel that is split again becomes 25"):
+        Job((load_scene(path),), (target_under(folder, "soft"),), folder / "out")
+    lights.write_text("[light.sky]\nsplit = [8, 5]\nsun = -3\n")
+    with pytest.raises(LightpaintError, match=r"light.sky.sun is -3: expected how many"):
+        Job((load_scene(path),), (target_under(folder, "soft"),), folder / "out")
+
+
+@pytest.mark.parametrize(
+    ("scene", "options", "part"),
+    [
+        ("even", ["--sun"], "--sun 72 finds a sun in a sky that is split into texels"),
+        ("even", ["--split", "sky=8x5", "--sun", "-1"], "--sun: '-1' is not a whole number"),
+        ("even", ["--split", "sky=8x5", "--sun", "10"], "expected at least 24 more"),
+        ("even", ["--split", "sky=8x5", "--sun", "9999"], "too large: expected at most 4096"),
+        ("even", ["--split", "sky=8x5", "--symmetric", "sky", "--sun"], "sky is symmetric"),
+        (
+            "even",
+            ["--split", "sky=8x5", "--group", "dome=sky.*.y0", "--sun"],
+            "each texel of sky must be a light of its own",
+        ),
+        ("wall", ["--split", "wall=4x4", "--sun"], "the texels of wall are not split again"),
+    ],
+)
+def test_what_has_no_sun_is_refused_in_one_line(
+    folder: Path, scene: str, options: list[str], part: str
+) -> None:
+    write_rgb(folder / "flat.exr", np.full((30, 40, 3), 0.4, np.float32))
+    line = run_refused(folder, "solve", f"{scene}.xml", "flat.exr", *options, "-o", "refused")
+    assert part in line
