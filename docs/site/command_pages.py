@@ -30,7 +30,7 @@ THEMES = {
     "What the painting means": "--literal --hold --unpainted --space --colors --emitters "
     "--no-correct-noise --method --refine",
     "Lights": "--lights --group --lights-file --no-lights-file --no-group-alike --split "
-    "--symmetric --pattern --unit",
+    "--symmetric --sun --pattern --unit",
     "Scene and camera": "--scene --stage --sensor -D --integrator --variant",
     "How much to render": "--spp --time --error --quality --resolution --seed --exact-spp "
     "--no-cache",

@@ -21,6 +21,17 @@ ROOT_PAGES = {
     "SECURITY.md": "security.md",
 }
 
+#: Tutorials in the order in which somebody learns; others follow.
+TUTORIALS = (
+    "an-evening-in-the-gallery",
+    "a-paint-over-from-gimp-or-krita",
+    "a-stage-from-two-seats",
+    "a-blender-shot",
+    "the-sky-for-a-picture",
+    "hang-three-lights",
+    "fifty-looks-overnight",
+)
+
 _LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
 _FENCE = re.compile(r"(^ *(?:```|~~~).*?^ *(?:```|~~~) *$)", re.MULTILINE | re.DOTALL)
 
@@ -40,21 +51,36 @@ def stage(source: Path) -> None:
 
 
 def _stage_tutorials(source: Path) -> None:
-    """Write the tutorials, and a page that lists them; their files go along with them."""
-    titles = []
+    """Write the tutorials with their files, and a page that lists them."""
+    pages = []
     for path in sorted((DOCS / "tutorials").rglob("*")):
         place = source / path.relative_to(DOCS)
         if path.suffix == ".md":
             _write(source, path, place)
-            if path.stem != "index":
-                titles.append(path.relative_to(DOCS / "tutorials").with_suffix("").as_posix())
-        elif path.is_file() and path.suffix != ".pyc":
+            pages.append(path)
+        elif path.is_file() and "__pycache__" not in path.parts:
             place.parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(path, place)
-    page = source / "tutorials" / "index.md"
-    if not page.exists():
-        page.parent.mkdir(parents=True, exist_ok=True)
-        page.write_text(_TUTORIALS + _toctree(titles), encoding="utf-8")
+    pages.sort(
+        key=lambda page: (TUTORIALS.index(page.stem) if page.stem in TUTORIALS else 99, page)
+    )
+    cards = "".join(_card(page.stem, page.read_text(encoding="utf-8")) for page in pages)
+    text = _TUTORIALS + (f"\n::::{{grid}} 1 1 2 2\n:gutter: 3\n{cards}::::\n" if cards else "")
+    index = source / "tutorials" / "index.md"
+    index.parent.mkdir(parents=True, exist_ok=True)
+    index.write_text(text + _toctree([page.stem for page in pages], "hidden"), encoding="utf-8")
+
+
+def _card(name: str, text: str) -> str:
+    """Return the card of a tutorial: its last picture, its title and its first paragraph."""
+    title, first, *_ = (x.strip() for x in text.split("\n\n"))
+    pictures = re.findall(r"^!\[([^\]]*)\]\(([^)\s]+)\)", text, re.MULTILINE)
+    shown = ""
+    if pictures:
+        caption, path = pictures[-1]
+        shown = f":img-top: {path}\n:img-alt: {' '.join(caption.split())}\n"
+    head = f":::{{grid-item-card}} {title.removeprefix('# ')}\n:link: {name}\n:link-type: doc\n"
+    return f"\n{head}{shown}\n{first}\n:::\n"
 
 
 def _list_notebooks(folder: Path) -> None:
@@ -74,10 +100,10 @@ Each tutorial is a whole job, from the files it begins with to a picture that yo
 """
 
 
-def _toctree(names: list[str]) -> str:
+def _toctree(names: list[str], option: str = "titlesonly") -> str:
     if not names:
         return "\nNone is here yet; [first look](../first-look.md) is the place to start.\n"
-    return "\n```{toctree}\n:maxdepth: 1\n\n" + "\n".join(names) + "\n```\n"
+    return f"\n```{{toctree}}\n:{option}:\n\n" + "\n".join(names) + "\n```\n"
 
 
 def _write(source: Path, original: Path, place: Path) -> None:
