@@ -124,3 +124,16 @@ def _literals() -> Iterator[str]:
             elif isinstance(node, ast.Constant) and isinstance(node.value, str):
                 yield node.value
     yield (REPOSITORY / "lightpaint/paint/page/language/en.js").read_text("utf-8")
+
+
+def test_the_version_is_the_same_everywhere() -> None:
+    yaml = pytest.importorskip("yaml", reason="PyYAML")
+    citation = yaml.safe_load((REPOSITORY / "CITATION.cff").read_text("utf-8"))
+    assert citation["version"] == lp.__version__
+    assert citation["cff-version"] == "1.2.0"
+    titles = [citation["title"], *(x["title"] for x in citation["references"])]
+    page = " ".join((REPOSITORY / "docs" / "cite.md").read_text("utf-8").split())
+    assert [title for title in titles if title not in page] == []
+    assert f"version = {{{lp.__version__}}}" in page
+    versions = re.findall(r"^## (\d\S+)", (REPOSITORY / "CHANGELOG.md").read_text("utf-8"), re.M)
+    assert versions[0] == lp.__version__
