@@ -21,16 +21,16 @@ ROOT_PAGES = {
     "SECURITY.md": "security.md",
 }
 
-#: Tutorials in the order in which somebody learns; others follow.
-TUTORIALS = (
-    "an-evening-in-the-gallery",
-    "a-paint-over-from-gimp-or-krita",
-    "a-stage-from-two-seats",
-    "a-blender-shot",
-    "the-sky-for-a-picture",
-    "hang-three-lights",
-    "fifty-looks-overnight",
-)
+#: Tutorials in the order in which somebody learns, and the picture of each; others follow.
+TUTORIALS = {
+    "an-evening-in-the-gallery": "evening-6-warmer",
+    "a-paint-over-from-gimp-or-krita": "paint-over-3-layers",
+    "a-stage-from-two-seats": "two-seats-4-dawn",
+    "a-blender-shot": "blender-6-keyed",
+    "the-sky-for-a-picture": "sky-2-painting",
+    "hang-three-lights": "three-lights-1-painting",
+    "fifty-looks-overnight": "fifty-3-gallery",
+}
 
 _LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
 _FENCE = re.compile(r"(^ *(?:```|~~~).*?^ *(?:```|~~~) *$)", re.MULTILINE | re.DOTALL)
@@ -52,7 +52,7 @@ def stage(source: Path) -> None:
 
 def _stage_tutorials(source: Path) -> None:
     """Write the tutorials with their files, and a page that lists them."""
-    pages = []
+    pages, order = [], {name: number for number, name in enumerate(TUTORIALS)}
     for path in sorted((DOCS / "tutorials").rglob("*")):
         place = source / path.relative_to(DOCS)
         if path.suffix == ".md":
@@ -61,9 +61,7 @@ def _stage_tutorials(source: Path) -> None:
         elif path.is_file() and "__pycache__" not in path.parts:
             place.parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(path, place)
-    pages.sort(
-        key=lambda page: (TUTORIALS.index(page.stem) if page.stem in TUTORIALS else 99, page)
-    )
+    pages.sort(key=lambda page: (page.stem not in order, order.get(page.stem, 0), page))
     cards = "".join(_card(page.stem, page.read_text(encoding="utf-8")) for page in pages)
     text = _TUTORIALS + (f"\n::::{{grid}} 1 1 2 2\n:gutter: 3\n{cards}::::\n" if cards else "")
     index = source / "tutorials" / "index.md"
@@ -72,12 +70,13 @@ def _stage_tutorials(source: Path) -> None:
 
 
 def _card(name: str, text: str) -> str:
-    """Return the card of a tutorial: its last picture, its title and its first paragraph."""
+    """Return the card of a tutorial: a picture of it, its title and its first paragraph."""
     title, first, *_ = (x.strip() for x in text.split("\n\n"))
     pictures = re.findall(r"^!\[([^\]]*)\]\(([^)\s]+)\)", text, re.MULTILINE)
     shown = ""
     if pictures:
-        caption, path = pictures[-1]
+        chosen = [x for x in pictures if Path(x[1]).stem == TUTORIALS.get(name)]
+        caption, path = [*pictures, *chosen][-1]
         shown = f":img-top: {path}\n:img-alt: {' '.join(caption.split())}\n"
     head = f":::{{grid-item-card}} {title.removeprefix('# ')}\n:link: {name}\n:link-type: doc\n"
     return f"\n{head}{shown}\n{first}\n:::\n"
