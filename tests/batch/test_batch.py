@@ -203,6 +203,15 @@ def test_a_plan_is_only_told(batch_folder: Path) -> None:
     assert [look["look"] for look in summary["looks"]] == NAMES
 
 
+def test_a_plan_names_paintings_from_the_current_folder(batch_folder: Path) -> None:
+    """However the manifest leads there."""
+    (batch_folder / "plans").mkdir()
+    manifest = '[defaults]\nbasis = "../b.basis.exr"\n\n[[look]]\npainting = "../p0.exr"\n'
+    (batch_folder / "plans" / "looks.toml").write_text(manifest, encoding="utf-8")
+    _, look, _ = succeed(batch_folder, "batch", "plans/looks.toml", "--dry-run").splitlines()
+    assert look.split()[-1] == "p0.exr"
+
+
 def test_what_fails_is_tried_again_as_often_as_is_asked(
     batch_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,5 +1,6 @@
 """`lightpaint batch`: plans, runs and prints."""
 
+import os
 import shlex
 from collections.abc import Callable
 from datetime import UTC, datetime
@@ -158,7 +159,8 @@ def _show_plan(plan_: Plan) -> CommandOutcome:
     table, looks = terminal.table("look", "what", "of"), []
     for look in plan_.chosen_looks:
         action = look.failure or ("done earlier" if look.is_done else ", ".join(look.entry.want))
-        inputs = ", ".join([*(x.path for x in look.entry.paintings), *look.entry.combined_looks])
+        paintings = (_short_path(x.path) for x in look.entry.paintings)
+        inputs = ", ".join([*paintings, *look.entry.combined_looks])
         table.row(look.entry.name, visible(action), inputs or look.entry.lighting)
         looks.append({"look": look.entry.name, "is_done": look.is_done, "want": look.entry.want})
     terminal.print_table(table)
@@ -172,6 +174,12 @@ def _show_plan(plan_: Plan) -> CommandOutcome:
     if failed_names:
         terminal.complain("batch", f"cannot be done: {some_of(failed_names)}")
     return CommandOutcome(lambda: {"looks": looks, **vars(cost)}, 1 if failed_names else 0)
+
+
+def _short_path(path: str) -> str:
+    """Return a path without `..` in it, from the current folder if it leads into that."""
+    short, here = Path(os.path.normpath(path)), Path.cwd()
+    return str(short.relative_to(here) if short.is_relative_to(here) else short)
 
 
 def spoken_time(seconds: float) -> str:
