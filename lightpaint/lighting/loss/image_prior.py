@@ -37,8 +37,8 @@ def image_prior(
     power: (n, 3), ‖Φᵢ‖² of the lights' pictures. painted_share: see `weight_pull`.
 
     For radiances f of an image, energy E of the picture of an even white one and current chroma c,
-    it is E times the mean of SMOOTHNESS |∇f|² + COLOR |f − Y(f) c|² + STAYING (f − f₀)² over the
-    image, on which lengths are such that its area is 4π.
+    it is E times the mean of s |∇f|² + COLOR |f − Y(f) c|² + STAYING (f − f₀)² over the image, on
+    which lengths are such that its area is 4π; s is SMOOTHNESS times that of the domain.
     """
     images, strength = light_images(lights), fit.brightness * painted_share
     if not images or strength <= 0:
@@ -58,12 +58,13 @@ def image_prior(
         seen_share = amplitudes.sum(axis=1) / amplitudes.sum() / areas
         at = np.where(image.is_split, -1, image.places)
         seen = np.where(np.isin(at, in_image[seen_share > SEEN_SHARE]), at, -1)
+        smoothness = SMOOTHNESS * image.domain.smoothness
         for one, other, stiffness in image.domain.neighbours(image.size):
             first, second = int(seen[one]), int(seen[other])
             if first < 0 or second < 0 or first == second:
                 continue
             for i, j, sign in ((first, first, 1), (second, second, 1), (first, second, -1)):
-                M[:, i, j] += sign * SMOOTHNESS * stiffness * energy
+                M[:, i, j] += sign * smoothness * stiffness * energy
             M[:, second, first] = M[:, first, second]
     even = NormalEquations(M, np.zeros((3, n)), np.zeros(3))
     current = lights.current_weights

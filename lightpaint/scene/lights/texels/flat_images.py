@@ -74,6 +74,8 @@ class Wall(FlatDomain):
     whole: ClassVar[str] = "its surface"
     parameter: ClassVar[str] = "radiance"
     unit: ClassVar[str] = "W/(m² sr)"
+    # A wall lights a scene from one side and shows little of its image there.
+    smoothness: ClassVar[float] = 10.0
 
 
 @dataclass(frozen=True)

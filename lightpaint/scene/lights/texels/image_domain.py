@@ -24,7 +24,8 @@ class ImageDomain(ABC):
     mean is taken over. parameter, unit: of the emission of a texel. min_size: fewest columns and
     rows; Mitsuba resamples smaller images. has_texture: whether the emitter has the image in a
     texture, its parameter; otherwise it is an environment map. has_proportions: whether the light
-    has the proportions of the image, also of an even one.
+    has the proportions of the image, also of an even one. smoothness: how strongly its image is
+    pulled to a smooth one, relative to a sky.
 
     The first row of an image is its top.
     """
@@ -37,6 +38,7 @@ class ImageDomain(ABC):
     min_size: ClassVar[GridSize]
     has_texture: ClassVar[bool]
     has_proportions: ClassVar[bool] = False
+    smoothness: ClassVar[float] = 1.0
 
     def check_size(self, size: GridSize, pixels: GridSize, light: str) -> None:
         """Raise SceneError for an image with too few columns or rows, or of other proportions than
