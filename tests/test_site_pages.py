@@ -8,7 +8,7 @@ from axe import axe_source, violations
 from renderer import REPOSITORY
 
 SITE = REPOSITORY / "docs" / "_build" / "html"
-PAGES = ("index", "first-look", "commands/solve", "api/solving", "troubleshooting")
+PAGES = ("index", "first-look", "commands/solve", "api/relighting", "tutorials/index")
 
 
 @pytest.fixture
