@@ -132,8 +132,8 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         """Return a pandas.DataFrame with a row for each light, by its name.
 
         red, green, blue: its emission, linear Rec.709 in `unit`; where they are known also
-        `error_red` and the ends `lower_red`, `upper_red` of the 95 % interval, and those of the
-        other channels. y: luminance of the emission.
+        `"error_red"` and the ends `"lower_red"`, `"upper_red"` of the 95 % interval, and those of
+        the other channels. y: luminance of the emission.
         kelvin, duv, hex: its colour, where it has one. Raises LightpaintError without pandas.
         """
         rows = [self._row(light) for light in self.lights]
