@@ -57,7 +57,7 @@ class LightImage:
         """Its size for people."""
         columns, rows = self.size
         finer = sum(1 for node in self.layout.nodes if node[0])
-        return f"{columns}x{rows} texels" + (f" and {finer} finer ones" if finer else "")
+        return f"{columns}x{rows}{f' + {finer}' if finer else ''} texels"
 
     @cached_property
     def places(self) -> Indices:

@@ -143,7 +143,8 @@ def _text(best: _Candidate, started: _Candidate, image: str) -> str:
     finer = [node for node in nodes if node[0]]
     if not finer:
         return f"no sun: finer texels of {image} remove less than a twentieth of the error"
+    part = ("third", "ninth", "27th")[max(x[0] for x in finer) - 1]
     return (
-        f"{len(finer)} finer texels of {image}, down to a {RATIO ** max(x[0] for x in finer)}th of "
-        f"its size, leave {100 * best.missed / started.missed:.0f} % of the error"
+        f"{len(finer)} finer texels of {image}, down to a {part} of the width, leave "
+        f"{100 * best.missed / started.missed:.0f} % of the error"
     )

@@ -68,8 +68,7 @@ class Scene(SceneFiles, Shown):
         emitters: All emitters.
         lights: The lights to adjust, followed by the fixed light if there is one.
         files: All XML files.
-        content: Hash of all XML files and assets, the parameters and the sensor; independent of a
-            reduced film.
+        content: Hash of all XML files and assets, the parameters and the sensor, not of the film.
         unlit_content: Hash of everything that the image of each light depends on besides that
             light: the scene without its lights, but with the shapes of area lights.
         lights_file: The lights file that was used for `lights`, or None.
@@ -79,7 +78,7 @@ class Scene(SceneFiles, Shown):
         split: Columns and rows, or layouts, of images that are split into texels, by light.
         symmetric: Those whose images are equal to their mirror images.
         map_size: Size of their images as written; None for a pixel per texel.
-        added: Emitters added by `with_new_emitters`, which are in no file.
+        added: Emitters of `with_new_emitters`, which are in no file.
         old_sites: Sites in the file of the emitters that `moved` has moved, by name.
 
     Examples:
