@@ -22,9 +22,9 @@ from lightpaint.pipeline.job_bases import view_listener
 from lightpaint.pipeline.needed_samples import problem_of, without_noise
 from lightpaint.pipeline.placed_lights import moved_basis, on_film_of
 from lightpaint.progress import Listener
-from lightpaint.scene.finer_scene import with_layout
 from lightpaint.scene.lights.texels.texel_layout import CHILDREN, MAX_LEVEL, RATIO, Node
 from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import with_layout
 
 #: Share of the error that splitting a texel must remove, and how much more for each unknown that it
 #: adds, relative to the number of pixels.

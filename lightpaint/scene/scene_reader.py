@@ -11,11 +11,12 @@ from lightpaint.scene.checks.old_scenes import explain_old_scene
 from lightpaint.scene.checks.xml_limits import MAX_XML
 from lightpaint.scene.lights.emitters import Emitter, check_emitters
 from lightpaint.scene.lights.image_split import with_split
-from lightpaint.scene.lights.light import Light
+from lightpaint.scene.lights.light import Light, lights_of
 from lightpaint.scene.lights.light_choice import choose_lights
 from lightpaint.scene.lights.lights_file import LightsFile, lights_file_for
 from lightpaint.scene.lights.texels.image_domain import GridSize
 from lightpaint.scene.lights.texels.texel import mirrored_pairs, parse_map_size, parse_size
+from lightpaint.scene.lights.texels.texel_layout import TexelLayout
 from lightpaint.scene.properties.film import check_film, sensor_index
 from lightpaint.scene.properties.integrator import IntegratorChoice
 from lightpaint.scene.runtime.mitsuba_errors import mitsuba_errors
@@ -121,6 +122,25 @@ def load_scene(
         map_size=None if map_size is None else parse_map_size(map_size),
         **facts,
     )
+
+
+@MITSUBA.acquired()
+def with_layout(scene: Scene, image: str, layout: TexelLayout) -> Scene:
+    """Return a scene whose sky `image` has other texels, each a light that shows what it does now.
+
+    Its texels must have been lights of their own.
+    """
+    split = {**scene.split, image: layout}
+    with mitsuba_errors(scene.path):
+        facts = inspect_scene(scene.parsed, scene.sensor)
+        facts = with_split(facts, scene.parsed, split, scene.symmetric)
+    light_of = {name: light.name for light in scene.lights for name in light.member_names}
+    members: dict[str, list[str]] = {}
+    for emitter in facts["emitters"]:
+        members.setdefault(light_of.get(emitter.name, emitter.name), []).append(emitter.name)
+    fixed = [light.name for light in scene.lights if light.is_fixed]
+    lights = lights_of(facts["emitters"], members, fixed)
+    return replace(scene, **facts | {"film": scene.film}, lights=lights, split=split)
 
 
 def _image_sizes(selection: LightsFile, split: Mapping[str, object] | None) -> dict[str, GridSize]:

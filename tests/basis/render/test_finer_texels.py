@@ -10,10 +10,9 @@ from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.relit.relight import relight
 from lightpaint.relit.verification_render import verify
-from lightpaint.scene.finer_scene import with_layout
 from lightpaint.scene.lights.texels.texel_layout import TexelLayout
 from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_reader import load_scene
+from lightpaint.scene.scene_reader import load_scene, with_layout
 
 ROTATED = """<emitter type="envmap" id="sky"><string name="filename" value="map.exr"/>
     <float name="scale" value="2"/><transform name="to_world"><rotate x="1" angle="40"/>
