@@ -39,7 +39,7 @@ from lightpaint.scene.properties.pose import Pose, Site
 from lightpaint.scene.scene import Scene
 
 #: Steps of all lights together along many paths.
-STEPS = 12
+STEPS = 10
 
 #: Errors of a place, relative to the spread of visible points, and of a direction, in degrees,
 #: above which a picture says little about a light's pose.
@@ -127,8 +127,9 @@ def place(
         if watch is not None:
             poses.steps.watch = lambda arrangement: watch(_sites_by_name(arrangement, names))
         judge = PlacementJudge(fine, poses.steps.with_fit(fine), paths)
-        found = _searched(poses, judge, movables, slots, progress)
-        return _Result.of(found, judge, paths, large[0])
+        start, best = _searched(poses, judge, movables, slots, progress)
+        judge = judge.without_noise(best)
+        return _Result.of(judge.worthwhile(start, best), judge, paths, large[0])
 
     result = large[0].while_loaded(search, views=large[1:])
     return _placement([x for x, _ in views], result, lights, len(names))
@@ -210,8 +211,8 @@ def _searched(
     movables: list[Movable],
     slots: list[Movable],
     progress: Progress,
-) -> Found:
-    """Return the moves and new lights that are worth it."""
+) -> tuple[Arrangement, Arrangement]:
+    """Return the arrangement before all moves, and the best one."""
     total = TURNS * len(movables) + len(slots) + STEPS
     done = 0
 
@@ -226,9 +227,9 @@ def _searched(
     found = poses.by_blocks(start, count)
     if slots:
         found = NewLightSearch(poses, slots, judge).run(found, count)
-    found = judge.refined(found, STEPS, progress=count)
+    found = judge.without_noise(found).refined(found, STEPS, progress=count)
     progress("poses", total, total)
-    return judge.worthwhile(start, found)
+    return start, found
 
 
 def _placement(

@@ -9,6 +9,7 @@ whose squares are the variance of the columns, and the loss subtracts this noise
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,6 +31,9 @@ from lightpaint.placement.look_goals import LookGoal, balanced, goal_of
 #: Share of a column that others cannot replace, below which it counts as none.
 LEAST_OWN = 1e-3
 
+#: Noise of a pixel, as a share of ‖Ψ‖², above which the pixel tells nothing.
+NOISY = 1e-3
+
 
 @dataclass(frozen=True)
 class Fitted:
@@ -38,6 +42,19 @@ class Fitted:
     columns: Floats
     weights: Doubles
     missed: float
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """Derivatives of columns by numbers of poses.
+
+    values: (s, p or 2 p, 3 or 4), shaped like columns. owners: the index of each one's column.
+    numbers: the index of its number, which several columns may share.
+    """
+
+    values: Floats
+    owners: Sequence[int]
+    numbers: Sequence[int]
 
 
 @dataclass(frozen=True)
@@ -111,6 +128,14 @@ class PlacementFit:
         """The number p of pixels."""
         return len(self._root)
 
+    def without_pixels(self, left_out: Bools) -> "PlacementFit":
+        """Return the fit without some pixels, (p,), of which lights may do what they like."""
+        fit = copy(self)
+        seen = ~left_out[:, None]
+        fit._root, fit._goal = self._root * seen, self._goal * seen
+        fit._goal_noise = self._goal_noise * seen[: len(self._goal_noise)]
+        return fit
+
     def replaced(self, changed: Mapping[int, Floats]) -> Floats:
         """Return the columns, with those of some lights replaced by (q, 3)."""
         return with_columns(self.columns, changed)
@@ -157,6 +182,15 @@ class PlacementFit:
         noise = np.square(self._noise(columns, weights)).sum(axis=1)
         return np.asarray(missed - noise if len(noise) else missed)
 
+    def noisy_pixels(self, fitted: Fitted) -> Bools:
+        """Return which pixels, (p,), have so much noise that they hide what all others tell.
+
+        Where a light is close to an edge that is seen in few pixels, these are bright, and their
+        few paths meet the light by chance.
+        """
+        noise = np.square(self._noise(fitted.columns, fitted.weights)).sum(axis=1)
+        return np.asarray(np.resize(noise > NOISY * self.norm2, self.pixels))
+
     def ranking(self, fitted: Fitted) -> "Ranking":
         """Return the ranking of candidates for the place of a light that is not in `fitted`."""
         others, inverses, columns = [], [], seen_columns(fitted.columns)
@@ -170,26 +204,30 @@ class PlacementFit:
         return Ranking(self._root.astype(np.float32), residual.astype(np.float32), others, inverses)
 
     def newton(
-        self, fitted: Fitted, slopes: Floats, owners: Sequence[int], numbers: Sequence[int]
+        self, fitted: Fitted, slopes: Slopes, there: Fitted | None = None
     ) -> tuple[Doubles, Doubles]:
         """Return Gauss-Newton matrix (q, q) and gradient (q,), the weights eliminated.
 
-        slopes: of the columns `owners`, shaped like these, by q numbers of poses: each by one of
-        `numbers`, which several columns may share.
+        slopes: at the same poses. there: the lighting along other paths, whose gradient it is.
         """
-        residual = self._residual(fitted.columns, fitted.weights)
-        # Half differences act like pixels that count negatively.
-        residual = np.concatenate([residual, -self._noise(fitted.columns, fitted.weights)])
-        p, count = self.pixels, max(numbers) + 1
+        if there is None:
+            residual = self._residual(fitted.columns, fitted.weights)
+            # Half differences act like pixels that count negatively.
+            residual = np.concatenate([residual, -self._noise(fitted.columns, fitted.weights)])
+        else:
+            residual = self._residual(there.columns, there.weights)
+            residual = np.resize(residual, (fitted.columns.shape[1], residual.shape[1]))
+            residual[self.pixels :] = 0
+        p, count = self.pixels, max(slopes.numbers) + 1
         matrix, gradient = np.zeros((count, count)), np.zeros(count)
         columns = seen_columns(fitted.columns)
         for c in self.channels:
             root = np.resize(self._root[:, c], len(residual))
             weighted_slopes = root * picture_slopes(
-                fitted.columns, fitted.weights, slopes, owners, c
+                fitted.columns, fitted.weights, slopes.values, slopes.owners, c
             )
             jacobian = np.zeros((count, len(residual)))
-            for number, row in zip(numbers, weighted_slopes, strict=True):
+            for number, row in zip(slopes.numbers, weighted_slopes, strict=True):
                 jacobian[number] += row
             gradient += jacobian @ residual[:, c]
             jacobian = jacobian[:, :p]

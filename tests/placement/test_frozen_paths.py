@@ -60,6 +60,40 @@ def test_columns_are_the_planes_of_a_basis(room: Scene) -> None:
         assert np.square(column - plane).sum() < 0.03 * np.square(plane).sum()  # noise
 
 
+def test_a_spot_in_a_narrow_cone_is_that_which_shines_all_around(room: Scene) -> None:
+    """Only what it lights is traced; later directions in the cone need no further rays."""
+    spots = [
+        Site((0.1, 1.2, 0.4), (math.sin(x), -math.cos(x), 0.0), cutoff=25.0, beam=10.0)
+        for x in (0.0, 0.1)
+    ]
+    opposite = [Site((0.1, 1.2, 0.4), (0.0, 1.0, 0.0), cutoff=5.0), *spots]
+
+    def compare(paths: FrozenPaths) -> None:
+        narrow = [paths.columns([spot])[0] for spot in spots]
+        paths._forget()
+        wide = paths.columns(opposite)[1:]  # all directions, since one is the other way
+        assert all(column.any() for column in narrow)
+        np.testing.assert_allclose(narrow, wide, atol=1e-6 * wide.max())  # float32
+
+    along_paths(room, compare, first_hits=4, bounces=4)
+
+
+def test_more_first_hits_in_some_pixels_are_less_noise_there_alone(room: Scene) -> None:
+    [site] = sites(room)[:1]
+    pixels = np.array([3, 200, 201])
+
+    def compare(paths: FrozenPaths) -> None:
+        others = np.setdiff1d(np.arange(math.prod(paths.size)), pixels)
+        before = paths._sums(paths.direct, [site])[0]
+        first, second = (paths.with_more_hits(pixels, 32) for _ in range(2))
+        one, other = (its._sums(its.direct, [site])[0] for its in (first, second))
+        np.testing.assert_array_equal(one[others], before[others])
+        assert not np.array_equal(one[pixels], other[pixels])
+        np.testing.assert_allclose(one[pixels], other[pixels], rtol=0.05)  # noise
+
+    along_paths(room, compare, first_hits=1, bounces=0)
+
+
 @pytest.mark.parametrize("first_hits", [1, 9])
 def test_sums_of_one_light_are_its_column(room: Scene, first_hits: int) -> None:
     """One kernel with the cone of a spot, and vertices that are cached and summed by NumPy."""

@@ -7,7 +7,7 @@ from lightpaint.arrays import Doubles, Floats
 from lightpaint.lighting.unknowns.knobs import Knob
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.placement.look_goals import LookGoal
-from lightpaint.placement.placement_fit import PlacementFit
+from lightpaint.placement.placement_fit import PlacementFit, Slopes
 
 PIXELS = 20_000
 RNG = np.random.default_rng(3)
@@ -66,8 +66,32 @@ def test_the_gradient_of_the_loss_is_that_of_finite_differences() -> None:
     def missed_energy(step: float) -> float:
         return fit.fitted(start + np.float32(step) * slope).missed
 
-    _, gradient = fit.newton(fit.fitted(start), slope, [0], [0])
+    _, gradient = fit.newton(fit.fitted(start), Slopes(slope, [0], [0]))
     step = 0.001
     assert -2 * gradient[0] == pytest.approx(
         (missed_energy(step) - missed_energy(-step)) / (2 * step), rel=1e-3
     )
+
+
+def test_a_pixel_that_is_nothing_but_noise_is_left_out() -> None:
+    """Its noise would otherwise be taken off the loss of all the others."""
+    fit, noisy = fit_to(2 * TRUE), column(TRUE, 0.01)
+    noisy[0, PIXELS + 7] = 20
+    fitted = fit.fitted(noisy)
+    assert fitted.missed < -0.01 * fit.norm2
+    left_out = fit.noisy_pixels(fitted)
+    assert np.flatnonzero(left_out).tolist() == [7]
+    without = fit.without_pixels(left_out)
+    assert abs(without.fitted(noisy).missed) < 1e-3 * fit.norm2
+    assert not without.noisy_pixels(without.fitted(noisy)).any()
+
+
+def test_the_gradient_along_other_paths_has_no_bias_by_noise() -> None:
+    """Slopes of one set of paths and the residual of another: 0 at the truth, on average."""
+    fit = fit_to(2 * TRUE)
+    change = RNG.random((PIXELS, 3))
+    start, there = column(TRUE, 0.2), fit.fitted(column(TRUE, 0.2))
+    slope = column(change, 0.2)
+    slope += 0.5 * (start - column(TRUE, 0.0))  # of the noise that the column has
+    matrix, gradient = fit.newton(fit.fitted(start), Slopes(slope, [0], [0]), there)
+    assert abs(gradient[0] / matrix[0, 0]) < 0.02  # noise

@@ -1,8 +1,8 @@
 """Paths of a camera, traced once: the points on surfaces where a light may add to the picture."""
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -84,10 +84,18 @@ def longest_path(scene: Scene) -> int:
 
 
 def first_hits_of(
-    loaded: Any, camera: Any, size: tuple[int, int], side: int, rng: np.random.Generator
+    loaded: Any,
+    camera: Any,
+    size: tuple[int, int],
+    side: int,
+    rng: np.random.Generator,
+    chosen: Indices | None = None,
 ) -> Vertices:
-    """Return first hits in a grid of side x side cells in each pixel, one in each cell."""
-    rays, weight, pixels = _camera_rays(camera, size, side, rng)
+    """Return first hits in a grid of side x side cells in each pixel, one in each cell.
+
+    chosen: pixels, ascending; by default all.
+    """
+    rays, weight, pixels = _camera_rays(camera, size, side, rng, chosen)
     return _compressed(loaded.ray_intersect(rays), weight, pixels)[0]
 
 
@@ -131,16 +139,42 @@ def later_vertices_of(
     return found.vertices()
 
 
+def joined(parts: Sequence[Vertices]) -> tuple[Vertices, Indices]:
+    """Return the vertices of all parts, ordered by pixel, and the index of each in this order."""
+    import drjit as dr
+    import mitsuba as mi
+
+    pixels = np.concatenate([part.pixels for part in parts])
+    order = np.argsort(pixels, kind="stable")
+    place = np.empty(len(order), np.uint32)
+    place[order] = np.arange(len(order))
+    si = dr.zeros(mi.SurfaceInteraction3f, len(order))
+    throughput = dr.zeros(mi.Color3f, len(order))
+    start = 0
+    for part in parts:
+        part_places = mi.UInt32(aligned(place[start : start + len(part)], np.uint32))
+        dr.scatter(si, part.interaction, part_places)
+        dr.scatter(throughput, part.throughput, part_places)
+        dr.eval(si, throughput)
+        start += len(part)
+    return Vertices(si, throughput, pixels[order]), place.astype(np.int64)
+
+
 def _camera_rays(
-    camera: Any, size: tuple[int, int], side: int, rng: np.random.Generator
+    camera: Any,
+    size: tuple[int, int],
+    side: int,
+    rng: np.random.Generator,
+    chosen: Indices | None = None,
 ) -> tuple[Any, Any, npt.NDArray[np.int64]]:
     """Return rays, their weights for a pixel's mean, and their pixels, ascending."""
     import drjit as dr
     import mitsuba as mi
 
     height, width = size
-    pixels = np.repeat(np.arange(height * width), side**2)
-    cell = np.tile(np.arange(side**2), height * width)
+    every = np.arange(height * width) if chosen is None else chosen
+    pixels = np.repeat(every, side**2)
+    cell = np.tile(np.arange(side**2), len(every))
     jitter = rng.random((2, len(pixels)))
     x = (pixels % width + (cell % side + jitter[0]) / side) / width
     y = (pixels // width + (cell // side + jitter[1]) / side) / height
@@ -206,28 +240,13 @@ class _Hits:
 
     def vertices(self) -> Vertices | None:
         """Return the hits after the first ones, ordered by pixel; None if there are none."""
-        import drjit as dr
-        import mitsuba as mi
-
         if not self._parts:
             return None
-        pixels = np.concatenate([part.pixels for part in self._parts])
-        order = np.argsort(pixels, kind="stable")
-        place = np.empty(len(order), np.uint32)
-        place[order] = np.arange(len(order))
-        si = dr.zeros(mi.SurfaceInteraction3f, len(order))
-        throughput = dr.zeros(mi.Color3f, len(order))
-        start = 0
-        for part in self._parts:
-            part_places = mi.UInt32(aligned(place[start : start + len(part)], np.uint32))
-            dr.scatter(si, part.interaction, part_places)
-            dr.scatter(throughput, part.throughput, part_places)
-            dr.eval(si, throughput)
-            start += len(part)
+        vertices, place = joined(self._parts)
         starts = np.concatenate(self._starts)
         is_later = starts < np.arange(len(starts))
-        vertices = np.full(len(starts), -1)
-        vertices[is_later] = place
+        indices = np.full(len(starts), -1)
+        indices[is_later] = place
         later_blocks = [block for block in self._blocks if is_later[block.start]]
-        segments = PathSegments(np.concatenate(self._points), starts, later_blocks, vertices)
-        return Vertices(si, throughput, pixels[order], segments=segments)
+        segments = PathSegments(np.concatenate(self._points), starts, later_blocks, indices)
+        return replace(vertices, segments=segments)

@@ -13,19 +13,20 @@ indirect light is smooth, and is averaged along surfaces (images/surface_filter.
 import math
 from collections import OrderedDict
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from copy import copy
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import Floats, aligned
+from lightpaint.arrays import Floats, Indices, aligned
 from lightpaint.errors import SceneError
 from lightpaint.images.denoiser import Features
 from lightpaint.images.surface_filter import SurfaceFilter
 from lightpaint.placement.paths.camera_paths import (
     Vertices,
     first_hits_of,
+    joined,
     later_vertices_of,
     longest_path,
 )
@@ -38,7 +39,7 @@ from lightpaint.placement.paths.light_origin import (
 from lightpaint.placement.paths.panel_site import PanelSite
 from lightpaint.placement.paths.panels_in_view import SightLines
 from lightpaint.placement.paths.shared_vertices import SharedVertices
-from lightpaint.placement.paths.spot_cones import away_from, share_in_cone
+from lightpaint.placement.paths.vertex_light import VertexLight
 from lightpaint.scene.properties.site import Site
 from lightpaint.scene.runtime.render_lock import tracing
 from lightpaint.scene.scene import Scene
@@ -49,6 +50,9 @@ LANES = 2**20
 
 #: Number of cached values at vertices, which limits the number of cached origins.
 KEPT_VALUES = 2**24
+
+#: Number of panels of which it is kept what they cover.
+KEPT_PANELS = 64
 
 
 class FrozenPaths:
@@ -85,7 +89,7 @@ class FrozenPaths:
         if side**2 != first_hits:
             raise SceneError(f"first_hits is {first_hits}: expected a square number, like 16")
         self._camera, longest = scene.camera(loaded), longest_path(scene)
-        rng = np.random.default_rng(pass_seed(seed, Stream.FROZEN_PATHS, 0))
+        self._rng = rng = np.random.default_rng(pass_seed(seed, Stream.FROZEN_PATHS, 0))
         with tracing():
             self.direct = first_hits_of(loaded, self._camera, self.size, side, rng)
             self.indirect = (
@@ -96,14 +100,30 @@ class FrozenPaths:
             if shared is not None and self.indirect is not None:
                 self.indirect = SharedVertices.of(self.indirect, shared, rng)
         self._shift = rng.random(2)
-        self._panel_points: dict[int, tuple[Any, Any]] = {}
         self._filter: SurfaceFilter | None = None
-        self._kept: OrderedDict[tuple[int, LightOrigin], _Shone] = OrderedDict()
+        self._forget()
 
     def filtered_along(self, features: Features) -> "FrozenPaths":
         """Make `columns` average indirect light along surfaces. features: of the film's pixels."""
         self._filter = SurfaceFilter(features)
         return self
+
+    def with_more_hits(self, pixels: Indices, side: int) -> "FrozenPaths":
+        """Return the paths with other first hits in some pixels, side x side of each."""
+        paths, is_kept = copy(self), ~np.isin(self.direct.pixels, pixels)
+        with tracing():
+            more = first_hits_of(self.loaded, self._camera, self.size, side, self._rng, pixels)
+            kept = self.direct.at(np.flatnonzero(is_kept), self.direct.pixels[is_kept])
+            paths.direct, _ = joined([kept, more])
+        paths._forget()
+        return paths
+
+    def _forget(self) -> None:
+        """Begin without what earlier columns keep for later ones."""
+        self._panel_points: dict[int, tuple[Any, Any]] = {}
+        self._kept: OrderedDict[tuple[int, LightOrigin], VertexLight] = OrderedDict()
+        # Columns ask for it twice.
+        self._covered = lru_cache(maxsize=KEPT_PANELS)(self._covered_by)
 
     def columns(self, sites: Sequence[Site]) -> Floats:
         """Return the images of lights at unit intensity, (k, h, w, 3) float32 linear Rec.709.
@@ -134,7 +154,7 @@ class FrozenPaths:
             return np.asarray(self._covered(site).sum(axis=0))
         return np.zeros(self.size[0] * self.size[1], np.float32)
 
-    def _covered(self, site: PanelSite) -> Floats:
+    def _covered_by(self, site: PanelSite) -> Floats:
         """Return the shares of pixels that the front and the back of a panel fill, (2, h · w)."""
         shares = np.zeros((2, self.size[0] * self.size[1]), np.float32)
         assert site.position is not None
@@ -164,7 +184,7 @@ class FrozenPaths:
     def contributions(self, vertices: Vertices, sites: Sequence[Site]) -> Floats:
         """Return contributions of sites at the vertices, (k, v, 3); of spots without their cone."""
         shone = self._shone(vertices, [LightOrigin.of(site) for site in sites])
-        return np.stack([each.light.T for each in shone])
+        return np.stack([each.everywhere.T for each in shone])
 
     def points(self, vertices: Vertices) -> Floats:
         """Return the places of vertices, (v, 3)."""
@@ -174,11 +194,14 @@ class FrozenPaths:
         """Return the images of lights from their contributions at vertices, (k, h · w, 3)."""
         count = self.size[0] * self.size[1]
         sums = np.empty((len(sites), count, 3), np.float32)
-        origins = [LightOrigin.of(site) for site in sites]
         # Sites of one origin, like the directions of a spot, share its shadow rays.
-        by_origin: dict[LightOrigin, list[int]] = {}
-        for k, origin in enumerate(origins):
-            by_origin.setdefault(origin, []).append(k)
+        by_place: dict[LightOrigin, list[int]] = {}
+        for k, site in enumerate(sites):
+            by_place.setdefault(LightOrigin.of(site), []).append(k)
+        by_origin = {
+            self._origin(vertices, place, [sites[k] for k in its]): its
+            for place, its in by_place.items()
+        }
         distinct = [*by_origin]
         at_once = max(1, LANES // max(len(vertices), 1))
         for start in range(0, len(distinct), at_once):
@@ -190,15 +213,26 @@ class FrozenPaths:
                     sums[k] = vertices.pixel_sums(light, count, blocked).T
         return sums
 
-    def _shone(self, vertices: Vertices, origins: Sequence[LightOrigin]) -> "list[_Shone]":
+    def _origin(self, vertices: Vertices, place: LightOrigin, sites: Sequence[Site]) -> LightOrigin:
+        """Return the origin of lights at a place: a kept one that shines where they do, or a new
+        one with a margin.
+        """
+        number, origin = self._number(vertices), place.in_cone(sites)
+        kept = (its for at, its in reversed(self._kept) if at == number and its.covers(origin))
+        return next(kept, origin.with_margin())
+
+    def _number(self, vertices: Vertices) -> int:
+        return 0 if vertices is self.direct else 1
+
+    def _shone(self, vertices: Vertices, origins: Sequence[LightOrigin]) -> "list[VertexLight]":
         """Return contributions of origins at vertices; recent ones are cached."""
-        number = 0 if vertices is self.direct else 1
+        number = self._number(vertices)
         cached = {x: self._kept[number, x] for x in origins if (number, x) in self._kept}
         missing = [x for x in dict.fromkeys(origins) if x not in cached]
         if missing:
             light = self._launch(vertices, np.stack([x.row for x in missing]))
             for origin, shone in zip(missing, light, strict=True):
-                cached[origin] = _Shone(shone, vertices, origin)
+                cached[origin] = VertexLight.of(shone, vertices, origin)
         most = max(2, KEPT_VALUES // (6 * max(len(vertices), 1)))
         for origin in [*cached][-most:]:
             self._kept[number, origin] = cached[origin]
@@ -246,25 +280,3 @@ class FrozenPaths:
             dr.while_loop((mi.UInt32(0),), lambda light: light < last, add)
             values: Floats = np.array(sums, dtype=np.float32).reshape(lights, 3, count)
         return values
-
-
-@dataclass(frozen=True)
-class _Shone:
-    """The light of an origin at vertices. light: (3, v)."""
-
-    light: Floats
-    vertices: Vertices
-    origin: LightOrigin
-
-    def towards(self, site: Site) -> Floats:
-        """Return the part of it within the cone of a spot, (3, v); all of it for other lights."""
-        if site.position is None or site.cutoff is None:
-            return self.light
-        beam = site.cutoff if site.beam is None else site.beam
-        direction = np.asarray(site.direction or (0.0, 0.0, 1.0), np.float32)
-        share = share_in_cone(self._away @ direction, site.cutoff, min(beam, site.cutoff))
-        return np.asarray(self.light * share)
-
-    @cached_property
-    def _away(self) -> Floats:
-        return away_from(self.origin.position, self.vertices.points)

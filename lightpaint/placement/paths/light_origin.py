@@ -1,7 +1,8 @@
 """The origin of the light of one lamp or sun, and what it adds at vertices of paths."""
 
+import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,25 +23,33 @@ SPREAD = 0.7548776662466927, 0.5698402909980532
 #: points, and the largest number of these: a wall close to a panel is bright, and one point noise.
 NEAR, POINTS = 2.0, 32
 
-#: Values of an origin that a launch reads: position, axis, two half sides of a panel, kind.
-ORIGIN_VALUES = 13
+#: Degrees by which the cone around several directions of a spot exceeds these, so that small turns
+#: need no further shadow rays, and from which on a cone is all directions.
+MARGIN, WIDEST = 12.0, 120.0
+
+#: Values of an origin that a launch reads: position, axis, two half sides of a panel, kind, and the
+#: cosine of the cone.
+ORIGIN_VALUES = 14
 _POINT, _SUN, _PANEL = 0.0, 1.0, 2.0
 
 
 @dataclass(frozen=True)
 class LightOrigin:
-    """The parameters of a shadow ray: the origin of light, without the cone of a spot.
+    """The parameters of a shadow ray: the origin of light, without the falloff of a spot.
 
-    half_sides: of a panel, six numbers.
+    half_sides: of a panel, six numbers. reach: degrees around the axis in which it shines at all,
+    for spots.
     """
 
     position: tuple[float, ...]
     axis: tuple[float, ...]
     kind: float
     half_sides: tuple[float, ...] = (0.0,) * 6
+    reach: float = 180.0
 
     @classmethod
     def of(cls, site: Site) -> "LightOrigin":
+        """Return the origin of a site; that of a spot shines in all directions."""
         if site.position is None:
             return cls((0, 0, 0), site.direction or (0, 0, 1), _SUN)
         if isinstance(site, PanelSite):
@@ -48,10 +57,40 @@ class LightOrigin:
             return cls(site.position, site.direction or (0, 0, 1), _PANEL, half_sides)
         return cls(site.position, (0, 0, 1), _POINT)
 
+    def in_cone(self, spots: Sequence[Site]) -> "LightOrigin":
+        """Return the origin of some spots here, which shines in a cone around all of theirs."""
+        if self.kind != _POINT or any(
+            spot.direction is None or spot.cutoff is None for spot in spots
+        ):
+            return self
+        directions = np.array([spot.direction for spot in spots])
+        axis = directions.mean(axis=0)
+        axis /= max(float(np.linalg.norm(axis)), 1e-9)
+        angles = np.degrees(np.arccos(np.clip(directions @ axis, -1, 1)))
+        reach = float(np.max(angles + np.array([spot.cutoff or 0.0 for spot in spots])))
+        return self if reach > WIDEST else replace(self, axis=tuple(axis.tolist()), reach=reach)
+
+    def with_margin(self) -> "LightOrigin":
+        """Return the origin with a slightly wider cone."""
+        reach = self.reach + MARGIN
+        return replace(self, reach=reach if reach <= WIDEST else 180.0)
+
+    def covers(self, other: "LightOrigin") -> bool:
+        """Return whether the other is here and shines nowhere that this one does not."""
+        if self == other or self.kind != _POINT:
+            return self == other
+        if self.position != other.position or self.reach >= 180:
+            return self.position == other.position and other.kind == _POINT
+        cosine = float(np.clip(np.dot(self.axis, other.axis), -1, 1))
+        return math.degrees(math.acos(cosine)) + other.reach <= self.reach
+
     @property
     def row(self) -> Floats:
         """Its values for a launch."""
-        return np.array([*self.position, *self.axis, *self.half_sides, self.kind], np.float32)
+        cosine = -2.0 if self.reach >= 180 else math.cos(math.radians(self.reach))
+        return np.array(
+            [*self.position, *self.axis, *self.half_sides, self.kind, cosine], np.float32
+        )
 
 
 def added_light(
@@ -82,6 +121,7 @@ def added_light(
         towards = dr.select(is_sun, -axis, between * dr.rsqrt(squared))
         power = dr.select(is_panel, area * dr.maximum(dr.dot(-towards, axis), 0), 1) / squared
         power = dr.select(is_sun, 1.0, power)
+        power = dr.select(dr.dot(-towards, axis) >= row[13], power, 0)
         if share_towards is not None:
             power *= share_towards(-towards)
         is_lit = power > 0

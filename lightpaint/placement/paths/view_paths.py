@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -34,6 +35,10 @@ COARSE_SAMPLES = ((1, 0), (16, 16))
 #: pixel; and the share of them that continue as paths.
 FINE_HITS, FINE_SIDES, CONTINUED_SHARE = 2**17, (3, 6), 1
 
+#: Side of the grid of first hits in pixels that would otherwise be nothing but noise, and in those
+#: this near to them, where a small move of the light makes noise as well.
+NOISY_SIDE, NOISY_AROUND = 32, 2
+
 #: Largest number of vertices after first hits that take the light of a place.
 SHARED = 2**13, 2**13
 
@@ -51,6 +56,22 @@ class ViewPaths:
         self, parts: Sequence[FrozenPaths], other_half: Sequence[FrozenPaths] = ()
     ) -> None:
         self.parts, self._other_half = tuple(parts), tuple(other_half)
+
+    def with_more_hits(self, noisy: Bools) -> "ViewPaths":
+        """Return the paths with many more first hits around some of all pixels, (p,)."""
+        edges = np.cumsum([math.prod(part.size) for part in self.parts])[:-1]
+        pixels = [
+            np.flatnonzero(_around(its.reshape(part.size)))
+            for its, part in zip(np.split(noisy, edges), self.parts, strict=True)
+        ]
+        halves = [
+            [
+                part.with_more_hits(its, NOISY_SIDE) if len(its) else part
+                for part, its in zip(half, pixels, strict=False)
+            ]
+            for half in (self.parts, self._other_half)
+        ]
+        return ViewPaths(*halves)
 
     def columns(self, sites: Sequence[Site]) -> Floats:
         """Return the images of lights at unit emission, (k, p, 3), p being all pixels.
@@ -138,6 +159,7 @@ class SearchPaths:
         self, small: Sequence[Scene], large: Sequence[Scene], loaded: Any, *, seed: int
     ) -> None:
         self._small, self._large, self.loaded, self._seed = small, large, loaded, seed
+        self._noisy: Bools | None = None
         self._features = [loaded_features(view, loaded, seed) for view in large]
         self.space = FreeSpace.of_views([free_space(view, loaded, seed=seed) for view in large])
 
@@ -166,6 +188,13 @@ class SearchPaths:
         """Further independent paths in equal number, for the spread of places."""
         return self._fine(4)
 
+    def with_more_hits(self, noisy: Bools) -> "SearchPaths":
+        """Return the paths with many more first hits in some pixels, (p,), of the larger films."""
+        paths = copy(self)
+        paths.refine, paths.judge = (its.with_more_hits(noisy) for its in (self.refine, self.judge))
+        paths._noisy = noisy
+        return paths
+
     def in_view(self, places: Floats) -> Bools:
         """Return which places any camera sees, (k,)."""
         seen = [seen_by_camera(view, self.loaded, places) for view in self._large]
@@ -191,7 +220,8 @@ class SearchPaths:
         side = round(float(np.clip(math.sqrt(FINE_HITS / pixels), *FINE_SIDES)))
         samples = side**2, max(1, round(CONTINUED_SHARE * side**2))
         halves = [self._made(2 * k + j, self._large, self._features, samples) for j in range(2)]
-        return ViewPaths(*halves)
+        paths = ViewPaths(*halves)
+        return paths if self._noisy is None else paths.with_more_hits(self._noisy)
 
     def _made(
         self, k: int, views: Sequence[Scene], features: Sequence[Features], samples: tuple[int, int]
@@ -208,3 +238,13 @@ class SearchPaths:
             )
             view_paths.append(paths.filtered_along(view_features))
         return view_paths
+
+
+def _around(chosen: Bools) -> Bools:
+    """Return the pixels, (h, w), at most `NOISY_AROUND` from chosen ones."""
+    height, width = chosen.shape
+    wide = np.pad(chosen, NOISY_AROUND)
+    side = range(2 * NOISY_AROUND + 1)
+    return np.asarray(
+        np.any([wide[y : y + height, x : x + width] for y in side for x in side], axis=0)
+    )

@@ -117,6 +117,29 @@ class PlacementJudge:
     def __init__(self, fit: PlacementFit, steps: PoseSteps, paths: SearchPaths) -> None:
         self._fit, self._steps, self._paths = fit, steps, paths
 
+    @property
+    def _both(self) -> tuple[ViewPaths, ViewPaths]:
+        """The paths that weights are fitted on, and the others."""
+        return self._paths.refine, self._paths.judge
+
+    def without_noise(self, best: Arrangement) -> "PlacementJudge":
+        """Return a judge with more paths in pixels that are nothing but noise for these lights.
+
+        It leaves out those that still are. A loss from which noise is subtracted is right on
+        average, but a search would look for the places where it is too small by chance.
+        """
+        noisy = self._noisy_pixels(best)
+        if not noisy.any():
+            return self
+        paths = self._paths.with_more_hits(noisy)
+        still_noisy = PlacementJudge(self._fit, self._steps, paths)._noisy_pixels(best)
+        fit = self._fit.without_pixels(still_noisy)
+        return PlacementJudge(fit, self._steps.with_fit(fit), paths)
+
+    def _noisy_pixels(self, best: Arrangement) -> Bools:
+        fits = [self._steps.fitted(best.movables, best.sites, at) for at in self._both]
+        return np.asarray(np.any([self._fit.noisy_pixels(fitted) for fitted in fits], axis=0))
+
     def refined(
         self, best: Arrangement, steps: int, *, progress: Callable[[], None]
     ) -> Arrangement:
@@ -134,7 +157,7 @@ class PlacementJudge:
 
         The change with the least gain goes first, since others may take over what it did.
         """
-        errors = _ErrorsOfChanges(self._fit, start, best, (self._paths.refine, self._paths.judge))
+        errors = _ErrorsOfChanges(self._fit, start, best, self._both)
         changed, gains = errors.changed.copy(), np.zeros(len(best.movables))
         before, after = errors.missed(np.zeros_like(changed)), errors.missed(changed)
         while changed.any():
@@ -171,18 +194,17 @@ class PlacementJudge:
         """Return whether the last light has enough gain on paths that nothing was fitted to."""
         if after.missed >= before.missed:
             return False
+        fits = [
+            [self._steps.fitted(its.movables, its.sites, at) for at in self._both]
+            for its in (before, after)
+        ]
+        fit = self._fit.without_pixels(
+            np.any([self._fit.noisy_pixels(fitted) for pair in fits for fitted in pair], axis=0)
+        )
         maps = []
-        for its in (before, after):
-            fitted, judged = (
-                self._steps.fitted(its.movables, its.sites, at)
-                for at in (self._paths.refine, self._paths.judge)
-            )
-            maps.append(
-                [
-                    self._fit.missed_map(columns, fitted.weights)
-                    for columns in (fitted.columns, judged.columns)
-                ]
-            )
+        for pair in fits:
+            weights = fit.fitted(pair[0].columns).weights
+            maps.append([fit.missed_map(fitted.columns, weights) for fitted in pair])
         gain = np.array(maps[0]) - np.array(maps[1])
         least = self._least_gain(gain, np.array(maps[0]))
         # Noise of painting and basis is the same for all paths. It is independent between pixels,
@@ -193,11 +215,9 @@ class PlacementJudge:
 
     def errors(self, best: Arrangement) -> list[PoseError]:
         """Return the spread of each pose between fits along independent paths."""
-        fits = [best.sites]
-        for at in (self._paths.judge, self._paths.spread):
-            start = self._steps.slid(self._steps.refitted(best, at), at)
-            refit = self._steps.descend(start, at, REFIT_STEPS, first_share=REFIT_SHARE)
-            fits.append(refit.sites)
+        fits: list[Sequence[Site]] = [best.sites]
+        for other in (self._paths.judge, self._paths.spread):
+            fits.append(self._steps.refit(best, self._paths.refine, other))
         return [
             _error([sites[k] for sites in fits], best.movables[k].light.freedom.slides)
             for k in range(len(best.movables))
@@ -208,10 +228,9 @@ class PlacementJudge:
 
         order: of these movables.
         """
-        paths = (self._paths.refine, self._paths.judge)
         columns = [
             by_column(best.movables, at.columns(all_sites(best.movables, best.sites)))
-            for at in paths
+            for at in self._both
         ]
         stages = []
         for count in range(len(order) + 1):

@@ -1,18 +1,18 @@
 """Gauss-Newton steps of several lights' poses, their weights eliminated."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats
+from lightpaint.arrays import Doubles
 from lightpaint.placement.free_light import FreeLight
 from lightpaint.placement.light_columns import with_columns
 from lightpaint.placement.movable import Arrangement, Movable, all_sites, by_column
 from lightpaint.placement.paths.panel_site import PanelSite
 from lightpaint.placement.paths.view_paths import ViewPaths
-from lightpaint.placement.placement_fit import Fitted, PlacementFit
+from lightpaint.placement.placement_fit import Fitted, PlacementFit, Slopes
 from lightpaint.placement.space.free_space import as_position
 from lightpaint.scene.properties.pose import Site
 
@@ -23,6 +23,10 @@ MAX_STEP = 6.0
 #: shrinkage after one that helped; its minimum; and the trials of a step.
 RIDGE, RIDGE_GROWTH, RIDGE_SHRINK, LEAST_RIDGE, TRIALS = 1e-2, 6.0, 4.0, 1e-5, 5
 
+#: Steps that may follow with the same slopes, and the share of the error, which the last one must
+#: have removed for that.
+REPEATS, WORTH_REPEAT = 2, 0.02
+
 #: Length of the first finite differences, relative to the spread of visible points; the least
 #: length relative to that; and the factors after a step that helped, and after one without
 #: progress.
@@ -30,6 +34,9 @@ FIRST_STEP, LAST_SHARE, SHORTER, MUCH_SHORTER = 0.04, 0.15, 0.6, 0.4
 
 #: Ratios of distances that panels and spots are tried at, and how many times in a row.
 RATIOS, MOST_SLIDES = (1.25, 1.08, 1.025), 8
+
+#: Steps of a fit along other paths, and the largest of them, relative to the first differences.
+REFIT_STEPS, REFIT_STEP = 4, 3.0
 
 #: Decrease, as a share of the error, below which a step counts as no progress.
 MIN_PROGRESS = 1e-4
@@ -166,28 +173,26 @@ class PoseSteps:
 
         step: length of the differences. moving: movables that move; None for all.
         """
-        every = range(len(arrangement.movables)) if moving is None else moving
-        scales = {
-            k: self._scales(arrangement.movables[k].light, arrangement.sites[k]) for k in every
-        }
-        numbers = [(k, j) for k, stepped in scales.items() for j in range(len(stepped))]
-        if not numbers:
+        scales = self._all_scales(arrangement, moving)
+        if not any(len(scale) for scale in scales.values()):
             return arrangement, ridge
-        slopes, owners, places = self._slopes(arrangement, at, numbers, scales, step)
-        matrix, gradient = self._fit.newton(arrangement.fitted, slopes, owners, places)
-        diagonal = np.diag(matrix) + 1e-9 * np.trace(matrix) + 1e-300
+        slopes = self._slopes(arrangement, at, scales, step)
+
+        def trial(start: Arrangement) -> Arrangement:
+            matrix, gradient = self._fit.newton(start.fitted, slopes)
+            change = np.linalg.solve(matrix + ridge * np.diag(_diagonal(matrix)), gradient)
+            change = np.clip(change, -MAX_STEP * step, MAX_STEP * step)
+            sites = self._stepped(start, start.sites, change, scales)
+            if not self._permits(start.movables, sites):
+                return start
+            fitted = self._moved(start, sites, [*scales], at)
+            return Arrangement(start.movables, tuple(sites), fitted)
+
         for _ in range(TRIALS):
-            change = np.linalg.solve(matrix + ridge * np.diag(diagonal), gradient)
-            change = change.clip(-MAX_STEP * step, MAX_STEP * step)
-            sites = list(arrangement.sites)
-            for k, scale in scales.items():
-                own = change[[q for q, (owner, _) in enumerate(numbers) if owner == k]]
-                sites[k] = arrangement.movables[k].light.stepped(sites[k], own * scale)
-            if self._permits(arrangement.movables, sites):
-                fitted = self._moved(arrangement, sites, [*scales], at)
-                if fitted.missed < arrangement.missed * (1 - 1e-7):
-                    stepped = Arrangement(arrangement.movables, tuple(sites), fitted)
-                    return stepped, max(ridge / RIDGE_SHRINK, LEAST_RIDGE)
+            stepped = trial(arrangement)
+            if stepped.missed < arrangement.missed * (1 - 1e-7):
+                ridge = max(ridge / RIDGE_SHRINK, LEAST_RIDGE)
+                return _repeated(trial, arrangement, stepped), ridge
             ridge *= RIDGE_GROWTH
         return arrangement, ridge
 
@@ -200,19 +205,53 @@ class PoseSteps:
         changed = by_column(movables, columns)
         return self._fit.fitted(with_columns(arrangement.fitted.columns, changed))
 
-    def _slopes(
+    def refit(self, arrangement: Arrangement, at: ViewPaths, other: ViewPaths) -> Sequence[Site]:
+        """Return the poses that fit best along `other` paths, near those that do along `at`.
+
+        Slopes are along the first paths, so that their noise is independent of the residual's: then
+        the gradient needs no correction, and they serve all steps.
+        """
+        step = LAST_SHARE * self.first_step
+        scales = self._all_scales(arrangement, None)
+        sites: Sequence[Site] = arrangement.sites
+        if not any(len(scale) for scale in scales.values()):
+            return sites
+        slopes = self._slopes(arrangement, at, scales, step)
+        for _ in range(REFIT_STEPS):
+            there = self.fitted(arrangement.movables, sites, other)
+            matrix, gradient = self._fit.newton(arrangement.fitted, slopes, there)
+            change = np.linalg.solve(matrix + LEAST_RIDGE * np.diag(_diagonal(matrix)), gradient)
+            largest = REFIT_STEP * self.first_step
+            stepped = self._stepped(arrangement, sites, np.clip(change, -largest, largest), scales)
+            if not self._permits(arrangement.movables, stepped):
+                break
+            sites = stepped
+        return sites
+
+    def _stepped(
         self,
         arrangement: Arrangement,
-        at: ViewPaths,
-        numbers: Sequence[tuple[int, int]],
-        scales: dict[int, Doubles],
-        step: float,
-    ) -> tuple[Floats, list[int], list[int]]:
-        """Return slopes of columns (s, p, 3 or 4), the index of each one's column and number."""
+        sites: Sequence[Site],
+        change: Doubles,
+        scales: Mapping[int, Doubles],
+    ) -> list[Site]:
+        """Return other poses. change: of all numbers, in the order of `scales`."""
+        stepped, start = list(sites), 0
+        for k, scale in scales.items():
+            own = change[start : start + len(scale)]
+            stepped[k] = arrangement.movables[k].light.stepped(stepped[k], own * scale)
+            start += len(scale)
+        return stepped
+
+    def _slopes(
+        self, arrangement: Arrangement, at: ViewPaths, scales: Mapping[int, Doubles], step: float
+    ) -> Slopes:
+        """Return slopes of columns by all numbers of poses, in the order of `scales`."""
         ahead: list[Site] = []
         owners: list[int] = []
         places: list[int] = []
         widths: list[float] = []
+        numbers = [(k, j) for k, scale in scales.items() for j in range(len(scale))]
         for q, (k, j) in enumerate(numbers):
             movable, site = arrangement.movables[k], arrangement.sites[k]
             change = np.zeros(len(scales[k]))
@@ -228,12 +267,41 @@ class PoseSteps:
         slopes = at.columns(ahead)
         slopes -= arrangement.fitted.columns[owners][:, :, : slopes.shape[2]]
         slopes /= np.array(widths, np.float32)[:, None, None]
-        return slopes, owners, places
+        return Slopes(slopes, owners, places)
+
+    def _all_scales(
+        self, arrangement: Arrangement, moving: Sequence[int] | None
+    ) -> dict[int, Doubles]:
+        """Return the scales of each movable that moves; all of them for None."""
+        every = range(len(arrangement.movables)) if moving is None else moving
+        return {k: self._scales(arrangement.movables[k].light, arrangement.sites[k]) for k in every}
 
     def _scales(self, light: FreeLight, site: Site) -> Doubles:
         """Return the amounts of a pose's numbers that are equivalent to sliding by one unit."""
         place, turn, cone = light.dimensions(site)
         return np.array([1.0] * place + [1 / self._unit] * (turn + cone))
+
+
+def _repeated(
+    trial: Callable[[Arrangement], Arrangement], before: Arrangement, stepped: Arrangement
+) -> Arrangement:
+    """Return the arrangement after more steps with the slopes of the last, as far as they help.
+
+    Slopes take a column for each number of a pose, and a step takes one for each light.
+    """
+    for _ in range(REPEATS):
+        if before.missed - stepped.missed < WORTH_REPEAT * stepped.missed:
+            break
+        again = trial(stepped)
+        if again.missed >= stepped.missed:
+            break
+        before, stepped = stepped, again
+    return stepped
+
+
+def _diagonal(matrix: Doubles) -> Doubles:
+    """Return the diagonal, without zeros."""
+    return np.asarray(np.diag(matrix) + 1e-9 * np.trace(matrix) + 1e-300)
 
 
 def _scaled(site: Site, factor: float) -> Site:
