@@ -36,7 +36,7 @@ FIRST_STEP, LAST_SHARE, SHORTER, MUCH_SHORTER = 0.04, 0.15, 0.6, 0.4
 RATIOS, MOST_SLIDES = (1.25, 1.08, 1.025), 8
 
 #: Steps of a fit along other paths, and the largest of them, relative to the first differences.
-REFIT_STEPS, REFIT_STEP = 4, 3.0
+REFIT_STEPS, REFIT_STEP = 8, 3.0
 
 #: Decrease, as a share of the error, below which a step counts as no progress.
 MIN_PROGRESS = 1e-4
