@@ -354,6 +354,7 @@ OTHERS: list[tuple[str, Callable[[Session], object]]] = [
     ("tie", lambda session: session.handle(protocol.TieLights((("lamp 0", "lamp 1"),)), {})),
     ("load", lambda session: session.load({}, SessionRequests({"lamp 1": {"off": True}}), "look")),
     ("undo", lambda session: session.handle(protocol.Undo(), {})),
+    ("drop", lambda session: session.handle(protocol.DropStroke(), {})),
     (
         "refused",
         lambda session: session.handle(protocol.ConstrainLight(0, {"limits": {"min": -1}}), {}),

@@ -102,9 +102,12 @@ class ImportLayers(Message, kind="import_layers"):
 
 @dataclass(frozen=True)
 class DropStroke(Message, kind="drop_stroke"):
-    """Cancel the unfinished stroke. Answered by `patch`."""
+    """Cancel the unfinished stroke, and what a drag or a slider has changed. Answered by `patch`.
 
-    stroke: int
+    stroke: number of the stroke; 0 for none.
+    """
+
+    stroke: int = 0
 
 
 @dataclass(frozen=True)

@@ -31,8 +31,13 @@ def unfold(painter: Painter) -> None:
     painter.still()
 
 
-def drag(painter: Painter, *places: tuple[int, int], modifier: str = "") -> None:
-    """Drag over the middles of texels, given by column and row."""
+def drag(
+    painter: Painter, *places: tuple[int, int], modifier: str = "", is_cancelled: bool = False
+) -> None:
+    """Drag over the middles of texels, given by column and row, and wait for the answer.
+
+    is_cancelled: press Escape before the end.
+    """
     painter.page.locator(".texel-map").scroll_into_view_if_needed()
     box = painter.page.locator(".texel-map").bounding_box()
     if modifier:
@@ -43,9 +48,12 @@ def drag(painter: Painter, *places: tuple[int, int], modifier: str = "") -> None
         painter.page.mouse.move(x, y, steps=1 if k == 0 else 6)
         if k == 0:
             painter.page.mouse.down()
+    if is_cancelled:
+        painter.page.keyboard.press("Escape")
     painter.page.mouse.up()
     if modifier:
         painter.page.keyboard.up(modifier)
+    painter.still()
 
 
 def test_an_image_is_one_row_with_its_map(painter: Painter) -> None:
@@ -89,7 +97,6 @@ def test_texels_are_painted_locked_and_released_in_one_step_each(painter: Painte
     before = weights(painter)
     mean = float(before.mean(axis=0) @ LUMINANCE)
     drag(painter, (0, 1), (2, 1))
-    painter.still()
     painted = weights(painter)
     np.testing.assert_allclose(painted[4:7] @ LUMINANCE, mean * 2**0.1, rtol=1e-6)
     assert not painted[4:7, 1:].any()
@@ -109,13 +116,44 @@ def test_texels_are_painted_locked_and_released_in_one_step_each(painter: Painte
     assert page.locator(".texel-lock").count() == 2
 
 
+@pytest.mark.parametrize("query", ["", "&model"], ids=["page", "notebook"])
+def test_escape_cancels_a_stroke_on_the_map(new_painter: Any, query: str) -> None:
+    painter = new_painter(QUERY + query)
+    unfold(painter)
+    page = painter.page
+    drag(painter, (0, 0))
+    before, constraints = weights(painter), painter.ui("constraints")
+    drag(painter, (0, 0), (2, 1), is_cancelled=True)
+    assert not painter.requests("constrain_lights")[-1]["is_final"]
+    np.testing.assert_array_equal(weights(painter), before)
+    assert painter.ui("constraints") == constraints
+    assert painter.ui("history")["count"] == 1
+    assert page.locator(".texel-lock").count() == 1
+    # What is painted next is the only change.
+    drag(painter, (3, 2))
+    assert list(last_request(painter)["constraints"]) == ["sky.x3.y2"]
+    assert page.locator(".texel-lock").count() == 2
+    assert painter.ui("history")["count"] == 2
+    painter.button("Release", exact=True).click()
+    drag(painter, (0, 0), (3, 2), is_cancelled=True)
+    assert page.locator(".texel-lock").count() == 2
+
+
+def test_escape_on_the_map_leaves_the_selection_of_lights(painter: Painter) -> None:
+    unfold(painter)
+    painter.page.evaluate("() => painter.store.set({ selectedLights: [0, 1] })")
+    drag(painter, (0, 0), (1, 1), is_cancelled=True)
+    assert painter.ui("selectedLights") == [0, 1]
+    painter.page.keyboard.press("Escape")
+    painter.still()
+    assert painter.ui("selectedLights") == []
+
+
 def test_a_texel_gives_its_light_as_paint(painter: Painter) -> None:
     unfold(painter)
     drag(painter, (1, 0), modifier="Alt")
-    painter.still()
     assert not painter.requests("constrain_lights")
     drag(painter, (2, 2))
-    painter.still()
     np.testing.assert_allclose(weights(painter)[10], weights(painter)[1], rtol=1e-6)
 
 
@@ -147,7 +185,6 @@ def test_in_a_symmetric_image_two_texels_are_one_light(painter: Painter) -> None
     )
     unfold(painter)
     drag(painter, (3, 1))
-    painter.still()
     assert list(last_request(painter)["constraints"]) == ["sky.x0.y1"]
     assert painter.page.locator(".texel-lock").count() == 2
 
@@ -182,6 +219,5 @@ def test_a_notebook_paints_texels_too(new_painter: Any) -> None:
     painter = new_painter(f"{QUERY}&model")
     unfold(painter)
     drag(painter, (1, 1))
-    painter.still()
     assert list(last_request(painter)["constraints"]) == ["sky.x1.y1"]
     assert painter.page.locator(".texel-lock").count() == 1

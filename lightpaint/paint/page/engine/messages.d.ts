@@ -851,10 +851,12 @@ export interface Select {
 }
 
 /**
- * Cancel the unfinished stroke. Answered by `patch`.
+ * Cancel the unfinished stroke, and what a drag or a slider has changed. Answered by `patch`.
+ *
+ * stroke: number of the stroke; 0 for none.
  */
 export interface DropStroke {
-  stroke: number;
+  stroke?: number;
 }
 
 /**

@@ -249,7 +249,10 @@ export class FakeHost {
     return made;
   }
 
+  /** Also what a drag has changed. */
   drop_stroke() {
+    Object.assign(this, this.atRest);
+    this.atRest = null;
     return this.patch();
   }
   undo() {
@@ -325,6 +328,8 @@ export class FakeHost {
     return this.answer(is_final);
   }
   constrain_lights({ constraints, label = 'constraint', is_final = true }) {
+    const { constraints: before, weights } = this;
+    this.atRest = is_final ? null : (this.atRest ?? { constraints: before, weights: [...weights] });
     this.constraints = { ...this.constraints, ...constraints };
     this.room.lights.forEach(({ name }, k) => {
       const { lock, off } = constraints[name] ?? {};

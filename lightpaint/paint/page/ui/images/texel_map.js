@@ -3,28 +3,25 @@
 import { Hex, Hsv, MIXERS, Rgb, White } from '../colour_mixers.js';
 import { Choice, Slider, useId } from '../controls.js';
 import { signedText, whiteText } from '../format.js';
-import { presentLevel, stopsOf } from '../level_field.js';
-import { scaled } from '../lamps/lamp_colours.js';
-import { atFullBrightness, luminance, toHex, toKelvin } from '../paint_colour.js';
+import { stopsOf } from '../level_field.js';
+import { atFullBrightness, toHex, toKelvin } from '../paint_colour.js';
 import { html, useLayoutEffect, useRef, useState } from '../../vendor/preact.js';
 import { fill, words } from '../../language/language.js';
 import { drawMap } from './image_map.js';
 import { mapStops, wholeLight } from './light_images.js';
+import { MAX_STOPS, MIN_STOPS, applyTool, clamp, pick, placeAt, useTexelStroke } from './texel_stroke.js';
 
 /** @typedef {import("../engine_interface.js").RGB} RGB */
 /** @typedef {import("../ui_state.js").Ui} Ui */
 /** @typedef {import("../shortcuts.js").App} App */
 /** @typedef {import("./image_state.js").LightImage} LightImage */
-/** @typedef {[row: number, column: number]} Place */
+/** @typedef {import("./texel_stroke.js").Place} Place */
 
 const TOOLS = [
   { value: 'paint', label: words.images.paint, tip: words.images.paintTexels },
   { value: 'lock', label: words.images.lock, tip: words.images.lockTexels },
   { value: 'release', label: words.images.release, tip: words.images.releaseTexels },
 ];
-
-/** Ends of the brightness of paint, in stops from the mean of the image in the scene. */
-const [MIN_STOPS, MAX_STOPS] = [-8, 12];
 
 /** @param {{image: LightImage, ui: Ui, app: App, held: number[]}} props */
 export function TexelMap({ image, ui, app, held }) {
@@ -67,45 +64,20 @@ function Grid({ image, ui, app, held, place, setPlace }) {
   const id = useId();
   const canvas = useRef(/** @type {HTMLCanvasElement | null} */ (null));
   const [key, setKey] = useState(/** @type {Place} */ ([0, 0]));
-  /** The stroke in progress, with the exposure at its start, which would change under the brush.
-   * @type {{current: {texels: Set<number>, last: Place, stops: number} | null}} */
-  const stroke = useRef(null);
   const [rows, columns] = [image.places.length, image.places[0].length];
+  const stroke = useTexelStroke(image, ui, app, (next) => {
+    setKey(next);
+    setPlace(next);
+  });
   useLayoutEffect(() => {
     if (!canvas.current) return;
-    drawMap(canvas.current, image, ui.weights, stroke.current?.stops ?? mapStops(image, ui.weights));
+    drawMap(canvas.current, image, ui.weights, stroke.stops() ?? mapStops(image, ui.weights));
   });
   const texelAt = (/** @type {Place} */ [row, column]) => image.places[row][column];
-  const apply = (/** @type {boolean} */ isFinal) =>
-    applyTool(image, ui, app, [...(stroke.current?.texels ?? [])], isFinal);
-  const begin = (/** @type {PointerEvent} */ event) => {
-    if (event.button !== 0) return;
-    event.preventDefault();
-    const start = placeAt(event, rows, columns);
-    if (event.altKey) return pick(image, ui, app, texelAt(start));
-    const element = /** @type {HTMLElement} */ (event.currentTarget);
-    element.setPointerCapture(event.pointerId);
-    element.focus({ preventScroll: true });
-    setKey(start);
-    const texels = new Set([texelAt(start)].filter((k) => k >= 0));
-    stroke.current = { texels, last: start, stops: mapStops(image, ui.weights) };
-    return apply(false);
-  };
   const move = (/** @type {PointerEvent} */ event) => {
     const next = placeAt(event, rows, columns);
     if (String(next) !== String(place)) setPlace(next);
-    const current = stroke.current;
-    if (!current || String(next) === String(current.last)) return;
-    for (const passed of placesBetween(current.last, next))
-      if (texelAt(passed) >= 0) current.texels.add(texelAt(passed));
-    current.last = next;
-    setKey(next);
-    apply(false);
-  };
-  const end = () => {
-    if (!stroke.current) return;
-    apply(true);
-    stroke.current = null;
+    stroke.move(next);
   };
   const press = (/** @type {KeyboardEvent} */ event) => {
     const step = KEY_STEPS[event.key];
@@ -128,8 +100,8 @@ function Grid({ image, ui, app, held, place, setPlace }) {
     aria-rowcount=${rows} aria-colcount=${columns} aria-activedescendant=${cellId}
     style=${{ aspectRatio: String(image.aspect) }} onKeyDown=${press}
     onFocus=${() => setPlace(key)} onBlur=${() => setPlace(null)}
-    onPointerDown=${begin} onPointerMove=${move} onPointerUp=${end} onPointerCancel=${end}
-    onPointerLeave=${() => !stroke.current && setPlace(null)}>
+    onPointerDown=${stroke.begin} onPointerMove=${move} onPointerUp=${stroke.end} onPointerCancel=${stroke.end}
+    onPointerLeave=${() => stroke.stops() === null && setPlace(null)}>
     <canvas class="image-map" ref=${canvas} aria-hidden="true"></canvas>
     <${Locks} image=${image} held=${held} />
     ${place && html`<i class="texel-here" aria-hidden="true" style=${cellStyle(image, place)}></i>`}
@@ -164,19 +136,6 @@ function cellStyle({ places }, [row, column]) {
   };
 }
 
-/** Return the nearest of `count` indices. @param {number} index @param {number} count */
-const clamp = (index, count) => Math.min(count - 1, Math.max(0, Math.floor(index)));
-
-/** Return the texel under the pointer. @param {PointerEvent} event @param {number} rows
- * @param {number} columns @returns {Place} */
-function placeAt(event, rows, columns) {
-  const box = /** @type {Element} */ (event.currentTarget).getBoundingClientRect();
-  return [
-    clamp((rows * (event.clientY - box.top)) / box.height, rows),
-    clamp((columns * (event.clientX - box.left)) / box.width, columns),
-  ];
-}
-
 /** Steps of the keys, in rows and columns. @type {Record<string, Place>} */
 const KEY_STEPS = {
   ArrowUp: [-1, 0],
@@ -186,39 +145,6 @@ const KEY_STEPS = {
   Home: [0, -Infinity],
   End: [0, Infinity],
 };
-
-/** Return the places from one to another, without the first. @param {Place} from @param {Place} to
- * @returns {Place[]} */
-function placesBetween(from, to) {
-  const [rows, columns] = [to[0] - from[0], to[1] - from[1]];
-  const count = Math.max(Math.abs(rows), Math.abs(columns));
-  return Array.from({ length: count }, (_, i) => [
-    Math.round(from[0] + (rows * (i + 1)) / count),
-    Math.round(from[1] + (columns * (i + 1)) / count),
-  ]);
-}
-
-/** @param {LightImage} image @param {Ui} ui @param {App} app @param {number[]} texels
- * @param {boolean} isFinal */
-function applyTool(image, ui, app, texels, isFinal) {
-  const { images, many } = app.session;
-  if (!texels.length) return;
-  if (ui.texelTool === 'paint') {
-    const level = presentLevel(wholeLight(image, ui.lights)) * 2 ** ui.texelStops;
-    images.paint(texels, scaled(ui.texelColour, level / luminance(ui.texelColour)), isFinal);
-  } else if (isFinal && ui.texelTool === 'lock') many.lock(texels);
-  else if (isFinal) void many.unlock(texels);
-}
-
-/** Take the light of a texel as paint. @param {LightImage} image @param {Ui} ui @param {App} app
- * @param {number} k */
-function pick(image, ui, app, k) {
-  const rgb = ui.weights[k];
-  if (!rgb || !(luminance(rgb) > 0)) return;
-  const stops = stopsOf(rgb, wholeLight(image, ui.lights)) ?? 0;
-  const texelStops = Math.min(MAX_STOPS, Math.max(MIN_STOPS, stops));
-  app.store.set({ texelColour: atFullBrightness(rgb), texelStops, texelTool: 'paint' });
-}
 
 /** Return a texel in words. @param {LightImage} image @param {Ui} ui @param {number[]} held
  * @param {Place} place */

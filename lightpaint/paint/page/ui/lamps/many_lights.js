@@ -25,6 +25,8 @@ export class ManyLights {
     this.startWeights = null;
     /** @type {Change | null} */
     this.nextChange = null;
+    /** Whether the session has yet to drop the changes of a drag. */
+    this.isCancelled = false;
     /** @type {Promise<void> | null} */
     this.inProgress = null;
   }
@@ -115,9 +117,25 @@ export class ManyLights {
     this.inProgress ??= this.send();
   }
 
+  /** Cancel the changes of a drag, none of which was final. @param {RGB[]} weights the answer before */
+  cancel(weights) {
+    const { session, store } = this;
+    this.nextChange = null;
+    this.isCancelled = true;
+    session.groupMoves = new Map();
+    session.revert();
+    store.set({ weights });
+    this.inProgress ??= this.send();
+  }
+
   /** Send the newest change until there is none left. */
   async send() {
-    while (this.nextChange) {
+    while (this.isCancelled || this.nextChange) {
+      if (this.isCancelled || !this.nextChange) {
+        this.isCancelled = false;
+        await this.session.send('drop_stroke', {});
+        continue;
+      }
       const { lights, label, isFinal } = this.nextChange;
       this.nextChange = null;
       const ui = this.store.value;
