@@ -53,14 +53,14 @@ def make_once(basis: Basis, key: Hashable, make: Callable[[], Result]) -> Result
     return result
 
 
-def page_reduction(basis: Basis, count: int) -> int:
+def page_reduction(basis: Basis, count: int, *, max_pixels: int = MAX_PIXELS) -> int:
     """Return the side of the blocks of pixels that become a pixel of a plane in a page.
 
-    count: planes in the page.
+    count: planes in the page. max_pixels: of all of them.
     """
     height, width = basis.size
     factor = max(1, -(-width // MAX_WIDTH))
-    while count * (height // factor) * (width // factor) > MAX_PIXELS and factor < min(
+    while count * (height // factor) * (width // factor) > max_pixels and factor < min(
         height, width
     ):
         factor += 1

@@ -29,6 +29,7 @@ from lightpaint.paint.notebook.painter_files import (
     widget_style,
 )
 from lightpaint.paint.notebook.session_traits import SessionTraits
+from lightpaint.paint.notebook.static_view import CellOutput, static_view
 from lightpaint.paint.notebook.widget_views import KernelThread, WidgetViews
 from lightpaint.paint.protocol import AnswerUpdate, Message, Notice, SessionState
 from lightpaint.paint.studio.studio import Studio
@@ -123,7 +124,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         self._lock, self._ready = RLock(), Event()
         self._is_closed = False
         self._solved: tuple[int, Solution | None] | None = None
-        self._kernel = KernelThread()
+        self._kernel, self._output = KernelThread(), CellOutput()
         subjects = widget_arguments.widget_subjects(
             scene,
             folder=folder,
@@ -143,13 +144,10 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             self, self._studio, self._lock, send=self._views.send, warn=self._warn
         )
         self._failed = ""
-        widget_layout = (
-            layout
-            if isinstance(layout, ipywidgets.Layout)
-            else {**DEFAULT_LAYOUT, **(layout or {})}
-        )
-        super().__init__(height=height, layout=widget_layout)
-        self.on_msg(self._on_page_message)
+        if not isinstance(layout, ipywidgets.Layout):
+            layout = {**DEFAULT_LAYOUT, **(layout or {})}
+        super().__init__(height=height, layout=layout)
+        self.on_msg(lambda _, content, buffers: self._views.receive(content, buffers))
         self._studio.on_message = self._on_studio_message
         try:
             self._begin(target)
@@ -161,7 +159,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         """Start the studio; wait for it if nothing has to be rendered. Raises LightpaintError."""
         self._studio.start()
         if self._studio.has_scenes:
-            atexit.register(self.close)  # a render must end before the process does
+            atexit.register(self._end)  # a render must end before the process does
         else:
             self._ready.wait()
             if self._failed:
@@ -178,6 +176,21 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             f"{subject.size[1]}x{subject.size[0]}" if not further else f"{1 + len(further)} views"
         )
         return f"Painter({first.name}, {len(subject.lights)} lights, {extent})"
+
+    def _ipython_display_(self) -> None:
+        """Show the painter as the output of a cell, which `close` can replace."""
+        self._output.show(*self._repr_mimebundle_())
+
+    def _repr_mimebundle_(self, **options: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+        data, metadata = super()._repr_mimebundle_(**options)
+        return {**data, **({"text/html": page} if (page := self._static_view()) else {})}, metadata
+
+    def _static_view(self) -> str | None:
+        """Return the first view as HTML that needs no kernel; None until there is a basis."""
+        if self.lighting is None:
+            return None
+        snapshot = self._studio.snapshot()
+        return static_view(snapshot.bases[0], self.lighting, self.target, snapshot.transform)
 
     @property
     def solution(self) -> Solution | None:
@@ -206,13 +219,21 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
     def close(self) -> None:
         """End the painter; a session with a file can be continued. Closing twice does nothing.
 
+        Its cells show its last picture and a mixer from then on, which need no kernel.
+
         Raises OutputError if the last steps could not be written; the painter has ended all the
         same.
         """
         if "_studio" not in vars(self) or self._is_closed:  # it has never begun, or ended before
             return
+        if self._output.is_shown and (page := self._static_view()):
+            self._output.replace({"text/plain": repr(self), "text/html": page})
+        self._end()
+
+    def _end(self) -> None:
+        """End the studio, and the widget with it. Raises OutputError."""
         self._is_closed = True
-        atexit.unregister(self.close)  # the reference would keep the painter's pictures alive
+        atexit.unregister(self._end)  # the reference would keep the painter's pictures alive
         self._studio.on_message = None
         try:
             self._studio.close()
@@ -243,12 +264,8 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
         Raises PaintError for a handler that cannot be called, and for names that are not traits.
         """
-        if not callable(handler):
-            raise PaintError(f"{handler!r} cannot observe a painter: expected a function")
-        for name in [names] if isinstance(names, str) or names is traitlets.All else names:
-            if name is not traitlets.All and not self.has_trait(name):
-                hint = widget_arguments.did_you_mean(name, LIVE_TRAITS)
-                raise PaintError(f"painter.{name} cannot be observed{hint}")
+        known = [*self.trait_names(), traitlets.All]
+        widget_arguments.check_observer(handler, names, known, LIVE_TRAITS)
         super().observe(self._callback(handler), names, type)
 
     def unobserve(self, handler: Any, names: Any = traitlets.All, type: str = "change") -> None:
@@ -269,9 +286,6 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         return dimmed(lighting, snapshot.requests.master)
 
     # Messages of page and studio
-
-    def _on_page_message(self, _: Any, content: Any, buffers: Any) -> None:
-        self._views.receive(content, buffers)
 
     def _send_to_pages(self, content: dict[str, Any], buffers: list[bytes]) -> None:
         if self.comm is not None:

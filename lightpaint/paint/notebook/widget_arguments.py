@@ -216,6 +216,18 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
     return f": did you mean {near[0]!r}?" if near else ""
 
 
+def check_observer(handler: Any, names: Any, known: Sequence[Any], usual: Iterable[str]) -> None:
+    """Raise PaintError for a handler that cannot be called, and for unknown names of traits.
+
+    names: one of `known`, or several of them. usual: those that a hint may give.
+    """
+    if not callable(handler):
+        raise PaintError(f"{handler!r} cannot observe a painter: expected a function")
+    for name in [names] if isinstance(names, str) or names in known else names:
+        if name not in known:
+            raise PaintError(f"painter.{name} cannot be observed{did_you_mean(name, usual)}")
+
+
 def widget_subjects(
     value: Paintable | Sequence[Paintable],
     *,

@@ -12,7 +12,7 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
@@ -31,7 +31,12 @@ from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.lighting.answer.light_setting import ALL_REACHED
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import lighting_fields
-from lightpaint.report.basis_memo import cached_clean_planes, make_once, page_reduction
+from lightpaint.report.basis_memo import (
+    MAX_PIXELS,
+    cached_clean_planes,
+    make_once,
+    page_reduction,
+)
 from lightpaint.report.page.figures import CLEAN_REDUCTION, data_uri
 from lightpaint.report.page.joint_lights import JointLights, rows_of_mixer
 from lightpaint.threads import parallel_map
@@ -51,6 +56,13 @@ INTRODUCTION = (
 )
 
 
+class PlaneOptions(TypedDict):
+    """Options of the planes in a page: whether to denoise them, and their pixels at most."""
+
+    is_clean: bool
+    max_pixels: int
+
+
 def mixer_html(
     basis: Basis,
     lighting: Lighting,
@@ -59,6 +71,7 @@ def mixer_html(
     transform: ViewTransform | None = None,
     is_clean: bool = False,
     scene: str | None = None,
+    max_pixels: int = MAX_PIXELS,
 ) -> str:
     """Return a section of HTML; a page with mixers needs `mixer_assets` after the last.
 
@@ -69,9 +82,12 @@ def mixer_html(
         transform: The view transform of the mix.
         is_clean: Whether to denoise planes.
         scene: For the command line; None without a scene to relight.
+        max_pixels: Maximum number of pixels in all planes.
     """
     shown, joint = rows_of_mixer(basis, lighting)
-    size, planes = _shown_planes(basis, lighting, shown, joint, is_clean=is_clean)
+    options: PlaneOptions = {"is_clean": is_clean, "max_pixels": max_pixels}
+    size, planes = _shown_planes(basis, lighting, shown, joint, **options)
+    factor = page_reduction(basis, len(planes), max_pixels=max_pixels)
     transform = transform or ViewTransform()
     data = {
         "size": size,
@@ -81,7 +97,7 @@ def mixer_html(
         "kelvins": kelvin_colors(),
         "gels": packed_gels(),
         "transform": transform_data(transform),
-        "painting": None if painting is None else _painting(painting, basis, len(planes)),
+        "painting": None if painting is None else _painting(painting, factor),
         "lighting": lighting_data(lighting),
         "command": None if scene is None else f"lightpaint relight {scene} lighting.json",
     }
@@ -106,17 +122,18 @@ def _shown_planes(
     lighting: Lighting,
     shown: Indices,
     joint: Sequence[JointLights],
-    *,
-    is_clean: bool,
+    **options: Unpack[PlaneOptions],
 ) -> tuple[list[int], list[dict[str, Any]]]:
     """Return size and planes of each light; then of joint ones, in the answer and in the scene."""
     if not joint:
-        return planes_for_page(basis, is_clean=is_clean)
+        return planes_for_page(basis, **options)
     mixes = [mix for lights in joint for mix in lights.mixes(lighting, basis)]
-    return _compact_planes(basis, shown, mixes, is_clean=is_clean)
+    return _compact_planes(basis, shown, mixes, **options)
 
 
-def planes_for_page(basis: Basis, *, is_clean: bool) -> tuple[list[int], list[dict[str, Any]]]:
+def planes_for_page(
+    basis: Basis, *, is_clean: bool, max_pixels: int = MAX_PIXELS
+) -> tuple[list[int], list[dict[str, Any]]]:
     """Return height and width of the planes in a page, and the plane of each light.
 
     is_clean: whether they are denoised.
@@ -124,18 +141,18 @@ def planes_for_page(basis: Basis, *, is_clean: bool) -> tuple[list[int], list[di
     all_lights = np.arange(len(basis.lights))
     return make_once(
         basis,
-        ("mixer", is_clean),
-        lambda: _compact_planes(basis, all_lights, [], is_clean=is_clean),
+        ("mixer", is_clean, max_pixels),
+        lambda: _compact_planes(basis, all_lights, [], is_clean=is_clean, max_pixels=max_pixels),
     )
 
 
 def _compact_planes(
-    basis: Basis, lights: Indices, mixes: Sequence[Doubles], *, is_clean: bool
+    basis: Basis, lights: Indices, mixes: Sequence[Doubles], *, is_clean: bool, max_pixels: int
 ) -> tuple[list[int], list[dict[str, Any]]]:
     """Return planes of some lights and mixes of others, (n, 3) each, compact for the page."""
     planes = cached_clean_planes(basis) if is_clean else None
     count = len(lights) + len(mixes)
-    factor = page_reduction(basis, count)
+    factor = page_reduction(basis, count, max_pixels=max_pixels)
     # The mean of many pixels has hardly any noise left to remove.
     must_denoise = is_clean and planes is None and factor < CLEAN_REDUCTION
 
@@ -219,8 +236,8 @@ def transform_data(transform: ViewTransform) -> dict[str, Any]:
     return {**data, "curve": curve, "lattice": lattice}
 
 
-def _painting(painting: Floats, basis: Basis, count: int) -> str:
-    small = block_mean(np.asarray(painting, np.float32), page_reduction(basis, count))
+def _painting(painting: Floats, factor: int) -> str:
+    small = block_mean(np.asarray(painting, np.float32), factor)
     return data_uri(to_8_bit(np.clip(small, 0, 1)))
 
 

@@ -1,0 +1,115 @@
+"""A painter in a saved notebook: its last picture, and a mixer that needs no kernel."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lightpaint as lp
+from lightpaint.paint.notebook.static_view import static_view
+
+pytest.importorskip("anywidget", reason="anywidget")
+
+NAUGHTY = "a 'b' </script> & \"c\""
+
+#: Characters of all that a cell keeps.
+MAX_LENGTH = 400_000
+
+
+@pytest.fixture
+def painter(make_basis: Any, tmp_path: Path) -> Iterator[Any]:
+    """Of three lights whose images are smooth enough to be told apart."""
+    y, x = np.mgrid[:54, :96] / 54
+    images = [np.exp(-8 * np.hypot(y - 0.5, x - at))[..., None] * [1, 1, 1] for at in (0, 0.9, 1.7)]
+    basis = make_basis(images=images, names=(NAUGHTY, "fill", "back"))
+    painter = lp.Painter(basis, folder=tmp_path)
+    yield painter
+    painter.close()
+
+
+def _picture(frame: Any) -> Any:
+    """Return the display values of the mix, (h, w, 3)."""
+    height, width, flat = frame.evaluate(
+        """async () => {
+          for (let k = 0; k < 2; k++) await new Promise(requestAnimationFrame)
+          const canvas = document.querySelector('.mixer-mix')
+          const { width, height } = canvas
+          const data = canvas.getContext('2d').getImageData(0, 0, width, height).data
+          return [height, width, [...data]]
+        }"""
+    )
+    return np.reshape(flat, (height, width, 4))[..., :3].astype(float)
+
+
+def test_a_saved_painter_is_a_mixer(browser: Any, painter: Any, tmp_path: Path) -> None:
+    painter.target = lp.Target.of(0.5 * painter._studio.snapshot().bases[0].images.sum(axis=0))
+    data, _ = painter._repr_mimebundle_()
+    assert "application/vnd.jupyter.widget-view+json" in data
+    path = tmp_path / "saved.html"
+    path.write_text(f'<!doctype html><body style="width: 740px">{data["text/html"]}', "utf-8")
+    context = browser.new_context(offline=True, viewport={"width": 800, "height": 900})
+    page, errors = context.new_page(), []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.goto(path.as_uri())
+    [frame] = page.frames[1:]
+    frame.locator(".mixer-mix").wait_for()
+    page.locator(".lightpaint-static > img").wait_for(state="hidden")
+    assert frame.locator(".mixer-name").all_inner_texts() == [NAUGHTY, "fill", "back"]
+    # It begins with the answer, and a slider changes it where its light is.
+    basis = painter._studio.snapshot().bases[0]
+    expected = basis.mix(painter.lighting.weights_for(basis))
+    before = _picture(frame)
+    encoded = 255 * lp.ViewTransform().encode(expected)
+    assert np.abs(before - np.clip(encoded, 0, 255)).mean() < 1
+    frame.locator(".mixer-light").first.locator("input[type=range]").first.evaluate(
+        "(input) => { input.value = input.max; input.dispatchEvent(new Event('input')) }"
+    )
+    change = np.abs(_picture(frame) - before).mean(axis=(0, 2))
+    assert change[:10].mean() > 20 > 10 * change[-10:].mean()
+    # The frame shows all of the first light below the mix.
+    box = page.locator("iframe").bounding_box()
+    assert 300 < box["height"] <= 640
+    assert errors == []
+    context.close()
+
+
+def test_without_scripts_the_picture_remains(browser: Any, painter: Any, tmp_path: Path) -> None:
+    path = tmp_path / "saved.html"
+    path.write_text(painter._repr_mimebundle_()[0]["text/html"], "utf-8")
+    context = browser.new_context(java_script_enabled=False)
+    page = context.new_page()
+    page.goto(path.as_uri())
+    picture = page.locator(".lightpaint-static > img")
+    assert picture.is_visible()
+    assert "showed it last" in picture.get_attribute("alt")
+    context.close()
+
+
+@pytest.mark.parametrize("size", [(360, 640), (128, 128)])
+def test_it_is_small_even_of_noise(make_basis: Any, size: tuple[int, int]) -> None:
+    basis = make_basis(12, size)
+    target = lp.Target.of(basis.current_look)
+    page = static_view(basis, lp.Lighting.current(basis), target, lp.ViewTransform())
+    assert len(page) < MAX_LENGTH
+
+
+def test_cells_keep_the_last_picture(monkeypatch: pytest.MonkeyPatch, painter: Any) -> None:
+    """What is shown has an id, by which it is replaced when the painter is closed."""
+    outputs: dict[str, list[Any]] = {}
+
+    def display(data: Any, *, display_id: str, **_: Any) -> None:
+        outputs.setdefault(display_id, []).append(data)
+
+    monkeypatch.setattr("IPython.display.display", display)
+    monkeypatch.setattr("IPython.display.update_display", display)
+    painter._ipython_display_()
+    painter.lighting = lp.Lighting.of_weights(
+        painter._studio.snapshot().bases[0], np.full((3, 3), 0.3)
+    )
+    painter.close()
+    painter.close()
+    [(shown, kept)] = outputs.values()
+    assert set(kept) == {"text/plain", "text/html"}
+    assert kept["text/html"] != shown["text/html"]
