@@ -139,6 +139,60 @@ def test_escape_cancels_a_stroke_on_the_map(new_painter: Any, query: str) -> Non
     assert page.locator(".texel-lock").count() == 2
 
 
+def test_constraints_of_an_image_hold_for_each_texel(painter: Painter) -> None:
+    page = painter.page
+    painter.type("key, level", "-1")
+    unfold(painter)
+    drag(painter, (1, 1))
+    locked = last_request(painter)["constraints"]
+    panel = page.get_by_role("group", name="Constraints on sky")
+    others = [f"sky.x{x}.y{y}" for y in range(ROWS) for x in range(COLUMNS) if (x, y) != (1, 1)]
+
+    def expect(**constraints: Any) -> None:
+        painter.still()
+        request = last_request(painter)
+        assert request["label"] == "sky, constraints"
+        assert request["constraints"] == dict.fromkeys(others, constraints)
+
+    panel.get_by_label("Max").fill("0.5")
+    page.keyboard.press("Enter")
+    expect(limits={"max": 0.5})
+    # A share is one of each texel, and no luminance is the same.
+    assert panel.get_by_label("Unit").locator("option").count() == 1
+    panel.get_by_label("Colour").select_option("kelvin")
+    expect(limits={"max": 0.5}, kelvin=[2700, 6500])
+    panel.get_by_label("From").fill("3000")
+    page.keyboard.press("Enter")
+    expect(limits={"max": 0.5}, kelvin=[3000, 6500])
+    assert painter.ui("history")["count"] == 5
+    assert painter.ui("constraints")["sky.x1.y1"] == locked["sky.x1.y1"]
+    # A locked texel gets them once it is released.
+    painter.button("Release", exact=True).click()
+    drag(painter, (1, 1))
+    expected = {"limits": {"max": 0.5}, "kelvin": [3000, 6500]}
+    assert last_request(painter)["constraints"] == {"sky.x1.y1": expected}
+    # What one texel has alone stays when the image loses what all have.
+    page.evaluate("() => painter.session.constrainLight(4, { limits: { min: 0.1, max: 0.5 } })")
+    painter.still()
+    assert panel.get_by_label("Max").input_value() == ""
+    panel.get_by_label("Colour").select_option("color")
+    panel.get_by_label("Colour").select_option("any")
+    painter.still()
+    assert last_request(painter)["constraints"] == {
+        **dict.fromkeys([*others, "sky.x1.y1"], {"limits": {"max": 0.5}}),
+        "sky.x1.y0": {"limits": {"min": 0.1, "max": 0.5}},
+    }
+
+
+def test_an_image_that_is_locked_offers_no_constraints(painter: Painter) -> None:
+    unfold(painter)
+    panel = painter.page.get_by_role("group", name="Constraints on sky")
+    assert panel.count() == 1
+    painter.page.get_by_role("button", name="Lock sky as it is in the answer").click()
+    painter.still()
+    assert panel.count() == 0
+
+
 def test_escape_on_the_map_leaves_the_selection_of_lights(painter: Painter) -> None:
     unfold(painter)
     painter.page.evaluate("() => painter.store.set({ selectedLights: [0, 1] })")

@@ -505,6 +505,8 @@ export const en = {
     texelsLocked: { one: '{count} texel is locked.', other: '{count} texels are locked.' },
     reset: 'Reset {label}: the solve sets all texels again',
     painted: '{texels}, painted',
+    limited: '{name}, constraints',
+    constraintsOnEachTexel: 'Constraints on each texel',
     tiedTexelsKeepTheirColours: 'Tied texels keep their colours: untie them first.',
   },
   lightList: {

@@ -19,9 +19,9 @@ const COLOURS = [
 export const colourKind = (constraints) =>
   ['color', 'kelvin', 'primaries'].find((key) => constraints[key] !== undefined) ?? 'any';
 
-/** @param {import("./light_row.js").Props} props */
+/** @param {import("./light_constraints.js").LimitProps} props */
 export function ColourConstraint(props) {
-  const { k, app, constraints = {}, rgb } = props;
+  const { constraints, rgb, set } = props;
   const kind = colourKind(constraints);
   const { color, kelvin, duv, primaries, ...otherConstraints } = constraints;
   const change = (/** @type {string} */ newKind) => {
@@ -31,7 +31,7 @@ export function ColourConstraint(props) {
       kelvin: { kelvin: [2700, 6500] },
       primaries: { primaries: ['#ff0000', '#00ff00', '#0000ff'] },
     }[newKind];
-    app.session.constrainLight(k, { ...otherConstraints, ...constraint });
+    set({ ...otherConstraints, ...constraint });
   };
   return html`<div class="ask-row">
       <${Select} label=${words.colourConstraint.colour} value=${kind} choices=${COLOURS} change=${change} /></div>
@@ -41,7 +41,7 @@ export function ColourConstraint(props) {
       kind === 'primaries' &&
       html`<${TextField} label=${words.colourConstraint.leds} value=${[...primaries].join(', ')}
       take=${(/** @type {string} */ text) =>
-        app.session.constrainLight(k, {
+        set({
           ...otherConstraints,
           primaries: text.split(/[\s,]+/).filter(Boolean),
         })} />`
@@ -49,19 +49,19 @@ export function ColourConstraint(props) {
 }
 
 /** @param {any} props */
-function SingleColour({ k, app, constraints, otherConstraints, rgb }) {
+function SingleColour({ constraints, otherConstraints, rgb, set }) {
   const text = Array.isArray(constraints.color)
     ? hexOf(constraints.color)
     : String(constraints.color);
   const white = toKelvin(rgb);
   return html`<div class="ask-row">
     <${TextField} label=${words.colourConstraint.hexOrKelvin} value=${text}
-      take=${(/** @type {string} */ color) => app.session.constrainLight(k, { ...otherConstraints, color })} />
+      take=${(/** @type {string} */ color) => set({ ...otherConstraints, color })} />
     ${
       white &&
       html`<${Button} label=${`${Math.round(white.kelvin / 50) * 50}K`}
       tip=${words.colourConstraint.theWhiteNearestToItsColour} act=${() =>
-        app.session.constrainLight(k, {
+        set({
           ...otherConstraints,
           color: `${Math.round(white.kelvin / 50) * 50}K`,
         })} />`
@@ -70,11 +70,11 @@ function SingleColour({ k, app, constraints, otherConstraints, rgb }) {
 }
 
 /** @param {any} props */
-function WhiteRange({ k, app, constraints, otherConstraints }) {
+function WhiteRange({ constraints, otherConstraints, set }) {
   const range = [constraints.kelvin].flat();
   const [low, high] = [range[0], range.at(-1)];
-  const set = (/** @type {number} */ a, /** @type {number} */ b, /** @type {number} */ duv) =>
-    app.session.constrainLight(k, {
+  const setRange = (/** @type {number} */ a, /** @type {number} */ b, /** @type {number} */ duv) =>
+    set({
       ...otherConstraints,
       kelvin: a === b ? a : [Math.min(a, b), Math.max(a, b)],
       ...(duv ? { duv } : {}),
@@ -82,12 +82,12 @@ function WhiteRange({ k, app, constraints, otherConstraints }) {
   const duv = constraints.duv ?? 0;
   return html`<div class="ask-fields">
     <${NumberField} label=${words.colourConstraint.from} value=${low} min=${1000} max=${25000} step=${100} digits=${0}
-      unit=${words.colourConstraint.k} change=${(/** @type {number} */ kelvin) => set(kelvin, high, duv)} />
+      unit=${words.colourConstraint.k} change=${(/** @type {number} */ kelvin) => setRange(kelvin, high, duv)} />
     <${NumberField} label=${words.colourConstraint.to} value=${high} min=${1000} max=${25000} step=${100} digits=${0}
-      unit=${words.colourConstraint.k} change=${(/** @type {number} */ kelvin) => set(low, kelvin, duv)} />
+      unit=${words.colourConstraint.k} change=${(/** @type {number} */ kelvin) => setRange(low, kelvin, duv)} />
     <${NumberField} label=${words.colourConstraint.tint} value=${1000 * duv} min=${-20} max=${20} digits=${1}
       tip=${words.colourConstraint.duv1000Above0GreenBelow}
-      change=${(/** @type {number} */ tint) => set(low, high, tint / 1000)} />
+      change=${(/** @type {number} */ tint) => setRange(low, high, tint / 1000)} />
   </div>`;
 }
 

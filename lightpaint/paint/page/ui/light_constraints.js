@@ -71,12 +71,8 @@ export function LightConstraints(props) {
     }
     ${
       mode === 'free' &&
-      html`<${LevelLimits} ...${props} />
-      ${
-        tie && colourKind(constraints) === 'any'
-          ? html`<p class="faint">${words.lightConstraints.tiedLightsKeepTheirCurrent}</p>`
-          : !light.is_scalar && html`<${ColourConstraint} ...${props} />`
-      }`
+      html`<${LevelAndColour} light=${light} rgb=${rgb} constraints=${constraints} isTied=${Boolean(tie)} app=${app}
+        set=${(/** @type {Constraints} */ limited) => void session.constrainLight(k, limited)} />`
     }
     <${TieFields} ...${props} />
   </div>`;
@@ -127,12 +123,26 @@ const unitsOf = (light) => [
   { value: 'value', label: light.unit || 'value' },
 ];
 
-/** @param {import("./light_row.js").Props} props */
-function LevelLimits({ k, light, app, constraints = {} }) {
+/** Limits of a level and of a colour: of a light, or of all texels of an image.
+ * @typedef {{light: import("./ui_state.js").Light, rgb: RGB, constraints: Constraints, isTied: boolean,
+ *   isImage?: boolean, app: import("./shortcuts.js").App, set: (constraints: Constraints) => void}} LimitProps
+ * @param {LimitProps} props */
+export function LevelAndColour(props) {
+  const { light, constraints, isTied } = props;
+  return html`<${LevelLimits} ...${props} />
+    ${
+      isTied && colourKind(constraints) === 'any'
+        ? html`<p class="faint">${words.lightConstraints.tiedLightsKeepTheirCurrent}</p>`
+        : !light.is_scalar && html`<${ColourConstraint} ...${props} />`
+    }`;
+}
+
+/** @param {LimitProps} props */
+function LevelLimits({ light, app, constraints, isImage = false, set: constrain }) {
   const limits = constraints.limits ?? {};
   const levels = Object.values(limits);
   const canShare = isOnAtPresent(light);
-  const [chosenUnit, setUnit] = useState(canShare ? 'share' : 'value');
+  const [chosenUnit, setUnit] = useState(canShare && !isImage ? 'share' : 'value');
   // A lights file may have luminances, shares and colours; all but shares are shown as luminance.
   const areShares = levels.every((x) => typeof x === 'string');
   const unit = levels.length ? (areShares ? 'share' : 'value') : chosenUnit;
@@ -152,8 +162,7 @@ function LevelLimits({ k, light, app, constraints = {} }) {
       return;
     }
     const { limits: _, ...otherConstraints } = constraints;
-    app.session.constrainLight(
-      k,
+    constrain(
       Object.keys(validLimits).length
         ? { ...otherConstraints, limits: validLimits }
         : otherConstraints,
@@ -166,8 +175,11 @@ function LevelLimits({ k, light, app, constraints = {} }) {
       const level = Number(limitAmount(x, light, newUnit).toPrecision(SIGNIFICANT_DIGITS));
       return [key, newUnit === 'share' ? `${level}%` : level];
     });
-    app.session.constrainLight(k, { ...constraints, limits: Object.fromEntries(convertedLimits) });
+    constrain({ ...constraints, limits: Object.fromEntries(convertedLimits) });
   };
+  // A share is that of each texel, so that no single level is equal to it.
+  const isUnitSet = isImage && levels.length > 0;
+  const units = unitsOf(light).filter(({ value }) => !isUnitSet || value === unit);
   return html`<div class="ask-fields is-levels">
     <${NumberField} label=${words.lightConstraints.min} value=${limitValue(limits.min)} min=${0} placeholder="–" step=${5}
       change=${(/** @type {number | null} */ value) => set('min', value)} figures=${SIGNIFICANT_DIGITS} />
@@ -175,7 +187,7 @@ function LevelLimits({ k, light, app, constraints = {} }) {
       change=${(/** @type {number | null} */ value) => set('max', value)} figures=${SIGNIFICANT_DIGITS} />
     ${
       canShare &&
-      html`<${Select} label=${words.lightConstraints.unit} value=${unit} choices=${unitsOf(light)} change=${convert} />`
+      html`<${Select} label=${words.lightConstraints.unit} value=${unit} choices=${units} change=${convert} />`
     }
   </div>`;
 }

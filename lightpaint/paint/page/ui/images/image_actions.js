@@ -4,13 +4,14 @@ import { signedText } from '../format.js';
 import { presentLevel } from '../level_field.js';
 import { luminance } from '../paint_colour.js';
 import { findTie } from '../tied_lights.js';
-import { isHeld } from '../lamps/many_lights.js';
+import { adjustableLights, isHeld } from '../lamps/many_lights.js';
 import { scaled } from '../lamps/lamp_colours.js';
 import { lightsText } from '../lamps/light_selection.js';
 import { fill, words } from '../../language/language.js';
 import { meanOf, wholeLight } from './light_images.js';
 
 /** @typedef {import("../engine_interface.js").RGB} RGB */
+/** @typedef {import("../ui_state.js").Constraints} Constraints */
 /** @typedef {import("../ui_state.js").Ui} Ui */
 /** @typedef {import("./image_state.js").LightImage} LightImage */
 
@@ -56,6 +57,32 @@ export class ImageActions {
     const changes = new Map(free.map((k) => [k, rgb]));
     const label = fill(words.images.painted, { texels: lightsText(ui, free) });
     this.set(changes, label, isFinal);
+  }
+
+  /** Return the constraints of a texel; of one that is locked or off those that it had before.
+   * @param {number} k @returns {Constraints} */
+  openConstraints(k) {
+    const { store, unlockedConstraints } = this.session;
+    const { lock, off, ...others } = store.value.constraints[store.value.lights[k].name] ?? {};
+    return unlockedConstraints.get(k) ?? others;
+  }
+
+  /** Change constraints on all texels of an image, and keep the others of each.
+   * @param {LightImage} image @param {Constraints} change undefined for what is gone */
+  constrain(image, change) {
+    const { many, unlockedConstraints } = this.session;
+    const ui = this.session.store.value;
+    /** @type {Record<string, Constraints>} */
+    const constraints = {};
+    for (const k of adjustableLights(ui, image.lights)) {
+      const all = Object.entries({ ...this.openConstraints(k), ...change });
+      const changed = Object.fromEntries(all.filter(([, value]) => value !== undefined));
+      // A texel that is locked or off gets them once it is released.
+      if (isHeld(ui, k)) unlockedConstraints.set(k, changed);
+      else constraints[ui.lights[k].name] = changed;
+    }
+    const label = fill(words.images.limited, { name: image.name });
+    if (Object.keys(constraints).length) void many.constrain(constraints, label);
   }
 
   /** Let the solve set all texels of an image again. @param {LightImage} image */

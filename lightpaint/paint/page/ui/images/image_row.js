@@ -16,6 +16,7 @@ import { isSelecting, toggleLights } from '../lamps/light_selection.js';
 import { atFullBrightness, luminance, toHex, toKelvin } from '../paint_colour.js';
 import { fill, fillCount, words } from '../../language/language.js';
 import { heldTexels } from './image_actions.js';
+import { ImageConstraints } from './image_constraints.js';
 import { ImageMap } from './image_map.js';
 import { meanOf, wholeLight } from './light_images.js';
 import { TexelMap } from './texel_map.js';
@@ -65,6 +66,7 @@ export function ImageRow({ image, ui, app }) {
       <${Brightness} image=${image} ui=${ui} app=${app} isHeld=${held.length === lights.length} />
     </div>
     ${isOpen && html`<${TexelMap} image=${image} ui=${ui} app=${app} held=${held} />`}
+    ${isOpen && html`<${ImageConstraints} image=${image} ui=${ui} app=${app} />`}
   </div>`;
 }
 
