@@ -179,7 +179,7 @@ def test_constraints_of_an_image_hold_for_each_texel(painter: Painter) -> None:
     panel.get_by_label("Colour").select_option("any")
     painter.still()
     assert last_request(painter)["constraints"] == {
-        **dict.fromkeys([*others, "sky.x1.y1"], {"limits": {"max": 0.5}}),
+        **{name: {"limits": {"max": 0.5}} for name in [*others, "sky.x1.y1"]},
         "sky.x1.y0": {"limits": {"min": 0.1, "max": 0.5}},
     }
 
