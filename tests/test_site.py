@@ -11,6 +11,7 @@ import pytest
 from renderer import REPOSITORY
 
 import lightpaint as lp
+from lightpaint.batch.gallery.summary import LightRow, SummaryRow, summary_json
 from lightpaint.cli.options.parser import command_parser
 
 sys.path.insert(0, str(REPOSITORY / "docs" / "site"))
@@ -90,6 +91,20 @@ def test_a_lighting_that_is_written_fits_its_schema(tmp_path: Path) -> None:
     for damage in ({"format": "other"}, {"lights": {"lamp": {**light, "emission": [1.0]}}}):
         with pytest.raises(jsonschema.ValidationError):
             jsonschema.validate({**written, **damage}, schema)
+
+
+def test_a_summary_that_is_written_fits_its_schema() -> None:
+    jsonschema = pytest.importorskip("jsonschema", reason="jsonschema")
+    schema = schemas()["summary"][1]
+    light = LightRow("lamp", 1.0, (1.0, 1.0, 1.0), kelvin=3200.0)
+    done = SummaryRow("dusk", "done", "", "dusk", delta_e=1.5, view=("srgb", 0.0), lights=(light,))
+    failed = SummaryRow("dawn", "failed", "no such painting", "dawn")
+    written = json.loads(summary_json([done, failed]))
+    jsonschema.validate(written, schema)
+    unknown_state = {**written["looks"][0], "state": "lost"}
+    for looks in ([{"look": "dusk"}], [unknown_state]):
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate({**written, "looks": looks}, schema)
 
 
 def test_every_schema_is_one() -> None:

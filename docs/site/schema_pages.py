@@ -10,6 +10,8 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+from lightpaint.batch.gallery.summary import SummaryRow
+from lightpaint.batch.manifest.folder_names import SUMMARY_FORMAT
 from lightpaint.lighting.answer.certificate import Certificate
 from lightpaint.lighting.answer.light_setting import LightSetting
 from lightpaint.lighting.answer.lighting import EmitterPlace, Lighting
@@ -39,6 +41,7 @@ def schemas() -> dict[str, tuple[str, Schema]]:
     return {
         "lighting": ("``lighting.json``, the answer", lighting_schema()),
         "result": ("``result.json``, what a folder holds", schema_of(_Record)),
+        "summary": ("``summary.json``, the looks of a batch", summary_schema()),
         "places": (
             "``places.json``, moved and added lights of a batch or a painter",
             schema_of(PlacementRecord),
@@ -72,6 +75,19 @@ def lighting_schema() -> Schema:
         "solve": schema_of(Certificate),
     }
     return {"type": "object", "properties": properties, "required": ["format", "lights"]}
+
+
+def summary_schema() -> Schema:
+    """Return the schema of summary.json, whose rows have no fields without a value."""
+    row = {**schema_of(SummaryRow), "required": ["look", "state", "folder", "size"]}
+    properties = {
+        "format": {"const": SUMMARY_FORMAT},
+        "lightpaint": {"type": "string"},
+        "done": {"type": "integer"},
+        "failed": {"type": "integer"},
+        "looks": {"type": "array", "items": row},
+    }
+    return {"type": "object", "properties": properties, "required": list(properties)}
 
 
 def schema_of(kind: Any, *left_out: str) -> Schema:
