@@ -203,6 +203,26 @@ def test_a_plan_is_only_told(batch_folder: Path) -> None:
     assert [look["look"] for look in summary["looks"]] == NAMES
 
 
+def test_a_plan_says_why_a_look_cannot_be_done(batch_folder: Path) -> None:
+    (batch_folder / "p2.exr").write_bytes(b"no picture")
+    ended = run(batch_folder, "batch", "looks.toml", "--dry-run", "--json")
+    looks = {look["look"]: look for look in json.loads(ended.stdout)["looks"]}
+    assert ended.returncode == 1
+    assert "p2.exr" in looks["third"]["why"]
+    assert "why" not in looks["p0"]
+
+
+def test_a_look_can_have_no_variations_though_the_defaults_do(batch_folder: Path) -> None:
+    defaults = '[defaults]\nbasis = "b.basis.exr"\nvariations = ["warmer", "white only"]\n\n'
+    looks = '[[look]]\npainting = "p0.exr"\n\n[[look]]\npainting = "p1.exr"\nvariations = []\n'
+    looks += '\n[[look]]\npainting = "p2.exr"\nvariations = []\nwant = ["lights"]\n'
+    looks += "settings = { literal = true }\n"
+    (batch_folder / "looks.toml").write_text(defaults + looks, encoding="utf-8")
+    planned = plan(batch_folder / "looks.toml", batch_folder / "out")
+    names = [look.entry.name for look in planned.looks]
+    assert names == ["p0", "p0-warmer", "p0-white-only", "p1", "p2"]
+
+
 def test_a_plan_names_paintings_from_the_current_folder(batch_folder: Path) -> None:
     """However the manifest leads there."""
     (batch_folder / "plans").mkdir()

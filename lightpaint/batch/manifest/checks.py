@@ -92,7 +92,7 @@ def check_by_sums(mistakes: Mistakes, table: Table) -> None:
     label, look = table.label, table.values
     if len(look["want"]) > 1:
         mistakes.add(label, "want has 'lights', which is the lighting alone: leave the rest out")
-    if "views" in look or "variations" in look:
+    if "views" in look or look.get("variations"):
         mistakes.add(label, "want has 'lights', which is of one view, without variations")
     settings = look.get("settings", {})
     if settings.get("literal") is not True and "settings" not in table.unclear_keys:

@@ -51,10 +51,13 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < BRIGHTEST
 
 
-def _some_of(words: Iterable[str]) -> Check:
+def _some_of(words: Iterable[str], *, or_none: bool = False) -> Check:
+    """Return the check of a list of some words. or_none: whether it may be empty."""
     allowed_words = tuple(words)
 
     def is_valid(value: Any) -> bool:
+        if or_none and value == []:
+            return True
         return _texts(value) and set(value) <= set(allowed_words) and len(set(value)) == len(value)
 
     return is_valid, f"a list of some of {', '.join(map(repr, allowed_words))}, each once"
@@ -112,7 +115,7 @@ REQUEST_KEYS: dict[str, Check] = {
     "want": _some_of(get_args(Step)),
     "render": TABLE,
     "export": TABLE,
-    "variations": _some_of(VARIATIONS),
+    "variations": _some_of(VARIATIONS, or_none=True),
     "share": (lambda v: v in get_args(Share), '"places"'),
 }
 

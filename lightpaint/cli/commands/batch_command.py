@@ -162,7 +162,8 @@ def _show_plan(plan_: Plan) -> CommandOutcome:
         paintings = (_short_path(x.path) for x in look.entry.paintings)
         inputs = ", ".join([*paintings, *look.entry.combined_looks])
         table.row(look.entry.name, visible(action), inputs or look.entry.lighting)
-        looks.append({"look": look.entry.name, "is_done": look.is_done, "want": look.entry.want})
+        document = {"look": look.entry.name, "is_done": look.is_done, "want": look.entry.want}
+        looks.append({**document, "why": look.failure} if look.failure else document)
     terminal.print_table(table)
     cost = estimate(plan_)
     terminal.write(
