@@ -182,7 +182,7 @@ export const en = {
     scene: 'Scene',
     relitXmlTheSceneWithThis: 'relit.xml: the scene with this lighting',
     report: 'Report',
-    reportHtmlPaintingAnswerAnd: 'report.html: painting, answer and analysis',
+    reportHtmlPaintingAnswerAnd: 'answer/report.html: painting, answer and analysis',
     nothingIsPaintedYetSoNo:
       'Nothing is painted yet, so no painting, layers or report were exported.',
     export: 'Export',
@@ -1232,11 +1232,11 @@ export const en = {
     done: 'Done',
     paint: {
       title: 'Paint how it should look',
-      text: 'Choose a colour and drag over the left picture. The light of the room follows your brush.',
+      text: 'Choose a colour and drag over the picture Painting. The lights follow your brush.',
     },
     answer: {
       title: 'See the answer',
-      text: 'The right picture shows the closest that your lights can do. This sentence says how close that is, what is missing, and why.',
+      text: 'The picture Answer shows the closest that your lights can come. This sentence says how close that is, what is missing, and why.',
     },
     ask: {
       title: 'Ask by numbers',
