@@ -83,11 +83,11 @@ def comparison_image(
     ]
     if verified is not None and looks.verified is not None:
         difference = _rms_difference(predicted, verified)
-        samples = "" if verified_spp is None else f", {verified_spp} samples per pixel"
+        samples = "" if verified_spp is None else f", {verified_spp} spp"
         tiles.append(
             Tile(
                 f"verified{view_note}",
-                f"independent render{samples}, {difference:.2g} RMS off the prediction",
+                f"independent render{samples}, RMS {difference:.2g} off",
                 to_8_bit(transform.encode(looks.verified)),
             )
         )
@@ -203,4 +203,4 @@ def _short_verdict(appearance: Appearance) -> str:
         else "part of the way"
     )
     delta_e, noise = appearance.delta_e, appearance.noise
-    return f"{word}: mean dE {delta_e:.1f} where painted (noise explains {noise:.1f})"
+    return f"{word}: mean dE {delta_e:.1f} (noise {noise:.1f})"

@@ -101,6 +101,23 @@ def test_three_pictures_without_a_verification(make_basis: Any):
         np.testing.assert_array_equal(a, b)
 
 
+def test_captions_of_numbers_are_whole_below_small_pictures(
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch
+):
+    cut = comparison.shorten_to_width
+    captions: dict[str, str] = {}
+
+    def record(words: str, font: Any, width: int) -> str:
+        captions[words] = cut(words, font, width)
+        return captions[words]
+
+    monkeypatch.setattr(comparison, "shorten_to_width", record)
+    comparison_image(**_look(make_basis), verified_spp=128)
+    told = [words for words in captions if "dE" in words or "128 spp" in words]
+    assert len(told) == 2
+    assert [captions[words] for words in told] == told
+
+
 def test_a_long_name_stays_below_its_own_picture(make_basis: Any):
     short = comparison_image(**_look(make_basis))
     long = comparison_image(**_look(make_basis, name="dusk over the old harbour " * 9))
