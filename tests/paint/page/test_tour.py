@@ -61,6 +61,19 @@ def test_one_paints_below_it_and_escape_ends_it(new_painter: Any) -> None:
     assert painter.page.locator(BUBBLE).count() == 0
 
 
+def test_it_folds_again_what_it_unfolded(new_painter: Any) -> None:
+    painter: Painter = new_painter("tour")
+    painter.page.locator(BUBBLE).wait_for()
+    fields = painter.page.locator(".fold.is-ask").get_by_role("button", name="Apply")
+    assert not fields.is_visible()
+    for _ in range(2):
+        painter.button("Next", exact=True).click()
+    assert fields.is_visible()
+    for name in ("Next", "Next", "Done"):
+        painter.button(name, exact=True).click()
+    assert not fields.is_visible()
+
+
 def test_by_keyboard_alone(new_painter: Any) -> None:
     painter: Painter = new_painter("tour")
     bubble = painter.page.locator(BUBBLE)

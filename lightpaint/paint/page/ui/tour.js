@@ -34,7 +34,8 @@ export function startTour(store) {
 }
 
 /** @param {UiStore} store */
-export const endTour = (store) => store.set({ tour: null });
+export const endTour = (store) =>
+  store.set((ui) => ({ tour: null, tourFold: null, open: foldAgain(ui) }));
 
 /** Start the tour at the first visit, once there is a picture and room for it.
  * @param {UiStore} store @param {HTMLElement} root @returns {() => void} what stops the wait */
@@ -48,13 +49,18 @@ export function startAtFirstVisit(store, root) {
   return stop;
 }
 
+/** Return what is unfolded without the present step of the tour. @param {Ui} ui */
+const foldAgain = ({ open, tourFold }) => (tourFold ? { ...open, [tourFold]: false } : open);
+
 /** @param {UiStore} store @param {number} tour */
 function goTo(store, tour) {
   const { fold } = STEPS[tour];
-  store.set((ui) => ({
-    tour,
-    ...(fold ? { side: true, panel: null, open: { ...ui.open, [fold]: true } } : {}),
-  }));
+  store.set((ui) => {
+    const open = foldAgain(ui);
+    if (!fold) return { tour, tourFold: null, open };
+    const tourFold = open[fold] ? null : fold;
+    return { tour, tourFold, side: true, panel: null, open: { ...open, [fold]: true } };
+  });
 }
 
 /** @param {{ui: Ui, app: App, root: () => HTMLElement}} props */

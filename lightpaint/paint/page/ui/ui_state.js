@@ -150,6 +150,7 @@ import { initialSelection } from './selection/selection_settings.js';
  * @property {boolean} side whether the panels are there
  * @property {null | "settings"} panel what lies over the panels
  * @property {number | null} tour step of the tour that is shown
+ * @property {string | null} tourFold what this step has unfolded and folds again
  * @property {null | "keys" | "export" | "looks" | "presets"} dialog
  * @property {string} search
  * @property {"scene" | "name" | "share" | "change"} sort
@@ -280,6 +281,7 @@ export function initialState() {
     side: true,
     panel: null,
     tour: null,
+    tourFold: null,
     dialog: null,
     search: '',
     sort: 'scene',
