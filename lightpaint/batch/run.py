@@ -17,6 +17,7 @@ from lightpaint.batch.folder_lock import lock_folder
 from lightpaint.batch.gallery.gallery import write_gallery
 from lightpaint.batch.gallery.small_planes import write_task_planes
 from lightpaint.batch.manifest.folder_names import THUMBNAILS
+from lightpaint.batch.manifest.key_spelling import with_manifest_keys
 from lightpaint.batch.placed_bases import obtain_placed_bases
 from lightpaint.batch.plan.cost_estimate import look_seconds
 from lightpaint.batch.plan.journal import Journal, JournalLine
@@ -173,7 +174,8 @@ class _Run:
             except (LightpaintError, MemoryError) as error:
                 if is_disk_full(error):
                     raise
-                reason = OUT_OF_MEMORY_TEXT if isinstance(error, MemoryError) else str(error)
+                is_memory = isinstance(error, MemoryError)
+                reason = OUT_OF_MEMORY_TEXT if is_memory else with_manifest_keys(str(error))
                 for step in steps:
                     self._fail(self._looks[step.task.look], step, reason)
                 return

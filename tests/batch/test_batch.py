@@ -23,6 +23,8 @@ from lightpaint.batch.distribution.processes import Processes
 from lightpaint.batch.gallery.gallery import contact_sheet, gallery_page
 from lightpaint.batch.gallery.summary import LightRow, SummaryRow
 from lightpaint.batch.manifest.folder_names import FILES, is_reserved
+from lightpaint.batch.manifest.key_spelling import with_manifest_keys
+from lightpaint.batch.manifest.manifest import read_manifest
 from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import _Run, run_batch
 from lightpaint.batch.run_options import RunOptions
@@ -221,6 +223,38 @@ def test_a_look_can_have_no_variations_though_the_defaults_do(batch_folder: Path
     planned = plan(batch_folder / "looks.toml", batch_folder / "out")
     names = [look.entry.name for look in planned.looks]
     assert names == ["p0", "p0-warmer", "p0-white-only", "p1", "p2"]
+
+
+def test_a_failure_names_keys_of_the_manifest(batch_folder: Path) -> None:
+    write_rgb(batch_folder / "p1.exr", np.ones((5, 7, 3), dtype=np.float32))
+    failures = {x.entry.name: x.failure for x in plan(batch_folder / "looks.toml", "out").looks}
+    assert failures["p1"].endswith("or pass settings.resize = true"), failures
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("pass find=False if all counts", "pass find_template = false if all counts"),
+        ("choose it with sensor='guest', or", 'choose it with sensor = "guest", or'),
+        ("give it by template=...", "give it by template = ..."),
+        ("use resolution=... or fewer lights", "use settings.resolution = ... or fewer lights"),
+        ("pass force=True", "pass force=True"),
+        ("no such file: a/spp=8.exr", "no such file: a/spp=8.exr"),
+    ],
+)
+def test_arguments_are_spelled_as_keys(text: str, expected: str) -> None:
+    assert with_manifest_keys(text) == expected
+
+
+def test_a_look_can_do_without_the_template_of_the_defaults(batch_folder: Path) -> None:
+    (batch_folder / "t").mkdir()
+    looks = '[[look]]\npainting = "p0.exr"\n\n[[look]]\npainting = "p1.exr"\n'
+    defaults = '[defaults]\nbasis = "b.basis.exr"\ntemplate = "t"\n\n'
+    (batch_folder / "looks.toml").write_text(
+        defaults + looks + "find_template = false\n", encoding="utf-8"
+    )
+    templates = [x.values.get("template") for x in read_manifest(batch_folder / "looks.toml").looks]
+    assert templates == ["t", None]
 
 
 def test_a_plan_names_paintings_from_the_current_folder(batch_folder: Path) -> None:

@@ -32,7 +32,11 @@ TABLES: Mapping[str, Check] = {
 MERGED_TABLES = ("settings", "parameters", "render", "export")
 
 #: Groups of keys: if a look has any key of a group, it replaces all defaults of that group.
-SOURCE_GROUPS = ("scene", "basis", "light_groups", "pattern"), ("sensor", "sensors")
+REPLACED_GROUPS = (
+    ("scene", "basis", "light_groups", "pattern"),
+    ("sensor", "sensors"),
+    ("template", "find_template"),
+)
 
 
 @dataclass(frozen=True)
@@ -137,7 +141,7 @@ def _display_name(table: Mapping[str, Any]) -> str:
 def _merge(defaults: Table, table: Table) -> Table:
     """Return a look merged over the defaults, tables of values key by key."""
     values, look, unclear_keys = dict(defaults.values), table.values, defaults.unclear_keys
-    for keys in SOURCE_GROUPS:
+    for keys in REPLACED_GROUPS:
         if table.has(*keys):
             values = {key: value for key, value in values.items() if key not in keys}
             unclear_keys = unclear_keys - set(keys)

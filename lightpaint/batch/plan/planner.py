@@ -9,6 +9,7 @@ from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.basis.render.render_memory import memory_needed
 from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.folder_names import check_gallery
+from lightpaint.batch.manifest.key_spelling import with_manifest_keys
 from lightpaint.batch.manifest.keys import Mistakes
 from lightpaint.batch.manifest.look_list import entries_of
 from lightpaint.batch.manifest.manifest import Manifest, read_manifest
@@ -137,10 +138,10 @@ class _Planner:
         try:
             entry, source_files, remarks = self._resolve_entry(entry)
         except LOOK_ERRORS as error:
-            failure = str(error)
+            failure = with_manifest_keys(str(error))
         except LightpaintError as error:
-            self._mistakes.add(entry.label, str(error))
-            failure = str(error)
+            failure = with_manifest_keys(str(error))
+            self._mistakes.add(entry.label, failure)
             self.collect_errors(entry)
         if not failure and (failed_parts := self._failed_looks & set(entry.combined_looks)):
             failure = f"it is made of {some_names(sorted(failed_parts))}, which failed"

@@ -10,6 +10,7 @@ from typing import Any
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.basis.render.guide_training import train_guide
+from lightpaint.batch.manifest.key_spelling import with_manifest_keys
 from lightpaint.batch.manifest.keys import Space
 from lightpaint.batch.manifest.sequence import interpolate
 from lightpaint.batch.manifest.variations import shift
@@ -50,7 +51,9 @@ DISK_FULL_ERRNOS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 MAX_REASON_LENGTH = 600
 
 #: Text of the failure of an item that needs too much memory.
-OUT_OF_MEMORY_TEXT = "it takes more memory than there is: use resolution=... or fewer workers"
+OUT_OF_MEMORY_TEXT = (
+    "it takes more memory than there is: lower settings.resolution, or use fewer workers"
+)
 
 
 def run_item(item: WorkItem, cache: WorkerCache, listen: Listener) -> ItemResult:
@@ -65,7 +68,7 @@ def attempt(item: WorkItem, work: Callable[[], Any]) -> ItemResult:
     try:
         value = work()
     except LightpaintError as error:
-        failure, disk_full = str(error), is_disk_full(error)
+        failure, disk_full = with_manifest_keys(str(error)), is_disk_full(error)
     except MemoryError:
         failure, is_lost = OUT_OF_MEMORY_TEXT, True
     except OSError as error:
