@@ -24,8 +24,9 @@ from lightpaint.relit.export.scene_script import scene_script
 from lightpaint.relit.export.sky_maps import SkyMap
 from lightpaint.relit.export.usd import check_usd, usd_overrides
 from lightpaint.relit.export.usd_groups import usd_multipliers
+from lightpaint.relit.light_maps import WallImage, sky_maps_of, wall_images_of
 from lightpaint.relit.relight import scene_of
-from lightpaint.relit.xml_patch import emitters_of, scene_patch, sky_maps_of
+from lightpaint.relit.xml_patch import emitters_of, scene_patch
 from lightpaint.scene.lights.texels.texel import images_of
 from lightpaint.scene.scene import Scene
 
@@ -40,7 +41,7 @@ FORMS: dict[str, tuple[str | None, str | None]] = {
 }
 
 
-#: Formats that refer to maps of skies.
+#: Formats that refer to maps of image lights.
 WITH_MAPS = ("usd", "blender")
 
 
@@ -125,15 +126,16 @@ def write_content(path: Path, content: str | Floats) -> None:
         write_rgb(path, content)
 
 
-def _maps(names: Collection[str], lighting: Lighting, source: Source) -> list[SkyMap]:
-    """Return the maps of skies that some of the formats refer to.
+def _maps(names: Collection[str], lighting: Lighting, source: Source) -> list[SkyMap | WallImage]:
+    """Return the maps of image lights that some of the formats refer to.
 
-    Raises LightpaintError for other images, which these formats do not have.
+    Raises LightpaintError for slides, which these formats do not have.
     """
     forms = [form for form in names if form in WITH_MAPS]
     if not forms or source.scene is None:
         return []
-    maps = sky_maps_of(source.scene, lighting)
+    skies, walls = sky_maps_of(source.scene, lighting), wall_images_of(source.scene, lighting)
+    maps: list[SkyMap | WallImage] = [*skies, *walls]
     members = [name for names in lighting.members.values() for name in names]
     if others := sorted({*images_of(members)} - {x.name for x in maps}):
         raise LightpaintError(
@@ -170,7 +172,7 @@ def _writer_of(
     source: Source,
     folder: Path,
     listen: Listener,
-    maps: Sequence[SkyMap],
+    maps: Sequence[SkyMap | WallImage],
 ) -> Callable[[], str]:
     """Return a function that makes the text of one format. See `writers_of` for the arguments."""
     if form in ("csv", "json"):
@@ -182,12 +184,21 @@ def _writer_of(
     if form == "mitsuba":
         return lambda: scene_patch(scene, lighting)
     emitters, name = emitters_of(scene, lighting), scene.files[0].name
-    skies = {one.name: one.file for one in maps}
+    skies = {one.name: one.file for one in maps if isinstance(one, SkyMap)}
+    walls = {one.name: one for one in maps if isinstance(one, WallImage)}
+    files = {name: wall.file for name, wall in walls.items()}
     if form == "blender":
         return lambda: scene_script(
-            lighting.target, name, emitters, places=lighting.places, up=lighting.up, skies=skies
+            *(lighting.target, name, emitters),
+            places=lighting.places,
+            up=lighting.up,
+            skies=skies,
+            walls=files,
         )
-    return lambda: _usd_layer(lighting, source, emitters, folder, listen, skies)
+    panels = {name: file for name, file in files.items() if walls[name].is_rectangle}
+    if meshes := sorted({*files} - {*panels}):
+        listen.say(f"USD has no image for {some_names(meshes)}, a mesh: set it by hand")
+    return lambda: _usd_layer(lighting, source, emitters, folder, listen, skies, panels)
 
 
 def _usd_layer(
@@ -197,6 +208,7 @@ def _usd_layer(
     folder: Path,
     listen: Listener,
     skies: Mapping[str, str],
+    panels: Mapping[str, str],
 ) -> str:
     """Return a layer of USD with these emitters, and say which of them its stage lacks."""
     assert source.scene is not None
@@ -208,6 +220,7 @@ def _usd_layer(
         places=lighting.places,
         up=lighting.up,
         skies=skies,
+        panels=panels,
         about=f"lightpaint: the lights of {name} as solved for {lighting.target}",
     )
     stage_name = source.stage or "USD"

@@ -126,7 +126,7 @@ def _edit_images(
     """Add edits of the lights whose texels are among `settings`."""
     for texels, image in images_of_texels(scene, settings):
         if scene.map_size is not None:
-            image = _enlarged(image, texels[0], scene.map_size)
+            image = enlarged(image, texels[0], scene.map_size)
         is_sampled = bool(image.any()) or any(x in sampled for x in texels)
         weight = _sampling_weight(texels[0], is_sampled=is_sampled)
         file = scene.files[texels[0].file]
@@ -149,7 +149,7 @@ def images_of_texels(
         )
 
 
-def _enlarged(image: Floats, emitter: Emitter, map_size: GridSize) -> Floats:
+def enlarged(image: Floats, emitter: Emitter, map_size: GridSize) -> Floats:
     """Return the image of a light at the size in which it is written, as Mitsuba interpolates it.
 
     emitter: one of its texels. Raises SceneError if that is smaller than the image.

@@ -5,18 +5,13 @@ import os
 import re
 from pathlib import Path
 
-import numpy as np
-
 from lightpaint.arrays import RGB
 from lightpaint.errors import OutputError, SceneError
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.relit.emission_xml import safe_name
-from lightpaint.relit.export.sky_maps import SkyMap, lat_long, map_axes, map_size_for
 from lightpaint.relit.relight import scene_of
-from lightpaint.relit.relit_files import images_of_texels, relit_files, settings_of
+from lightpaint.relit.relit_files import relit_files, settings_of
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.lights.emitters import Emitter
-from lightpaint.scene.lights.texels.sky import Sky
 from lightpaint.scene.properties.emission import Scaling
 from lightpaint.scene.scene import Scene
 
@@ -65,24 +60,6 @@ def emitters_of(scene: Scene, lighting: Lighting) -> list[tuple[str, str, RGB]]:
         for emitter, rgb in settings_of(regrouped_scene, lighting.emission)
         if emitter.texel is None
     ]
-
-
-def sky_maps_of(scene: Scene, lighting: Lighting) -> list[SkyMap]:
-    """Return the maps of all skies whose texels are adjusted."""
-    regrouped_scene = scene_of(scene, lighting)
-    settings = dict(settings_of(regrouped_scene, lighting.emission))
-    maps, from_map = [], map_axes(lighting.up).T
-    for texels, image in images_of_texels(regrouped_scene, settings):
-        assert texels[0].texel is not None
-        if isinstance(texels[0].texel.domain, Sky):
-            name, props = texels[0].texel.image, scene.parsed.state.nodes[texels[0].node].props
-            to_world = np.eye(3)
-            if "to_world" in props:
-                to_world = np.array(props["to_world"].matrix, float).reshape(4, 4)[:3, :3]
-            to_light = np.linalg.inv(to_world) @ from_map
-            shown = lat_long(image, to_light, scene.map_size or map_size_for(image))
-            maps.append(SkyMap(name, f"{safe_name(name)}.latlong.exr", shown))
-    return maps
 
 
 def _quantity(emitter: Emitter) -> str:

@@ -43,11 +43,13 @@ def scene_script(
     places: Sequence[EmitterPlace] = (),
     up: Position = (0.0, 1.0, 0.0),
     skies: Mapping[str, str] = MappingProxyType({}),
+    walls: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
     """Return the script, which leaves emitters without a plain colour, such as a sky, to the user.
 
     emitters: name, Mitsuba's parameter and emission of each adjusted emitter. places: places of all
-    emitters in the answer. up: the scene's up axis. skies: file of each sky's map, by its name.
+    emitters in the answer. up: the scene's up axis. skies, walls: file of the map of each sky, and
+    of the image of each wall, by its name.
     """
     rows, unset_names = [], []
     for name, parameter, emission in emitters:
@@ -63,6 +65,7 @@ def scene_script(
         lights="{\n" + "".join(rows) + "}",
         left=repr(tuple(unset_names)),
         skies=_table(skies),
+        walls=_table(walls),
         sky_axes=repr(np.round(blender_axes(up), 12).tolist()),
         **_placed(places, up),
     )

@@ -17,7 +17,7 @@ from lightpaint.arrays import RGB, Position
 from lightpaint.errors import OutputError
 from lightpaint.files import one_line
 from lightpaint.relit.export.sky_maps import map_axes
-from lightpaint.relit.export.usd_places import UsdPlaces
+from lightpaint.relit.export.usd_places import UsdPlaces, write_image
 from lightpaint.scene.properties.site import EmitterPlace
 
 #: Whether a light is normalized, by Mitsuba's parameter.
@@ -61,6 +61,7 @@ def usd_overrides(
     places: Sequence[EmitterPlace] = (),
     up: Position = (0.0, 1.0, 0.0),
     skies: Mapping[str, str] = MappingProxyType({}),
+    panels: Mapping[str, str] = MappingProxyType({}),
     about: str = "",
 ) -> Overrides:
     """Return the layer.
@@ -75,6 +76,7 @@ def usd_overrides(
             layer, in the stage's axes and the scene's units.
         up: The scene's up axis.
         skies: File of each sky's map beside the layer, by its name.
+        panels: File of the image of each rectangle, as it is seen from the front, by its name.
         about: Text for the layer's comment.
 
     Raises OutputError if the library is not installed, or cannot read the stage.
@@ -87,7 +89,8 @@ def usd_overrides(
     layer.comment = about
     # The layer's own stage is closed when this call returns: while open, it would look for
     # sublayers as soon as there are any, starting from a layer without a path.
-    unset_names, unplaced = _write_lights(layer, opened_stage, list(emitters), places, up, skies)
+    written = list(emitters), places, up, skies, panels
+    unset_names, unplaced = _write_lights(layer, opened_stage, *written)
     if stage is not None:
         layer.subLayerPaths.append(Path(os.path.relpath(stage, folder)).as_posix())
         like_stage(layer, stage)
@@ -101,12 +104,15 @@ def _write_lights(
     places: Sequence[EmitterPlace],
     up: Position,
     skies: Mapping[str, str],
+    panels: Mapping[str, str],
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Write all lights into the layer; return `left` and `unplaced`, as in `Overrides`."""
     from pxr import Usd
 
     layer_stage = Usd.Stage.Open(layer)
-    names = dict.fromkeys([*(name for name, _, _ in emitters), *(x.name for x in places), *skies])
+    names = dict.fromkeys(
+        [*(name for name, _, _ in emitters), *(x.name for x in places), *skies, *panels]
+    )
     if opened_stage is None:
         new = {place.name for place in places if place.new}
         prims = _assumed_prims(name for name in names if name not in new)
@@ -123,6 +129,14 @@ def _write_lights(
         _override(layer_stage.OverridePrim(path), kind, "radiance", (1.0, 1.0, 1.0))
         if not writer.place_sky(path, map_axes(up), file):
             unturned.append(name)
+    for name, file in panels.items():
+        path, kind = light_prims.get(name, ("", ""))
+        if opened_stage is not None and kind != "RectLight":
+            unset_names.append(name)
+            continue
+        prim = layer_stage.OverridePrim(path)
+        _override(prim, kind, "radiance", (1.0, 1.0, 1.0))
+        write_image(prim, file)
     for name, parameter, emission in emitters:
         if parameter not in NORMALIZED or name not in light_prims:
             unset_names.append(name)

@@ -126,11 +126,9 @@ class UsdPlaces:
             UsdGeom.SetStageUpAxis(self._layer_stage, self._up)
         elif self._stage.GetPrimAtPath(path).GetTypeName() == "DomeLight_1":
             prim.CreateAttribute("poleAxis", Sdf.ValueTypeNames.Token, custom=False).Set("Y")
-        for name, kind, value in (
-            ("file", Sdf.ValueTypeNames.Asset, f"./{file}"),
-            ("format", Sdf.ValueTypeNames.Token, "latlong"),
-        ):
-            prim.CreateAttribute(f"inputs:texture:{name}", kind, custom=False).Set(value)
+        write_image(prim, file)
+        token = Sdf.ValueTypeNames.Token
+        prim.CreateAttribute("inputs:texture:format", token, custom=False).Set("latlong")
         if not self._conversion.is_known:
             return False
         world = np.eye(4)
@@ -206,6 +204,14 @@ class UsdPlaces:
         if not prim:
             return {path.rpartition("/")[2] for path, _ in self._prims.values()}
         return {child.GetName() for child in prim.GetAllChildren()}
+
+
+def write_image(prim: Any, file: str) -> None:
+    """Give a dome or a panel its image. file: beside the layer."""
+    from pxr import Sdf
+
+    asset = Sdf.ValueTypeNames.Asset
+    prim.CreateAttribute("inputs:texture:file", asset, custom=False).Set(f"./{file}")
 
 
 def _write_transform(prim: Any, matrix: Doubles, is_reset: bool) -> None:
