@@ -10,6 +10,7 @@ from command import run, succeed
 from renderer import LIGHTS, write_room
 
 from lightpaint.batch import task_bases
+from lightpaint.batch.plan.planner import plan
 from lightpaint.images.estimate import read_estimate
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting_file import read_lighting
@@ -206,3 +207,17 @@ def test_looks_get_the_samples_that_an_error_needs(
         )
         assert of_batch.emission == single.emission
         assert [x.interval for x in of_batch.lights] == [x.interval for x in single.lights]
+
+
+@pytest.mark.parametrize("count", [0, 72])
+def test_a_batch_says_that_it_finds_no_sun(tmp_path: Path, count: int) -> None:
+    write_room(tmp_path, lights=LIGHTS["sky"])
+    write_rgb(tmp_path / "p.exr", np.full((20, 24, 3), 0.5, np.float32))
+    lights = f"[light.sky]\nsplit = [4, 3]\nsun = {count}\n"
+    (tmp_path / "room.lights.toml").write_text(lights, encoding="utf-8")
+    looks = '[[look]]\nname = "one"\nscene = "room.xml"\npainting = "p.exr"\nwant = ["predict"]\n'
+    (tmp_path / "looks.toml").write_text(looks, encoding="utf-8")
+    [look] = plan(tmp_path / "looks.toml", tmp_path / "out").looks
+    assert not look.failure
+    remarks = [text for text in look.remarks if "asks for a sun in sky" in text]
+    assert len(remarks) == (1 if count else 0)

@@ -122,3 +122,14 @@ def check_given_lighting(
         names = (basis.basis if isinstance(basis, LightGroups) else basis).names
         if lighting_names != set(names):
             raise BatchError(f"{entry.lighting} is of other lights than {entry.basis}")
+
+
+def remarks_on_suns(job: Job) -> tuple[str, ...]:
+    """Return a remark on a sun that a lights file asks for, and that a batch does not find."""
+    scene = next((view.scene for view in job.views if view.scene is not None), None)
+    if scene is None or not (suns := {k: n for k, n in scene.requests.sun.items() if n}):
+        return ()
+    return (
+        f"the lights file asks for a sun in {some_names(suns)}, which a batch does not find, since "
+        "its looks share their basis: the texels stay as they are; solve a look alone for its sun",
+    )

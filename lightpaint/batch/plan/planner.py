@@ -21,6 +21,7 @@ from lightpaint.batch.plan.look_checks import (
     check_given_lighting,
     collect_errors,
     files_of_lighting_look,
+    remarks_on_suns,
 )
 from lightpaint.batch.plan.place_groups import (
     PlaceGroup,
@@ -250,7 +251,7 @@ class _Planner:
             on_film(scenes[0].content, None, entry.final.resolution)
         source_files = tuple(dict.fromkeys(job.results.reads))
         entry = replace(entry, settings=settings, constraints=constraints)
-        return entry, source_files, job.remarks
+        return entry, source_files, (*job.remarks, *remarks_on_suns(job))
 
     def _job(
         self,
