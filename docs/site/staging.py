@@ -5,6 +5,7 @@ repository. The site has pages of some of these; of other files it offers a copy
 link to a folder becomes plain text.
 """
 
+import json
 import re
 import shutil
 from os.path import relpath
@@ -90,7 +91,8 @@ def _list_notebooks(folder: Path) -> None:
 
 _NOTEBOOKS = """# Notebooks
 
-`notebooks/` in the repository has these. Each runs from its first cell to its last.
+`notebooks/` in the repository has these, with the outputs of their last run. Each runs from its
+first cell to its last.
 """
 
 _TUTORIALS = """# Tutorials
@@ -112,8 +114,15 @@ def _write(source: Path, original: Path, place: Path) -> None:
     def led(match: re.Match[str]) -> str:
         return _led(match, source, original, place)
 
-    # Of a notebook, all is JSON; of a document, code between fences stays as it is.
-    parts = [text] if original.suffix == ".ipynb" else _FENCE.split(text)
+    if original.suffix == ".ipynb":
+        notebook = json.loads(text)
+        for cell in notebook["cells"]:
+            if cell["cell_type"] == "markdown":
+                cell["source"] = [_LINK.sub(led, "".join(cell["source"]))]
+        place.write_text(json.dumps(notebook), encoding="utf-8")
+        return
+    # Code between fences stays as it is.
+    parts = _FENCE.split(text)
     is_code = [part.lstrip().startswith(("```", "~~~")) for part in parts]
     place.write_text(
         "".join(

@@ -70,7 +70,7 @@ def test_a_saved_painter_is_a_mixer(browser: Any, painter: Any, tmp_path: Path) 
     assert change[:10].mean() > 20 > 10 * change[-10:].mean()
     # The frame shows all of the first light below the mix.
     box = page.locator("iframe").bounding_box()
-    assert 300 < box["height"] <= 640
+    assert 300 < box["height"] <= 690
     assert errors == []
     context.close()
 

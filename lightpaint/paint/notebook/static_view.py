@@ -30,7 +30,7 @@ MAX_PLANE_PIXELS = 44_000
 MAX_PICTURE_WIDTH, MAX_PICTURE_BYTES = 640, 20_000
 
 #: Maximum heights on the screen, in pixels, of the frame and of the mix in it.
-FRAME_HEIGHT, MIX_HEIGHT = 640, 320
+FRAME_HEIGHT, MIX_HEIGHT = 690, 320
 
 #: The frame takes the height of its page; with a mixer in it, the picture above is superfluous.
 FRAME_SCRIPT = """
