@@ -4,12 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command import run_refused
+from command import run_refused, succeed
 
 from lightpaint.basis.light_images import light_images
 from lightpaint.colour.color import luminance
 from lightpaint.errors import LightpaintError
 from lightpaint.images.formats.exr import write_rgb
+from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.one_call import paint_with_light
@@ -125,6 +126,25 @@ def test_constraints_on_a_texel_hold_for_the_finer_ones_in_its_place(folder: Pat
     its_row = [coarse_name(name).endswith(".y1") for name in look.basis.names]
     assert sum(its_row) == 8 - 1 + 15  # three rows of the finer grid are nearest to it
     assert np.max(luminance(look.solution.weights)[its_row]) == pytest.approx(5, rel=1e-6)
+
+
+def test_several_views_share_the_finer_texels(folder: Path) -> None:
+    for sky in ("even", "sunny"):
+        scene = (folder / f"{sky}.xml").read_text()
+        one, rest = scene[scene.index("<sensor") :].split("</sensor>", 1)
+        sensors = [one.replace("<sensor", f'<sensor id="{name}"') for name in ("left", "right")]
+        both = "</sensor>".join([*sensors, rest]).replace("0, 3, 3", "0.5, 3, 3", 1)
+        (folder / f"{sky}-twice.xml").write_text(scene[: scene.index("<sensor")] + both)
+    options = []
+    for index, name in enumerate(("left", "right")):
+        lit = load_scene(folder / "sunny-twice.xml", sensor=index)
+        write_rgb(folder / f"{name}.exr", render(lit, spp=256, stream=Stream.TEMPLATE).image)
+        options += ["--target", f"{name}={name}.exr"]
+    options += ["--split", "sky=8x5", "--sun", "24", "--spp", "64", "--colors", "free"]
+    succeed(folder, "solve", "even-twice.xml", *options, "--no-verify", "-o", "views")
+    names = list(read_lighting(folder / "views" / "lighting.json"))
+    assert len(names) == 40 + 24
+    assert sum(name.startswith("sky.sun1.") for name in names) == 25
 
 
 def test_the_lights_file_may_ask_for_a_sun(folder: Path) -> None:
