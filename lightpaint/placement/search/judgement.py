@@ -14,7 +14,7 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.placement.movable import Arrangement, all_sites, by_column
 from lightpaint.placement.paths.view_paths import SearchPaths, ViewPaths
-from lightpaint.placement.placement_fit import PlacementFit
+from lightpaint.placement.placement_fit import Fitted, PlacementFit
 from lightpaint.placement.search.pose_steps import PoseSteps
 from lightpaint.scene.properties.pose import Site
 
@@ -137,8 +137,12 @@ class PlacementJudge:
         return PlacementJudge(fit, self._steps.with_fit(fit), paths)
 
     def _noisy_pixels(self, best: Arrangement) -> Bools:
-        fits = [self._steps.fitted(best.movables, best.sites, at) for at in self._both]
-        return np.asarray(np.any([self._fit.noisy_pixels(fitted) for fitted in fits], axis=0))
+        noisy = [self._fit.noisy_pixels(fitted) for fitted in self._along_both(best)]
+        return np.asarray(np.any(noisy, axis=0))
+
+    def _along_both(self, arrangement: Arrangement) -> list[Fitted]:
+        its = arrangement
+        return [self._steps.fitted(its.movables, its.sites, at) for at in self._both]
 
     def refined(
         self, best: Arrangement, steps: int, *, progress: Callable[[], None]
@@ -190,28 +194,24 @@ class PlacementJudge:
         missed = max(float(without[1].sum()), 0.0)
         return max(WORTH * missed, SURE * standard_error(lost), NOTHING * self._fit.norm2)
 
-    def is_worth(self, before: Arrangement, after: Arrangement) -> bool:
-        """Return whether the last light has enough gain on paths that nothing was fitted to."""
+    def worth(self, before: Arrangement, after: Arrangement) -> float:
+        """Return the gain of the last light on paths that nothing was fitted to, relative to the
+        least that is worth it.
+        """
         if after.missed >= before.missed:
-            return False
-        fits = [
-            [self._steps.fitted(its.movables, its.sites, at) for at in self._both]
-            for its in (before, after)
-        ]
-        fit = self._fit.without_pixels(
-            np.any([self._fit.noisy_pixels(fitted) for pair in fits for fitted in pair], axis=0)
-        )
-        maps = []
-        for pair in fits:
-            weights = fit.fitted(pair[0].columns).weights
-            maps.append([fit.missed_map(fitted.columns, weights) for fitted in pair])
+            return 0.0
+        judge, maps = self.without_noise(after), []
+        for its in (before, after):
+            fitted, judged = judge._along_both(its)
+            weights = fitted.weights
+            maps.append([judge._fit.missed_map(x.columns, weights) for x in (fitted, judged)])
         gain = np.array(maps[0]) - np.array(maps[1])
         least = self._least_gain(gain, np.array(maps[0]))
         # Noise of painting and basis is the same for all paths. It is independent between pixels,
         # and a search fits some of it by chance.
         usual = np.sort(maps[0][1])[: max(1, round(USUAL_SHARE * len(maps[0][1])))]
         least = max(least, BY_CHANCE * float(usual.mean()))
-        return float(gain[1].sum() - gain[1].max()) >= least
+        return float(gain[1].sum() - gain[1].max()) / max(least, 1e-300)
 
     def errors(self, best: Arrangement) -> list[PoseError]:
         """Return the spread of each pose between fits along independent paths."""

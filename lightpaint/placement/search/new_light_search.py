@@ -24,6 +24,10 @@ WORTH_AGAIN, MOST_TRIALS = 0.02, 3
 #: usual ones, once lights slid.
 STEPS, SLID_SHARE = 8, 0.5
 
+#: Number of places that are judged for one light, and the gain of the one before, relative to the
+#: least that is worth it, from which the next is judged at all.
+JUDGED, UNSURE = 3, 0.3
+
 #: Weight, relative to the largest, below which a light is off.
 OFF = 1e-6
 
@@ -51,18 +55,31 @@ class NewLightSearch:
         """Return an arrangement with the worthwhile new lights."""
         arrangement = start
         while self._free and arrangement.missed > NOTHING * self._fit.norm2:
-            more = self._with_one_more(arrangement)
+            more = self._worthwhile(arrangement, self._with_one_more(arrangement))
             progress()
             if more is None:
-                break
-            # Until the others make room for it, a light may seem to gain next to nothing.
-            more = self._together(more)
-            if not self._judge.is_worth(arrangement, more):
                 break
             added = more.movables[-1]
             self._free = [slot for slot in self._free if slot.columns != added.columns]
             arrangement = self._without_off(more)
         return self._merged(self._tried_again(arrangement))
+
+    def _worthwhile(
+        self, before: Arrangement, candidates: Sequence[Arrangement]
+    ) -> Arrangement | None:
+        """Return the first candidate that is worth it, after steps of all lights; None without any.
+
+        If the best one seems to help but is lost in noise, the next may not be.
+        """
+        for more in candidates:
+            # Until the others make room for it, a light may seem to gain next to nothing.
+            together = self._together(more)
+            worth = self._judge.worth(before, together)
+            if worth >= 1:
+                return together
+            if worth < UNSURE:
+                break
+        return None
 
     def _together(self, arrangement: Arrangement) -> Arrangement:
         """Return the arrangement after steps of all lights together."""
@@ -96,21 +113,21 @@ class NewLightSearch:
         without = {k: self._fit.fitted(self._blackened(arrangement, k)).missed for k in new}
         return sorted(new, key=lambda k: without[k])
 
-    def _with_one_more(self, arrangement: Arrangement) -> Arrangement | None:
-        """Return the arrangement with the best light added, and the others unchanged."""
+    def _with_one_more(self, arrangement: Arrangement) -> list[Arrangement]:
+        """Return the arrangement with one light added and the others unchanged, the best first."""
         kinds: list[Movable] = []
         for slot in self._free:
             if all(slot.group is not kind.group for kind in kinds):
                 kinds.append(slot)
-        best: Arrangement | None = None
+        added: list[Arrangement] = []
         for j, candidates in self._search.candidates(arrangement, kinds).items():
             for site, fitted in candidates:
                 more = arrangement.with_movable(kinds[j], site, fitted)
                 last = len(more.movables) - 1
-                more = self._steps.descend(more, self._paths.compare, SHORT_STEPS, moving=[last])
-                if best is None or more.missed < best.missed:
-                    best = more
-        return best
+                added.append(
+                    self._steps.descend(more, self._paths.compare, SHORT_STEPS, moving=[last])
+                )
+        return sorted(added, key=lambda more: more.missed)[:JUDGED]
 
     def _without_off(self, arrangement: Arrangement) -> Arrangement:
         """Return the arrangement without new lights that are off, whose slots are free again."""
