@@ -1,4 +1,4 @@
-"""What a saved notebook shows of a painter without a kernel: its last picture, and a mixer.
+"""A painter in a saved notebook, without a kernel: its last picture, and a mixer.
 
 The output of a cell holds this page beside the widget. Where a notebook is not trusted, scripts are
 removed and the picture remains; elsewhere the mixer of reports replaces it, in a frame of its own,
@@ -104,7 +104,7 @@ class CellOutput:
 
     @property
     def is_shown(self) -> bool:
-        """Whether a cell has shown the painter."""
+        """Return whether a cell has shown the painter."""
         return self._id != ""
 
     def show(self, data: Mapping[str, Any], metadata: Mapping[str, Any]) -> None:

@@ -17,7 +17,7 @@ from lightpaint.arrays import RGB, Position
 from lightpaint.errors import OutputError
 from lightpaint.files import one_line
 from lightpaint.relit.export.sky_maps import map_axes
-from lightpaint.relit.export.usd_places import UsdPlaces, write_image
+from lightpaint.relit.export.usd_places import UsdPlaces, set_image
 from lightpaint.scene.properties.site import EmitterPlace
 
 #: Whether a light is normalized, by Mitsuba's parameter.
@@ -136,7 +136,7 @@ def _write_lights(
             continue
         prim = layer_stage.OverridePrim(path)
         _override(prim, kind, "radiance", (1.0, 1.0, 1.0))
-        write_image(prim, file)
+        set_image(prim, file)
     for name, parameter, emission in emitters:
         if parameter not in NORMALIZED or name not in light_prims:
             unset_names.append(name)

@@ -126,7 +126,7 @@ class UsdPlaces:
             UsdGeom.SetStageUpAxis(self._layer_stage, self._up)
         elif self._stage.GetPrimAtPath(path).GetTypeName() == "DomeLight_1":
             prim.CreateAttribute("poleAxis", Sdf.ValueTypeNames.Token, custom=False).Set("Y")
-        write_image(prim, file)
+        set_image(prim, file)
         token = Sdf.ValueTypeNames.Token
         prim.CreateAttribute("inputs:texture:format", token, custom=False).Set("latlong")
         if not self._conversion.is_known:
@@ -206,7 +206,7 @@ class UsdPlaces:
         return {child.GetName() for child in prim.GetAllChildren()}
 
 
-def write_image(prim: Any, file: str) -> None:
+def set_image(prim: Any, file: str) -> None:
     """Give a dome or a panel its image. file: beside the layer."""
     from pxr import Sdf
 
