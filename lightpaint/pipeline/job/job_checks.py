@@ -150,24 +150,24 @@ def sky_for_sun(scene: Scene, count: int) -> str:
     if not skies:
         others = f": the texels of {', '.join(names)} are not split again" if names else ""
         raise SceneError(
-            f"sun={count} finds a sun in a sky that is split into texels, and {scene.path} has "
+            f"sun={count!r} finds a sun in a sky that is split into texels, and {scene.path} has "
             f"none{others}"
         )
     [image] = skies
     if count < CHILDREN - 1:
         raise SceneError(
-            f"sun={count}: a texel that is split again becomes {CHILDREN}, expected at least "
+            f"sun={count!r}: a texel that is split again becomes {CHILDREN}, expected at least "
             f"{CHILDREN - 1} more"
         )
     if image in scene.symmetric:
         raise SceneError(
-            f"sun={count}: {image} is symmetric, and a sun is on one side of it: "
+            f"sun={count!r}: {image} is symmetric, and a sun is on one side of it: "
             "leave one of the two out"
         )
     single = {x.name for x in scene.lights if not x.is_fixed and x.member_names == (x.name,)}
     if not all(x.name in single for x in scene.emitters if x.texel and x.texel.image == image):
         raise SceneError(
-            f"sun={count}: each texel of {image} must be a light of its own, and some are in a "
+            f"sun={count!r}: each texel of {image} must be a light of its own, and some are in a "
             "group or not adjusted"
         )
     return image

@@ -40,7 +40,7 @@ def test_files_that_are_written_are_seen_when_their_window_is_closed(painter: Pa
     painter.tell(kind="exported", files=files, command="")
     page.get_by_text("Exported painting.exr, answer/report.html.", exact=True).wait_for()
     painter.button("Export").click()
-    assert page.get_by_role("dialog").get_by_text("answer/report.html").is_visible()
+    assert page.get_by_role("dialog").get_by_text("answer/report.html", exact=True).is_visible()
 
 
 def test_reasons_that_are_sought_are_said_to_be(painter: Painter) -> None:
