@@ -73,7 +73,17 @@ html_theme_options = {
 
 def setup(app: Any) -> None:
     """Register what is done to every page."""
+    app.connect("autodoc-process-docstring", keep_colons, priority=400)  # before napoleon
     app.connect("doctree-resolved", dash_fields)
+
+
+def keep_colons(app: Any, what: str, name: str, value: Any, options: Any, lines: list[str]) -> None:
+    """Begin the docstring of a property with an empty comment.
+
+    Otherwise napoleon takes what is before a colon in the first line for the property's type.
+    """
+    if what == "property":
+        lines[:0] = ["..", ""]
 
 
 def dash_fields(app: Any, doctree: nodes.document, name: str) -> None:

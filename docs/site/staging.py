@@ -35,6 +35,8 @@ TUTORIALS = {
 
 _LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
 _FENCE = re.compile(r"(^ *(?:```|~~~).*?^ *(?:```|~~~) *$)", re.MULTILINE | re.DOTALL)
+#: A percent sign that begins a line of text: MyST takes such a line for a comment.
+_PERCENT = re.compile(r"^( {0,3})%", re.MULTILINE)
 
 
 def stage(source: Path) -> None:
@@ -126,7 +128,7 @@ def _write(source: Path, original: Path, place: Path) -> None:
     is_code = [part.lstrip().startswith(("```", "~~~")) for part in parts]
     place.write_text(
         "".join(
-            part if code else _LINK.sub(led, part)
+            part if code else _PERCENT.sub(r"\1\\%", _LINK.sub(led, part))
             for part, code in zip(parts, is_code, strict=True)
         ),
         encoding="utf-8",
