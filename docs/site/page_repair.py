@@ -1,4 +1,4 @@
-"""What Sphinx and its theme write that keeps people from using a page, mended."""
+"""Repairs of the HTML of Sphinx and its theme, which keeps some people from using a page."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What has to hold of the built site: links lead somewhere, nothing comes from elsewhere, size."""
+"""Checks of the built site: no dead link, no request to another host, and its size."""
 
 import re
 from html.parser import HTMLParser

@@ -12,6 +12,7 @@ import pytest
 from axe import axe_source, violations
 from batches import NAMES, run_whole_batch, small_basis, write_batch
 from command import succeed
+from mixer_canvas import mixer_pixels
 from PIL import Image
 
 from lightpaint.basis.lights import BasisLight
@@ -104,18 +105,8 @@ def test_links_lead_to_what_is_there_and_lights_to_each_look(page: Any, batch: P
     assert page.locator("#lights tbody th").all_text_contents() == ["dusk-0", "dusk-1", "dusk-2"]
 
 
-def pixels(page: Any) -> Any:
-    """Codes truly on the canvas of the mix, (h, w, 3)."""
-    h, w, flat = page.evaluate(
-        """async () => {
-          for (let k = 0; k < 3; k++) await new Promise(requestAnimationFrame)
-          const canvas = document.querySelector('.mixer:not([hidden]) .mixer-mix')
-          const { width, height } = canvas
-          const data = canvas.getContext('2d').getImageData(0, 0, width, height).data
-          return [height, width, [...data]]
-        }"""
-    )
-    return np.array(flat, np.int16).reshape(h, w, 4)[..., :3]
+#: The canvas of the mixer that is open.
+OPEN_MIX = ".mixer:not([hidden]) .mixer-mix"
 
 
 def test_every_look_can_be_mixed_from_planes_that_are_there_once(page: Any, batch: Path) -> None:
@@ -135,7 +126,7 @@ def test_every_look_can_be_mixed_from_planes_that_are_there_once(page: Any, batc
         # Until what has begun is drawn: another look's picture is far off.
         page.wait_for_function("document.querySelectorAll('.mixer-light').length === 3")
         for _ in range(50):
-            difference = np.abs(pixels(page) - expected.astype(np.int16))
+            difference = np.abs(mixer_pixels(page, OPEN_MIX) - expected.astype(np.int16))
             if difference.max() <= 2:
                 break
             page.wait_for_timeout(100)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mixer_canvas import mixer_pixels
 
 import lightpaint as lp
 from lightpaint.paint.notebook.static_view import static_view
@@ -29,20 +30,6 @@ def painter(make_basis: Any, tmp_path: Path) -> Iterator[Any]:
     painter.close()
 
 
-def _picture(frame: Any) -> Any:
-    """Return the display values of the mix, (h, w, 3)."""
-    height, width, flat = frame.evaluate(
-        """async () => {
-          for (let k = 0; k < 2; k++) await new Promise(requestAnimationFrame)
-          const canvas = document.querySelector('.mixer-mix')
-          const { width, height } = canvas
-          const data = canvas.getContext('2d').getImageData(0, 0, width, height).data
-          return [height, width, [...data]]
-        }"""
-    )
-    return np.reshape(flat, (height, width, 4))[..., :3].astype(float)
-
-
 def test_a_saved_painter_is_a_mixer(browser: Any, painter: Any, tmp_path: Path) -> None:
     painter.target = lp.Target.of(0.5 * painter._studio.snapshot().bases[0].images.sum(axis=0))
     data, _ = painter._repr_mimebundle_()
@@ -60,13 +47,13 @@ def test_a_saved_painter_is_a_mixer(browser: Any, painter: Any, tmp_path: Path) 
     # It begins with the answer, and a slider changes it where its light is.
     basis = painter._studio.snapshot().bases[0]
     expected = basis.mix(painter.lighting.weights_for(basis))
-    before = _picture(frame)
+    before = mixer_pixels(frame).astype(float)
     encoded = 255 * lp.ViewTransform().encode(expected)
     assert np.abs(before - np.clip(encoded, 0, 255)).mean() < 1
     frame.locator(".mixer-light").first.locator("input[type=range]").first.evaluate(
         "(input) => { input.value = input.max; input.dispatchEvent(new Event('input')) }"
     )
-    change = np.abs(_picture(frame) - before).mean(axis=(0, 2))
+    change = np.abs(mixer_pixels(frame).astype(float) - before).mean(axis=(0, 2))
     assert change[:10].mean() > 20 > 10 * change[-10:].mean()
     # The frame shows all of the first light below the mix.
     box = page.locator("iframe").bounding_box()
@@ -96,7 +83,7 @@ def test_it_is_small_even_of_noise(make_basis: Any, size: tuple[int, int]) -> No
 
 
 def test_cells_keep_the_last_picture(monkeypatch: pytest.MonkeyPatch, painter: Any) -> None:
-    """What is shown has an id, by which it is replaced when the painter is closed."""
+    """Its output has an id, by which that is replaced when the painter is closed."""
     outputs: dict[str, list[Any]] = {}
 
     def display(data: Any, *, display_id: str, **_: Any) -> None:

@@ -1,4 +1,4 @@
-"""What the scripts of all tutorials need: commands that run, pages that are looked at, pictures.
+"""Helpers of all tutorials' scripts: run commands, drive the painter's page, and save pictures.
 
 Each tutorial in docs/tutorials/ has a script here, which does its job in a folder of its own and
 writes a picture for every step beside itself. `python docs/images/tutorials/NAME.py` runs one.

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from axe import violations
+from mixer_canvas import mixer_pixels
 from painter_page import Finger
 
 import lightpaint as lp
@@ -86,20 +87,6 @@ def open_file(offline_tab: tuple[Any, list[str]], tmp_path: Path) -> Any:
     assert page_errors == []
 
 
-def pixels(page: Any) -> Any:
-    """Codes truly on the canvas of the mix, (h, w, 3)."""
-    h, w, flat = page.evaluate(
-        """async () => {
-          for (let k = 0; k < 2; k++) await new Promise(requestAnimationFrame)
-          const canvas = document.querySelector('.mixer-mix')
-          const { width, height } = canvas
-          const data = canvas.getContext('2d').getImageData(0, 0, width, height).data
-          return [height, width, [...data]]
-        }"""
-    )
-    return np.array(flat, np.int16).reshape(h, w, 4)[..., :3]
-
-
 def codes(basis: lp.Basis, weights: Any, transform: lp.ViewTransform) -> Any:
     """What is to be there."""
     return to_8_bit(transform.encode(basis.mix(np.asarray(weights)))).astype(np.int16)
@@ -124,7 +111,7 @@ def move(page: Any, light: int, slider: int, value: float) -> None:
 
 def check(page: Any, expected: Any) -> None:
     """Within a code of the display, but for what rounding of the planes adds up to."""
-    difference = np.abs(pixels(page) - expected)
+    difference = np.abs(mixer_pixels(page) - expected)
     assert difference.mean() < 0.5
     assert difference.max() <= 2
 
@@ -294,7 +281,7 @@ def test_through_other_transforms(make_basis: Any, open_file: Any, name: str) ->
     lighting = solve_painting(basis)[1].lighting
     text = mixer_html(basis, lighting, transform=transform) + mixer_assets()
     page = open_file(f"<!doctype html><body>{text}")
-    difference = np.abs(pixels(page) - codes(basis, lighting.weights_for(basis), transform))
+    difference = np.abs(mixer_pixels(page) - codes(basis, lighting.weights_for(basis), transform))
     assert difference.mean() < 1
 
 
