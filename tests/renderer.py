@@ -11,6 +11,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.relit.relight import relight
 from lightpaint.scene.scene import Scene
 
 REPOSITORY = Path(__file__).parent.parent
@@ -196,3 +197,15 @@ def painted(scene: Scene, seed: int = 3) -> Lighting:
         if not light.is_fixed:
             lighting = lighting.with_emission(light.name, tuple(rgb))
     return lighting
+
+
+def predicted_and_shown(scene: Scene, folder: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Return the prediction of a painted lighting by one pass, and what Mitsuba shows of the
+    written scene with the same samples, (h, w, 3) each.
+    """
+    lighting = painted(scene)
+    planes = one_pass(scene, seed=5, spp=16)
+    weights = np.array([lighting.emission[light.name] for light in scene.lights])
+    relit = relight(scene, lighting, folder / "relit.xml")
+    shown = mitsuba_render(relit, seed=5, spp=16)
+    return np.einsum("nc,nhwc->hwc", weights, planes), shown

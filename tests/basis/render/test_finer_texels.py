@@ -4,7 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from renderer import LIGHTS, map_file, mitsuba_render, one_pass, painted, write_room
+from renderer import (
+    LIGHTS,
+    map_file,
+    painted,
+    predicted_and_shown,
+    write_room,
+)
 
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.lighting.answer.combination import combine
@@ -32,11 +38,7 @@ def finer_room(folder: Path, **options: str) -> Scene:
 
 def test_a_sky_in_view_looks_as_mitsuba_shows_the_written_image(tmp_path: Path) -> None:
     scene = finer_room(tmp_path, integrator=SHORT)
-    lighting = painted(scene)
-    planes = one_pass(scene, seed=5, spp=16)
-    weights = np.array([lighting.emission[light.name] for light in scene.lights])
-    predicted = np.einsum("nc,nhwc->hwc", weights, planes)
-    shown = mitsuba_render(relight(scene, lighting, tmp_path / "relit.xml"), seed=5, spp=16)
+    predicted, shown = predicted_and_shown(scene, tmp_path)
     assert shown.max() > 0.5
     # Mitsuba's float32 interpolation.
     np.testing.assert_allclose(predicted, shown, atol=3e-4)

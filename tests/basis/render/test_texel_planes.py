@@ -11,6 +11,7 @@ from renderer import (
     mitsuba_render,
     one_pass,
     painted,
+    predicted_and_shown,
     write_room,
 )
 
@@ -52,11 +53,7 @@ def test_the_pictures_of_all_texels_sum_to_that_of_an_even_sky(tmp_path: Path) -
 @pytest.mark.parametrize("sky", [LIGHTS["sky"], ROTATED], ids=["constant", "envmap"])
 def test_a_sky_in_view_looks_as_mitsuba_shows_the_written_image(tmp_path: Path, sky: str) -> None:
     scene = split_room(tmp_path, sky, integrator=SHORT)
-    lighting = painted(scene)
-    planes = one_pass(scene, seed=5, spp=16)
-    weights = np.array([lighting.emission[light.name] for light in scene.lights])
-    predicted = np.einsum("nc,nhwc->hwc", weights, planes)
-    shown = mitsuba_render(relight(scene, lighting, tmp_path / "relit.xml"), seed=5, spp=16)
+    predicted, shown = predicted_and_shown(scene, tmp_path)
     assert shown.max() > 0.5
     # Mitsuba's float32 interpolation.
     np.testing.assert_allclose(predicted, shown, atol=1e-4)
