@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import bpy
+from blender_cycles import empty_scene
 
 FOLDER = Path(sys.argv[-1])
 #: Metres of the lamps above the floor.
@@ -67,15 +68,8 @@ def radiance():
 
 
 def main():
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    scene = bpy.context.scene
-    scene.render.engine, scene.cycles.device = "CYCLES", "CPU"
-    scene.cycles.samples, scene.cycles.max_bounces = 256, 0
-    scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
-    scene.render.resolution_x = scene.render.resolution_y = 8
-    scene.render.threads_mode, scene.render.threads = "FIXED", 2
-    scene.render.image_settings.file_format = "OPEN_EXR"
-    scene.render.image_settings.color_depth = "32"
+    scene = empty_scene(8, 8, 256)
+    scene.cycles.max_bounces = 0
     floor_and_camera()
     lamps = [
         lamp("bulb", "POINT", shadow_soft_size=0),

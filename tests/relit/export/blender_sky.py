@@ -10,21 +10,14 @@ import sys
 from pathlib import Path
 
 import bpy
+from blender_cycles import empty_scene
 from mathutils import Vector
 
 FOLDER = Path(sys.argv[-1])
 
 
 def main():
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    scene = bpy.context.scene
-    scene.render.engine, scene.cycles.device = "CYCLES", "CPU"
-    scene.cycles.samples = 4
-    scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
-    scene.render.resolution_x = scene.render.resolution_y = 3
-    scene.render.threads_mode, scene.render.threads = "FIXED", 2
-    scene.render.image_settings.file_format = "OPEN_EXR"
-    scene.render.image_settings.color_depth = "32"
+    scene = empty_scene(3, 3, 4)
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     camera.data.type, camera.data.lens = "PERSP", 5000
     scene.collection.objects.link(camera)

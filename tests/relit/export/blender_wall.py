@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import bpy
+from blender_cycles import empty_scene
 
 FOLDER, MESH = Path(sys.argv[-4]), sys.argv[-3]
 COLUMNS, ROWS = map(int, sys.argv[-2:])
@@ -37,17 +38,9 @@ def wall():
 
 
 def main():
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    scene = bpy.context.scene
-    scene.render.engine, scene.cycles.device = "CYCLES", "CPU"
-    scene.cycles.samples = 4
-    scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
+    scene = empty_scene(COLUMNS, ROWS, 4)
     # The middles of pixels, which are those of texels.
     scene.cycles.pixel_filter_type, scene.cycles.filter_width = "BLACKMAN_HARRIS", 0.01
-    scene.render.resolution_x, scene.render.resolution_y = COLUMNS, ROWS
-    scene.render.threads_mode, scene.render.threads = "FIXED", 2
-    scene.render.image_settings.file_format = "OPEN_EXR"
-    scene.render.image_settings.color_depth = "32"
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     camera.location, camera.data.type, camera.data.ortho_scale = (0, 0, 3), "ORTHO", 2 * HALF[0]
     scene.collection.objects.link(camera)
