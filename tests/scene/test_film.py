@@ -253,3 +253,11 @@ def test_on_blocks_every_plane_is_what_mitsuba_makes_of_their_pixels(tmp_path: P
     for name, coverage in full_surfaces.coverage.items():
         # Noise of 18 samples a pixel, at the edges.
         assert np.abs(small.coverage[name] - block_mean(coverage, 3)).mean() < 0.03
+
+
+def test_equal_sensors_without_ids_are_a_clear_error(tmp_path: Path) -> None:
+    """Mitsuba makes one of them."""
+    sensor = '<sensor type="perspective"><float name="fov" value="60"/></sensor>'
+    path = write_room(tmp_path, sensors=2 * sensor)
+    with pytest.raises(SceneError, match="two sensors are equal and have no id"):
+        load_scene(path, sensor=1)

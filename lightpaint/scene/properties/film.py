@@ -181,8 +181,12 @@ def check_film(path: Path, film: Film, spp: int) -> None:
 
 
 def camera_named(loaded: Any, name: str) -> Any:
-    """Return the sensor with that id in a loaded scene."""
-    return next(sensor for sensor in loaded.sensors() if sensor.id() == name)
+    """Return the sensor with that id in a loaded scene. Raises SceneError."""
+    for sensor in loaded.sensors():
+        if sensor.id() == name:
+            return sensor
+    # Mitsuba makes one of equal sensors without an id.
+    raise SceneError(f"two sensors are equal and have no id (one is {name}): leave one out")
 
 
 def sensor_index(sensor: int | str | None, names: Sequence[str], path: Path) -> int:
