@@ -1,5 +1,6 @@
 """A sun in a sky of coarse texels gets finer ones, if the painting gains by it."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +37,7 @@ SCENE = """<scene version="3.0.0">
 </scene>"""
 WALL = """<shape type="rectangle" id="panel"><transform name="to_world"><translate y="5"/>
     </transform><emitter type="area" id="wall"><rgb name="radiance" value="1"/></emitter></shape>"""
+BULB = """<emitter type="point" id="bulb"><point name="position" x="0" y="3" z="0"/></emitter>"""
 SPLIT = {"sky": "8x5"}
 
 
@@ -51,16 +53,20 @@ class Remarks(Listener):
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A post on a plane below an even sky, below one with a small sun, and below a softer one."""
+    """A post on a plane below an even sky, one with a small sun, one with two, and a softer one."""
     folder = tmp_path_factory.mktemp("suns")
     even = np.full((61, 120, 3), 0.4, np.float32)
     sunny, soft = even.copy(), np.full((5, 8, 3), 0.4, np.float32)
     sunny[20:22, 40:42] = 300.0, 240.0, 180.0
     soft[1, 2] *= 2
-    for name, image in (("even", even), ("sunny", sunny), ("soft", soft)):
+    twins = np.maximum(sunny, sunny[:, ::-1])
+    skies = (("even", even), ("sunny", sunny), ("twins", twins), ("soft", soft))
+    for name, image in skies:
         write_rgb(folder / f"{name}.exr", image)
         (folder / f"{name}.xml").write_text(SCENE.format(map=name, more=""))
     (folder / "wall.xml").write_text(SCENE.format(map="even", more=WALL))
+    without_sky = SCENE[: SCENE.index("<emitter")] + "{more}</scene>"
+    (folder / "bulb.xml").write_text(without_sky.format(more=BULB))
     return folder
 
 
@@ -70,9 +76,17 @@ def target_under(folder: Path, sky: str) -> Target:
     return Target.of(render(lit, spp=512, stream=Stream.TEMPLATE).image)
 
 
-def answered(folder: Path, sky: str, sun: int, remarks: Remarks, **options: object) -> Look:
+def answered(
+    folder: Path,
+    sky: str,
+    sun: int,
+    remarks: Remarks,
+    *,
+    symmetric: Sequence[str] = (),
+    **options: object,
+) -> Look:
     """Return the answer to a sky from the even one, split, with a sun of that many texels."""
-    scene = load_scene(folder / "even.xml", split=SPLIT)
+    scene = load_scene(folder / "even.xml", split=SPLIT, symmetric=symmetric)
     return paint_with_light(
         scene,
         target_under(folder, sky),
@@ -128,6 +142,22 @@ def test_constraints_on_a_texel_hold_for_the_finer_ones_in_its_place(folder: Pat
     assert np.max(luminance(look.solution.weights)[its_row]) == pytest.approx(5, rel=1e-6)
 
 
+def test_a_symmetric_sky_gets_finer_texels_on_both_sides(folder: Path) -> None:
+    remarks = Remarks()
+    coarse, finer = (answered(folder, "twins", sun, remarks, symmetric=["sky"]) for sun in (0, 24))
+    assert missed(finer) < 0.6 * missed(coarse)
+    assert len(finer.basis.lights) - len(coarse.basis.lights) == 24
+    [image] = light_images(finer.basis.lights)
+    assert image.is_whole
+    assert sum(1 for node in image.layout.nodes if node[0]) == 50
+    shown = image.radiances(finer.solution.weights)
+    np.testing.assert_allclose(shown, shown[:, ::-1], rtol=1e-12)  # it is interpolated
+    written = read_emitted_image(folder / "twins-24" / "relit.sky.exr", is_linear=True)
+    np.testing.assert_allclose(written, shown, rtol=1e-6)
+    assert finer.verification is not None
+    assert finer.verification.agrees
+
+
 def test_several_views_share_the_finer_texels(folder: Path) -> None:
     for sky in ("even", "sunny"):
         scene = (folder / f"{sky}.xml").read_text()
@@ -162,17 +192,22 @@ def test_the_lights_file_may_ask_for_a_sun(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("scene", "options", "part"),
     [
-        ("even", ["--sun"], "--sun 72 finds a sun in a sky that is split into texels"),
+        ("even", ["--sun"], "even.xml has none: split its sky with --split sky=VALUE"),
         ("even", ["--split", "sky=8x5", "--sun", "-1"], "--sun: '-1' is not a whole number"),
         ("even", ["--split", "sky=8x5", "--sun", "10"], "expected at least 24 more"),
         ("even", ["--split", "sky=8x5", "--sun", "9999"], "too large: expected at most 4096"),
-        ("even", ["--split", "sky=8x5", "--symmetric", "sky", "--sun"], "sky is symmetric"),
         (
             "even",
             ["--split", "sky=8x5", "--group", "dome=sky.*.y0", "--sun"],
             "each texel of sky must be a light of its own",
         ),
-        ("wall", ["--split", "wall=4x4", "--sun"], "the texels of wall are not split again"),
+        (
+            "wall",
+            ["--split", "wall=4x3", "--sun"],
+            "the texels of wall are not split again; split it more finely, such as 8x6, and leave "
+            "--sun out",
+        ),
+        ("bulb", ["--sun"], "bulb.xml has none: leave --sun out"),
     ],
 )
 def test_what_has_no_sun_is_refused_in_one_line(

@@ -53,7 +53,7 @@ def find_suns(job: Job, bases: list[Basis], listen: Listener) -> tuple[Job, list
         # More unknowns fit some of the noise of any picture.
         least_gain = LEAST_GAIN + NOISE_FIT * added / finer.solution.importance.size
         if finer.missed > (1 - least_gain) * best.missed:
-            passed.add(node)
+            passed |= _with_mirror_image(best, image, node)
             continue
         best, count = finer, count - added
         listen.note(f"a finer texel of {image} leaves {best.missed / first:.3g} of the error")
@@ -83,8 +83,8 @@ class _Candidate:
 
 
 def _split(one: _Candidate, image: str, node: Node, listen: Listener) -> _Candidate:
-    """Return the answer with a texel split again."""
-    layout = one.image(image).layout.split_again(node)
+    """Return the answer with a texel split again, in a symmetric sky with its mirror image."""
+    layout = one.image(image).layout.split_again(*_with_mirror_image(one, image, node))
     scenes: list[Scene] = []
     for view, basis in zip(one.job.views, one.bases, strict=True):
         assert view.scene is not None
@@ -95,6 +95,13 @@ def _split(one: _Candidate, image: str, node: Node, listen: Listener) -> _Candid
         for scene, basis, view in zip(scenes, one.bases, job.views, strict=True)
     ]
     return _Candidate.of(job, bases)
+
+
+def _with_mirror_image(one: _Candidate, image: str, node: Node) -> set[Node]:
+    """Return the texels that are one light with `node`, itself among them."""
+    layout, index = one.image(image).layout, one.image(image).index
+    same = np.flatnonzero(index == index[layout.number_of[node]])
+    return {layout.nodes[k] for k in same.tolist()}
 
 
 def _finer_basis(scene: Scene, before: Basis, job: Job, listen: Listener) -> Basis:

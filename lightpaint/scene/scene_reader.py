@@ -96,7 +96,7 @@ def load_scene(
     sizes = _image_sizes(selection, split)
     mirrored = _symmetric_images(selection, symmetric, sizes)
     for name in mirrored:
-        pairs = mirrored_pairs(name, sizes[name])
+        pairs = mirrored_pairs(name, TexelLayout(sizes[name]))
         selection = replace(selection, groups={**pairs, **selection.groups})
     with explain_old_scene(path), mitsuba_errors(path):
         whole = inspect_scene(parsed, index)
@@ -128,13 +128,16 @@ def load_scene(
 def with_layout(scene: Scene, image: str, layout: TexelLayout) -> Scene:
     """Return a scene whose sky `image` has other texels, each a light that shows what it does now.
 
-    Its texels must have been lights of their own.
+    Its texels must have been lights of their own; those of a symmetric sky are one with their
+    mirror images.
     """
     split = {**scene.split, image: layout}
     with mitsuba_errors(scene.path):
         facts = inspect_scene(scene.parsed, scene.sensor)
         facts = with_split(facts, scene.parsed, split, scene.symmetric)
     light_of = {name: light.name for light in scene.lights for name in light.member_names}
+    pairs = mirrored_pairs(image, layout) if image in scene.symmetric else {}
+    light_of |= {name: pair for pair, names in pairs.items() for name in names}
     members: dict[str, list[str]] = {}
     for emitter in facts["emitters"]:
         members.setdefault(light_of.get(emitter.name, emitter.name), []).append(emitter.name)

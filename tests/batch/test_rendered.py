@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command import run, succeed
+from command import run, run_refused, succeed
 from renderer import LIGHTS, write_room
 
 from lightpaint.batch import task_bases
@@ -221,3 +221,6 @@ def test_a_batch_says_that_it_finds_no_sun(tmp_path: Path, count: int) -> None:
     assert not look.failure
     remarks = [text for text in look.remarks if "asks for a sun in sky" in text]
     assert len(remarks) == (1 if count else 0)
+    (tmp_path / "looks.toml").write_text(f"{looks}settings.sun = 72\n", encoding="utf-8")
+    line = run_refused(tmp_path, "batch", "looks.toml", "-o", "out")
+    assert "leave it out here, and solve that look alone for its sun" in line

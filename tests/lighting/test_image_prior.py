@@ -17,6 +17,7 @@ from lightpaint.lighting.loss.image_prior import image_prior
 from lightpaint.lighting.solve import solve
 from lightpaint.scene.lights.texels.sky import solid_angles
 from lightpaint.scene.lights.texels.texel import mirrored_pairs, texel_names
+from lightpaint.scene.lights.texels.texel_layout import TexelLayout
 from lightpaint.target.target import Target
 
 FREE = Fit(colors="free")
@@ -155,7 +156,7 @@ def test_what_no_pixel_sees_stays_as_it_is(make_basis: BasisFactory) -> None:
 def test_a_symmetric_image_costs_as_much_as_one_that_happens_to_be(size: tuple[int, int]) -> None:
     """Where the picture of two texels is twice that of one, as if both were at one place."""
     columns, rows = size
-    pairs = mirrored_pairs("sky", size)
+    pairs = mirrored_pairs("sky", TexelLayout(size))
     lights = Lights(
         tuple(
             BasisLight(

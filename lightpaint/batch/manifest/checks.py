@@ -169,9 +169,11 @@ def check_sequence(mistakes: Mistakes, table: Table) -> None:
 def settings_of(mistakes: Mistakes, label: str, look: Mapping[str, Any]) -> Settings:
     values = mistakes.settings(look.get("settings", {}), label)
     steps = look.get("want", SOLVE_STEPS)
-    if values.get("sun"):
+    if "scene" in look and values.get("sun"):
         mistakes.add(
-            label, "sun adds texels for one look, and looks share their basis: solve it alone"
+            label,
+            "sun adds texels for one look, and looks share their basis: leave it out here, and "
+            "solve that look alone for its sun",
         )
     if "scene" in look:
         values["sun"] = 0  # also instead of that in a lights file

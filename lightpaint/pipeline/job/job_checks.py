@@ -20,10 +20,15 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import Painting, content
 from lightpaint.placement.rigging.rigged_lights import rigged_lights
 from lightpaint.placement.rigging.rigging import Rigging, rigging_of
+from lightpaint.scene.lights.texels.domains import DOMAINS
 from lightpaint.scene.lights.texels.sky import Sky
+from lightpaint.scene.lights.texels.texel import mirrored_pairs, node_name
 from lightpaint.scene.lights.texels.texel_layout import CHILDREN
 from lightpaint.scene.scene import Scene
 from lightpaint.target.target import Target
+
+#: Emitters that shine from all directions.
+SKY_PLUGINS = [plugin for plugin, domain in DOMAINS.items() if isinstance(domain, Sky)]
 
 
 def check_inputs(
@@ -148,10 +153,9 @@ def sky_for_sun(scene: Scene, count: int) -> str:
     names = {x.texel.image: x.texel for x in scene.emitters if x.texel}
     skies = [name for name, texel in names.items() if isinstance(texel.domain, Sky)]
     if not skies:
-        others = f": the texels of {', '.join(names)} are not split again" if names else ""
         raise SceneError(
             f"sun={count!r} finds a sun in a sky that is split into texels, and {scene.path} has "
-            f"none{others}"
+            f"none: {_advice_without_sky(scene)}"
         )
     [image] = skies
     if count < CHILDREN - 1:
@@ -159,15 +163,28 @@ def sky_for_sun(scene: Scene, count: int) -> str:
             f"sun={count!r}: a texel that is split again becomes {CHILDREN}, expected at least "
             f"{CHILDREN - 1} more"
         )
-    if image in scene.symmetric:
-        raise SceneError(
-            f"sun={count!r}: {image} is symmetric, and a sun is on one side of it: "
-            "leave one of the two out"
-        )
-    single = {x.name for x in scene.lights if not x.is_fixed and x.member_names == (x.name,)}
-    if not all(x.name in single for x in scene.emitters if x.texel and x.texel.image == image):
+    layout = names[image].layout
+    pairs = mirrored_pairs(image, layout) if image in scene.symmetric else {}
+    light_of = {name: tuple(pair) for pair in pairs.values() for name in pair}
+    adjusted = {x.member_names for x in scene.lights if not x.is_fixed}
+    texels = [node_name(image, node) for node in layout.nodes]
+    if not all(light_of.get(name, (name,)) in adjusted for name in texels):
         raise SceneError(
             f"sun={count!r}: each texel of {image} must be a light of its own, and some are in a "
             "group or not adjusted"
         )
     return image
+
+
+def _advice_without_sky(scene: Scene) -> str:
+    """Return what to do about a sun in a scene that has no sky in texels."""
+    texel = next((x.texel for x in scene.emitters if x.texel), None)
+    if texel is None:
+        skies = (x.name for x in scene.emitters if x.plugin in SKY_PLUGINS)
+        sky = next(skies, "")
+        return f"split its sky with split={{'{sky}': ...}}" if sky else "leave sun=... out"
+    columns, rows = (2 * k for k in texel.layout.size)
+    return (
+        f"the texels of {texel.image} are not split again; split it more finely, such as "
+        f"{columns}x{rows}, and leave sun=... out"
+    )

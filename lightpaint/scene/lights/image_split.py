@@ -93,8 +93,10 @@ def _texels(
     current = current_image(
         emitter.node, emitter.kind, emitter.emission, domain, layout.size, parsed
     )
+    radiances = layout.values(current)
     if is_symmetric:
-        current = (current + current[:, ::-1]) / 2
+        mirrored = [layout.number_of.get(layout.mirrored(x), k) for k, x in enumerate(layout.nodes)]
+        radiances = (radiances + radiances[mirrored]) / 2
     texels = (Texel(emitter.name, node, layout, domain) for node in layout.nodes)
     return [
         replace(
@@ -110,7 +112,7 @@ def _texels(
             site=Site(),
             texel=texel,
         )
-        for texel, radiance in zip(texels, layout.values(current), strict=True)
+        for texel, radiance in zip(texels, radiances, strict=True)
     ]
 
 

@@ -130,16 +130,12 @@ def texel_names(image: str, size: GridSize) -> list[str]:
     return [texel_name(image, x, y) for y in range(rows) for x in range(columns)]
 
 
-def mirrored_pairs(image: str, size: GridSize) -> dict[str, list[str]]:
+def mirrored_pairs(image: str, layout: TexelLayout) -> dict[str, list[str]]:
     """Return the texels of an image, row by row, by the name of the left one of each pair that are
     mirror images of each other; one in the middle is alone.
     """
-    columns, rows = size
-    return {
-        texel_name(image, x, y): [texel_name(image, k, y) for k in sorted({x, columns - 1 - x})]
-        for y in range(rows)
-        for x in range((columns + 1) // 2)
-    }
+    pairs = (sorted({node, layout.mirrored(node)}) for node in layout.nodes)
+    return {node_name(image, pair[0]): [node_name(image, x) for x in pair] for pair in pairs}
 
 
 def parse_size(value: object, where: str) -> GridSize:

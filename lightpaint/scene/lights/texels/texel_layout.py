@@ -53,9 +53,14 @@ class TexelLayout:
             todo = {x for x in todo if x[0]}
         return cls(size, tuple(sorted(splits)))
 
-    def split_again(self, node: Node) -> "TexelLayout":
-        """Return the layout with another of its texels split."""
-        return TexelLayout(self.size, tuple(sorted({*self.splits, node})))
+    def split_again(self, *nodes: Node) -> "TexelLayout":
+        """Return the layout with more of its texels split."""
+        return TexelLayout(self.size, tuple(sorted({*self.splits, *nodes})))
+
+    def mirrored(self, node: Node) -> Node:
+        """Return the place of a texel in the mirror image, left and right."""
+        level, column, row = node
+        return level, self.grid(level)[0] - 1 - column, row
 
     @cached_property
     def level(self) -> int:
