@@ -16,7 +16,8 @@ With --rivals, Adam through Mitsuba's differentiable renderer has the same texel
 sky, for as much of the processor as basis and solve take together, and for four times as much: the
 better of two step sizes, judged like the check, by a plain render.
 
-And it prints the processor's time of a basis relative to an ordinary render of as many samples.
+Before that it prints the processor's time of a basis relative to an ordinary render: of as many
+samples, and for the same noise, where that of the whole picture is the sum's of all planes.
 """
 
 import argparse
@@ -206,28 +207,36 @@ def rows_of(
                     yield rival_row(folder, material, sky, label, basis, target, times * budget_s)
 
 
-def times_of(folder: Path, sizes: list[str], spp: int) -> Iterator[str]:
-    """Yield rows of the processor's time of a basis, relative to an ordinary render."""
-    path = scene_file(folder, "glossy", "overcast")
+def times_of(folder: Path, material: str, sizes: list[str], spp: int) -> Iterator[str]:
+    """Yield rows of the processor's time of a basis, relative to an ordinary render.
+
+    Once with as many samples, and once for the same noise of the whole picture.
+    """
+    path = scene_file(folder, material, "overcast")
     plain = lp.load_scene(path)
     import mitsuba as mi  # after lightpaint has chosen its variant
 
-    def ordinary() -> None:
-        loaded = plain.load()
-        for k in range(2):
-            begin_s = time.process_time()
-            np.array(mi.render(loaded, seed=k, spp=spp))
-            ordinary_s[0] = time.process_time() - begin_s
-
-    ordinary_s = [0.0]
-    ordinary()
+    loaded, pictures = plain.load(), []
+    for k in range(3):  # the first compiles
+        begin_s = time.process_time()
+        pictures.append(np.array(mi.render(loaded, seed=k, spp=spp)))
+        ordinary_s = time.process_time() - begin_s
     for label in ("one light", *sizes):
         scene = plain if label == "one light" else lp.load_scene(path, split={"sky": label})
         lp.render_basis(scene, spp=2)  # compiles the kernels
         begin_s = time.process_time()
-        lp.render_basis(scene, spp=spp, seed=1)
-        ratio = (time.process_time() - begin_s) / ordinary_s[0]
-        yield f"| {label} | {ratio:.2f} |"
+        basis = lp.render_basis(scene, spp=spp, seed=1)
+        ratio = (time.process_time() - begin_s) / ordinary_s
+        lit = ~basis.emitters_seen
+        whole, its_half_difference = (np.sum(list(x), axis=0) for x in (basis.planes, basis.noise))
+        its_noise = noise_share(whole[lit], its_half_difference[lit])
+        noise = noise_share(pictures[1][lit], (pictures[1] - pictures[2])[lit]) / 2
+        yield f"| {material} | {label} | {ratio:.2f} | {ratio * its_noise / noise:.2f} |"
+
+
+def noise_share(image: Floats, noise: Floats) -> float:
+    """Return the energy of noise relative to that of an image."""
+    return float((noise**2).sum() / (image**2).sum())
 
 
 def main() -> None:
@@ -243,9 +252,10 @@ def main() -> None:
         folder = Path(name)
         for sky, image in skies().items():
             write_rgb(folder / f"{sky}.exr", image)
-        print("| image | time of a basis, of an ordinary render |\n|---|---|")
-        for row in times_of(folder, options.sizes, options.spp):
-            print(row, flush=True)
+        print("| ball | image | time of a basis | for the same noise |\n|---|---|---|---|")
+        for material in options.materials:
+            for row in times_of(folder, material, options.sizes, options.spp):
+                print(row, flush=True)
         if options.time_only:
             return
         print("\n| ball | sky | image | missed | ΔE | map error | correlation | check |")
