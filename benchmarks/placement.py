@@ -217,8 +217,8 @@ def show_behind() -> None:
 def show_gallery() -> None:
     """Print what the gallery's evening misses with fixed, moved and new spots.
 
-    Roots of shares of ‖Ψ‖² on 160x90 pixels, where all count alike: of the best lights of two bases
-    of the scene that was found, with their noise and without, and of a plain render.
+    Roots of shares of ‖Ψ‖² on 160x90 pixels and on 80x45, where all count alike: of the best lights
+    of two bases of the scene that was found, with their noise and without, and of a plain render.
     """
     scene = lp.load_scene(ROOT / "scenes" / "gallery" / "scene.xml").reduced("1/2")
     # The painting itself keeps lamps' colours, and counts what was painted more than the rest.
@@ -247,8 +247,13 @@ def show_gallery() -> None:
 
 
 def gallery_shares(scene: Scene, target: lp.Target) -> str:
+    """Return roots of missed shares on films of two sizes."""
+    films = [scene.reduced(part) for part in ("1/2", "1/4")]
+    return "; ".join(shares_on(film, target) for film in films)
+
+
+def shares_on(scene: Scene, target: lp.Target) -> str:
     """Return roots of missed shares: without noise of a basis, with it, and of a plain render."""
-    scene = scene.reduced("1/2")
     painted = block_mean(target.image, target.image.shape[0] // scene.size[0])
     bases = [lp.render_basis(scene, spp=GALLERY_SPP, seed=seed) for seed in (5, 6)]
     lighting = lp.solve(bases[0], lp.Target.of(painted), space="linear", hold=0).lighting
@@ -259,7 +264,8 @@ def gallery_shares(scene: Scene, target: lp.Target) -> str:
     picture = block_mean(picture, picture.shape[0] // painted.shape[0])
     shares = missed_by_best(bases, painted), missed_by_best(bases[:1] * 2, painted)
     exact, noisy, plain = (math.sqrt(share) for share in (*shares, missed(picture, painted)))
-    return f"{exact:.3f}, with noise {noisy:.3f}, rendered {plain:.3f}"
+    height, width = scene.size
+    return f"{width}x{height} {exact:.3f}, with noise {noisy:.3f}, rendered {plain:.3f}"
 
 
 def rail_of(scene: Scene, name: str) -> Any:
