@@ -9,11 +9,14 @@ from command import run_refused, succeed
 
 from lightpaint.basis.light_images import light_images
 from lightpaint.colour.color import luminance
+from lightpaint.colour.white_range import white_range
 from lightpaint.errors import LightpaintError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.values import parse_color
 from lightpaint.pipeline.job.job import Job
+from lightpaint.pipeline.needed_samples import Certainty
 from lightpaint.pipeline.one_call import paint_with_light
 from lightpaint.pipeline.results.results import Look
 from lightpaint.progress import Listener
@@ -87,17 +90,14 @@ def answered(
 ) -> Look:
     """Return the answer to a sky from the even one, split, with a sun of that many texels."""
     scene = load_scene(folder / "even.xml", split=SPLIT, symmetric=symmetric)
+    defaults = {"spp": 64, "colors": "free", "space": "linear", "report": False}
     return paint_with_light(
         scene,
         target_under(folder, sky),
         folder / f"{sky}-{sun}",
         sun=sun,
-        spp=64,
-        colors="free",
-        space="linear",
-        report=False,
         progress=remarks,
-        **options,
+        **{**defaults, **options},
     )
 
 
@@ -156,6 +156,58 @@ def test_a_symmetric_sky_gets_finer_texels_on_both_sides(folder: Path) -> None:
     np.testing.assert_allclose(written, shown, rtol=1e-6)
     assert finer.verification is not None
     assert finer.verification.agrees
+
+
+#: A palette of two colours, between which the sun of the test is.
+PALETTE = ("#ffb060", "#ffffff")
+
+
+def mixes_of_palette(colors: np.ndarray) -> np.ndarray:
+    """Return mixes of the palette near to colours, (n, 3): equal to those that are mixes."""
+    palette = np.array([parse_color(x, "the palette") for x in PALETTE])
+    parts, *_ = np.linalg.lstsq(palette.T, colors.T)
+    return np.maximum(parts.T, 0) @ palette
+
+
+@pytest.mark.parametrize(
+    ("values", "colors"),
+    [
+        ({"limits": {"max": 10}}, "free"),
+        ({"limits": {"max": 10}}, "gentle"),
+        ({"kelvin": [3000, 12000]}, "free"),
+        ({"primaries": list(PALETTE)}, "free"),
+    ],
+)
+def test_constraints_on_the_sky_hold_for_all_its_texels(
+    folder: Path, values: dict[str, object], colors: str
+) -> None:
+    constraints = Constraints.of({"sky": values})
+    options = {"constraints": constraints, "colors": colors, "verify": False}
+    look = answered(folder, "sunny", 24, Remarks(), **options)
+    weights = look.solution.weights
+    assert len(weights) == 40 + 24
+    if "limits" in values:
+        assert np.max(luminance(weights)) == pytest.approx(10, rel=1e-6)
+    if "primaries" in values:
+        np.testing.assert_allclose(weights, mixes_of_palette(weights), atol=1e-6)
+    if "kelvin" in values:
+        whites = white_range(3000, 12000).nearest(weights)
+        np.testing.assert_allclose(weights, whites, rtol=1e-3, atol=1e-6)
+
+
+def test_the_errors_of_finer_texels_are_as_small_as_asked_for(folder: Path) -> None:
+    remarks = Remarks()
+    options = {"spp": None, "error": 0.6, "use_cache": False, "verify": False}
+    look = answered(folder, "sunny", 24, remarks, **options)
+    assert len(look.basis.lights) == 40 + 24
+    state = Certainty.of(look.solution)
+    assert len(state.errors) == 40 + 24
+    assert state.error <= 0.6
+    assert look.basis.extra is not None
+    finer = [x for x in look.lighting.lights if x.name.startswith("sky.sun1.")]
+    assert len(finer) == 25
+    assert all(x.interval is not None for x in finer)
+    assert any("lights are known to" in text for text in remarks.said)
 
 
 def test_several_views_share_the_finer_texels(folder: Path) -> None:
