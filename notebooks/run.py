@@ -30,6 +30,7 @@ KEPT = (*PICTURES, "text/html", "text/plain")
 #: and the size below which numbers are round-off.
 ROUNDING, ROUND_OFF = 0.02, 1e-9
 
+_PAINTER_ID = re.compile(r' data-painter="[0-9a-f]+"')
 _NUMBER = re.compile(r"-?\d+(?:\.(\d+))?(?:e[+-]?\d+)?")
 
 
@@ -73,6 +74,8 @@ def _stripped(outputs: list[Any]) -> Iterator[Any]:
         kept = [x for x in KEPT if x in data and (x not in PICTURES or x == smallest)]
         output.data = {kind: data[kind] for kind in kept}
         output.data["text/plain"] = _plain(data.get("text/plain", ""))
+        if "text/html" in kept:
+            output.data["text/html"] = _PAINTER_ID.sub("", data["text/html"])
         output.metadata = {}
         yield output
 

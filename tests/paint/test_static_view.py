@@ -1,5 +1,6 @@
 """A painter in a saved notebook: its last picture, and a mixer that needs no kernel."""
 
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,8 @@ from lightpaint.paint.notebook.static_view import static_view
 pytest.importorskip("anywidget", reason="anywidget")
 
 NAUGHTY = "a 'b' </script> & \"c\""
+
+WIDGET = "application/vnd.jupyter.widget-view+json"
 
 #: Characters of all that a cell keeps.
 MAX_LENGTH = 400_000
@@ -33,7 +36,7 @@ def painter(make_basis: Any, tmp_path: Path) -> Iterator[Any]:
 def test_a_saved_painter_is_a_mixer(browser: Any, painter: Any, tmp_path: Path) -> None:
     painter.target = lp.Target.of(0.5 * painter._studio.snapshot().bases[0].images.sum(axis=0))
     data, _ = painter._repr_mimebundle_()
-    assert "application/vnd.jupyter.widget-view+json" in data
+    assert WIDGET in data
     path = tmp_path / "saved.html"
     path.write_text(f'<!doctype html><body style="width: 740px">{data["text/html"]}', "utf-8")
     context = browser.new_context(offline=True, viewport={"width": 800, "height": 900})
@@ -82,21 +85,63 @@ def test_it_is_small_even_of_noise(make_basis: Any, size: tuple[int, int]) -> No
     assert len(page) < MAX_LENGTH
 
 
-def test_cells_keep_the_last_picture(monkeypatch: pytest.MonkeyPatch, painter: Any) -> None:
-    """Its output has an id, by which that is replaced when the painter is closed."""
-    outputs: dict[str, list[Any]] = {}
+@pytest.fixture
+def outputs(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[Any]]:
+    """All data of each output of cells, by its id."""
+    by_id: dict[str, list[Any]] = {}
 
     def display(data: Any, *, display_id: str, **_: Any) -> None:
-        outputs.setdefault(display_id, []).append(data)
+        by_id.setdefault(display_id, []).append(data)
 
     monkeypatch.setattr("IPython.display.display", display)
     monkeypatch.setattr("IPython.display.update_display", display)
+    return by_id
+
+
+def relit(painter: Any, level: float) -> lp.Lighting:
+    """A lighting whose lights all have one level."""
+    basis = painter._studio.snapshot().bases[0]
+    return lp.Lighting.of_weights(basis, np.full((3, 3), level))
+
+
+def test_cells_keep_the_last_picture(outputs: dict[str, list[Any]], painter: Any) -> None:
+    """When the painter is closed, nothing remains that needs a kernel."""
     painter._ipython_display_()
-    painter.lighting = lp.Lighting.of_weights(
-        painter._studio.snapshot().bases[0], np.full((3, 3), 0.3)
-    )
+    painter.lighting = relit(painter, 0.3)
     painter.close()
     painter.close()
-    [(shown, kept)] = outputs.values()
-    assert set(kept) == {"text/plain", "text/html"}
-    assert kept["text/html"] != shown["text/html"]
+    [(widget, ended), (shown, kept)] = outputs.values()
+    assert WIDGET in widget
+    assert WIDGET not in shown
+    for data in (ended, kept):
+        assert set(data) == {"text/plain", "text/html"}
+    assert "<iframe" in kept["text/html"] != shown["text/html"]
+    assert "<" not in ended["text/html"].removeprefix("<!--")
+
+
+def test_a_saved_view_follows_what_is_painted(
+    monkeypatch: pytest.MonkeyPatch, outputs: dict[str, list[Any]], painter: Any
+) -> None:
+    """It does so once the brush rests, and its widget stays as it is."""
+    monkeypatch.setattr("lightpaint.paint.notebook.cell_output.REST_S", 0.3)
+    painter.lighting = relit(painter, 0.2)
+    time.sleep(0.5)
+    assert outputs == {}  # no cell shows it yet
+    painter._ipython_display_()
+    views = outputs[painter._saved_view]
+    for level in (0.3, 0.4, 0.5):
+        painter.lighting = relit(painter, level)
+    end_s = time.monotonic() + 60
+    while len(views) < 2:
+        assert time.monotonic() < end_s
+        time.sleep(0.05)
+    expected = painter._static_view()
+    assert expected in views[-1]["text/html"]
+    time.sleep(0.8)
+    assert len(views) == 2  # one for three changes, and none for the exact answer, which is equal
+    [widget] = [data for key, data in outputs.items() if key != painter._saved_view]
+    assert len(widget) == 1
+    painter.lighting = relit(painter, 0.6)
+    painter.close()
+    time.sleep(0.8)
+    assert len(views) == 3  # by `close`, after which nothing follows

@@ -1,14 +1,11 @@
 """A painter in a saved notebook, without a kernel: its last picture, and a mixer.
 
-The output of a cell holds this page beside the widget. Where a notebook is not trusted, scripts are
-removed and the picture remains; elsewhere the mixer of reports replaces it, in a frame of its own,
-so that neither its style nor the notebook's reaches the other.
+Where a notebook is not trusted, scripts are removed and the picture remains; elsewhere the mixer of
+reports replaces it, in a frame of its own, so that neither its style nor the notebook's reaches the
+other.
 """
 
-from collections.abc import Mapping
 from html import escape
-from typing import Any
-from uuid import uuid4
 
 import numpy as np
 
@@ -69,7 +66,7 @@ def static_view(
     return (
         f'<div class="lightpaint-static"><img alt="{alt}" src="{source}" '
         f'style="display: block; width: 100%; max-width: {max(width, MIX_HEIGHT)}px">'
-        f"<iframe title=\"Light mixer\" srcdoc='{quoted}' "
+        f'<iframe title="Light mixer" loading="lazy" srcdoc=\'{quoted}\' '
         'style="display: block; width: 100%; height: 0; border: 0"></iframe></div>'
         "<style>.lightpaint-static > [hidden] { display: none !important }</style>"
     )
@@ -94,28 +91,3 @@ def _page(mixer: str, *, mix_width: int) -> str:
         f"<style>{styles('viewer/mixer/wipe.css')}</style><body>{mixer}{mixer_assets()}"
         f"<style>{style}</style><script>{script}</script></body></html>"
     )
-
-
-class CellOutput:
-    """The output of cells that show a painter: its widget, and later what is left of it."""
-
-    def __init__(self) -> None:
-        self._id = ""
-
-    @property
-    def is_shown(self) -> bool:
-        """Return whether a cell has shown the painter."""
-        return self._id != ""
-
-    def show(self, data: Mapping[str, Any], metadata: Mapping[str, Any]) -> None:
-        """Show a painter in the cell that runs. data: by MIME type."""
-        from IPython.display import display
-
-        self._id = self._id or uuid4().hex
-        display(data, metadata=metadata, raw=True, display_id=self._id)  # type: ignore[no-untyped-call]
-
-    def replace(self, data: Mapping[str, Any]) -> None:
-        """Replace the painter in all cells that show it."""
-        from IPython.display import update_display
-
-        update_display(data, raw=True, display_id=self._id)  # type: ignore[no-untyped-call]

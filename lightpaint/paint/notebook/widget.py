@@ -20,6 +20,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint.notebook import widget_arguments
+from lightpaint.paint.notebook.cell_output import CellOutput
 from lightpaint.paint.notebook.painter_files import (
     claim_file,
     open_store,
@@ -29,7 +30,7 @@ from lightpaint.paint.notebook.painter_files import (
     widget_style,
 )
 from lightpaint.paint.notebook.session_traits import SessionTraits
-from lightpaint.paint.notebook.static_view import CellOutput, static_view
+from lightpaint.paint.notebook.static_view import static_view
 from lightpaint.paint.notebook.widget_views import KernelThread, WidgetViews
 from lightpaint.paint.protocol import AnswerUpdate, Message, Notice, SessionState
 from lightpaint.paint.studio.studio import Studio
@@ -101,6 +102,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
     _esm = widget_script()
     _sheet = traitlets.Unicode(widget_style()).tag(sync=True)
+    _saved_view = traitlets.Unicode("").tag(sync=True)
     height = traitlets.Int(720, min=MIN_HEIGHT).tag(sync=True)
     target: LiveTrait[Target | None, Target | None] = LiveTrait(None)
     targets: LiveTrait[tuple[Target | None, ...], Sequence[Target | None]] = LiveTrait(())
@@ -124,7 +126,8 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         self._lock, self._ready = RLock(), Event()
         self._is_closed = False
         self._solved: tuple[int, Solution | None] | None = None
-        self._kernel, self._output = KernelThread(), CellOutput()
+        self._kernel = KernelThread()
+        self._output = CellOutput(self._static_view, self._kernel.call)
         subjects = widget_arguments.widget_subjects(
             scene,
             folder=folder,
@@ -146,8 +149,9 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         self._failed = ""
         if not isinstance(layout, ipywidgets.Layout):
             layout = {**DEFAULT_LAYOUT, **(layout or {})}
-        super().__init__(height=height, layout=layout)
+        super().__init__(height=height, layout=layout, _saved_view=self._output.id)
         self.on_msg(lambda _, content, buffers: self._views.receive(content, buffers))
+        super().observe(lambda _: self._output.follow(), ("target", "lighting"))
         self._studio.on_message = self._on_studio_message
         try:
             self._begin(target)
@@ -178,8 +182,9 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         return f"Painter({first.name}, {len(subject.lights)} lights, {extent})"
 
     def _ipython_display_(self) -> None:
-        """Show the painter as the output of a cell, which `close` can replace."""
-        self._output.show(*self._repr_mimebundle_())
+        """Show the painter as the output of a cell, which follows what is painted when saved."""
+        data, metadata = super()._repr_mimebundle_()
+        self._output.show(data, metadata, repr(self))
 
     def _repr_mimebundle_(self, **options: Any) -> tuple[dict[str, Any], dict[str, Any]]:
         data, metadata = super()._repr_mimebundle_(**options)
@@ -226,8 +231,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         """
         if "_studio" not in vars(self) or self._is_closed:  # it has never begun, or ended before
             return
-        if self._output.is_shown and (page := self._static_view()):
-            self._output.replace({"text/plain": repr(self), "text/html": page})
+        self._output.end()
         self._end()
 
     def _end(self) -> None:
@@ -305,15 +309,13 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
     def _forward(self, message: Message) -> None:
         self._views.send(message)
-        if isinstance(message, SessionState) or _is_exact(message):
+        is_exact = isinstance(message, AnswerUpdate) and message.exact
+        if is_exact or isinstance(message, SessionState):
             self._session_traits.update()
+            self._output.follow()
 
 
 #: Arguments of a painter other than settings.
 ARGUMENT_NAMES = [
     name for name in signature(Painter).parameters if name not in ("self", "settings")
 ]
-
-
-def _is_exact(message: Message) -> bool:
-    return isinstance(message, AnswerUpdate) and message.exact

@@ -17,12 +17,34 @@ async function render({ model, el }) {
   const host = new ModelHost(model);
   const engine = openEngine(host);
   const painter = await mount(frame, host, { engine, isGuided: !navigator.webdriver });
+  const turn = takeTurns(frame, String(model.get('_saved_view')));
+  host.on('state', () => turn(true));
+  // A painter that a page restores without its kernel is never answered.
+  host.on('silence', ({ isSilent }) => {
+    if (isSilent && !host.isAnswered) turn(false);
+  });
   host.open();
   return () => {
     model.off('change:height', size);
     painter.close();
+    turn(false);
     style.remove();
     frame.remove();
+  };
+}
+
+/** Return a function that shows the painter or the saved view, which other outputs of the notebook
+ * hold.
+ * @param {HTMLElement} frame @param {string} savedView */
+function takeTurns(frame, savedView) {
+  const hiding = document.createElement('style');
+  hiding.textContent = `[data-painter="${savedView}"] { display: none !important }`;
+  return (/** @type {boolean} */ isAnswered) => {
+    const hasSavedView = document.querySelector(`[data-painter="${savedView}"]`) !== null;
+    frame.classList.toggle('is-unanswered', !isAnswered && hasSavedView);
+    frame.hidden = !isAnswered && hasSavedView;
+    if (isAnswered) document.head.append(hiding);
+    else hiding.remove();
   };
 }
 

@@ -5,6 +5,7 @@ Both are large and take half a minute each, so that they are no part of what tes
     pip install jupyterlab marimo && pytest tests/paint/page/test_notebooks.py
 """
 
+import html
 import json
 import os
 import socket
@@ -57,7 +58,13 @@ def serve_notebooks(folder: Path, *command: str) -> Iterator[str]:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     homes = ("JUPYTER_CONFIG_DIR", "JUPYTER_RUNTIME_DIR", "JUPYTERLAB_SETTINGS_DIR")
-    homes += ("JUPYTERLAB_WORKSPACES_DIR", "IPYTHONDIR", "XDG_CONFIG_HOME", "XDG_STATE_HOME")
+    homes += (
+        "JUPYTER_DATA_DIR",
+        "JUPYTERLAB_WORKSPACES_DIR",
+        "IPYTHONDIR",
+        "XDG_CONFIG_HOME",
+        "XDG_STATE_HOME",
+    )
     env = {**os.environ, "PYTHONPATH": str(REPOSITORY)}
     env |= {name: str(folder / "home" / name) for name in homes}
     url = f"http://127.0.0.1:{port}"
@@ -168,6 +175,47 @@ def paste_picture(page: Any) -> None:
     page.keyboard.press("Control+V")
 
 
+def check_saved(page: Any, path: Path) -> None:
+    """What is saved follows what is painted, though the output of the cell is not shown."""
+    assert not page.locator(".lightpaint-saved").is_visible()
+    end_s = time.monotonic() + SHOW_MS / 1000
+    while True:
+        page.keyboard.press("Control+S")
+        outputs = json.loads(path.read_text("utf-8"))["cells"][0].get("outputs", [])
+        saved = ["".join(x["data"]["text/html"]) for x in outputs]
+        # Of a picture with a painting, the mixer has a wipe.
+        if len(saved) == 2 and '"painting":"data:' in html.unescape(saved[1]):
+            return
+        assert time.monotonic() < end_s
+        time.sleep(0.5)
+
+
+def check_without_kernel(page: Any, url: str, folder: Path) -> None:
+    """The mixer stands in place of the error message; where nothing is trusted, the picture does.
+
+    The kernel of a notebook that is opened again knows no painter.
+    """
+    notebook = json.loads((folder / "paint.ipynb").read_text("utf-8"))
+    page.goto(f"{url}/lab/tree/paint.ipynb?reset")
+    page.locator(".lightpaint-saved").wait_for()
+    page.frame_locator(".lightpaint-saved iframe").locator(".mixer-mix").wait_for()
+    page.locator(".jp-OutputArea-output.jupyter-widgets").wait_for(state="hidden")
+    assert "model not found" not in page.locator(".jp-Notebook").inner_text()
+    assert not page.locator(".lightpaint-saved img").is_visible()
+    # A signature holds for the outputs that were signed.
+    notebook["cells"][0]["outputs"][0]["data"]["text/plain"] = "another"
+    (folder / "foreign.ipynb").write_text(json.dumps(notebook), "utf-8")
+    page.goto(f"{url}/lab/tree/foreign.ipynb?reset")
+    page.locator(".jp-OutputArea-output img").wait_for()
+    assert page.locator(".jp-OutputArea-output iframe").count() == 0
+    assert page.locator(".jp-OutputArea-output.jupyter-widgets").count() == 0
+    # What has no widgets at all shows the same mixer.
+    from nbconvert import HTMLExporter
+
+    text, _ = HTMLExporter().from_filename(folder / "paint.ipynb")
+    assert text.count("lightpaint-static") > 0 == text.count("jupyter-widgets-view")
+
+
 def has_painting(folder: Path) -> bool:
     """Whether Python has heard of a painting."""
     path = folder / "told.txt"
@@ -201,11 +249,14 @@ def test_in_jupyterlab(browser: Any, folder: Path) -> None:
         row = page.locator('.lightpaint [data-light="light 0"]')
         assert "is-dim" not in row.get_attribute("class")
         run_cell(page, 1, lambda: "is-dim" in row.get_attribute("class"))
+        check_saved(page, folder / "paint.ipynb")
         # What is painted for a kernel that is there no more would be lost.
         page.remove_locator_handler(dialog_button)
         page.locator('.jp-NotebookPanel-toolbar [data-jp-item-name="restart"] *').first.click()
         dialog_button.click()
         page.get_by_text("The kernel has ended. Run the cell again to continue.").wait_for()
+        page.add_locator_handler(dialog_button, lambda: dialog_button.click())
+        check_without_kernel(page, url, folder)
 
 
 @pytest.mark.skipif(find_spec("marimo") is None, reason="marimo")

@@ -42,6 +42,7 @@ export class ModelHost extends Emitter {
     model.on('comm_live_update', this.onEnd);
     this.isOver = false;
     this.isSilent = false;
+    this.isAnswered = false;
     /** @type {ReturnType<typeof setTimeout> | undefined} */
     this.timer = undefined;
   }
@@ -69,6 +70,7 @@ export class ModelHost extends Emitter {
       },
     );
     const message = /** @type {Message} */ ({ ...content, arrays });
+    this.isAnswered = true;
     this.setSilent(false);
     this.emit(message.kind, message);
     if (message.kind === 'state') this.emit('connection', { kind: 'connection', state: 'open' });
