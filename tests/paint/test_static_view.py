@@ -1,9 +1,9 @@
 """A painter in a saved notebook: its last picture, and a mixer that needs no kernel."""
 
-import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from threading import Thread
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -23,8 +23,10 @@ MAX_LENGTH = 400_000
 
 
 @pytest.fixture
-def painter(make_basis: Any, tmp_path: Path) -> Iterator[Any]:
+def painter(make_basis: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     """Of three lights whose images are smooth enough to be told apart."""
+    # No kernel runs, nor a loop, as Playwright leaves one.
+    monkeypatch.setattr("lightpaint.paint.notebook.widget_views._running_loop", lambda: None)
     y, x = np.mgrid[:54, :96] / 54
     images = [np.exp(-8 * np.hypot(y - 0.5, x - at))[..., None] * [1, 1, 1] for at in (0, 0.9, 1.7)]
     basis = make_basis(images=images, names=(NAUGHTY, "fill", "back"))
@@ -119,29 +121,59 @@ def test_cells_keep_the_last_picture(outputs: dict[str, list[Any]], painter: Any
     assert "<" not in ended["text/html"].removeprefix("<!--")
 
 
+class Rest:
+    """A timer that ends when a test says so."""
+
+    waiting: ClassVar[list["Rest"]] = []
+
+    def __init__(self, _: float, act: Callable[..., None], arguments: list[Any]) -> None:
+        self._act, self._arguments = act, arguments
+        self.daemon = False
+
+    def start(self) -> None:
+        """Wait for the test."""
+        assert self.daemon  # else a kernel would wait for it at its end
+        self.waiting.append(self)
+
+    def cancel(self) -> None:
+        """Wait no longer."""
+        if self in self.waiting:
+            self.waiting.remove(self)
+
+    def end(self) -> None:
+        """Do what waits in a thread of its own, as a timer does."""
+        self.cancel()
+        thread = Thread(target=self._act, args=self._arguments)
+        thread.start()
+        thread.join()
+
+
 def test_a_saved_view_follows_what_is_painted(
     monkeypatch: pytest.MonkeyPatch, outputs: dict[str, list[Any]], painter: Any
 ) -> None:
     """It does so once the brush rests, and its widget stays as it is."""
-    monkeypatch.setattr("lightpaint.paint.notebook.cell_output.REST_S", 0.3)
+    monkeypatch.setattr("lightpaint.paint.notebook.cell_output.Timer", Rest)
+    monkeypatch.setattr(Rest, "waiting", [])
     painter.lighting = relit(painter, 0.2)
-    time.sleep(0.5)
-    assert outputs == {}  # no cell shows it yet
+    assert Rest.waiting == []  # no cell shows it yet
     painter._ipython_display_()
     views = outputs[painter._saved_view]
     for level in (0.3, 0.4, 0.5):
         painter.lighting = relit(painter, level)
-    end_s = time.monotonic() + 60
-    while len(views) < 2:
-        assert time.monotonic() < end_s
-        time.sleep(0.05)
-    expected = painter._static_view()
-    assert expected in views[-1]["text/html"]
-    time.sleep(0.8)
-    assert len(views) == 2  # one for three changes, and none for the exact answer, which is equal
+    [rest] = Rest.waiting
+    rest.end()
+    assert [painter._static_view() in view["text/html"] for view in views] == [False, True]
+    painter._output.follow()
+    [rest] = Rest.waiting
+    rest.end()
+    assert len(views) == 2  # nothing has changed since
     [widget] = [data for key, data in outputs.items() if key != painter._saved_view]
     assert len(widget) == 1
     painter.lighting = relit(painter, 0.6)
+    [rest] = Rest.waiting
     painter.close()
-    time.sleep(0.8)
-    assert len(views) == 3  # by `close`, after which nothing follows
+    assert len(views) == 3
+    rest.end()
+    painter._output.follow()
+    assert len(views) == 3
+    assert Rest.waiting == []

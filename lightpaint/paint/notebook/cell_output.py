@@ -47,11 +47,14 @@ class CellOutput:
         self._saved: str | None = None
         self._is_over = False
 
-    def show(self, data: Mapping[str, Any], metadata: Mapping[str, Any], text: str) -> None:
-        """Show a painter in the cell that runs. data: by MIME type; text: for a terminal."""
+    def show(self, bundle: tuple[Mapping[str, Any], Mapping[str, Any]], text: str) -> None:
+        """Show a painter in the cell that runs.
+
+        bundle: data of the widget by MIME type, and their metadata. text: for a terminal.
+        """
         from IPython.display import display
 
-        self._text, self._saved = text, self._render()
+        (data, metadata), self._text, self._saved = bundle, text, self._render()
         widget = {**data, "text/html": NO_WIDGET}
         display(widget, raw=True, metadata=metadata, display_id=self._widget_id)  # type: ignore[no-untyped-call]
         display(self._saved_data(), raw=True, display_id=self.id)  # type: ignore[no-untyped-call]

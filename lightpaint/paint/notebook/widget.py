@@ -183,8 +183,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
     def _ipython_display_(self) -> None:
         """Show the painter as the output of a cell, which follows what is painted when saved."""
-        data, metadata = super()._repr_mimebundle_()
-        self._output.show(data, metadata, repr(self))
+        self._output.show(super()._repr_mimebundle_(), repr(self))
 
     def _repr_mimebundle_(self, **options: Any) -> tuple[dict[str, Any], dict[str, Any]]:
         data, metadata = super()._repr_mimebundle_(**options)
