@@ -49,6 +49,11 @@ def some_of(texts: Sequence[str], joint: str = ", ", room: int = MAX_LIST_LENGTH
     return text_so_far
 
 
+def rounded_text(value: float, digits: int) -> str:
+    """Return a number of so many digits, without an exponent where people need none: `10`."""
+    return f"{float(f'{value:.{digits}g}'):g}"
+
+
 class Listed(tuple[_Item, ...]):
     """A tuple whose repr has a line for each item, as many as fit."""
 

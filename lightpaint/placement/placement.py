@@ -8,6 +8,7 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Floats
 from lightpaint.colour.photometry import lambertian_flux, point_flux, spot_flux
+from lightpaint.display_text import rounded_text
 from lightpaint.keywords import keywords
 from lightpaint.placement.space.free_space import as_position
 from lightpaint.scene.lights.new_emitter import NewEmitter
@@ -81,7 +82,7 @@ class Move:
         if self.turn >= 0.5:
             done.append(f"turned by {self.turn:.0f}°")
         if self.distance > 0:
-            done.append(f"slid by {self.distance:.2g}")
+            done.append(f"slid by {rounded_text(self.distance, 2)}")
         if self.new.cutoff is not None and self.new.cutoff != self.old.cutoff:
             done.append(f"cone {self.old.cutoff:.0f}° to {self.new.cutoff:.0f}°")
         gain = f"{_percent(self.gain_share)} of what was missed"

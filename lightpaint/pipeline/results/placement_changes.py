@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from lightpaint.display_text import rounded_text
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.placement.placement import HARDLY_VISIBLE, AddedLight, Move, Placement
 from lightpaint.placement.placement_record import PlacementRecord
@@ -46,7 +47,7 @@ def spoken_change(change: Move | AddedLight) -> str:
         x, y, z = (f"{v:.2f}" for v in change.site.position or (0.0, 0.0, 0.0))
         phrase = f"a new {change.emitter.kind} at ({x}, {y}, {z})".replace("-", "−")
         if change.place_error:
-            phrase += f" ± {change.place_error:.1g}"
+            phrase += f" ± {rounded_text(change.place_error, 1)}"
     text = f"{change.name} {phrase}: {spoken_fraction(change.gain_share)} of what was missed"
     return f"{text}; {HARDLY_VISIBLE}" if change.is_hardly_visible else text
 
@@ -55,12 +56,14 @@ def spoken_move(move: Move) -> str:
     """Return a light's change with its errors: `turned by 12° ± 1°, slid by 0.6 ± 0.05`."""
     phrases = []
     if move.turn >= 0.5:
-        error = f" ± {move.turn_error:.1g}°" if (move.turn_error or 0) >= LEAST_TURN_ERROR else ""
+        turn_error = move.turn_error or 0.0
+        error = f" ± {rounded_text(turn_error, 1)}°" if turn_error >= LEAST_TURN_ERROR else ""
         phrases.append(f"turned by {move.turn:.0f}°{error}")
     if move.distance > 0:
-        is_told = (move.place_error or 0) >= LEAST_SHARE * move.distance
-        error = f" ± {move.place_error:.1g}" if is_told else ""
-        phrases.append(f"slid by {move.distance:.2g}{error}")
+        place_error = move.place_error or 0.0
+        is_told = place_error >= LEAST_SHARE * move.distance
+        error = f" ± {rounded_text(place_error, 1)}" if is_told else ""
+        phrases.append(f"slid by {rounded_text(move.distance, 2)}{error}")
     if move.new.cutoff is not None and move.new.cutoff != move.old.cutoff:
         phrases.append(f"its cone ends at {move.new.cutoff:.0f}° (was {move.old.cutoff:.0f}°)")
     return ", ".join(phrases)
