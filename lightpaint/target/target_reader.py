@@ -222,7 +222,8 @@ def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | No
     if template is None and picture.alpha is None and picture.transform is not None:
         # Without a template, the meaning of display values is unknown.
         view = f"{picture.transform.name} at {picture.transform.stops:+g} stops"
-        return None, [f"no template is known: all of it counts, as seen through {view}"]
+        missing_text = "no template is known (template=... names it)"
+        return None, [f"{missing_text}: all of it counts, as seen through {view}"]
     if template is None or not is_opaque:
         return picture.alpha, []
     importance = painted_where(path, picture, template)

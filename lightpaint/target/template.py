@@ -253,9 +253,12 @@ def _read_picture(path: Path, size: tuple[int, int]) -> Floats:
 def find_template(painting: Path) -> Path | None:
     """Return the folder of the template that `painting` was most likely painted on.
 
-    The candidates are its own folder, `template/` in it, and `template/` in the current folder.
+    The candidates are its own folder, `template/` in it, the template beside it under another name
+    if it is the only one, and `template/` in the current folder.
     """
-    places = (painting.parent, painting.parent / "template", Path("template"))
+    folder = painting.parent
+    beside = [record.parent for record in folder.glob(f"*/{RECORD_FILE}")]
+    places = (folder, folder / "template", *(beside if len(beside) == 1 else ()), Path("template"))
     return next((place for place in places if (place / RECORD_FILE).is_file()), None)
 
 

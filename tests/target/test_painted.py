@@ -132,6 +132,18 @@ def test_the_template_is_found_where_people_keep_it(
     assert read_target("a/p8.png").sensor == "camera"
 
 
+def test_the_only_template_beside_a_painting_is_found_under_any_name(tmp_path: Path) -> None:
+    """A second one leaves open which is meant, as the remark says."""
+    template = template_of()
+    save(tmp_path / "p8.png", brushed(template.shown)[0], template.transform)
+    write(tmp_path / "monday", template)
+    assert not read_target(tmp_path / "p8.png").everything
+    write(tmp_path / "tuesday", template)
+    target = read_target(tmp_path / "p8.png")
+    assert target.everything
+    assert "no template is known (template=... names it)" in target.notes[0]
+
+
 def test_of_another_size(tmp_path: Path) -> None:
     template = template_of()
     write(tmp_path / "template", template)

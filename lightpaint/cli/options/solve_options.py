@@ -52,7 +52,7 @@ def _add_template(parser: argparse.ArgumentParser) -> None:
         "--template",
         metavar="DIR",
         help="template that was painted over: only pixels that differ from it count (default: the"
-        " template beside the painting, or ./template)",
+        " folder of the painting, the template beside it, or ./template)",
     )
     parser.add_argument(
         "--no-template",
