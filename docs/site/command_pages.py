@@ -4,6 +4,7 @@ import argparse
 import re
 from pathlib import Path
 
+from lightpaint.cli.options.option_themes import by_theme
 from lightpaint.cli.options.parser import EXIT_CODES, command_parser
 
 #: Pages on what a command is for.
@@ -22,27 +23,6 @@ GUIDES = {
     "cache": "solving",
     "doctor": "install",
 }
-
-#: What options are for, in this order; constraints and places have groups of the parser.
-THEMES = {
-    "Painting": "--target --mask --layer --template --no-template --paint --view --exposure "
-    "--resize --layers",
-    "What the painting means": "--literal --hold --unpainted --space --colors --emitters "
-    "--no-correct-noise --method --refine",
-    "Lights": "--lights --group --lights-file --no-lights-file --no-group-alike --split "
-    "--symmetric --sun --pattern --unit",
-    "Scene and camera": "--scene --stage --sensor -D --integrator --variant",
-    "How much to render": "--spp --time --error --quality --resolution --seed --exact-spp "
-    "--no-cache",
-    "Verification": "--verify-spp --no-verify --max-miss --min-fit",
-    "Shots, looks and advice": "--frames --animate --variations --keep-going --suggest",
-    "Looks": "--init --only --dry-run --retry --stop-early",
-    "Machines": "--workers --cluster --shared-fs --apart --task-limit --export --log",
-    "Page": "--host --port --no-browser --new",
-    "Results": "--to --output --force --table --map-size --no-sheet --json --quiet --verbose "
-    "--help",
-}
-_PLACE = {option: title for title, options in THEMES.items() for option in options.split()}
 
 _SPECIAL = re.compile(r"([\\*`|_])")
 _OPTION = re.compile(r"(?<![\w-])(--?[a-z][a-z-]*)(?![\w-])")
@@ -78,25 +58,10 @@ def _page(name: str, command: argparse.ArgumentParser) -> str:
         f"The guide is :doc:`/{GUIDES[name]}`.",
         f".. program:: lightpaint {name}",
     ]
-    for title, actions in _themes(command).items():
+    for title, actions in by_theme(command).items():
         parts.append(_title(title, "-"))
         parts += [_option(action, command) for action in actions]
     return "\n\n".join(parts) + "\n"
-
-
-def _themes(command: argparse.ArgumentParser) -> dict[str, list[argparse.Action]]:
-    """Return the arguments of a command by what they are for."""
-    titles = ["Arguments", *THEMES, *(x.title or "" for x in command._action_groups)]
-    themes: dict[str, list[argparse.Action]] = {title: [] for title in titles}
-    for group in command._action_groups:
-        for action in group._group_actions:
-            title = group.title or ""
-            if not action.option_strings:
-                title = "Arguments"
-            elif title == "options":
-                title = _PLACE[action.option_strings[-1]]
-            themes[title].append(action)
-    return {title.capitalize(): actions for title, actions in themes.items() if actions}
 
 
 def _option(action: argparse.Action, command: argparse.ArgumentParser) -> str:

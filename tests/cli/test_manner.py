@@ -206,3 +206,18 @@ def test_each_command_takes_them_and_says_its_exit_codes(tmp_path: Path) -> None
         assert {"--json", "-q", "--quiet", "-v", "--verbose"} <= set(option_actions)
         assert "Exit codes" in parser.format_help()
     assert json.loads(succeed(tmp_path, "cache", "--json", "list"))
+
+
+def test_help_shows_each_option_once_under_what_it_is_for() -> None:
+    [commands] = (x for x in command_parser()._actions if isinstance(x.choices, dict))
+    for name, parser in commands.choices.items():
+        help_text = parser.format_help()
+        lines = [line for line in help_text.splitlines() if line.startswith("  -")]
+        entries = [re.split(r" {2,}", line.strip())[0] for line in lines]
+        for option in (x for x in parser._actions if x.option_strings):
+            word = re.compile(rf"(?<!\S){option.option_strings[-1]}(?![\w-])")
+            assert sum(bool(word.search(x)) for x in entries) == 1, (name, option.option_strings)
+    titles = re.findall(r"^(\S.*):$", commands.choices["solve"].format_help(), re.M)
+    assert titles[:3] == ["Arguments", "Painting", "What the painting means"]
+    assert titles[-3:] == ["Results", "Constraints", "Places"]
+    assert len(set(titles)) == len(titles)

@@ -11,6 +11,7 @@ import shlex
 from collections.abc import Iterator, Sequence
 from typing import Any, NoReturn
 
+from lightpaint.cli.options.option_themes import themed_help
 from lightpaint.cli.output import lines
 
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
@@ -41,6 +42,10 @@ class CommandParser(Parser):
         if unknown_words:
             self.error(f"unrecognized arguments: {' '.join(unknown_words)}")
         return options, unknown_words
+
+    def format_help(self) -> str:
+        """Return the help, with many options by what they are for."""
+        return themed_help(self)
 
 
 def in_order(parser: argparse.ArgumentParser, words: Sequence[str]) -> list[str]:
