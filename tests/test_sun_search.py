@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command import run_refused, succeed
+from command import run, run_refused, succeed
 
 from lightpaint.basis.light_images import light_images
 from lightpaint.colour.color import luminance
@@ -123,7 +123,13 @@ def test_a_sun_is_found_and_casts_its_shadow(folder: Path) -> None:
     assert row / (rows - 1) == pytest.approx(20.5 / 60, abs=1 / 12)
     written = read_emitted_image(folder / "sunny-50" / "relit.sky.exr", is_linear=True)
     assert written.shape == (rows, columns, 3)
-    assert any("finer texels of sky" in text for text in remarks.said)
+    [remark] = [text for text in remarks.said if "finer texels of sky" in text]
+    assert remark.endswith(f"split={{'sky': '{image.layout.text}'}}")
+    # The answer can be opened with these texels, which are what was found.
+    again = load_scene(folder / "sunny-50" / "relit.xml", split={"sky": image.layout.text})
+    names = [light.name for light in again.lights]
+    weights = [finer.solution.weights[finer.basis.names.index(name)] for name in names]
+    np.testing.assert_allclose([x.emission for x in again.lights], weights, rtol=1e-4, atol=1e-9)
 
 
 def test_where_nothing_is_gained_the_texels_stay_as_they_are(folder: Path) -> None:
@@ -239,6 +245,18 @@ def test_the_lights_file_may_ask_for_a_sun(folder: Path) -> None:
     lights.write_text("[light.sky]\nsplit = [8, 5]\nsun = -3\n")
     with pytest.raises(LightpaintError, match=r"light.sky.sun is -3: expected how many"):
         Job((load_scene(path),), (target_under(folder, "soft"),), folder / "out")
+
+
+def test_the_remark_on_a_sun_has_the_option_that_paints_with_it(folder: Path) -> None:
+    write_rgb(folder / "sunny-painting.exr", target_under(folder, "sunny").image)
+    options = ("--split", "sky=8x5", "--sun", "24", "--spp", "64", "--no-verify")
+    arguments = ("solve", "even.xml", "sunny-painting.exr", *options, "-o", "told")
+    told = run(folder, *arguments).stderr
+    assert "to paint with them or solve again: --split sky=8x5+x2.y1\n" in told
+    listed = succeed(folder, "lights", "told/relit.xml", "--split", "sky=8x5+x2.y1")
+    assert "8x5 + 25 texels" in listed
+    text = "no sky: only its texels can be split again"
+    assert text in run_refused(folder, "lights", "wall.xml", "--split", "wall=4x4+x1.y1")
 
 
 @pytest.mark.parametrize(

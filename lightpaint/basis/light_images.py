@@ -55,9 +55,7 @@ class LightImage:
     @property
     def size_text(self) -> str:
         """Its size for people."""
-        columns, rows = self.size
-        finer = sum(1 for node in self.layout.nodes if node[0])
-        return f"{columns}x{rows}{f' + {finer}' if finer else ''} texels"
+        return self.layout.size_text
 
     @cached_property
     def places(self) -> Indices:
@@ -69,6 +67,19 @@ class LightImage:
             for x in range(columns)
         ]
         return np.asarray(self.index[numbers].reshape(rows, columns))
+
+    @cached_property
+    def nearest(self) -> Indices:
+        """(rows, columns) of its finest grid, the index of the light of the nearest texel."""
+        return np.asarray(self.index[self.layout.nearest])
+
+    @property
+    def nearest_shares(self) -> Doubles:
+        """(rows, columns) of its finest grid, the share of the nearest texel, in equal parts for
+        all places that are nearest to it.
+        """
+        counts = np.bincount(self.layout.nearest.ravel(), minlength=len(self.shares))
+        return np.asarray((self.shares / counts)[self.layout.nearest])
 
     @property
     def is_split(self) -> Bools:

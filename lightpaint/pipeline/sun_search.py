@@ -151,7 +151,9 @@ def _text(best: _Candidate, started: _Candidate, image: str) -> str:
     if not finer:
         return f"no sun: finer texels of {image} remove less than a twentieth of the error"
     part = ("third", "ninth", "27th")[max(x[0] for x in finer) - 1]
+    layout = best.image(image).layout
     return (
         f"{len(finer)} finer texels of {image}, down to a {part} of the width, leave "
-        f"{100 * best.missed / started.missed:.0f} % of the error"
+        f"{100 * best.missed / started.missed:.0f} % of the error; to paint with them or solve "
+        f"again: split={{{image!r}: {layout.text!r}}}"
     )

@@ -1,6 +1,6 @@
 """Reads a Mitsuba scene and chooses the lights to adjust."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -64,8 +64,9 @@ def load_scene(
         integrator: Integrator to render with instead of the scene's own, such as `path`, `direct`
             or `path:max_depth=8`. It inherits max_depth, rr_depth and hide_emitters.
         split: Name → columns and rows, such as `(16, 8)`: a sky, an area light or a projector
-            becomes an image of that many texels, each a light `NAME.xCOLUMN.yROW`. By default those
-            of the lights file, which this replaces.
+            becomes an image of that many texels, each a light `NAME.xCOLUMN.yROW`; or a text such
+            as `16x8+x4.y3`, a sky of which a texel is split again. By default those of the lights
+            file, which this replaces.
         symmetric: Names of split lights whose images are equal to their mirror images, so that two
             texels, left and right, are one light, called like the left one. By default those of the
             lights file, which this replaces.
@@ -96,7 +97,10 @@ def load_scene(
     sizes = _image_sizes(selection, split)
     mirrored = _symmetric_images(selection, symmetric, sizes)
     for name in mirrored:
-        pairs = mirrored_pairs(name, TexelLayout(sizes[name]))
+        size = sizes[name]
+        layout = size.made_symmetric() if isinstance(size, TexelLayout) else TexelLayout(size)
+        sizes[name] = layout if layout.splits else layout.size
+        pairs = mirrored_pairs(name, layout)
         selection = replace(selection, groups={**pairs, **selection.groups})
     with explain_old_scene(path), mitsuba_errors(path):
         whole = inspect_scene(parsed, index)
@@ -146,19 +150,23 @@ def with_layout(scene: Scene, image: str, layout: TexelLayout) -> Scene:
     return replace(scene, **facts | {"film": scene.film}, lights=lights, split=split)
 
 
-def _image_sizes(selection: LightsFile, split: Mapping[str, object] | None) -> dict[str, GridSize]:
-    """Return columns and rows of images by name of the light: `split`, or those of the file."""
+def _image_sizes(
+    selection: LightsFile, split: Mapping[str, object] | None
+) -> dict[str, GridSize | TexelLayout]:
+    """Return columns and rows, or layouts, of images by name of the light: `split`, or those of the
+    file.
+    """
     if split is None:
         return selection.requests.split
     return {name: parse_size(size, f"split: {name}") for name, size in split.items()}
 
 
 def _symmetric_images(
-    selection: LightsFile, symmetric: Iterable[str] | None, sizes: Mapping[str, GridSize]
+    selection: LightsFile, symmetric: Iterable[str] | None, sizes: Collection[str]
 ) -> list[str]:
     """Return the names of symmetric images: `symmetric`, or those of the file that are split."""
     if symmetric is None:
-        return sorted(selection.requests.symmetric & sizes.keys())
+        return sorted(selection.requests.symmetric.intersection(sizes))
     names = sorted(set(symmetric))
     if whole := [name for name in names if name not in sizes]:
         raise SceneError(f"symmetric: {whole[0]!r} is not split into texels: split it")

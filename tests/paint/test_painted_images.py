@@ -25,13 +25,16 @@ ORANGE = (1.5, 0.5, 0.1)
 
 
 class SkyStudio:
-    """A studio of a room under a sky of 4 by 3 texels, and all that it says."""
+    """A studio of a room under a sky of 4 by 3 texels, and all that it says.
 
-    def __init__(self, folder: Path) -> None:
+    split: layout of the texels.
+    """
+
+    def __init__(self, folder: Path, split: str = "4x3") -> None:
         path = folder / "room.xml"
         if not path.exists():
             write_room(folder, lights=LIGHTS["sky"] + LIGHTS["bulb"])
-        scene = SceneFile(str(path), split={"sky": "4x3"})
+        scene = SceneFile(str(path), split={"sky": split})
         subject = make_subject(scene, folder / "session", settings=Settings(spp=4))
         (folder / "session").mkdir(exist_ok=True)
         self.messages: list[Message] = []
@@ -88,3 +91,25 @@ def test_painted_texels_are_undone_kept_and_exported(tmp_path: Path) -> None:
     identity = session_identity([replace(whole, basis=next(whole.bases()))])
     with pytest.raises(PaintError, match=r"lights 12 texels of sky, bulb, and .* has sky, bulb:"):
         Store.open(tmp_path / "session" / "session.db", identity)
+
+
+@pytest.mark.usefixtures("without_reasons")
+@pytest.mark.filterwarnings("ignore:.*samples.*")
+def test_finer_texels_of_a_sun_are_painted_and_exported(tmp_path: Path) -> None:
+    sky = SkyStudio(tmp_path, "4x3+x1.y1")
+    [image] = sky.studio.state().fields["images"]
+    names = np.array([x["name"] for x in sky.studio.state().fields["lights"]])
+    places = np.array(image["places"])
+    assert places.shape == (7, 12)
+    assert len(np.unique(places)) == 12 - 1 + 25
+    assert names[places[3, 4]] == "sky.sun1.x4.y3"
+    assert set(names[places[2:5, 9:]].ravel()) == {"sky.x3.y1"}
+    assert np.sum(image["shares"]) == pytest.approx(1, abs=1e-4)
+    locks = {"sky.sun1.x4.y3": {"lock": list(ORANGE)}}
+    sky.studio.handle(protocol.ConstrainLights(locks, label="sky.sun1.x4.y3, painted"), {})
+    sky.studio.handle(protocol.Export(("lighting", "relit")), {})
+    sky.wait(lambda m: m.kind == "exported")
+    written = read_emitted_image(tmp_path / "session" / "relit.sky.exr", is_linear=True)
+    assert written.shape == (7, 12, 3)
+    np.testing.assert_allclose(written[3, 4], ORANGE, rtol=1e-3)  # halves
+    sky.close()

@@ -14,6 +14,7 @@ from lightpaint.scene.lights.texels.texel import (
     parse_size,
     texel_names,
 )
+from lightpaint.scene.lights.texels.texel_layout import TexelLayout
 from lightpaint.scene.runtime.variant import use_variant
 
 SIZES = st.tuples(st.integers(2, 24), st.integers(3, 24))
@@ -83,6 +84,26 @@ def test_names_tell_the_image_and_its_size() -> None:
 )
 def test_a_size_is_a_text_or_two_numbers(value: object, size: tuple[int, int]) -> None:
     assert parse_size(value, "split") == size
+
+
+def test_a_layout_is_a_size_and_the_texels_that_are_split_again() -> None:
+    text = "16x8+x4.y3+sun1.x13.y10"
+    layout = parse_size(text, "split: sky")
+    assert layout == TexelLayout((16, 8), ((0, 4, 3), (1, 13, 10)))
+    assert layout.text == text
+    assert parse_size(" 16x8 + x4.y3", "split: sky") == TexelLayout((16, 8), ((0, 4, 3),))
+
+
+@pytest.mark.parametrize(
+    "split", ["", "x4.y8", "x16.y3", "sun1.x13.y10", "sky.x4.y3", "x4", "x4.y3+x4.y3"]
+)
+def test_a_texel_that_cannot_be_split_again_is_one_line(split: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        parse_size(f"16x8+{split}", "split: sky")
+    last = split.split("+")[-1]
+    assert str(caught.value) == (
+        f"split: sky has {last!r} after a +: expected a texel to split again, such as x8.y4"
+    )
 
 
 @pytest.mark.parametrize(

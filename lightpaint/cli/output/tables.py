@@ -16,7 +16,7 @@ from lightpaint.report.verdict import agreement
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.lights.light import Light
 from lightpaint.scene.lights.texels.domains import domain_of
-from lightpaint.scene.lights.texels.texel import image_of, images_of, texel_name
+from lightpaint.scene.lights.texels.texel import image_of, layouts_of, node_name
 from lightpaint.scene.properties.emission import MULTIPLE
 from lightpaint.scene.scene import Scene
 
@@ -28,14 +28,14 @@ def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
     amounts = () if cd_per_unit is None else ("luminous", "flux")
     table = terminal.table(*headings, *amounts)
     adjusted = (x for x in scene.lights if not x.is_fixed and image_of(x.name))
-    images = images_of(name for light in adjusted for name in light.member_names)
-    for image, (columns, rows) in images.items():
+    images = layouts_of(name for light in adjusted for name in light.member_names)
+    for image, layout in images.items():
         texels = [x.emission for x in scene.emitters if x.texel and x.texel.image == image]
-        light = scene.light(texel_name(image, 0, 0))
-        shares = domain_of(light.plugin).shares((columns, rows))
-        mean = np.average(texels, axis=0, weights=shares.ravel())
+        light = scene.light(node_name(image, layout.nodes[0]))
+        shares = layout.sums(domain_of(light.plugin).shares(layout.finest))
+        mean = np.average(texels, axis=0, weights=shares)
         symmetric = ", symmetric" if image in scene.symmetric else ""
-        size = f"{columns}x{rows} texels {image}.xCOLUMN.yROW{symmetric}"
+        size = f"{layout.size_text} {image}.xCOLUMN.yROW{symmetric}"
         table.row(image, light.plugin, terminal.numbers(as_rgb(mean)), light.unit, size, "", "")
     for light in scene.lights:
         if image_of(light.name) in images:

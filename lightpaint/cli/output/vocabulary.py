@@ -81,7 +81,7 @@ _NEW = re.compile(BY_OPTION + r": new( \d+)?(?:\.(?:on(?=: )|(\w+)))?(:?) ")
 
 #: `name=value` as the library writes it: a separate word, so that no path matches.
 _ARGUMENT = re.compile(
-    r"""(?<![^\s(])(\w+)=(\.\.\.|True|False|\d+|'[^']*'|"\w+"|\{'\w+':\ \.\.\.\})"""
+    r"""(?<![^\s(])(\w+)=(\.\.\.|True|False|\d+|'[^']*'|"\w+"|\{'\w+':\ (?:\.\.\.|'[^']*')\})"""
     r"""(?=[,;:.)]*(?:\s|$))""",
     re.VERBOSE,
 )
@@ -106,8 +106,8 @@ def _spoken(match: re.Match[str]) -> str:
         return SPELLINGS[argument]
     if name not in OPTIONS:
         return argument
-    if key := re.fullmatch(r"\{'(\w+)': \.\.\.\}", value):
-        return f"{OPTIONS[name]} {key[1]}=VALUE"
+    if key := re.fullmatch(r"\{'(\w+)': (?:\.\.\.|'(.*)')\}", value):
+        return f"{OPTIONS[name]} {key[1]}={key[2] or 'VALUE'}"
     return OPTIONS[name] if value in ("...", "True") else f"{OPTIONS[name]} {value.strip(chr(34))}"
 
 

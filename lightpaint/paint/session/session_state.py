@@ -63,8 +63,10 @@ def image_info(image: LightImage) -> ImageInfo:
     width, height = image.domain.picture_size(image.size, ASPECT_PIXELS)
     return ImageInfo(
         name=image.name,
-        places=tuple(map(tuple, image.places.tolist())),
-        shares=tuple(map(tuple, image.domain.shares(image.size).tolist())),
+        places=tuple(map(tuple, image.nearest.tolist())),
+        shares=tuple(
+            tuple(float(f"{x:.6g}") for x in row) for row in image.nearest_shares.tolist()
+        ),
         aspect=width / height,
     )
 

@@ -62,7 +62,7 @@ class SceneFile(ReadOnce):
         use_lights_file: False to ignore that one.
         group_alike: False to adjust similar emitters without names one by one.
         integrator: Integrator to use instead of the scene's own.
-        split: Columns and rows of lights that are images, `16x8`, by name.
+        split: Columns and rows of lights that are images, `16x8`, by name, or layouts of texels.
         symmetric: Names of those whose images are symmetric.
         map_size: Columns and rows of their images in the relit scene, `1024x512`.
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import RGB, Floats, as_rgb
+from lightpaint.arrays import RGB, Doubles, Floats, as_rgb
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.scene.lights.emitters import Emitter
@@ -90,10 +90,7 @@ def _texels(
         )
     if layout.splits and not isinstance(domain, Sky):
         raise SceneError(f"light {emitter.name!r} is no sky: only its texels can be split again")
-    current = current_image(
-        emitter.node, emitter.kind, emitter.emission, domain, layout.size, parsed
-    )
-    radiances = layout.values(current)
+    radiances = _current_radiances(emitter, layout, domain, parsed)
     if is_symmetric:
         mirrored = [layout.number_of.get(layout.mirrored(x), k) for k, x in enumerate(layout.nodes)]
         radiances = (radiances + radiances[mirrored]) / 2
@@ -114,6 +111,20 @@ def _texels(
         )
         for texel, radiance in zip(texels, radiances, strict=True)
     ]
+
+
+def _current_radiances(
+    emitter: Emitter, layout: TexelLayout, domain: ImageDomain, parsed: ParsedScene
+) -> Doubles:
+    """Return what the texels of an emitter show now, (nodes, 3)."""
+    assert emitter.kind is not None
+    shown = (emitter.node, emitter.kind, emitter.emission, domain)
+    # An image that was written from these texels has their values.
+    if layout.splits:
+        radiances = layout.shown_by(current_image(*shown, layout.finest, parsed))
+        if radiances is not None:
+            return radiances
+    return layout.values(current_image(*shown, layout.size, parsed))
 
 
 def _why_no_image(emitter: Emitter, shape: str, parsed: ParsedScene) -> str:

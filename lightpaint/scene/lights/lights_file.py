@@ -15,6 +15,7 @@ from lightpaint.file_reading import read_text
 from lightpaint.files import one_line
 from lightpaint.scene.lights.texels.image_domain import GridSize
 from lightpaint.scene.lights.texels.texel import image_of, parse_size
+from lightpaint.scene.lights.texels.texel_layout import TexelLayout
 from lightpaint.storage.json_records import strict_toml
 from lightpaint.validation import MAX_LISTED, MAX_NAME
 
@@ -56,8 +57,8 @@ class SceneRequests:
         return cls({key: data[key] for key in keys if key in data}, str(path))
 
     @property
-    def split(self) -> dict[str, GridSize]:
-        """Columns and rows of the images to split into texels, by name of the light."""
+    def split(self) -> dict[str, GridSize | TexelLayout]:
+        """Columns and rows, or layouts, of images to split into texels, by name of the light."""
         lights = self.keys.get("light")
         tables = lights.items() if isinstance(lights, dict) else ()
         return {

@@ -275,3 +275,41 @@ def test_a_notebook_paints_texels_too(new_painter: Any) -> None:
     drag(painter, (1, 1))
     assert list(last_request(painter)["constraints"]) == ["sky.x1.y1"]
     assert painter.page.locator(".texel-lock").count() == 1
+
+
+def test_finer_texels_of_a_sun_are_painted_and_locked_each_by_itself(new_painter: Any) -> None:
+    """A texel among 4 by 3 is split again: the map has the places of the finer ones, 12 by 7."""
+    painter = new_painter("lights=39&image=4x3&finer=1,1")
+    page = painter.page
+    row = page.get_by_role("group", name="sky", exact=True)
+    assert row.locator("canvas.image-map").evaluate("map => [map.width, map.height]") == [12, 7]
+    row.get_by_role("button", name="Lock sky as it is in the answer").click()
+    assert len(last_request(painter)["constraints"]) == 36
+    unfold(painter)
+    # One mark for each texel, however many places it covers.
+    assert page.locator(".texel-lock").count() == 36
+    row.get_by_role("button", name="Reset sky").click()
+    box = page.locator(".texel-map").bounding_box()
+
+    def press(column: int, row: int) -> None:
+        page.mouse.click(
+            box["x"] + (column + 0.5) / 12 * box["width"],
+            box["y"] + (row + 0.5) / 7 * box["height"],
+        )
+        painter.still()
+
+    page.locator(".texel-map").scroll_into_view_if_needed()
+    box = page.locator(".texel-map").bounding_box()
+    press(4, 3)
+    assert list(last_request(painter)["constraints"]) == ["sky.sun1.x4.y3"]
+    press(10, 3)
+    assert list(last_request(painter)["constraints"]) == ["sky.x3.y1"]
+    here = page.locator(".texel-here").bounding_box()
+    assert here["width"] == pytest.approx(box["width"] / 4, abs=1)
+    assert here["height"] == pytest.approx(box["height"] * 3 / 7, abs=1)
+    # The keys go from texel to texel: from a coarse one over its three places to a finer one.
+    page.locator(".texel-map").focus()
+    for key in ("ArrowLeft", "ArrowLeft", "Enter"):
+        page.keyboard.press(key)
+    painter.still()
+    assert list(last_request(painter)["constraints"]) == ["sky.sun1.x6.y3"]

@@ -77,9 +77,9 @@ export interface LightInfo {
  * A light that is an image: its texels are lights.
  *
  * places: index of the light that each texel is, row by row from the top; in a symmetric image two
- * texels are one light; -1 for one that is not adjusted, or only together with others. shares:
- * part of the image that each texel covers, which add up to 1. aspect: width of its map over the
- * height.
+ * texels are one light; where some texels are finer than others, several places are one texel; -1
+ * for one that is not adjusted, or only together with others. shares: part of the image that each
+ * place covers, which add up to 1. aspect: width of its map over the height.
  */
 export interface ImageInfo {
   name: string;

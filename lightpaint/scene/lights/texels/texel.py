@@ -138,15 +138,32 @@ def mirrored_pairs(image: str, layout: TexelLayout) -> dict[str, list[str]]:
     return {node_name(image, pair[0]): [node_name(image, x) for x in pair] for pair in pairs}
 
 
-def parse_size(value: object, where: str) -> GridSize:
-    """Return columns and rows of texels from `16x8` or [16, 8]. where: their place, for errors."""
-    columns, rows = _parsed_size(value, where, "16x8")
-    if columns * rows > MAX_TEXELS:
+def parse_size(value: object, where: str) -> GridSize | TexelLayout:
+    """Return columns and rows of texels from `16x8` or [16, 8], or a layout of them.
+
+    where: their place, for errors. `16x8+x4.y3+sun1.x13.y10` has texels that are split again.
+    """
+    size, splits = value, list[str]()
+    if isinstance(value, str):
+        size, *splits = value.split("+")
+    columns, rows = _parsed_size(size, where, "16x8")
+    count = columns * rows + (CHILDREN - 1) * len(splits)
+    if count > MAX_TEXELS:
         raise SceneError(
-            f"{where} is {columns}x{rows}, {columns * rows:,} texels: expected at most "
+            f"{where} is {columns}x{rows}, {count:,} texels: expected at most "
             f"{MAX_TEXELS:,}, each of which is a light with pictures of its own"
         )
-    return columns, rows
+    layout = TexelLayout((columns, rows))
+    for split in splits:
+        found = _node_of(f"{where}.{split.strip()}")
+        node = None if found is None or found[0] != where else found[1]
+        if node not in layout.number_of or node[0] == MAX_LEVEL:
+            raise SceneError(
+                f"{where} has {one_line(repr(split))} after a +: expected a texel to split again, "
+                f"such as x{columns // 2}.y{rows // 2}"
+            )
+        layout = layout.split_again(node)
+    return layout if splits else (columns, rows)
 
 
 def parse_map_size(value: object) -> GridSize:

@@ -57,6 +57,10 @@ class TexelLayout:
         """Return the layout with more of its texels split."""
         return TexelLayout(self.size, tuple(sorted({*self.splits, *nodes})))
 
+    def made_symmetric(self) -> "TexelLayout":
+        """Return the layout with the mirror images of its splits, left and right."""
+        return self.split_again(*map(self.mirrored, self.splits))
+
     def mirrored(self, node: Node) -> Node:
         """Return the place of a texel in the mirror image, left and right."""
         level, column, row = node
@@ -91,6 +95,46 @@ class TexelLayout:
     def number_of(self) -> dict[Node, int]:
         """The index of each of its texels among `nodes`."""
         return {node: k for k, node in enumerate(self.nodes)}
+
+    @property
+    def size_text(self) -> str:
+        """The number of its texels for people."""
+        columns, rows = self.size
+        finer = sum(1 for node in self.nodes if node[0])
+        return f"{columns}x{rows}{f' + {finer}' if finer else ''} texels"
+
+    @property
+    def text(self) -> str:
+        """Its size and the texels that are split again, `16x8+x4.y3+sun1.x13.y10`."""
+        columns, rows = self.size
+        places = (f"{f'sun{level}.' if level else ''}x{x}.y{y}" for level, x, y in self.splits)
+        return "+".join([f"{columns}x{rows}", *places])
+
+    @cached_property
+    def nearest(self) -> Indices:
+        """The index of the texel that is nearest to each place of the finest grid, (rows, columns).
+
+        One around which others are split has fewer places than its grid gives it.
+        """
+        columns, rows = self.size
+        nearest = np.full((rows, columns), -1)
+        for level, (places, which) in enumerate(self._by_level):
+            if level:
+                columns, rows = self.grid(level)
+                y, x = (np.arange(rows) + 1) // RATIO, np.arange(columns) // RATIO
+                nearest = nearest[y[:, None], x]
+            nearest[places[:, 1], places[:, 0]] = which
+        return np.asarray(nearest)
+
+    def shown_by(self, image: Doubles) -> Doubles | None:
+        """Return the values of its texels that make an image, (nodes, k); None if none do.
+
+        image: (rows, columns, k) of the finest grid.
+        """
+        finer = RATIO ** (self.level - np.array([x[0] for x in self.nodes]))
+        columns, rows = (np.array([x[k] for x in self.nodes]) for k in (1, 2))
+        values = image[finer * rows, finer * columns + (finer - 1) // 2]
+        return values if np.allclose(self.image(values), image, rtol=1e-3, atol=0) else None
 
     def texel_at(self, place: Node) -> Node:
         """Return the texel at a place of a grid: that of the grid, or of a finer one."""

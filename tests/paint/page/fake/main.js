@@ -1,5 +1,5 @@
 /** The interface over a session and an engine that are made up: `?lights=N`, `?shadow`, `?first`,
- * `?elsewhere`; `?image=4x3`: the last of the lights are texels of an image, `sky`; `?crowd`: as much of everything as there may be, and as long;
+ * `?elsewhere`; `?image=4x3`: the last of the lights are texels of an image, `sky`, with `?finer=1,1` that one split again; `?crowd`: as much of everything as there may be, and as long;
  * `?tour`: as for people, whom the tour greets at their first visit;
  * `?model`: that of a notebook, `?model=taken`: at a place that loses the painter at once. */
 
@@ -20,7 +20,7 @@ const host = new FakeHost(room, {
   isElsewhere: asked.has('elsewhere'),
 });
 if (asked.has('crowd')) crowd(host);
-if (asked.has('image')) split(host, asked.get('image') ?? '');
+if (asked.has('image')) split(host, asked.get('image') ?? '', asked.get('finer'));
 let element = /** @type {HTMLElement} */ (document.getElementById('lightpaint'));
 if (asked.has('shadow')) {
   const shadow = element.attachShadow({ mode: 'open' });

@@ -46,6 +46,37 @@ export function meanOf({ places, shares }, radiance) {
   return /** @type {RGB} */ (sum.map((value) => value / (total || 1)));
 }
 
+/** The places that a texel covers: those next to each other, from a row and a column.
+ * @typedef {{row: number, column: number, rows: number, columns: number}} Block */
+
+/** Return the places around one that are the same texel: one, or more where others are finer.
+ * @param {LightImage} image @param {[row: number, column: number]} place @returns {Block} */
+export function blockAt({ places }, [row, column]) {
+  const k = places[row][column];
+  let [top, bottom, left, right] = [row, row, column, column];
+  if (k >= 0) {
+    while (places[row][left - 1] === k) left -= 1;
+    while (places[row][right + 1] === k) right += 1;
+    while (places[top - 1]?.[column] === k) top -= 1;
+    while (places[bottom + 1]?.[column] === k) bottom += 1;
+  }
+  return { row: top, column: left, rows: bottom - top + 1, columns: right - left + 1 };
+}
+
+/** Return the first place of each texel, row by row: two in a symmetric image.
+ * @param {LightImage} image @returns {[row: number, column: number][]} */
+export function firstPlaces({ places }) {
+  /** @type {[number, number][]} */
+  const firsts = [];
+  places.forEach((row, y) => {
+    for (let x = 0, end = 0; x < row.length; x = end) {
+      for (end = x + 1; row[end] === row[x]; ) end += 1;
+      if (!places[y - 1]?.slice(x, end).includes(row[x])) firsts.push([y, x]);
+    }
+  });
+  return firsts;
+}
+
 /** Return an image as one light, for what shows the level of a light. @param {LightImage} image
  * @param {Light[]} lights @returns {Light} */
 export function wholeLight(image, lights) {

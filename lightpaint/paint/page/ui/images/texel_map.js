@@ -8,7 +8,7 @@ import { atFullBrightness, toHex, toKelvin } from '../paint_colour.js';
 import { html, useLayoutEffect, useRef, useState } from '../../vendor/preact.js';
 import { fill, words } from '../../language/language.js';
 import { drawMap } from './image_map.js';
-import { mapStops, wholeLight } from './light_images.js';
+import { blockAt, firstPlaces, mapStops, wholeLight } from './light_images.js';
 import { MAX_STOPS, MIN_STOPS, applyTool, clamp, pick, placeAt, useTexelStroke } from './texel_stroke.js';
 
 /** @typedef {import("../engine_interface.js").RGB} RGB */
@@ -86,9 +86,10 @@ function Grid({ image, ui, app, held, place, setPlace }) {
     event.preventDefault();
     event.stopPropagation();
     if (step) {
+      const block = blockAt(image, key);
       const next = /** @type {Place} */ ([
-        clamp(key[0] + step[0], rows),
-        clamp(key[1] + step[1], columns),
+        clamp(stepped(key[0], step[0], block.row, block.rows), rows),
+        clamp(stepped(key[1], step[1], block.column, block.columns), columns),
       ]);
       setKey(next);
       setPlace(next);
@@ -115,24 +116,23 @@ function Grid({ image, ui, app, held, place, setPlace }) {
 /** A mark on each locked texel. @param {{image: LightImage, held: number[]}} props */
 function Locks({ image, held }) {
   const locked = new Set(held);
-  return image.places.map((places, row) =>
-    places.map(
-      (k, column) =>
-        locked.has(k) &&
-        html`<i key=${`${row} ${column}`} class="texel-lock" aria-hidden="true"
-        style=${cellStyle(image, [row, column])}></i>`,
-    ),
-  );
+  return firstPlaces(image)
+    .filter(([row, column]) => locked.has(image.places[row][column]))
+    .map(
+      (place) => html`<i key=${place.join(' ')} class="texel-lock" aria-hidden="true"
+        style=${cellStyle(image, place)}></i>`,
+    );
 }
 
 /** Return where a texel lies on the map. @param {LightImage} image @param {Place} place */
-function cellStyle({ places }, [row, column]) {
-  const [rows, columns] = [places.length, places[0].length];
+function cellStyle(image, place) {
+  const [rows, columns] = [image.places.length, image.places[0].length];
+  const block = blockAt(image, place);
   return {
-    left: `${(100 * column) / columns}%`,
-    top: `${(100 * row) / rows}%`,
-    width: `${100 / columns}%`,
-    height: `${100 / rows}%`,
+    left: `${(100 * block.column) / columns}%`,
+    top: `${(100 * block.row) / rows}%`,
+    width: `${(100 * block.columns) / columns}%`,
+    height: `${(100 * block.rows) / rows}%`,
   };
 }
 
@@ -145,6 +145,13 @@ const KEY_STEPS = {
   Home: [0, -Infinity],
   End: [0, Infinity],
 };
+
+/** Return the index some steps away from a texel, which has `count` indices from `first` on.
+ * @param {number} index @param {number} step @param {number} first @param {number} count */
+function stepped(index, step, first, count) {
+  if (step === 0) return index;
+  return step > 0 ? first + count - 1 + step : first + step;
+}
 
 /** Return a texel in words. @param {LightImage} image @param {Ui} ui @param {number[]} held
  * @param {Place} place */
