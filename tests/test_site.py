@@ -1,7 +1,6 @@
 """The site: what stands in the repository is led into it, and what is wrong with it is found."""
 
 import ast
-import json
 import re
 import sys
 from collections.abc import Iterator
@@ -11,14 +10,12 @@ import pytest
 from renderer import REPOSITORY
 
 import lightpaint as lp
-from lightpaint.batch.gallery.summary import LightRow, SummaryRow, summary_json
 from lightpaint.cli.options.parser import command_parser
 
 sys.path.insert(0, str(REPOSITORY / "docs" / "site"))
 
 from api_pages import GROUPS
 from command_pages import GUIDES, write_commands
-from schema_pages import schemas
 from site_check import check_site
 from staging import stage
 
@@ -75,42 +72,6 @@ def test_a_page_that_is_broken_is_found(tmp_path: Path) -> None:
         "loads",
         "no",
     ]
-
-
-def test_a_lighting_that_is_written_fits_its_schema(tmp_path: Path) -> None:
-    jsonschema = pytest.importorskip("jsonschema", reason="jsonschema")
-    schema = schemas()["lighting"][1]
-    jsonschema.Draft202012Validator.check_schema(schema)
-    light = {"plugin": "point", "parameter": "intensity", "unit": "W/sr"}
-    light |= {"emission": [1.0, 0.5, 0.25], "weight": [1.0, 0.5, 0.25]}
-    text = json.dumps({"format": "lightpaint-lighting 1", "lights": {"lamp": light}})
-    (tmp_path / "first.json").write_text(text, "utf-8")
-    lp.write_lighting(tmp_path / "second.json", lp.read_lighting(tmp_path / "first.json"))
-    written = json.loads((tmp_path / "second.json").read_text("utf-8"))
-    jsonschema.validate(written, schema)
-    for damage in ({"format": "other"}, {"lights": {"lamp": {**light, "emission": [1.0]}}}):
-        with pytest.raises(jsonschema.ValidationError):
-            jsonschema.validate({**written, **damage}, schema)
-
-
-def test_a_summary_that_is_written_fits_its_schema() -> None:
-    jsonschema = pytest.importorskip("jsonschema", reason="jsonschema")
-    schema = schemas()["summary"][1]
-    light = LightRow("lamp", 1.0, (1.0, 1.0, 1.0), kelvin=3200.0)
-    done = SummaryRow("dusk", "done", "", "dusk", delta_e=1.5, view=("srgb", 0.0), lights=(light,))
-    failed = SummaryRow("dawn", "failed", "no such painting", "dawn")
-    written = json.loads(summary_json([done, failed]))
-    jsonschema.validate(written, schema)
-    unknown_state = {**written["looks"][0], "state": "lost"}
-    for looks in ([{"look": "dusk"}], [unknown_state]):
-        with pytest.raises(jsonschema.ValidationError):
-            jsonschema.validate({**written, "looks": looks}, schema)
-
-
-def test_every_schema_is_one() -> None:
-    jsonschema = pytest.importorskip("jsonschema", reason="jsonschema")
-    for _, schema in schemas().values():
-        jsonschema.Draft202012Validator.check_schema(schema)
 
 
 def test_messages_that_are_explained_are_those_of_the_code() -> None:

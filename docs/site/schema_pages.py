@@ -1,14 +1,13 @@
 """JSON schemas of the files and messages, made of the dataclasses that read and write them."""
 
-import inspect
 import json
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import MISSING, fields, is_dataclass
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from types import NoneType
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Any
 
-import numpy as np
+from dataclass_schemas import Schema, list_of, schema_of
+from manifest_schema import manifest_schema
+from report_schema import report_schema
 
 from lightpaint.batch.gallery.summary import SummaryRow
 from lightpaint.batch.manifest.folder_names import SUMMARY_FORMAT
@@ -20,32 +19,24 @@ from lightpaint.paint.protocol.events import EVENTS
 from lightpaint.paint.protocol.requests import REQUESTS
 from lightpaint.pipeline.results.result_folder import _Record
 from lightpaint.placement.placement_record import PlacementRecord
-from lightpaint.storage.json_records import UNIONS
-
-Schema = dict[str, Any]
+from lightpaint.relit.export import fixtures
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-
-_PLAIN: dict[Any, Schema] = {
-    Any: {},
-    str: {"type": "string"},
-    bool: {"type": "boolean"},
-    float: {"type": "number"},
-    int: {"type": "integer"},
-    NoneType: {"type": "null"},
-}
 
 
 def schemas() -> dict[str, tuple[str, Schema]]:
     """Return each schema by its name, with what it is of."""
     return {
+        "manifest": ("``looks.toml``, the manifest of a batch", manifest_schema()),
         "lighting": ("``lighting.json``, the answer", lighting_schema()),
+        "report": ("``report.json``, the numbers of a report", report_schema()),
         "result": ("``result.json``, what a folder holds", schema_of(_Record)),
         "summary": ("``summary.json``, the looks of a batch", summary_schema()),
         "places": (
             "``places.json``, moved and added lights of a batch or a painter",
             schema_of(PlacementRecord),
         ),
+        "fixtures": ("``fixtures.json``, an answer for consoles", fixtures_schema()),
         "requests": ("what clients send to the painter", _messages(REQUESTS)),
         "events": ("what the painter sends to clients", _messages(EVENTS)),
     }
@@ -56,12 +47,13 @@ def lighting_schema() -> Schema:
     head = schema_of(Lighting)["properties"]
     light, place = schema_of(LightSetting, "name"), schema_of(EmitterPlace, "name")
     light["properties"]["photometry"] = {"type": "object"}
+    rgb = list_of([{"type": "number"}] * 3)
     key = {
         "type": "object",
         "properties": {
             "frame": {"type": "integer"},
             "target": {"type": "string"},
-            "weights": {"type": "object", "additionalProperties": _list([_PLAIN[float]] * 3)},
+            "weights": {"type": "object", "additionalProperties": rgb},
         },
         "required": ["frame", "weights"],
     }
@@ -90,54 +82,20 @@ def summary_schema() -> Schema:
     return {"type": "object", "properties": properties, "required": list(properties)}
 
 
-def schema_of(kind: Any, *left_out: str) -> Schema:
-    """Return the schema of a dataclass, without the fields `left_out`.
-
-    Arrays of messages are buffers beside the JSON (docs/protocol.md), and stand in no schema.
-    """
-    hints = get_type_hints(kind)
-    shown = [x for x in fields(kind) if x.name not in left_out and not _is_array(hints[x.name])]
-    required = [x.name for x in shown if x.default is MISSING and x.default_factory is MISSING]
-    schema: Schema = {"type": "object"}
-    if text := (inspect.getdoc(kind) or "").partition("\n\n")[0]:
-        schema["description"] = " ".join(text.split())
-    schema["properties"] = {x.name: _value(hints[x.name]) for x in shown}
-    return {**schema, "required": required} if required else schema
-
-
-def _is_array(kind: Any) -> bool:
-    return get_origin(kind) is np.ndarray or any(map(_is_array, get_args(kind)))
-
-
-def _value(kind: Any) -> Schema:
-    """Return the schema of values of an annotation."""
-    outer, inner = get_origin(kind), get_args(kind)
-    if kind in _PLAIN:
-        return dict(_PLAIN[kind])
-    if outer is Literal:
-        return {"enum": list(inner)}
-    if outer in UNIONS:
-        return {"anyOf": [_value(x) for x in inner]}
-    if outer is Mapping or outer is dict:
-        return {"type": "object", "additionalProperties": _value(inner[1])}
-    if outer in (Sequence, list) or (outer is tuple and inner[-1:] == (...,)):
-        return {"type": "array", "items": _value(inner[0])}
-    if outer is tuple:
-        return _list([_value(x) for x in inner])
-    if isinstance(kind, type) and is_dataclass(kind):
-        return schema_of(kind)
-    if isinstance(kind, type) and issubclass(kind, str):
-        return {"type": "string"}
-    raise TypeError(f"no schema for {kind!r}")
-
-
-def _list(values: list[Schema]) -> Schema:
-    return {
-        "type": "array",
-        "prefixItems": values,
-        "minItems": len(values),
-        "maxItems": len(values),
+def fixtures_schema() -> Schema:
+    """Return the schema of fixtures.json."""
+    rows = {"type": "array", "items": schema_of(fixtures.Fixture)}
+    frame = {"frame": {"type": "integer"}, "fixtures": rows}
+    properties = {
+        "format": {"const": fixtures.FORMAT},
+        "lightpaint": {"type": "string"},
+        "target": {"type": "string"},
+        "cd_per_unit": {"type": ["number", "null"]},
+        "fixtures": rows,
+        "frames": {"type": "array", "items": {"type": "object", "properties": frame}},
     }
+    required = [name for name in properties if name != "frames"]
+    return {"type": "object", "properties": properties, "required": required}
 
 
 def _messages(kinds: Mapping[str, type[Any]]) -> Schema:
@@ -167,10 +125,10 @@ def _page() -> Iterator[str]:
         "JSON schemas",
         "============",
         "",
-        "The dataclasses that read and write these files give these schemas, in the dialect of",
+        "The code that reads and writes these files gives these schemas, in the dialect of",
         "2020-12. A field that a schema does not require may be absent. :doc:`/formats` says what",
-        "each field means; :doc:`/protocol` does so for messages, whose arrays are buffers beside",
-        "the JSON.",
+        "each field means, and :doc:`/batch` what each key of a manifest; :doc:`/protocol` does so",
+        "for messages, whose arrays are buffers beside the JSON.",
         "",
         "Any validator of this dialect checks a file, such as the Python package jsonschema:",
         "",
@@ -184,6 +142,11 @@ def _page() -> Iterator[str]:
         '   schema = json.loads(Path("lighting.schema.json").read_text("utf-8"))',
         '   lighting = json.loads(Path("evening/lighting.json").read_text("utf-8"))',
         "   jsonschema.validate(lighting, schema)",
+        "",
+        "A manifest is TOML, which ``tomllib.loads`` turns into such values. Editors that complete",
+        "and check TOML do so by the schema named in its first line,",
+        "``#:schema ./manifest.schema.json``. ``lightpaint batch --dry-run`` finds more: keys that",
+        "contradict each other, and files that do not exist.",
         "",
         ".. list-table::",
         "   :widths: 40 60",
