@@ -13,6 +13,8 @@ from lightpaint.errors import PaintError
 from lightpaint.paint.protocol import (
     Acknowledgement,
     AnyRequest,
+    ConstrainLight,
+    ConstrainLights,
     Message,
     Notice,
     Paint,
@@ -50,6 +52,8 @@ class FakeSession:
                 self.before_paint()
                 weights = np.full((2, 3), float(arrays["image"].sum()))
                 return [fake_answer(stroke=request.stroke, weights=weights)]
+            case ConstrainLight() | ConstrainLights():
+                return [fake_answer()]
         return [Acknowledgement(), Notice(text="said")]
 
     def state(self) -> SessionState:

@@ -327,21 +327,37 @@ def test_observers_are_few_and_speak_this_version(
         assert receive(other)["text"] == "1 observers are there already: close one of them"
 
 
-def test_what_observers_ask_for_waits_while_a_brush_is_down(served_session: ServedSession) -> None:
+@pytest.mark.parametrize(
+    ("kind", "fields"),
+    [
+        ("paint", {}),
+        ("constrain_light", {"light": 0, "constraints": {"lock": 1.0}}),
+        ("constrain_lights", {"constraints": {"lamp 0": {"lock": 1.0}}}),
+    ],
+)
+def test_what_observers_ask_for_waits_while_a_brush_or_slider_is_in_hand(
+    served_session: ServedSession, kind: str, fields: Any
+) -> None:
+    def drag(seq: int, *, is_final: bool) -> None:
+        if kind == "paint":
+            paint(page, seq, is_final=is_final)
+        else:
+            send_request(page, kind, seq, is_final=is_final, **fields)
+
     with served_session.page() as page, served_session.program() as program:
         send_request(page, "hello", version=VERSION)
         receive(page)
         send_request(program, "observe", version=VERSION)
         receive(program)
-        paint(page, 2, is_final=False)
+        drag(2, is_final=False)
         receive(page)
         assert receive(program)["kind"] == "answer"
         send_request(program, "export", 7, outputs=["lighting"])
-        paint(page, 3, is_final=True)
+        drag(3, is_final=True)
         assert receive(page)["reply"] == 3
         assert [receive(program).get("reply") for _ in range(2)] == [None, 7]
     kinds = [request.kind for request in served_session.session.requests]
-    assert kinds == ["paint", "paint", "export"]
+    assert kinds == [kind, kind, "export"]
 
 
 def test_the_brush_of_who_leaves_is_down_no_more(served_session: ServedSession) -> None:

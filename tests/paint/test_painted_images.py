@@ -95,6 +95,32 @@ def test_painted_texels_are_undone_kept_and_exported(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("without_reasons")
 @pytest.mark.filterwarnings("ignore:.*samples.*")
+def test_limits_of_locked_texels_are_known_after_a_restart(tmp_path: Path) -> None:
+    """A lock takes their place until it is gone; they can change meanwhile, and be undone."""
+    sky, limits = SkyStudio(tmp_path), {"limits": {"max": 2.0}}
+    texels = [f"sky.x{x}.y1" for x in range(3)]
+    sky.studio.handle(protocol.ConstrainLights(dict.fromkeys(texels, limits)), {})
+    for rgb in (ORANGE, (1.0, 1.0, 1.0)):
+        locks = {name: {"lock": list(rgb)} for name in texels[:2]}
+        sky.studio.handle(protocol.ConstrainLights(locks), {})
+    kelvin = {"kelvin": [3000, 6000]}
+    change = protocol.ConstrainLights({texels[2]: kelvin}, earlier={texels[1]: kelvin})
+    sky.studio.handle(change, {})
+    sky.close()
+
+    again = SkyStudio(tmp_path)
+    assert again.studio.state().fields["earlier"] == {texels[0]: limits, texels[1]: kelvin}
+    again.studio.handle(protocol.Undo(), {})
+    assert again.studio.state().fields["earlier"] == dict.fromkeys(texels[:2], limits)
+    again.studio.handle(protocol.ConstrainLights({texels[0]: limits}), {})
+    state = again.studio.state().fields
+    assert state["earlier"] == {texels[1]: limits}
+    assert state["constraints"][texels[0]] == limits
+    again.close()
+
+
+@pytest.mark.usefixtures("without_reasons")
+@pytest.mark.filterwarnings("ignore:.*samples.*")
 def test_finer_texels_of_a_sun_are_painted_and_exported(tmp_path: Path) -> None:
     sky = SkyStudio(tmp_path, "4x3+x1.y1")
     [image] = sky.studio.state().fields["images"]

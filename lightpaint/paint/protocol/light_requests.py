@@ -1,7 +1,7 @@
 """Requests about lights: their constraints, ties and places."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from lightpaint.paint.protocol.base import Message
@@ -28,11 +28,14 @@ class ConstrainLights(Message, kind="constrain_lights"):
     Answered by `answer`.
 
     is_final: as in `constrain_light`. label: its name for undo; "" for the names of the lights.
+    earlier: constraints of lights that are locked or off, by name, which apply once these are
+    released, in place of those from before they were locked.
     """
 
     constraints: Mapping[str, Mapping[str, Any]]
     is_final: bool = True
     label: str = ""
+    earlier: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -255,7 +255,8 @@ class EditState:
     name. added_lights: names of lights that the scene does not have. places: a text, equal for
     equal places of all lights; "" if all hang as in the scene. layers: of the painting. master:
     factor of all lights but fixed ones, by the master dimmer: a light shines at `master` times its
-    weight. selection: the part of the painting that strokes keep to.
+    weight. selection: the part of the painting that strokes keep to. earlier: constraints of lights
+    that are locked or off, by name, from before they were, to be sent when they are released.
     """
 
     history: HistoryInfo | None = field(default=None, metadata=OPTIONAL)
@@ -269,6 +270,7 @@ class EditState:
     layers: LayerList | None = field(default=None, metadata=OPTIONAL)
     master: float | None = field(default=None, metadata=OPTIONAL)
     selection: SelectionInfo | None = field(default=None, metadata=OPTIONAL)
+    earlier: Mapping[str, Mapping[str, Any]] | None = field(default=None, metadata=OPTIONAL)
 
 
 #: Tone of a message to the user.

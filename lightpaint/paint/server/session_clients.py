@@ -23,6 +23,7 @@ from lightpaint.paint.protocol import (
     AnyRequest,
     Closing,
     ConstrainLight,
+    ConstrainLights,
     DraggedPlane,
     Failure,
     Message,
@@ -53,7 +54,7 @@ REST_S = 10.0
 CLOSING_S = 1.0
 
 #: Requests during a drag, until one with `is_final`.
-LIVE_REQUESTS = (Paint, ConstrainLight, MoveLights, PointLight)
+LIVE_REQUESTS = (Paint, ConstrainLight, ConstrainLights, MoveLights, PointLight)
 
 
 class Connections:

@@ -39,6 +39,7 @@ def edit_state(history: History, live_answer: LiveAnswer, views: Canvases) -> di
             tuple(layer_info(layer, views) for layer in views.layers), views.next_layer
         ),
         "master": requests.master,
+        "earlier": dict(requests.earlier),
         "selection": SelectionInfo(
             tuple(view.selection.bounds for view in views),
             sum(view.selection.revision for view in views),

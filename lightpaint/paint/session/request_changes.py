@@ -32,6 +32,8 @@ def changed_requests(
             return constrain_light(requests, lights, message)
         case protocol.ConstrainLights():
             changed = constrain_lights(requests, lights, message.constraints)
+            _check_names(message.earlier, lights)
+            changed = changed.with_earlier(message.earlier)
             return message.label or ", ".join(message.constraints), changed
         case protocol.MoveLights():
             changed = move_lights(requests, lights, message.poses)

@@ -46,6 +46,7 @@ class SessionRequests:
     added: lights that the scene does not have, by name, behind all others: kind, pose, size and
     emission, as in a `NewEmitter`.
     master: factor of all lights but fixed ones, applied to the answer.
+    earlier: constraints of held lights, by name, which apply again once they are released.
     """
 
     lights: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
@@ -54,6 +55,7 @@ class SessionRequests:
     poses: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     added: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     master: float = 1.0
+    earlier: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, data: Mapping[str, Any]) -> "SessionRequests":
@@ -62,7 +64,8 @@ class SessionRequests:
         poses = {name: dict(pose) for name, pose in data.get("poses", {}).items()}
         added = {name: dict(light) for name, light in data.get("added", {}).items()}
         lights, values = dict(data.get("lights", {})), dict(data.get("values", {}))
-        requests = cls(lights, ties, values, poses, added)
+        earlier = {name: dict(entry) for name, entry in data.get("earlier", {}).items()}
+        requests = cls(lights, ties, values, poses, added, earlier=earlier)
         return requests.with_master(data.get("master", 1.0))
 
     def as_json(self) -> dict[str, Any]:
@@ -77,6 +80,7 @@ class SessionRequests:
             **({"poses": moved} if moved else {}),
             **({"added": added} if added else {}),
             **({"master": self.master} if self.master != 1 else {}),
+            **({"earlier": {k: dict(v) for k, v in self.earlier.items()}} if self.earlier else {}),
         }
 
     @property
@@ -103,8 +107,20 @@ class SessionRequests:
         Holding a light holds all on its dimmer; earlier holds of these are dropped.
         """
         tied = next((names for names in self.ties if name in names), ())
-        lights = {**self.lights, name: requested}
-        return replace(self, lights=_hold_once(lights, (name, *tied)))
+        lights = _hold_once({**self.lights, name: requested}, (name, *tied))
+        before = {k: v for k, v in self.lights.get(name, {}).items() if k not in HOLD_KEYS}
+        return replace(self, lights=lights)._with_earlier({name: before, **self.earlier})
+
+    def with_earlier(self, earlier: Mapping[str, Mapping[str, Any]]) -> "SessionRequests":
+        """Return these requests with other constraints that apply to held lights once they are
+        released, by name. Those of other lights are left out.
+        """
+        return self._with_earlier({**self.earlier, **earlier})
+
+    def _with_earlier(self, earlier: Mapping[str, Mapping[str, Any]]) -> "SessionRequests":
+        is_held = {name for name, entry in self.lights.items() if _holds(entry)}
+        kept = {name: entry for name, entry in earlier.items() if entry and name in is_held}
+        return replace(self, earlier=kept)
 
     def with_poses(self, poses: Mapping[str, Mapping[str, Any]]) -> "SessionRequests":
         """Return these requests with changed poses of lights; an empty change puts one back."""
@@ -130,6 +146,7 @@ class SessionRequests:
             ties=tuple(names for names in ties if len(names) > 1),
             poses=others(self.poses),
             added=others(self.added),
+            earlier=others(self.earlier),
         )
 
     def with_ties(self, ties: Sequence[Sequence[str]]) -> "SessionRequests":
@@ -137,7 +154,8 @@ class SessionRequests:
         lights = dict(self.lights)
         for names in ties:
             lights = _hold_once(lights, names)
-        return replace(self, lights=lights, ties=tuple(map(tuple, ties)))
+        changed = replace(self, lights=lights, ties=tuple(map(tuple, ties)))
+        return changed._with_earlier(self.earlier)
 
     def with_master(self, level: float) -> "SessionRequests":
         """Return these requests with the master dimmer at a factor. Raises PaintError."""
@@ -204,8 +222,13 @@ def _hold_once(
         constraints = dict(result.get(name, {}))
         if is_held:
             constraints = {key: value for key, value in constraints.items() if key not in HOLD_KEYS}
-        # Not by `in`: 0 is a level, and equals False.
-        values = (constraints.get(key) for key in HOLD_KEYS)
-        is_held = is_held or any(value is not None and value is not False for value in values)
+        is_held = is_held or _holds(constraints)
         result[name] = constraints
     return {name: constraints for name, constraints in result.items() if constraints}
+
+
+def _holds(constraints: Mapping[str, Any]) -> bool:
+    """Return whether constraints hold a light at a level."""
+    # Not by `in`: 0 is a level, and equals False.
+    values = (constraints.get(key) for key in HOLD_KEYS)
+    return any(value is not None and value is not False for value in values)

@@ -193,6 +193,26 @@ def test_what_was_asked_of_a_light_is_known_until_it_is_free(painter: Painter, w
     assert newest_constraints(painter) == limits
 
 
+def test_limits_of_a_locked_light_are_known_after_a_reload(painter: Painter) -> None:
+    """The session remembers what a page that is gone has replaced by a lock."""
+    limits = {"limits": {"max": "150%"}}
+    names = [light["name"] for light in painter.ui("lights")[:2]]
+    constraints = {name: {"lock": [1, 1, 1]} for name in names}
+    painter.page.evaluate(
+        """([constraints, earlier]) => {
+          host.constraints = constraints;
+          const state = host.state();
+          host.tell({ kind: 'state', ...state, constraints, earlier });
+        }""",
+        [constraints, dict.fromkeys(names, limits)],
+    )
+    painter.still()
+    painter.page.evaluate("() => painter.session.unlockLight(0)")
+    assert newest_constraints(painter) == limits
+    painter.page.evaluate("() => painter.session.unlockAll()")
+    assert painter.requests("constrain_lights")[-1]["constraints"] == {names[1]: limits}
+
+
 def test_what_a_light_may_do(painter: Painter) -> None:
     page = painter.page
     page.get_by_role("button", name="key", exact=True).click()

@@ -286,7 +286,8 @@ export interface ResolvedFit {
  * name. added_lights: names of lights that the scene does not have. places: a text, equal for
  * equal places of all lights; "" if all hang as in the scene. layers: of the painting. master:
  * factor of all lights but fixed ones, by the master dimmer: a light shines at `master` times its
- * weight. selection: the part of the painting that strokes keep to.
+ * weight. selection: the part of the painting that strokes keep to. earlier: constraints of lights
+ * that are locked or off, by name, from before they were, to be sent when they are released.
  */
 export interface EditState {
   history?: HistoryInfo;
@@ -300,6 +301,7 @@ export interface EditState {
   layers?: LayerList;
   master?: number;
   selection?: SelectionInfo;
+  earlier?: Record<string, Record<string, any>>;
 }
 
 /**
@@ -389,6 +391,7 @@ export interface SessionState {
   layers?: LayerList;
   master?: number;
   selection?: SelectionInfo;
+  earlier?: Record<string, Record<string, any>>;
   version: number;
   scene: string;
   folder: string;
@@ -464,6 +467,7 @@ export interface AnswerUpdate {
   layers?: LayerList;
   master?: number;
   selection?: SelectionInfo;
+  earlier?: Record<string, Record<string, any>>;
   version: number;
   stroke: number;
   exact: boolean;
@@ -492,6 +496,7 @@ export interface CanvasPatch {
   layers?: LayerList;
   master?: number;
   selection?: SelectionInfo;
+  earlier?: Record<string, Record<string, any>>;
   region: Region;
   view: number;
   views: number[];
@@ -519,6 +524,7 @@ export interface SelectionUpdate {
   layers?: LayerList;
   master?: number;
   selection?: SelectionInfo;
+  earlier?: Record<string, Record<string, any>>;
   arrays: {  };
 }
 
@@ -989,11 +995,14 @@ export interface ConstrainLight {
  * Answered by `answer`.
  *
  * is_final: as in `constrain_light`. label: its name for undo; "" for the names of the lights.
+ * earlier: constraints of lights that are locked or off, by name, which apply once these are
+ * released, in place of those from before they were locked.
  */
 export interface ConstrainLights {
   constraints: Record<string, Record<string, any>>;
   is_final?: boolean;
   label?: string;
+  earlier?: Record<string, Record<string, any>>;
 }
 
 /**

@@ -92,7 +92,7 @@ function remainingConstraints(name, keys, ui, session) {
   const light = ui.lights.findIndex((info) => info.name === name);
   const removesLevel = keys.includes('off') || keys.includes('lock');
   const constraints =
-    (removesLevel && session.unlockedConstraints.get(light)) || ui.constraints[name];
+    (removesLevel && session.openConstraints(light)) || ui.constraints[name];
   return Object.fromEntries(Object.entries(constraints).filter(([key]) => !keys.includes(key)));
 }
 

@@ -57,10 +57,18 @@ export class SessionController extends SessionLink {
 
   /** Note the constraints of a light before it is locked, to restore them. @param {number} light */
   noteUnlocked(light) {
-    const { lights, constraints } = this.store.value;
     if (!this.unlockedConstraints.has(light)) {
-      this.unlockedConstraints.set(light, withoutLevel(constraints[lights[light].name] ?? {}));
+      this.unlockedConstraints.set(light, this.openConstraints(light));
     }
+  }
+
+  /** Return the constraints on a light; of one that is locked or off those from before.
+   * @param {number} light @returns {Constraints} */
+  openConstraints(light) {
+    const { lights, constraints, earlier } = this.store.value;
+    const { name } = lights[light];
+    const known = this.unlockedConstraints.get(light) ?? earlier[name];
+    return known ?? withoutLevel(constraints[name] ?? {});
   }
 
   async sendMoves() {
@@ -85,12 +93,10 @@ export class SessionController extends SessionLink {
   /** Unlock a light, or the light that it is tied to, and restore its earlier constraints.
    * @param {number} tiedLight */
   unlockLight(tiedLight) {
-    const { lights, constraints } = this.store.value;
     const light = lockingLight(this.store.value, tiedLight);
     this.moves.delete(tiedLight);
     this.moves.delete(light);
-    const earlierConstraints =
-      this.unlockedConstraints.get(light) ?? withoutLevel(constraints[lights[light].name] ?? {});
+    const earlierConstraints = this.openConstraints(light);
     this.unlockedConstraints.delete(light);
     return this.constrainLight(light, earlierConstraints);
   }
@@ -106,11 +112,8 @@ export class SessionController extends SessionLink {
 
   /** @param {number[]} lockedIndices of lights that are locked or off @param {string} label */
   unlockLights(lockedIndices, label) {
-    const { lights, constraints } = this.store.value;
-    const entries = lockedIndices.map((k) => [
-      lights[k].name,
-      this.unlockedConstraints.get(k) ?? withoutLevel(constraints[lights[k].name]),
-    ]);
+    const { lights } = this.store.value;
+    const entries = lockedIndices.map((k) => [lights[k].name, this.openConstraints(k)]);
     for (const k of lockedIndices) {
       this.moves.delete(k);
       this.unlockedConstraints.delete(k);

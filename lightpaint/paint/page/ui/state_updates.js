@@ -47,6 +47,7 @@ export function stateUpdate(message, /** @type {import('./ui_state.js').Ui} */ p
     lights,
     images: withLights(message.images ?? []),
     constraints: message.constraints ?? {},
+    earlier: message.earlier ?? {},
     ties: message.ties ?? [],
     settings: message.settings ?? {},
     effectiveSettings: message.effective_settings ?? {},
@@ -262,6 +263,7 @@ export function answerUpdate(message, ui) {
   for (const key of /** @type {const} */ ([
     'history',
     'constraints',
+    'earlier',
     'ties',
     'settings',
     'poses',

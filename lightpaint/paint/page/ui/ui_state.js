@@ -67,6 +67,7 @@ import { initialSelection } from './selection/selection_settings.js';
  * @property {boolean} isLive the last answer is the quick one, of a stroke in progress
  * @property {boolean} isJudgementCurrent whether the statements on the answer are on the last one
  * @property {Record<string, Constraints>} constraints
+ * @property {Record<string, Constraints>} earlier those of held lights from before they were held
  * @property {string[][]} ties
  * @property {Record<string, Record<string, any>>} poses of lights that were moved, by name
  * @property {string[]} addedLights names of lights that the scene does not have
@@ -206,6 +207,7 @@ export function initialState() {
     isLive: false,
     isJudgementCurrent: true,
     constraints: {},
+    earlier: {},
     ties: [],
     poses: {},
     addedLights: [],

@@ -59,14 +59,6 @@ export class ImageActions {
     this.set(changes, label, isFinal);
   }
 
-  /** Return the constraints of a texel; of one that is locked or off those that it had before.
-   * @param {number} k @returns {Constraints} */
-  openConstraints(k) {
-    const { store, unlockedConstraints } = this.session;
-    const { lock, off, ...others } = store.value.constraints[store.value.lights[k].name] ?? {};
-    return unlockedConstraints.get(k) ?? others;
-  }
-
   /** Change constraints on all texels of an image, and keep the others of each.
    * @param {LightImage} image @param {Constraints} change undefined for what is gone */
   constrain(image, change) {
@@ -74,15 +66,19 @@ export class ImageActions {
     const ui = this.session.store.value;
     /** @type {Record<string, Constraints>} */
     const constraints = {};
+    /** @type {Record<string, Constraints>} */
+    const earlier = {};
     for (const k of adjustableLights(ui, image.lights)) {
-      const all = Object.entries({ ...this.openConstraints(k), ...change });
+      const all = Object.entries({ ...this.session.openConstraints(k), ...change });
       const changed = Object.fromEntries(all.filter(([, value]) => value !== undefined));
       // A texel that is locked or off gets them once it is released.
-      if (isHeld(ui, k)) unlockedConstraints.set(k, changed);
-      else constraints[ui.lights[k].name] = changed;
+      if (isHeld(ui, k)) {
+        unlockedConstraints.set(k, changed);
+        earlier[ui.lights[k].name] = changed;
+      } else constraints[ui.lights[k].name] = changed;
     }
     const label = fill(words.images.limited, { name: image.name });
-    if (Object.keys(constraints).length) void many.constrain(constraints, label);
+    if (Object.keys(constraints).length) void many.constrain(constraints, label, true, earlier);
   }
 
   /** Let the solve set all texels of an image again. @param {LightImage} image */

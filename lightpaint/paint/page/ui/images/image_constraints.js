@@ -20,7 +20,7 @@ export function ImageConstraints({ image, ui, app }) {
   if (!free.length) return null;
   const light = wholeLight(image, ui.lights);
   const rgb = meanOf(image, (k) => ui.weights[k] ?? ui.lights[k].present);
-  const constraints = sharedBy(free.map((k) => images.openConstraints(k)));
+  const constraints = sharedBy(free.map((k) => app.session.openConstraints(k)));
   return html`<div class="asking-light" role="group" aria-label=${fill(words.lightConstraints.constraintsOn, { label: image.name })}>
     <h3>${words.images.constraintsOnEachTexel}</h3>
     <${LevelAndColour} light=${light} rgb=${rgb} constraints=${constraints} isImage app=${app}

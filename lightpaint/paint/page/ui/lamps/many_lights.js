@@ -153,8 +153,9 @@ export class ManyLights {
   }
 
   /** Set the constraints on lights, by name. @param {Record<string, Constraints>} constraints
-   * @param {string} label @param {boolean} [isFinal] */
-  async constrain(constraints, label, isFinal = true) {
+   * @param {string} label @param {boolean} [isFinal]
+   * @param {Record<string, Constraints>} [earlier] those of held lights, for when they are released */
+  async constrain(constraints, label, isFinal = true, earlier = {}) {
     const { session, store } = this;
     const pending = store.value.lights.flatMap(({ name }, k) =>
       constraints[name] ? [/** @type {const} */ ([k, constraints[name]])] : [],
@@ -165,6 +166,7 @@ export class ManyLights {
       constraints,
       label,
       is_final: isFinal,
+      ...(Object.keys(earlier).length ? { earlier } : {}),
     });
     for (const [k, entry] of pending)
       if (session.pendingConstraints.get(k) === entry) session.pendingConstraints.delete(k);
