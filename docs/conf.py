@@ -45,6 +45,15 @@ napoleon_use_rtype = False
 
 exclude_patterns = ["files"]
 
+# For docs/build --links: what is no other site, such as the painter's own address.
+linkcheck_ignore = [r"(?!https?://)", r"http://127\.0\.0\.1:8421"]
+# Publishers refuse programs that ask for a paper; who registered its DOI answers them.
+linkcheck_request_headers = {
+    "https://doi.org/": {"Accept": "application/vnd.citationstyles.csl+json"}
+}
+linkcheck_timeout = 20
+linkcheck_workers = 4
+
 html_theme = "furo"
 html_title = "lightpaint"
 html_static_path = ["_static", "../lightpaint/paint/page/icon.svg"]
