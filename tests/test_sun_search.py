@@ -213,7 +213,7 @@ def test_the_errors_of_finer_texels_are_as_small_as_asked_for(folder: Path) -> N
     finer = [x for x in look.lighting.lights if x.name.startswith("sky.sun1.")]
     assert len(finer) == 25
     assert all(x.interval is not None for x in finer)
-    assert any("lights are known to" in text for text in remarks.said)
+    assert any("texels are known to" in text for text in remarks.said)
 
 
 def test_several_views_share_the_finer_texels(folder: Path) -> None:

@@ -160,6 +160,11 @@ def texel_lights(lights: Sequence[NamedLight]) -> Bools:
     return is_texel
 
 
+def is_of_texels(name: str) -> bool:
+    """Return whether a name is that of a texel, or one that `joined_texels` gives to several."""
+    return TEXELS in name or bool(image_of(name))
+
+
 def joined_texels(names: Iterable[str]) -> list[str]:
     """Return names for a sentence, in which `12 texels of sky` stand for those of one image."""
     texels: dict[str, list[str]] = {}

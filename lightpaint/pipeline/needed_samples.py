@@ -9,6 +9,7 @@ import numpy as np
 from lightpaint.arrays import Doubles, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.cached_render import obtain_basis, top_up_basis
+from lightpaint.basis.light_images import texel_lights
 from lightpaint.basis.render.pixel_top_up import KeptTracer, kept_loaded
 from lightpaint.basis.render.render_origin import ONE_PASS
 from lightpaint.colour.color import LUMINANCE
@@ -112,8 +113,11 @@ def _text(state: Certainty, bases: Sequence[Basis]) -> str:
     extra = sum(basis.origin.extra_spp for basis in bases) / len(bases)
     extra_text = f", {_spoken(extra)} of them where the painting needs them" if extra else ""
     least_text = f"one below {spoken_percent(LEAST_SHARE)} of the picture's light counts as that"
+    lights = state.solution.basis.lights
+    texels = texel_lights(lights)
+    noun = "texels" if texels.all() else "lights and texels" if texels.any() else "lights"
     return (
-        f"{_spoken(mean)} samples per pixel{extra_text}: lights are known to "
+        f"{_spoken(mean)} samples per pixel{extra_text}: {noun} are known to "
         f"± {spoken_percent(state.error)} (least sure: {state.light}; {least_text})"
     )
 

@@ -4,11 +4,14 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache
-from lightpaint.basis.denoised_mixes import denoise_current_look, denoise_plane
+from lightpaint.basis.denoised_mixes import denoise_current_look, denoise_mix, denoise_plane
 from lightpaint.basis.exposure_meter import meter_exposure
+from lightpaint.basis.light_images import light_images
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.basis.render.render_origin import is_of
@@ -225,7 +228,7 @@ def _exposure(scene: Scene, basis: Basis | None, look: Floats) -> float:
 def _thumbnails(
     scene: Scene, basis: Basis | None, settings: Settings, progress: Progress
 ) -> dict[str, Floats]:
-    """Return, by name, each light alone at unit emission, (h', w', 3) linear, denoised."""
+    """Return, by name, a picture of each light alone, (h', w', 3) linear, denoised."""
     factor = THUMBNAIL.reduction(scene.film)
     if basis is None:
         small_features = scene.reduced(f"1/{factor}")
@@ -237,14 +240,26 @@ def _thumbnails(
 
 
 def _small_planes(basis: Basis, factor: int) -> dict[str, Floats]:
-    """Return, by name, each light alone in means over blocks; denoised, if there is noise."""
-    small_features = {
-        name: block_mean(image, factor)
-        for name, image in zip(basis.names, basis.planes, strict=True)
-    }
-    if not basis.knows_noise:
-        return small_features
-    if factor == 1:
-        return {name: denoise_plane(basis, k) for k, name in enumerate(basis.names)}
+    """Return, by name, each light alone in means over blocks; denoised, if there is noise.
+
+    A light that is an image is one, as it is now, or an even white if it is off.
+    """
+    images = [x for x in light_images(basis.lights) if x.is_whole]
+    texels = {int(k) for image in images for k in image.lights}
     features = None if basis.features is None else basis.features.reduced(factor)
-    return {name: denoised(image, features) for name, image in small_features.items()}
+    pictures = {}
+    for k in (k for k in range(len(basis.lights)) if k not in texels):
+        if basis.knows_noise and factor == 1:
+            pictures[basis.names[k]] = denoise_plane(basis, k)
+        else:
+            image = block_mean(basis.planes.plane(k), factor)
+            pictures[basis.names[k]] = denoised(image, features) if basis.knows_noise else image
+    for one in images:
+        is_its = np.isin(np.arange(len(basis.lights)), one.lights)[:, None]
+        current = basis.current_weights if basis.current_weights[one.lights].any() else 1.0
+        weights = np.where(is_its, current, np.zeros((1, 3)))
+        if basis.knows_noise:
+            pictures[one.name] = denoise_mix(basis, weights, factor=factor)
+        else:
+            pictures[one.name] = block_mean(basis.mix(weights), factor)
+    return pictures

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from lightpaint.basis.light_images import TEXELS, joined_texels
+from lightpaint.basis.light_images import TEXELS, is_of_texels, joined_texels
 from lightpaint.colour.color import luminance
 from lightpaint.display_text import some_names, some_of
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
@@ -56,13 +56,16 @@ def spoken_amount(delta_e: float) -> str:
 
 
 def spoken_lights(names: Sequence[str], *, start: bool = False) -> str:
-    """Return `light key`, `lights key, fill`, or `light_3` alone if the name already says "light".
+    """Return `light key`, `lights key, fill`, `texel sky.x0.y1`, `3 texels of sky, key`, or
+    `light_3` alone if the name already says "light".
 
     start: whether it begins a sentence. A long list is cut, with the number of other lights.
     """
     names = joined_texels(names)
     names_text = some_of([name or "without a name" for name in names], room=MAX_NAME_CHARACTERS)
-    if all(TEXELS in name for name in names):
+    if len(names) == 1 and TEXELS not in names[0] and is_of_texels(names[0]):
+        return f"{'Texel' if start else 'texel'} {names_text}"
+    if any(map(is_of_texels, names)):
         return names_text
     if all(re.search("light|lamp", name, re.IGNORECASE) for name in names):
         return names_text

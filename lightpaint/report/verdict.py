@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lightpaint.basis.light_images import joined_texels
+from lightpaint.basis.light_images import TEXELS, is_of_texels, joined_texels
 from lightpaint.colour.color import luminance
 from lightpaint.display_text import some_names
 from lightpaint.images.estimate import Estimate
@@ -18,6 +18,7 @@ from lightpaint.report.phrases import (
     spoken_percent,
     spoken_where,
 )
+from lightpaint.scene.lights.texels.texel import image_of
 
 #: Maximum number of barely visible lights that a sentence names.
 MAX_UNSEEN_NAMES = 2
@@ -155,6 +156,8 @@ def spoken_reason(appearance: Appearance) -> str:
     if not appearance.local_lights:
         return "no light reaches it"
     names, is_one = _spoken_some(appearance.local_lights)
+    if is_darker(appearance) and is_of_texels(names):
+        return f"{names} {'shines' if is_one else 'shine'} there, too"
     if is_darker(appearance):
         return f"{names} {'lights' if is_one else 'light'} it too"
     if not appearance.has_strong_light:
@@ -165,7 +168,11 @@ def spoken_reason(appearance: Appearance) -> str:
     free_lights = tuple(
         name for name in appearance.local_lights if name not in appearance.held_lights
     )
-    return f"{_spoken_some(free_lights)[0]} would light too much else"
+    free_names = _spoken_some(free_lights)[0]
+    # The lights of several texels are one, in a sentence.
+    if all(map(image_of, free_lights)):
+        return f"more light from {free_names} would fall on too much else"
+    return f"{free_names} would light too much else"
 
 
 def spoken_holding(reason: Reason) -> str:
@@ -175,7 +182,9 @@ def spoken_holding(reason: Reason) -> str:
         return "other views ask for different light"
     names = joined_texels(reason.names)
     if len(names) > MAX_NAMES:
-        lights = f"{len(reason.names)} lights"
+        texels = [name for name in names if TEXELS in name]
+        others = len(names) - len(texels)
+        lights = " and ".join([*texels, f"{others} light{'s' if others > 1 else ''}"])
     else:
         *first_phrases, last = [some_names([name]) for name in names] or [""]
         lights = f"{', '.join(first_phrases)} and {last}" if first_phrases else last
@@ -236,9 +245,10 @@ def spoken_blindness(verification: Verification) -> str:
             f" but {some_names(other_names, joint=' and ')}" if other_names else ""
         )
     else:
-        visible_names = [some_names([name]) for name in unseen[:MAX_UNSEEN_NAMES]] + [
-            f"{unnamed} more"
-        ] * (unnamed > 0)
+        visible_names = [
+            f"any of {name}" if TEXELS in name else some_names([name])
+            for name in unseen[:MAX_UNSEEN_NAMES]
+        ] + [f"{unnamed} more"] * (unnamed > 0)
         *first_phrases, last = visible_names
         names = f"{', '.join(first_phrases)} and {last}" if first_phrases else last
     return f"The render would probably have missed an error of {100 * ERROR:.0f} % in {names}"

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command import run, run_refused, succeed
+from PIL import Image
 from renderer import LIGHTS, write_room
 
 from lightpaint.images.formats.exr import write_rgb
@@ -116,6 +117,20 @@ def test_the_list_of_lights_has_one_row_for_the_image(solved: Path) -> None:
     document = json.loads(succeed(solved, "lights", "room.xml", *SPLIT, "--json"))
     names = [light["name"] for light in document["lights"]]
     assert names == [*texel_names("sky", (4, 3)), "bulb"]
+
+
+@pytest.mark.parametrize("radiance", ["0.1 0.2 0.3", "0 0 0"], ids=["lit", "off"])
+def test_a_template_has_one_picture_for_the_image(tmp_path: Path, radiance: str) -> None:
+    """Of all texels as they are now, or of white ones if the image is off."""
+    sky = LIGHTS["sky"].replace("0.1 0.2 0.3", radiance)
+    scene = write_room(tmp_path, lights=sky + LIGHTS["bulb"])
+    succeed(tmp_path, "template", scene, *SPLIT, "--spp", 16, "-o", "template")
+    pictures = sorted((tmp_path / "template" / "lights").iterdir())
+    assert [x.name for x in pictures] == ["bulb.png", "sky.png"]
+    means = np.asarray(Image.open(pictures[1]), np.float64).mean(axis=(0, 1))
+    assert means.max() > 100
+    is_grey = np.ptp(means) < 10
+    assert is_grey == (radiance == "0 0 0")
 
 
 def test_none_ignores_what_the_lights_file_splits(solved: Path) -> None:

@@ -246,12 +246,15 @@ def test_the_report_says_how_many_bounds_were_not_looked_into(make_basis: Any):
         (["Skylight", "annex_lamp"], "Skylight, annex_lamp"),
         (["light_3", "key"], "Lights light_3, key"),
         ([""], "Light without a name"),
+        (["sky.x0.y1"], "Texel sky.x0.y1"),
+        (["sky.x0.y1", "sky.sun1.x4.y3"], "2 texels of sky"),
+        (["sky.x0.y1", "sky.x1.y1", "key"], "2 texels of sky, key"),
     ],
 )
 def test_lights_are_called_lights_once(names: list[str], words: str):
     assert spoken_lights(names, start=True) == words
-    if words.startswith("Light"):
-        assert spoken_lights(names) == f"l{words[1:]}"
+    if words.startswith(("Light", "Texel")):
+        assert spoken_lights(names) == words[0].lower() + words[1:]
     assert spoken_bound(_bound("tie", *names), 0.5).startswith(words)
 
 

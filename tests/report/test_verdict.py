@@ -122,6 +122,26 @@ def _seen(missed_delta_e: float, asked_delta_e: float = 20.0, **fields: Any) -> 
             "wall and lamp would light too much else.",
         ),
         (
+            _seen(5.0, local_lights=("wall.x1.y0", "wall.x1.y1")),
+            "Part of the way, but the brighter light in the middle is out of reach: more light "
+            "from 2 texels of wall would fall on too much else.",
+        ),
+        (
+            _seen(5.0, local_lights=("sky.x1.y0",)),
+            "Part of the way, but the brighter light in the middle is out of reach: more light "
+            "from sky.x1.y0 would fall on too much else.",
+        ),
+        (
+            _seen(5.0, local_lights=("sky.x1.y0", "sky.x2.y0"), at=((1, 0), DARK, LIT)),
+            "Part of the way, but the darker shade on the left is out of reach: 2 texels of sky "
+            "shine there, too.",
+        ),
+        (
+            _seen(5.0, reasons=(Reason("lock", ("sky.x1.y0", "sky.x2.y0", *"abc")),)),
+            "Part of the way, but the brighter light in the middle is missing: 2 texels of sky "
+            "and 3 lights are locked.",
+        ),
+        (
             Appearance(14.0, 0.0, 20.0),
             "These lights cannot match this: too much of what was painted is out of reach.",
         ),
@@ -242,6 +262,10 @@ def test_what_a_render_would_have_missed_is_said(make_basis: BasisFactory):
     for power, lights_text in (
         ({"bulb": 0.49, "sun": 1.0}, "5 % in bulb."),
         ({"bulb": 0.3, "sun": 0.1}, "5 % in sun and bulb."),
+        (
+            {"sky.x0.y0": 0.3, "sky.x1.y0": 0.2, "sun": 0.1},
+            "5 % in sun and any of 2 texels of sky.",
+        ),
         ({"a": 0.3, "b": 0.1, "c": 0.2, "d": 0.0}, "5 % in any light."),
         ({"a": 0.3, "b": 0.1, "c": 0.2, "d": 0.9}, "5 % in any light but d."),
         ({"a": 0.3, "b": 0.1, "c": 0.2, **dict.fromkeys("def", 1.0)}, "5 % in b, c and 1 more."),
