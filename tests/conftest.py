@@ -22,6 +22,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.origin import Origin
 from lightpaint.basis.render.basis_render import render_basis
+from lightpaint.scene.runtime import kernel_threads
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
@@ -146,6 +147,19 @@ def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Neither take nor leave anything in the cache of whoever runs the tests."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("LIGHTPAINT_CACHE", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _one_kernel_thread(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Let each worker of pytest-xdist run kernels on one thread; alone, tests use all.
+
+    Kernels of a few pixels wait for their slowest thread, which waits for the other workers. Other
+    processes, such as commands of their own, use all threads.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        if hasattr(request.config, "workerinput"):
+            patch.setattr(kernel_threads, "_limit", 1)
         yield
 
 
