@@ -1,10 +1,13 @@
 """The site: what stands in the repository is led into it, and what is wrong with it is found."""
 
 import ast
+import inspect
 import re
 import sys
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
+from typing import Any, get_args, get_type_hints
 
 import pytest
 from renderer import REPOSITORY
@@ -14,8 +17,9 @@ from lightpaint.cli.options.parser import command_parser
 
 sys.path.insert(0, str(REPOSITORY / "docs" / "site"))
 
-from api_pages import GROUPS
+from api_pages import GROUPS, PARTS
 from command_pages import GUIDES, write_commands
+from page_repair import short_type
 from site_check import check_site
 from staging import stage
 
@@ -30,6 +34,71 @@ def staged(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_every_public_name_has_one_place_in_the_reference() -> None:
     names = [name for _, _, names in GROUPS.values() for name in names]
     assert sorted(names) == sorted({*lp.__all__, *lp._EXTRAS} - {"__version__"})
+
+
+#: Classes of public attributes that a program has no use for: they hold files, nodes and unknowns.
+INTERNAL = {
+    *("Backend", "Emitter", "Features", "Film", "Integrator", "IntegratorChoice", "ParsedScene"),
+    *("BasisFile", "GroupsFile", "PaintedView", "PlacementFile", "PlacementRecord", "ResultFolder"),
+    *("Loss", "Reduction", "SceneRequests", "Software", "Squares", "Stream", "SurfaceFilter"),
+    *("Progress", "TexelLayout", "Views"),
+}
+
+
+def test_what_public_attributes_hold_is_in_the_reference() -> None:
+    public = [getattr(lp, name) for name in lp.__all__ if name != "__version__"]
+    documented = {name for names in PARTS.values() for name in names} | set(lp.__all__)
+    seen: set[str] = set()
+    for value in (x for x in public if isinstance(x, type)):
+        for hint in [*attribute_types(value)]:
+            seen |= {x.__name__ for x in classes_in(hint)}
+    assert seen - documented - INTERNAL == set()
+    parts = {name for names in PARTS.values() for name in names}
+    assert parts & (set(lp.__all__) | INTERNAL) == set()
+
+
+def attribute_types(kind: type) -> Iterator[Any]:
+    """The annotations of a class's public attributes and of what its properties return."""
+    hints = get_type_hints(kind)
+    yield from (hint for name, hint in hints.items() if not name.startswith("_"))
+    for name, value in vars(kind).items():
+        getter = getattr(value, "fget", None) or getattr(value, "func", None)
+        if getter is not None and not name.startswith("_"):
+            yield get_type_hints(getter).get("return")
+
+
+def classes_in(hint: Any) -> Iterator[type]:
+    """The classes of lightpaint in an annotation."""
+    if isinstance(hint, type) and hint.__module__.startswith("lightpaint."):
+        yield hint
+    for part in get_args(hint):
+        yield from classes_in(part)
+
+
+def test_the_reference_names_nothing_that_readers_cannot_find() -> None:
+    """Modules, and names that begin with an underscore, are of those who read the code."""
+    values = [getattr(lp, name) for name in lp.__all__ if name != "__version__"]
+    values += [
+        getattr(import_module(f"lightpaint.{module}"), name)
+        for module, names in PARTS.items()
+        for name in names
+    ]
+    texts = [(value.__name__, inspect.getdoc(value) or "") for value in values]
+    for value in (x for x in values if isinstance(x, type)):
+        members = {k: x for k, x in vars(value).items() if not k.startswith("_")}
+        texts += [(f"{value.__name__}.{k}", inspect.getdoc(x) or "") for k, x in members.items()]
+    assert len(texts) > 400
+    modules = "|".join(path.stem for path in (REPOSITORY / "lightpaint").rglob("*.py"))
+    hidden = re.compile(rf"\b(?:{modules})\.py\b|`_\w+|\(see `?\w+\.\w+")
+    found = [(name, hidden.findall(text)) for name, text in texts]
+    assert [x for x in found if x[1]] == []
+
+
+def test_types_are_shown_without_modules() -> None:
+    array = "numpy.ndarray[tuple[Any, ...], numpy.dtype[numpy.float64]]"
+    assert short_type(f"{array} | None") == "array of float64 | None"
+    place = "lightpaint.scene.properties.site.EmitterPlace"
+    assert short_type(f"tuple[{place}, ...]") == "tuple[EmitterPlace, ...]"
 
 
 def test_every_option_of_every_command_is_in_the_reference(tmp_path: Path) -> None:

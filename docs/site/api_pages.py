@@ -118,6 +118,35 @@ GROUPS: dict[str, tuple[str, str, tuple[str, ...]]] = {
     ),
 }
 
+#: Classes that are no public names, of values in the attributes of those: by module, in the order
+#: of the groups.
+PARTS: dict[str, tuple[str, ...]] = {
+    "scene.lights.light": ("Light",),
+    "scene.properties.site": ("Site", "EmitterPlace"),
+    "basis.lights": ("Lights", "BasisLight"),
+    "basis.planes": ("Planes", "IndirectLight"),
+    "basis.origin": ("Origin",),
+    "basis.lightgroups.render_layers": ("RenderLayer",),
+    "lighting.constraints.constraints": ("Tie",),
+    "lighting.normal_equations": ("NormalEquations",),
+    "lighting.loss.reweighting": ("Reweighting",),
+    "lighting.problem": ("Refinement",),
+    "lighting.answer.active_bound": ("Bound",),
+    "lighting.answer.light_setting": ("LightSetting",),
+    "lighting.answer.lighting_keys": ("LightingKey",),
+    "colour.photometry": ("Photometry",),
+    "lighting.analysis.ambiguity": ("Ambiguity",),
+    "lighting.analysis.appearance.color_choices": ("ColorChoice",),
+    "lighting.analysis.appearance.limiting_reasons": ("Reason", "Loosening"),
+    "lighting.analysis.appearance.unpainted_change": ("UnpaintedChange",),
+    "lighting.analysis.diagnosis": ("Place",),
+    "placement.suggestions.suggestion": ("MoveSuggestion",),
+    "placement.new_lights": ("Mirror",),
+}
+
+PARTS_TITLE = "Values in attributes"
+PARTS_PURPOSE = "What other values are made of: M and b, lights, planes, bounds."
+
 
 def write_api(folder: Path) -> None:
     """Write a page for each group into a new folder, and one that lists them."""
@@ -130,18 +159,35 @@ def write_api(folder: Path) -> None:
         entries = [_entry(name) for name in names]
         page = "\n\n".join([_title(title), purpose, *entries])
         (folder / f"{key}.rst").write_text(page + "\n", encoding="utf-8")
+    (folder / "parts.rst").write_text(_parts_page() + "\n", encoding="utf-8")
+    pages = {key: (title, purpose) for key, (title, purpose, _) in GROUPS.items()}
+    pages["parts"] = PARTS_TITLE, PARTS_PURPOSE
     rows = [
         f"   * - :doc:`{title} <{key}>`\n     - {purpose}"
-        for key, (title, purpose, _) in GROUPS.items()
+        for key, (title, purpose) in pages.items()
     ]
     index = [
         _title("Python API"),
         "All public names, as ``import lightpaint as lp`` has them. :doc:`/python` shows them at "
         "work; :doc:`/stability` says which of them stay as they are.",
         ".. list-table::\n   :widths: 35 65\n\n" + "\n".join(rows),
-        ".. toctree::\n   :hidden:\n\n   " + "\n   ".join(GROUPS),
+        ".. toctree::\n   :hidden:\n\n   " + "\n   ".join(pages),
     ]
     (folder / "index.rst").write_text("\n\n".join(index) + "\n", encoding="utf-8")
+
+
+def _parts_page() -> str:
+    """Return the page of the classes that a program reads but does not make."""
+    note = (
+        "You get these from the public names and need not import them; their modules may change "
+        "from version to version."
+    )
+    entries = [
+        f"{_title(name, '-')}\n\n.. autoclass:: lightpaint.{module}.{name}\n   :members:"
+        for module, names in PARTS.items()
+        for name in names
+    ]
+    return "\n\n".join([_title(PARTS_TITLE), PARTS_PURPOSE, note, *entries])
 
 
 def _entry(name: str) -> str:

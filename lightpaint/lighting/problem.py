@@ -45,7 +45,7 @@ TANGENT_REACH = 32.0
 
 @dataclass(frozen=True)
 class Refinement:
-    """The noise in the last step to an answer (see analysis/noise/refinement.py).
+    """The noise in the last step to an answer, by `lp.refine`.
 
     before: (n, 3), the weights at its start.
     noise: (h, w, 3), half difference of the prediction there, as far as it influenced the step.
@@ -66,7 +66,7 @@ class Problem(LinearProblem):
 
     Attributes:
         basis: The basis of all views together.
-        views: Basis and target of each view (joined_views.py).
+        views: Basis and target of each view.
         loss: The loss of a picture.
         squares: The linear problem that approximates the loss, or the loss itself if it is linear;
             before a solve, the literal squares of the painting.

@@ -62,9 +62,8 @@ def place(
 ) -> Placement:
     """Search for the poses of lights that bring `solution` closest to its painting.
 
-    The search uses light along frozen paths (paths/frozen_paths.py). For exact images and weights,
-    render bases of the returned scenes and solve again. Constraints of the solution hold
-    throughout.
+    The search uses light along frozen paths. For exact images and weights, render bases of the
+    returned scenes and solve again. Constraints of the solution hold throughout.
 
     Args:
         scenes: The scene of `bases`, on the same film or a larger one; through the sensor of each

@@ -46,15 +46,15 @@ class Verification(Shown):
             1 if there is only noise; slightly more if the noise consists of rare bright samples.
         z_mean: (3,), difference of the sums over the whole image, in standard errors.
         z_pattern: Correlation between the differences of the two halves, block by block, in
-            standard errors (see `_pattern`): 0 on average for noise, larger for a local error.
+            standard errors: 0 on average for noise, larger for a local error.
         rmse: Root mean square difference of the pixels, in radiance.
         noise_rmse: The value of `rmse` expected from noise alone.
         delta_e_mean: Mean CIEDE2000, at an exposure metered on the render.
         delta_e_95: 95th percentile of the same.
-        z_lights: For each lit light, the difference along its picture in standard errors
-            (light_tests.py); empty if not computed.
+        z_lights: For each lit light, the difference along its picture in standard errors;
+            empty if not computed.
         power: For each lit light, the probability that this render would have disagreed with an
-            error of 5 % in it (detection_power.py); None if not computed.
+            error of 5 % in it; None if not computed.
         limit: Standard errors beyond which a difference counts as real; larger if the render was
             examined several times, so that correct renders pass as often.
         spp: Samples per pixel that were rendered; None if unknown.

@@ -111,7 +111,7 @@ def read_light_groups(
         path: EXR file or folder. In a folder, hidden files, lightpaint's own output and recognised
             paintings are skipped; `remarks` lists them.
         pattern: Pattern of the layers, parts or files that are lights, such as `Light_{name}`; by
-            default the names that known renderers use (naming_conventions.py).
+            default the names that known renderers use.
         leave_out: Files of the folder that are not lights, such as the painting.
 
     Raises:

@@ -18,7 +18,9 @@ class Certificate:
     """The certificate of a solve's optimality, per colour channel (R, G, B).
 
     Attributes:
-        kkt_residual: Optimality measure of the solver (see solver.kkt_residual).
+        kkt_residual: How far the weights are from optimal: the largest part of the gradient that no
+            bound holds, relative to b, with lights scaled so that M has a unit diagonal. 0 at the
+            optimum. docs/method.md has the formula.
         objective: ‖Ψ − Σ w_i Φ_i‖² under the importance.
         relative_objective: The objective divided by ‖Ψ‖².
         sweeps: Gauss–Seidel sweeps per channel; 0 if Newton steps sufficed.
@@ -32,7 +34,7 @@ class Certificate:
         display: The view transform of the objective; "" for linear light.
         rounds: The number of linear problems solved in turn, the last of which is certified.
         hold: Weight of unpainted pixels, which holds them to the current look, relative to painted
-        ones.
+            ones.
         colors: The freedom of lamps to change their colour: `free`, `gentle` or `white`.
         noise_removed: Share of the noise that was removed from the equations.
         delta_e: Mean CIEDE2000 between the prediction and the painting, over the paint.

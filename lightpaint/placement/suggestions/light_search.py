@@ -52,7 +52,8 @@ def suggest_lights(
         progress: Receives progress.
 
     Raises:
-        SceneError: For scenes that `check_suggestible` refuses.
+        SceneError: For scenes with fog or another medium, or with an integrator or a variant whose
+            paths cannot be traced.
 
     Examples:
         >>> lp.suggest_lights(lp.load_scene("room.xml"), basis, lp.solve(basis, target))

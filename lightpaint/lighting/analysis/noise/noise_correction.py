@@ -34,15 +34,15 @@ SHARE_STEPS = 8
 def correct_noise(solution: Solution, *, share: float | None = None) -> Solution:
     """Solve the equations without a share of the noise power in M and b.
 
-    With many lights, the equations use light averaged along surfaces (smooth_light.py).
+    With many lights, the equations use light averaged along surfaces.
     A fit of blocks of pixels has already averaged most of the noise; its solution stays as it is.
     If squares stand for another loss, the share is lowered until this loss falls, too: far from the
     answer the squares do not represent it.
 
     Args:
         solution: The solution to correct, where the solve starts.
-        share: 0 to 1; the most promising one by default (see `_best_share`). docs/method.md has
-            measurements.
+        share: 0 to 1; by default the one with the least expected error of bias and scatter
+            together. docs/method.md has measurements.
 
     Raises:
         BasisError: If the noise is unknown.

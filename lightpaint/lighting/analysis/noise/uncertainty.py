@@ -38,7 +38,7 @@ class Uncertainty:
     Attributes:
         weights: (n, 3), as solved.
         scatter: (n, 3), standard deviation of the weights between seeds. For a light that is off
-            or at a limit, the part on the side where it may go (see weight_spread.py).
+            or at a limit, the part on the side where it may go.
         bias: (n, 3), the rise of the weights without the noise power in M.
         interval: The 95 % interval of each weight, lower and upper ends, (n, 3) each. At 0 or at a
             limit it has one side, which is never empty.
@@ -92,7 +92,7 @@ def error_bars(solution: Solution) -> Uncertainty | None:
     are of the last linear problem.
 
     Fixed or locked lights have an error of 0; that of lights which reach nothing is unknown. Noise
-    may have pushed a weight to 0 or to a limit: it has an interval on one side (weight_spread.py).
+    may have pushed a weight to 0 or to a limit: it has an interval on one side.
 
     Args:
         solution: From `solve`, `refine` or `correct_noise`.
