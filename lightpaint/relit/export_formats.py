@@ -24,10 +24,15 @@ from lightpaint.relit.export.scene_script import scene_script
 from lightpaint.relit.export.sky_maps import SkyMap
 from lightpaint.relit.export.usd import check_usd, usd_overrides
 from lightpaint.relit.export.usd_groups import usd_multipliers
-from lightpaint.relit.light_maps import WallImage, sky_maps_of, wall_images_of
+from lightpaint.relit.light_maps import (
+    SlideImage,
+    WallImage,
+    sky_maps_of,
+    slide_images_of,
+    wall_images_of,
+)
 from lightpaint.relit.relight import scene_of
 from lightpaint.relit.xml_patch import emitters_of, scene_patch
-from lightpaint.scene.lights.texels.texel import images_of
 from lightpaint.scene.scene import Scene
 
 #: Name of the file in each format, for a scene and for light groups; None if not available.
@@ -126,23 +131,17 @@ def write_content(path: Path, content: str | Floats) -> None:
         write_rgb(path, content)
 
 
-def _maps(names: Collection[str], lighting: Lighting, source: Source) -> list[SkyMap | WallImage]:
-    """Return the maps of image lights that some of the formats refer to.
+#: The map of an image light.
+AnyMap = SkyMap | WallImage | SlideImage
 
-    Raises LightpaintError for slides, which these formats do not have.
-    """
+
+def _maps(names: Collection[str], lighting: Lighting, source: Source) -> list[AnyMap]:
+    """Return the maps of image lights that some of the formats refer to."""
     forms = [form for form in names if form in WITH_MAPS]
     if not forms or source.scene is None:
         return []
-    skies, walls = sky_maps_of(source.scene, lighting), wall_images_of(source.scene, lighting)
-    maps: list[SkyMap | WallImage] = [*skies, *walls]
-    members = [name for names in lighting.members.values() for name in names]
-    if others := sorted({*images_of(members)} - {x.name for x in maps}):
-        raise LightpaintError(
-            f"{forms[0]} cannot set the texels of {some_names(others)}: load the image that "
-            "relight writes beside its relit.xml, an EXR in linear light"
-        )
-    return maps
+    finders = (sky_maps_of, wall_images_of, slide_images_of)
+    return [one for maps_of in finders for one in maps_of(source.scene, lighting)]
 
 
 def _exported(lighting: Lighting, source: Source) -> tuple[Lighting, str]:
@@ -172,7 +171,7 @@ def _writer_of(
     source: Source,
     folder: Path,
     listen: Listener,
-    maps: Sequence[SkyMap | WallImage],
+    maps: Sequence[AnyMap],
 ) -> Callable[[], str]:
     """Return a function that makes the text of one format. See `writers_of` for the arguments."""
     if form in ("csv", "json"):
@@ -187,6 +186,7 @@ def _writer_of(
     skies = {one.name: one.file for one in maps if isinstance(one, SkyMap)}
     walls = {one.name: one for one in maps if isinstance(one, WallImage)}
     files = {name: wall.file for name, wall in walls.items()}
+    slides = [one for one in maps if isinstance(one, SlideImage)]
     if form == "blender":
         return lambda: scene_script(
             *(lighting.target, name, emitters),
@@ -194,10 +194,16 @@ def _writer_of(
             up=lighting.up,
             skies=skies,
             walls=files,
+            slides={one.name: (one.file, one.position, one.axes, one.half_size) for one in slides},
         )
     panels = {name: file for name, file in files.items() if walls[name].is_rectangle}
     if meshes := sorted({*files} - {*panels}):
         listen.say(f"USD has no image for {some_names(meshes)}, a mesh: set it by hand")
+    if slides:
+        listen.say(
+            f"USD has no projector for {some_names(one.name for one in slides)}: give a light the "
+            f"slide by hand, {some_names(one.file for one in slides)}"
+        )
     return lambda: _usd_layer(lighting, source, emitters, folder, listen, skies, panels)
 
 

@@ -1,4 +1,4 @@
-"""The maps of image lights for other programs: of skies all around, and of walls."""
+"""The maps of image lights for other programs: of skies all around, walls and slides."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import Floats
+from lightpaint.arrays import Doubles, Floats, Position
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.emission_xml import safe_name
 from lightpaint.relit.export.sky_maps import SkyMap, lat_long, map_axes, map_size_for
 from lightpaint.relit.relight import scene_of
 from lightpaint.relit.relit_files import enlarged, images_of_texels, settings_of
 from lightpaint.scene.lights.emitters import Emitter
-from lightpaint.scene.lights.texels.flat_images import Wall
+from lightpaint.scene.lights.texels.flat_images import Slide, Wall
 from lightpaint.scene.lights.texels.sky import Sky
 from lightpaint.scene.scene import Scene
 
@@ -37,6 +37,22 @@ class WallImage:
     file: str
     image: Floats
     is_rectangle: bool
+
+
+@dataclass(frozen=True)
+class SlideImage:
+    """The slide of a projector: name of the light, name of the file, and image (h, w, 3), upright.
+
+    position: of the projector. axes: the rows of its axes x, to the right of the image, y, upwards,
+    and z, against the light. half_size: half the width and height of the slide at distance 1.
+    """
+
+    name: str
+    file: str
+    image: Floats
+    position: Position
+    axes: tuple[Position, ...]
+    half_size: tuple[float, float]
 
 
 def sky_maps_of(scene: Scene, lighting: Lighting) -> list[SkyMap]:
@@ -71,6 +87,59 @@ def wall_images_of(scene: Scene, lighting: Lighting) -> list[WallImage]:
         is_rectangle = regrouped_scene.parsed.shape_plugin(light.node) == "rectangle"
         images.append(WallImage(name, f"{safe_name(name)}.image.exr", shown, is_rectangle))
     return images
+
+
+def slide_images_of(scene: Scene, lighting: Lighting) -> list[SlideImage]:
+    """Return the slides of all projectors whose texels are adjusted."""
+    images = []
+    for regrouped_scene, light, image in _images(scene, lighting):
+        if light.texel is None or not isinstance(light.texel.domain, Slide):
+            continue
+        name, size = light.texel.image, light.texel.layout.size
+        width = max(WALL_COLUMNS, TEXEL_COLUMNS * size[0])
+        shown_size = scene.map_size or light.texel.domain.picture_size(size, width)
+        shown = enlarged(image, light, shown_size)
+        props: Any = regrouped_scene.parsed.state.nodes[light.node].props
+        to_world = np.eye(4)
+        if "to_world" in props:
+            to_world = np.array(props["to_world"].matrix, float).reshape(4, 4)
+        # A projector of Mitsuba has its x axis to the left, and shines along z.
+        axes = to_world[:3, :3].T * np.array([[-1.0], [1.0], [-1.0]])
+        axes = axes / np.linalg.norm(axes, axis=1, keepdims=True)
+        columns, rows = scene.map_size or size
+        images.append(
+            SlideImage(
+                name,
+                f"{safe_name(name)}.slide.exr",
+                shown,
+                _position(to_world[:3, 3]),
+                tuple(_position(axis) for axis in axes),
+                half_slide(props, columns / rows),
+            )
+        )
+    return images
+
+
+def _position(values: Doubles) -> Position:
+    x, y, z = values.tolist()
+    return x, y, z
+
+
+def half_slide(props: Any, aspect: float) -> tuple[float, float]:
+    """Return half the width and height of a projector's slide at distance 1.
+
+    props: of the projector, in which its field of view is as in Mitsuba's cameras. aspect: width
+    over height of the slide.
+    """
+    if "fov" in props:
+        half, axis = np.tan(np.radians(float(props["fov"])) / 2), str(props.get("fov_axis", "x"))
+    else:
+        length = float(str(props.get("focal_length", "50mm")).removesuffix("mm"))
+        half, axis = np.hypot(36, 24) / (2 * length), "diagonal"
+    if axis in ("smaller", "larger"):
+        axis = "x" if (aspect < 1) == (axis == "smaller") else "y"
+    width = {"x": half, "y": half * aspect, "diagonal": half / np.hypot(1, 1 / aspect)}[axis]
+    return float(width), float(width / aspect)
 
 
 def _images(scene: Scene, lighting: Lighting) -> Iterator[tuple[Scene, Emitter, Floats]]:

@@ -44,12 +44,14 @@ def scene_script(
     up: Position = (0.0, 1.0, 0.0),
     skies: Mapping[str, str] = MappingProxyType({}),
     walls: Mapping[str, str] = MappingProxyType({}),
+    slides: Mapping[str, tuple[Any, ...]] = MappingProxyType({}),
 ) -> str:
     """Return the script, which leaves emitters without a plain colour, such as a sky, to the user.
 
     emitters: name, Mitsuba's parameter and emission of each adjusted emitter. places: places of all
     emitters in the answer. up: the scene's up axis. skies, walls: file of the map of each sky, and
-    of the image of each wall, by its name.
+    of the image of each wall, by its name. slides: by name of a projector, file of its slide,
+    position, rows of its axes, and half the width and height of the slide at distance 1.
     """
     rows, unset_names = [], []
     for name, parameter, emission in emitters:
@@ -66,6 +68,7 @@ def scene_script(
         left=repr(tuple(unset_names)),
         skies=_table(skies),
         walls=_table(walls),
+        slides=_table(slides),
         sky_axes=repr(np.round(blender_axes(up), 12).tolist()),
         **_placed(places, up),
     )

@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 from blender import in_blender
+from exported_files import export
 from renderer import write_room
 
 import lightpaint as lp
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.relit.export_formats import Source, write_content, writers_of
+from lightpaint.relit.export_formats import Source
 from lightpaint.scene.scene import Scene
 
 COLUMNS, ROWS = 6, 4
@@ -58,28 +59,6 @@ def seen_in_mitsuba(scene: Scene, folder: Path, lighting: Lighting) -> Any:
     ray = mi.Ray3f(mi.Point3f(points.reshape(-1, 3).T), mi.Vector3f(0, 0, -1))
     hit = loaded.ray_intersect(ray)
     return np.array(hit.emitter(loaded).eval(hit)).T.reshape(ROWS, COLUMNS, 3)
-
-
-class Remarks:
-    """A listener that keeps what is said."""
-
-    def __init__(self) -> None:
-        self.texts: list[str] = []
-
-    def __call__(self, done: int, total: int, unit: str) -> None:
-        pass
-
-    def say(self, text: str) -> None:
-        self.texts.append(text)
-
-
-def export(lighting: Lighting, source: Source, folder: Path, form: str, name: str) -> list[str]:
-    """Write the files of a format, and return what was said."""
-    remarks = Remarks()
-    writers, _ = writers_of({form: name}, lighting, source, folder, remarks)
-    for file, make in writers.items():
-        write_content(folder / file, make())
-    return remarks.texts
 
 
 @pytest.mark.parametrize("mesh", list(SHAPES))
@@ -137,14 +116,3 @@ def test_a_mesh_has_no_image_in_usd_and_says_so(tmp_path: Path) -> None:
     [remark] = export(lighting, Source(scene), tmp_path, "usd", "lights.usda")
     assert "USD has no image for screen, a mesh: set it by hand" in remark
     assert "texture" not in (tmp_path / "lights.usda").read_text()
-
-
-def test_a_slide_is_for_mitsuba_alone(tmp_path: Path) -> None:
-    projector = """<emitter type="projector" id="slide"><transform name="to_world">
-        <lookat origin="0 1 2" target="0 0 0" up="0 1 0"/></transform>
-        <float name="fov" value="40"/><rgb name="irradiance" value="3 3 3"/></emitter>"""
-    path = write_room(tmp_path, lights=projector)
-    scene = lp.load_scene(path, split={"slide": (2, 2)})
-    lighting = Lighting.current(lp.render_basis(scene, spp=2))
-    with pytest.raises(lp.LightpaintError, match="blender cannot set the texels of slide: load"):
-        export(lighting, Source(scene), tmp_path, "blender", "set_scene.py")
