@@ -24,6 +24,7 @@ from lightpaint.report.answer_pictures import (
     target_picture,
 )
 from lightpaint.report.clean_pictures import CleanLooks
+from lightpaint.report.phrases import spoken_progress
 from lightpaint.target.target import Target
 
 #: Narrower images are enlarged, pixel by pixel, until their captions can be read.
@@ -200,7 +201,7 @@ def _short_verdict(appearance: Appearance) -> str:
         if appearance.is_close
         else "out of reach"
         if appearance.is_far
-        else "part of the way"
+        else spoken_progress(appearance.share_met).lower()
     )
     delta_e, noise = appearance.delta_e, appearance.noise
     return f"{word}: mean dE {delta_e:.1f} (noise {noise:.1f})"

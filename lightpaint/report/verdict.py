@@ -7,15 +7,17 @@ from lightpaint.colour.color import luminance
 from lightpaint.display_text import some_names
 from lightpaint.images.estimate import Estimate
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.appearance.appearance import Appearance, compare_appearance
+from lightpaint.lighting.analysis.appearance.appearance import CLOSE, Appearance, compare_appearance
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.detection_power import ERROR
 from lightpaint.relit.verification import Verification
 from lightpaint.report.phrases import (
+    NO_CLOSER_TEXT,
     spoken_difference,
     spoken_elsewhere,
     spoken_percent,
+    spoken_progress,
     spoken_where,
 )
 from lightpaint.scene.lights.texels.texel import image_of
@@ -107,7 +109,9 @@ def spoken_current(appearance: Appearance) -> str:
 
 def _paint_headline(appearance: Appearance) -> str:
     if appearance.is_close and not (appearance.is_spot and appearance.place):
-        return "Close: it looks as painted."
+        # A mean ΔE of more than CLOSE is shown beside it, if noise is what is above.
+        is_noisy = round(appearance.delta_e, 1) > CLOSE
+        return f"Close: {'apart from noise, ' if is_noisy else ''}it looks as painted."
     if appearance.place is None:
         return f"{_headline_start(appearance)}: too much of what was painted is out of reach."
     if appearance.is_far:
@@ -126,7 +130,8 @@ def _headline_start(appearance: Appearance) -> str:
     if appearance.is_close:
         return "Close, but"
     if not appearance.is_far:
-        return "Part of the way, but"
+        far = spoken_progress(appearance.share_met)
+        return f"{far}, and" if far == NO_CLOSER_TEXT else f"{far}, but"
     # "The lights cannot" would not be true if something else holds them.
     if appearance.causes or _are_kept(appearance):
         return "Constraints keep the lights from this"
@@ -235,7 +240,7 @@ def spoken_delta_e(appearance: Appearance, *, known: bool) -> str:
 
 
 def spoken_blindness(verification: Verification) -> str:
-    """Name the least detectable lights: `The render would probably have missed … in bulb`."""
+    """Name the least detectable lights: `An error of 5 % in bulb would probably not show …`."""
     power = verification.power or {}
     other_names = joined_texels(name for name in power if name not in verification.unseen)
     unseen = joined_texels(verification.unseen)
@@ -251,7 +256,7 @@ def spoken_blindness(verification: Verification) -> str:
         ] + [f"{unnamed} more"] * (unnamed > 0)
         *first_phrases, last = visible_names
         names = f"{', '.join(first_phrases)} and {last}" if first_phrases else last
-    return f"The render would probably have missed an error of {100 * ERROR:.0f} % in {names}"
+    return f"An error of {100 * ERROR:.0f} % in {names} would probably not show in this render"
 
 
 def spoken_samples(spp: int | None) -> str:

@@ -22,11 +22,13 @@ from lightpaint.report.diagnosis_sentences import (
     spoken_shares,
 )
 from lightpaint.report.phrases import (
+    NO_CLOSER_TEXT,
     spoken_amount,
     spoken_changed,
     spoken_part,
     spoken_percent,
     spoken_place,
+    spoken_progress,
 )
 from lightpaint.report.uncertainty_sentences import spoken_errors
 from lightpaint.report.verdict import headline, spoken_missing, spoken_reason
@@ -35,18 +37,6 @@ from lightpaint.report.verdict import headline, spoken_missing, spoken_reason
 #: under which one is off.
 WHITE, OFF = 0.02, 1e-4
 
-
-#: Phrases for the share of the painting that the answer achieves, with their least shares.
-PROGRESS_PHRASES = (
-    (0.85, "Nearly there"),
-    (0.6, "Most of the way"),
-    (0.4, "About half way"),
-    (0.15, "Part of the way"),
-    (0.0, "A first step"),
-)
-
-#: Phrase for an answer that is no closer to the paint than the current look.
-NO_CLOSER_TEXT = "No closer than the current lighting"
 
 #: Phrase for an answer that is farther from the paint.
 WORSE_TEXT = "Farther from the paint than the current lighting, which undo brings back"
@@ -220,13 +210,13 @@ def _progress_phrase(appearance: Appearance) -> str:
     There is no praise if the rest has changed by more than the paint has come closer.
     """
     rest = appearance.unpainted_change if appearance.changes_unpainted else None
-    if appearance.share_met < 0.005:  # which would round to 0 %
-        phrase = WORSE_TEXT if appearance.is_worse else NO_CLOSER_TEXT
+    far = spoken_progress(appearance.share_met)
+    if far == NO_CLOSER_TEXT:
+        phrase = WORSE_TEXT if appearance.is_worse else far
     elif rest is not None and appearance.is_at_cost:
         cost = f"{spoken_part(rest)} (ΔE {spoken_amount(rest.worst)})"
         return f"{spoken_percent(appearance.share_met)} of the way, at the cost of {cost}"
     else:
-        far = next(words for least, words in PROGRESS_PHRASES if appearance.share_met >= least)
         phrase = f"{far} ({spoken_percent(appearance.share_met)})"
     return phrase if rest is None else f"{phrase}, and changes {spoken_changed(rest)}"
 

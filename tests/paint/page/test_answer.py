@@ -487,19 +487,19 @@ def test_escape_gives_up_the_stroke_before_it_closes_anything(painter: Painter) 
 HELPS: list[tuple[dict[str, Any], str, str, dict[str, Any]]] = [
     (
         {"kind": "hold", "hold": 0.8, "gain": 0.35},
-        "Loosen: 35 % closer",
+        "Loosen: 35 % less difference",
         "change_settings",
         {"hold": 0.8},
     ),
     (
         {"kind": "colors", "gain": 0.6},
-        "Any colour: 60 % closer",
+        "Any colour: 60 % less difference",
         "change_settings",
         {"colors": "free"},
     ),
     (
         {"kind": "off", "names": ["key"], "gain": 0.57},
-        "Turn on key: 57 % closer",
+        "Turn on key: 57 % less difference",
         "constrain_lights",
         {"key": {}},
     ),

@@ -33,7 +33,8 @@ export const en = {
     lights: '{count} lights',
     loosenTheHoldTo: 'Loosen the hold to {number}',
     ignoreUnpaintedParts: 'Ignore unpainted parts',
-    closer: ': {value} % closer',
+    lessDifference: ': {value} % less difference',
+    removesOfTheDifference: ' removes {value} % of the difference between answer and painting',
     showsAPreviewFirst: '{name}{gain}. Shows a preview first.',
     letLightsMove: 'Let lights move',
     searchForPlacesAndDirectionsOf:

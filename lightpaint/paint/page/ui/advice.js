@@ -103,10 +103,15 @@ export function AdviceButton({ ui, app }) {
   const change = advice && changeOf(advice, ui, app.session);
   if (!advice || !change) return null;
   const name = nameOf(advice, ui);
-  const gain =
-    advice.gain === null ? '' : fill(words.advice.closer, { value: Math.round(100 * advice.gain) });
+  /** @param {string} text */
+  const withGain = (text) =>
+    advice.gain === null ? '' : fill(text, { value: Math.round(100 * advice.gain) });
+  const gain = withGain(words.advice.lessDifference);
   return html`<${Button} label=${`${nameOf(advice, ui, BUTTON_NAME_MAX_LENGTH)}${gain}`} class="help"
-    tip=${fill(words.advice.showsAPreviewFirst, { name, gain })}
+    tip=${fill(words.advice.showsAPreviewFirst, {
+      name,
+      gain: withGain(words.advice.removesOfTheDifference),
+    })}
     act=${() => app.session.preview(titleOf(advice, name), change)} />`;
 }
 
