@@ -1,5 +1,7 @@
 """Sphinx's configuration of the site; `docs/build` stages the sources and runs it."""
 
+import inspect
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -83,6 +85,7 @@ html_theme_options = {
 def setup(app: Any) -> None:
     """Register what is done to every page."""
     app.connect("autodoc-process-docstring", keep_colons, priority=400)  # before napoleon
+    app.connect("autodoc-process-docstring", mark_names, priority=400)
     app.connect("doctree-resolved", dash_fields)
 
 
@@ -93,6 +96,26 @@ def keep_colons(app: Any, what: str, name: str, value: Any, options: Any, lines:
     """
     if what == "property":
         lines[:0] = ["..", ""]
+
+
+def mark_names(app: Any, what: str, name: str, value: Any, options: Any, lines: list[str]) -> None:
+    """Show as code the names in `name: what it is. other: what that is.` of a docstring.
+
+    They are those of arguments or fields, before the first section.
+    """
+    try:
+        names = "|".join(inspect.signature(value).parameters)
+    except (TypeError, ValueError):
+        return
+    pattern = re.compile(rf"(?:^|(?<=[.;] ))(?:(?:{names})(?:, (?=\w)|(?=:)))+: ")
+    for number, line in enumerate(lines):
+        if line in SECTIONS:
+            return
+        lines[number] = pattern.sub(lambda match: re.sub(r"\w+", r"`\g<0>`", match[0]), line)
+
+
+#: Headings after which a docstring lists names itself.
+SECTIONS = ("Args:", "Attributes:", "Returns:", "Raises:", "Examples:")
 
 
 def dash_fields(app: Any, doctree: nodes.document, name: str) -> None:

@@ -6,6 +6,7 @@ import re
 import sys
 from collections.abc import Iterator
 from importlib import import_module
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
@@ -92,6 +93,22 @@ def test_the_reference_names_nothing_that_readers_cannot_find() -> None:
     hidden = re.compile(rf"\b(?:{modules})\.py\b|`_\w+|\(see `?\w+\.\w+")
     found = [(name, hidden.findall(text)) for name, text in texts]
     assert [x for x in found if x[1]] == []
+
+
+def test_names_of_arguments_are_shown_as_code() -> None:
+    def mix(red: float, green: float, blue: float) -> None:
+        """Mix."""
+
+    pytest.importorskip("docutils", reason="docutils")
+    spec = spec_from_file_location("site_conf", REPOSITORY / "docs" / "conf.py")
+    assert spec is not None
+    assert spec.loader is not None
+    conf = module_from_spec(spec)
+    spec.loader.exec_module(conf)
+    lines = ["Mix.", "", "red: the first. green, blue: others: two; red: twice.", "Args:", "red: x"]
+    conf.mark_names(None, "function", "mix", mix, None, lines)
+    assert lines[2] == "`red`: the first. `green`, `blue`: others: two; `red`: twice."
+    assert lines[3:] == ["Args:", "red: x"]
 
 
 def test_types_are_shown_without_modules() -> None:
