@@ -253,12 +253,12 @@ class EditState:
     constraints: by name of light, keys and values as in a lights file. ties: names on one dimmer.
     settings: those that were set. effective_settings: those in effect. poses: of moved lights, by
     name. added_lights: names of lights that the scene does not have. places: a text, equal for
-    equal places of all lights; "" if all hang as in the scene. layers: of the painting.
+    equal places of all lights; "" if all hang as in the scene. layers: of the painting. master:
+    factor of all lights but fixed ones, by the master dimmer: a light shines at `master` times its
+    weight. selection: the part of the painting that strokes keep to.
 
-    master: factor of all lights but fixed ones, by the master dimmer: a light shines at `master`
-    times its weight. selection: the part of the painting that strokes keep to. earlier: constraints
-    of lights that are locked or off, by name, from before they were, to be sent when they are
-    released.
+    earlier: constraints of lights that are locked or off, by name, from before they were, to be
+    sent when they are released.
     """
 
     history: HistoryInfo | None = field(default=None, metadata=OPTIONAL)
