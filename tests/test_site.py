@@ -42,7 +42,7 @@ INTERNAL = {
     *("Backend", "Emitter", "Features", "Film", "Integrator", "IntegratorChoice", "ParsedScene"),
     *("BasisFile", "GroupsFile", "PaintedView", "PlacementFile", "PlacementRecord", "ResultFolder"),
     *("Loss", "Reduction", "SceneRequests", "Software", "Squares", "Stream", "SurfaceFilter"),
-    *("Progress", "TexelLayout", "Views"),
+    *("TexelLayout", "Views"),
 }
 
 

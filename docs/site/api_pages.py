@@ -118,8 +118,8 @@ GROUPS: dict[str, tuple[str, str, tuple[str, ...]]] = {
     ),
 }
 
-#: Classes that are no public names, of values in the attributes of those: by module, in the order
-#: of the groups.
+#: Classes that are no public names, of values in attributes and arguments of those: by module, in
+#: the order of the groups.
 PARTS: dict[str, tuple[str, ...]] = {
     "scene.lights.light": ("Light",),
     "scene.properties.site": ("Site", "EmitterPlace"),
@@ -142,6 +142,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "lighting.analysis.diagnosis": ("Place",),
     "placement.suggestions.suggestion": ("MoveSuggestion",),
     "placement.new_lights": ("Mirror",),
+    "progress": ("Progress",),
 }
 
 PARTS_TITLE = "Values in attributes"
@@ -182,8 +183,9 @@ def _parts_page() -> str:
         "You get these from the public names and need not import them; their modules may change "
         "from version to version."
     )
+    options = "\n   :members:\n   :special-members: __call__"
     entries = [
-        f"{_title(name, '-')}\n\n.. autoclass:: lightpaint.{module}.{name}\n   :members:"
+        f"{_title(name, '-')}\n\n.. autoclass:: lightpaint.{module}.{name}{options}"
         for module, names in PARTS.items()
         for name in names
     ]
