@@ -19,13 +19,13 @@ MAX_NAME_CHARACTERS = 120
 #: Difference of painting and light, in chromaticity, that counts as another colour.
 COLOR_SHIFT = 0.06
 
-#: Phrases for the share of the requested change that the answer achieves, with their least shares.
+#: Phrases for the part of the requested change that the answer achieves, with their least percents.
 PROGRESS_PHRASES = (
-    (0.85, "Nearly there"),
-    (0.6, "Most of the way"),
-    (0.4, "About half way"),
-    (0.15, "Part of the way"),
-    (0.005, "A first step"),  # a smaller share rounds to 0 %
+    (85, "Nearly there"),
+    (60, "Most of the way"),
+    (40, "About half way"),
+    (15, "Part of the way"),
+    (1, "A first step"),
 )
 
 #: Phrase for an answer that is no closer to the paint than the current look.
@@ -34,7 +34,8 @@ NO_CLOSER_TEXT = "No closer than the current lighting"
 
 def spoken_progress(share: float) -> str:
     """Return how far an answer has come, `Most of the way`. share: achieved of the request."""
-    return next((words for least, words in PROGRESS_PHRASES if share >= least), NO_CLOSER_TEXT)
+    percents = round(100 * share)  # as the number beside it is rounded
+    return next((words for least, words in PROGRESS_PHRASES if percents >= least), NO_CLOSER_TEXT)
 
 
 def spoken_changed(unpainted_change: UnpaintedChange) -> str:

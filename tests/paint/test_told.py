@@ -46,6 +46,12 @@ PLACE = Place((1, 1), 0.9, (0, 0, 8, 8), (0.4, 0.4, 0.4), (0.1, 0.1, 0.1), "floo
             "too much else.",
         ),
         (
+            12.08,  # 39.6 %
+            {"local_lights": ("lamp",)},
+            "About half way (40 %). Brighter light on the floor is missing: lamp would light "
+            "too much else.",
+        ),
+        (
             6.0,
             {"reasons": (COLORS, SIDE)},
             "Most of the way (70 %). Brighter light on the floor is missing: lights keep "
