@@ -258,15 +258,17 @@ def _starts(part: PartLayout) -> list[int]:
     return [sum(sizes[:k]) for k in range(len(sizes))]
 
 
-def zip_filtered(data: bytes) -> bytes:
-    """Return bytes filtered for ZIP: even bytes before odd bytes, then differences."""
-    values = np.frombuffer(data, np.uint8)
-    separated = np.concatenate([values[0::2], values[1::2]])
+def zip_filtered(chunks: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
+    """Return the bytes of chunks, (k, b), filtered for ZIP.
+
+    The filter puts even bytes before odd bytes, and then takes differences.
+    """
+    separated = np.concatenate([chunks[:, 0::2], chunks[:, 1::2]], axis=1)
     steps = np.empty_like(separated)
-    steps[:1] = separated[:1]
-    np.subtract(separated[1:], separated[:-1], out=steps[1:])
-    steps[1:] += np.uint8(128)
-    return steps.tobytes()
+    steps[:, :1] = separated[:, :1]
+    np.subtract(separated[:, 1:], separated[:, :-1], out=steps[:, 1:])
+    steps[:, 1:] += np.uint8(128)
+    return steps
 
 
 def _unpacked(compressed: bytes, size: int) -> bytes:

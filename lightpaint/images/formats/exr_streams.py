@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from lightpaint.files import replacing
 from lightpaint.images.formats.exr import VERSION_KEY, Channels, is_worth_packing
@@ -27,6 +28,9 @@ PLAIN_HEAD_BYTES = 2048
 
 #: OpenEXR's codes for no compression and for ZIP of 16 lines; and the ZIP level.
 PLAIN, ZIPPED, LEVEL = 0, 3, 4
+
+#: Approximate number of bytes of pixels that are prepared at a time.
+BLOCK_BYTES = 2**18
 
 
 #: Returns all channels of a part from one row to another.
@@ -109,22 +113,35 @@ class PartHead:
 
     def packed(self, channels: "Channels | Rows") -> Iterator[tuple[int, bytes]]:
         """Yield the first line and the bytes of each chunk of pixels."""
-        for first in range(0, self.size[0], self.lines):
-            last = min(first + self.lines, self.size[0])
+        line_bytes = sum(self.size[1] * kind.itemsize for kind in self.channels.values())
+        # Chunks of few bytes are filtered many at a time.
+        step = self.lines * max(1, BLOCK_BYTES // (line_bytes * self.lines))
+        for top in range(0, self.size[0], step):
+            bottom = min(top + step, self.size[0])
             if callable(channels):
-                chunk = channels(first, last)
+                block = channels(top, bottom)
             else:
-                chunk = {name: pixels[first:last] for name, pixels in channels.items()}
+                block = {name: pixels[top:bottom] for name, pixels in channels.items()}
             # A line stores its channels one after the other.
             parts = [
-                np.ascontiguousarray(chunk[name]).view(np.uint8).reshape(last - first, -1)
+                np.ascontiguousarray(block[name]).view(np.uint8).reshape(bottom - top, -1)
                 for name in sorted(self.channels)
             ]
-            data = np.concatenate(parts, axis=1).tobytes()
-            if self.is_packed:
-                small = zlib.compress(zip_filtered(data), LEVEL)
-                data = small if len(small) < len(data) else data
-            yield first, data
+            yield from self._chunks(np.concatenate(parts, axis=1), top)
+
+    def _chunks(self, rows: npt.NDArray[np.uint8], top: int) -> Iterator[tuple[int, bytes]]:
+        """Yield the chunks of lines from `top` on, whose bytes are rows."""
+        whole = len(rows) // self.lines * self.lines
+        for first, last in ((0, whole), (whole, len(rows))):
+            if first == last:
+                continue
+            lines = min(self.lines, last - first)
+            data = rows[first:last].reshape((last - first) // lines, -1)
+            filtered = zip_filtered(data) if self.is_packed else data
+            for k, (plain, steps) in enumerate(zip(data, filtered, strict=True)):
+                small = zlib.compress(steps, LEVEL) if self.is_packed else b""
+                is_smaller = self.is_packed and len(small) < len(plain)
+                yield top + first + k * lines, small if is_smaller else plain.tobytes()
 
 
 def write_streamed(
