@@ -31,18 +31,33 @@ export function imageOf(images, light) {
   return owner.get(light);
 }
 
+/** @type {WeakMap<number[][], Map<number, number>>} */
+const sums = new WeakMap();
+
+/** Return the part of an image that each of its lights covers: the sum of those of its places, of
+ * which there are many where some texels are finer. @param {LightImage} image
+ * @returns {Map<number, number>} */
+function coverage({ places, shares }) {
+  let sum = sums.get(places);
+  if (!sum) {
+    sum = new Map();
+    for (const [y, row] of places.entries())
+      for (const [x, k] of row.entries())
+        if (k >= 0) sum.set(k, (sum.get(k) ?? 0) + shares[y][x]);
+    sums.set(places, sum);
+  }
+  return sum;
+}
+
 /** Return the mean of an image, each texel by the part that it covers.
  * @param {LightImage} image @param {(light: number) => RGB} radiance @returns {RGB} */
-export function meanOf({ places, shares }, radiance) {
+export function meanOf(image, radiance) {
   const sum = [0, 0, 0];
   let total = 0;
-  places.forEach((row, y) =>
-    row.forEach((k, x) => {
-      if (k < 0) return;
-      total += shares[y][x];
-      radiance(k).forEach((value, c) => (sum[c] += shares[y][x] * value));
-    }),
-  );
+  for (const [k, share] of coverage(image)) {
+    total += share;
+    radiance(k).forEach((value, c) => (sum[c] += share * value));
+  }
   return /** @type {RGB} */ (sum.map((value) => value / (total || 1)));
 }
 
