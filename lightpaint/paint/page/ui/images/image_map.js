@@ -10,20 +10,26 @@ import { mapStops } from './light_images.js';
 /** Draw an image on a canvas; texels that are no lights stay transparent.
  * @param {HTMLCanvasElement} canvas @param {LightImage} image @param {RGB[]} weights
  * @param {number} stops exposure */
-export function drawMap(canvas, { places }, weights, stops) {
+export function drawMap(canvas, { places, lights }, weights, stops) {
   const [height, width] = [places.length, places[0].length];
   if (canvas.width !== width) canvas.width = width;
   if (canvas.height !== height) canvas.height = height;
   const pixels = new ImageData(width, height);
   const gain = 2 ** stops;
-  places.flat().forEach((k, i) => {
-    if (k < 0) return;
-    const rgb = weights[k] ?? [0, 0, 0];
+  const colourOf = (/** @type {RGB} */ rgb) => {
     // What is too bright keeps its hue, by which it is recognised where it was painted.
     const shown = Math.min(gain, 1 / Math.max(...rgb, 1e-30));
-    for (let c = 0; c < 3; c += 1) pixels.data[4 * i + c] = 255 * encode(shown * rgb[c]);
-    pixels.data[4 * i + 3] = 255;
-  });
+    return [...rgb.map((value) => 255 * encode(shown * value)), 255];
+  };
+  // Each light once: where some texels are finer, the others have many places.
+  const colours = new Map(lights.map((k) => [k, colourOf(weights[k] ?? [0, 0, 0])]));
+  let at = 0;
+  for (const row of places)
+    for (const k of row) {
+      const colour = colours.get(k);
+      if (colour) pixels.data.set(colour, at);
+      at += 4;
+    }
   canvas.getContext('2d')?.putImageData(pixels, 0, 0);
 }
 
