@@ -32,6 +32,9 @@ CHANGED = (255, 176, 66)
 #: Brightness of the room's points, and their largest side in pixels of the large drawing.
 ROOM, LARGEST = 0.45, 40
 
+#: Approximate number of pixels of the room's points that are drawn at a time.
+DRAWN_AT_ONCE = 2**14
+
 #: Length of a beam that meets no visible point, as a share of the panel.
 BEAM = 0.3
 
@@ -117,11 +120,13 @@ def _room(panel: Panel, geometry: ViewGeometry, colors: Doubles) -> npt.NDArray[
     for side in sorted({*sides[faces].tolist()}, reverse=True):
         shown_faces = np.flatnonzero(faces & (sides == side))
         shown_faces = shown_faces[np.argsort(depth[shown_faces])]
-        for i in range(side):
-            for j in range(side):
-                across, down = x[shown_faces] + i - side // 2, y[shown_faces] + j - side // 2
-                inside = (across >= 0) & (across < width) & (down >= 0) & (down < height)
-                image[down[inside], across[inside]] = shade[shown_faces[inside]]
+        offsets = np.indices((side, side)).reshape(2, -1, 1) - side // 2
+        step = max(1, DRAWN_AT_ONCE // max(1, len(shown_faces)))
+        for first in range(0, side * side, step):
+            i, j = offsets[:, first : first + step]
+            across, down = x[shown_faces] + i, y[shown_faces] + j
+            inside = (across >= 0) & (across < width) & (down >= 0) & (down < height)
+            image[down[inside], across[inside]] = shade[shown_faces[np.nonzero(inside)[1]]]
     return image
 
 
