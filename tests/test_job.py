@@ -56,6 +56,15 @@ def room(tmp_path: Path) -> Path:
     return write_room(tmp_path, lights=lights, sensors=SIDE)
 
 
+def test_a_folder_may_be_a_text(room: Path) -> None:
+    """As everywhere else in Python, though attributes of a job are paths."""
+    scene = load_scene(room)
+    target = Target.of(np.ones((*scene.size, 3), np.float32))
+    job = Job((scene,), (target,), "evening")  # type: ignore[arg-type]
+    assert job.folder == Path("evening")
+    assert [view.folder for view in job.views] == [Path("evening")]
+
+
 def _flat(basis: Basis, **options: Any) -> Target:
     image, importance = basis.images.sum(axis=0), np.ones(basis.size, np.float32)
     return Target("flat", image, importance, everything=True, **options)

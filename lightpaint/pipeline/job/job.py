@@ -29,6 +29,7 @@ from lightpaint.pipeline.job.job_checks import (
     check_animation,
     check_inputs,
     check_painting_is_no_light,
+    check_places,
     rigging_for,
     sky_for_sun,
     wanted_sun,
@@ -82,7 +83,7 @@ class Job:
         scenes: The scene through the sensor of each view; empty to solve from `basis` alone,
             without a renderer.
         targets: The painting of each view.
-        folder: Receives the results.
+        folder: Receives the results; a path or its text.
         basis: Existing basis, of several views a tuple with one for each; taken from the cache or
             rendered if not given. With another renderer's light groups `folder` also receives files
             for other programs.
@@ -134,6 +135,7 @@ class Job:
     __repr__ = short_repr
 
     def __post_init__(self) -> None:
+        self._set(folder=Path(self.folder))
         given = self.given_bases
         check_inputs(self.scenes, self.targets, given, self.constraints, self.settings)
         if not self.scenes:
@@ -162,11 +164,7 @@ class Job:
             all_constraints = constraints_of(source.requests).and_then(all_constraints)
         if scenes and bases:
             check_same_view(scenes[0], bases[0])
-        if self.placement is not None and not scenes:
-            raise LightpaintError(
-                "lights can only hang elsewhere in their scene: give the scene, or leave "
-                "placement=... out"
-            )
+        check_places(self.placement, scenes)
         check_animation(self.settings, all_constraints, len(self.painted_frames))
         # Reports impossible constraints before rendering.
         reduce_to(all_constraints, self._lights(scenes, bases))

@@ -75,6 +75,15 @@ def check_painting_is_no_light(basis: Any, target: Target | Painting) -> None:
         )
 
 
+def check_places(placement: object, scenes: Sequence[object]) -> None:
+    """Raise LightpaintError if lights are to hang elsewhere in a scene that is not given."""
+    if placement is not None and not scenes:
+        raise LightpaintError(
+            "lights can only hang elsewhere in their scene: give the scene, or leave "
+            "placement=... out"
+        )
+
+
 def with_same_lights(bases: Sequence[Basis | LightGroups]) -> list[Basis | LightGroups]:
     """Return the bases of all views with the same lights.
 
