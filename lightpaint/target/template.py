@@ -257,7 +257,10 @@ def find_template(painting: Path) -> Path | None:
     if it is the only one, and `template/` in the current folder.
     """
     folder = painting.parent
-    beside = [record.parent for record in folder.glob(f"*/{RECORD_FILE}")]
+    # Other programs also have files of its record's name.
+    beside = [
+        x.parent for x in folder.glob(f"*/{RECORD_FILE}") if x.with_name(SHOWN_FILE).is_file()
+    ]
     places = (folder, folder / "template", *(beside if len(beside) == 1 else ()), Path("template"))
     return next((place for place in places if (place / RECORD_FILE).is_file()), None)
 

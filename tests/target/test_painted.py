@@ -137,6 +137,8 @@ def test_the_only_template_beside_a_painting_is_found_under_any_name(tmp_path: P
     template = template_of()
     save(tmp_path / "p8.png", brushed(template.shown)[0], template.transform)
     write(tmp_path / "monday", template)
+    (tmp_path / "job").mkdir()
+    (tmp_path / "job" / "template.json").write_text("{}")  # as jobs of render farms have it
     assert not read_target(tmp_path / "p8.png").everything
     write(tmp_path / "tuesday", template)
     target = read_target(tmp_path / "p8.png")

@@ -23,10 +23,6 @@ MAX_STEP = 6.0
 #: shrinkage after one that helped; its minimum; and the trials of a step.
 RIDGE, RIDGE_GROWTH, RIDGE_SHRINK, LEAST_RIDGE, TRIALS = 1e-2, 6.0, 4.0, 1e-5, 5
 
-#: Steps that may follow with the same slopes, and the share of the error, which the last one must
-#: have removed for that.
-REPEATS, WORTH_REPEAT = 2, 0.02
-
 #: Length of the first finite differences, relative to the spread of visible points; the least
 #: length relative to that; and the factors after a step that helped, and after one without
 #: progress.
@@ -177,22 +173,17 @@ class PoseSteps:
         if not any(len(scale) for scale in scales.values()):
             return arrangement, ridge
         slopes = self._slopes(arrangement, at, scales, step)
-
-        def trial(start: Arrangement) -> Arrangement:
-            matrix, gradient = self._fit.newton(start.fitted, slopes)
+        matrix, gradient = self._fit.newton(arrangement.fitted, slopes)
+        movables = arrangement.movables
+        for _ in range(TRIALS):
             change = np.linalg.solve(matrix + ridge * np.diag(_diagonal(matrix)), gradient)
             change = np.clip(change, -MAX_STEP * step, MAX_STEP * step)
-            sites = self._stepped(start, start.sites, change, scales)
-            if not self._permits(start.movables, sites):
-                return start
-            fitted = self._moved(start, sites, [*scales], at)
-            return Arrangement(start.movables, tuple(sites), fitted)
-
-        for _ in range(TRIALS):
-            stepped = trial(arrangement)
-            if stepped.missed < arrangement.missed * (1 - 1e-7):
-                ridge = max(ridge / RIDGE_SHRINK, LEAST_RIDGE)
-                return _repeated(trial, arrangement, stepped), ridge
+            sites = self._stepped(arrangement, arrangement.sites, change, scales)
+            if self._permits(movables, sites):
+                fitted = self._moved(arrangement, sites, [*scales], at)
+                if fitted.missed < arrangement.missed * (1 - 1e-7):
+                    ridge = max(ridge / RIDGE_SHRINK, LEAST_RIDGE)
+                    return Arrangement(movables, tuple(sites), fitted), ridge
             ridge *= RIDGE_GROWTH
         return arrangement, ridge
 
@@ -280,23 +271,6 @@ class PoseSteps:
         """Return the amounts of a pose's numbers that are equivalent to sliding by one unit."""
         place, turn, cone = light.dimensions(site)
         return np.array([1.0] * place + [1 / self._unit] * (turn + cone))
-
-
-def _repeated(
-    trial: Callable[[Arrangement], Arrangement], before: Arrangement, stepped: Arrangement
-) -> Arrangement:
-    """Return the arrangement after more steps with the slopes of the last, as far as they help.
-
-    Slopes take a column for each number of a pose, and a step takes one for each light.
-    """
-    for _ in range(REPEATS):
-        if before.missed - stepped.missed < WORTH_REPEAT * stepped.missed:
-            break
-        again = trial(stepped)
-        if again.missed >= stepped.missed:
-            break
-        before, stepped = stepped, again
-    return stepped
 
 
 def _diagonal(matrix: Doubles) -> Doubles:
