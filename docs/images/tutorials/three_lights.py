@@ -25,7 +25,7 @@ SCENE = "scenes/gallery/scene.xml"
 SMALL = ("--resolution", "1/2")
 
 #: The part of a report's section with the picture and the plan, and what is left around it.
-PLAN, MARGIN = (960, 1220), 24
+PLAN, MARGIN = (960, 1340), 24
 
 #: Glazes: multiplied with what is there.
 DUSK, WARM = (0.75, 0.85, 1.0), (1.0, 0.72, 0.45)
