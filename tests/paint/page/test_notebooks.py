@@ -176,7 +176,7 @@ def paste_picture(page: Any) -> None:
 
 
 def check_saved(page: Any, path: Path) -> None:
-    """What is saved follows what is painted, though the output of the cell is not shown."""
+    """Check that saving a notebook keeps the last painting, in an output that the page hides."""
     assert not page.locator(".lightpaint-saved").is_visible()
     end_s = time.monotonic() + SHOW_MS / 1000
     while True:
