@@ -258,6 +258,7 @@ def test_what_cannot_be_done_with_a_scene_is_said_before_it_renders(
     )
     check_refusal(TargetError, "2 targets for 1 views", scene, [target, target])
     check_refusal(SceneError, "given twice", [scene, scene], [target, target])
+    check_refusal(SceneError, "^the scene is of type ndarray: expected the path of", image, target)
     check_refusal(
         TargetError, "template of the sensor side, not of", scene, replace(target, sensor="side")
     )

@@ -139,6 +139,12 @@ def _job(
     targets = [
         Painting(str(x), **painting_options) if _is_path(x) else x for x in _as_list(targets)
     ]
+    for each in scenes:
+        if not isinstance(each, Scene | SceneFile):
+            raise SceneError(
+                f"the scene is of type {type(each).__name__}: expected the path of Mitsuba XML, a "
+                "loaded Scene, or None with a basis"
+            )
     if scene_options and not scenes:
         check_needed(scene_options, basis)
     if scene_options and not any(isinstance(x, SceneFile) for x in scenes):
