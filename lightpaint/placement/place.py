@@ -28,7 +28,7 @@ from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.placement.placement import AddedLight, Move, Placement, hung
 from lightpaint.placement.placement_fit import fit_of
 from lightpaint.placement.search.judgement import Found, Growth, PlacementJudge, PoseError
-from lightpaint.placement.search.new_light_search import NewLightSearch
+from lightpaint.placement.search.new_light_search import STARTS, NewLightSearch
 from lightpaint.placement.search.pose_rules import PoseRules
 from lightpaint.placement.search.pose_search import TURNS, PoseSearch
 from lightpaint.placement.search_views import check_looks, check_views, films_of
@@ -212,7 +212,7 @@ def _searched(
     progress: Progress,
 ) -> tuple[Arrangement, Arrangement]:
     """Return the arrangement before all moves, and the best one."""
-    total = TURNS * len(movables) + len(slots) + STEPS
+    total = TURNS * len(movables) + STARTS * len(slots) + STEPS
     done = 0
 
     def count() -> None:

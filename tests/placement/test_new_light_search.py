@@ -31,6 +31,31 @@ class Search(NewLightSearch):
 
 
 @pytest.mark.parametrize(
+    ("small_film", "large_film", "chosen"),
+    [
+        ((0.5, 0.4), (0.3, 0.6), 0),  # the larger film tells
+        ((0.5, 0.6), (0.6, 0.3), 1),
+        ((0.1, 0.05), (0.6, 0.3), 0),  # little is left: no other search
+    ],
+)
+def test_the_better_of_two_searches_is_kept(
+    small_film: tuple[float, ...], large_film: tuple[float, ...], chosen: int
+) -> None:
+    start: Any = SimpleNamespace(missed=1.0)
+    found = [SimpleNamespace(missed=x) for x in small_film]
+    errors = dict(zip(map(id, found), large_film, strict=True))
+    stub: Any = SimpleNamespace(fit=SimpleNamespace(norm2=1.0), steps=None, paths=None)
+    judge: Any = SimpleNamespace(missed=lambda arrangement: errors[id(arrangement)])
+    ends = iter(found)
+
+    class Ends(NewLightSearch):
+        def _grown(self, *_: Any) -> Any:
+            return next(ends)
+
+    assert Ends(stub, [], judge).run(start, lambda: None) is found[chosen]
+
+
+@pytest.mark.parametrize(
     ("helps", "expected"),
     [
         ((), [1, 2]),  # the one that does most stays where it is

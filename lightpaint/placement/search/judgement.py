@@ -213,6 +213,11 @@ class PlacementJudge:
         least = max(least, BY_CHANCE * float(usual.mean()))
         return float(gain[1].sum() - gain[1].max()) / max(least, 1e-300)
 
+    def missed(self, arrangement: Arrangement) -> float:
+        """Return the error on paths that weights were not fitted to."""
+        fitted, judged = self._along_both(arrangement)
+        return float(self._fit.missed_map(judged.columns, fitted.weights).sum())
+
     def errors(self, best: Arrangement) -> list[PoseError]:
         """Return the spread of each pose between fits along independent paths."""
         fits: list[Sequence[Site]] = [best.sites]

@@ -16,6 +16,10 @@ from lightpaint.placement.search.judgement import NOTHING, PlacementJudge
 from lightpaint.placement.search.pose_search import SHORT_STEPS, PoseSearch
 from lightpaint.scene.properties.pose import Site
 
+#: Number of searches at most, each with other trial places, and the share of the error before them
+#: up to which no further one is made.
+STARTS, ENOUGH = 2, 0.2
+
 #: Least decrease of the error for which a new light moves once all are added, and how often one of
 #: them is tried at most.
 WORTH_AGAIN, MOST_TRIALS = 0.02, 3
@@ -48,12 +52,27 @@ class NewLightSearch:
     """
 
     def __init__(self, search: PoseSearch, slots: Sequence[Movable], judge: PlacementJudge) -> None:
-        self._search, self._free, self._judge = search, list(slots), judge
+        self._search, self._slots, self._judge = search, slots, judge
+        self._free: list[Movable] = []
         self._fit, self._steps, self._paths = search.fit, search.steps, search.paths
 
     def run(self, start: Arrangement, progress: Callable[[], None]) -> Arrangement:
-        """Return an arrangement with the worthwhile new lights."""
-        arrangement = start
+        """Return an arrangement with the worthwhile new lights.
+
+        A single search sometimes ends where no step leads on, and what looks as good on the small
+        film may be far worse on the larger one. So another search has other trial places, and the
+        paths of the judgement tell which is better.
+        """
+        found: list[Arrangement] = []
+        for _ in range(STARTS):
+            found.append(self._grown(start, progress))
+            if found[-1].missed <= max(ENOUGH * start.missed, NOTHING * self._fit.norm2):
+                break
+        return min(found, key=self._judge.missed) if len(found) > 1 else found[0]
+
+    def _grown(self, start: Arrangement, progress: Callable[[], None]) -> Arrangement:
+        """Return an arrangement with the worthwhile new lights of one search."""
+        arrangement, self._free = start, list(self._slots)
         while self._free and arrangement.missed > NOTHING * self._fit.norm2:
             more = self._worthwhile(arrangement, self._with_one_more(arrangement))
             progress()
