@@ -45,8 +45,8 @@ FOUND, NEAR = 0.005, 0.15
 #: What kinds of lights rooms have, in turn.
 KINDS = ("point", "spot", "panel")
 
-#: Cones of the gallery's spots where they are free, in degrees; just below its ceiling, which goes
-#: on in the annex; and samples of each of two bases.
+#: Cones of the gallery's spots where these and their beams are free, in degrees; just below its
+#: ceiling, which goes on in the annex; and samples of each of two bases.
 FREE_CONE = (10, 60)
 UNDER_CEILING = ((-3.2, 3.65, 0.2), (3.2, 3.65, 9.8))
 GALLERY_SPP = 128
@@ -231,13 +231,14 @@ def show_gallery() -> None:
     added = [lp.NewLights("spot", count=2, freedom=lp.Freedom(box=UNDER_CEILING))]
     for new, cone in (([], None), ([], FREE_CONE), (added, FREE_CONE)):
         freedoms = {
-            name: lp.Freedom(line=rail, aim=True, cone=cone) for name, rail in rails.items()
+            name: lp.Freedom(line=rail, aim=True, cone=cone, beam=cone is not None)
+            for name, rail in rails.items()
         }
         start = cpu_s()
         placement = lp.place(scene, basis, solution, freedoms, new=new)
         seconds = cpu_s() - start
         print(
-            f"  {len(placement.additions)} new, cones of others {'free' if cone else 'fixed'}: "
+            f"  {len(placement.additions)} new, cones and beams {'free' if cone else 'fixed'}: "
             f"{gallery_shares(placement.scene, target)}, by the search "
             f"{math.sqrt(placement.missed_after):.3f}, in {seconds:.0f} s",
             flush=True,

@@ -133,7 +133,7 @@ def _suggestion() -> Schema:
 
 
 def _placement() -> Schema:
-    names = ("gain_share", "distance", "turn", "cutoff", "place_error", "turn_error")
+    names = ("gain_share", "distance", "turn", "cutoff", "beam", "place_error", "turn_error")
     change = _record(name=_TEXT, text=_TEXT, **_all(_NUMBER, *names), is_hardly_visible=_YES)
     ends = _all(_NUMBER, "missed_before", "missed_after")
     return _record(**ends, looks=_TEXTS, changes=_list(change))

@@ -43,8 +43,7 @@ class FreeLight:
     """A light with its current site and its freedom.
 
     places: where it may hang; those of `freedom` if that has no surfaces. sides: smallest and
-    largest side of a panel. has_free_beam: whether its beam varies independently; else it keeps its
-    share of the cone.
+    largest side of a panel.
     """
 
     name: str
@@ -52,7 +51,6 @@ class FreeLight:
     freedom: Freedom
     places: Places | None = None
     sides: tuple[float, float] | None = None
-    has_free_beam: bool = False
 
     def __post_init__(self) -> None:
         freedom, site = self.freedom, self.site
@@ -60,6 +58,7 @@ class FreeLight:
             (freedom.slides, site.position is not None, "place that could change"),
             (freedom.turn > 0, site.direction is not None, "direction that could change"),
             (freedom.cone is not None, site.cutoff is not None, "cone"),
+            (freedom.beams is not None, site.cutoff is not None, "beam"),
         ):
             if is_asked and not has_it:
                 raise SceneError(
@@ -71,11 +70,12 @@ class FreeLight:
 
     def dimensions(self, site: Site) -> tuple[int, int, int]:
         """Return the numbers of coordinates of place, direction, and cone or size at a pose."""
-        cone = 2 if self.has_free_beam else 1
+        freedom = self.freedom
+        cone = (freedom.cone is not None) + (freedom.beams is not None)
         return (
             len(self._tangents(site)),
-            2 if self.freedom.turn else 0,
-            cone if self.freedom.cone is not None else 1 if self.sides is not None else 0,
+            2 if freedom.turn else 0,
+            cone + (self.sides is not None),
         )
 
     def stepped(self, site: Site, step: Doubles) -> Site:
@@ -95,10 +95,12 @@ class FreeLight:
             if len(cone):
                 site = replace(site, side=site.side * math.exp(SIDE_UNIT * float(cone[0])))
         elif len(cone) and site.cutoff is not None:
-            share = (site.beam or 0.0) / site.cutoff
-            if self.has_free_beam:
-                share += BEAM_UNIT * float(cone[1])
-            site = self._opened(site, site.cutoff + CONE_UNIT * float(cone[0]), share)
+            cutoff, share = site.cutoff, (site.beam or 0.0) / site.cutoff
+            if self.freedom.cone is not None:
+                cutoff += CONE_UNIT * float(cone[0])
+            if self.freedom.beams is not None:
+                share += BEAM_UNIT * float(cone[-1])
+            site = self._opened(site, cutoff, share)
         return self.permitted(site)
 
     def permitted(self, site: Site) -> Site:
@@ -113,7 +115,7 @@ class FreeLight:
         if isinstance(site, PanelSite) and isinstance(self.site, PanelSite):
             sides = self.sides or (self.site.side, self.site.side)
             return replace(site, side=float(np.clip(site.side, *sides)))
-        if self.freedom.cone is not None and site.cutoff is not None:
+        if site.cutoff is not None and self._has_free_cone:
             site = self._opened(site, site.cutoff, (site.beam or 0.0) / site.cutoff)
         return site
 
@@ -164,6 +166,10 @@ class FreeLight:
             return np.zeros((0, 3))
         return self.places.tangents(np.array(site.position, dtype=float))
 
+    @property
+    def _has_free_cone(self) -> bool:
+        return self.freedom.cone is not None or self.freedom.beams is not None
+
     @cached_property
     def _share(self) -> float:
         """The current width of its beam, as a share of its cone."""
@@ -171,10 +177,13 @@ class FreeLight:
 
     def _opened(self, site: Site, cutoff: float, share: float) -> Site:
         """Return `site` with a permitted cone nearest to `cutoff`, and that share of beam."""
-        assert self.freedom.cone is not None
-        cutoff = float(np.clip(cutoff, *self.freedom.cone))
-        share = max(share, LEAST_BEAM) if self.has_free_beam else self._share
-        beam = max(min(share * cutoff, cutoff - EDGE), EDGE)
+        now = self.site.cutoff or 0.0
+        cutoff = float(np.clip(cutoff, *(self.freedom.cone or (now, now))))
+        if self.freedom.beams is None:
+            beam = self._share * cutoff
+        else:
+            beam = float(np.clip(max(share, LEAST_BEAM) * cutoff, *self.freedom.beams))
+        beam = max(min(beam, cutoff - EDGE), EDGE)
         return replace(site, cutoff=cutoff, beam=beam)
 
 

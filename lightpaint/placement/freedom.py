@@ -15,6 +15,9 @@ from lightpaint.scene.properties.pose import FARTHEST
 #: Least width of a beam's soft edge, in degrees.
 EDGE = 0.5
 
+#: All angles between a spot's axis and the edge of its beam.
+ANY_BEAM = (EDGE, 90.0)
+
 #: Maximum number of rails, and of surfaces, in one freedom.
 MAX_PARTS = 1000
 
@@ -36,6 +39,8 @@ class Freedom:
             part of the room.
         aim: Degrees by which it may turn; True to point anywhere.
         cone: Smallest and largest cutoff of a spot, in degrees.
+        beam: Smallest and largest beam width of a spot, in degrees from its axis; True for any in
+            its cone. Otherwise the beam keeps its share of the cone.
 
     Raises:
         SceneError: For invalid values, or more than one kind of place.
@@ -53,6 +58,7 @@ class Freedom:
     clear: float | None = None
     aim: float | bool = False
     cone: tuple[float, float] | None = None
+    beam: bool | tuple[float, float] = False
 
     def __post_init__(self) -> None:
         kinds = ("within", "box", "line", "rails", "surfaces")
@@ -78,7 +84,9 @@ class Freedom:
         if not isinstance(self.aim, bool):
             object.__setattr__(self, "aim", _number("aim", self.aim, 180.0))
         if self.cone is not None:
-            object.__setattr__(self, "cone", _cone(self.cone))
+            object.__setattr__(self, "cone", _angles("cone", self.cone, 2 * EDGE))
+        if not isinstance(self.beam, bool):
+            object.__setattr__(self, "beam", _angles("beam", self.beam, EDGE))
 
     @property
     def is_still(self) -> bool:
@@ -96,6 +104,13 @@ class Freedom:
     def all_rails(self) -> tuple[Segment, ...]:
         """All rails, `line` among them."""
         return (self.line,) if self.line is not None else self.rails or ()
+
+    @property
+    def beams(self) -> tuple[float, float] | None:
+        """Smallest and largest beam width in degrees; None if it keeps its share of the cone."""
+        if isinstance(self.beam, bool):
+            return ANY_BEAM if self.beam else None
+        return self.beam
 
     @property
     def turn(self) -> float:
@@ -142,11 +157,11 @@ def _ids(value: Any) -> tuple[str, ...]:
     return ids
 
 
-def _cone(value: Any) -> tuple[float, float]:
+def _angles(name: str, value: Any, least: float) -> tuple[float, float]:
     try:
         low, high = (float(v) for v in value)
     except (TypeError, ValueError):
         low, high = math.nan, math.nan
-    if not 2 * EDGE < low <= high < 90:
-        raise SceneError(f"cone is {value!r}: expected two angles, from {2 * EDGE:g} to 90 degrees")
+    if not least < low <= high < 90:
+        raise SceneError(f"{name} is {value!r}: expected two angles, from {least:g} to 90 degrees")
     return low, high

@@ -180,7 +180,8 @@ def followers_of(
         named |= {first, second}
         if first not in freedoms:
             raise SceneError(f"{first!r} leads a pair and has no freedom: give it one")
-        if freedoms[first].cone is None and (one.cutoff, one.beam) != (other.cutoff, other.beam):
+        has_alike_beams = freedoms[first].beams is not None or one.beam == other.beam
+        if freedoms[first].cone is None and not (one.cutoff == other.cutoff and has_alike_beams):
             raise SceneError(f"{first!r} and {second!r} have two cones: free the cone of the first")
         followers[first] = pair
     return followers
@@ -212,11 +213,11 @@ def _template(scene: Scene, light: NewLight, paths: SearchPaths, seed: int) -> F
         cutoff, beam = model.site.cutoff or 0.0, model.site.beam or 0.0
     else:
         cone = freedom.cone or NEW_CONE
-        freedom = replace(freedom, cone=cone)
+        freedom = replace(freedom, cone=cone, beam=freedom.beam or True)
         cutoff = math.sqrt(cone[0] * cone[1])
         beam = FIRST_BEAM * cutoff
     spot = Site(position, _first_direction(model), cutoff=cutoff, beam=beam)
-    return FreeLight(light.name, spot, freedom, places, has_free_beam=model is None)
+    return FreeLight(light.name, spot, freedom, places)
 
 
 def _freedom_of_new(

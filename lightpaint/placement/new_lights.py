@@ -83,8 +83,12 @@ class NewLights:
 
     def check_kind(self, kind: NewKind) -> None:
         """Raise SceneError for a freedom that this kind of light cannot have."""
-        if self.freedom.cone is not None and kind != "spot":
-            raise SceneError(f"a new {kind} has no cone: leave that freedom out")
+        for is_asked, name in (
+            (self.freedom.cone is not None, "cone"),
+            (self.freedom.beams is not None, "beam"),
+        ):
+            if is_asked and kind != "spot":
+                raise SceneError(f"a new {kind} has no {name}: leave that freedom out")
         if self.freedom.aim and kind == "point":
             raise SceneError("a new point has no direction: leave aim out")
         if self.size is not None and kind != "panel":

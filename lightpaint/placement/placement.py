@@ -18,6 +18,9 @@ from lightpaint.scene.scene import Scene
 #: Advice on a place that the picture hardly determines.
 HARDLY_VISIBLE = "hardly visible from here: paint a second view"
 
+#: Change of a beam's share of its cone that is worth mentioning.
+LEAST_BEAM_CHANGE = 0.01
+
 
 @keywords()
 @dataclass(frozen=True)
@@ -77,6 +80,11 @@ class Move:
             beam=new.beam if new.beam != self.old.beam else None,
         )
 
+    @property
+    def has_other_edge(self) -> bool:
+        """True if the beam has another share of its cone: a softer or harder edge."""
+        return abs(_beam_share(self.new) - _beam_share(self.old)) >= LEAST_BEAM_CHANGE
+
     def __str__(self) -> str:
         done = []
         if self.turn >= 0.5:
@@ -85,6 +93,8 @@ class Move:
             done.append(f"slid by {rounded_text(self.distance, 2)}")
         if self.new.cutoff is not None and self.new.cutoff != self.old.cutoff:
             done.append(f"cone {self.old.cutoff:.0f}° to {self.new.cutoff:.0f}°")
+        if self.has_other_edge:
+            done.append(f"beam {self.old.beam:.0f}° to {self.new.beam:.0f}°")
         gain = f"{_percent(self.gain_share)} of what was missed"
         return _with_advice(f"{self.name}: {', '.join(done)}: {gain}", self)
 
@@ -155,6 +165,11 @@ class AddedLight:
         gain = f"{_percent(self.gain_share)} of what was missed"
         text = f"{self.name}: a new {self.emitter.kind} at ({x:.2f}, {y:.2f}, {z:.2f}): {gain}"
         return _with_advice(text, self)
+
+
+def _beam_share(site: Site) -> float:
+    """Return the width of a spot's beam, as a share of its cone."""
+    return (site.beam or 0.0) / (site.cutoff or 1.0)
 
 
 def _percent(share: float) -> str:

@@ -103,6 +103,7 @@ def test_nothing_moves_where_nothing_is_missed(
         ("sky", lp.Freedom(aim=True), "'sky' is of the kind constant"),
         ("bulb", lp.Freedom(aim=10), "'bulb' has no direction"),
         ("bulb", lp.Freedom(cone=(10, 20)), "'bulb' has no cone"),
+        ("bulb", lp.Freedom(beam=True), "'bulb' has no beam"),
         ("sun", lp.Freedom(within=1), "'sun' has no place"),
         ("lamp", lp.Freedom(within=1), "no light 'lamp'"),
     ],
@@ -121,6 +122,7 @@ def test_what_a_light_is_not_free_to_do(
         ({"within": np.nan}, "within is nan"),
         ({"aim": 200}, "aim is 200"),
         ({"cone": (30, 10)}, r"cone is \(30, 10\)"),
+        ({"beam": (0.1, 10)}, r"beam is \(0.1, 10\): expected two angles, from 0.5 to 90 degrees"),
         ({"line": ((0, 0, 0), (0, 0, 0))}, "two different points"),
         ({"line": (0, 1)}, "two points of three numbers"),
         ({"box": ((0, 0), (1, 1))}, "two points of three numbers"),
@@ -138,6 +140,9 @@ def test_freedoms_that_mean_nothing(values: dict[str, Any], words: str) -> None:
         lp.Freedom(within=0.7, aim=25, cone=(10, 40)),
         lp.Freedom(box=((-1, 1, -1), (1, 2, 0.5)), aim=True),
         lp.Freedom(line=LINE, cone=(15, 60)),
+        lp.Freedom(line=LINE, cone=(15, 60), beam=True),
+        lp.Freedom(cone=(10, 40), beam=(5, 20)),
+        lp.Freedom(beam=(5, 20)),
         lp.Freedom(aim=5),
     ],
 )
@@ -161,6 +166,31 @@ def test_steps_stay_within_the_freedom(freedom: lp.Freedom) -> None:
             assert np.linalg.norm(place - (0.5, 1.5, 0.0)) <= freedom.within + 1e-9
         if freedom.cone is not None:
             assert freedom.cone[0] <= cutoff <= freedom.cone[1]
+        else:
+            assert cutoff == 30
+        if freedom.beams is not None:
+            assert freedom.beams[0] <= beam <= freedom.beams[1]
+        else:
+            # The start's share, but for the least width of an edge.
+            assert beam == pytest.approx(min(2 / 3 * cutoff, cutoff - 0.5))
+
+
+@pytest.mark.parametrize("edge", ["harder", "softer"])
+def test_a_beam_gets_the_edge_that_the_painting_has(room: Scene, edge: str) -> None:
+    """A free beam is found; one that keeps its share of the cone is not."""
+    now = room.light("beam").members[0].site
+    assert now.cutoff is not None
+    width = {"harder": 0.9, "softer": 0.2}[edge] * now.cutoff
+    painted = room.moved({"beam": lp.Pose(beam=width)})
+    placement = placed(room, painted, {"beam": lp.Freedom(beam=True)})
+    [move] = placement.moves
+    assert move.new.cutoff == now.cutoff
+    assert move.new.beam == pytest.approx(width, abs=0.1 * now.cutoff)
+    assert f"beam {now.beam:.0f}° to {move.new.beam:.0f}°" in str(move)
+    # What is left is noise of the small picture.
+    assert placement.missed_after < 0.75 * placement.missed_before
+    shut = placed(room, painted, {"beam": lp.Freedom(aim=1)})
+    assert shut.missed_after > 0.8 * shut.missed_before
 
 
 def test_directions_cover_what_is_permitted_and_nothing_else() -> None:

@@ -78,8 +78,8 @@ def test_a_spot_with_the_right_circle_of_light_finds_its_distance(tmp_path: Path
         look = LookGoal(goal, np.ones_like(goal), reduction, None, np.zeros_like(goal))
         fit = PlacementFit(np.zeros((1, *goal.shape), np.float32), [look])
         steps = PoseSteps(fit, 1.0, lambda *_: True)
-        freedom = lp.Freedom(box=BOX, aim=True, cone=(5, 50))
-        light = FreeLight("new", wrong, freedom, has_free_beam=True)
+        freedom = lp.Freedom(box=BOX, aim=True, cone=(5, 50), beam=True)
+        light = FreeLight("new", wrong, freedom)
         movables = (Movable(light, (0,), None, lp.NewLights("spot")),)
         start = Arrangement(movables, (wrong,), steps.fitted(movables, (wrong,), at))
         return steps.slid(start, at).sites[0]

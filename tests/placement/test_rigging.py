@@ -90,9 +90,9 @@ def test_freedoms_follow_from_names_and_patterns(room: Scene) -> None:
 
 def test_the_later_of_two_sources_wins_key_by_key(room: Scene) -> None:
     file = lp.Rigging.of({"beam": {"aim": 20, "cone": [10, 30]}}, where="file")
-    options = lp.Rigging.of({"beam": {"aim": True}}, where="line")
+    options = lp.Rigging.of({"beam": {"aim": True, "beam": [5, 9]}}, where="line")
     assert freedoms_of(file.and_then(options), room) == {
-        "beam": lp.Freedom(aim=True, cone=(10, 30))
+        "beam": lp.Freedom(aim=True, cone=(10, 30), beam=(5, 9))
     }
     assert file.and_then(file.and_then(options)) == file.and_then(options)
 
@@ -105,6 +105,9 @@ def test_the_later_of_two_sources_wins_key_by_key(room: Scene) -> None:
         ("[light.beam]\naim = 'much'", "light.beam.aim is 'much'"),
         ("[light.beam]\ncone = [40, 10]", r"light.beam.cone is \[40, 10\]: expected two angles"),
         ("[light.beam]\ncone = 40", "light.beam.cone is 40"),
+        ("[light.beam]\nbeam = [20, 5]", r"light.beam.beam is \[20, 5\]: expected two angles"),
+        ("[light.beam]\nbeam = 'soft'", "light.beam.beam is 'soft': expected two angles"),
+        ("[[new]]\nkind = 'panel'\nbeam = true", "new has the key 'beam': a panel has none"),
         ("[light.beam]\nmove = -1", "light.beam.move.within is -1: expected a distance"),
         ("[light.beam]\nmove = true", "light.beam.move is True: expected a distance"),
         ("[light.beam]\nmove = {}", "light.beam.move has nothing: expected one of"),

@@ -127,13 +127,20 @@ def aim(text: str) -> tuple[str, Any]:
 def cone(text: str) -> tuple[str, list[float]]:
     """Parse how wide a spot may open, `NAME=LEAST:MOST`."""
     name, value = light_value(text)
-    min_text, colon, max_text = str(value).partition(":")
-    expected = "NAME=10:45, in degrees"
-    ends = [
-        _number_of(text, end, expected)
-        for end in ((min_text, max_text) if colon else (min_text,) * 2)
-    ]
-    return name, ends
+    return name, _angles(text, value, "NAME=10:45, in degrees")
+
+
+def beam(text: str) -> tuple[str, list[float] | bool]:
+    """Parse how wide the beam of a spot may be, `NAME=LEAST:MOST` or `NAME=any`."""
+    name, value = light_value(text)
+    expected = "NAME=5:20, in degrees, or NAME=any"
+    return name, True if value == "any" else _angles(text, value, expected)
+
+
+def _angles(text: str, value: Any, expected: str) -> list[float]:
+    """Return the ends of `LEAST:MOST`; of one number, both are that."""
+    least, colon, most = str(value).partition(":")
+    return [_number_of(text, end, expected) for end in ((least, most) if colon else (least,) * 2)]
 
 
 def new_light(text: str) -> dict[str, Any]:

@@ -139,6 +139,13 @@ def add_rigging(parser: argparse.ArgumentParser) -> None:
         "let the cutoff angle of the spot vary between these, in degrees from its axis",
     )
     add(
+        "--beam",
+        "NAME=5:20|any",
+        arguments.beam,
+        "let the spot's beam, the part at full brightness, end between these angles, in degrees "
+        "from its axis, or anywhere in its cone (default: at the same share of the cone as now)",
+    )
+    add(
         "--add",
         "KIND[:N][@WHERE]",
         arguments.new_light,

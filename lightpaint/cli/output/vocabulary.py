@@ -73,7 +73,7 @@ OPTIONS_OF_KEYS = {"limits": "limit", "duv": "kelvin"}
 #: Beginnings of errors: in a light's constraint or place by option, for an unknown light, and for a
 #: new light.
 _LIGHT = re.compile(
-    BY_OPTION + r": light\.(.+?)\.(lock|off|limits|color|kelvin|duv|primaries|move|aim|cone)"
+    BY_OPTION + r": light\.(.+?)\.(lock|off|limits|color|kelvin|duv|primaries|move|aim|cone|beam)"
     r"(?:\.\w+)?(?=:? )"
 )
 _UNKNOWN = re.compile(BY_OPTION + r": light\.[^:]+: (?=no light )")

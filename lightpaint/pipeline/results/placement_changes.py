@@ -35,7 +35,8 @@ def _change_of(change: Move | AddedLight) -> LightChange:
         "is_hardly_visible": change.is_hardly_visible,
     }
     if isinstance(change, Move):
-        numbers |= {"distance": change.distance, "turn": change.turn, "cutoff": change.new.cutoff}
+        numbers |= {"distance": change.distance, "turn": change.turn}
+        numbers |= {"cutoff": change.new.cutoff, "beam": change.new.beam}
     return LightChange(change.name, spoken_change(change), numbers)
 
 
@@ -66,4 +67,6 @@ def spoken_move(move: Move) -> str:
         phrases.append(f"slid by {rounded_text(move.distance, 2)}{error}")
     if move.new.cutoff is not None and move.new.cutoff != move.old.cutoff:
         phrases.append(f"its cone ends at {move.new.cutoff:.0f}° (was {move.old.cutoff:.0f}°)")
+    if move.has_other_edge:
+        phrases.append(f"its beam at {move.new.beam:.0f}° (was {move.old.beam:.0f}°)")
     return ", ".join(phrases)

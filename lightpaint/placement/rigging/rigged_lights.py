@@ -98,7 +98,7 @@ def _matches(name: str, scene: Scene, where: str) -> list[Light]:
 def _freedom(
     table: Mapping[str, Any], light: Light, scene: Scene, rigging: Rigging, where: str
 ) -> Freedom:
-    """Return the freedom that the keys `move`, `aim` and `cone` give a light."""
+    """Return the freedom that the keys `move`, `aim`, `cone` and `beam` give a light."""
     move = table.get("move", {})
     move = move if isinstance(move, Mapping) else {"within": move}
     places: dict[str, Any] = {}
@@ -112,7 +112,16 @@ def _freedom(
         places["box"] = _segment(move["box"])
     if "on" in move:
         places |= _places_on(move["on"], scene, rigging, f"{where}.move.on")
-    return Freedom(**places, aim=table.get("aim", False), cone=table.get("cone"))
+    return Freedom(**places, **_turns(table))
+
+
+def _turns(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of a freedom to turn, and to open the cone and the beam."""
+    return {
+        "aim": table.get("aim", False),
+        "cone": table.get("cone"),
+        "beam": table.get("beam", False),
+    }
 
 
 def _new_lights(table: Mapping[str, Any], where: str, scene: Scene, rigging: Rigging) -> NewLights:
@@ -129,7 +138,7 @@ def _new_lights(table: Mapping[str, Any], where: str, scene: Scene, rigging: Rig
             kind=table.get("kind", "point"),
             like=like,
             count=table.get("count", 1),
-            freedom=Freedom(**places, aim=table.get("aim", False), cone=table.get("cone")),
+            freedom=Freedom(**places, **_turns(table)),
             apart=table.get("apart", 0.0),
             in_view=table.get("in_view", True),
             name=table.get("name", f"new_{like or table['kind']}"),

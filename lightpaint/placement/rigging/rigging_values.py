@@ -9,6 +9,7 @@ from lightpaint.errors import ConstraintError
 from lightpaint.files import one_line
 from lightpaint.lighting.constraints.constraints import LightConstraint
 from lightpaint.lighting.constraints.values import check_keys
+from lightpaint.placement.freedom import EDGE
 from lightpaint.scene.lights.lights_file import MOVES
 from lightpaint.scene.properties.pose import FARTHEST
 from lightpaint.validation import MAX_LISTED, MAX_NAME, is_number
@@ -21,7 +22,10 @@ ON_KEYS = ("line", "shapes", "clear")
 KINDS = ("point", "spot", "panel")
 
 #: Keys of a light to add: for its place and pose, and for its constraints.
-NEW_KEYS = ("kind", "like", "name", "count", "on", "box", "aim", "cone", "size", "apart", "in_view")
+NEW_KEYS = (
+    *("kind", "like", "name", "count", "on", "box"),
+    *("aim", "cone", "beam", "size", "apart", "in_view"),
+)
 NEW_CONSTRAINTS = ("limits", "color", "kelvin", "duv", "primaries")
 
 #: Maximum number of lights that one table adds: a larger number is a typing error.
@@ -32,7 +36,7 @@ _PLANE = re.compile(r"\s*([xyz])\s*=\s*(\S+)\s*")
 
 
 def check_move(table: Mapping[str, Any], where: str) -> None:
-    """Raise ConstraintError unless these are valid values of `move`, `aim` and `cone`."""
+    """Raise ConstraintError unless these are valid values of `move`, `aim`, `cone`, `beam`."""
     check_keys(table, MOVES, where)
     if "move" in table:
         _check_places(table["move"], f"{where}.move")
@@ -88,8 +92,9 @@ def check_new(table: Mapping[str, Any], where: str) -> None:
         raise _wrong(f"{where}.in_view", table["in_view"], "true or false")
     if "size" in table:
         _check_size(table["size"], kind, f"{where}.size")
-    if kind in ("point", "panel") and "cone" in table:
-        raise ConstraintError(f"{where} has the key 'cone': a {kind} has none")
+    for key in ("cone", "beam"):
+        if kind in ("point", "panel") and key in table:
+            raise ConstraintError(f"{where} has the key {key!r}: a {kind} has none")
     if kind == "point" and "aim" in table:
         raise ConstraintError(f"{where} has the key 'aim': a point light points nowhere")
     _check_turns(table, where)
@@ -158,15 +163,26 @@ def _check_places(value: Any, where: str) -> None:
 
 
 def _check_turns(table: Mapping[str, Any], where: str) -> None:
-    """Raise ConstraintError for invalid values of `aim` and `cone`."""
+    """Raise ConstraintError for invalid values of `aim`, `cone` and `beam`."""
     aim = table.get("aim", True)
     if not isinstance(aim, bool) and not (is_number(aim) and 0 < aim <= 180):
         raise _wrong(f"{where}.aim", aim, "degrees from 0 to 180, or true for any direction")
-    if "cone" in table:
-        cone = table["cone"]
-        is_pair = _is_list(cone, 2) and all(map(is_number, cone))
-        if not (is_pair and 1 < cone[0] <= cone[1] < 90):
-            raise _wrong(f"{where}.cone", cone, "two angles, from 1 to 90 degrees, like [10, 45]")
+    if "cone" in table and not _is_range(table["cone"], 1):
+        raise _wrong(
+            f"{where}.cone", table["cone"], "two angles, from 1 to 90 degrees, like [10, 45]"
+        )
+    beam = table.get("beam", True)
+    if not isinstance(beam, bool) and not _is_range(beam, EDGE):
+        raise _wrong(
+            f"{where}.beam",
+            beam,
+            f"two angles, from {EDGE:g} to 90 degrees, like [5, 20], or true for any in the cone",
+        )
+
+
+def _is_range(value: Any, least: float) -> bool:
+    """Return whether it is two angles in degrees, above `least`."""
+    return _is_list(value, 2) and all(map(is_number, value)) and least < value[0] <= value[1] < 90
 
 
 def _check_size(value: Any, kind: str, where: str) -> None:

@@ -25,7 +25,7 @@ CONSTRAINTS = ("light", "tie", "prefer_current", "sparse")
 #: Older key for `prefer_current`, as in `prefer = { current = 0.01 }`.
 OLDER = ("prefer",)
 #: Keys of permitted moves, and those of a light in `[light.NAME]`.
-RIGGING, MOVES = ("on", "new", "pair"), ("move", "aim", "cone")
+RIGGING, MOVES = ("on", "new", "pair"), ("move", "aim", "cone", "beam")
 #: Key of a light in `[light.NAME]` for the size of its image.
 SPLIT = "split"
 #: Key of a light in `[light.NAME]` for an image that is equal to its mirror image.
