@@ -7,6 +7,8 @@ import signal
 import subprocess
 from pathlib import Path
 
+from displays import FREE_DISPLAY
+
 #: Options of a window that is the same everywhere, and takes simulated events.
 OPTIONS = (
     *("--factory-startup", "--enable-event-simulate", "--python-exit-code", "1"),
@@ -14,7 +16,7 @@ OPTIONS = (
 )
 
 #: The display; Blender wants GLX.
-SCREEN = ("xvfb-run", "-a", "-s", "-screen 0 1280x800x24 +extension GLX")
+SCREEN = ("xvfb-run", *FREE_DISPLAY, "-s", "-screen 0 1280x800x24 +extension GLX")
 
 #: Seconds in which everything in a window is done on a busy machine.
 WINDOW_S = 300.0

@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from damaged_files import Case, damage, outcomes, read_despite_cut, wrong_outcomes
+from displays import FREE_DISPLAY
 from layered_sessions import SIZES, RandomEditor, bases_of, identity_of, open_session
 from nightly import FIFTHS, fifth_of
 from paint_programs import needs, run
@@ -323,7 +324,7 @@ def test_krita_opens_both_files_and_saves_layers_that_come_back(tmp_path: Path) 
     write_layers_openraster(tmp_path / "layers.ora", view, CURRENT, TRANSFORM)
     run(
         tmp_path,
-        *(display, "-a", krita, "-s", "lightpaint_krita_layers"),
+        *(display, *FREE_DISPLAY, krita, "-s", "lightpaint_krita_layers"),
         PYTHONPATH=str(KRITA_SCRIPTS),
         LIGHTPAINT_FOLDER=str(tmp_path),
     )

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from displays import FREE_DISPLAY
 from paint_programs import needs, run
 
 import lightpaint as lp
@@ -118,7 +119,7 @@ def test_krita(folder: Path, basis: lp.Basis) -> None:
     krita, display = needs("kritarunner", "Krita"), needs("xvfb-run", "Xvfb")
     run(
         folder,
-        *(display, "-a", krita, "-s", "lightpaint_krita"),
+        *(display, *FREE_DISPLAY, krita, "-s", "lightpaint_krita"),
         PYTHONPATH=str(SCRIPTS),
         LIGHTPAINT_FOLDER=str(folder),
     )
