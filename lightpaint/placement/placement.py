@@ -82,8 +82,10 @@ class Move:
 
     @property
     def has_other_edge(self) -> bool:
-        """True if the beam has another share of its cone: a softer or harder edge."""
-        return abs(_beam_share(self.new) - _beam_share(self.old)) >= LEAST_BEAM_CHANGE
+        """True if the beam is noticeably wider or narrower, and not in proportion to its cone."""
+        old, new = self.old, self.new
+        is_noticeable = round(new.beam or 0.0) != round(old.beam or 0.0)
+        return is_noticeable and abs(_beam_share(new) - _beam_share(old)) >= LEAST_BEAM_CHANGE
 
     def __str__(self) -> str:
         done = []

@@ -10,6 +10,7 @@ from renderer import write_room
 
 import lightpaint as lp
 from lightpaint.errors import SceneError
+from lightpaint.pipeline.results.placement_changes import spoken_move
 from lightpaint.placement.free_light import FreeLight
 from lightpaint.scene.properties.pose import Site
 from lightpaint.scene.scene import Scene
@@ -173,6 +174,25 @@ def test_steps_stay_within_the_freedom(freedom: lp.Freedom) -> None:
         else:
             # The start's share, but for the least width of an edge.
             assert beam == pytest.approx(min(2 / 3 * cutoff, cutoff - 0.5))
+
+
+@pytest.mark.parametrize(
+    ("cone", "is_told"),
+    [
+        ((40, 12), True),
+        ((20, 10), False),  # in proportion
+        ((38, 20.2), False),  # nobody reads 20° (was 20°)
+        ((40, 20), False),
+    ],
+)
+def test_a_beam_is_told_that_changed_apart_from_its_cone(
+    cone: tuple[float, float], is_told: bool
+) -> None:
+    old, new = (Site((0, 1, 0), (0, -1, 0), cutoff=a, beam=b) for a, b in ((40, 20), cone))
+    move = lp.Move("spot", old, new, gain_share=0.1)
+    assert ("beam 20° to 12°" in str(move)) == is_told
+    assert ("its beam at 12° (was 20°)" in spoken_move(move)) == is_told
+    assert ("beam" in spoken_move(move)) == is_told
 
 
 @pytest.mark.parametrize("edge", ["harder", "softer"])
