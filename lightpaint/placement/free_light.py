@@ -64,6 +64,12 @@ class FreeLight:
                 raise SceneError(
                     f"light {self.name!r} has no {property_name}: leave that freedom out"
                 )
+        widest = self._cutoffs[1]
+        if freedom.beams is not None and freedom.beams[0] > widest - EDGE:
+            raise SceneError(
+                f"beam of light {self.name!r} begins at {freedom.beams[0]:g} degrees, and its cone "
+                f"ends at {widest:g}: give it a wider cone or a narrower beam"
+            )
         if self.places is None and site.position is not None:
             position = np.array(site.position, dtype=float)
             object.__setattr__(self, "places", places_of(freedom, position))
@@ -167,6 +173,12 @@ class FreeLight:
         return self.places.tangents(np.array(site.position, dtype=float))
 
     @property
+    def _cutoffs(self) -> tuple[float, float]:
+        """The smallest and largest cutoff in degrees."""
+        now = self.site.cutoff or 0.0
+        return self.freedom.cone or (now, now)
+
+    @property
     def _has_free_cone(self) -> bool:
         return self.freedom.cone is not None or self.freedom.beams is not None
 
@@ -177,12 +189,13 @@ class FreeLight:
 
     def _opened(self, site: Site, cutoff: float, share: float) -> Site:
         """Return `site` with a permitted cone nearest to `cutoff`, and that share of beam."""
-        now = self.site.cutoff or 0.0
-        cutoff = float(np.clip(cutoff, *(self.freedom.cone or (now, now))))
-        if self.freedom.beams is None:
+        beams, (least, most) = self.freedom.beams, self._cutoffs
+        if beams is None:
+            cutoff = float(np.clip(cutoff, least, most))
             beam = self._share * cutoff
         else:
-            beam = float(np.clip(max(share, LEAST_BEAM) * cutoff, *self.freedom.beams))
+            cutoff = float(np.clip(cutoff, max(least, beams[0] + EDGE), most))
+            beam = float(np.clip(max(share, LEAST_BEAM) * cutoff, *beams))
         beam = max(min(beam, cutoff - EDGE), EDGE)
         return replace(site, cutoff=cutoff, beam=beam)
 

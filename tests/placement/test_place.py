@@ -105,6 +105,7 @@ def test_nothing_moves_where_nothing_is_missed(
         ("bulb", lp.Freedom(aim=10), "'bulb' has no direction"),
         ("bulb", lp.Freedom(cone=(10, 20)), "'bulb' has no cone"),
         ("bulb", lp.Freedom(beam=True), "'bulb' has no beam"),
+        ("beam", lp.Freedom(beam=(50, 60)), "begins at 50 degrees, and its cone ends at 30: give"),
         ("sun", lp.Freedom(within=1), "'sun' has no place"),
         ("lamp", lp.Freedom(within=1), "no light 'lamp'"),
     ],
@@ -144,6 +145,7 @@ def test_freedoms_that_mean_nothing(values: dict[str, Any], words: str) -> None:
         lp.Freedom(line=LINE, cone=(15, 60), beam=True),
         lp.Freedom(cone=(10, 40), beam=(5, 20)),
         lp.Freedom(beam=(5, 20)),
+        lp.Freedom(cone=(10, 40), beam=(22, 35)),
         lp.Freedom(aim=5),
     ],
 )
