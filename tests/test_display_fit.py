@@ -140,6 +140,7 @@ def test_an_exposure_alone_is_one_of_the_templates_view(folder: Path, basis: Bas
     np.testing.assert_allclose(_weights("a"), TRUTH / 2**0.5, rtol=0.01, atol=0.01)
 
 
+@pytest.mark.nightly
 def test_noise_is_corrected_and_the_scene_refined(room: Path, folder: Path):
     """Steps of the last linear problem: towards what a good basis gives."""
     target = lp.read_target("odd.exr")

@@ -57,6 +57,7 @@ def written(
     return {"painting": folder / "painting.png", "basis": folder / "it.basis.exr"}
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("grain", [0.02, NOISY])
 def test_results_are_those_of_planes_in_memory(
     tmp_path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch, grain: float
@@ -102,6 +103,7 @@ def test_results_are_those_of_planes_in_memory(
     assert np.abs(sheets[0] - sheets[1]).max() <= 1
 
 
+@pytest.mark.nightly
 @pytest.mark.long
 @pytest.mark.parametrize("grain", [0.02, nightly(NOISY)])
 def test_memory_of_a_large_film_is_that_of_a_few_pictures(

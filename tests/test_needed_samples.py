@@ -66,6 +66,7 @@ def answer(scene: Any, target: Any, folder: Path, **options: Any) -> tuple[Any, 
     return paint_with_light(scene, target, folder, progress=recorder, **options), recorder
 
 
+@pytest.mark.nightly
 def test_the_scene_stays_loaded_over_the_rounds(
     small_room: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
@@ -130,6 +131,7 @@ def test_several_views_share_the_samples(tmp_path: Path):
         assert look.basis.origin.extra_spp > 0
 
 
+@pytest.mark.nightly
 def test_renders_of_single_lights_get_more_samples_everywhere(tmp_path: Path):
     integrator = '<integrator type="volpathmis"/>'
     room = write_room(tmp_path, lights=LIGHTS["panel"] + LIGHTS["bulb"], integrator=integrator)

@@ -43,6 +43,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.nightly
 @pytest.mark.long
 def test_wheel_solves_the_demo_in_an_empty_folder(built: Path, tmp_path: Path):
     [wheel] = built.glob("*.whl")

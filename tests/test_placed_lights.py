@@ -283,6 +283,7 @@ def test_a_suggestion_is_a_turn_with_its_picture_and_the_line_to_paste(
     assert json.loads((tmp_path / "answer" / "report.json").read_text())["turn"]["name"] == "beam"
 
 
+@pytest.mark.nightly
 def test_all_views_count_in_what_is_suggested(tmp_path: Path) -> None:
     """The first view is as painted already; the second has its spot turned."""
     path = write_room(tmp_path, sensors=SIDE)
@@ -344,6 +345,7 @@ def test_an_interrupted_search_leaves_nothing_half_written(room: Scene, tmp_path
     assert [move.name for move in look.placement.moves] == ["beam"]
 
 
+@pytest.mark.nightly
 def test_samples_are_added_for_lights_where_they_hang_now(room: Scene, tmp_path: Path) -> None:
     """An error that is asked for is met with the lights moved, by a basis of where they are."""
     small = room.reduced("1/2")
@@ -360,6 +362,7 @@ def test_samples_are_added_for_lights_where_they_hang_now(room: Scene, tmp_path:
     assert look.lighting["beam"].emission == pytest.approx(lighting["beam"].emission, rel=0.1)
 
 
+@pytest.mark.nightly
 def test_variations_hang_as_the_look_that_they_vary(room: Scene, tmp_path: Path) -> None:
     small = room.reduced("1/2")
     look_image = lp.render_basis(small.moved({"beam": AIMED}), spp=64).current_look

@@ -55,6 +55,7 @@ def check(folder: Path, text: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
 
 
+@pytest.mark.nightly
 def test_links_that_answer_pass(site: str, tmp_path: Path) -> None:
     run = check(tmp_path, f"<{site}/there> <{site}/moved> <http://127.0.0.1:8421/> [here](#page)")
     assert run.returncode == 0, run.stderr

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from nightly import nightly
 
 from lightpaint.errors import OutputError
 from lightpaint.storage import staging
@@ -59,7 +60,7 @@ def look(tmp_path: Path) -> Path:
     return folder
 
 
-@pytest.fixture(params=["beside", "within"])
+@pytest.fixture(params=["beside", nightly("within")])
 def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
     """Where files are written before they come to their place."""
     if request.param == "within":
@@ -216,6 +217,7 @@ def test_killed_at_any_step_it_comes_to_the_one_or_the_other(tmp_path: Path) -> 
     assert len(states) > 25
 
 
+@pytest.mark.nightly
 def test_killed_while_it_finishes_what_was_killed(tmp_path: Path) -> None:
     def cut_short(look: Path) -> None:
         before, staging._finish_stage = staging._finish_stage, lambda *_, **__: os._exit(0)

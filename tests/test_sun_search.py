@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command import run, run_refused, succeed
+from nightly import nightly
 
 from lightpaint.basis.light_images import light_images
 from lightpaint.colour.color import luminance
@@ -132,6 +133,7 @@ def test_a_sun_is_found_and_casts_its_shadow(folder: Path) -> None:
     np.testing.assert_allclose([x.emission for x in again.lights], weights, rtol=1e-4, atol=1e-9)
 
 
+@pytest.mark.nightly
 def test_where_nothing_is_gained_the_texels_stay_as_they_are(folder: Path) -> None:
     remarks = Remarks()
     look = answered(folder, "soft", 24, remarks)
@@ -148,6 +150,7 @@ def test_constraints_on_a_texel_hold_for_the_finer_ones_in_its_place(folder: Pat
     assert np.max(luminance(look.solution.weights)[its_row]) == pytest.approx(5, rel=1e-6)
 
 
+@pytest.mark.nightly
 def test_a_symmetric_sky_gets_finer_texels_on_both_sides(folder: Path) -> None:
     remarks = Remarks()
     coarse, finer = (answered(folder, "twins", sun, remarks, symmetric=["sky"]) for sun in (0, 24))
@@ -178,10 +181,10 @@ def mixes_of_palette(colors: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize(
     ("values", "colors"),
     [
-        ({"limits": {"max": 10}}, "free"),
+        nightly({"limits": {"max": 10}}, "free"),
         ({"limits": {"max": 10}}, "gentle"),
         ({"kelvin": [3000, 12000]}, "free"),
-        ({"primaries": list(PALETTE)}, "free"),
+        nightly({"primaries": list(PALETTE)}, "free"),
     ],
 )
 def test_constraints_on_the_sky_hold_for_all_its_texels(
@@ -201,6 +204,7 @@ def test_constraints_on_the_sky_hold_for_all_its_texels(
         np.testing.assert_allclose(weights, whites, rtol=1e-3, atol=1e-6)
 
 
+@pytest.mark.nightly
 def test_the_errors_of_finer_texels_are_as_small_as_asked_for(folder: Path) -> None:
     remarks = Remarks()
     options = {"spp": None, "error": 0.6, "use_cache": False, "verify": False}
@@ -216,6 +220,7 @@ def test_the_errors_of_finer_texels_are_as_small_as_asked_for(folder: Path) -> N
     assert any("texels are known to" in text for text in remarks.said)
 
 
+@pytest.mark.nightly
 def test_several_views_share_the_finer_texels(folder: Path) -> None:
     for sky in ("even", "sunny"):
         scene = (folder / f"{sky}.xml").read_text()

@@ -58,6 +58,7 @@ def test_an_untouched_template_solves_to_the_present_lighting(folder: Path):
     assert look.solution.problem.noise_removed == 0
 
 
+@pytest.mark.nightly
 def test_files_that_other_seeds_and_lights_need_are_theirs(folder: Path):
     """What is kept is that of the same lights, groups, film and seed."""
     for option in (("--seed", 1), ("--lights", "panel"), ("--resolution", "1/2")):

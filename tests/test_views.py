@@ -64,6 +64,7 @@ def painting(basis: Basis, weights: np.ndarray, name: str) -> Target:
     return Target(name, basis.mix(weights), np.ones(basis.size, np.float32), everything=False)
 
 
+@pytest.mark.nightly
 def test_what_is_painted_in_two_views_is_solved_alike(room: Path, tmp_path: Path) -> None:
     sources = [SceneFile(str(room), sensor=name) for name in ("camera", "close")]
     options = ["--spp=16", "--resolution=1/2"]

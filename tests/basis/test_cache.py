@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from command import run
+from nightly import nightly
 from renderer import LIGHTS, assert_equal_bits, same_basis, write_room
 
 from lightpaint.basis.basis import Basis
@@ -141,7 +142,7 @@ def test_exactly_what_is_asked_for_whatever_is_kept(scene: Scene) -> None:
     assert log == []
 
 
-@pytest.mark.parametrize("integrator", ["path", "volpathmis"])
+@pytest.mark.parametrize("integrator", ["path", nightly("volpathmis")])
 def test_the_first_samples_of_what_is_asked_for_are_gone_on_with(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, integrator: str
 ) -> None:

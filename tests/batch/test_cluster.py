@@ -250,6 +250,7 @@ def test_a_cluster_does_what_one_process_does(
     assert contents(folder / "shared") == expected
 
 
+@pytest.mark.nightly
 def test_a_worker_killed_in_the_middle_of_a_basis_costs_one_part(
     workers: Workers, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:
@@ -289,6 +290,7 @@ def test_a_worker_killed_in_the_middle_of_a_look_costs_one_try(
     assert repeated == {"training": 2, "bright: answer": 2}
 
 
+@pytest.mark.nightly
 def test_a_worker_that_hangs_and_one_without_memory_are_replaced(
     workers: Workers, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:

@@ -88,6 +88,7 @@ def test_light_groups_stand_for_a_scene(folder: Path) -> None:
     assert contents(output_folder) == before
 
 
+@pytest.mark.nightly
 def test_what_other_programs_get_is_made_again_alone(folder: Path) -> None:
     run_looks(folder)
     output_folder = folder / "out"

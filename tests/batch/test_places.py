@@ -126,6 +126,7 @@ def test_looks_hang_their_lights_once_and_dim_them_each(folder: Path) -> None:
     assert listener.labels.count("poses") == 1
 
 
+@pytest.mark.nightly
 def test_places_that_were_found_are_not_searched_for_again(folder: Path) -> None:
     """A batch that was stopped after its search goes on from there."""
     first = plan(folder / "looks.toml", folder / "out")

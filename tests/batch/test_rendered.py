@@ -191,6 +191,7 @@ paintings = ["bright.exr", "dark.exr"]
 """
 
 
+@pytest.mark.nightly
 def test_looks_get_the_samples_that_an_error_needs(
     batch_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -8,6 +8,7 @@ from blender import found_in_blender
 HERE = Path(__file__).parent
 
 
+@pytest.mark.nightly
 @pytest.mark.long
 def test_hostile_shots_are_told_apart_and_put_back(
     blender: list[str], tmp_path: Path, variables: dict[str, str]
@@ -46,6 +47,7 @@ def test_hostile_shots_are_told_apart_and_put_back(
     assert not [text for text in messages if "\n" in text or "Traceback" in text]
 
 
+@pytest.mark.nightly
 @pytest.mark.long
 def test_a_painter_is_started_as_its_error_asks_for(
     blender: list[str], tmp_path: Path, variables: dict[str, str]

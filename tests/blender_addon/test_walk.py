@@ -84,6 +84,7 @@ def block_means(image: Any, side: int = 10) -> Any:
     return image.reshape(height // side, side, width // side, side, channels).mean((1, 3))
 
 
+@pytest.mark.nightly
 @pytest.mark.long
 @pytest.mark.parametrize("view", [nightly("Filmic"), "AgX"])
 def test_known_lamps_are_found_from_a_picture_in_blenders_view(

@@ -9,6 +9,7 @@ from blender_window import missing_programs, run_in_window
 HERE = Path(__file__).parent
 
 
+@pytest.mark.nightly
 @pytest.mark.long
 def test_a_window_of_blender_follows_the_painter(tmp_path: Path, variables: dict[str, str]) -> None:
     if missing := missing_programs():

@@ -146,6 +146,7 @@ def test_several_targets_share_one_basis(tmp_path: Path) -> None:
     assert completed.stderr.count("basis:") == 1
 
 
+@pytest.mark.nightly
 def test_each_target_with_its_own_mask(basis_file: Path, tmp_path: Path) -> None:
     write_parts(tmp_path / "m.exr", [ExrPart("", {"Y": np.ones((128, 128), np.float32)})])
     masks = ("--mask", "m.exr", "--mask", COOL_MASK)
@@ -451,6 +452,7 @@ def test_deep_images_are_refused_by_name(tmp_path: Path) -> None:
     assert "deep" in run_refused(tmp_path, "solve", CORNELL, "deep.exr")
 
 
+@pytest.mark.nightly
 def test_resize_and_unpainted(basis_file: Path, tmp_path: Path) -> None:
     [part] = read_parts(WARM)
     wide = {k: np.repeat(np.repeat(v, 2, 0), 2, 1) for k, v in part.channels.items()}
@@ -509,6 +511,7 @@ CHECKERS = """<shape type="rectangle" id="screen"><transform name="to_world"><sc
     <texture type="checkerboard" name="radiance"/></emitter></shape>"""
 
 
+@pytest.mark.nightly
 def test_groups_and_kept_lights_from_solve_to_relight(tmp_path: Path) -> None:
     room = write_room(tmp_path, lights="".join(LIGHTS.values()) + CHECKERS)
     choice = ("--group", "warm=panel,bulb", "--lights", "warm,s*")
@@ -596,6 +599,7 @@ def test_wrong_choices_are_refused_in_one_line(
     assert words in run_refused(tmp_path, "lights", write_room(tmp_path), *arguments)
 
 
+@pytest.mark.nightly
 def test_solved_small_and_verified_large(tmp_path: Path) -> None:
     few_samples = ("--resolution", "1/4", "--spp", 16, "--seed", 8)
     arguments = ("solve", CORNELL, WARM, *few_samples, "--verify-spp", 16)
@@ -649,6 +653,7 @@ def test_a_tampered_scene_is_told_from_a_small_prediction_too(tmp_path: Path) ->
     assert "DISAGREE" in completed.stdout
 
 
+@pytest.mark.nightly
 def test_a_basis_for_a_time(tmp_path: Path) -> None:
     def spp_of(output: str) -> int:
         return int(output.split(" lights, ")[1].split()[0])

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from command import succeed
+from nightly import nightly
 from renderer import CORNELL, REPOSITORY, write_room
 
 from lightpaint.basis.cache.cache_folder import TAG
@@ -19,7 +20,7 @@ WARM = REPOSITORY / "targets" / "cornell" / "warm.exr"
 SMALL = 48 * 1024
 
 
-@pytest.fixture(params=["a small file system", "a limit of file sizes"])
+@pytest.fixture(params=["a small file system", nightly("a limit of file sizes")])
 def small_disk(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[tuple[Path, str]]:
     """(a folder with next to no room, shell code to run before a command that writes there)."""
     folder = tmp_path / "disk"

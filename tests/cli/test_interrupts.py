@@ -77,7 +77,7 @@ def three_lights(folder: Path, method: str) -> Path:
     return write_room(folder, lights=lights, integrator=INTEGRATORS[method])
 
 
-@pytest.fixture(scope="module", params=INTEGRATORS)
+@pytest.fixture(scope="module", params=[ONE_PASS, nightly(SEPARATE)])
 def uninterrupted(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[str, Path, Basis]:
@@ -245,6 +245,7 @@ def test_what_a_script_starts_in_its_background_hears_ctrl_c(tmp_path: Path) -> 
         assert process.wait(timeout=60) == 130
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("delay_s", [nightly(0.3), 0.7, nightly(1.3)])
 def test_killed_at_any_moment_leaves_a_readable_basis(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, delay_s: float

@@ -12,7 +12,7 @@ from killed_commands import Stage, wait_for_record, wait_for_seconds, wait_for_s
 from nightly import nightly
 
 
-@pytest.fixture(scope="module", params=["solve", "relight"])
+@pytest.fixture(scope="module", params=["solve", nightly("relight")])
 def stage(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Stage:
     return Stage(tmp_path_factory.mktemp("kills"), str(request.param))
 

@@ -25,6 +25,7 @@ def as_nobody(tmp_path: Path) -> list[str]:
     return words
 
 
+@pytest.mark.nightly
 def test_what_cannot_be_written_is_said_before_anything_is_rendered(
     tmp_path: Path, as_nobody: list[str]
 ) -> None:

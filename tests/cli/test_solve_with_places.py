@@ -66,6 +66,7 @@ def opened_subject(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Subject:
     return subjects[0]
 
 
+@pytest.mark.nightly
 def test_the_command_of_a_session_moves_no_light_by_itself(
     work_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

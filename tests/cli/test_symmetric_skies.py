@@ -62,6 +62,7 @@ def test_two_texels_are_one_light_at_their_mean(folder: Path) -> None:
     assert scene.light("sky.x2.y2").member_names == ("sky.x2.y2",)
 
 
+@pytest.mark.nightly
 def test_a_symmetric_sky_keeps_to_its_limits_and_whites(folder: Path) -> None:
     (folder / "sky.lights.toml").write_text("[light.sky]\nsplit = [5, 4]\nsymmetric = true\n")
     options = ["--kelvin", "sky=3000:9000", "--limit", "sky.*.y1=:0.3", "--spp", 32, "-o", "out"]

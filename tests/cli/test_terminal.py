@@ -119,6 +119,7 @@ def test_relight_of_names_that_steer(tmp_path: Path, make_basis: Any) -> None:
     assert not STEERS.search(refusal)
 
 
+@pytest.mark.nightly
 def test_thousands_of_names_are_not_repeated(tmp_path: Path, make_basis: Any) -> None:
     names = [f"light_{k}" for k in range(3000)]
     basis = make_basis(images=[[[[1.0] * 3]]] * 3000, names=names)

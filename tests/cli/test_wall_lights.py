@@ -92,6 +92,7 @@ def test_a_wall_keeps_to_all_constraints(room: Path) -> None:
     assert (found[..., 0] >= found[..., 2] * 0.98).all()
 
 
+@pytest.mark.nightly
 def test_a_wall_can_be_one_dimmer_or_have_one_row_that_changes(room: Path) -> None:
     solve(room, "--group", "dimmer=led")
     stored = read_emitted_image(room / "out" / "relit.led.exr", is_linear=True)

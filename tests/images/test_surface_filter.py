@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from nightly import nightly
 
 from lightpaint.images.denoiser import DARKEST, Features
 from lightpaint.images.surface_filter import (
@@ -109,7 +110,7 @@ def filter_pixelwise(features: Features, image: Any, radius: int) -> Any:
     return filtered
 
 
-@pytest.mark.parametrize("radius", [2, RADIUS])
+@pytest.mark.parametrize("radius", [2, nightly(RADIUS)])
 def test_it_is_what_its_plain_form_is(radius: int, rng: np.random.Generator):
     features = room(rng)
     image = rng.random((*SIZE, 3), dtype=np.float32)

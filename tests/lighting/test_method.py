@@ -66,6 +66,7 @@ def _similar_lights(make_basis: Any) -> Any:
     return basis, _target(truth)
 
 
+@pytest.mark.nightly
 def test_running_out_of_sweeps_is_said(make_basis: Any) -> None:
     basis, target = _similar_lights(make_basis)
     assert solve(basis, target).certificate.converged

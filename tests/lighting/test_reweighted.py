@@ -225,6 +225,7 @@ def test_a_display_fit_is_stationary_and_no_worse(
     assert np.abs(_projected_gradient(value, w)).max() < 1e-6 * value(0 * w)
 
 
+@pytest.mark.nightly
 def test_most_display_fits_are_the_best_there_are(make_basis: Any):
     """The loss is not convex. Random starts seldom find better, or much better."""
     worse = []

@@ -89,6 +89,7 @@ def test_a_click_hangs_a_light_before_the_surface(moving: MovingStudio) -> None:
     assert np.subtract(place["target"], place["position"])[1] > 0
 
 
+@pytest.mark.nightly
 def test_undo_looks_and_the_file_keep_added_lights(moving: MovingStudio) -> None:
     session, before = moving.studio.session, names(moving)
     add_light(moving, protocol.AddLight("point", position=AIR))

@@ -499,6 +499,7 @@ def test_the_number_of_a_deleted_look_does_not_return(moving: MovingStudio) -> N
     assert [look.id for look in moving.studio.state().looks] == [2]
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("without_reasons")
 def test_exported_places_give_the_same_lamps_in_the_terminal(moving: MovingStudio) -> None:
     """Up to the noise of 16 samples; unpainted parts are held near the look before the move."""
@@ -525,6 +526,7 @@ def test_exported_places_give_the_same_lamps_in_the_terminal(moving: MovingStudi
         assert there[name] == pytest.approx(emission, rel=3e-3, abs=1e-3), name
 
 
+@pytest.mark.nightly
 def test_a_report_searches_for_no_places(tmp_path: Path) -> None:
     """In the painter no light moves unless somebody moves it, whatever the lights file permits."""
     (tmp_path / "room.lights.toml").write_text("[light.beam]\naim = true\n")

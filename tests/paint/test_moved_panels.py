@@ -58,6 +58,7 @@ def two_lights(tmp_path: Path) -> Iterator[MovingStudio]:
     room.close()
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("without_reasons")
 def test_a_verification_names_panels_whose_shadow_is_new(two_lights: MovingStudio) -> None:
     moving = two_lights

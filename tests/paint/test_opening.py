@@ -147,6 +147,7 @@ def test_what_is_wrong_with_a_scene_ends_the_painter_in_one_line(tmp_path: Path)
     assert not list(tmp_path.glob("*.paint"))
 
 
+@pytest.mark.nightly
 def test_a_session_of_other_lights_is_refused_when_the_scene_tells(
     path: Path, make_basis: Any
 ) -> None:

@@ -58,6 +58,7 @@ class SkyStudio:
         self.studio.wait()
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("without_reasons")
 @pytest.mark.filterwarnings("ignore:.*samples.*")
 def test_painted_texels_are_undone_kept_and_exported(tmp_path: Path) -> None:
@@ -119,6 +120,7 @@ def test_limits_of_locked_texels_are_known_after_a_restart(tmp_path: Path) -> No
     again.close()
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("without_reasons")
 @pytest.mark.filterwarnings("ignore:.*samples.*")
 def test_finer_texels_of_a_sun_are_painted_and_exported(tmp_path: Path) -> None:

@@ -49,6 +49,7 @@ def paint(studio: Studio, stroke: int, light: tuple[float, float, float]) -> Non
     studio.handle(protocol.Paint(stroke, (9, 15, 4, 12), True), arrays)
 
 
+@pytest.mark.nightly
 def test_paint_is_answered_as_surely_as_was_asked_for(subject: Subject):
     studio = Studio([subject], MemoryStore)
     messages: list[Any] = []

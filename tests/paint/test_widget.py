@@ -210,7 +210,7 @@ def test_what_is_set_from_a_cell_shows(basis: lp.Basis, open_painter: Any, tmp_p
         {"everything": True},
         {},
         nightly({"through_view": True, "transform": VIEW}),
-        {"through_view": True, "over_look": True, "transform": VIEW},
+        nightly({"through_view": True, "over_look": True, "transform": VIEW}),
     ],
 )
 def test_a_target_is_answered_as_by_solve(basis: lp.Basis, open_painter: Any, options: Any) -> None:
@@ -451,6 +451,7 @@ def test_settings_by_name_are_those_there_are() -> None:
     assert set(SettingsByName.__annotations__) == names
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(find_spec("mypy") is None, reason="mypy")
 def test_type_checkers_know_what_can_be_set(tmp_path: Path) -> None:
     right = "painter.target = None\npainter.targets = [None]\nassert painter.lighting\n"

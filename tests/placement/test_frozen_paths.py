@@ -113,6 +113,7 @@ def test_sums_of_one_light_are_its_column(room: Scene, first_hits: int) -> None:
     along_paths(room, compare, first_hits=first_hits, bounces=4)
 
 
+@pytest.mark.nightly
 def test_vertices_of_all_paths_share_kernels(room: Scene) -> None:
     """Each takes a second to compile: none is of a film, a number of paths or a bounce alone.
 
@@ -298,6 +299,7 @@ def test_a_panel_that_the_camera_sees_is_in_its_column(tmp_path: Path) -> None:
     assert np.square(column - plane).sum() < 0.005 * np.square(plane).sum()  # noise
 
 
+@pytest.mark.nightly
 def test_the_back_of_a_panel_is_dark_and_in_the_way(tmp_path: Path) -> None:
     """It hides the wall that it lights, and absorbs light that comes back from there."""
     room = load_scene(write_room(tmp_path, film='<rfilter type="box"/>'))

@@ -75,6 +75,7 @@ def test_a_missing_spot_is_found_with_its_cone(room: Scene, basis: lp.Basis) -> 
     assert placement.missed_after < 0.1 * placement.missed_before
 
 
+@pytest.mark.nightly
 def test_a_panel_is_found_by_its_flux(room: Scene, basis: lp.Basis) -> None:
     pose = lp.Pose(position=(0.4, 2.1, 0.9), target=(-0.2, 0.0, -0.2))
     true = NewEmitter("true", "panel", pose, size=(0.4, 0.4), emission=(60, 60, 60))
@@ -125,6 +126,7 @@ def test_new_lights_hang_where_they_may(
     assert deviation == pytest.approx(0, abs=1e-6)
 
 
+@pytest.mark.nightly
 def test_constraints_out_of_view_and_distance_hold(room: Scene, basis: lp.Basis) -> None:
     others = [
         NewEmitter(f"true_{k}", "point", lp.Pose(position=(x, 1.4, 0.3)), emission=(1, 1, 1))
@@ -160,6 +162,7 @@ def is_hidden(scene: Scene, place: Any) -> bool:
     return bool(np.array(hit.t)[0] < 0.999)
 
 
+@pytest.mark.nightly
 def test_new_lights_are_like_one_of_the_scene(room: Scene, basis: lp.Basis) -> None:
     painted = room.with_new_emitters([emitter("spot", emission=(9, 9, 9))])
     new = lp.NewLights(like="beam", count=1, name="beam")
@@ -170,6 +173,7 @@ def test_new_lights_are_like_one_of_the_scene(room: Scene, basis: lp.Basis) -> N
     assert light.site.cutoff == pytest.approx(30)
 
 
+@pytest.mark.nightly
 def test_a_pair_stays_a_mirror_image(tmp_path: Path) -> None:
     pair_text = """
     <emitter type="point" id="left"><point name="position" x="-0.6" y="1.3" z="0.3"/>

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from nightly import nightly
 from renderer import write_room
 
 import lightpaint as lp
@@ -51,6 +52,7 @@ def test_a_lamp_is_found_where_the_painting_has_it(room: Scene) -> None:
     assert site.position == pytest.approx(placement.moves[0].new.position, rel=1e-6)
 
 
+@pytest.mark.nightly
 def test_a_panel_is_found_where_the_painting_has_it(tmp_path: Path) -> None:
     """A long one, so that its outline counts; the camera sees it, and what it hides."""
     path = write_room(tmp_path)
@@ -197,7 +199,7 @@ def test_a_beam_is_told_that_changed_apart_from_its_cone(
     assert ("beam" in spoken_move(move)) == is_told
 
 
-@pytest.mark.parametrize("edge", ["harder", "softer"])
+@pytest.mark.parametrize("edge", ["harder", nightly("softer")])
 def test_a_beam_gets_the_edge_that_the_painting_has(room: Scene, edge: str) -> None:
     """A free beam is found; one that keeps its share of the cone is not."""
     now = room.light("beam").members[0].site

@@ -37,6 +37,7 @@ def solved(bases: tuple[Basis, Basis], **levels: float) -> lp.Solution:
     return lp.solve(basis, lp.Target.of(painted.planes.mix(weights)), space="linear", hold=0)
 
 
+@pytest.mark.nightly
 def test_a_dark_look_places_its_lamp_as_a_bright_one_does(
     room: Scene, bases: tuple[Basis, Basis]
 ) -> None:

@@ -123,6 +123,7 @@ def test_a_light_that_is_missing_is_found(
     np.testing.assert_allclose(repeat.lighting.emission[first.name], first.emission, rtol=0.15)
 
 
+@pytest.mark.nightly
 def test_gains_of_a_display_fit_are_shares_of_its_last_linear_problem(
     lacking: tuple[Scene, Basis], missing: Any, monkeypatch: pytest.MonkeyPatch
 ):
@@ -190,6 +191,7 @@ def test_constraints_hold_beside_a_suggestion(lacking: tuple[Scene, Basis], miss
     assert first.gain_share > 0.7
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("sensor", ["orthographic", nightly("thinlens")])
 def test_other_cameras(tmp_path: Path, sensor: str):
     camera = f"""<sensor type="{sensor}" id="other">
@@ -230,6 +232,7 @@ def test_a_camera_that_sees_nothing_but_the_sky(tmp_path: Path):
     assert suggest_lights(scene, basis, solve(basis, full_target)) == ()
 
 
+@pytest.mark.nightly
 def test_a_basis_of_a_smaller_film_and_names_that_are_taken(tmp_path: Path):
     lights = LIGHTS["sky"].replace('"sky"', '"suggested_1"')
     lights += LIGHTS["bulb"].replace('"bulb"', '"candidate_1"')

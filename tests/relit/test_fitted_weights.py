@@ -67,6 +67,7 @@ def judged(make_basis: BasisFactory, is_painted: bool) -> tuple[np.ndarray, np.n
     return np.array(z), np.einsum("sic,sic->s", deviation, np.array(errors)) / light
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("is_painted", [nightly(False), True])
 def test_z_is_standard_normal_where_the_prediction_is_true(
     make_basis: BasisFactory, is_painted: bool

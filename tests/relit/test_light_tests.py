@@ -116,6 +116,7 @@ def test_errors_in_a_light_are_found_as_often_as_the_sensitivity_says(kind: str,
     assert np.mean(misses) == pytest.approx(np.mean(stated_powers), abs=room)
 
 
+@pytest.mark.nightly
 def test_looks_and_lights_alarm_no_more_often_than_is_stated():
     """Renders of growing length, looked at six times, each time by all tests."""
     single_limit, looks, runs = 2.5, 6, 250

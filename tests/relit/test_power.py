@@ -34,6 +34,7 @@ def power(predicted: Estimate, verified: Estimate, light: Estimate) -> float:
     return (judge(predicted, verified, light).power or {})["lamp"]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("strength", "spread"),
     # Half of each sort is found by its sum, half by its pattern; the first and last hardly, always.

@@ -30,6 +30,7 @@ def target(scene: lp.Scene) -> lp.Target:
     return lp.read_target(path).fitted_to(scene.size, resize=True)
 
 
+@pytest.mark.nightly
 @pytest.mark.long
 @pytest.mark.parametrize(("seeds", "refined"), [FEW, nightly(*MANY)])
 def test_error_bars_hold_the_answer_of_many_samples(

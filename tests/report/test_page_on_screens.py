@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from nightly import nightly
 
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.analysis import without_constraints
@@ -106,9 +107,9 @@ def hall(make_basis: Any) -> str:
 @pytest.mark.parametrize(
     ("n", "name", "options"),
     [
-        (3, "spot_{}", {}),
+        nightly(3, "spot_{}", {}),
         (302, "ceiling_lamp_{}", {}),
-        (40, "Sternwartenkuppelbeleuchtungskoerper{}", {"sparse": 6}),
+        nightly(40, "Sternwartenkuppelbeleuchtungskoerper{}", {"sparse": 6}),
     ],
 )
 def test_nothing_scrolls_sideways_and_hundreds_of_lights_are_folded(

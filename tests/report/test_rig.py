@@ -103,6 +103,7 @@ def test_an_arrow_leads_from_where_a_light_pointed_to_where_it_does_now() -> Non
     assert marked[int(y) - 3 : int(y) + 4, int(x) - 3 : int(x) + 4].any()
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("position", [None, (1e6, 1e6, 1e6)])
 def test_lights_far_away_do_not_shrink_the_room(position: Any) -> None:
     room = a_room()

@@ -114,6 +114,7 @@ def test_gimp(folder: Path, basis: lp.Basis) -> None:
             lp.read_target(folder / name)
 
 
+@pytest.mark.nightly
 def test_krita(folder: Path, basis: lp.Basis) -> None:
     # It wants a display, and on Linux takes no other than X11's.
     krita, display = needs("kritarunner", "Krita"), needs("xvfb-run", "Xvfb")

@@ -79,6 +79,7 @@ def test_bands_have_the_bits_of_the_whole_film(
     assert len(band_memory) > 8
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("after", [nightly(2), 6, nightly(11)])
 def test_an_interrupted_band_goes_on_to_the_same_bits(
     small_room: Scene,
@@ -112,6 +113,7 @@ def test_an_interrupted_band_goes_on_to_the_same_bits(
     assert_equal_bits(basis, basis_file.as_stored(whole_basis))
 
 
+@pytest.mark.nightly
 def test_sums_are_read_once_to_write_all_planes(
     small_room: Scene, band_memory: list[int], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -128,6 +130,7 @@ def test_sums_are_read_once_to_write_all_planes(
     assert sorted(read) == [*range(2 * len(small_room.lights))]
 
 
+@pytest.mark.nightly
 def test_indirect_planes_of_many_lights_stay_in_their_file(
     small_room: Scene, whole_basis: Basis, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -147,6 +150,7 @@ def test_indirect_planes_of_many_lights_stay_in_their_file(
         assert_equal_bits(basis, expected)
 
 
+@pytest.mark.nightly
 def test_indirect_planes_of_another_file_are_not_taken(
     small_room: Scene, whole_basis: Basis, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

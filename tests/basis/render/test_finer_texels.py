@@ -44,6 +44,7 @@ def test_a_sky_in_view_looks_as_mitsuba_shows_the_written_image(tmp_path: Path) 
     np.testing.assert_allclose(predicted, shown, atol=3e-4)
 
 
+@pytest.mark.nightly
 def test_a_render_of_the_written_image_confirms_the_prediction(tmp_path: Path) -> None:
     scene = finer_room(tmp_path)
     lighting = painted(scene)
@@ -56,6 +57,7 @@ def test_a_render_of_the_written_image_confirms_the_prediction(tmp_path: Path) -
     assert files[0] == files[1]
 
 
+@pytest.mark.nightly
 def test_the_light_of_finer_texels_is_that_of_the_coarse_ones(tmp_path: Path) -> None:
     scene = finer_room(tmp_path)
     coarse = load_scene(scene.path, split={"sky": "6x4"})
@@ -77,6 +79,7 @@ def test_only_changed_texels_have_other_planes(tmp_path: Path) -> None:
     assert not kept & {"sky.x1.y1", "sky.x3.y1", "sky.x2.y2", "sky.x0.y2", "sky.x4.y1"}
 
 
+@pytest.mark.nightly
 def test_planes_of_finer_texels_alone_are_those_of_a_basis_of_all(tmp_path: Path) -> None:
     scene = finer_room(tmp_path)
     names = [x.name for x in scene.lights if x.name.startswith("sky.sun2")]

@@ -71,6 +71,7 @@ def test_an_interrupt_keeps_what_is_done(small_room: Scene, after: int) -> None:
     assert_equal_bits(continuation, render_basis(small_room, spp=40))
 
 
+@pytest.mark.nightly
 def test_an_interrupt_between_the_halves_of_a_step_waits_for_the_second(
     small_room: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -97,6 +98,7 @@ def test_an_interrupt_between_the_halves_of_a_step_waits_for_the_second(
     assert_equal_bits(continuation, render_basis(small_room, spp=40))
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("integrator", ["path", "volpathmis"])
 def test_what_goes_on_has_the_bits_of_one_render(tmp_path: Path, integrator: str) -> None:
     options = {"integrator": f'<integrator type="{integrator}"/>'}

@@ -127,6 +127,7 @@ def test_a_moved_lamp_is_rendered_alone(tmp_path: Path, rendered_lights: Rendere
     assert len(rendered_lights) == 2
 
 
+@pytest.mark.nightly
 def test_two_moved_lamps_are_one_pass_and_planes_come_from_several_files(
     tmp_path: Path, rendered_lights: Rendered
 ) -> None:
@@ -177,6 +178,7 @@ def test_an_area_lamp_that_moves_is_another_room(tmp_path: Path, rendered_lights
     assert rendered_lights == [(NAMES, 4, True)] * 2
 
 
+@pytest.mark.nightly
 def test_lights_with_fewer_samples_catch_up(tmp_path: Path, rendered_lights: Rendered) -> None:
     obtain_basis(room(tmp_path), spp=16)
     scene = room(tmp_path, MOVED)
@@ -188,6 +190,7 @@ def test_lights_with_fewer_samples_catch_up(tmp_path: Path, rendered_lights: Ren
     assert_agrees(basis, render_basis(scene, spp=64, seed=5))
 
 
+@pytest.mark.nightly
 def test_unequal_numbers_of_samples(tmp_path: Path, rendered_lights: Rendered) -> None:
     first = obtain_basis(room(tmp_path), spp=64)
     scene = room(tmp_path, MOVED)
@@ -292,6 +295,7 @@ def test_groups_and_what_is_kept(tmp_path: Path, rendered_lights: Rendered) -> N
     assert_agrees(third, render_basis(scene, spp=32, seed=5))
 
 
+@pytest.mark.nightly
 def test_separate_renders(tmp_path: Path, rendered_lights: Rendered) -> None:
     options: dict[str, Any] = {"integrator": '<integrator type="volpathmis"/>'}
     first = obtain_basis(room(tmp_path, **options), spp=16)
@@ -311,6 +315,7 @@ def test_separate_renders(tmp_path: Path, rendered_lights: Rendered) -> None:
     assert second.origin.is_composed
 
 
+@pytest.mark.nightly
 def test_what_is_rendered_in_parts(tmp_path: Path) -> None:
     log: list[tuple[tuple[str, ...], bool]] = []
 
@@ -330,6 +335,7 @@ def test_what_is_rendered_in_parts(tmp_path: Path) -> None:
     assert_agrees(third, render_basis(scene, spp=32, seed=5))
 
 
+@pytest.mark.nightly
 def test_what_is_larger_than_memory(
     tmp_path: Path, rendered_lights: Rendered, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -402,7 +402,12 @@ def test_integrators_that_take_other_samples_have_the_same_mean(
 
 @pytest.mark.parametrize(
     ("name", "size"),
-    [("cornell", "1/4"), ("stage", "1/10"), nightly("gallery", "1/10"), nightly("table", "1/10")],
+    [
+        ("cornell", "1/4"),
+        nightly("stage", "1/10"),
+        nightly("gallery", "1/10"),
+        nightly("table", "1/10"),
+    ],
 )
 def test_planes_of_the_scenes_that_come_along_add_up_to_their_render(name: str, size: str) -> None:
     """Of all emitters as they are, textured ones and environments among them."""

@@ -79,6 +79,7 @@ def test_every_sample_of_every_pixel_is_in_one_part(
         plan_parts(small_room, 1)
 
 
+@pytest.mark.nightly
 def test_parts_in_any_order_make_the_basis_of_one_go(
     small_room: Scene, guide_table: np.ndarray, monkeypatch: pytest.MonkeyPatch
 ) -> None:

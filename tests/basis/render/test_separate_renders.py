@@ -103,6 +103,7 @@ def test_interrupted_and_gone_on_is_as_if_never_interrupted(
     same_basis(continuation, single_render, of_file=through_a_file)
 
 
+@pytest.mark.nightly
 def test_more_samples_add_only_what_is_missing(scene: Scene) -> None:
     rendered: list[int] = []
 
@@ -146,7 +147,7 @@ def test_a_part_of_separate_renders_does_not_replace_a_whole_basis(
     assert obtain_basis(scene, spp=8).origin == start.origin
 
 
-@pytest.mark.parametrize("integrator", [SEPARATELY, '<integrator type="path"/>'])
+@pytest.mark.parametrize("integrator", [nightly(SEPARATELY), '<integrator type="path"/>'])
 def test_a_time_is_kept_and_adds_samples(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, integrator: str
 ) -> None:
@@ -173,6 +174,7 @@ def test_a_time_is_kept_and_adds_samples(
         same_basis(continuation, render_basis(scene, spp=continuation.origin.spp), of_file=True)
 
 
+@pytest.mark.nightly
 def test_a_time_goes_on_from_unequal_lights(scene: Scene) -> None:
     saved_bases: list[Basis] = []
     interrupt_after(4, scene, saved_bases, spp=16)

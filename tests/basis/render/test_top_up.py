@@ -82,6 +82,7 @@ def test_in_two_goes_as_in_one(small_room: Scene, counts: Any, tmp_path: Path):
     same_basis(pixel_top_up.top_up(small_room, read, counts - first), in_one, of_file=True)
 
 
+@pytest.mark.nightly
 def test_a_scene_that_stays_loaded_changes_no_bit(
     small_room: Scene, counts: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
@@ -141,7 +142,7 @@ def test_uniform_samples_go_on_after_a_top_up(small_room: Scene, counts: Any):
     same_basis(render_in_parts(small_room, spp=24, start=before), after)
 
 
-@pytest.mark.parametrize("most", [nightly(1), 7, 2**20])
+@pytest.mark.parametrize("most", [nightly(1), nightly(7), 2**20])
 def test_batches_change_no_bit(
     small_room: Scene, counts: Any, monkeypatch: pytest.MonkeyPatch, most: int
 ):
@@ -164,6 +165,7 @@ def test_batches_have_every_pixel_once(counts: Any):
     assert all(a <= lightpaint.scene.scene_render.SAMPLES_PER_PASS // 4 for a in batch_samples)
 
 
+@pytest.mark.nightly
 def test_noise_falls_with_the_samples(small_room: Scene):
     """Half differences and true errors of pixels with 16 times the samples fall alike."""
     counts = np.zeros((20, 24), int)

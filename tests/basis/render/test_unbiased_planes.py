@@ -144,7 +144,7 @@ def plane_deviations(scene: Scene, basis: Basis) -> Doubles:
 
 
 @pytest.mark.parametrize(
-    "kind", [nightly(kind) if kind in ("rough plastic", "envmap") else kind for kind in ROOMS]
+    "kind", [kind if kind == "every kind" else nightly(kind) for kind in ROOMS]
 )
 def test_each_plane_is_the_render_of_its_light_alone(tmp_path: Path, kind: str) -> None:
     scene = room(tmp_path, **ROOMS[kind])
@@ -172,6 +172,7 @@ def mutation(name: str) -> Any:
     }[name]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("fault", ["one sample by chance", nightly("weights that do not add up")])
 def test_a_wrong_weight_is_found(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: str
@@ -184,6 +185,7 @@ def test_a_wrong_weight_is_found(
         check_means(z)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("lights", [33, nightly(129)])
 def test_many_lights_have_the_mean_of_their_render(tmp_path: Path, lights: int) -> None:
     """Four emitters at later vertices from 32 on, eight from 128 on."""

@@ -283,6 +283,7 @@ def test_each_multiplier_is_how_fast_the_objective_changes(make_basis: Any, seed
             assert abs(multiplier - slope) <= allowed
 
 
+@pytest.mark.nightly
 def test_multipliers_of_the_tests_are_not_small(make_basis: Any) -> None:
     """Else the one above could not fail."""
     sizes: dict[str, list[float]] = {}

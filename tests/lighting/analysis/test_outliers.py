@@ -111,6 +111,7 @@ def test_intervals_hold_what_few_pixels_show(
     assert np.mean(excluded_shares, axis=0)[:2].max() <= (0.25 if kind == "highlight" else 0)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("kind", ["two fifths", nightly("a tenth")])
 def test_intervals_hold_what_one_pixel_has_a_share_of(make_basis: Any, kind: str):
     """A pixel that a few paths meet: its halves may agree by chance, one number for all noise."""

@@ -54,6 +54,7 @@ def coverage_share(bars: list[Any], light: int) -> float:
     return float(np.mean([(low <= true) & (true <= high) for low, high in ends]))
 
 
+@pytest.mark.nightly
 def test_intervals_hold_the_weight_of_a_bulb_in_glass(
     bases: list[Basis], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -121,6 +121,7 @@ def test_one_light_by_hand(make_basis: Any):
     np.testing.assert_allclose(error_bars(corrected).bias, 0, atol=1e-5)
 
 
+@pytest.mark.nightly
 def test_intervals_are_those_of_student_where_few_pixels_have_noise(make_basis: Any):
     """Three half differences are three degrees of freedom: 1.96 standard errors hold in 85 %."""
     image, target = np.ones((1, *SIZE, 3)), _target(np.full((*SIZE, 3), 0.5))
@@ -264,7 +265,7 @@ ASKED: dict[str, tuple[dict[str, Any], str]] = {
 }
 
 
-@pytest.mark.parametrize("name", ASKED)
+@pytest.mark.parametrize("name", [nightly(name) if name == "sparse" else name for name in ASKED])
 def test_error_bars_under_constraints(make_basis: Any, name: str) -> None:
     """Of each light of which something is asked, against the spread over seeds."""
     clean = _pools()

@@ -7,6 +7,7 @@ from nightly import nightly
 from painter_page import Painter
 
 
+@pytest.mark.nightly
 def test_what_was_said_of_the_answer_before_is_marked(painter: Painter) -> None:
     painter.stroke()
     painter.still()
@@ -88,6 +89,7 @@ def test_overlays_by_their_key_say_what_their_colours_mean(painter: Painter) -> 
 LEGENDS = [("48x27", "side", True), ("27x48", "wipe", True), ("48x27", "wipe", False)]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("size", "layout", "has_room"), LEGENDS)
 def test_a_legend_lies_on_no_picture_where_there_is_room(
     new_painter: Any, size: str, layout: str, has_room: bool
@@ -187,6 +189,7 @@ def test_looks(painter: Painter) -> None:
     assert painter.requests("copy_look")[-1]["look"] == 1
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("way", ["deleted", "elsewhere"])
 def test_looks_are_compared_while_both_are_there(new_painter: Any, way: str) -> None:
     painter = new_painter(viewport={"width": 1600, "height": 900})
@@ -228,6 +231,7 @@ def test_looks_are_compared_while_both_are_there(new_painter: Any, way: str) -> 
     assert len(painter.calls("begin")) == 2
 
 
+@pytest.mark.nightly
 def test_what_is_said_while_looks_are_compared_is_of_the_answer(painter: Painter) -> None:
     for _ in range(3):
         painter.stroke()
@@ -278,6 +282,7 @@ def test_a_render_of_before_is_offered_again(painter: Painter) -> None:
 WITH_LOOKS = [(1280, 720), nightly((1600, 900)), nightly((780, 600)), (690, 560), (480, 640)]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("size", WITH_LOOKS)
 def test_pictures_stay_as_large_whatever_is_done_with_looks(
     new_painter: Any, size: tuple[int, int]
@@ -512,6 +517,7 @@ HELPS: list[tuple[dict[str, Any], str, str, dict[str, Any]]] = [
 ]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("help_", "label", "kind", "change"), HELPS)
 def test_what_is_advised_is_seen_before_it_is_done(
     painter: Painter, help_: dict[str, Any], label: str, kind: str, change: dict[str, Any]
@@ -560,6 +566,7 @@ def test_a_preview_of_before_is_none(painter: Painter) -> None:
     painter.page.get_by_role("dialog").wait_for(state="detached")
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "help_",
     [

@@ -133,6 +133,7 @@ LINE_WIDTHS = """(one) => {
 }"""
 
 
+@pytest.mark.nightly
 def test_hints_are_of_the_tool_and_of_fingers(new_painter: Any) -> None:
     painter = new_painter("first")
     hint, status = painter.page.locator(".hint"), painter.page.locator("#lp-status")
@@ -274,6 +275,7 @@ def test_a_page_that_is_loaded_anew_knows_what_was_in_the_hand(painter: Painter)
     assert painter.ui("size") == 2 * held_values["size"]  # it is a part of the picture
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "junk",
     [
@@ -297,6 +299,7 @@ def test_what_is_remembered_is_not_believed(painter: Painter, junk: str) -> None
     assert {name: painter.ui(name) for name in names} == reloaded
 
 
+@pytest.mark.nightly
 def test_what_was_used_in_painters_beside_each_other_is_remembered(painter: Painter) -> None:
     """A notebook has several, and a browser several tabs."""
     assert painter.page.evaluate("() => localStorage['lightpaint.hand']") is None
@@ -465,6 +468,7 @@ def test_a_pointer_that_has_left_is_over_nothing(painter: Painter) -> None:
     assert painter.ui("probe") is None
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("tool", ["adjust", "pick"])
 def test_what_is_said_beside_the_brush_lies_in_the_picture(painter: Painter, tool: str) -> None:
     """Above it, or beside it where there is no room; never under the hand."""
@@ -619,7 +623,7 @@ OUTLINE = """(object) => {
 }"""
 
 
-@pytest.mark.parametrize("engine", ["", "engine"], ids=["made up", "real"])
+@pytest.mark.parametrize("engine", ["", nightly("engine")], ids=["made up", "real"])
 def test_the_object_that_would_be_filled_has_an_outline(new_painter: Any, engine: str) -> None:
     painter = new_painter(engine)
     page = painter.page
@@ -728,6 +732,7 @@ def test_zoom_is_said_in_pixels_of_the_picture(painter: Painter) -> None:
     assert zoom()[0] == "Fit"
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("width", [nightly(1600), 1280, 1024])
 def test_what_is_under_the_pointer_has_room_beside_what_goes_on(
     new_painter: Any, width: int

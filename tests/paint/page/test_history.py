@@ -29,6 +29,7 @@ def rows(painter: Painter) -> list[tuple[str, str]]:
     ]
 
 
+@pytest.mark.nightly
 def test_a_click_goes_to_a_step_and_what_is_undone_stays(painter: Painter) -> None:
     names = [name for name, _ in rows(painter)]
     assert names == ["Brush", "Brush", "Brush", "Beginning"]
@@ -64,6 +65,7 @@ def test_clearing_and_starting_over_are_one_step_each(painter: Painter) -> None:
     assert rows(painter)[0] == ("Clear painting", "is-undone")
 
 
+@pytest.mark.nightly
 def test_many_steps_are_listed_in_parts_and_reduced_to_milestones(painter: Painter) -> None:
     painter.page.evaluate(
         "() => { for (let k = 0; k < 130; k += 1) window.host.step(`step ${k}`); }"
@@ -79,6 +81,7 @@ def test_many_steps_are_listed_in_parts_and_reduced_to_milestones(painter: Paint
     assert len(rows(painter)) == 8
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("size", [(1280, 720), nightly((820, 1180))])
 def test_nothing_in_the_history_is_cut_or_unnamed(painter: Painter, size: tuple[int, int]) -> None:
     painter.page.set_viewport_size({"width": size[0], "height": size[1]})
@@ -94,6 +97,7 @@ def test_nothing_in_the_history_is_cut_or_unnamed(painter: Painter, size: tuple[
     assert painter.page.evaluate(overflow) == 0
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("by", ["key", "button", nightly("focus")])
 def test_the_answer_before_the_last_step_shows_while_a_key_or_button_is_held(
     painter: Painter, by: str

@@ -116,6 +116,7 @@ def test_texels_are_painted_locked_and_released_in_one_step_each(painter: Painte
     assert page.locator(".texel-lock").count() == 2
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("query", ["", "&model"], ids=["page", "notebook"])
 def test_escape_cancels_a_stroke_on_the_map(new_painter: Any, query: str) -> None:
     painter = new_painter(QUERY + query)

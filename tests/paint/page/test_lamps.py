@@ -128,6 +128,7 @@ def test_lights_are_marked_dragged_and_taken_back(room: PaintedRoom) -> None:
     wait_until(lambda: room.mark("bulb") == pytest.approx(room.seen(bulb), abs=1))
 
 
+@pytest.mark.nightly
 def test_a_mark_follows_the_pointer_before_the_answer_comes(room: PaintedRoom) -> None:
     room.page.evaluate(f"() => {{ {PAINTER}.host.send = () => new Promise(() => {{}}); }}")
     x, y = room.mark("bulb")
@@ -143,6 +144,7 @@ def test_a_mark_follows_the_pointer_before_the_answer_comes(room: PaintedRoom) -
     mouse.up()
 
 
+@pytest.mark.nightly
 def test_a_spot_is_pointed_by_clicks_and_by_numbers(room: PaintedRoom, axe: str) -> None:
     row = room.page.locator('[data-light="beam"]')
     row.get_by_role("button", name="beam", exact=True).first.click()
@@ -192,6 +194,7 @@ def test_a_light_is_added_by_a_click_dragged_and_removed(room: PaintedRoom) -> N
     page.wait_for_selector('[data-lamp="point_1"]')
 
 
+@pytest.mark.nightly
 @pytest.mark.long
 def test_compared_looks_are_shown_with_their_own_places(room: PaintedRoom) -> None:
     page, session = room.page, room.studio.session
@@ -225,6 +228,7 @@ def test_compared_looks_are_shown_with_their_own_places(room: PaintedRoom) -> No
     wait_until(lambda: np.allclose(shown("solution", row, column), here[row, column], rtol=0.1))
 
 
+@pytest.mark.nightly
 @pytest.mark.long
 def test_axe_finds_nothing_with_a_light_added_and_moved(room: PaintedRoom, axe: str) -> None:
     """Handles are on, and the fields of the light's pose are unfolded."""

@@ -231,6 +231,7 @@ def test_layers_are_made_hidden_weakened_ordered_grouped_and_deleted(wishes: Per
     assert me.still().names == listed
 
 
+@pytest.mark.nightly
 @pytest.mark.long
 def test_a_mask_is_painted_and_shown_and_the_eraser_takes_what_lies_there(wishes: Person) -> None:
     me = wishes
@@ -256,6 +257,7 @@ def test_a_mask_is_painted_and_shown_and_the_eraser_takes_what_lies_there(wishes
     assert views[0].layer(3).part((25, 26, 70, 71)).importance < 0.6
 
 
+@pytest.mark.nightly
 @pytest.mark.long
 def test_a_wish_is_changed_later_and_its_name_follows(wishes: Person) -> None:
     me = wishes
@@ -280,6 +282,7 @@ def test_a_wish_is_changed_later_and_its_name_follows(wishes: Person) -> None:
     assert (copy.gain, copy.tint) == (original.gain, original.tint)
 
 
+@pytest.mark.nightly
 @pytest.mark.long
 def test_strokes_and_adjustments_keep_to_what_is_selected_and_it_survives(me: Person) -> None:
     session, selections = me.studio.session, f"{PAINTER}.engine.selections"
@@ -325,6 +328,7 @@ def test_strokes_and_adjustments_keep_to_what_is_selected_and_it_survives(me: Pe
     assert 0.1 < share.mean() < 0.9
 
 
+@pytest.mark.nightly
 @pytest.mark.long
 def test_a_gradient_falls_off_within_the_selection_and_its_ends_are_moved_later(
     me: Person,
@@ -370,6 +374,7 @@ def test_without_layers_the_panel_is_one_line(new_painter: Any) -> None:
     assert painter.page.locator(".layer").count() == 0
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("size", [(1280, 720), nightly((820, 1180)), (700, 500)])
 def test_nothing_in_the_panel_is_cut_or_unnamed(new_painter: Any, axe: str, size: Any) -> None:
     painter: Painter = new_painter(axe=axe, viewport={"width": size[0], "height": size[1]})
@@ -403,6 +408,7 @@ def test_arrows_go_through_the_list_and_delete_deletes(new_painter: Any) -> None
         assert time.monotonic() < start + 5
 
 
+@pytest.mark.nightly
 @pytest.mark.long
 def test_layers_are_imported_by_dialog_and_by_drop(me: Person, tmp_path: Path) -> None:
     layer = LayerPixels((H, W))
@@ -445,6 +451,7 @@ def test_layers_are_imported_by_dialog_and_by_drop(me: Person, tmp_path: Path) -
     assert len(me.names) == 3
 
 
+@pytest.mark.nightly
 @pytest.mark.long
 def test_a_page_opens_without_the_pixels_of_layers_and_fetches_them_when_needed(
     wishes: Person,

@@ -41,6 +41,7 @@ def test_by_keyboard_alone(painter: Painter) -> None:
     assert len(painter.calls("begin")) == len(painter.calls("end")) == 1
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("query", ["lights=12", "lights=40&shadow"])
 def test_tab_leads_to_pictures_and_lights_at_once(new_painter: Any, query: str) -> None:
     painter = new_painter(query)
@@ -70,6 +71,7 @@ def test_tab_leads_to_pictures_and_lights_at_once(new_painter: Any, query: str) 
     assert painter.page.locator(".stage").bounding_box() == before
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("size", [(1280, 720), (900, 600)])
 def test_how_true_is_seen_where_it_opens(new_painter: Any, size: tuple[int, int]) -> None:
     painter = new_painter("lights=12", viewport={"width": size[0], "height": size[1]})
@@ -86,6 +88,7 @@ def test_how_true_is_seen_where_it_opens(new_painter: Any, size: tuple[int, int]
     assert painter.page.locator(".side").evaluate("(one) => one.scrollTop") == 0
 
 
+@pytest.mark.nightly
 def test_in_a_shadow_root_it_looks_the_same(new_painter: Any) -> None:
     plain, shadow = new_painter(), new_painter("shadow")
     width = "engine.element.getBoundingClientRect().width"
@@ -135,6 +138,7 @@ def test_around_it_nothing_hears_its_keys(new_painter: Any) -> None:
     assert painter.ui("tool") == "brush"
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("query", ["", "shadow"])
 def test_a_look_is_kept_from_anywhere(new_painter: Any, query: str) -> None:
     """With what is being typed; the browser's own window for that never opens."""
@@ -196,6 +200,7 @@ def test_a_window_is_open_before_the_next_key(new_painter: Any) -> None:
     painter.page.wait_for_function("() => !document.querySelector('dialog')")
 
 
+@pytest.mark.nightly
 def test_windows_lie_over_it(new_painter: Any) -> None:
     """In a frame as high as all of a notebook; over the frame where hardly any of it is seen."""
     painter = new_painter("shadow", viewport={"width": 1280, "height": 5000})
@@ -311,6 +316,7 @@ def test_without_panels_pictures_have_all_there_is(new_painter: Any, size: tuple
     assert stage["x"] + stage["width"] == pytest.approx(size[0], abs=1)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("size", LOW)
 def test_of_a_low_painter_the_sentence_comes_first(new_painter: Any, size: tuple[int, int]) -> None:
     """Nothing that is needed lies below what is seen, and panels scroll."""
@@ -330,6 +336,7 @@ def test_of_a_low_painter_the_sentence_comes_first(new_painter: Any, size: tuple
     assert light.bounding_box()["y"] < size[1]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("size", [(1280, 720), (690, 560), (690, 300)])
 def test_what_has_to_be_known_does_not_lie_over_a_name(
     new_painter: Any, size: tuple[int, int]

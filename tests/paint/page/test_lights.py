@@ -122,6 +122,7 @@ def test_limits_that_leave_nothing_are_not_sent(painter: Painter) -> None:
         assert len(painter.requests("constrain_light")) == count
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("size", [(1280, 720), (1920, 1080), (690, 560), (480, 640)])
 def test_what_is_asked_of_a_level_stands_in_one_row(
     new_painter: Any, size: tuple[int, int]
@@ -403,6 +404,7 @@ def test_solo_and_mute_ask_nothing_of_the_solve(painter: Painter) -> None:
     assert [max(rgb) > 0 for rgb in shown_view["otherWeights"]] == [k == 1 for k in range(7)]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("way", ["panels", "fold", "search"])
 def test_a_light_is_shown_alone_until_its_row_is_gone(painter: Painter, way: str) -> None:
     painter.page.locator(".light-thumb").nth(1).hover()
@@ -446,6 +448,7 @@ def test_a_number_is_taken_as_it_is_shown(painter: Painter) -> None:
     assert painter.page.get_by_role("textbox", name="At most").input_value() == "2"
 
 
+@pytest.mark.nightly
 def test_a_finger_scrolls_lights_and_moves_none(new_painter: Any) -> None:
     """Where it begins on a slider; sideways it moves it, and so does a tap."""
     painter = new_painter("lights=12", viewport={"width": 1024, "height": 768}, has_touch=True)
@@ -522,6 +525,7 @@ def test_levels_far_below_one_are_not_off(painter: Painter) -> None:
     assert 0.2126 * lock[0] + 0.7152 * lock[1] + 0.0722 * lock[2] == pytest.approx(4e-5, rel=1e-3)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("limits", "words", "position"),
     [

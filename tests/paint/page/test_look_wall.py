@@ -60,6 +60,7 @@ def open_looks(new_painter: Any) -> Any:
     return open_painter
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("count", "size", "columns"),
     [
@@ -139,6 +140,7 @@ def test_by_keyboard_alone(open_looks: Any) -> None:
     assert len(painter.requests("load_look")) == 1
 
 
+@pytest.mark.nightly
 def test_zoom_pan_and_exposure_are_common(open_looks: Any) -> None:
     painter = open_looks()
     open_wall(painter, "Look 1", "Look 2", "Look 3")
@@ -225,6 +227,7 @@ def test_a_deleted_look_ends_it(open_looks: Any) -> None:
     assert painter.page.locator(".look-wall").count() == 0
 
 
+@pytest.mark.nightly
 def test_looks_of_the_strip_are_opened_by_keyboard(open_looks: Any, axe: str) -> None:
     painter = open_looks(axe=axe)
     strip = painter.page.locator(".looks")

@@ -33,6 +33,7 @@ def last_locks(painter: Painter) -> dict[str, Any]:
     return {name: np.array(entry["lock"]) for name, entry in constraints.items()}
 
 
+@pytest.mark.nightly
 def test_lights_are_selected_by_keys_patterns_and_groups(new_painter: Any) -> None:
     painter = new_painter("lights=64")
     page = painter.page
@@ -285,6 +286,7 @@ def test_the_master_dims_pictures_and_no_level(painter: Painter) -> None:
     assert len(painter.requests("set_master")) == count
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("size", [(1280, 720), nightly((1024, 768)), (480, 640)])
 def test_the_controls_of_a_selection_fit_and_have_names(
     new_painter: Any, axe: str, size: tuple[int, int]

@@ -227,6 +227,7 @@ def test_kelvin_turns_the_colour_and_keeps_the_luminance(make_basis: Any, open_f
     assert "3000 K" in page.locator(".mixer-light").nth(0).inner_text()
 
 
+@pytest.mark.nightly
 def test_a_finger_scrolls_past_sliders(make_basis: Any, open_file: Any, browser: Any) -> None:
     """One that begins on them; sideways it moves them."""
     basis = light_basis(make_basis, 3)

@@ -259,6 +259,7 @@ def test_in_jupyterlab(browser: Any, folder: Path) -> None:
         check_without_kernel(page, url, folder)
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(find_spec("marimo") is None, reason="marimo")
 def test_in_marimo(browser: Any, folder: Path) -> None:
     state = ["import marimo as mo", "lighting, set_lighting = mo.state(painter.lighting)"]

@@ -211,6 +211,7 @@ def test_what_is_undone_while_the_painting_is_fetched_stays_undone(run: Any):
     assert light == 0.125
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("stops", [0.0, -1.3])
 def test_paint_is_shown_beside_its_colour_as_the_pictures_show_it(run: Any, stops: float):
     light = [0.02, 0.4, 3.0]
@@ -219,6 +220,7 @@ def test_paint_is_shown_beside_its_colour_as_the_pictures_show_it(run: Any, stop
     np.testing.assert_allclose(codes, expected, atol=0.75)  # rounded, from a table
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("view", ["cpu", "gl"])
 def test_what_is_picked_paints_the_same(run: Any, view: str):
     """As light it is what falls there, and not what comes back of it."""

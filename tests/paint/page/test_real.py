@@ -329,6 +329,7 @@ def fill_and_ask(user: PainterUser) -> None:
     np.testing.assert_allclose(user.seen(80, 15), user.code(light), atol=2)
 
 
+@pytest.mark.nightly
 def test_a_light_is_held_and_moved_and_left(served_painter: ServedPainter, open_page: Any) -> None:
     user = open_page(served_painter, viewport={"width": 1280, "height": 720}).ready()
     session = served_painter.studio.session
@@ -377,6 +378,7 @@ def test_a_stroke_is_kept_though_the_page_is_closed_at_once(
     wait_until(lambda: served_painter.steps == ["brush"], "the stroke is lost")
 
 
+@pytest.mark.nightly
 def test_what_is_said_while_nothing_is_painted(
     served_painter: ServedPainter, open_page: Any
 ) -> None:
@@ -398,6 +400,7 @@ def test_what_is_said_while_nothing_is_painted(
     )
 
 
+@pytest.mark.nightly
 def test_a_pen_paints_with_its_pressure_and_fingers_paint_and_zoom(
     served_painter: ServedPainter, open_page: Any
 ) -> None:
@@ -523,6 +526,7 @@ def test_what_is_kept_is_there_again_and_solved_alike_from_its_files(
         np.testing.assert_allclose(weights, session.weights, rtol=1e-9)
 
 
+@pytest.mark.nightly
 def test_a_second_tab_takes_over_and_the_first_takes_back(
     served_painter: ServedPainter, open_page: Any
 ) -> None:
@@ -545,6 +549,7 @@ def test_a_second_tab_takes_over_and_the_first_takes_back(
     np.testing.assert_allclose(first.seen(15, 5), first.code(current), atol=1)
 
 
+@pytest.mark.nightly
 def test_a_stroke_that_was_taken_over_lies_over_nothing(
     served_painter: ServedPainter, open_page: Any
 ) -> None:
@@ -569,6 +574,7 @@ def test_a_stroke_that_was_taken_over_lies_over_nothing(
     np.testing.assert_allclose(first.seen(58, 5), first.code(current), atol=1)
 
 
+@pytest.mark.nightly
 def test_a_tab_of_an_earlier_start_says_what_to_do(subject: Subject, browser: Any) -> None:
     """Its errors on the console are what a server that is not there, or refuses it, makes."""
     first_painter = ServedPainter(subject)
@@ -618,6 +624,7 @@ def two_views(subject: Subject, basis: lp.Basis) -> Iterator[ServedPainter]:
     painter.close()
 
 
+@pytest.mark.nightly
 def test_two_views_are_painted_and_have_one_answer(
     two_views: ServedPainter, open_page: Any
 ) -> None:
@@ -728,6 +735,7 @@ def test_one_waits_for_the_first_picture_and_paints_while_it_gets_better(
         painter.close()
 
 
+@pytest.mark.nightly
 def test_what_comes_at_rest_is_drawn_sharply_at_once(
     served_painter: ServedPainter, open_page: Any
 ) -> None:
@@ -744,6 +752,7 @@ def test_what_comes_at_rest_is_drawn_sharply_at_once(
     assert not any(user.page.evaluate("() => window.drawn"))
 
 
+@pytest.mark.nightly
 def test_in_a_browser_that_is_zoomed_it_is_sharp_and_in_its_place(
     served_painter: ServedPainter, open_page: Any
 ) -> None:

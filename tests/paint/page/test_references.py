@@ -145,6 +145,7 @@ def test_look_like_this_asks_what_is_chosen(room: Painter) -> None:
     assert room.ui("open")["layers"]
 
 
+@pytest.mark.nightly
 def test_pairs_of_places_are_pressed_listed_and_removed(room: Painter) -> None:
     page = room.page
     give(page, "drop", "dusk.png", png())
@@ -211,6 +212,7 @@ def studio(make_basis: Any, tmp_path: Path) -> Iterator[Studio]:
     studio.close()
 
 
+@pytest.mark.nightly
 @pytest.mark.long
 def test_a_real_painter_looks_like_a_picture_from_the_clipboard(
     studio: Studio, browser: Any

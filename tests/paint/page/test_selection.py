@@ -115,6 +115,7 @@ def test_adjustments_apply_to_what_is_selected_until_nothing_is(painter: Painter
     assert whole.inner_text() == "Whole picture"
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("size", [(1280, 720), nightly((820, 1180)), (700, 500)])
 def test_the_panel_selects_by_numbers_and_nothing_of_it_is_cut(
     new_painter: Any, axe: str, size: Any
@@ -169,6 +170,7 @@ ANTS = """() => {
 }"""
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("motion", ["no-preference", "reduce"])
 def test_ants_march_unless_motion_is_unwanted(new_painter: Any, motion: str) -> None:
     painter: Painter = new_painter(reduced_motion=motion, viewport={"width": 420, "height": 300})

@@ -113,6 +113,7 @@ def test_a_mask_grows_in_a_circle_and_shrinks_by_the_same(page: Any) -> None:
     np.testing.assert_array_equal(mask_of(page, back, disc.ravel().tolist()), disc)
 
 
+@pytest.mark.nightly
 def test_colours_brightness_and_light_are_selected_as_they_are_seen(page: Any) -> None:
     codes = np.zeros((H, W, 4), int)
     codes[..., 3] = 255

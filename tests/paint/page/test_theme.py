@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 from axe import violations
+from nightly import nightly
 from painter_page import Painter
 from renderer import REPOSITORY
 
@@ -42,6 +43,7 @@ def test_the_theme_follows_the_system_until_one_is_chosen(new_painter: Any) -> N
     assert theme_of(painter) == "dark"
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("say", "theme"),
     [
@@ -133,7 +135,7 @@ FADED_IN = """() => Promise.all(document.getAnimations().filter(({ animationName
   animationName === 'lightpaint-in').map((animation) => animation.finished))"""
 
 
-@pytest.mark.parametrize("theme", ["dark", "light"])
+@pytest.mark.parametrize("theme", ["dark", nightly("light")])
 def test_axe_finds_enough_contrast_in_any_state(new_painter: Any, axe: str, theme: str) -> None:
     """That of WCAG AA. Its other rules know no theme."""
     painter: Painter = new_painter("lights=5", axe=axe, color_scheme=theme)
@@ -151,6 +153,7 @@ def test_axe_finds_enough_contrast_in_any_state(new_painter: Any, axe: str, them
     assert found == {}
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("theme", ["dark", "light"])
 def test_the_focus_is_seen(new_painter: Any, theme: str) -> None:
     """Rings have at least the contrast of 3 that WCAG asks for, on panels and over pictures."""

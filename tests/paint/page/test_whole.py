@@ -257,6 +257,7 @@ def test_lines_of_a_name_end_between_words(painter: Painter) -> None:
         assert not (start[-1:].isalnum() and end[:1].isalnum()), (start, end)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("theme", ["dark", "light"])
 def test_axe_finds_nothing_in_a_crowd(painter: Painter, axe: str, theme: Any) -> None:
     painter.page.emulate_media(color_scheme=theme)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from blender import in_blender
 from exported_files import export
+from nightly import nightly
 from renderer import write_room
 
 import lightpaint as lp
@@ -61,7 +62,7 @@ def seen_in_mitsuba(scene: Scene, folder: Path, lighting: Lighting) -> Any:
     return np.array(hit.emitter(loaded).eval(hit)).T.reshape(ROWS, COLUMNS, 3)
 
 
-@pytest.mark.parametrize("mesh", list(SHAPES))
+@pytest.mark.parametrize("mesh", ["plane", nightly("wall.obj"), nightly("wall.ply")])
 def test_a_wall_in_blender_shows_the_same_picture(
     tmp_path: Path, blender: list[str], mesh: str
 ) -> None:
