@@ -22,10 +22,15 @@ def blender_command() -> list[str]:
 def in_blender(
     blender: list[str], script: Path, *arguments: object, variables: dict[str, str] | None = None
 ) -> str:
-    dashes = ["--"] if len(blender) > 1 else []
-    run = [*blender, str(script), *dashes, *map(str, arguments)]
+    if len(blender) > 1:
+        # Unlike Python, Blender does not look for modules beside its script.
+        beside = f"import sys; sys.path.insert(0, {str(script.parent)!r})"
+        run = [*blender[:-1], "--python-expr", beside, blender[-1], str(script), "--"]
+    else:
+        run = [*blender, str(script)]
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
     environment |= variables or {}
+    run += map(str, arguments)
     completed = subprocess.run(run, capture_output=True, text=True, env=environment, check=False)
     assert completed.returncode == 0, completed.stdout + completed.stderr
     return completed.stdout

@@ -113,6 +113,7 @@ def test_the_view_is_that_of_the_picture(folder: Path):
     assert _solved("b")["solve"]["display"] == "agx"
 
 
+@pytest.mark.nightly
 def test_an_exposure_alone_is_one_of_the_templates_view(folder: Path, basis: Basis):
     """And a view alone is at the template's exposure: half of what is asked is the template's."""
     image, transform = basis.mix(TRUTH), ViewTransform("agx", -3.0)

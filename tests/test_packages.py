@@ -72,6 +72,7 @@ def test_wheel_solves_the_demo_in_an_empty_folder(built: Path, tmp_path: Path):
     assert len(answer) == 12
 
 
+@pytest.mark.nightly
 @pytest.mark.long  # beside the one that takes long, for one worker builds for all three
 def test_source_distribution_has_all_that_the_checks_want(built: Path):
     [archive] = built.glob("*.tar.gz")

@@ -332,6 +332,7 @@ class _Stop:
             raise KeyboardInterrupt
 
 
+@pytest.mark.nightly
 def test_an_interrupted_search_leaves_nothing_half_written(room: Scene, tmp_path: Path) -> None:
     small = room.reduced("1/2")
     target = lp.Target.of(lp.render_basis(small.moved({"beam": AIMED}), spp=64).current_look)

@@ -62,6 +62,7 @@ def test_links_that_answer_pass(site: str, tmp_path: Path) -> None:
     assert "2 links to other sites, none of them dead" in run.stdout
 
 
+@pytest.mark.nightly
 def test_links_that_are_gone_are_found(site: str, tmp_path: Path) -> None:
     run = check(tmp_path, f"<{site}/there> <{site}/gone>")
     assert run.returncode == 1

@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 from axe import axe_source, violations
+from nightly import nightly
 from renderer import REPOSITORY
 
 SITE = REPOSITORY / "docs" / "_build" / "html"
@@ -18,7 +19,7 @@ def site() -> Path:
     return SITE
 
 
-@pytest.mark.parametrize("width", [400, 1440])
+@pytest.mark.parametrize("width", [400, nightly(1440)])
 def test_pages_are_for_everybody_and_fit(site: Path, browser: Any, width: int) -> None:
     source, foreign_requests = axe_source(), []
     page = browser.new_page(viewport={"width": width, "height": 900})

@@ -141,6 +141,7 @@ def test_where_nothing_is_gained_the_texels_stay_as_they_are(folder: Path) -> No
     assert any(text.startswith("no sun:") for text in remarks.said)
 
 
+@pytest.mark.nightly
 def test_constraints_on_a_texel_hold_for_the_finer_ones_in_its_place(folder: Path) -> None:
     constraints = Constraints.of({"sky.*.y1": {"limits": {"max": 5}}})
     look = answered(folder, "sunny", 24, Remarks(), constraints=constraints)
@@ -252,6 +253,7 @@ def test_the_lights_file_may_ask_for_a_sun(folder: Path) -> None:
         Job((load_scene(path),), (target_under(folder, "soft"),), folder / "out")
 
 
+@pytest.mark.nightly
 def test_the_remark_on_a_sun_has_the_option_that_paints_with_it(folder: Path) -> None:
     write_rgb(folder / "sunny-painting.exr", target_under(folder, "sunny").image)
     options = ("--split", "sky=8x5", "--sun", "24", "--spp", "64", "--no-verify")

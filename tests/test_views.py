@@ -289,6 +289,7 @@ def test_views_share_no_random_numbers(tmp_path: Path) -> None:
     assert abs((x * y)[noisy].mean()) < 5 / np.sqrt(noisy.sum() / 3)
 
 
+@pytest.mark.nightly
 def test_no_pixel_is_held_twice(room: Path, tmp_path: Path) -> None:
     scenes = [load_scene(room, sensor=name) for name in ("camera", "close")]
     bases = [render_basis(scene, spp=4) for scene in scenes]

@@ -210,6 +210,7 @@ def test_a_render_that_was_killed_goes_on_to_the_bits_of_one(scene: Scene) -> No
     assert not sums_files()
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("damage", ["cut", "missing", "of others"])
 def test_without_its_sums_what_is_unfinished_counts_and_is_not_exact(
     scene: Scene, damage: str

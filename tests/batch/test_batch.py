@@ -563,6 +563,7 @@ def test_without_anybody_listening(batch_folder: Path) -> None:
     ).done
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("damage", [b"", b"junk", None])
 def test_small_pictures_that_are_damaged_are_made_again(
     batch_folder: Path, damage: bytes | None

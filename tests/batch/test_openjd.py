@@ -103,6 +103,7 @@ def test_a_template_that_is_there_is_kept(folder: Path) -> None:
     )
 
 
+@pytest.mark.nightly
 def test_openjd_runs_it(folder: Path) -> None:
     if OPENJD is None:
         pytest.skip("openjd (or LIGHTPAINT_OPENJD: its path)")

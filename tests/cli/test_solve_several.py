@@ -66,6 +66,7 @@ def test_a_painting_called_as_a_file_of_the_gallery_is_refused(folder: Path) -> 
     assert "thumbnails is a folder of the gallery of several looks" in refusal
 
 
+@pytest.mark.nightly
 def test_variations_are_what_a_batch_makes_of_them(folder: Path) -> None:
     words = ("warmer", "cooler", "fewer lights", "white only", "held harder")
     (folder / "looks.toml").write_text(

@@ -69,6 +69,7 @@ LIBRARY = [
 ]
 
 
+@pytest.mark.nightly
 def test_the_library_names_no_option() -> None:
     with_options = [
         (file, line, text) for file in LIBRARY for line, text in texts(file) if OPTION.search(text)

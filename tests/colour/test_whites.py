@@ -10,6 +10,7 @@ from lightpaint.colour.white_range import white_range
 RANGES = [(1901, 100_000, 0.0), (2200, 9000, 0.0), (2700, 6500, 0.005), (2700, 2701, 0.0)]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("low", "high", "duv"), RANGES)
 def test_all_whites_are_on_the_locus(low: float, high: float, duv: float) -> None:
     whites = white_range(low, high, duv)

@@ -117,6 +117,7 @@ def _outcomes(
     return results
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("tenth", TENTHS)
 def test_what_has_checksums(tmp_path: Path, tenth: int):
     _outcomes(_checked_files(), tmp_path, 250, tenth)
@@ -139,6 +140,7 @@ def test_exr(tmp_path: Path, tenth: int):
     assert len(unharmed) < len(results) / 50
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("tenth", TENTHS)
 def test_masks(tmp_path: Path, tenth: int):
     samples = {
@@ -156,6 +158,7 @@ def test_masks(tmp_path: Path, tenth: int):
     assert read_despite_cut(results) == []
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("tenth", TENTHS)
 def test_estimates(tmp_path: Path, tenth: int):
     rng = np.random.default_rng(0)

@@ -90,6 +90,7 @@ def test_the_optimum_is_that_of_all_pixels(
     assert max(solution.certificate.kkt_residual) <= 1e-12
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("transform", VIEWS, ids=lambda v: v.spoken)
 @pytest.mark.parametrize(
     "constraint_words",

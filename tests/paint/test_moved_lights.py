@@ -179,6 +179,7 @@ def test_a_drag_that_is_given_up_moves_nothing(moving: MovingStudio) -> None:
     assert moving.studio.session.requests.poses == {}
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("without_reasons")
 def test_exports_and_verification_have_the_new_places(moving: MovingStudio) -> None:
     moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}))
@@ -435,6 +436,7 @@ def compared_picture(moving: MovingStudio, look: int) -> np.ndarray:
     return moving.studio.resource(f"look_plane/{look}").astype(np.float32)
 
 
+@pytest.mark.nightly
 def test_compared_looks_have_their_own_places_and_added_lights(moving: MovingStudio) -> None:
     """Estimated at first, rendered soon, whatever the session does with these lights meanwhile."""
     studio, session = moving.studio, moving.studio.session

@@ -82,6 +82,7 @@ def keep_basis(
     return basis
 
 
+@pytest.mark.nightly
 def test_previews_of_more_and_more_samples_come_to_the_bits_of_one_render(path: Path) -> None:
     solved = obtain(lp.load_scene(path), Settings(spp=48, use_cache=False), silent)
     bases = list(open_subject(path, spp=48).bases())
@@ -137,6 +138,7 @@ def test_a_known_scene_is_painted_without_being_loaded(
         _ = other.loaded_scene
 
 
+@pytest.mark.nightly
 def test_what_is_wrong_with_a_scene_ends_the_painter_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "scene.xml").write_text("<scene version='3.0.0'><bsdf type='no'/></scene>")
     completed = spawn(tmp_path, "paint", "scene.xml", "--no-browser", "--port", "0")

@@ -94,6 +94,7 @@ def test_painted_texels_are_undone_kept_and_exported(tmp_path: Path) -> None:
         Store.open(tmp_path / "session" / "session.db", identity)
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("without_reasons")
 @pytest.mark.filterwarnings("ignore:.*samples.*")
 def test_limits_of_locked_texels_are_known_after_a_restart(tmp_path: Path) -> None:

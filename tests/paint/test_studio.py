@@ -590,6 +590,7 @@ def test_a_preview_shows_what_the_change_does_then(
         studio.handle(protocol.Preview(9, {"holds": 1}), {})
 
 
+@pytest.mark.nightly
 def test_letting_go_gradually_is_judged_on_the_whole_picture(client: StudioClient):
     """What the button sets brings what it says, and changes the rest less than no hold does."""
     client.paint(1, 1.2)

@@ -61,6 +61,7 @@ def test_a_missing_point_is_found_with_its_colour(room: Scene, basis: lp.Basis) 
     assert "a new point at (0.4" in str(light)
 
 
+@pytest.mark.nightly
 def test_a_missing_spot_is_found_with_its_cone(room: Scene, basis: lp.Basis) -> None:
     pose = lp.Pose(position=THERE, target=(-0.5, 0.0, -0.2), cutoff=28, beam=14)
     true = NewEmitter("true", "spot", pose, emission=(8, 8, 8))

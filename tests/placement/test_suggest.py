@@ -144,6 +144,7 @@ def test_gains_of_a_display_fit_are_shares_of_its_last_linear_problem(
     assert solution.norm2.sum() != pytest.approx(solution.equations.target_norm2.sum(), rel=0.2)
 
 
+@pytest.mark.nightly
 def test_the_same_seed_gives_the_same_light(lacking: tuple[Scene, Basis], missing: Any):
     _, solution, suggestions = missing()
     [first] = suggest_lights(*lacking, solution, count=1)

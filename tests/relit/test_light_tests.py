@@ -99,6 +99,7 @@ def test_z_is_no_standard_normal_where_a_light_is_off():
     assert abs(z[:, 1:].mean()) < 2
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("kind", "error"), [("smooth", 0.01), ("smooth", ERROR), ("skew", 0.15)])
 def test_errors_in_a_light_are_found_as_often_as_the_sensitivity_says(kind: str, error: float):
     images, misses, stated_powers = pictures(), [], []

@@ -160,6 +160,7 @@ def test_who_is_interrupted_while_waiting_keeps_nobody(work: Work, monkeypatch: 
     assert work.done == ["leisure"] * 6
 
 
+@pytest.mark.nightly
 def test_threads_render_what_one_alone_does(small_room: lp.Scene, monkeypatch: pytest.MonkeyPatch):
     """Two scenes in two threads, one of them loaded anew between the passes of the other."""
     monkeypatch.setattr("lightpaint.scene.scene_render.SAMPLES_PER_PASS", 2**11)

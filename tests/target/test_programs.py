@@ -161,6 +161,7 @@ def test_imagemagick(folder: Path, basis: lp.Basis) -> None:
     check(folder, basis, "shown-png16.png", *names)
 
 
+@pytest.mark.nightly
 def test_oiiotool(folder: Path, basis: lp.Basis) -> None:
     oiiotool = needs("oiiotool", "oiiotool")
     make = (oiiotool, "--create", f"{WIDTH}x{HEIGHT}", "4", "-d", "float")

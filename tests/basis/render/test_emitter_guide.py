@@ -152,6 +152,7 @@ def test_the_table_goes_through_the_file(tmp_path: Path) -> None:
     np.testing.assert_array_equal(reread, basis.guide_table)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("damage", ["nan", "negative", "shape", "none"])
 def test_a_damaged_memory_is_forgotten(tmp_path: Path, damage: str) -> None:
     scene = load_scene(write_room(tmp_path, lights=SPOTS))

@@ -147,7 +147,8 @@ def test_a_part_of_separate_renders_does_not_replace_a_whole_basis(
     assert obtain_basis(scene, spp=8).origin == start.origin
 
 
-@pytest.mark.parametrize("integrator", [nightly(SEPARATELY), '<integrator type="path"/>'])
+@pytest.mark.nightly
+@pytest.mark.parametrize("integrator", [SEPARATELY, '<integrator type="path"/>'])
 def test_a_time_is_kept_and_adds_samples(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, integrator: str
 ) -> None:

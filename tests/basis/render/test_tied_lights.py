@@ -83,6 +83,7 @@ def test_rest_of_separate_renders_is_the_present_render_of_the_others(tmp_path: 
     )  # noise
 
 
+@pytest.mark.nightly
 def test_another_choice_is_another_basis(tmp_path: Path) -> None:
     path = write_room(tmp_path, lights=ROOM)
     choices: list[dict[str, object]] = [

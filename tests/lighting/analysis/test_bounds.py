@@ -328,6 +328,7 @@ def test_a_limit_of_luminance(make_basis: Any, seed: int, is_least: bool) -> Non
     assert multiplier == pytest.approx(slope, abs=1e-13 * norm2 / step + 2 * step * power)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("seed", seeds(8, 60))
 def test_lights_that_sparse_leaves_out(make_basis: Any, seed: int) -> None:
     basis, target = _problem(make_basis, seed)

@@ -4,7 +4,6 @@ from typing import Any, get_args
 
 import numpy as np
 import pytest
-from nightly import nightly
 
 from lightpaint.lighting.analysis.appearance.appearance import compare_appearance
 from lightpaint.lighting.analysis.appearance.color_choices import MIN_SAMPLE, color_choices
@@ -51,7 +50,8 @@ def test_choices_are_what_solving_with_them_gives(make_basis: Any, colors: Color
         assert choice.delta_e == pytest.approx(compare_appearance(other).delta_e, rel=1e-4)
 
 
-@pytest.mark.parametrize("colors", ["gentle", nightly("free"), nightly("white")])
+@pytest.mark.nightly
+@pytest.mark.parametrize("colors", get_args(Colors))
 def test_on_a_display_a_sample_of_the_pixels_says_nearly_the_same(make_basis: Any, colors: Colors):
     """Its own rounds end at a change of `ENOUGH`, far below a ΔE of 0.1."""
     size = (100, 110)

@@ -51,6 +51,7 @@ def _error(solution: Solution, target: Target) -> float:
     return float((target.importance[..., None] * np.square(residual)).sum())
 
 
+@pytest.mark.nightly
 def test_a_weaker_hold_removes_the_share_that_is_said(studio: Any):
     basis, target = studio
     before = correct_noise(solve(basis, target, hold=30.0))

@@ -88,6 +88,7 @@ def _basis(make_basis: Any, kind: str, seed: int) -> Any:
     return make_basis(images=(a + b) / 2, half_differences=(a - b) / 2, names="abc")
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("kind", "excluded_range"),
     [("plain", (0, 0)), ("fireflies", (0.95, 1)), ("highlight", (0.2, 1))],

@@ -63,6 +63,7 @@ def _tie_channels(basis: Basis, *dimmed: int) -> Basis:
     return replace(basis, lights=tuple(lights))
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("sigma", "dimmed"), [(0.05, ()), (0.2, ()), (0.2, (0, 2)), (0.5, (1,)), (0.5, ())]
 )

@@ -291,6 +291,7 @@ def test_strokes_before_all_is_asked_stay_accents(page: Any):
     np.testing.assert_array_equal(repeated_fill, importance)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("tool", ["brush", "eraser", "weight", "fill", "line", "adjust"])
 def test_a_dropped_stroke_has_never_been(page: Any, tool: str):
     first = (

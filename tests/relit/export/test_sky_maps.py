@@ -67,6 +67,7 @@ def _export(lighting: Lighting, source: Source, folder: Path, form: str, name: s
         write_content(folder / file, make())
 
 
+@pytest.mark.nightly
 def test_a_map_in_blender_shines_from_the_same_side(
     sky: tuple[Scene, Lighting], tmp_path: Path, blender: list[str]
 ) -> None:

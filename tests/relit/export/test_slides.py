@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from blender import in_blender
 from exported_files import export
+from nightly import nightly
 from renderer import write_room
 
 import lightpaint as lp
@@ -61,7 +62,7 @@ def floor_in_mitsuba(scene: Scene, folder: Path, lighting: Lighting) -> Any:
     return (np.array(light) * cosine / np.pi).T.reshape(PIXELS, PIXELS, 3)
 
 
-@pytest.mark.parametrize("before", ["new", "AREA", "SPOT"])
+@pytest.mark.parametrize("before", ["new", nightly("AREA"), nightly("SPOT")])
 def test_a_slide_in_blender_lights_a_floor_the_same(
     tmp_path: Path, blender: list[str], before: str
 ) -> None:

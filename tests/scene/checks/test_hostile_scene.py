@@ -167,6 +167,7 @@ def _assets(folder: Path, tenth: int = 0) -> list[tuple[str, bytes]]:
     ]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("tenth", TENTHS)
 def test_hostile_files_of_a_scene(tmp_path: Path, tenth: int) -> None:
     cases = []
@@ -196,6 +197,7 @@ def _wall(content: str) -> str:
     return _with(f'<shape type="cube"><bsdf type="diffuse">{content}</bsdf></shape>')
 
 
+@pytest.mark.nightly
 def test_plugins_that_lack_what_mitsuba_takes_for_granted(tmp_path: Path) -> None:
     """Each of these ended the process by a signal."""
     texture = '<texture type="{}" name="reflectance">{}</texture>'
