@@ -119,6 +119,7 @@ def test_time_bounds_what_an_error_takes(small_room: Scene, tmp_path: Path):
     assert any("was asked for" in x for x in recorder.remarks)
 
 
+@pytest.mark.nightly
 def test_several_views_share_the_samples(tmp_path: Path):
     lights = LIGHTS["panel"] + LIGHTS["bulb"] + LIGHTS["beam"] + LIGHTS["sky"]
     room = write_room(tmp_path, lights=lights, sensors=CLOSE)

@@ -307,6 +307,7 @@ def test_no_pixel_is_held_twice(room: Path, tmp_path: Path) -> None:
     assert not any(alive)
 
 
+@pytest.mark.nightly
 def test_paintings_of_two_views_seen_through_two_transforms(room: Path, tmp_path: Path) -> None:
     scenes = [load_scene(room, sensor=name) for name in ("camera", "close")]
     transforms = [ViewTransform("agx", 1.0), ViewTransform("srgb")]

@@ -84,6 +84,7 @@ def test_what_was_just_rendered_is_as_from_its_file(scene: Scene, use_cache: boo
         assert getattr(cached, name).tobytes() == getattr(fresh_basis, name).tobytes()
 
 
+@pytest.mark.nightly
 def test_what_is_large_is_read_from_its_file_as_soon_as_it_is_kept(
     scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:

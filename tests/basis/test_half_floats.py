@@ -301,6 +301,7 @@ class MadePlanes(RowPlanes):
         return np.random.default_rng(i).random((*self.size, 3), np.float32)
 
 
+@pytest.mark.nightly
 def test_writing_holds_one_light_at_a_time(tmp_path: Path, make_basis: Any) -> None:
     planes: Any = MadePlanes()
     basis = make_basis(images=np.ones((planes.count, 1, 1, 3)))

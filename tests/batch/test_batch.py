@@ -522,6 +522,7 @@ def test_the_page_holds_all_and_loads_nothing(
     ]
 
 
+@pytest.mark.nightly
 def test_a_page_of_a_thousand_looks_with_names_that_mean_mischief(tmp_path: Path) -> None:
     hostile_name = "</script><img src=x onerror=alert(1)>\u202e$title"
     lights = tuple(LightRow(f"{hostile_name}{k}", 1.0, hex="#ffffff") for k in range(12))
@@ -578,6 +579,7 @@ def test_small_pictures_that_are_damaged_are_made_again(
     assert {path: path.read_bytes() for path in pictures} == before
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "message", [nightly('{"lights": 3}'), '{"lights": [1]}', nightly('{"lights": []}'), "junk"]
 )

@@ -51,6 +51,7 @@ def _names(page: Any) -> list[str]:
     return list(page.locator("#cards .name").all_text_contents())
 
 
+@pytest.mark.nightly
 def test_two_looks_under_a_border(page: Any, batch: Path) -> None:
     page.goto((batch / "index.html").as_uri())
     assert _names(page) == NAMES
@@ -143,6 +144,7 @@ def test_every_look_can_be_mixed_from_planes_that_are_there_once(page: Any, batc
         assert int(code[1:3], 16) < int(code[5:7], 16) == 255  # bluer than the lamp's own white
 
 
+@pytest.mark.nightly
 def test_of_many_lights_those_that_do_most_have_sliders(page: Any, tmp_path: Path) -> None:
     small = small_basis()
     lights = tuple(replace(small.lights[0], name=f"lamp {k}") for k in range(60))
@@ -333,6 +335,7 @@ def write_many_looks(folder: Path, count: int = 1000) -> Path:
     return folder / "index.html"
 
 
+@pytest.mark.nightly
 def test_a_thousand_looks_are_filtered_and_ordered(page: Any, tmp_path: Path) -> None:
     page.goto(write_many_looks(tmp_path).as_uri())
     assert page.locator("#count").text_content() == "1001 of 1001"

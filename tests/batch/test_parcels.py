@@ -79,6 +79,7 @@ def test_a_look_done_elsewhere_is_the_look_done_here(
     unpack(force(remote_task), outcome.files)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("is_whole", [False, True])
 def test_light_groups_in_a_folder_among_paintings_are_the_same_elsewhere(
     folder: Path, store: ParcelStore, is_whole: bool

@@ -310,6 +310,7 @@ def test_results_of_two_solves_never_stand_together(
     assert (other / "relit.xml").read_text(encoding="utf-8") == "mine"
 
 
+@pytest.mark.nightly
 def test_whoever_reads_may_leave(basis_file: Path, tmp_path: Path) -> None:
     command = f"{sys.executable} -m lightpaint solve {basis_file} {WARM} {COOL} -o out"
     completed = subprocess.run(

@@ -194,6 +194,7 @@ sys.exit(main())
 """
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("module", "number"),
     [

@@ -69,6 +69,7 @@ def test_light_groups_are_painted_on_and_answered(shot: Path, tmp_path: Path):
     assert report["lights"]["key"]["stops"] > 0.3
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("view", [nightly(ViewTransform()), ViewTransform("filmic", 1.0)])
 def test_a_painting_over_the_beauty_is_known_as_such(
     shot: Path, tmp_path: Path, view: ViewTransform

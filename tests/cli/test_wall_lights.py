@@ -78,6 +78,7 @@ def test_a_limited_wall_is_as_near_as_its_limit_permits(room: Path) -> None:
     assert certificate.converged
 
 
+@pytest.mark.nightly
 def test_a_wall_keeps_to_all_constraints(room: Path) -> None:
     """Its name stands for its texels, and patterns for its rows and columns."""
     solve(room, "--off", "led.*.y2", "--lock", "led.x0.*", "--kelvin", "led.x1.y0=3000")

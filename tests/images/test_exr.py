@@ -94,6 +94,7 @@ def _write_kind(path: Path, kind: str) -> bytes:
     return path.read_bytes()
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "kind", ["parts", "tiles", "NO_COMPRESSION", "ZIP_COMPRESSION", "PIZ_COMPRESSION"]
 )
@@ -141,6 +142,7 @@ def test_the_terminal_is_given_back(tmp_path: Path, capfd: pytest.CaptureFixture
     assert capfd.readouterr() == ("out", "err")
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-", "<&- 2>&-", "<&- >&- 2>&-"])
 def test_reading_without_a_terminal(tmp_path: Path, closed: str):
     """Services start programs so; `sys.stdout` is None then. What is open stays as it was."""

@@ -125,6 +125,7 @@ def test_at_least_is_the_optimum_of_the_hinge(make_basis: Any, seed: int, unpain
     assert sum(solution.certificate.objective) <= value(w) * (1 + 1e-9)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "transform", [None, SRGB, ViewTransform("agx", 1.0), ViewTransform("filmic", -1.0)]
 )

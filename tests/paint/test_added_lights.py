@@ -160,6 +160,7 @@ def test_added_lights_are_solved_for_exported_and_verified(moving: MovingStudio)
     assert verified.fields["agrees"], verified.fields["text"]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("request_", "text"),
     [
@@ -217,6 +218,7 @@ def test_undo_and_removal_while_a_plane_renders(moving: MovingStudio) -> None:
     assert not [m for m in moving.messages if m.kind == "notice" and "inside" in m.fields["text"]]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("request_", "text"),
     [

@@ -1,5 +1,6 @@
 """How the server ends, over real connections: with pages that hear, are deaf, or have just left."""
 
+import pytest
 from live_server import LARGE, Page, RunningServer, wait_until
 
 from lightpaint.paint.protocol import VERSION, PictureData
@@ -30,6 +31,7 @@ def test_a_page_that_is_there_hears_of_the_end(serving: RunningServer) -> None:
     assert page.receive()[0]["reason"] == "ended"
 
 
+@pytest.mark.nightly
 def test_a_page_that_does_not_hear_is_not_waited_for(serving: RunningServer) -> None:
     deaf_page(serving)
     wait_until(lambda: any(unsent_bytes(serving)), "the system takes it all")

@@ -13,6 +13,7 @@ from lightpaint.paint import protocol
 from lightpaint.paint.store.store import MemoryStore, Store
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("count", [4, 11])
 def test_killed_at_any_moment_all_moves_that_were_acknowledged_are_there(
     tmp_path: Path, count: int

@@ -384,6 +384,7 @@ def wait_for(messages: list[Message], *kinds: str) -> Message:
     raise AssertionError([message.kind for message in messages])
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("name", "precision"), [("layers.exr", 1e-4), ("layers.ora", 1e-3)])
 def test_exported_layers_open_in_another_session(
     tmp_path: Path, name: str, precision: float

@@ -341,6 +341,7 @@ def test_what_no_layer_can_be_is_refused_and_nothing_changes() -> None:
     assert (hand.state(), len(hand.session.store.steps)) == (state, steps + 1)
 
 
+@pytest.mark.nightly
 def test_killed_at_any_moment_the_layers_of_all_acknowledged_steps_are_there(
     tmp_path: Path,
 ) -> None:

@@ -244,6 +244,7 @@ def test_hostile_places_are_refused_in_one_line(moving: MovingStudio) -> None:
     assert (moving.studio.session.version, moving.studio.session.requests.placed) == (version, {})
 
 
+@pytest.mark.nightly
 def test_a_camera_that_sees_nothing_still_lets_lights_move(tmp_path: Path) -> None:
     """Their planes are black, and a search ends in one line."""
     path = write_room(tmp_path)
@@ -335,6 +336,7 @@ def test_a_shadow_ends_on_the_line_through_its_edge(moving: MovingStudio) -> Non
     assert line @ (hit - floor_point) > (hit - floor_point) @ (hit - floor_point)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("name", "click", "place", "text"),
     [

@@ -35,6 +35,7 @@ def painter(make_basis: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     painter.close()
 
 
+@pytest.mark.nightly
 def test_a_saved_painter_is_a_mixer(browser: Any, painter: Any, tmp_path: Path) -> None:
     painter.target = lp.Target.of(0.5 * painter._studio.snapshot().bases[0].images.sum(axis=0))
     data, _ = painter._repr_mimebundle_()

@@ -54,6 +54,7 @@ def loaded(session: Session) -> list[bool]:
     return [v.layer(n).is_loaded for v in session.views for n in session.views.layers.ids]
 
 
+@pytest.mark.nightly
 @settings(max_examples=3, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(seed=st.integers(0, 10**6), further=st.integers(0, 3))
 def test_what_is_opened_from_compositions_goes_on_as_what_is_built_afresh(

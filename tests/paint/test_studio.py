@@ -206,6 +206,7 @@ def test_a_stroke_whose_end_was_never_heard_is_kept_at_the_end(
         np.testing.assert_array_equal(store.steps[0].patches[0].after.image, arrays["image"])
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("without_reasons")
 def test_one_export_is_written_at_a_time(client: StudioClient, monkeypatch: pytest.MonkeyPatch):
     """Also of what needs no render: they go to the same files."""
@@ -502,6 +503,7 @@ def test_what_was_done_is_there_again(client: StudioClient, basis: lp.Basis, tmp
     second_client.studio.close()
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("without_reasons")
 def test_a_full_disk_is_said_to_pages_and_to_the_terminal(
     client: StudioClient, monkeypatch: pytest.MonkeyPatch
@@ -768,6 +770,7 @@ def two_bases(basis: lp.Basis) -> list[lp.Basis]:
     return [basis, replace(basis, **part, origin=replace(basis.origin, sensor="side"))]
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("without_reasons")
 def test_several_views_are_painted_kept_and_exported(two_bases: list[lp.Basis], tmp_path: Path):
     client = StudioClient(tmp_path, *two_bases)

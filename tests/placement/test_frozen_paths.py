@@ -200,6 +200,7 @@ def test_vertices_that_share_with_none_are_those_of_all_paths(room: Scene) -> No
     np.testing.assert_allclose(shared, own, atol=1e-5 * own.max())  # float32
 
 
+@pytest.mark.nightly
 def test_vertices_of_all_paths_share_few_shadow_rays(room: Scene) -> None:
     """As many as those of few paths have less than half their noise, and the same light."""
     truth = along_paths(room, lambda p: p.indirect_images(sites(room)), bounces=400)

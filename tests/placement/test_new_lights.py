@@ -100,6 +100,7 @@ def test_nothing_is_added_where_nothing_is_missed(room: Scene, basis: lp.Basis) 
     assert placement.scene is room
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("freedom", "distance"),
     [

@@ -172,6 +172,7 @@ def test_where_the_lights_can_do_it_none_is_named(small_room: Scene, small_room_
     assert suggest_lights(small_room, basis, solve(basis, exact)) == ()
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("seed", [1, nightly(2), nightly(3)])
 def test_noise_is_not_taken_for_a_lack_of_light(
     small_room: Scene, small_room_basis: Any, seed: int
@@ -184,6 +185,7 @@ def test_noise_is_not_taken_for_a_lack_of_light(
     assert suggest_lights(small_room, basis, solution) == ()
 
 
+@pytest.mark.nightly
 def test_constraints_hold_beside_a_suggestion(lacking: tuple[Scene, Basis], missing: Any):
     scene, basis = lacking
     solution = solve(basis, missing()[0], constraints=Constraints.of({"*": {"lock": True}}))

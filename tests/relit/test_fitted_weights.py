@@ -80,6 +80,7 @@ def test_z_is_standard_normal_where_the_prediction_is_true(
     assert kstest(z, "norm").pvalue > 1e-3
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("is_painted", [nightly(False), True])
 def test_fitting_darkens_the_prediction_by_less_than_a_thousandth(
     make_basis: BasisFactory, is_painted: bool

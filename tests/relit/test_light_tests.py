@@ -68,6 +68,7 @@ def found(kind: str, error_share: float) -> tuple[np.ndarray, np.ndarray]:
     return np.array(z), np.array(power)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("kind", list(PATHS))
 def test_z_of_each_light_strays_no_further_than_a_normal_number_where_all_is_true(kind: str):
     z, _ = found(kind, 0.0)

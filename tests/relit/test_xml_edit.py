@@ -309,6 +309,7 @@ def trees(draw: st.DrawFn, depth: int = 3) -> str:
     return f"<{name}{attributes}>{body}</{name}{draw(st.sampled_from(['', ' ']))}>"
 
 
+@pytest.mark.nightly
 @given(tree=trees(), before=st.sampled_from(["", '<?xml version="1.0"?>\n', "<!DOCTYPE a>"]))
 def test_scanner_finds_the_tree_that_another_parser_finds(tree: str, before: str) -> None:
     text = (before + tree).encode()

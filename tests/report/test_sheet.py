@@ -70,6 +70,7 @@ def test_what_is_off_is_shown_as_it_would_be_and_what_is_not_there_is_not(make_b
     assert nowhere < 10
 
 
+@pytest.mark.nightly
 def test_names_cannot_break_it(make_basis: Any) -> None:
     names = ["a\n\x1b[2J\r", "x" * 900, "灯\u202e\ud800"]
     basis = make_basis(3, size=(6, 8), names=names)

@@ -191,6 +191,7 @@ def test_presets_take_the_smallest_reduction_that_is_small_enough(tmp_path: Path
     assert samples("preview", spp=None, time_s=1.0) is None
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("cropped", "factor", "size"),
     [(False, 4, (5, 6)), (True, 4, (2, 3)), (False, 5, (4, 4)), (True, 3, (2, 4))],

@@ -97,6 +97,7 @@ def test_light_that_is_no_light_is_named(tmp_path: Path) -> None:
         load_scene(write_room(tmp_path, lights=light.replace("-2", "inf")))
 
 
+@pytest.mark.nightly
 def test_another_variant_afterwards_is_noticed(tmp_path: Path) -> None:
     code = (
         "import lightpaint as lp, sys; s = lp.load_scene(sys.argv[1])\n"

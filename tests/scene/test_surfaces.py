@@ -53,6 +53,7 @@ def test_depth_is_the_distance_along_the_camera_s_axis(seen: Surfaces) -> None:
     assert np.ptp(wall) > 0.3 * (farthest - nearest)
 
 
+@pytest.mark.nightly
 def test_one_picture_in_every_variant(seen: Surfaces, tmp_path: Path) -> None:
     import subprocess
     import sys

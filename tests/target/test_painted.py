@@ -306,6 +306,7 @@ CONVERTED = {
 }
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("style", CONVERTED)
 @pytest.mark.parametrize("name", ["p8.png", "p.jpg", "half.exr"])
 def test_a_conversion_of_all_of_it_is_doubted(tmp_path: Path, style: str, name: str) -> None:

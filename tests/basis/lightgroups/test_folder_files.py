@@ -141,6 +141,7 @@ def test_of_a_group_without_a_pixel_nobody_is_told_to_paint_it(tmp_path: Path):
     assert [row.split(",")[6] for row in rows if row.startswith("old")] == ["unknown"]
 
 
+@pytest.mark.nightly
 def test_a_solve_into_the_folder_of_its_lights_twice(folder: Path):
     """The painting lies there, and so does the first answer when it is asked again."""
     _write_plain(folder / "evening.exr", 2 * pictures()[1] + 0.5 * pictures()[2])

@@ -169,6 +169,7 @@ def test_memory_is_that_of_half_floats_and_some_bands(
     assert whole_film - banded > 9 * len(small_room.lights) * height * width * 12
 
 
+@pytest.mark.nightly
 def test_a_full_disk_is_one_clear_line(
     small_room: Scene, band_memory: list[int], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -51,6 +51,7 @@ def test_in_two_goes_as_in_one(tmp_path: Path, small_room: Scene, through_a_file
     same_basis(continuation, single_render, of_file=through_a_file)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("after", [1, 2, 4])
 def test_an_interrupt_keeps_what_is_done(small_room: Scene, after: int) -> None:
     saved_bases: list[Basis] = []

@@ -221,6 +221,7 @@ def test_a_time_is_spent_on_what_lacks(tmp_path: Path, rendered_lights: Rendered
     assert (basis.origin.halves, basis.origin.each_light) == ((2, 2), ())
 
 
+@pytest.mark.nightly
 def test_what_is_left_of_a_time_is_for_all_lights(
     tmp_path: Path, rendered_lights: Rendered
 ) -> None:
@@ -244,6 +245,7 @@ def test_what_is_left_of_a_time_is_for_all_lights(
     assert (basis.origin.halves, basis.origin.each_light) == ((4, 4), ())
 
 
+@pytest.mark.nightly
 def test_exactly_what_is_asked_for_is_rendered_as_a_whole(
     tmp_path: Path, rendered_lights: Rendered
 ) -> None:
@@ -280,6 +282,7 @@ def test_a_reduced_film_has_planes_of_its_own(tmp_path: Path, rendered_lights: R
     assert_agrees(second, render_basis(scene, spp=36, seed=5))
 
 
+@pytest.mark.nightly
 def test_groups_and_what_is_kept(tmp_path: Path, rendered_lights: Rendered) -> None:
     options: dict[str, Any] = {"lights": ["pair", "panel"], "groups": {"pair": ["bulb", "beam"]}}
     first = obtain_basis(load_scene(room(tmp_path).path, **options), spp=32)
@@ -383,6 +386,7 @@ def test_a_damaged_file_costs_its_planes(
     assert not basis.origin.is_composed
 
 
+@pytest.mark.nightly
 def test_planes_without_an_identity_are_none_of_anybodys(
     tmp_path: Path, rendered_lights: Rendered
 ) -> None:

@@ -555,6 +555,7 @@ def test_hidden_emitters_are_hidden_from_the_camera_alone(
     assert image.sum() > 1.1 * rendered.sum()
 
 
+@pytest.mark.nightly
 def test_better_numbers_are_unbiased_at_any_length_and_less_noisy(tmp_path: Path) -> None:
     """Against choosing at random, for a scene whose lights have no other noise."""
     lamps = "".join(

@@ -106,6 +106,7 @@ def test_threads_decide_no_bit(small_room: Scene, threads: int) -> None:
     assert is_same(render_basis(small_room, spp=SPP), single_render)
 
 
+@pytest.mark.nightly
 def test_any_budget_that_comes_to_the_same_samples_makes_the_same(
     small_room: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -144,6 +145,7 @@ def test_the_training_depends_on_the_seed_alone(small_room: Scene, guide_table: 
     assert (guide_training.train_guide(small_room, 1) != guide_table).any()
 
 
+@pytest.mark.nightly
 def test_what_an_older_version_has_rendered_is_used_but_not_gone_on_with(
     small_room: Scene,
 ) -> None:

@@ -105,6 +105,7 @@ def test_a_scene_that_stays_loaded_changes_no_bit(
         same_basis(a, b)
 
 
+@pytest.mark.nightly
 def test_views_of_a_scene_are_loaded_once(counts: Any, tmp_path: Path, monkeypatch: Any):
     """Each goes on from its own sensor, with the bits that it has alone."""
     path = write_room(tmp_path, lights=LIGHTS["panel"] + LIGHTS["bulb"], sensors=SECOND_SENSOR)
@@ -130,6 +131,7 @@ def test_views_of_a_scene_are_loaded_once(counts: Any, tmp_path: Path, monkeypat
         same_basis(a, b)
 
 
+@pytest.mark.nightly
 def test_uniform_samples_go_on_after_a_top_up(small_room: Scene, counts: Any):
     """Both kinds of samples come to the same, in whichever order they are taken."""
     basis = render_basis(small_room, spp=8)

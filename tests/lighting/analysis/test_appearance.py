@@ -144,6 +144,7 @@ def _four_quarters(make_basis: Any) -> Any:
     return replace(basis, objects=Objects(index, ("wall", "annex", "niche", "door")))
 
 
+@pytest.mark.nightly
 def test_a_light_that_somebody_switched_off_goes_before_the_hold(make_basis: Any):
     """Two are off by hand, and one of them is all that is missed."""
     basis = _four_quarters(make_basis)
@@ -263,6 +264,7 @@ def test_what_becomes_of_the_rest_is_seen(make_basis: Any):
     )
 
 
+@pytest.mark.nightly
 def test_lights_that_are_held_back_are_known(make_basis: Any):
     basis = _left_and_right(make_basis, spill=0.5)
     target = _paint_over(_look(basis), (slice(8, 16), slice(4, 12)), 0.6)

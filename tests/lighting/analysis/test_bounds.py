@@ -299,6 +299,7 @@ def test_multipliers_of_the_tests_are_not_small(make_basis: Any) -> None:
         assert np.median(measured) > 100, kind
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("seed", seeds(8, 40))
 @pytest.mark.parametrize("is_least", [False, True])
 def test_a_limit_of_luminance(make_basis: Any, seed: int, is_least: bool) -> None:

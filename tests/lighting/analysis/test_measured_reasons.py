@@ -63,6 +63,7 @@ def test_a_weaker_hold_removes_the_share_that_is_said(studio: Any):
     assert reason.loosening.share == pytest.approx(gained, abs=1e-9)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("kind", ["limits", "colors"])
 def test_the_first_reason_removes_the_share_that_is_said(studio: Any, kind: str):
     basis, target = studio

@@ -181,6 +181,7 @@ def test_kept_and_unreached_lights_have_no_error(make_basis: Any):
     assert [x.standard_error is None for x in lighting.lights] == [True, False, True]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("mixed_sigma", [0.05, 0.3, 3.0])
 def test_a_refinement_comes_closer(make_basis: Any, mixed_sigma: float):
     """On average over seeds; a render of the mix that is nothing but noise does no harm."""

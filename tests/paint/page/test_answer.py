@@ -157,6 +157,7 @@ def test_how_pictures_are_shown(painter: Painter) -> None:
     assert not painter.requests("change_settings")  # for the eye only
 
 
+@pytest.mark.nightly
 def test_looks(painter: Painter) -> None:
     painter.button("Save look").click()
     painter.stroke()
@@ -347,6 +348,7 @@ def test_what_lies_between_two_looks_is_kept_under_a_name_that_says_so(painter: 
     assert request["name"] in name.get_attribute("data-tip")
 
 
+@pytest.mark.nightly
 def test_the_look_that_is_seen_is_marked(painter: Painter) -> None:
     def marked() -> list[str]:
         painter.still()
@@ -420,6 +422,7 @@ def test_files_are_written_and_their_command_shown(painter: Painter) -> None:
     assert painter.requests("export")[-1]["outputs"][-1] == "layers"
 
 
+@pytest.mark.nightly
 def test_settings(painter: Painter) -> None:
     painter.button("Solve settings").click()
     painter.button("Ignore").click()
@@ -638,6 +641,7 @@ def test_what_is_half_typed_is_given_up_by_escape(painter: Painter) -> None:
     assert painter.requests("change_settings") == painter.requests("constrain_light") == []
 
 
+@pytest.mark.nightly
 def test_where_a_page_may_not_copy_it_says_so(new_painter: Any) -> None:
     painter = new_painter(
         init="Object.defineProperty(navigator, 'clipboard', { value: undefined })"

@@ -38,6 +38,7 @@ def place_script(x: float, y: float, pressure: float = 1.0) -> str:
     return f"{{ x: {x}, y: {y}, pressure: {pressure} }}"
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("hardness", [0, 0.5, 1])
 def test_one_stamp_has_the_energy_of_its_profile(page: Any, hardness: float):
     image, importance = run_brush(

@@ -4,6 +4,7 @@ from dataclasses import MISSING, fields, make_dataclass
 from typing import Any, get_origin, get_type_hints
 
 import numpy as np
+import pytest
 
 from lightpaint.paint.protocol import EVENTS, REQUESTS
 from lightpaint.storage.json_records import read_record
@@ -59,6 +60,7 @@ def check(message: dict[str, Any]) -> None:
     assert needed <= set(plain), (message["kind"], needed - set(plain))
 
 
+@pytest.mark.nightly
 def test_a_made_up_session_says_what_a_real_one_could(painter: Any) -> None:
     assert set(ASKED) == set(REQUESTS) - {"hello", "fetch", "observe", "propose", *RIG}
     messages = painter.page.evaluate(

@@ -217,6 +217,7 @@ def test_the_colour_panel(painter: Painter) -> None:
     assert painter.ui("paintMode") == "colour"
 
 
+@pytest.mark.nightly
 def test_how_bright_a_colour_is_is_seen_and_said(painter: Painter) -> None:
     """On the patch, beside the colour itself; of what was used lately, in stops."""
 
@@ -254,6 +255,7 @@ def reopen(painter: Painter, query: str = "") -> None:
     painter.still()
 
 
+@pytest.mark.nightly
 def test_a_page_that_is_loaded_anew_knows_what_was_in_the_hand(painter: Painter) -> None:
     reloaded = {name: painter.ui(name) for name in HELD}
     painter.type("Hex", "#336699")
@@ -496,6 +498,7 @@ def test_what_is_said_beside_the_brush_lies_in_the_picture(painter: Painter, too
             assert box["y"] + box["height"] <= y or gap
 
 
+@pytest.mark.nightly
 def test_what_a_drag_asks_about_stays_where_it_began(painter: Painter) -> None:
     """Ring, readout, and what is said of the place; they are at the pointer before and after."""
     page = painter.page
@@ -530,6 +533,7 @@ def test_what_a_drag_asks_about_stays_where_it_began(painter: Painter) -> None:
     assert after != page.evaluate(rings) == before
 
 
+@pytest.mark.nightly
 def test_numbers_that_were_typed_stay_while_other_panels_are_open(painter: Painter) -> None:
     """In another view the same object is meant, though its number is another."""
     page = painter.page
@@ -578,6 +582,7 @@ def test_keys_among_numbers_are_none_of_the_pictures(painter: Painter) -> None:
     assert painter.ui("tool") == "eraser"
 
 
+@pytest.mark.nightly
 def test_undo_takes_back_what_a_field_has_taken(painter: Painter) -> None:
     """Ctrl+Z in a field undoes what is being typed, and the step once the field has taken it."""
     painter.stroke()
@@ -702,6 +707,7 @@ def test_fill_has_a_flow_of_its_own(painter: Painter) -> None:
     assert flows() == (0.3, 0.3)
 
 
+@pytest.mark.nightly
 def test_zoom_is_said_in_pixels_of_the_picture(painter: Painter) -> None:
     def zoom() -> tuple[str, float]:
         painter.still()

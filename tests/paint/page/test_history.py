@@ -48,12 +48,14 @@ def test_a_click_goes_to_a_step_and_what_is_undone_stays(painter: Painter) -> No
     assert [name for name, _ in rows(painter)] == ["Brush", "Beginning"]
 
 
+@pytest.mark.nightly
 def test_the_picture_of_the_last_step_follows_its_answer(painter: Painter) -> None:
     lit = """() => [...document.querySelectorAll('.step canvas')].map(({ width, height }, k, all) =>
       all[k].getContext('2d').getImageData(width / 2, height / 2, 1, 1).data[3])"""
     painter.page.wait_for_function(f"() => ({lit})().every((alpha) => alpha === 255)")
 
 
+@pytest.mark.nightly
 def test_clearing_and_starting_over_are_one_step_each(painter: Painter) -> None:
     painter.button("Start over").click()
     assert rows(painter)[0] == ("Start over", "is-current")

@@ -140,6 +140,7 @@ def test_escape_cancels_a_stroke_on_the_map(new_painter: Any, query: str) -> Non
     assert page.locator(".texel-lock").count() == 2
 
 
+@pytest.mark.nightly
 def test_constraints_of_an_image_hold_for_each_texel(painter: Painter) -> None:
     page = painter.page
     painter.type("key, level", "-1")

@@ -170,6 +170,7 @@ def test_another_language_replaces_all_texts(painter: Painter) -> None:
     assert found == {}
 
 
+@pytest.mark.nightly
 def test_a_language_is_chosen_in_the_settings(painter: Painter) -> None:
     """It is there when the page opens next, and says on its element which one it is."""
     kept = "() => localStorage.getItem('lightpaint.language')"

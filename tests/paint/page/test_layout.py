@@ -100,6 +100,7 @@ def test_in_a_shadow_root_it_looks_the_same(new_painter: Any) -> None:
     assert shadow.ui("tool") == "eraser"
 
 
+@pytest.mark.nightly
 def test_around_it_nothing_hears_its_keys(new_painter: Any) -> None:
     """In a notebook `B` makes a cell, Delete deletes the painter's own."""
     painter = new_painter("shadow")
@@ -293,6 +294,7 @@ def test_nothing_is_cut_off(new_painter: Any, size: tuple[int, int]) -> None:
         assert clipped_elements(painter) == []
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("size", [(1280, 720), (1024, 768)])
 def test_numbers_show_all_their_digits(new_painter: Any, size: tuple[int, int]) -> None:
     """Also the second colour that a painter begins with, 12000 K."""
@@ -446,6 +448,7 @@ def test_two_fingers_zoom_by_as_much_as_they_spread(painter: Painter) -> None:
     assert zoom == pytest.approx(2, rel=0.02)
 
 
+@pytest.mark.nightly
 def test_what_a_press_moves_below_the_pointer_shows_no_tip(painter: Painter) -> None:
     painter.button("Fit").hover()
     painter.page.evaluate(

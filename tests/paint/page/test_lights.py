@@ -32,6 +32,7 @@ def test_a_light_is_moved_by_hand_and_freed(painter: Painter) -> None:
     assert newest_constraints(painter) == {"lock": [0, 0, 0]}
 
 
+@pytest.mark.nightly
 def test_a_level_is_typed_in_stops_or_percent(painter: Painter) -> None:
     current = painter.page.evaluate("() => window.painter.store.value.lights[0].present")
 
@@ -174,6 +175,7 @@ def test_a_long_name_of_a_dimmer_has_one_line(painter: Painter) -> None:
     assert strong.bounding_box()["height"] < 20
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("way", ["off", "slider"])
 def test_what_was_asked_of_a_light_is_known_until_it_is_free(painter: Painter, way: str) -> None:
     """Also where an answer of before comes while the session has not heard of the hand."""
@@ -214,6 +216,7 @@ def test_limits_of_a_locked_light_are_known_after_a_reload(painter: Painter) -> 
     assert painter.requests("constrain_lights")[-1]["constraints"] == {names[1]: limits}
 
 
+@pytest.mark.nightly
 def test_what_a_light_may_do(painter: Painter) -> None:
     page = painter.page
     page.get_by_role("button", name="key", exact=True).click()
@@ -420,6 +423,7 @@ def test_a_light_is_shown_alone_until_its_row_is_gone(painter: Painter, way: str
     painter.page.wait_for_function("() => engine.shown.right === 'solution'")
 
 
+@pytest.mark.nightly
 def test_64_lights_are_found_sorted_and_folded(new_painter: Any) -> None:
     painter = new_painter("lights=64")
     rows = painter.page.locator(".light")

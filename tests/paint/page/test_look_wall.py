@@ -164,6 +164,7 @@ def test_zoom_pan_and_exposure_are_common(open_looks: Any) -> None:
     assert painter.requests("load_look") == []  # a drag takes none
 
 
+@pytest.mark.nightly
 def test_two_fingers_zoom_and_one_pans(open_looks: Any) -> None:
     painter = open_looks()
     open_wall(painter, "Look 1", "Look 2")
@@ -192,6 +193,7 @@ def test_two_fingers_zoom_and_one_pans(open_looks: Any) -> None:
     assert painter.requests("load_look") == []
 
 
+@pytest.mark.nightly
 def test_pictures_are_those_of_the_engine(open_looks: Any) -> None:
     """Those that ships draws each look with its own lights, as beside each other in two panes."""
     painter = open_looks("lights=5&engine")

@@ -42,6 +42,7 @@ def test_the_sheet_shows_every_look_and_a_click_goes_on_from_one(painter: Painte
     assert painter.ui("dialog") is None
 
 
+@pytest.mark.nightly
 def test_the_table_has_the_lamp_that_differs_most_on_top(painter: Painter) -> None:
     painter.button("Lamps", exact=True).click()
     rows = painter.page.locator(".lamp-table tbody tr")

@@ -153,6 +153,7 @@ def test_a_kernel_that_does_not_answer_is_said_to_until_it_does(new_painter: Any
     assert alert_text(painter) == ""
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("model", ["model", "model=taken"])
 def test_a_kernel_that_has_ended_is_said_to_have(new_painter: Any, model: str) -> None:
     """Nothing is painted for nobody, and nobody is there to take it over from."""

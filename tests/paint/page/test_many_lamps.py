@@ -202,6 +202,7 @@ def test_a_gel_is_put_on_by_its_number_with_its_loss_and_taken_off(painter: Pain
             assert options.count() > 5
 
 
+@pytest.mark.nightly
 def test_a_held_lamp_takes_any_colour_at_its_level(painter: Painter) -> None:
     painter.button("key", exact=True).click()
     painter.button("Locked", exact=True).click()
@@ -307,6 +308,7 @@ def test_the_controls_of_a_selection_fit_and_have_names(
     assert violations(page, ".is-lights") == []
 
 
+@pytest.mark.nightly
 def test_a_lasso_selects_the_marks_that_it_encloses(new_painter: Any) -> None:
     painter = new_painter("lights=12")
     page = painter.page

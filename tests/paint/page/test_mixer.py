@@ -173,6 +173,7 @@ def test_selected_lights_are_dimmed_together_and_the_master_dims_all(
     check(page, codes(basis, answer, transform))
 
 
+@pytest.mark.nightly
 def test_a_gel_takes_its_light_and_another_takes_its_place(make_basis: Any, open_file: Any) -> None:
     basis = light_basis(make_basis, 2)
     transform, answer = transform_of_report(basis), solve_painting(basis)[1].weights
@@ -275,6 +276,7 @@ def test_on_a_phone_nothing_parts_lights_and_buttons(make_basis: Any, open_file:
     assert box["y"] + box["height"] <= light["y"]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["filmic", "agx", "linear"])
 def test_through_other_transforms(make_basis: Any, open_file: Any, name: str) -> None:
     basis = light_basis(make_basis, 3)
@@ -312,6 +314,7 @@ def test_what_is_copied_is_read(make_basis: Any, open_file: Any, tmp_path: Path)
     assert copied == "lightpaint relight scene.xml lighting.json"
 
 
+@pytest.mark.nightly
 def test_of_hundreds_of_lights_the_rest_is_one(make_basis: Any, open_file: Any) -> None:
     basis = light_basis(make_basis, 60)
     transform, answer = transform_of_report(basis), solve_painting(basis)[1].weights

@@ -290,6 +290,7 @@ def test_newer_pictures_are_fetched_and_others_are_not(run: Any):
     assert fetched == ["plane/1"]
 
 
+@pytest.mark.nightly
 def test_of_another_view_only_its_pictures_are_fetched(run: Any, site_of: Any):
     names = {f"{name}@1": 1 for name in site_of["resources"]}
     view = {"size": [H, W], "scales": [1, 2, 4], "objects": site_of["objects"]}
@@ -333,6 +334,7 @@ def test_an_answer_to_what_was_undone_does_not_come_back(run: Any):
     assert weights == [1] * 9
 
 
+@pytest.mark.nightly
 def test_a_gpu_that_comes_back_is_filled_again(run: Any):
     before, after = run(
         """
@@ -350,6 +352,7 @@ def test_a_gpu_that_comes_back_is_filled_again(run: Any):
     assert after[1] == code(*[0.25] * 3)
 
 
+@pytest.mark.nightly
 def test_a_gpu_that_does_not_come_back_is_done_without(run: Any):
     before, after, name = run(
         """
@@ -365,6 +368,7 @@ def test_a_gpu_that_does_not_come_back_is_done_without(run: Any):
     np.testing.assert_allclose(after, before, atol=1)
 
 
+@pytest.mark.nightly
 def test_a_view_that_is_closed_is_no_gpu_that_is_lost(run: Any):
     """It gives its context up, and is told so when the next view is there already."""
     names, canvases = run(
@@ -391,6 +395,7 @@ def test_a_view_that_is_closed_is_no_gpu_that_is_lost(run: Any):
     assert (names, canvases) == (["gl", None], 0)
 
 
+@pytest.mark.nightly
 def test_another_view_does_not_wait_for_the_gpu_of_the_one_before(run: Any):
     name = run(
         """

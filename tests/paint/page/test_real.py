@@ -360,6 +360,7 @@ def test_a_light_is_held_and_moved_and_left(served_painter: ServedPainter, open_
     assert not session.requests.lights
 
 
+@pytest.mark.nightly
 def test_a_stroke_is_kept_though_the_page_is_closed_at_once(
     served_painter: ServedPainter, open_page: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -248,6 +248,7 @@ def test_a_gradient_is_drawn_by_key_and_its_ends_are_moved(painter: Painter) -> 
     assert painter.calls("begin") == []
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("size", [(1280, 720), nightly((820, 1180))])
 def test_a_gradient_is_changed_in_numbers_and_nothing_of_it_is_cut(
     new_painter: Any, axe: str, size: Any

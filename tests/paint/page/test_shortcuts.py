@@ -3,6 +3,7 @@
 import re
 from typing import Any
 
+import pytest
 from axe import violations
 from painter_page import Painter
 from renderer import REPOSITORY
@@ -131,6 +132,7 @@ def test_a_conflict_is_named_and_chosen(new_painter: Any) -> None:
     assert painter.ui("keyBindings") == {"brush": ""}
 
 
+@pytest.mark.nightly
 def test_escape_ends_the_change_and_not_the_dialog(new_painter: Any) -> None:
     painter: Painter = new_painter()
     open_keys(painter)

@@ -26,6 +26,7 @@ def theme_of(painter: Painter) -> str:
     return str(theme)
 
 
+@pytest.mark.nightly
 def test_the_theme_follows_the_system_until_one_is_chosen(new_painter: Any) -> None:
     painter: Painter = new_painter(is_fresh=True, color_scheme="light")
     assert theme_of(painter) == "light"

@@ -50,6 +50,7 @@ def test_five_steps_greet_a_person_once(new_painter: Any, axe: str, size: Any) -
     assert painter.page.locator(BUBBLE).count() == 0
 
 
+@pytest.mark.nightly
 def test_one_paints_below_it_and_escape_ends_it(new_painter: Any) -> None:
     painter: Painter = new_painter("tour")
     painter.page.locator(BUBBLE).wait_for()

@@ -103,6 +103,7 @@ def test_nothing_to_undo_is_no_mistake(painter: Painter) -> None:
     assert "is-warn" not in toast.get_attribute("class")
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("picture", ["Painting", "Answer"])
 def test_until_a_look_is_there_no_picture_is_called_its_own(painter: Painter, picture: str) -> None:
     painter.page.keyboard.press("Control+s")

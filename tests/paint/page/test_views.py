@@ -111,6 +111,7 @@ def test_views_agree(page: Any, pictures: Any, overlay: str | None):
         assert changed == [overlay in ("importance", "falsecolor"), overlay != "importance"]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("kind", ["cpu", "gl"])
 def test_wipe_blink_and_zoom(page: Any, pictures: Any, kind: str):
     draw_panes(page, kind, pictures)

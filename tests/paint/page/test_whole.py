@@ -184,10 +184,12 @@ PANELS: tuple[Callable[[Painter], None], ...] = (
 )
 
 
+@pytest.mark.nightly
 def test_it_begins_with_nothing_cut(painter: Painter) -> None:
     assert clipped_elements(painter) == []
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("panel", PANELS, ids=lambda panel: panel.__name__)
 def test_no_panel_has_anything_cut(painter: Painter, panel: Callable[[Painter], None]) -> None:
     panel(painter)

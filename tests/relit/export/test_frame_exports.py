@@ -121,6 +121,7 @@ def vars_of(groups: LightGroups) -> dict[str, Any]:
     return {name: getattr(groups, name) for name in groups.__dataclass_fields__}
 
 
+@pytest.mark.nightly
 def test_keys_in_blender_follow_the_curves(
     groups: LightGroups, tmp_path: Path, blender: list[str]
 ) -> None:

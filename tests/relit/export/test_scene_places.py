@@ -112,6 +112,7 @@ def assert_all_hung(before: Any, first: Any, second: Any, third: Any) -> None:
     assert third["spot"]["cone"] == pytest.approx(before["spot"]["cone"], abs=FLOAT32)
 
 
+@pytest.mark.nightly
 def test_lamps_in_blender_hang_as_in_the_answer(tmp_path: Path, blender: list[str]) -> None:
     (tmp_path / "set_scene.py").write_text(script(PLACES), encoding="utf-8")
     (tmp_path / "again.py").write_text(script(STAYED), encoding="utf-8")

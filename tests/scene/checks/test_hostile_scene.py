@@ -252,6 +252,7 @@ def test_good_files_are_still_read(tmp_path: Path) -> None:
         load_scene(path)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "name", ["entities", nightly("deep"), nightly("include_dev_zero"), "width_1000000000"]
 )
