@@ -69,7 +69,8 @@ def obtain_scene_basis(
     if basis is None:
         film = on_film(scene.content, settings.quality, settings.resolution)
         scene_film = SceneFilm(scene, settings.quality, settings.resolution, _scene_files(scene))
-        basis = obtain(film, settings, listen, render=PartwiseRender(engine, scene_film))
+        render = PartwiseRender(engine, scene_film)
+        basis = obtain(film, settings, listen, render=render, names_cache=False)
         worker_cache.put(key, basis)
     return basis
 
@@ -91,8 +92,9 @@ def obtain_moved_basis(
     [moved_scene] = record.hung_in([film]).scenes
     files = (*_scene_files(scene), places)
     scene_film = SceneFilm(scene, settings.quality, settings.resolution, files, places=places)
+    render = PartwiseRender(engine, scene_film)
     return moved_basis(
-        moved_scene, unmoved_basis, settings, listen, render=PartwiseRender(engine, scene_film)
+        moved_scene, unmoved_basis, settings, listen, render=render, names_cache=False
     )
 
 

@@ -24,14 +24,16 @@ def obtain(
     views: int = 1,
     render: Render = render_basis,
     before: Basis | None = None,
+    names_cache: bool = True,
 ) -> Basis:
     """Return the basis of `scene` on its film, from the cache or rendered.
 
     views: number of views that share the rendering time. render: function that renders missing
     samples. before: a basis of the scene with lights elsewhere, whose other planes are taken.
+    names_cache: whether remarks name the argument that does without the cache.
     """
     listen = listener(progress)
-    watch = _RenderWatch(listen, has_moved=before is not None)
+    watch = _RenderWatch(listen, has_moved=before is not None, names_cache=names_cache)
     spp, time_s = settings.basis_spp, None if settings.error else settings.time_s
     began_s = time.perf_counter()
     basis = obtain_basis(
@@ -53,35 +55,39 @@ def obtain(
             f"the basis could not be saved in {folder()}, so the next run renders it again: "
             "is the disk full, or the folder not yours?"
         )
-    _remark_on_samples(scene, basis, settings, spp, listen, is_rendered=watch.is_rendered)
+    _remark_on_samples(scene, basis, settings, spp, watch)
     return basis
 
 
 class _RenderWatch:
     """A watch on how a basis is obtained, which passes reports on and remembers what happened."""
 
-    def __init__(self, listen: Listener, *, has_moved: bool) -> None:
-        self._listen, self._has_moved = listen, has_moved
+    def __init__(self, listen: Listener, *, has_moved: bool, names_cache: bool) -> None:
+        self.listen, self._has_moved, self._names_cache = listen, has_moved, names_cache
         self.is_rendered = self.is_all_rendered = self.is_reused = False
 
     def report(self, label: str, done: int, total: int, unit: str = "passes") -> None:
         """Pass progress on. All is rendered if the first report has nothing done."""
         self.is_all_rendered |= not self.is_rendered and done == 0
         self.is_rendered = True
-        self._listen(label, done, total, unit)
+        self.listen(label, done, total, unit)
 
     def report_reuse(self, count: int, of: int) -> None:
         """Say how many of all lights are reused."""
         self.is_reused = True
         remainder = of - count
         if self._has_moved:
-            self._listen.note(f"{remainder} of {of} lights are rendered where they are now")
+            self.listen.note(f"{remainder} of {of} lights are rendered where they are now")
             return
-        self._listen.say(
+        self.listen.say(
             f"{count} of {of} lights come from an earlier run; "
-            f"{remainder} {'is' if remainder == 1 else 'are'} rendered "
-            "(use_cache=False renders all again)"
+            f"{remainder} {'is' if remainder == 1 else 'are'} rendered"
+            f"{self.way_to_render('all')}"
         )
+
+    def way_to_render(self, what: str) -> str:
+        """Return how to render it without the cache, if the caller can."""
+        return f" (use_cache=False renders {what} again)" if self._names_cache else ""
 
 
 def _remark_on_samples(
@@ -89,14 +95,13 @@ def _remark_on_samples(
     basis: Basis,
     settings: Settings,
     spp: int | None,
-    listen: Listener,
-    *,
-    is_rendered: bool,
+    watch: _RenderWatch,
 ) -> None:
     """Say where a basis comes from, if it has not just the samples that were requested.
 
     spp: the requested samples per pixel; None for the scene's own.
     """
+    listen, is_rendered = watch.listen, watch.is_rendered
     basis_text = f"basis of {basis.origin.samples_text}"
     requested_spp = scene.spp if spp is None else spp
     if not is_rendered and basis.origin.mean_spp > samples_for(scene, spp):
@@ -105,7 +110,7 @@ def _remark_on_samples(
             "the answer may differ a little from one with exactly these (exact_spp=True)"
         )
     elif not is_rendered:
-        listen.say(f"{basis_text} kept from an earlier run (use_cache=False renders it again)")
+        listen.say(f"{basis_text} kept from an earlier run{watch.way_to_render('it')}")
     elif settings.time_s is None and basis.origin.spp > requested_spp + 1:
         listen.say(
             f"{basis_text}, not {requested_spp}: a block needs a sample in each pixel for each half"

@@ -113,10 +113,12 @@ def moved_basis(
     listen: Listener,
     *,
     render: Render = render_basis,
+    names_cache: bool = True,
 ) -> Basis:
     """Return the basis of a scene whose lights have moved, with as many samples as `before`.
 
     before: basis of the scene before the move; if it is of `scene` itself, it is returned.
+    names_cache: as of `obtain`.
     """
     if before.origin.scene_identity == scene.identity:
         return before
@@ -125,6 +127,6 @@ def moved_basis(
     )
     if settings.error is None:
         settings = replace(settings, spp=max(2, round(before.origin.mean_spp)))
-    basis = obtain(scene, settings, listen, before=before, render=render)
+    basis = obtain(scene, settings, listen, before=before, render=render, names_cache=names_cache)
     # The look that was painted over, and that unpainted parts keep, is from before the move.
     return replace(basis, former=Estimate(before.current_look, before.current_noise))

@@ -110,6 +110,14 @@ def test_each_basis_is_obtained_once_for_all_its_looks(
     }
 
 
+def test_a_remark_on_a_kept_basis_names_no_option_that_a_batch_lacks(batch_folder: Path) -> None:
+    """The fixture has solved the same scene with as many samples."""
+    command = ("batch", "looks.toml", "-o", "again", "--only", "dark-camera")
+    lines = run(batch_folder, *command).stderr.splitlines()
+    [remark] = [line for line in lines if "from an earlier run" in line]
+    assert remark.endswith("basis of 8 samples per pixel kept from an earlier run")
+
+
 def test_only_what_is_wanted_is_rendered(batch_folder: Path, batch_record: dict[str, Any]) -> None:
     output_folder = batch_folder / "out"
     assert not (output_folder / "dark-side" / "verified.exr").exists()
