@@ -22,6 +22,8 @@ def wall():
     if MESH == "plane":
         bpy.ops.mesh.primitive_plane_add(size=2)
         bpy.context.object.scale = (*HALF, 1)
+    elif MESH == "wall.ply" and bpy.app.version < (3, 6):
+        bpy.ops.import_mesh.ply(filepath=str(FOLDER / MESH))
     else:
         read = {".obj": bpy.ops.wm.obj_import, ".ply": bpy.ops.wm.ply_import}[Path(MESH).suffix]
         read(filepath=str(FOLDER / MESH), forward_axis="Y", up_axis="Z")

@@ -476,10 +476,10 @@ def test_lights_set_in_blender_render_the_answer(tmp_path: Path, blender: list[s
         assert reread.basis.image(name).mean(axis=(0, 1)) == pytest.approx(mean, rel=0.02, abs=1e-4)
 
 
-def test_every_kind_of_light_is_multiplied_once(tmp_path: Path, blender: list[str]):
+def test_every_kind_of_light_is_multiplied_once(tmp_path: Path, new_blender: list[str]):
     groups = _groups(tmp_path, names=["a", "b", "gone", "linked", "world"])
     write_exports(tmp_path, groups, _lighting(groups))
-    output = in_blender(blender, Path(__file__).parent / "blender_scene.py", "kinds", tmp_path)
+    output = in_blender(new_blender, Path(__file__).parent / "blender_scene.py", "kinds", tmp_path)
     assert "all as expected" in output
     assert "no light is in the group gone" in output
     assert "inside the node group hidden, set it by hand" in output

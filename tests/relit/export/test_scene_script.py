@@ -13,7 +13,7 @@ from lightpaint.relit.export.scene_script import scene_script
 NOISE = 0.01
 
 
-def test_a_floor_in_blender_is_lit_as_in_the_scene(tmp_path: Path, blender: list[str]) -> None:
+def test_a_floor_in_blender_is_lit_as_in_the_scene(tmp_path: Path, new_blender: list[str]) -> None:
     rgb = np.array([8.0, 4.0, 1.0])
     kinds = {
         **dict.fromkeys(("panel", "desk", "sky"), "radiance"),
@@ -24,7 +24,7 @@ def test_a_floor_in_blender_is_lit_as_in_the_scene(tmp_path: Path, blender: list
     emitters = [(name, kind, tuple(rgb)) for name, kind in kinds.items()]
     text = scene_script("evening", "hall.xml", [*emitters, ("dome", "", (2.0, 2.0, 2.0))])
     (tmp_path / "set_scene.py").write_text(text, encoding="utf-8")
-    output = in_blender(blender, Path(__file__).parent / "blender_lit.py", tmp_path)
+    output = in_blender(new_blender, Path(__file__).parent / "blender_lit.py", tmp_path)
     assert "lightpaint: 'gone' is left as it is" in output
     assert "lightpaint: 'dome' is left as it is" in output
     values = json.loads(next(x for x in output.splitlines() if x.startswith("SEEN"))[5:])

@@ -64,7 +64,7 @@ def floor_in_mitsuba(scene: Scene, folder: Path, lighting: Lighting) -> Any:
 
 @pytest.mark.parametrize("before", ["new", nightly("AREA"), nightly("SPOT")])
 def test_a_slide_in_blender_lights_a_floor_the_same(
-    tmp_path: Path, blender: list[str], before: str
+    tmp_path: Path, new_blender: list[str], before: str
 ) -> None:
     scene, lighting = write_slide(tmp_path)
     export(lighting, Source(scene), tmp_path, "blender", "set_scene.py")
@@ -74,7 +74,7 @@ def test_a_slide_in_blender_lights_a_floor_the_same(
     matrix[:3, :3], matrix[:3, 3] = to_z_up @ np.transpose(slide.axes), to_z_up @ slide.position
     (tmp_path / "matrix.json").write_text(json.dumps(matrix.tolist()))
     script = Path(__file__).parent / "blender_slide.py"
-    output = in_blender(blender, script, tmp_path, before)
+    output = in_blender(new_blender, script, tmp_path, before)
     assert "left as it is" not in output
     seen = json.loads(next(line for line in output.splitlines() if line.startswith("SEEN"))[5:])
     # Blender's first row is the lowest.
