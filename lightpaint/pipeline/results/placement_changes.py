@@ -46,7 +46,7 @@ def spoken_change(change: Move | AddedLight) -> str:
         phrase = spoken_move(change)
     else:
         x, y, z = (f"{v:.2f}" for v in change.site.position or (0.0, 0.0, 0.0))
-        phrase = f"a new {change.emitter.kind} at ({x}, {y}, {z})".replace("-", "−")
+        phrase = f"is a new {change.emitter.kind} at ({x}, {y}, {z})".replace("-", "−")
         if change.place_error:
             phrase += f" ± {rounded_text(change.place_error, 1)}"
     text = f"{change.name} {phrase}: {spoken_fraction(change.gain_share)} of what was missed"
