@@ -49,6 +49,7 @@ def fake_blender() -> tuple[ModuleType, ModuleType]:
     """Return the modules bpy and mathutils."""
     bpy, vectors = ModuleType("bpy"), ModuleType("mathutils")
     lights = SimpleNamespace(new=lambda name, kind: SimpleNamespace(type=kind, users=1))
+    bpy.app = SimpleNamespace(version=(4, 2, 0), version_string="4.2.0")  # type: ignore[attr-defined]
     bpy.data = SimpleNamespace(objects=FakeObjects(), worlds={}, lights=lights)  # type: ignore[attr-defined]
     scene_link = SimpleNamespace(link=lambda item: None)
     scene = SimpleNamespace(collection=SimpleNamespace(objects=scene_link))

@@ -159,6 +159,19 @@ def test_lamps_that_hang_elsewhere_than_in_the_scene_stay(
         assert f"{name!r} is no lamp, or not where the scene has it" in output
 
 
+@pytest.mark.parametrize(("version", "is_told"), [((4, 1, 1), True), ((4, 2, 0), False)])
+def test_an_old_blender_is_told_of(
+    version: tuple[int, ...],
+    is_told: bool,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    modules = fake_with(monkeypatch, lamps())
+    modules[0].app.version = version
+    run_in(modules, script(PLACES), monkeypatch)
+    assert ("use 4.2 or newer" in capsys.readouterr().out) == is_told
+
+
 def test_lamps_tell_the_axes_where_no_camera_does(monkeypatch: pytest.MonkeyPatch) -> None:
     """A camera that looks straight down has -z upwards in a scene whose y is up."""
     modules = fake_with(monkeypatch, lamps())
