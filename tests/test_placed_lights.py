@@ -185,6 +185,12 @@ def test_a_missing_lamp_is_added_with_its_constraint_and_written_behind_the_user
     room: Scene, tmp_path: Path
 ) -> None:
     goal = lp.render_basis(room.with_new_emitters([LAMP]), spp=256, seed=2).current_look
+    shares = []
+
+    def listen(label: str, done: int, total: int, unit: str = "passes") -> None:
+        if label == "poses":
+            shares.append(done / total)
+
     look = lp.paint_with_light(
         room,
         lp.Target.of(goal),
@@ -193,7 +199,12 @@ def test_a_missing_lamp_is_added_with_its_constraint_and_written_behind_the_user
         spp=256,
         space="linear",
         hold=0,
+        progress=listen,
     )
+    # The judgement, which follows the last step, takes its time as well.
+    assert shares == sorted(shares)
+    assert (shares[0], shares[-1]) == (0, 1)
+    assert shares[-2] < 0.9
     assert look.placement is not None
     [added] = look.placement.additions
     assert added.name == "new_point"

@@ -1,5 +1,6 @@
 """The search for moves of lights, and for new ones, that bring the answer closer."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -40,6 +41,9 @@ from lightpaint.scene.scene import Scene
 
 #: Steps of all lights together along many paths.
 STEPS = 10
+
+#: Time of the judgement and its error bars, as a share of all before it.
+JUDGED_SHARE = 0.3
 
 #: Errors of a place, relative to the spread of visible points, and of a direction, in degrees,
 #: above which a picture says little about a light's pose.
@@ -126,9 +130,12 @@ def place(
         if watch is not None:
             poses.steps.watch = lambda arrangement: watch(_sites_by_name(arrangement, names))
         judge = PlacementJudge(fine, poses.steps.with_fit(fine), paths)
-        start, best = _searched(poses, judge, movables, slots, progress)
+        stages = _Stages(progress, TURNS * len(movables), STARTS * len(slots), STEPS)
+        start, best = _searched(poses, judge, movables, slots, stages)
         judge = judge.without_noise(best)
-        return _Result.of(judge.worthwhile(start, best), judge, paths, large[0])
+        result = _Result.of(judge.worthwhile(start, best), judge, paths, large[0])
+        stages.end()
+        return result
 
     result = large[0].while_loaded(search, views=large[1:])
     return _placement([x for x, _ in views], result, lights, len(names))
@@ -188,6 +195,35 @@ class _Result:
         }
 
 
+class _Stages:
+    """Progress through stages, each of which may end before all of its steps are done.
+
+    counts: the largest number of steps of each stage. The judgement follows them.
+    """
+
+    def __init__(self, progress: Progress, *counts: int) -> None:
+        self._progress = progress
+        self._ends = [0, *np.cumsum(counts).tolist()]
+        self._total = math.ceil((1 + JUDGED_SHARE) * self._ends[-1])
+
+    def begin(self) -> Callable[[], None]:
+        """Begin the next stage, and return a function that counts its steps."""
+        done, *self._ends = self._ends
+        end = self._ends[0] if self._ends else done
+        self._progress("poses", done, self._total)
+
+        def count() -> None:
+            nonlocal done
+            done = min(done + 1, end)
+            self._progress("poses", done, self._total)
+
+        return count
+
+    def end(self) -> None:
+        """Report the end."""
+        self._progress("poses", self._total, self._total)
+
+
 def _sites_by_name(arrangement: Arrangement, names: Sequence[str]) -> dict[str, Site]:
     """Return the pose of each light of movables, by name. names: of the lights of the scene."""
     sites = {}
@@ -209,25 +245,18 @@ def _searched(
     judge: PlacementJudge,
     movables: list[Movable],
     slots: list[Movable],
-    progress: Progress,
+    stages: _Stages,
 ) -> tuple[Arrangement, Arrangement]:
     """Return the arrangement before all moves, and the best one."""
-    total = TURNS * len(movables) + STARTS * len(slots) + STEPS
-    done = 0
-
-    def count() -> None:
-        nonlocal done
-        done = min(done + 1, total)
-        progress("poses", done, total)
-
-    progress("poses", 0, total)
     paths, steps, sites = poses.paths, poses.steps, tuple(x.light.site for x in movables)
     start = Arrangement(tuple(movables), sites, steps.fitted(movables, sites, paths.compare))
-    found = poses.by_blocks(start, count)
+    # Until here paths are traced and kernels compiled, whose time says nothing about the rest.
+    found = poses.by_blocks(start, stages.begin())
+    count = stages.begin()
     if slots:
         found = NewLightSearch(poses, slots, judge).run(found, count)
-    found = judge.without_noise(found).refined(found, STEPS, progress=count)
-    progress("poses", total, total)
+    found = judge.without_noise(found).refined(found, STEPS, progress=stages.begin())
+    stages.begin()
     return start, found
 
 

@@ -89,6 +89,23 @@ def test_a_click_hangs_a_light_before_the_surface(moving: MovingStudio) -> None:
     assert np.subtract(place["target"], place["position"])[1] > 0
 
 
+def test_a_spot_that_lights_little_yet_is_not_glaring_once_it_is_aimed(
+    moving: MovingStudio,
+) -> None:
+    """Hung on the floor, it shines up past all that is seen; then it is turned to the ball."""
+    opened_rig(moving)
+    add_light(moving, protocol.AddLight("spot", pixel=(7.2, 16.0)))
+    session = moving.studio.session
+    emission, is_surface = (
+        session.requests.added["spot_1"]["emission"],
+        ~session.basis.emitters_seen,
+    )
+    look = session.basis.current_look[is_surface].sum()
+    moving.send(protocol.MoveLights({"spot_1": {"target": [0.3, 0.3, 0.2]}}))
+    shone = moving.plane("spot_1")[is_surface] * emission
+    assert 0.01 * look < shone.sum() < look
+
+
 @pytest.mark.nightly
 def test_undo_looks_and_the_file_keep_added_lights(moving: MovingStudio) -> None:
     session, before = moving.studio.session, names(moving)
@@ -197,7 +214,7 @@ def test_a_drag_is_answered_and_ends_a_search_which_moves_nothing(
     moving.wait(lambda: [m for m in moving.messages if m.kind == "trial"])
     for is_final in (False, False, True):
         moving.send(protocol.MoveLights({"bulb": {"position": [0.4, 1.2, 0.1]}}, is_final=is_final))
-    assert "somebody moved lights meanwhile" in place_lights(moving)["text"]
+    assert "lights were moved by hand meanwhile" in place_lights(moving)["text"]
     progress = [m for m in moving.messages if m.kind == "progress" and m.task == "place"]
     assert all(m.done < m.total for m in progress)  # it stopped early
     assert set(moving.studio.session.requests.placed) == {"bulb"}

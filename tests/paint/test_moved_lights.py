@@ -17,12 +17,15 @@ from moving import MovingStudio, exact_answer, opened_rig, pixel_of, place_light
 from renderer import LIGHTS, write_room
 
 import lightpaint as lp
+from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.cli import main
 from lightpaint.cli.commands.paint_command import command_for_paintings
 from lightpaint.errors import LightpaintError
 from lightpaint.paint import protocol
 from lightpaint.paint.rig import lamp_rig
 from lightpaint.paint.rig.rig_state import rig_state
+from lightpaint.paint.session.request_changes import changed_requests
+from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.scene.properties.pose import Site
 from lightpaint.scene.scene_reader import load_scene
 
@@ -31,6 +34,30 @@ POSITION = [0.4, 1.2, 0.1]
 
 #: Middle of the ball of the test room, which is .3 in radius.
 BALL = (0.3, 0.3, 0.2)
+
+
+@pytest.mark.parametrize(
+    ("pose", "label"),
+    [
+        ({"target": [0.0, 0.0, 0.0]}, "aim beam"),
+        ({"cutoff": 40.0, "beam": 30.0}, "cone of beam"),
+        ({"position": POSITION}, "move beam"),
+        ({"position": POSITION, "target": [0.0, 0.0, 0.0]}, "move beam"),
+    ],
+)
+def test_a_step_is_named_by_what_it_changes(pose: Any, label: str) -> None:
+    lights = Lights([BasisLight("beam", "spot", "intensity", "W/sr", (1.0, 1.0, 1.0), "")])
+    requests = SessionRequests()
+    assert changed_requests(requests, lights, protocol.MoveLights({"beam": pose}))[0] == label
+
+
+def test_a_drag_that_is_cancelled_leaves_no_trace(moving: MovingStudio) -> None:
+    session, before = moving.studio.session, moving.plane("bulb")
+    moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}, is_final=False))
+    assert not np.array_equal(moving.plane("bulb"), before)
+    moving.send(protocol.MoveLights({}))
+    assert np.array_equal(moving.plane("bulb"), before)
+    assert (session.requests.poses, session.store.position) == ({}, 0)
 
 
 def test_a_moved_light_has_the_plane_of_its_place(moving: MovingStudio) -> None:

@@ -204,3 +204,5 @@ def test_lamps_that_became_white_are_not_called_the_present_lighting(is_asked: b
     assert "current lighting" not in sentence
     plain = unpainted_text(is_asked=is_asked, is_white=False)
     assert ("current lighting" in plain) != is_asked
+    moved = unpainted_text(is_asked=False, is_white=False, is_moved=True)
+    assert moved.endswith("is the current lighting, from where you put the lights.")

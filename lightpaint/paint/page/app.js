@@ -70,6 +70,8 @@ export async function mount(element, host, { global = false, engine, isGuided = 
   listen(app);
   const controller = new AbortController();
   const { signal } = controller;
+  const showRefused = (/** @type {any} */ event) => session.toast(event.detail, 'warn');
+  root.addEventListener('refused', showRefused, { signal });
   if (global) root.dataset.isWholePage = 'true';
   if (global) window.addEventListener('keydown', (event) => handleKey(event, app), { signal });
   else listenWithin(root, app, signal);

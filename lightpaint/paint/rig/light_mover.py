@@ -39,6 +39,9 @@ from lightpaint.paint.session.view_pictures import plane_scale
 from lightpaint.paint.session_access import SessionAccess
 from lightpaint.paint.store.history_steps import name_in_view
 
+#: Luminance of a spot that is aimed well, relative to that of a lamp without a cone at its place.
+AIMED_SHARE = 0.3
+
 
 class LightMover:
     """Moves lights of a session for its studio.
@@ -113,12 +116,20 @@ class LightMover:
         taken = {*session.basis.names, *(x.name for x in self.rig.scene.emitters)}
         name = free_name(request.type, taken)
         emitter = emitter_at_place(self.rig, request, name)
-        planes = self.rig.quick_planes(session.bases, name, values_of(emitter))
-        alone = mean(float((plane.totals @ LUMINANCE)[0]) for plane in planes)
+        alone = self._total(name, values_of(emitter))
+        if emitter.kind == "spot":
+            # It will be aimed at other places, and these are all that a lamp there could light.
+            all_around = {"kind": "point", "position": values_of(emitter)["position"]}
+            alone = max(alone, AIMED_SHARE * self._total(name, all_around))
         current = mean(
             float((x.totals * x.current_weights).sum(axis=0) @ LUMINANCE) for x in session.bases
         )
         return name, values_of(with_level(emitter, alone, current))
+
+    def _total(self, name: str, values: Mapping[str, Any]) -> float:
+        """Return the luminance of the pictures with a new light alone, at unit emission."""
+        planes = self.rig.quick_planes(self._access.session.bases, name, values)
+        return mean(float((plane.totals @ LUMINANCE)[0]) for plane in planes)
 
     def follow(self, send: Callable[[Message], None], view: int = 0) -> bool:
         """Show the planes of newly moved lights, and render them once they rest.
@@ -282,7 +293,8 @@ def _unlit_warnings(session: Session, names: Collection[str]) -> list[Notice]:
     numbers = {name: session.basis.names.index(name) for name in sorted(names)}
     return [
         Notice(
-            text=f"{name} lights nothing that is seen from there: it may be in a wall", tone="warn"
+            text=f"{name} lights nothing that is seen from there: it may be in a wall, or far away",
+            tone="warn",
         )
         for name, k in numbers.items()
         if not any(view.basis.planes.plane(k).any() for view in session.views)

@@ -76,7 +76,7 @@ class LightPlacer:
             return [TaskStarted(task="stop")]
         snapshot = self._access.snapshot()
         if not snapshot.painted_views:
-            raise PaintError("nothing is painted yet: paint first, then let lights move")
+            raise PaintError("nothing is painted yet: paint first, so that the search has a goal")
         if request.new_type is not None:
             self._new_lights(request, snapshot)
         elif not self._freedoms(snapshot):
@@ -242,7 +242,7 @@ def _done(request: PlaceLights) -> str:
 
 
 def _outdated(request: PlaceLights) -> str:
-    return f"No light was {_done(request)}: somebody moved lights meanwhile."
+    return f"No light was {_done(request)}: lights were moved by hand meanwhile."
 
 
 def pose_values(move: Move, before: Mapping[str, Any]) -> dict[str, Any]:

@@ -76,7 +76,10 @@ def _visible_surface(view: RigView, pixel: tuple[float, float]) -> FirstHit:
     """Return the surface that a pixel (column, row) sees. Raises PaintError if it sees none."""
     height, width = view.scene.size
     if not (0 <= pixel[0] < width and 0 <= pixel[1] < height):
-        raise PaintError(f"the place {list(pixel)} is outside the picture, {width}x{height}")
+        column, row = (f"{x:.0f}" for x in pixel)
+        raise PaintError(
+            f"({column}, {row}) is outside the picture, {width}x{height} pixels: click inside it"
+        )
     hit = first_hit(view.scene, view.loaded, pixel)
     if hit is None:
         raise PaintError("nothing is seen there: click on a surface")

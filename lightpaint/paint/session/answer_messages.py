@@ -169,12 +169,15 @@ def judge(analyses: Sequence[Analysis], painted: Sequence[int]) -> Judgement:
     )
 
 
-def unpainted_text(*, is_asked: bool, is_white: bool) -> str:
+def unpainted_text(*, is_asked: bool, is_white: bool, is_moved: bool = False) -> str:
     """Describe the answer while nothing is painted, or all paint is undone.
 
     is_asked: whether there are constraints. is_white: whether all lights have to be white.
+    is_moved: whether lights were moved or added.
     """
     stay = "the answer is the current lighting"
+    if is_moved:
+        stay += ", from where you put the lights"
     if is_white:
         stay = "every light has the white nearest to its colour, at the same brightness"
     if is_asked:

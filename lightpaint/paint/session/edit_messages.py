@@ -74,7 +74,8 @@ def unpainted_headline(live_answer: LiveAnswer) -> str:
     # Constraints from before the session count, too.
     is_other = not np.allclose(live_answer.weights, live_answer.basis.current_weights)
     is_asked = bool(live_answer.requests.lights) or (is_other and not is_white)
-    return unpainted_text(is_asked=is_asked, is_white=is_white)
+    is_moved = bool(live_answer.requests.placed)
+    return unpainted_text(is_asked=is_asked, is_white=is_white, is_moved=is_moved)
 
 
 def canvas_patches(

@@ -37,7 +37,7 @@ def changed_requests(
             return message.label or ", ".join(message.constraints), changed
         case protocol.MoveLights():
             changed = move_lights(requests, lights, message.poses)
-            return f"move {', '.join(message.poses)}", changed
+            return _label_of_moves(message.poses), changed
         case protocol.RemoveLight():
             return f"remove {message.name}", remove_light(requests, lights, message.name)
         case protocol.TieLights():
@@ -79,6 +79,14 @@ def constrain_lights(
             raise PaintError(f"{name} is fixed, so it takes no constraint")
         requests = requests.with_light(name, constraints)
     return requests
+
+
+def _label_of_moves(poses: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return what changes about lights: their aim, their cone, or their place."""
+    keys, names = {key for pose in poses.values() for key in pose}, ", ".join(poses)
+    if keys == {"target"}:
+        return f"aim {names}"
+    return f"cone of {names}" if keys and keys <= {"cutoff", "beam"} else f"move {names}"
 
 
 def move_lights(

@@ -276,8 +276,11 @@ class Session:
         return self._patch_messages(changes)
 
     def _change_requests(self, message: RequestChange) -> Message:
-        label, requests = changed_requests(self.requests, self.basis.lights, message)
         is_move = isinstance(message, protocol.MoveLights)
+        if isinstance(message, protocol.MoveLights) and not message.poses:
+            self._edits.reset_slider()
+            return self.answer_update(poses=dict(self.requests.poses))
+        label, requests = changed_requests(self.requests, self.basis.lights, message)
         if is_move:
             self._edits.check_places(requests.placed)
         if getattr(message, "is_final", True):

@@ -1,5 +1,6 @@
 """Lights that are marked, dragged and pointed in the pictures of a real page over a real scene."""
 
+import math
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -142,6 +143,92 @@ def test_a_mark_follows_the_pointer_before_the_answer_comes(room: PaintedRoom) -
     room.page.wait_for_selector(".stage.is-dragging")
     assert room.mark("bulb") == pytest.approx((x + 45, y), abs=1)
     mouse.up()
+
+
+def test_a_drag_begins_with_a_few_pixels_and_escape_takes_it_back(room: PaintedRoom) -> None:
+    page, session, start = room.page, room.studio.session, room.mark("bulb")
+    room.drag(start, 2, 1)
+    # A click shows its row, with its numbers.
+    page.wait_for_selector('[data-light="bulb"] .lamp-fields')
+    page.mouse.move(*start)
+    page.mouse.down()
+    page.mouse.move(start[0] + 40, start[1], steps=4)
+    wait_until(lambda: session.is_open)
+    page.keyboard.press("Escape")
+    page.mouse.up()
+    wait_until(lambda: not session.is_open)
+    wait_until(lambda: room.mark("bulb") == pytest.approx(start, abs=1))
+    assert (session.store.position, room.poses) == (0, {})
+    # The keys move it in its plane, and with Shift upwards.
+    page.locator('[data-lamp="bulb"]').first.focus()
+    page.keyboard.press("ArrowRight")
+    right = wait_until(lambda: room.poses.get("bulb"))["position"]
+    assert right[0] > -0.5
+    assert right[1:] == pytest.approx([1, 0.5])
+    page.keyboard.press("Shift+ArrowUp")
+    wait_until(lambda: room.poses["bulb"]["position"][1] > 1)
+
+
+def test_a_drag_in_the_plan_ignores_that_the_plan_shifts(room: PaintedRoom) -> None:
+    """The end of a search brings back a button above or below it."""
+    page = room.page
+    circle = page.locator(".room-plan g:has(title:text-is('bulb')) circle")
+    circle.scroll_into_view_if_needed()
+    box = circle.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.evaluate("document.querySelector('.room-plan').style.marginTop = '40px'")
+    page.mouse.move(x + 12, y, steps=3)
+    page.mouse.up()
+    room.until_step(1)
+    position = room.poses["bulb"]["position"]
+    assert position[0] > -0.5
+    assert position[1:] == pytest.approx([1, 0.5], abs=1e-6)
+
+
+def test_what_cannot_be_taken_is_said(room: PaintedRoom) -> None:
+    page, session = room.page, room.studio.session
+    row = page.locator('[data-light="beam"]')
+    row.get_by_role("button", name="beam", exact=True).first.click()
+
+    def typed(label: str, text: str) -> None:
+        row.get_by_label(label).fill(text)
+        row.get_by_label(label).press("Enter")
+
+    for text in ("NaN", "0x10", "1e999", "left"):
+        typed("Position x", text)
+        page.wait_for_selector(f"text=Position x is {text}: expected a number")
+    assert room.poses == {}
+    typed("Cone", "200")
+    page.wait_for_selector("text=Cone cannot be 200: it is 89 now")
+    wait_until(lambda: room.poses.get("beam", {}).get("cutoff") == 89)
+    typed("Position x", "0.123456")
+    wait_until(lambda: room.poses["beam"].get("position", [0])[0] == 0.123456)
+    # A click beside the picture is none, and the next one counts.
+    row.get_by_role("button", name="Aim here").click()
+    left, top = room.seen((-0.4, 0, 0.3))
+    page.mouse.click(left, page.locator(".stage").bounding_box()["y"] + 2)
+    page.wait_for_selector("text=That is outside the picture")
+    page.mouse.click(left, top)
+    wait_until(lambda: "target" in room.poses["beam"])
+    page.get_by_role("button", name="Add a light").click()
+    box = page.locator(".room-plan > svg").bounding_box()
+    page.mouse.click(box["x"] + 1, box["y"] + 1)
+    page.wait_for_selector("text=That is outside the room")
+    assert session.requests.added == {}
+
+
+@pytest.mark.nightly
+def test_a_sun_is_turned_by_numbers(room: PaintedRoom) -> None:
+    row = room.page.locator('[data-light="sun"]')
+    row.get_by_role("button", name="sun", exact=True).first.click()
+    for label, text in (("Elevation", "30"), ("Azimuth", "90")):
+        row.get_by_label(label).fill(text)
+        row.get_by_label(label).press("Enter")
+    # Up is y: azimuths count from z towards x, and light goes the other way.
+    shine = [-math.cos(math.radians(30)), -0.5, 0]
+    wait_until(lambda: room.poses.get("sun", {}).get("target") == pytest.approx(shine, abs=1e-6))
 
 
 @pytest.mark.nightly

@@ -170,6 +170,8 @@ export const en = {
   },
   controls: {
     close: 'Close',
+    isNoNumber: '{label} is {typed}: expected a number',
+    isOutOfRange: '{label} cannot be {typed}: it is {taken} now',
   },
   dialogs: {
     painting: 'Painting',
@@ -325,6 +327,11 @@ export const en = {
     place: 'Place',
     position: 'Position',
     target: 'Target',
+    elevation: 'Elevation',
+    aboveTheHorizon: 'How high it stands, in degrees above the horizon',
+    azimuth: 'Azimuth',
+    aroundTheVertical: 'Its direction around the vertical, in degrees',
+    clickInsideThePicture: 'That is outside the picture: click inside it',
     cone: 'Cone',
     beam: 'Beam',
     pointByAClick: 'Point {label} by a click',
@@ -340,6 +347,7 @@ export const en = {
   lampMarks: {
     itStaysWhereItIs: '{label} {immovable_reason}: it stays where it is',
     dragToMoveItWithShift: '{label}: drag to move it, with Shift up and down',
+    isFarAway: '{label} is far away: turn it by its fields, a highlight or a shadow edge',
     selected: '{label}, selected',
     aimOf: 'Aim of {label}',
     dragWhatPointsAt: 'Drag what {label} points at',
@@ -794,6 +802,8 @@ export const en = {
   roomPlan: {
     loadingTheScene: 'Loading the scene …',
     planOfTheRoomFromAbove: 'Plan of the room from above',
+    clickInsideTheRoom: 'That is outside the room: click inside its outline',
+    camera: 'Camera',
   },
   selectOptions: {
     shape: 'Shape',
@@ -1022,7 +1032,7 @@ export const en = {
     swapColours: 'swap colours',
     pickLightFromThePicture: 'pick light from the picture',
     lineFromTheLastStroke: 'line from the last stroke',
-    cancelTheStroke: 'cancel the stroke',
+    cancelTheStroke: 'cancel the stroke, or the drag of a light',
     undo: 'undo',
     redo: 'redo',
     selection: 'Selection',

@@ -2,9 +2,9 @@
 
 import { slideByTouch } from '../../../viewer/touch_sliders.js';
 import { html, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
-import { cleanNumberText } from './format.js';
+import { cleanNumberText, typedNumber } from './format.js';
 import { Icon } from './icons.js';
-import { words } from '../language/language.js';
+import { fill, words } from '../language/language.js';
 
 /** The text being typed in a field, null if none, as state and as a ref. Event handlers read the
  * ref before the next render, so that text cancelled by Escape is not taken when the field loses
@@ -104,8 +104,9 @@ export function Checkbox({ label, checked, change, tip, disabled, keys, hidden }
 
 /**
  * A typed number: taken on Enter or when the field loses focus, cancelled by Escape, stepped by the
- * arrow keys. digits: after the point; figures: significant digits, instead. start: value from
- * which the keys step in an empty field.
+ * arrow keys. digits: after the point; figures: significant digits that are shown, instead, while a
+ * typed number is taken in full. start: value from which the keys step in an empty field. For text that
+ * cannot be taken as it is, the field sends the event `refused`, with a sentence as its detail.
  * @param {{label: string, value: number | null, change: (value: number | null) => void,
  *   min?: number, max?: number, step?: number, digits?: number, figures?: number, unit?: string,
  *   start?: number, hidden?: boolean, placeholder?: string, disabled?: boolean, tip?: string}} props
@@ -117,32 +118,40 @@ export function NumberField(props) {
   const round = (/** @type {number} */ x) =>
     Number(figures ? x.toPrecision(figures) : x.toFixed(digits));
   const displayText = draft ?? (value === null ? '' : String(round(value)));
-  // Take the number as shown.
-  const clamp = (/** @type {number} */ x) => Math.min(max, Math.max(min, round(x)));
-  const take = (/** @type {string} */ text) => {
+  const clamp = (/** @type {number} */ x) => Math.min(max, Math.max(min, x));
+  const take = (/** @type {string} */ text, /** @type {HTMLElement} */ field) => {
     setDraft(null);
-    const cleanText = cleanNumberText(text);
-    const number = Number(cleanText);
-    if (!cleanText && placeholder !== undefined) change(null);
-    else if (cleanText && Number.isFinite(number)) change(clamp(number));
+    const refuse = (/** @type {string} */ detail) =>
+      field.dispatchEvent(new CustomEvent('refused', { bubbles: true, composed: true, detail }));
+    const [typed, number] = [text.trim(), typedNumber(text)];
+    if (!typed) return void (placeholder !== undefined && change(null));
+    if (!Number.isFinite(number)) {
+      refuse(fill(words.controls.isNoNumber, { label, typed }));
+      return;
+    }
+    const taken = clamp(figures ? number : round(number));
+    if (number < min || number > max)
+      refuse(fill(words.controls.isOutOfRange, { label, typed, taken: round(taken) }));
+    change(taken);
   };
   const press = (/** @type {any} */ event) => {
     const sign = { ArrowUp: 1, ArrowDown: -1 }[/** @type {string} */ (event.key)];
-    if (event.key === 'Enter') take(event.currentTarget.value);
+    if (event.key === 'Enter') take(event.currentTarget.value, event.currentTarget);
     if (event.key === 'Escape') setDraft(null);
     if (!sign) return;
     event.preventDefault();
     setDraft(null);
     if (!displayText && sign < 0) return; // no negative amounts
     const base = displayText ? Number(cleanNumberText(displayText)) || 0 : start;
-    change(clamp(base + sign * step * (event.shiftKey ? 10 : 1)));
+    change(clamp(round(base + sign * step * (event.shiftKey ? 10 : 1))));
   };
   return html`<label class="field number" data-tip=${tip}>
     <span class=${hidden ? 'only-read' : 'name'}>${label}</span>
     <input type="text" inputmode="decimal" value=${displayText} placeholder=${placeholder} autocomplete="off"
       data-typed=${draft === null ? 'no' : 'yes'} disabled=${disabled} onKeyDown=${press}
       onInput=${(/** @type {any} */ event) => setDraft(event.currentTarget.value)}
-      onBlur=${() => draftRef.current !== null && take(draftRef.current)} />
+      onBlur=${(/** @type {any} */ event) =>
+        draftRef.current !== null && take(draftRef.current, event.currentTarget)} />
     ${unit !== undefined && html`<span class="unit" aria-hidden="true">${unit}</span>`}
   </label>`;
 }

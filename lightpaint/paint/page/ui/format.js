@@ -20,6 +20,12 @@ export function numberText(value, digits = 3) {
  * @param {string} text */
 export const cleanNumberText = (text) => text.trim().replace(MINUS, '-').replace(',', '.');
 
+/** Return a typed number, or NaN for other text. @param {string} text */
+export function typedNumber(text) {
+  const cleanText = cleanNumberText(text);
+  return /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i.test(cleanText) ? Number(cleanText) : NaN;
+}
+
 /** @param {number} value @param {number} [digits] @returns {string} "+0.5", "−1.2", "0" */
 export function signedText(value, digits = 1) {
   const roundedValue = Number(value.toFixed(digits));

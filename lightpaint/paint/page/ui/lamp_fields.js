@@ -2,6 +2,7 @@
 
 import { html } from '../vendor/preact.js';
 import { Button, NumberField } from './controls.js';
+import { directionFrom, skyAngles } from './lamp_geometry.js';
 import { placeOf } from './lamp_marks.js';
 import { fill, words } from '../language/language.js';
 import { completePair } from './references/reference_picture.js';
@@ -40,8 +41,11 @@ export function pointingHint(action, lights) {
 /** Handle a click on a picture that a click action waits for. @param {App} app
  * @param {{x: number, y: number} | null} point in pixels of the picture */
 export function pointLamp(app, point) {
-  const { clickAction, view } = app.store.value;
+  const { clickAction, state, view } = app.store.value;
   if (!clickAction || !point) return;
+  const [height, width] = state?.size ?? [Infinity, Infinity];
+  const isInside = point.x >= 0 && point.y >= 0 && point.x < width && point.y < height;
+  if (!isInside) return app.session.toast(words.lampFields.clickInsideThePicture, 'warn');
   if (clickAction.mode === 'pair') return completePair(app, clickAction, point);
   const pixel = /** @type {[number, number]} */ ([point.x, point.y]);
   if (clickAction.mode === 'hang')
@@ -57,6 +61,23 @@ export function pointLamp(app, point) {
     ...(edge ? { edge } : {}),
     view,
   });
+}
+
+/** Where a light that is far away stands in the sky.
+ * @param {{direction: number[], up: number, move: (direction: number[]) => void}} props direction: in
+ * which it shines. move: turns it */
+function SunFields({ direction, up, move }) {
+  const { elevation, azimuth } = skyAngles(direction, up);
+  const turn = (/** @type {Partial<ReturnType<typeof skyAngles>>} */ change) =>
+    move(directionFrom({ elevation, azimuth, ...change }, up));
+  return html`<div class="ask-fields is-pair">
+    <${NumberField} label=${words.lampFields.elevation} unit="°" value=${elevation} min=${-90} max=${90} step=${1}
+      digits=${1} tip=${words.lampFields.aboveTheHorizon}
+      change=${(/** @type {number} */ x) => turn({ elevation: x })} />
+    <${NumberField} label=${words.lampFields.azimuth} unit="°" value=${azimuth} min=${-360} max=${360} step=${1}
+      digits=${1} tip=${words.lampFields.aroundTheVertical}
+      change=${(/** @type {number} */ x) => turn({ azimuth: x })} />
+  </div>`;
 }
 
 /** @param {{k: number, ui: Ui, app: App}} props */
@@ -115,6 +136,7 @@ export function LampFields({ k, ui, app }) {
             session.moveLamp(k, { beam: x, cutoff: place.cutoff })} />
       </div>`
     }
+    ${!place.position && place.direction && ui.rig && html`<${SunFields} direction=${place.direction} up=${ui.rig.up} move=${(/** @type {number[]} */ target) => session.moveLamp(k, { target })} />`}
     <div class="lamp-ways" role="group" aria-label=${fill(words.lampFields.pointByAClick, { label })}>
       ${place.position && place.direction && pointButton('aim')}
       ${pointButton('highlight')}${pointButton('shadow')}

@@ -115,6 +115,48 @@ export function dragOnRail(camera, [start, end], x, y) {
   return add(start, axis, Math.min(1, Math.max(0, share)));
 }
 
+/** Return where light comes from that shines in a direction: its elevation and its azimuth in
+ * degrees, around the vertical from the axis after it. @param {number[]} direction @param {number} up */
+export function skyAngles(direction, up) {
+  const [x, y, z] = [1, 2, 3].map((k) => -direction[(up + k) % 3]);
+  const elevation = degrees(Math.atan2(z, Math.hypot(x, y)));
+  return { elevation, azimuth: degrees(Math.atan2(y, x)) };
+}
+
+/** Return the direction of light from such a place in the sky.
+ * @param {{elevation: number, azimuth: number}} angles @param {number} up @returns {Vector} */
+export function directionFrom({ elevation, azimuth }, up) {
+  const [height, turn] = [radians(elevation), radians(azimuth)];
+  const direction = /** @type {Vector} */ ([0, 0, 0]);
+  direction[(up + 1) % 3] = -Math.cos(height) * Math.cos(turn);
+  direction[(up + 2) % 3] = -Math.cos(height) * Math.sin(turn);
+  direction[up] = -Math.sin(height);
+  return direction;
+}
+
+const degrees = (/** @type {number} */ angle) => (angle * 180) / Math.PI;
+const radians = (/** @type {number} */ angle) => (angle * Math.PI) / 180;
+
+/** Return the point of a rail that is nearest to a point. @param {number[][]} rail both ends
+ * @param {number[]} point @returns {Vector} */
+export function onRail([start, end], point) {
+  const axis = subtract(end, start);
+  const share = dot(subtract(point, start), axis) / (dot(axis, axis) || 1);
+  return add(start, axis, Math.min(1, Math.max(0, share)));
+}
+
+/** Return a place moved to the right, away from the camera and upwards, by these amounts.
+ * @param {Camera} camera @param {number[]} place @param {number} up axis @param {number[]} amounts
+ * @returns {Vector} */
+export function nudged(camera, place, up, [right, away, upwards]) {
+  const vertical = /** @type {Vector} */ ([0, 0, 0].map((_, k) => (k === up ? 1 : 0)));
+  const rightAxis = normalize(camera.x_axis.map((x, k) => (k === up ? 0 : x)));
+  // Across both: it points away from a camera that looks straight down, too.
+  const across = cross(vertical, rightAxis);
+  const sign = dot(across, camera.forward) < dot(across, camera.y_axis) ? -1 : 1;
+  return add(add(add(place, rightAxis, right), across, sign * away), vertical, upwards);
+}
+
 /**
  * Return a place clamped to a rectangle, along the line to its centre.
  * @param {{x: number, y: number, isAhead: boolean}} seen

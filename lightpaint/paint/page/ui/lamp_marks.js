@@ -5,6 +5,8 @@ import {
   dragInPlane,
   subtract,
   dragOnRail,
+  nudged,
+  onRail,
   add,
   project,
   projectDirection,
@@ -27,6 +29,18 @@ import { fill, words } from '../language/language.js';
 
 /** CSS pixels between the edge and a mark of a light outside the picture. */
 const MARK_MARGIN = 14;
+
+/** Part of the room's diagonal by which an arrow key moves a light. */
+const NUDGE_ROOM_SHARE = 0.005;
+
+/** How far keys move a light: to the right, away from the camera, and upwards.
+ * @type {Record<string, (isShift: boolean) => [number, number, number]>} */
+const NUDGES = {
+  ArrowLeft: () => [-1, 0, 0],
+  ArrowRight: () => [1, 0, 0],
+  ArrowUp: (isShift) => (isShift ? [0, 0, 1] : [0, 1, 0]),
+  ArrowDown: (isShift) => (isShift ? [0, 0, -1] : [0, -1, 0]),
+};
 
 /** Length of the arrow at a trial place, relative to the room. */
 const ARROW_ROOM_SHARE = 0.06;
@@ -107,6 +121,13 @@ export function placeOf({ rig, drag }, k) {
   return drag?.light === k ? { ...place, ...drag.place } : place;
 }
 
+/** Return what a move to a position changes: a light keeps its direction. @param {LightPlace} place
+ * @param {number[]} position @returns {Partial<LightPlace>} */
+export function shiftedTo({ position: start, target }, position) {
+  if (!start || !target) return { position };
+  return { position, target: add(target, subtract(position, start)) };
+}
+
 /** Return the place of a light's mark; for an infinitely distant light, the direction that its
  * light comes from. @param {Camera} camera @param {LightPlace} place */
 function markAt(camera, { position, direction }) {
@@ -131,9 +152,18 @@ function Mark({ ui, app, light, place, pane, camera, positionOf, isTwin }) {
   const canDrag = place.immovable_reason === '' && place.position !== null;
   const isSelected = ui.selectedLights.includes(light);
   const choose = () => app.store.set({ lamp: light });
+  const nudge = (/** @type {KeyboardEvent} */ event) => {
+    const [right, away, upwards] = NUDGES[event.key]?.(event.shiftKey) ?? [0, 0, 0];
+    if (!canDrag || !place.position || !ui.rig || !(right || away || upwards)) return;
+    event.preventDefault();
+    event.stopPropagation();
+    const amounts = [right, away, upwards].map((x) => x * NUDGE_ROOM_SHARE * sizeOf(ui));
+    const position = nudged(camera, place.position, ui.rig.up, amounts);
+    app.session.moveLamp(light, { position: place.rail ? onRail(place.rail, position) : position });
+  };
   const tip = place.immovable_reason
     ? fill(words.lampMarks.itStaysWhereItIs, { label, immovable_reason: place.immovable_reason })
-    : fill(words.lampMarks.dragToMoveItWithShift, { label });
+    : fill(canDrag ? words.lampMarks.dragToMoveItWithShift : words.lampMarks.isFarAway, { label });
   const drag = useMarkDrag(app, pane, (x, y, isShift, start) => {
     if (!canDrag || !place.position || !ui.rig) return null;
     const startPosition = /** @type {number[]} */ (start.place.position);
@@ -143,7 +173,7 @@ function Mark({ ui, app, light, place, pane, camera, positionOf, isTwin }) {
         ? dragVertically(camera, startPosition, ui.rig.up, x, y)
         : dragInPlane(camera, startPosition, ui.rig.up, x, y);
     return {
-      place: { position: newPosition },
+      place: shiftedTo(start.place, newPosition),
       mark: positionOf({ ...place, position: newPosition }),
       request: { kind: 'move', pose: { position: newPosition } },
     };
@@ -163,13 +193,24 @@ function Mark({ ui, app, light, place, pane, camera, positionOf, isTwin }) {
   }} aria-label=${isSelected ? fill(words.lampMarks.selected, { label }) : label} aria-pressed=${String(ui.lamp === light)} tabindex=${isTwin ? -1 : 0}
     aria-hidden=${isTwin ? 'true' : undefined} data-tip=${tip} data-lamp=${label}
     onClick=${(/** @type {MouseEvent} */ event) =>
-      hasControl(event) ? pressLight(app.store, light, event) : choose()}
+      hasControl(event) ? pressLight(app.store, light, event) : showLight(app, light, event)} onKeyDown=${nudge}
     onPointerDown=${(/** @type {PointerEvent} */ event) => {
       if (ui.clickAction) return; // the click goes to the picture behind it
       if (hasControl(event)) return event.stopPropagation(); // the click selects it
       choose();
       drag.down(event, light, place);
     }} onPointerMove=${drag.move} onPointerUp=${drag.up} onPointerCancel=${drag.up}></button>`;
+}
+
+/** Choose a light, and open its row. @param {App} app @param {number} light
+ * @param {MouseEvent} event on its mark */
+function showLight({ store }, light, { currentTarget }) {
+  const { name } = store.value.lights[light];
+  const root = /** @type {HTMLElement} */ (currentTarget).closest('.lightpaint');
+  store.set(({ openLights }) => ({ lamp: light, openLights: [...new Set([...openLights, light])] }));
+  requestAnimationFrame(() =>
+    root?.querySelector(`.light[data-light="${CSS.escape(name)}"]`)?.scrollIntoView({ block: 'nearest' }),
+  );
 }
 
 /** Return whether a press on a mark selects it; Shift moves it up and down.
@@ -184,12 +225,18 @@ function AimHandle({ ui, app, light, pane, camera, innerBox, toPage, isTwin }) {
   const place = placeOf(ui, light);
   const positionOf = (/** @type {{x: number, y: number, isAhead: boolean}} */ projection) =>
     clampToBox(toPage(projection), innerBox);
-  const drag = useMarkDrag(app, pane, (x, y) => ({
-    place: {},
-    aimPixel: [x, y],
-    mark: positionOf({ x, y, isAhead: true }),
-    request: { kind: 'point', mode: 'aim', pixel: [x, y], view: ui.view },
-  }));
+  const [height, width] = ui.state.size;
+  const drag = useMarkDrag(app, pane, (pointerX, pointerY) => {
+    // Beyond the edge of the picture there is nothing to aim at.
+    const x = Math.min(Math.max(pointerX, 0), width - 1);
+    const y = Math.min(Math.max(pointerY, 0), height - 1);
+    return {
+      place: {},
+      aimPixel: [x, y],
+      mark: positionOf({ x, y, isAhead: true }),
+      request: { kind: 'point', mode: 'aim', pixel: [x, y], view: ui.view },
+    };
+  });
   if (!place.position || !place.direction || !place.target || place.immovable_reason) return null;
   const aimPixel = ui.drag?.light === light ? ui.drag.aimPixel : undefined;
   const projection = aimPixel

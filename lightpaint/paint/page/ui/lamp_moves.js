@@ -7,8 +7,8 @@ import { DraftPace } from './draft_pace.js';
 
 /** @typedef {import("./session_controller.js").SessionController} SessionController */
 /** @typedef {Record<string, any>} Pose */
-/** A requested pose of a light, or a place to aim it by.
- * @typedef {{kind: "move", pose: Pose} | {kind: "point", mode: "aim" | "highlight" | "shadow",
+/** A requested pose of a light, or a place to aim it by; or the end of its drag, which puts it back.
+ * @typedef {{kind: "move", pose: Pose} | {kind: "cancel"} | {kind: "point", mode: "aim" | "highlight" | "shadow",
  *   pixel: [number, number], edge?: [number, number], view: number}} LampRequest */
 
 /** step: between the pixels of the light's picture.
@@ -33,6 +33,11 @@ export class LampMoves {
   queue(light, request) {
     this.nextMove = { light, request, isFinal: true, step: 1 };
     this.sendNext();
+  }
+
+  /** Put a light back that is dragged. @param {number} light */
+  cancel(light) {
+    this.queue(light, { kind: 'cancel' });
   }
 
   /** Move a light while it is dragged: its pictures are drafts until it rests.
@@ -63,9 +68,9 @@ export class LampMoves {
     const { value } = this.session.store;
     const { kind, ...fields } = request;
     const reply =
-      kind === 'move'
+      kind !== 'point'
         ? await this.session.send('move', {
-            poses: { [value.lights[light].name]: request.pose },
+            poses: kind === 'move' ? { [value.lights[light].name]: request.pose } : {},
             is_final: isFinal,
             view: value.view,
             step,

@@ -3,14 +3,20 @@
 import { html, useRef } from '../vendor/preact.js';
 import { AddLight } from './add_light.js';
 import { MoveButton } from './advice.js';
-import { dot, subtract, add, normalize } from './lamp_geometry.js';
-import { placeOf } from './lamp_marks.js';
+import { dot, subtract, add, normalize, onRail } from './lamp_geometry.js';
+import { placeOf, shiftedTo } from './lamp_marks.js';
+import { DRAG_MIN_PIXELS, endOnEscape } from './lamps/mark_drag.js';
 import { atFullBrightness, luminance, toHex } from './paint_colour.js';
 import { words } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
 /** @typedef {import("./lamp_geometry.js").Vector} Vector */
+/** @typedef {import("../engine/messages.js").LightPlace} LightPlace */
+
+/** A drag of a light: where it hung, where the pointer pressed, and where the light is now.
+ * @typedef {{light: number, place: LightPlace, x: number, y: number, position: Vector | null,
+ *   stop: () => void}} PlanDrag */
 
 /** Height of the plan and its margin, in CSS pixels; its width follows from the panel. */
 const [WIDTH, HEIGHT, MARGIN] = [270, 130, 10];
@@ -76,10 +82,27 @@ function planOf({ rig, view, state }) {
   };
 }
 
+/** The camera, at the edge of the plan if it is outside. @param {{ui: Ui,
+ *   toPlan: (point: number[]) => [number, number]}} props */
+function CameraMark({ ui, toPlan }) {
+  const camera = ui.rig?.cameras[ui.view] ?? ui.rig?.cameras[0];
+  if (!camera || camera.is_parallel) return null;
+  const [x, y] = toPlan(camera.origin).map((value, c) =>
+    Math.min(Math.max(value, MARGIN), (c ? HEIGHT : WIDTH) - MARGIN / 2),
+  );
+  const corners = [
+    [x, y],
+    [x - 6, y - 9],
+    [x + 6, y - 9],
+  ];
+  return html`<polygon class="camera" points=${corners.join(' ')} data-tip=${words.roomPlan.camera}>
+    <title>${words.roomPlan.camera}</title></polygon>`;
+}
+
 /** @param {{ui: Ui, app: App}} props */
 export function RoomPlan({ ui, app }) {
   const frame = useRef(/** @type {SVGElement | null} */ (null));
-  const draggedLight = useRef(/** @type {number | null} */ (null));
+  const drag = useRef(/** @type {PlanDrag | null} */ (null));
   const plan = planOf(ui);
   if (!plan || !ui.rig) return html`<p class="faint">${words.roomPlan.loadingTheScene}</p>`;
   const { rig } = ui;
@@ -97,23 +120,37 @@ export function RoomPlan({ ui, app }) {
     corner(high[a], high[b]),
     corner(low[a], high[b]),
   ].join(' ');
-  const dragLight = (/** @type {PointerEvent} */ event, /** @type {boolean} */ isFinal) => {
-    const light = draggedLight.current;
-    if (light === null || !frame.current) return;
-    const box = frame.current.getBoundingClientRect();
-    const place = rig.lights[light];
-    if (!place.position) return;
-    const zoom = WIDTH / box.width;
-    const [x, y] = [(event.clientX - box.left) * zoom, (event.clientY - box.top) * zoom];
-    const position = plan.toScene(x, y, place.position[rig.up]);
-    const request = /** @type {const} */ ({ kind: 'move', pose: { position } });
-    if (!isFinal) {
-      app.store.setForFrame({ drag: { light, place: { position } } });
-      return app.session.lampMoves.drag(light, request, app.engine);
-    }
+  const dragLight = (/** @type {PointerEvent} */ event) => {
+    const { current } = drag;
+    if (!current || !frame.current) return;
+    // From where the drag began: the plan itself may shift on the page meanwhile.
+    const [dx, dy] = [event.clientX - current.x, event.clientY - current.y];
+    if (!current.position && Math.hypot(dx, dy) < DRAG_MIN_PIXELS) return;
+    const zoom = WIDTH / frame.current.getBoundingClientRect().width;
+    const { light, place } = current;
+    const start = /** @type {number[]} */ (place.position);
+    const [x, y] = plan.toPlan(start);
+    const free = plan.toScene(x + zoom * dx, y + zoom * dy, start[rig.up]);
+    const position = place.rail ? onRail(place.rail, free) : free;
+    current.position = position;
+    app.store.setForFrame({ drag: { light, place: shiftedTo(place, position) } });
+    app.session.lampMoves.drag(light, { kind: 'move', pose: { position } }, app.engine);
+  };
+  const endDrag = () => {
+    const { current } = drag;
+    if (!current) return;
+    current.stop();
+    drag.current = null;
     app.store.set({ drag: null });
     app.engine.dragLight(null);
-    app.session.lampMoves.queue(light, request);
+    const pose = current.position && { position: current.position };
+    if (pose) app.session.lampMoves.queue(current.light, { kind: 'move', pose });
+  };
+  const cancelDrag = () => {
+    const { current } = drag;
+    if (current?.position) app.session.lampMoves.cancel(current.light);
+    if (current) current.position = null;
+    endDrag();
   };
   const isHanging = ui.clickAction?.mode === 'hang';
   const hang = (/** @type {PointerEvent} */ event) => {
@@ -126,18 +163,17 @@ export function RoomPlan({ ui, app }) {
       (event.clientY - box.top) * zoom,
       height,
     );
+    if ([a, b].some((axis) => place[axis] < low[axis] || place[axis] > high[axis]))
+      return app.session.toast(words.roomPlan.clickInsideTheRoom, 'warn');
     void app.session.addLight({ type: ui.clickAction.type, position: place, view: ui.view });
-  };
-  const endDrag = (/** @type {PointerEvent} */ event) => {
-    if (app.store.value.drag) dragLight(event, true);
-    draggedLight.current = null;
   };
   return html`<div class="room-plan">
     <svg ref=${frame} viewBox=${`0 0 ${WIDTH} ${HEIGHT}`} role="group"
       aria-label=${words.roomPlan.planOfTheRoomFromAbove} class=${isHanging ? 'is-pointing' : ''}
-      onPointerDown=${hang} onPointerMove=${(/** @type {any} */ e) => dragLight(e, false)}
+      onPointerDown=${hang} onPointerMove=${dragLight}
       onPointerUp=${endDrag} onPointerCancel=${endDrag}>
       <polygon class="room" points=${outline} />
+      <${CameraMark} ui=${ui} toPlan=${plan.toPlan} />
       ${Object.entries(ui.trial?.positions ?? {}).map(([name, position]) => {
         const [x, y] = plan.toPlan(position);
         const [dx, dy] = plan.toPlanDirection(ui.trial?.directions[name] ?? [0, 0, 0]);
@@ -157,8 +193,9 @@ export function RoomPlan({ ui, app }) {
             data-tip=${label} onPointerDown=${(/** @type {PointerEvent} */ event) => {
               if (isHanging) return;
               app.store.set({ lamp: k });
-              if (place.immovable_reason || place.rail) return;
-              draggedLight.current = k;
+              if (place.immovable_reason || event.button !== 0) return;
+              const { clientX: pointerX, clientY: pointerY } = event;
+              drag.current = { light: k, place, x: pointerX, y: pointerY, position: null, stop: endOnEscape(cancelDrag) };
               frame.current?.setPointerCapture(event.pointerId);
             }}><title>${label}</title></circle></g>`;
       })}

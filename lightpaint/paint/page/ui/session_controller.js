@@ -4,6 +4,7 @@ import { ImageActions } from './images/image_actions.js';
 import { LampMoves } from './lamp_moves.js';
 import { ManyLights } from './lamps/many_lights.js';
 import { SessionLink } from './session_link.js';
+import { movablePlaces } from './state_updates.js';
 import { lockedLights, lockingLight } from './tied_lights.js';
 import { fill, words } from '../language/language.js';
 
@@ -214,14 +215,10 @@ export class SessionController extends SessionLink {
     const { rig, lights, areLampsMarked } = this.store.value;
     if (!run) return this.send('place', { run });
     if (!areLampsMarked) this.toggleLamps();
-    /** @type {Record<string, number[]>} */
-    const ghosts = {};
-    rig?.lights.forEach(({ position, immovable_reason: reason }, k) => {
-      if (position && !reason) ghosts[lights[k].name] = position;
-    });
+    this.awaitsGhosts = !rig;
     this.store.set({
       placementProgress: { task: 'place', done: 0, total: 0, unit: 'steps' },
-      ghosts,
+      ghosts: rig ? movablePlaces(rig, lights) : {},
     });
     return this.send('place', { run });
   }

@@ -6,6 +6,7 @@ import {
   answerUpdate,
   explanationUpdate,
   looksUpdate,
+  movablePlaces,
   previewUpdate,
   progressUpdate,
   stateUpdate,
@@ -127,7 +128,7 @@ export class SessionLink {
       renewed: (/** @type {HostEvents['renewed']} */ m) => ({
         resources: { ...this.store.value.resources, ...m.resources },
       }),
-      rig: (/** @type {HostEvents['rig']} */ m) => ({ rig: m }),
+      rig: (/** @type {HostEvents['rig']} */ m) => this.takeRig(m),
       trial: (/** @type {HostEvents['trial']} */ m) =>
         this.store.value.placementProgress ? { trial: m } : {},
       placed: (/** @type {HostEvents['placed']} */ m) => this.takePlacement(m),
@@ -219,6 +220,14 @@ export class SessionLink {
     );
     if (dialog !== 'export') this.toast(exportText(names, Boolean(isStopped)));
     return { exportResult: message, ...TASK_RESETS.export };
+  }
+
+  /** Take the places of lights. A search that began before they were known shows where lights were.
+   * @param {HostEvents["rig"]} rig @returns {Partial<Ui>} */
+  takeRig(rig) {
+    const ghosts = this.awaitsGhosts ? { ghosts: movablePlaces(rig, this.store.value.lights) } : {};
+    this.awaitsGhosts = false;
+    return { rig, ...ghosts };
   }
 
   /** Take the result of a search for places, and the earlier places of lights.

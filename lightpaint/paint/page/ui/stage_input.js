@@ -31,7 +31,10 @@ export function useStageInput(frame, pointer, app) {
       pointer.down(event);
     });
     listen('blur', () => delete element.dataset.by);
-    listen('pointermove', (event) => pointer.move(event));
+    listen('pointermove', (event) => {
+      if (element.dataset.by === 'keys') delete element.dataset.by;
+      pointer.move(event);
+    });
     listen('pointerup', (event) => pointer.up(event));
     listen('pointercancel', (event) => pointer.up(event));
     listen('wheel', (event) => pointer.wheel(event));
@@ -80,6 +83,7 @@ function handleBrushKey(event, pointer, app) {
   const pane = engine.panes()[0];
   const step = event.shiftKey ? 1 : 12;
   rings.hidden = false;
+  element.dataset.by = 'keys';
   const x =
     Number(rings.dataset.x ?? pane.x + pane.width / 2) + (direction ? direction[0] * step : 0);
   const y =

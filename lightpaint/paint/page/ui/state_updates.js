@@ -328,3 +328,13 @@ function estimateTime(progress, previous) {
       : undefined;
   return { ...progress, since, remainingSeconds };
 }
+
+/** Return the places of the lights that can move, by name. @param {import("../engine/messages.js").Rig} rig
+ * @param {Ui["lights"]} lights @returns {Record<string, number[]>} */
+export function movablePlaces(rig, lights) {
+  return Object.fromEntries(
+    rig.lights.flatMap(({ position, immovable_reason: reason }, k) =>
+      position && !reason ? [[lights[k].name, position]] : [],
+    ),
+  );
+}

@@ -7,9 +7,13 @@ import { useEffect, useLayoutEffect, useRef } from '../../vendor/preact.js';
 /** @typedef {import("../../engine/messages.js").LightPlace} LightPlace */
 /** @typedef {import("../lamp_moves.js").LampRequest} LampRequest */
 
-/** A drag that goes on. dx, dy: from the mark's middle to the pointer. mark: where the mark belongs.
- * @typedef {{button: HTMLElement, light: number, place: LightPlace, dx: number, dy: number,
- *   mark: {x: number, y: number} | null, lastRequest: LampRequest | null}} Drag */
+/** A drag that goes on. x, y: where it began, on the screen. dx, dy: from the mark's middle to there.
+ * mark: where the mark belongs.
+ * @typedef {{button: HTMLElement, light: number, place: LightPlace, x: number, y: number, dx: number,
+ *   dy: number, mark: {x: number, y: number} | null, lastRequest: LampRequest | null}} Drag */
+
+/** CSS pixels that the pointer goes before a press becomes a drag: a hand is never quite still. */
+export const DRAG_MIN_PIXELS = 4;
 
 /**
  * A drag of a mark: it requests a place at every move, and keeps the last. The mark itself follows
@@ -22,6 +26,7 @@ import { useEffect, useLayoutEffect, useRef } from '../../vendor/preact.js';
  */
 export function useMarkDrag(app, pane, resolveDrag) {
   const current = useRef(/** @type {Drag | null} */ (null));
+  const onEscape = useRef(/** @type {() => void} */ (() => {}));
   const inPicture = (/** @type {PointerEvent} */ event) => {
     const { left, top } = app.engine.element.getBoundingClientRect();
     return [
@@ -30,6 +35,7 @@ export function useMarkDrag(app, pane, resolveDrag) {
     ];
   };
   const end = () => {
+    onEscape.current();
     if (current.current) current.current.button.style.translate = '';
     current.current = null;
     app.engine.dragLight(null);
@@ -50,12 +56,19 @@ export function useMarkDrag(app, pane, resolveDrag) {
     const { left, top, width, height } = button.getBoundingClientRect();
     // The mark keeps its offset from the pointer.
     const offset = { dx: event.clientX - left - width / 2, dy: event.clientY - top - height / 2 };
-    current.current = { button, light, place, ...offset, mark: null, lastRequest: null };
+    const start = { x: event.clientX, y: event.clientY };
+    current.current = { button, light, place, ...start, ...offset, mark: null, lastRequest: null };
+    onEscape.current = endOnEscape(() => {
+      if (current.current?.lastRequest) app.session.lampMoves.cancel(light);
+      end();
+    });
   };
   const move = (/** @type {PointerEvent} */ event) => {
     const drag = current.current;
     if (!drag) return;
     event.stopPropagation();
+    const distance = Math.hypot(event.clientX - drag.x, event.clientY - drag.y);
+    if (!drag.lastRequest && distance < DRAG_MIN_PIXELS) return;
     const [x, y] = inPicture(event);
     const result = resolveDrag(
       x - drag.dx / pane.scale,
@@ -80,6 +93,19 @@ export function useMarkDrag(app, pane, resolveDrag) {
     end();
   };
   return { down, move, up };
+}
+
+/** Call `cancel` once Escape is pressed. @param {() => void} cancel @returns {() => void} to stop it */
+export function endOnEscape(cancel) {
+  const controller = new AbortController();
+  const press = (/** @type {KeyboardEvent} */ event) => {
+    if (event.key !== 'Escape') return;
+    event.preventDefault();
+    event.stopPropagation();
+    cancel();
+  };
+  window.addEventListener('keydown', press, { signal: controller.signal, capture: true });
+  return () => controller.abort();
 }
 
 /** Shift a mark from where it is drawn to where it belongs. @param {Drag} drag */
