@@ -20,6 +20,7 @@ from lightpaint.relit.export.colors import with_own_colors
 from lightpaint.relit.export.exports import blender_script
 from lightpaint.relit.export.fixtures import fixtures_csv, fixtures_json
 from lightpaint.relit.export.nuke import needs_copy, nuke_script, spoken_unreadable
+from lightpaint.relit.export.nuke_lights import nuke_lights
 from lightpaint.relit.export.scene_script import scene_script
 from lightpaint.relit.export.sky_maps import SkyMap
 from lightpaint.relit.export.usd import check_usd, usd_overrides
@@ -32,6 +33,7 @@ from lightpaint.relit.light_maps import (
     wall_images_of,
 )
 from lightpaint.relit.relight import scene_of
+from lightpaint.relit.rig_lights import rig_lights
 from lightpaint.relit.xml_patch import emitters_of, scene_patch
 from lightpaint.scene.scene import Scene
 
@@ -42,7 +44,7 @@ FORMS: dict[str, tuple[str | None, str | None]] = {
     "mitsuba": ("relit.patch", None),
     "usd": ("lights.usda", "lights.usda"),
     "blender": ("set_scene.py", "set_lights.py"),
-    "nuke": (None, "relit.nk"),
+    "nuke": ("lights.nk", "relit.nk"),
 }
 
 
@@ -82,12 +84,15 @@ def names_of_forms(forms: Iterable[str], source: Source) -> dict[str, str]:
         name = FORMS[form][source.light_groups is not None]
         if name is None:
             raise LightpaintError(
-                "nuke multiplies the layers of light groups: give them with light_groups=..."
-                if form == "nuke"
-                else f"{form} needs a scene: give it with scene=..., and leave light_groups=... out"
+                f"{form} needs a scene: give it with scene=..., and leave light_groups=... out"
             )
         if source.light_groups is None and source.scene is None and form not in ("csv", "json"):
-            raise LightpaintError(f"{form} needs the scene: give it with scene=...")
+            raise LightpaintError(
+                "nuke needs the scene or the light groups of the lighting: give scene=... for the "
+                "lights, or light_groups=... for multipliers of their layers"
+                if form == "nuke"
+                else f"{form} needs the scene: give it with scene=..."
+            )
         if form == "usd":
             check_usd()
             if source.light_groups is not None and source.stage is None:
@@ -182,6 +187,8 @@ def _writer_of(
     assert scene is not None
     if form == "mitsuba":
         return lambda: scene_patch(scene, lighting)
+    if form == "nuke":
+        return lambda: _nuke_lights(scene, lighting, listen)
     emitters, name = emitters_of(scene, lighting), scene.files[0].name
     skies = {one.name: one.file for one in maps if isinstance(one, SkyMap)}
     walls = {one.name: one for one in maps if isinstance(one, WallImage)}
@@ -205,6 +212,16 @@ def _writer_of(
             f"slide by hand, {some_names(one.file for one in slides)}"
         )
     return lambda: _usd_layer(lighting, source, emitters, folder, listen, skies, panels)
+
+
+def _nuke_lights(scene: Scene, lighting: Lighting, listen: Listener) -> str:
+    """Return a Nuke script with the lights, and say which of them it lacks."""
+    lights, left = rig_lights(scene, lighting)
+    if left:
+        listen.say(f"Nuke has no light like {some_names(left)}: set it by hand")
+    about = f"the lights of {scene.files[0].name} as solved for {lighting.target}"
+    up = lighting.up if lighting.places else scene.up
+    return nuke_lights(lights, up=up, about=about, left=left)
 
 
 def _usd_layer(

@@ -163,7 +163,7 @@ def test_what_it_lacks_is_one_line(answer_folder: Path) -> None:
     mistakes = {
         (lighting, "--to", "maya"): "no form 'maya': known are csv, json, mitsuba, usd",
         (lighting, "--to", "mitsuba"): "mitsuba needs the scene: give it with --scene",
-        (lighting, "--to", "nuke"): "give them with --lights",
+        (lighting, "--to", "nuke"): "give --scene for the lights, or --lights for multipliers",
         (lighting, "--to", "mitsuba", "--lights", "groups.exr"): "leave --lights out",
         (lighting, "--to", "nuke", "--lights", "groups.exr"): "different lights",
         ("room.xml", "--to", "csv"): "is not a JSON file",

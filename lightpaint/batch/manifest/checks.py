@@ -133,7 +133,7 @@ def check_handover(mistakes: Mistakes, label: str, handover: Handover, entry: An
     has_groups = isinstance(entry.basis, GroupsFile)
     for form in handover.to:
         if FORMS[form][has_groups] is None:
-            requirement = "light groups" if form == "nuke" else "a scene, and no light groups"
+            requirement = "a scene, and no light groups"
             mistakes.add(f"{label}, export", f"{form!r} is of {requirement}: leave it out")
         elif not has_groups and not entry.scenes and form not in ("csv", "json"):
             mistakes.add(f"{label}, export", f"{form!r} needs the scene: give scene = ...")

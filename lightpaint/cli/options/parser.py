@@ -198,8 +198,8 @@ def _export(parser: argparse.ArgumentParser) -> None:
         metavar="csv,json,mitsuba,usd,blender,nuke",
         help="one format or several. csv, json: fixtures with colour, kelvin, lumen and DMX; "
         "mitsuba: a patch for the XML of the scene; usd: a layer that overrides the lights "
-        "of a stage; blender: a Python script that sets lights by name; nuke: a script that "
-        "scales light groups",
+        "of a stage; blender: a Python script that sets lights by name; nuke: a script with the "
+        "lights of --scene in Nuke's 3-D system, or one that scales the light groups of --lights",
     )
     source_group = parser.add_mutually_exclusive_group()
     source_group.add_argument(

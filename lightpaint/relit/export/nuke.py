@@ -54,10 +54,10 @@ def nuke_script(groups: LightGroups, lighting: Lighting, folder: Path) -> str:
     for name in dict.fromkeys(x.layer for x in sources):
         if name != "rgba":
             lines.append(f"add_layer {{{name} {name}.red {name}.green {name}.blue {name}.alpha}}")
-    lines += _node("StickyNote", inputs="0", name="lightpaint_note", label=quoted(_note(groups)))
+    lines += node("StickyNote", inputs="0", name="lightpaint_note", label=quoted(_note(groups)))
     for k, file in enumerate(files):
         knobs = _file_knobs(file, groups)
-        lines += [*_node("Read", inputs="0", **knobs, raw="true", name=f"Read_{k}")]
+        lines += [*node("Read", inputs="0", **knobs, raw="true", name=f"Read_{k}")]
         lines.append(f"set R{k} [stack 0]")
 
     # Multipliers refer to Rec.709; the result is converted back to the primaries of the file.
@@ -76,7 +76,7 @@ def nuke_script(groups: LightGroups, lighting: Lighting, folder: Path) -> str:
     lines += _sum(groups, lighting, shuffled)
     lines += _matrix(None if matrix is None else np.linalg.inv(matrix), "As_in_the_file")
     if has_alpha:
-        lines += _node(
+        lines += node(
             "Copy", inputs="2", from0="rgba.alpha", to0="rgba.alpha", name="Alpha_of_beauty"
         )
     return "\n".join(lines) + "\n"
@@ -167,7 +167,7 @@ def _file_knobs(file: Path, groups: LightGroups) -> dict[str, str]:
     Of a shot they name all frames.
     """
     if _is_evaluated(file):
-        return {"file": '""', "label": quoted(f"choose by hand: {_plain(file.name)}")}
+        return {"file": '""', "label": quoted(f"choose by hand: {plain(file.name)}")}
     if (sequence := groups.sequence) is None:
         return {"file": quoted(_path(file))}
     name = _path(sequence.with_hashes(file, sequence.frame_of(groups.path)))
@@ -200,8 +200,8 @@ def _sum(groups: LightGroups, lighting: Lighting, shuffled: Sequence[list[str]])
     lines: list[str] = []
     labels: list[str] = []
     for k, (light, nodes) in enumerate(zip(groups.basis.lights, shuffled, strict=False)):
-        labels.append(free_name(_plain(light.name), labels))
-        lines += nodes + _node(
+        labels.append(free_name(plain(light.name), labels))
+        lines += nodes + node(
             "Multiply",
             channels="rgb",
             value=_multipliers(lighting, light.name),
@@ -209,7 +209,7 @@ def _sum(groups: LightGroups, lighting: Lighting, shuffled: Sequence[list[str]])
             label=quoted(labels[-1]),
         )
         if k or groups.has_rest:
-            lines += _node("Merge2", inputs="2", operation="plus", name=f"Sum_{k}")
+            lines += node("Merge2", inputs="2", operation="plus", name=f"Sum_{k}")
     return lines
 
 
@@ -235,7 +235,7 @@ def _rest(lights: Sequence[_Source], beauty: _Source | None, files: Sequence[Pat
     lines = _shuffle(beauty, files, "Beauty")
     for k, light in enumerate(lights):
         lines += _shuffle(light, files, f"Without_{k}")
-        lines += _node("Merge2", inputs="2", operation="minus", name=f"Rest_{k}")
+        lines += node("Merge2", inputs="2", operation="minus", name=f"Rest_{k}")
     return lines
 
 
@@ -243,26 +243,27 @@ def _matrix(matrix: Floats | None, name: str) -> list[str]:
     if matrix is None:
         return []
     rows = " ".join("{" + " ".join(f"{v:.9g}" for v in row) + "}" for row in matrix)
-    return _node("ColorMatrix", matrix=f"{{{rows}}}", name=name)
+    return node("ColorMatrix", matrix=f"{{{rows}}}", name=name)
 
 
 def _shuffle(source: _Source | None, files: Sequence[Path], name: str) -> list[str]:
     assert source is not None
     read = f"push $R{files.index(source.file)}"
-    return [read, *_node("Shuffle", **{"in": source.layer}, name=name)]
+    return [read, *node("Shuffle", **{"in": source.layer}, name=name)]
 
 
-def _node(kind: str, **knobs: str) -> list[str]:
+def node(kind: str, **knobs: str) -> list[str]:
+    """Return the lines of a node. knobs: values by name, as Tcl words."""
     return [f"{kind} {{", *(f" {knob} {value}" for knob, value in knobs.items()), "}"]
 
 
 def _note(groups: LightGroups) -> str:
     return (
-        f"lightpaint: light groups of {_plain(groups.name)}, multiplied as solved. "
+        f"lightpaint: light groups of {plain(groups.name)}, multiplied as solved. "
         "Should a Shuffle show black, choose its layer by hand: its Multiply bears the name."
     )
 
 
-def _plain(text: str) -> str:
+def plain(text: str) -> str:
     """Return a text without characters that Nuke would evaluate in a label."""
     return re.sub(r"[^\w .,+()-]", "_", text)
