@@ -9,6 +9,7 @@ from lightpaint.errors import OutputError
 from lightpaint.files import check_files, check_writable, write_bytes
 from lightpaint.images.denoiser import denoiser_text
 from lightpaint.images.formats.png import png_bytes, png_has_text
+from lightpaint.pipeline.results.recorded_places import recorded_places
 from lightpaint.progress import Progress, silent
 from lightpaint.report.light_sheet import light_sheet
 from lightpaint.report.rig.hung_lights import HungLight
@@ -46,8 +47,9 @@ def check_sheet(scene: Scene, path: Path, *, force: bool = False) -> None:
 def render_sheet(scene: Scene, path: Path, progress: Progress = silent) -> str:
     """Write a picture of each light of `scene` alone to `path`, a PNG.
 
-    It shows a cached basis or, if there is none, one of few samples on a small film. Returns "", or
-    the reason why nothing was written, if rendering would take too long.
+    It shows a cached basis or, if there is none, one of few samples on a small film. Of a relit
+    scene the plan shows what moved, as the lighting beside it records. Returns "", or the reason
+    why nothing was written, if rendering would take too long.
     """
     sensor = scene.sensor_names[scene.sensor]
     basis = cache.find_most_sampled(
@@ -65,7 +67,7 @@ def render_sheet(scene: Scene, path: Path, progress: Progress = silent) -> str:
     title = f"{Path(*scene.path.parts[-2:])} through {sensor}, {count} lights"
     texts = denoiser_text(basis.features, raw=f"basis of {basis.origin.spp} samples per pixel")
     emissions = {member.name: member.emission for member in scene.emitters}
-    lights = [HungLight(place, emissions[place.name]) for place in scene.emitter_places]
+    lights = [HungLight(place, emissions[place.name]) for place in recorded_places(scene)]
     image = light_sheet(basis, title=title, lights=lights, up=scene.up)
     write_bytes(path, png_bytes(image, {SHEET_KEY: "what each light does alone", **texts}))
     return ""

@@ -4,15 +4,23 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from command import run, run_refused
 from PIL import Image
 from renderer import LIGHTS, write_room
 
+import lightpaint as lp
 from lightpaint.images.formats.png import png_has_text
 from lightpaint.pipeline import light_sheets
 from lightpaint.pipeline.light_sheets import SHEET_KEY
+from lightpaint.pipeline.results.answer_folder import write_answer
+from lightpaint.pipeline.results.recorded_places import recorded_places
+from lightpaint.report.rig.rig_drawing import CHANGED
+from lightpaint.scene.lights.new_emitter import NewEmitter
 from lightpaint.scene.runtime.variant import use_variant
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
 
 
 @pytest.fixture
@@ -95,3 +103,52 @@ def test_a_render_for_each_light_is_not_made_just_to_look(
     completed = run(room.parent, "lights", room)
     assert "no lights.png: fog, so that each light needs a render of its own" in completed.stderr
     assert not (room.parent / "lights.png").exists()
+
+
+@pytest.fixture
+def relit(tmp_path: Path) -> Scene:
+    """A relit scene whose spot has moved and whose key is new, beside its lighting."""
+    scene = load_scene(write_room(tmp_path, lights=LIGHTS["bulb"] + LIGHTS["beam"]))
+    pose = lp.Pose(position=(0.5, 1.7, 1.0), target=(-0.6, 0, -0.3))
+    key = NewEmitter("key", "point", lp.Pose(position=(-0.7, 1.6, 1)))
+    moved = scene.moved({"beam": pose}).with_new_emitters([key])
+    lighting = lp.Lighting.current(lp.render_basis(moved, spp=2))
+    written = write_answer(tmp_path / "out", lighting, scene=moved)
+    assert written is not None
+    return load_scene(tmp_path / "out" / "relit.xml")
+
+
+def test_a_relit_scene_shows_what_its_lighting_has_moved(relit: Scene) -> None:
+    by_name = {place.name: place for place in recorded_places(relit)}
+    assert by_name["beam"].position == pytest.approx((0.5, 1.7, 1.0))
+    assert by_name["beam"].moved_from is not None
+    assert by_name["beam"].moved_from.position == pytest.approx((0.8, 1.8, 1.5))
+    assert by_name["key"].new == "point"
+    assert by_name["bulb"].moved_from is None
+    # The scene alone does not know, and a lighting of other places does not count.
+    assert all(x.moved_from is None and not x.new for x in relit.emitter_places)
+    elsewhere = relit.moved({"beam": lp.Pose(position=(0.4, 1.7, 1.0))})
+    [beam] = [x for x in recorded_places(elsewhere) if x.name == "beam"]
+    assert beam.moved_from is not None
+    assert beam.moved_from.position == pytest.approx((0.5, 1.7, 1.0))
+    (relit.path.parent / "lighting.json").write_text("{torn", encoding="utf-8")
+    assert recorded_places(relit) == relit.emitter_places
+    (relit.path.parent / "lighting.json").unlink()
+    assert recorded_places(relit) == relit.emitter_places
+
+
+def test_the_sheet_of_a_relit_scene_differs_by_the_marks(
+    relit: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = relit.path.parent
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(folder / "cache"))
+    marks = []
+    for name in ("marked", "plain"):
+        assert run(folder, "lights", "relit.xml", "-o", f"{name}.png").returncode == 0
+        with Image.open(folder / f"{name}.png") as picture:
+            pixels = np.asarray(picture.convert("RGB")).astype(int)
+        marks.append(int((np.abs(pixels - CHANGED).max(axis=-1) < 12).sum()))
+        (folder / "lighting.json").unlink(missing_ok=True)
+    # Rings, an arrow and names of two lights, in the plan and in the elevation.
+    assert marks[0] > 60
+    assert marks[1] == 0

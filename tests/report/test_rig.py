@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import BasisFactory
+from PIL import ImageDraw
 
 from lightpaint.images.denoiser import Features
 from lightpaint.report.light_sheet import light_sheet
 from lightpaint.report.page.placement_section import aim_picture, placement_section
+from lightpaint.report.rig.drawing_panels import FINER, plan_and_elevation
 from lightpaint.report.rig.hung_lights import (
     HungLight,
     HungLights,
@@ -90,6 +92,59 @@ def test_a_plan_marks_what_changed_and_nothing_else() -> None:
     near = [np.abs(x.astype(int) - CHANGED).max(axis=-1) < 40 for x in (plain, marked)]
     assert not near[0].any()
     assert near[1].sum() > 50
+
+
+def marks_along(light: HungLight, start: Any, end: Any) -> float:
+    """Return the share of a line in the elevation, from one place to another, that is marked."""
+    room, text = a_room(), FINER * max(11, 960 // 72)
+    drawing = rig_drawing(room, [light])
+    geometry = ViewGeometry.of(room)
+    assert drawing is not None
+    assert geometry is not None
+    panels = plan_and_elevation(geometry, [light], np.array([0.0, 1, 0]), FINER * 960, None)
+    plan, elevation = panels
+    corner = (FINER * 960 - elevation.size[0]) // 2, plan.size[1] + round(2.4 * text)
+    places = np.linspace(start, end, 200)
+    pixels = ((elevation.at(places) + corner) / FINER).astype(int)
+    # The room is grey, and the mark is orange, or half as much where it ends within a pixel.
+    marked = drawing[..., 0].astype(int) - drawing[..., 2] > 0.4 * (CHANGED[0] - CHANGED[2])
+    near = [marked[y, x - 1 : x + 2].any() for x, y in pixels]
+    return float(np.mean(near))
+
+
+def test_a_light_that_turned_has_a_dashed_line_in_its_old_direction() -> None:
+    """It pointed straight down from a height of 3; a dash is as long as a gap."""
+    light = turned()
+    old, floor = (0.0, 2.6, 0.0), (0.0, 0.1, 0.0)
+    assert marks_along(light, old, floor) == pytest.approx(0.5, abs=0.15)
+    same_site = light.place.site
+    only_moved = replace(light.place, moved_from=replace(same_site, position=(0.0, 2.0, 0.0)))
+    assert marks_along(replace(light, place=only_moved), (0.0, 1.6, 0.0), floor) < 0.05
+    narrowed = replace(light.place, moved_from=replace(same_site, cutoff=30.0))
+    assert marks_along(replace(light, place=narrowed), old, floor) < 0.05
+
+
+def test_a_light_that_moved_has_a_ring_and_an_arrow() -> None:
+    light = turned()
+    old_site = replace(light.place.site, position=(0.0, 1.0, 1.5))
+    moved = replace(light, place=replace(light.place, moved_from=old_site))
+    assert marks_along(moved, (0.0, 1.0, 1.5), (0.0, 3.0, 0.0)) > 0.85
+    assert marks_along(light, (0.0, 1.0, 1.5), (0.0, 3.0, 0.0)) < 0.3
+
+
+def test_a_new_light_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    texts: list[str] = []
+    draw_text = ImageDraw.ImageDraw.text
+
+    def text(self: Any, xy: Any, label: Any, *rest: Any, **options: Any) -> None:
+        texts.append(label)
+        draw_text(self, xy, label, *rest, **options)
+
+    monkeypatch.setattr(ImageDraw.ImageDraw, "text", text)
+    new = EmitterPlace("lamp", (1.0, 2.5, 0.0), new="point")
+    rig_drawing(a_room(), [HungLight(new, (1.0, 1.0, 1.0)), turned()])
+    assert texts.count("lamp (new)") == 2  # in the plan and in the elevation
+    assert texts.count("key") == 2
 
 
 def test_an_arrow_leads_from_where_a_light_pointed_to_where_it_does_now() -> None:

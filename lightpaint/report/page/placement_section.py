@@ -44,7 +44,8 @@ def placement_section(
         figures += _figure(
             drawing,
             "Plan and elevation of the room with its lights",
-            "The room is what the camera sees of it; lengths are in units of the scene.",
+            "Rings and dashed lines: where lights hung and pointed before. The room is what the "
+            "camera sees of it; lengths are in units of the scene.",
         )
     return (
         f"<section><h2>Where the lights hang</h2><p>{escape(placement.sentence)}</p>{items}"

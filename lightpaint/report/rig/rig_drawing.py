@@ -1,7 +1,8 @@
 """Drawings of the places of lights: a plan from above, and an elevation from the side.
 
 The room is drawn as the camera sees it: its pixels as points, in dimmed colours. Moved lights have
-a ring at the old place and an arrow to the new one; spots have their beams.
+a ring at the old place and an arrow to the new one, and those that turned a dashed line in the old
+direction; new lights say so. Spots have their beams.
 """
 
 import math
@@ -24,6 +25,7 @@ from lightpaint.report.rig.drawing_panels import (
 )
 from lightpaint.report.rig.hung_lights import HungLight
 from lightpaint.report.rig.view_geometry import ViewGeometry
+from lightpaint.scene.properties.site import Site
 
 #: Colours of texts and of changes.
 TEXT, FAINT, EDGE = (226, 226, 226), (142, 142, 146), (58, 58, 62)
@@ -37,6 +39,9 @@ DRAWN_AT_ONCE = 2**14
 
 #: Length of a beam that meets no visible point, as a share of the panel.
 BEAM = 0.3
+
+#: Degrees between the old direction of a light and the new one, from which the old one is drawn.
+TURNED = 1.0
 
 #: Maximum number of lights that are all named; of more, only those that changed are.
 MOST_NAMES = 24
@@ -84,6 +89,7 @@ def _drawn(
     ordered_lights = sorted(lights, key=lambda light: light.is_changed)
     for light in ordered_lights:
         _draw_beam(draw, panel, geometry, light)
+        _draw_old_direction(draw, panel, geometry, light, text)
     for light in ordered_lights:
         _draw_light(draw, panel, light, text)
     names = {light.place.name: light for light in lights}
@@ -158,10 +164,7 @@ def _draw_beam(
         return
     if site.cutoff is None and not light.is_changed:
         return
-    aim = geometry.aim_of(site)
-    length = BEAM * panel.size[0] / panel.scale
-    if aim is not None:
-        length = math.dist(aim, site.position)
+    length = _beam_length(panel, geometry, site)
     half_angle = math.radians(site.cutoff or 12.0)
     way = np.array(site.direction) * length
     start, end = panel.at(site.position), panel.at(np.array(site.position) + way)
@@ -175,6 +178,29 @@ def _draw_beam(
         draw.line(
             [tuple(start), tuple(end)], (*CHANGED, 200), max(1, round(0.0015 * panel.size[0]))
         )
+
+
+def _draw_old_direction(
+    draw: ImageDraw.ImageDraw, panel: Panel, geometry: ViewGeometry, light: HungLight, text: int
+) -> None:
+    """Draw where a light that turned pointed, from its earlier place to the surface that it lit."""
+    old_site, way = light.place.moved_from, light.place.direction
+    if old_site is None or old_site.position is None or old_site.direction is None or way is None:
+        return
+    if float(np.dot(old_site.direction, way)) > math.cos(math.radians(TURNED)):
+        return
+    length = _beam_length(panel, geometry, old_site)
+    end = np.array(old_site.position) + length * np.array(old_site.direction)
+    ends = panel.at(old_site.position), panel.at(end)
+    dashes(draw, *ends, CHANGED, width=max(2, text // 9), dash=0.45 * text)
+
+
+def _beam_length(panel: Panel, geometry: ViewGeometry, site: Site) -> float:
+    """Return the distance to the surface that a light points at, or of a beam that meets none."""
+    aim = geometry.aim_of(site)
+    if aim is None or site.position is None:
+        return BEAM * panel.size[0] / panel.scale
+    return math.dist(aim, site.position)
 
 
 def _draw_light(draw: ImageDraw.ImageDraw, panel: Panel, light: HungLight, text: int) -> None:
@@ -200,7 +226,7 @@ def _draw_names(
     for name, light in sorted(names.items(), key=lambda item: not item[1].is_changed):
         assert light.place.position is not None
         x, y = panel.at(light.place.position)
-        label = visible(name)
+        label = f"{visible(name)} (new)" if light.place.new else visible(name)
         label_width = font.getlength(label)
         left = x + 0.7 * text
         if left + label_width > panel.size[0]:
@@ -253,6 +279,23 @@ def arrow(
     draw.line([tuple(start), tuple(neck)], color, width)
     corners = [tuple(end), tuple(neck + 0.4 * head * side), tuple(neck - 0.4 * head * side)]
     draw.polygon(corners, fill=color)
+
+
+def dashes(
+    draw: ImageDraw.ImageDraw,
+    start: Doubles,
+    end: Doubles,
+    color: tuple[int, ...],
+    *,
+    width: int,
+    dash: float,
+) -> None:
+    """Draw a dashed line, in pixels. dash: length of a dash, and of a gap."""
+    way = np.asarray(end) - start
+    count = max(1, round(float(np.hypot(*way)) / dash))
+    for k in range(0, count, 2):
+        first, last = start + way * k / count, start + way * min(k + 1, count) / count
+        draw.line([tuple(first), tuple(last)], color, width)
 
 
 def _shown(color: RGB) -> tuple[int, int, int]:
