@@ -203,8 +203,14 @@ def test_what_cannot_be_taken_is_said(room: PaintedRoom) -> None:
     typed("Cone", "200")
     page.wait_for_selector("text=Cone cannot be 200: it is 89 now")
     wait_until(lambda: room.poses.get("beam", {}).get("cutoff") == 89)
+    # The second number does not wait for the answer to the first.
     typed("Position x", "0.123456")
-    wait_until(lambda: room.poses["beam"].get("position", [0])[0] == 0.123456)
+    typed("Position z", "1.25")
+    wait_until(lambda: room.poses["beam"].get("position") == pytest.approx([0.123456, 1.8, 1.25]))
+    # A refused one goes back.
+    typed("Position x", "1e9")
+    page.wait_for_selector("text=expected numbers of at most")
+    wait_until(lambda: row.get_by_label("Position x", exact=True).input_value() == "0.1235")
     # A click beside the picture is none, and the next one counts.
     row.get_by_role("button", name="Aim here").click()
     left, top = room.seen((-0.4, 0, 0.3))

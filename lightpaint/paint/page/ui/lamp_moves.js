@@ -79,6 +79,8 @@ export class LampMoves {
             'point',
             /** @type {any} */ ({ light, ...fields, is_final: isFinal, step }),
           );
-    if (reply?.kind === 'failed') this.session.revert();
+    if (reply?.kind !== 'failed') return;
+    this.session.revert();
+    void this.session.send('show_rig');
   }
 }

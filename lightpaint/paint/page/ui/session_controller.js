@@ -205,8 +205,14 @@ export class SessionController extends SessionLink {
     if (!areLampsMarked && !rig) void this.send('show_rig');
   }
 
-  /** Move a light. @param {number} light @param {Record<string, any>} change of its pose */
+  /** Move a light. The page shows the numbers at once, so that the next one goes with them.
+   * @param {number} light @param {Record<string, any>} change of its pose */
   moveLamp(light, change) {
+    const { rig } = this.store.value;
+    if (rig) {
+      const lights = rig.lights.map((place, k) => (k === light ? { ...place, ...change } : place));
+      this.store.set({ rig: { ...rig, lights } });
+    }
     this.lampMoves.queue(light, { kind: 'move', pose: change });
   }
 
