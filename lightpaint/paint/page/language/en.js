@@ -327,6 +327,8 @@ export const en = {
     place: 'Place',
     position: 'Position',
     target: 'Target',
+    theAnswerNeedsNone:
+      'Off in this answer, which needs no light from there. Lock its level to keep it on.',
     elevation: 'Elevation',
     aboveTheHorizon: 'How high it stands, in degrees above the horizon',
     azimuth: 'Azimuth',

@@ -4,6 +4,7 @@ import { html } from '../vendor/preact.js';
 import { Button, NumberField } from './controls.js';
 import { directionFrom, skyAngles } from './lamp_geometry.js';
 import { placeOf } from './lamp_marks.js';
+import { luminance } from './paint_colour.js';
 import { fill, words } from '../language/language.js';
 import { completePair } from './references/reference_picture.js';
 
@@ -121,8 +122,10 @@ export function LampFields({ k, ui, app }) {
           clickAction: isOn ? null : { light: k, mode },
         })} />`;
   };
+  const isUnwanted = luminance(ui.weights[k] ?? [1, 1, 1]) === 0 && !ui.constraints[name]?.off;
   return html`<div class="lamp-fields" data-numbers>
     <h3>${words.lampFields.place}</h3>
+    ${isUnwanted && html`<p class="faint">${words.lampFields.theAnswerNeedsNone}</p>`}
     ${vectorFields('position', words.lampFields.position, place.position)}
     ${place.position && place.direction && vectorFields('target', words.lampFields.target, place.target)}
     ${
