@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command import run
-from renderer import write_room
+from renderer import LIGHTS, write_room
 
 import lightpaint as lp
 from lightpaint.batch.plan.planner import plan
@@ -292,6 +292,28 @@ def test_a_suggestion_is_a_turn_with_its_picture_and_the_line_to_paste(
     page = (tmp_path / "answer" / "report.html").read_text()
     assert html.escape(turn.toml) in page
     assert json.loads((tmp_path / "answer" / "report.json").read_text())["turn"]["name"] == "beam"
+
+
+def test_the_suggested_line_gives_the_turn_and_the_gain_that_were_promised(tmp_path: Path) -> None:
+    """Two spots point elsewhere in the painting; only one of them is turned by the line."""
+    second = LIGHTS["beam"].replace('"beam"', '"second"').replace('x="0.8', 'x="-0.8')
+    # They light the same places, so each gains another share if the other one turns, too.
+    room = load_scene(write_room(tmp_path, lights=LIGHTS["beam"] + second + LIGHTS["sky"]))
+    goal = room.moved({"beam": AIMED, "second": lp.Pose(target=(0.6, 0.9, -1))})
+    target = lp.Target.of(lp.render_basis(goal, spp=256, seed=2).current_look)
+    options = {"spp": 128, "space": "linear", "hold": 0, "verify": False}
+    turn = lp.paint_with_light(
+        room, target, tmp_path / "promise", suggest=1, **options
+    ).move_suggestion
+    assert turn is not None
+    rigging = lp.Rigging.of(tomllib.loads(turn.toml)["light"])
+    look = lp.paint_with_light(room, target, tmp_path / "turned", rigging=rigging, **options)
+    assert look.placement is not None
+    [move] = look.placement.moves
+    assert move.name == turn.name
+    # The same search on the same basis.
+    assert move.turn == pytest.approx(turn.turn, abs=1e-6)
+    assert move.gain_share == pytest.approx(turn.gain_share, abs=1e-6)
 
 
 @pytest.mark.nightly

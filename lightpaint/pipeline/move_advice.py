@@ -1,7 +1,7 @@
 """Suggestions to turn an existing spot, for lights that miss the painting from where they hang."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from lightpaint.arrays import Floats
@@ -13,9 +13,11 @@ from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
 from lightpaint.pipeline.job.job import Job
+from lightpaint.pipeline.needed_samples import problem_of, without_noise
 from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.lights_to_place import free_light
 from lightpaint.placement.place import place
+from lightpaint.placement.placement import Move
 from lightpaint.placement.search_views import on_small_film
 from lightpaint.placement.suggestions.suggestion import MoveSuggestion
 from lightpaint.progress import Listener
@@ -23,6 +25,9 @@ from lightpaint.scene.scene import Scene
 
 #: Largest turn that is tried, in degrees, and the margin that the suggested option adds to it.
 TURN, MARGIN = 45.0, 10.0
+
+#: Number of spots, of those that help most when all may turn, that a search turns alone.
+TURNED_ALONE = 3
 
 #: Maximum number of pixels of the preview, camera samples of all of them, and most of one.
 PIXELS, SAMPLES, MAX_SPP = 2**14, 2**19, 512
@@ -34,30 +39,41 @@ NOTHING_MISSED = 0.01
 def suggest_move(job: Job, solution: Solution, listen: Listener) -> MoveSuggestion | None:
     """Return the turn of one spot that helps most in all views; None if none surely does.
 
-    Its pictures are of the first view.
+    A search of all spots together tells which are promising, but their gains count besides the
+    turns of the others. So each of the best is turned alone, in the search that the suggested
+    option starts, whose turn and gain the suggestion states. Its pictures are of the first view.
     """
     scenes = [view.scene for view in job.views if view.scene is not None]
     freedoms = _turns(scenes[0])
     norm2 = float(solution.norm2.sum())
     if not freedoms or sum(solution.certificate.objective) <= NOTHING_MISSED**2 * norm2:
         return None
-    try:
-        placement = place(
+    bases = solution.problem.views.bases
+    if job.settings.refine:  # The search for places is before the refinement.
+        solution = without_noise(job, solution_of(problem_of(job, bases)))
+
+    def moves(freedoms: Mapping[str, Freedom]) -> tuple[Move, ...]:
+        return place(
             scenes,
-            solution.problem.views.bases,
+            bases,
             solution,
             freedoms,
             seed=job.settings.seed,
             progress=lambda label, done, total, unit="": listen(label, done, total, "steps"),
-        )
+        ).moves
+
+    found: list[tuple[Move, int]] = []
+    try:
+        for candidate in moves(freedoms)[:TURNED_ALONE]:
+            aim = 5 * math.ceil((candidate.turn + MARGIN) / 5)
+            found += [(move, aim) for move in moves({candidate.name: Freedom(aim=aim)})]
     except SceneError:
         return None  # in fog, say: suggestions of new lights tell why
-    if not placement.moves:
+    if not found:
         return None
-    best = placement.moves[0]
+    best, aim = max(found, key=lambda move_and_aim: move_and_aim[0].gain_share)
     moved_scenes = [scene.moved({best.name: best.pose}) for scene in scenes]
     picture_without, picture_with = _pictures(job, solution, moved_scenes)
-    aim = 5 * math.ceil((best.turn + MARGIN) / 5)
     return MoveSuggestion(best.name, best.turn, best.gain_share, aim, picture_without, picture_with)
 
 

@@ -57,8 +57,8 @@ class MoveSuggestion:
 
     Attributes:
         name: The light.
-        turn: Degrees that it turns.
-        gain_share: The share of the error (energy) that the turn removes, as the search found it.
+        turn: Degrees that it turns if it alone may turn by up to `aim`.
+        gain_share: The share of the error (energy) that this turn removes, by the same search.
         aim: Degrees to let it turn by.
         without: (h, w, 3) linear, the solved picture, small.
         with_it: (h, w, 3), the same after the turn, with all lights solved again.
