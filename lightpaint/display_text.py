@@ -1,5 +1,6 @@
 """Text for users: short reprs, truncated lists, visible control characters, notebook pages."""
 
+import difflib
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import fields, is_dataclass
@@ -47,6 +48,17 @@ def some_of(texts: Sequence[str], joint: str = ", ", room: int = MAX_LIST_LENGTH
             return f"{text_so_far}{joint}{rest_note}" if k else rest_note
         text_so_far = extended
     return text_so_far
+
+
+def with_similar_name(listing: str, name: str, names: Sequence[str]) -> str:
+    """Return `did you mean 'beam'? There are beam, bulb` for the listing `there are beam, bulb`.
+
+    The listing alone if none of `names` resembles `name`.
+    """
+    similar_names = difflib.get_close_matches(name, names, n=1)
+    if not similar_names:
+        return listing
+    return f"did you mean {similar_names[0]!r}? {listing[:1].upper()}{listing[1:]}"
 
 
 def rounded_text(value: float, digits: int) -> str:

@@ -87,6 +87,14 @@ def test_places_that_see_nothing(work_folder: Path) -> None:
         ("[light.beam]\nmove = { box = [[0, 0, nan], [1, 1, 1]] }", "light.beam.move.box is"),
         ("[[pair]]\nlights = ['beam', 'bulb']\nmirror = 'x = nan'", "pair.mirror is"),
         ("[[new]]\nkind = 'spot'\ncount = 0", "new.count is 0"),
+        (
+            "[[pair]]\nlights = ['beam', 'nope']\nmirror = 'x = 0'",
+            "l.toml: pair.lights: no light 'nope'; there are panel, bulb, beam, sun, sky",
+        ),
+        (
+            "[on.unused]\nshapes = ['flor']",
+            "l.toml: on.unused.shapes: no shape 'flor'; did you mean 'floor'? There are floor, ",
+        ),
         ("[[new]]\nkind = 'spot'\napart = nan", "new.apart is nan"),
     ],
 )
@@ -96,3 +104,20 @@ def test_a_lights_file_is_told_by_its_keys(
     (tmp_path / "l.toml").write_text(text, encoding="utf-8")
     line = run_refused(work_folder, "--lights-file", str(tmp_path / "l.toml"))
     assert words in line
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[light.beem]\naim = 30", "light.beem.aim: no light 'beem'; did you mean 'beam'?"),
+        ("[[pair]]\nlights = ['beam', 'nope']\nmirror = 'x = 0'", "no light 'nope'"),
+        ("[on.unused]\nshapes = ['flor']", "no shape 'flor'"),
+    ],
+)
+@pytest.mark.parametrize("options", ["--no-move", "--aim beam=10"])
+def test_names_are_checked_whatever_moves(
+    work_folder: Path, tmp_path: Path, text: str, words: str, options: str
+) -> None:
+    (tmp_path / "l.toml").write_text(text, encoding="utf-8")
+    lights_file = ("--lights-file", str(tmp_path / "l.toml"))
+    assert words in run_refused(work_folder, *lights_file, *options.split())

@@ -1,12 +1,11 @@
 """Constraints of each light, resolved from names and patterns."""
 
-import difflib
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from typing import Any
 
 from lightpaint.basis.lights import BasisLight
-from lightpaint.display_text import some_names
+from lightpaint.display_text import some_names, with_similar_name
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.constraints import (
     Constraints,
@@ -85,9 +84,8 @@ def _match_lights(
     matches = [k for k, x in enumerate(lights) if not x.is_fixed and _is_meant(x.name, name)]
     if not matches:
         adjustable = [light.name for light in lights if not light.is_fixed]
-        close = difflib.get_close_matches(name, adjustable, n=1)
-        hint = f"did you mean {close[0]!r}? There" if close else "there"
-        raise ConstraintError(f"{where}: no light {name!r}; {hint} are {some_names(adjustable)}")
+        hint = with_similar_name(f"there are {some_names(adjustable)}", name, adjustable)
+        raise ConstraintError(f"{where}: no light {name!r}; {hint}")
     return matches
 
 

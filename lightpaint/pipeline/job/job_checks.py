@@ -18,7 +18,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.joined_views import check_same_lights
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import Painting, content
-from lightpaint.placement.rigging.rigged_lights import rigged_lights
+from lightpaint.placement.rigging.rigged_lights import check_names, rigged_lights
 from lightpaint.placement.rigging.rigging import Rigging, rigging_of
 from lightpaint.scene.lights.texels.domains import DOMAINS
 from lightpaint.scene.lights.texels.sky import Sky
@@ -134,12 +134,16 @@ def check_same_picture(target: Target, scene: Scene) -> None:
 
 
 def rigging_for(rigging: Rigging, scenes: Sequence[Scene], settings: Settings) -> Rigging:
-    """Return the rigging of the scene. Raises for lights that cannot move, before rendering."""
+    """Return the rigging of the scene.
+
+    Raises for unknown names and for lights that cannot move, before rendering.
+    """
     if not scenes:
         if rigging:
             raise LightpaintError("lights can only move in their scene: give the scene")
         return Rigging()
     all_rigging = rigging_of(scenes[0].requests).and_then(rigging)
+    check_names(all_rigging, scenes[0])
     if not settings.move_lights:
         return Rigging()
     if all_rigging:

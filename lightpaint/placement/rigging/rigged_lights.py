@@ -1,6 +1,5 @@
 """The rigging of a lights file, applied to the lights of a scene."""
 
-import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -9,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Position
-from lightpaint.display_text import some_names
+from lightpaint.display_text import some_names, with_similar_name
 from lightpaint.errors import ConstraintError, SceneError
 from lightpaint.lighting.constraints.constraints import Constraints, is_pattern
 from lightpaint.placement.freedom import Freedom
@@ -52,6 +51,26 @@ def rigged_lights(rigging: Rigging, scene: Scene) -> RiggedLights:
     return RiggedLights(freedoms, tuple(new), tuple(pairs), Constraints(requests))
 
 
+def check_names(rigging: Rigging, scene: Scene) -> None:
+    """Raise ConstraintError for names that no light or shape of `scene` has.
+
+    Those of pairs and surfaces count, too, whether or not a search would use them.
+    """
+    for name, table, where in rigging.lights:
+        _matches(name, scene, f"{where}.{next(iter(table))}" if table else where)
+    lights = [light.name for light in scene.lights]
+    for table, where in rigging.pairs:
+        for name in table["lights"]:
+            if name not in lights:
+                raise _unknown("light", name, lights, f"{where}.lights")
+    for _, table, where in rigging.on:
+        where_shapes = f"{where}.shapes"
+        for pattern in names_of(table["shapes"], where_shapes) if "shapes" in table else ():
+            if not _shapes(pattern, scene):
+                shapes = [*dict.fromkeys(scene.shape_names)]
+                raise _unknown("shape", pattern, shapes, where_shapes)
+
+
 def freedoms_of(rigging: Rigging, scene: Scene) -> dict[str, Freedom]:
     """Return the freedom of each light that may move, by name.
 
@@ -88,10 +107,7 @@ def _matches(name: str, scene: Scene, where: str) -> list[Light]:
         return exact
     matches = [x for x in lights if is_pattern(name) and fnmatchcase(x.name, name)]
     if not matches:
-        names = [light.name for light in lights]
-        close = difflib.get_close_matches(name, names, n=1)
-        hint = f"did you mean {close[0]!r}? There" if close else "there"
-        raise ConstraintError(f"{where}: no light {name!r}; {hint} are {some_names(names)}")
+        raise _unknown("light", name, [light.name for light in lights], where)
     return matches
 
 
@@ -192,18 +208,27 @@ def _places_on(names: Any, scene: Scene, rigging: Rigging, where: str) -> dict[s
             rails.append(_segment(table["line"]))
             continue
         clear += [table["clear"]] if table.get("clear") else []
-        for shape in names_of(table["shapes"], where):
-            shapes = [x for x in dict.fromkeys(scene.shape_names) if fnmatchcase(x, shape)]
-            if not shapes:
-                kind = "shape" if name in tables else "rail, surface or shape"
-                existing = some_names([*tables, *dict.fromkeys(scene.shape_names)])
-                raise ConstraintError(f"{where}: no {kind} {shape!r}; there are {existing}")
+        for pattern in names_of(table["shapes"], where):
+            if not (shapes := _shapes(pattern, scene)):
+                known_names = [*tables, *dict.fromkeys(scene.shape_names)]
+                raise _unknown("rail, surface or shape", pattern, known_names, where)
             surfaces += shapes
     places: dict[str, Any] = {"rails": tuple(rails)} if rails else {}
     if surfaces:
         places["surfaces"] = tuple(dict.fromkeys(surfaces))
         places["clear"] = max(clear, default=None)
     return places
+
+
+def _shapes(pattern: str, scene: Scene) -> list[str]:
+    """Return the names of the shapes that match a pattern."""
+    return [x for x in dict.fromkeys(scene.shape_names) if fnmatchcase(x, pattern)]
+
+
+def _unknown(kind: str, name: str, known_names: Sequence[str], where: str) -> ConstraintError:
+    """Return the error for a name that nothing of a kind has."""
+    hint = with_similar_name(f"there are {some_names(known_names)}", name, known_names)
+    return ConstraintError(f"{where}: no {kind} {name!r}; {hint}")
 
 
 def _segment(ends: Sequence[Sequence[float]]) -> tuple[Position, Position]:

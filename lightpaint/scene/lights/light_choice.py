@@ -7,13 +7,12 @@ hundred lamps without ids would otherwise be three hundred unknowns with meaning
 `area_217`, and take three hundred planes of the basis.
 """
 
-import difflib
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from itertools import count, pairwise
 
-from lightpaint.display_text import some_names
+from lightpaint.display_text import some_names, with_similar_name
 from lightpaint.errors import SceneError
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.lights.light import Light, check_adjustable, keep, tie
@@ -225,11 +224,8 @@ def _matching(pattern: str, names: Sequence[str], place: str, scene: str) -> set
         return {pattern}
     matches = {name for name in names if fnmatchcase(name, pattern) or image_of(name) == pattern}
     if not matches:
-        close = difflib.get_close_matches(pattern, names, n=1)
-        hint = f"did you mean {close[0]!r}? It" if close else "it"
-        raise SceneError(
-            f"{place}: {scene} has no light {pattern!r}; {hint} has {some_names(names)}"
-        )
+        hint = with_similar_name(f"it has {some_names(names)}", pattern, names)
+        raise SceneError(f"{place}: {scene} has no light {pattern!r}; {hint}")
     return matches
 
 
