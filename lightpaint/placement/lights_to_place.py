@@ -8,6 +8,7 @@ import numpy as np
 
 from lightpaint.arrays import Position
 from lightpaint.basis.lights import BasisLight
+from lightpaint.display_text import some_names, with_similar_name
 from lightpaint.errors import NoPlaceError, SceneError
 from lightpaint.placement.free_light import FreeLight, places_of
 from lightpaint.placement.freedom import Freedom
@@ -189,8 +190,14 @@ def followers_of(
 
 def _kind_like(scene: Scene, name: str) -> NewKind:
     """Return the kind of new lights that are like one of the scene."""
-    light = scene.light(name)
     kinds = {plugin: kind for kind, plugin in PLUGIN_OF.items()}
+    names = [light.name for light in scene.lights]
+    if name not in names:
+        # On the command line a kind stands in the same place as a light.
+        listing = f"there are the kinds {', '.join(PLUGIN_OF)}, and the lights {some_names(names)}"
+        hint = with_similar_name(listing, name, [*PLUGIN_OF, *names])
+        raise SceneError(f"no light {name!r} that new ones could be like; {hint}")
+    light = scene.light(name)
     if len(light.members) > 1 or light.plugin not in kinds or light.is_scalar:
         raise SceneError(f"new lights are like a point, a spot or a panel, and {name!r} is not one")
     return kinds[light.plugin]

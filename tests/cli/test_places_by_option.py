@@ -59,7 +59,14 @@ def run_refused(folder: Path, *options: str) -> str:
         ("--add spot:1000000", "--add: count is 1000000: expected a whole number from 1 to 100"),
         ("--add spot:2@nowhere", "--add: no rail, surface or shape 'nowhere'"),
         ("--add point --add spot:0", "--add 2: count is 0"),
-        ("--add lamp", "has no light 'lamp'"),
+        (
+            "--add lamp",
+            "--add: no light 'lamp' that new ones could be like; there are the kinds point, spot, "
+            "panel, and the lights panel, bulb, beam",
+        ),
+        ("--add sopt", "no light 'sopt' that new ones could be like; did you mean 'spot'? There"),
+        ("--add baem:2", "no light 'baem' that new ones could be like; did you mean 'beam'? There"),
+        ("--add bulb@flor", "--add: no rail, surface or shape 'flor'; did you mean 'floor'?"),
         ("--kelvin beam=1:2", "--kelvin beam: a colour temperature of 1 K"),
         ("--limit beam=5:1", "--limit beam "),
         ("--off nobody", "no light 'nobody'"),
