@@ -67,6 +67,11 @@ def run_refused(folder: Path, *options: str) -> str:
         ("--add sopt", "no light 'sopt' that new ones could be like; did you mean 'spot'? There"),
         ("--add baem:2", "no light 'baem' that new ones could be like; did you mean 'beam'? There"),
         ("--add bulb@flor", "--add: no rail, surface or shape 'flor'; did you mean 'floor'?"),
+        (
+            "--move bulb=1 --no-move",
+            "--move bulb and --no-move, which keeps all lights in place and adds none: leave",
+        ),
+        ("--no-move --add spot:2", "--add and --no-move, which keeps all"),
         ("--kelvin beam=1:2", "--kelvin beam: a colour temperature of 1 K"),
         ("--limit beam=5:1", "--limit beam "),
         ("--off nobody", "no light 'nobody'"),

@@ -194,11 +194,20 @@ def constraints_of(options: Namespace) -> Constraints:
 
 
 def rigging_of(options: Namespace) -> Rigging:
-    """Return the rigging that the options ask for."""
+    """Return the rigging that the options ask for.
+
+    Raises LightpaintError for lights that may move, or are new, and --no-move.
+    """
     lights: dict[str, dict[str, Any]] = {}
     for key in MOVES:
         for name, value in getattr(options, key):
             lights.setdefault(name, {})[key] = value
+    if not options.move_lights and (lights or options.added):
+        moving = [f"--{key} {name}" for name, table in lights.items() for key in table]
+        raise LightpaintError(
+            f"{[*moving, '--add'][0]} and --no-move, which keeps all lights in place and adds "
+            "none: leave one of the two out"
+        )
     return Rigging.of(lights, new=options.added, where=BY_OPTION)
 
 
