@@ -3,7 +3,7 @@
     LightpaintError
     ├── BackendError     Mitsuba or LLVM cannot run here
     ├── SceneError       the scene XML, a sensor, a light
-    │   └── NoPlaceError … or a new light for which no place is free
+    │   └── NoPlaceError … or a light for which no place is free
     ├── ImageError       an image file that cannot be read as what it should be
     │   └── ViewError    … or an unknown view transform to decode it with
     ├── KeywordError     an argument name that a function does not have; also a TypeError
@@ -45,7 +45,7 @@ class SceneError(LightpaintError):
 
 
 class NoPlaceError(SceneError):
-    """A new light for which no place is free and sees anything of the picture."""
+    """A light for which no place is free and sees anything of the picture."""
 
 
 class ImageError(LightpaintError):

@@ -80,7 +80,10 @@ def movables_of(
     *,
     seed: int,
 ) -> list[Movable]:
-    """Return the lights of `scene` that may move. names: of the lights, in the basis's order."""
+    """Return the lights of `scene` that may move. names: of the lights, in the basis's order.
+
+    Raises NoPlaceError for a light that may hang only where nothing of the picture is seen.
+    """
     followers = followers_of(scene, freedoms, pairs)
     movables = []
     for name, freedom in freedoms.items():
@@ -88,6 +91,7 @@ def movables_of(
             continue
         site = _site(scene, name)
         light = FreeLight(name, site, freedom, _places(scene, site, freedom, paths, seed))
+        _check_places(light, paths, seed)
         follower = followers.get(name)
         columns = [names.index(name)]
         if follower is not None:
@@ -154,6 +158,23 @@ def _places(
         return None
     surfaces = _surfaces(scene, freedom, paths, seed)
     return places_of(freedom, np.array(site.position, dtype=float), surfaces)
+
+
+def _check_places(light: FreeLight, paths: SearchPaths, seed: int) -> None:
+    """Raise NoPlaceError if no place of a light sees the picture, and it hangs at none of them."""
+    if light.site.position is None or light.places is None:
+        return
+    position = np.array(light.site.position, dtype=float)
+    if np.allclose(light.places.nearest(position), position, atol=1e-6):
+        return
+    tested = light.places.random(TESTED, np.random.default_rng(seed))
+    # Steps may bring a light of the scene close to surfaces, so that they need not be clear.
+    if not paths.usable(tested, 0.0).any():
+        raise NoPlaceError(_no_place(f"light {light.name!r}"))
+
+
+def _no_place(subject: str) -> str:
+    return f"{subject} has no free place that sees anything of the picture: give it more freedom"
 
 
 def _surfaces(scene: Scene, freedom: Freedom, paths: SearchPaths, seed: int) -> Places | None:
@@ -253,10 +274,7 @@ def _first_position(
     if not light.group.in_view:
         is_free &= ~paths.in_view(tested)
     if not is_free.any():
-        raise NoPlaceError(
-            f"new light {light.name!r} has no free place that sees anything of the picture: give "
-            "it more freedom"
-        )
+        raise NoPlaceError(_no_place(f"new light {light.name!r}"))
     return as_position(tested[int(np.argmax(is_free))])
 
 

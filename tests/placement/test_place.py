@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from nightly import nightly
-from renderer import write_room
+from renderer import LIGHTS, write_room
 
 import lightpaint as lp
 from lightpaint.errors import SceneError
@@ -110,6 +110,12 @@ def test_nothing_moves_where_nothing_is_missed(
         ("beam", lp.Freedom(beam=(50, 60)), "begins at 50 degrees, and its cone ends at 30: give"),
         ("sun", lp.Freedom(within=1), "'sun' has no place"),
         ("lamp", lp.Freedom(within=1), "no light 'lamp'"),
+        (
+            "bulb",
+            lp.Freedom(box=((0, 0, -9), (1, 1, -8))),
+            "^light 'bulb' has no free place that sees anything of the picture: give it more",
+        ),
+        ("bulb", lp.Freedom(line=((0.2, 0.3, 0.2), (0.4, 0.3, 0.2))), "'bulb' has no free place"),
     ],
 )
 def test_what_a_light_is_not_free_to_do(
@@ -117,6 +123,13 @@ def test_what_a_light_is_not_free_to_do(
 ) -> None:
     with pytest.raises(SceneError, match=words):
         placed(room.reduced("1/4"), room.reduced("1/4"), {name: freedom})
+
+
+def test_a_light_that_hangs_behind_the_wall_may_stay_there(tmp_path: Path) -> None:
+    """Its own place counts as one: it is moved nowhere, and that is no error."""
+    hidden = LIGHTS["bulb"].replace('y="1" z="0.5"', 'y="1" z="-2"')
+    room = load_scene(write_room(tmp_path, lights=hidden + LIGHTS["sky"])).reduced("1/4")
+    assert placed(room, room, {"bulb": lp.Freedom(within=0.2)}).moves == ()
 
 
 @pytest.mark.parametrize(
