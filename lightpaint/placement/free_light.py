@@ -34,6 +34,9 @@ AIM_UNIT, CONE_UNIT, BEAM_UNIT, SIDE_UNIT = 20.0, 10.0, 0.3, 0.7
 #: Relative difference of two cones or sides up to which one of them is enough to try.
 ALIKE = 0.05
 
+#: Share of a way or a turn that may be left of its freedom at its end; the texts round as much.
+AT_END = 0.02
+
 #: Least share of a cone that its beam has, if the beam is free.
 LEAST_BEAM = 0.05
 
@@ -124,6 +127,31 @@ class FreeLight:
         if site.cutoff is not None and self._has_free_cone:
             site = self._opened(site, site.cutoff, (site.beam or 0.0) / site.cutoff)
         return site
+
+    def is_slid_to_end(self, site: Site) -> bool:
+        """Return whether the pose is at the end of a rail, or the edge of a ball or box.
+
+        Edges of surfaces do not count, since triangles end inside of them.
+        """
+        if site.position is None or site.position == self.site.position or self.places is None:
+            return False
+        if not self.freedom.slides or self.freedom.surfaces is not None:
+            return False
+        tangents, place = self._tangents(site), np.array(site.position, dtype=float)
+        way = (place - np.array(self.site.position, dtype=float)) @ tangents.T @ tangents
+        step = 2 * AT_END * math.dist(site.position, self.site.position or site.position)
+        ahead = way / max(float(np.linalg.norm(way)), 1e-300)
+        steps = step * np.concatenate([tangents, -tangents, ahead[None]])
+        beyond = [math.dist(self.places.nearest(place + x), place + x) for x in steps]
+        return max(beyond) > step / 2
+
+    def is_turned_to_end(self, site: Site) -> bool:
+        """Return whether the pose is turned by all that is permitted."""
+        if site.direction is None or self.site.direction is None or self.freedom.turn >= 180:
+            return False
+        cosine = float(np.dot(site.direction, self.site.direction))
+        turn = math.degrees(math.acos(max(-1.0, min(1.0, cosine))))
+        return 0 < self.freedom.turn * (1 - AT_END) <= turn
 
     def some_places(self, count: int, rng: np.random.Generator) -> Floats:
         """Return about `count` permitted places that are far apart, the current one first."""

@@ -279,6 +279,8 @@ def _placement(
             about |= result.grown(order.index(k))
             additions.append(AddedLight(emitter, **about, seen_at=result.seen[k]))
         elif site != movable.light.site:
+            about["is_slid_to_end"] = movable.light.is_slid_to_end(site)
+            about["is_turned_to_end"] = movable.light.is_turned_to_end(site)
             names = [movable.light.name]
             if movable.mirror is not None:
                 names.append(scenes[0].lights[movable.columns[1]].name)

@@ -18,6 +18,9 @@ from lightpaint.scene.scene import Scene
 #: Advice on a place that the picture hardly determines.
 HARDLY_VISIBLE = "hardly visible from here: paint a second view"
 
+#: Remark on a way or a turn that more freedom might lengthen.
+TO_END = " (as far as it may)"
+
 #: Change of a beam's share of its cone that is worth mentioning.
 LEAST_BEAM_CHANGE = 0.01
 
@@ -35,6 +38,8 @@ class Move:
         place_error: Standard error of its place, in units of the scene; None if it did not slide.
         turn_error: The same of its direction, in degrees; None if it has none.
         is_hardly_visible: Whether the picture hardly tells where it is.
+        is_slid_to_end: Whether it hangs at the edge of the places that it may have.
+        is_turned_to_end: Whether it turned by all that it may.
 
     Examples:
         >>> solution, scene = lp.solve(basis, target), lp.load_scene("room.xml")
@@ -50,6 +55,8 @@ class Move:
     place_error: float | None = None
     turn_error: float | None = None
     is_hardly_visible: bool = False
+    is_slid_to_end: bool = False
+    is_turned_to_end: bool = False
 
     @property
     def distance(self) -> float:
@@ -90,9 +97,9 @@ class Move:
     def __str__(self) -> str:
         done = []
         if self.turn >= 0.5:
-            done.append(f"turned by {self.turn:.0f}°")
+            done.append(f"turned by {self.turn:.0f}°{TO_END * self.is_turned_to_end}")
         if self.distance > 0:
-            done.append(f"slid by {rounded_text(self.distance, 2)}")
+            done.append(f"slid by {rounded_text(self.distance, 2)}{TO_END * self.is_slid_to_end}")
         if self.new.cutoff is not None and self.new.cutoff != self.old.cutoff:
             done.append(f"cone {self.old.cutoff:.0f}° to {self.new.cutoff:.0f}°")
         if self.has_other_edge:

@@ -1,6 +1,7 @@
 """Places, directions and cones that a painting asks for are found; noise asks for none."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -85,6 +86,9 @@ def test_a_spot_is_turned_to_where_the_painting_has_its_beam(room: Scene) -> Non
     assert [move.name for move in placement.moves] == ["beam"]
     assert angle(placement.moves[0].new, beam) < 4
     assert f"turned by {placement.moves[0].turn:.0f}°" in str(placement.moves[0])
+    [move] = placed(room, painted, {"beam": lp.Freedom(aim=10)}).moves
+    assert move.is_turned_to_end
+    assert "turned by 10° (as far as it may)" in str(move)
 
 
 def test_nothing_moves_where_nothing_is_missed(
@@ -210,6 +214,47 @@ def test_a_beam_is_told_that_changed_apart_from_its_cone(
     assert ("beam 20° to 12°" in str(move)) == is_told
     assert ("its beam at 12° (was 20°)" in spoken_move(move)) == is_told
     assert ("beam" in spoken_move(move)) == is_told
+
+
+@pytest.mark.parametrize(
+    ("freedom", "is_slid_to_end", "is_turned_to_end"),
+    [
+        (lp.Freedom(within=0.2, aim=True), True, False),
+        (lp.Freedom(within=0.6, aim=40), False, False),
+        (lp.Freedom(within=0.405, aim=35.5), True, True),  # told as 0.4 and 35°, rounded
+        (lp.Freedom(within=0.42, aim=37), False, False),
+        (lp.Freedom(line=((0, 1, 0), (0.25, 1, 0)), aim=20), True, True),
+        (lp.Freedom(line=((0, 1, 0), (0.9, 1, 0)), aim=30), False, True),
+        (lp.Freedom(box=((-1, 1, -1), (1, 1, 1))), False, False),  # flat, so not at its edge
+        (lp.Freedom(box=((-1, 1, -1), (0.2, 2, 1)), aim=50), True, False),
+    ],
+)
+def test_a_freedom_that_ran_to_its_end_is_told(
+    freedom: lp.Freedom, is_slid_to_end: bool, is_turned_to_end: bool
+) -> None:
+    """A spot that would slide by (0.4, 0, 0) and turn by 35° is taken to the nearest pose."""
+    now = Site((0, 1, 0), (0, -1, 0), cutoff=30, beam=20)
+    turn = np.radians(35)
+    light = FreeLight("spot", now, freedom)
+    pose = light.permitted(
+        replace(now, position=(0.4, 1, 0), direction=(np.sin(turn), -np.cos(turn), 0))
+    )
+    assert light.is_slid_to_end(pose) is is_slid_to_end
+    assert light.is_turned_to_end(pose) is is_turned_to_end
+    assert not light.is_slid_to_end(now)
+    move = lp.Move(
+        "spot",
+        now,
+        pose,
+        gain_share=0.1,
+        place_error=0.01,
+        turn_error=1.0,
+        is_slid_to_end=is_slid_to_end,
+        is_turned_to_end=is_turned_to_end,
+    )
+    for text in (spoken_move(move), str(move)):
+        assert text.count("(as far as it may)") == is_slid_to_end + is_turned_to_end
+    assert ("± 0.01 (as far as it may)" in spoken_move(move)) == is_slid_to_end
 
 
 @pytest.mark.parametrize("edge", ["harder", nightly("softer")])

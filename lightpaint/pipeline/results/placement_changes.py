@@ -4,7 +4,13 @@ from typing import Any
 
 from lightpaint.display_text import rounded_text
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.placement.placement import HARDLY_VISIBLE, AddedLight, Move, Placement
+from lightpaint.placement.placement import (
+    HARDLY_VISIBLE,
+    TO_END,
+    AddedLight,
+    Move,
+    Placement,
+)
 from lightpaint.placement.placement_record import PlacementRecord
 from lightpaint.report.rig.hung_lights import HungLights, LightChange, hung_lights, spoken_fraction
 
@@ -59,12 +65,13 @@ def spoken_move(move: Move) -> str:
     if move.turn >= 0.5:
         turn_error = move.turn_error or 0.0
         error = f" ± {rounded_text(turn_error, 1)}°" if turn_error >= LEAST_TURN_ERROR else ""
-        phrases.append(f"turned by {move.turn:.0f}°{error}")
+        phrases.append(f"turned by {move.turn:.0f}°{error}{TO_END * move.is_turned_to_end}")
     if move.distance > 0:
         place_error = move.place_error or 0.0
         is_told = place_error >= LEAST_SHARE * move.distance
         error = f" ± {rounded_text(place_error, 1)}" if is_told else ""
-        phrases.append(f"slid by {rounded_text(move.distance, 2)}{error}")
+        way = rounded_text(move.distance, 2)
+        phrases.append(f"slid by {way}{error}{TO_END * move.is_slid_to_end}")
     if move.new.cutoff is not None and move.new.cutoff != move.old.cutoff:
         phrases.append(f"its cone ends at {move.new.cutoff:.0f}° (was {move.old.cutoff:.0f}°)")
     if move.has_other_edge:
