@@ -106,6 +106,47 @@ def test_no_move_leaves_all_where_it_is(room: Scene, painted: lp.Target, tmp_pat
     assert look.placement is None
 
 
+@pytest.mark.parametrize(
+    ("rigging", "count", "words"),
+    [
+        (lp.Rigging.of({"bulb": {"move": 0.5}}), 1, "no light is moved: "),
+        (lp.Rigging.of(new=[{"kind": "point"}]), 1, "no light is added: "),
+        (lp.Rigging.of({"bulb": {"move": 0.5}}, new=[{"kind": "point"}]), 2, "moved or added: "),
+    ],
+)
+def test_where_nothing_moves_a_second_view_is_advised(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    rigging: lp.Rigging,
+    count: int,
+    words: str,
+) -> None:
+    """The room is painted as it is rendered."""
+    # Other tests may keep planes of this room that have more samples.
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
+    path = write_room(tmp_path, sensors=SIDE)
+    scenes = [load_scene(path, sensor=name) for name in ("camera", "side")[:count]]
+    targets = [lp.Target.of(lp.render_basis(x, spp=16).current_look) for x in scenes]
+    remarks = _Remarks()
+    lp.paint_with_light(
+        scenes,
+        targets,
+        tmp_path / "answer",
+        rigging=rigging,
+        spp=16,
+        space="linear",
+        hold=0,
+        verify=False,
+        report=False,
+        progress=remarks,
+    )
+    [remark] = [x for x in remarks.texts if "no light is" in x]
+    assert words in remark
+    assert remark.endswith("paint a second view for lights that this one hardly shows") == (
+        count == 1
+    )
+
+
 def test_places_need_a_scene(room: Scene, tmp_path: Path) -> None:
     basis = lp.render_basis(room, spp=4)
     with pytest.raises(LightpaintError, match="lights can only move in their scene"):
@@ -355,6 +396,25 @@ def test_sums_alone_are_refused_where_lights_may_move(tmp_path: Path) -> None:
         plan(tmp_path / "looks.toml", tmp_path / "out")
     (tmp_path / "looks.toml").write_text(f"[[look]]\n{look}{settings}move_lights = false\n")
     assert not plan(tmp_path / "looks.toml", tmp_path / "out").looks[0].failure
+
+
+class _Remarks:
+    """Progress that keeps the remarks."""
+
+    def __init__(self) -> None:
+        self.texts: list[str] = []
+
+    def __call__(self, label: str, done: int, total: int, unit: str = "passes") -> None:
+        """Ignore progress."""
+
+    def say(self, text: str) -> None:
+        self.texts.append(text)
+
+    def note(self, text: str) -> None:
+        """Ignore a stage."""
+
+    def at_work(self, worker: str, task: str | None) -> None:
+        """Ignore a worker."""
 
 
 class _Stop:

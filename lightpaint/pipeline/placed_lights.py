@@ -38,7 +38,9 @@ def place_lights(
     scenes = [view.scene for view in job.views if view.scene is not None]
     if job.placement is None:
         placement = find_places([job], bases, listen)
-        say_changes(placement, listen)
+        rigging = job.all_rigging
+        changes = ["moved"] * bool(rigging.lights) + ["added"] * bool(rigging.new)
+        say_changes(placement, listen, requested=" or ".join(changes))
     else:
         placement = content(job.placement).hung_in(scenes)
     if placement.is_empty:
@@ -84,15 +86,22 @@ def find_places(jobs: Sequence[Job], bases: Sequence[Basis], listen: Listener) -
     )
 
 
-def say_changes(placement: Placement | PlacementRecord, listen: Listener) -> None:
-    """Tell the user which lights were moved and added, and for which looks they hang so."""
+def say_changes(
+    placement: Placement | PlacementRecord, listen: Listener, *, requested: str = "moved"
+) -> None:
+    """Tell the user which lights were moved and added, and for which looks they hang so.
+
+    requested: what lights may be, `moved`, `added`, or `moved or added`.
+    """
     changes = all_changes(placement)
     prefix = f"{some_names(placement.looks)}: " if placement.looks else ""
     for change in changes:
         listen.say(f"{prefix}{spoken_change(change)}")
     if not changes:
-        reason = "no change reliably removes a hundredth of the error"
-        listen.say(f"{prefix}no light is moved: {reason}")
+        text = f"no light is {requested}: no change reliably removes a hundredth of the error"
+        if isinstance(placement, Placement) and len(placement.scenes) == 1:
+            text += "; paint a second view for lights that this one hardly shows"
+        listen.say(f"{prefix}{text}")
 
 
 def _place_of(scene: Scene, bases: Sequence[Basis]) -> int:
