@@ -1021,10 +1021,11 @@ export interface SetMaster {
  * New places, targets and cones of lights, by name. Answered by `answer`; `rig` follows.
  *
  * poses: changed fields of `lightpaint.Pose`: position, target, cutoff and beam; an empty object
- * restores a light's place from the scene. is_final: whether it becomes a step; false while a
- * light is dragged. view: index of the view whose pictures of dragged lights are sent at once, as
- * `dragged`. step: while a light is dragged, its picture is computed at every step-th pixel of
- * every step-th row, 1 to 8: what the page draws in time.
+ * restores a light's place from the scene; without any pose, a drag ends and its light goes back.
+ * is_final: whether it becomes a step; false while a light is dragged. view: index of the view
+ * whose pictures of dragged lights are sent at once, as `dragged`. step: while a light is dragged,
+ * its picture is computed at every step-th pixel of every step-th row, 1 to 8: what the page draws
+ * in time.
  */
 export interface MoveLights {
   poses: Record<string, Record<string, any>>;
