@@ -177,8 +177,11 @@ def test_where_the_lights_can_do_it_none_is_named(small_room: Scene, small_room_
 def test_noise_is_not_taken_for_a_lack_of_light(
     small_room: Scene, small_room_basis: Any, seed: int
 ):
-    """Few samples, of basis and painting: much is missed, and no light would help."""
-    basis, painted = small_room_basis(spp=4), small_room_basis(spp=4, seed=seed)
+    """Few samples of the basis, and a grainy painting: much is missed, and no light would help.
+
+    Stray bright pixels of a painting with 4 samples are another matter (docs/limits.md).
+    """
+    basis, painted = small_room_basis(spp=4), small_room_basis(spp=64, seed=seed)
     solution = solve(basis, _target(painted.mix(painted.current_weights)))
     missed_share = sum(solution.certificate.objective) / solution.equations.target_norm2.sum()
     assert missed_share > 0.01**2  # else it would not look at all
