@@ -192,8 +192,12 @@ function Mark({ ui, app, light, place, pane, camera, positionOf, isTwin }) {
     '--outwards': `${position.angle}rad`,
   }} aria-label=${isSelected ? fill(words.lampMarks.selected, { label }) : label} aria-pressed=${String(ui.lamp === light)} tabindex=${isTwin ? -1 : 0}
     aria-hidden=${isTwin ? 'true' : undefined} data-tip=${tip} data-lamp=${label}
-    onClick=${(/** @type {MouseEvent} */ event) =>
-      hasControl(event) ? pressLight(app.store, light, event) : showLight(app, light, event)} onKeyDown=${nudge}
+    onClick=${(/** @type {MouseEvent} */ event) => {
+      if (hasControl(event)) return pressLight(app.store, light, event);
+      // The end of a drag is a click as well, and open rows cost time of the next one.
+      const isByPointer = event.detail > 0;
+      return isByPointer && drag.wasDragged.current ? choose() : showLight(app, light, event);
+    }} onKeyDown=${nudge}
     onPointerDown=${(/** @type {PointerEvent} */ event) => {
       if (ui.clickAction) return; // the click goes to the picture behind it
       if (hasControl(event)) return event.stopPropagation(); // the click selects it

@@ -27,6 +27,7 @@ export const DRAG_MIN_PIXELS = 4;
 export function useMarkDrag(app, pane, resolveDrag) {
   const current = useRef(/** @type {Drag | null} */ (null));
   const onEscape = useRef(/** @type {() => void} */ (() => {}));
+  const wasDragged = useRef(false);
   const inPicture = (/** @type {PointerEvent} */ event) => {
     const { left, top } = app.engine.element.getBoundingClientRect();
     return [
@@ -56,6 +57,7 @@ export function useMarkDrag(app, pane, resolveDrag) {
     const { left, top, width, height } = button.getBoundingClientRect();
     // The mark keeps its offset from the pointer.
     const offset = { dx: event.clientX - left - width / 2, dy: event.clientY - top - height / 2 };
+    wasDragged.current = false;
     const start = { x: event.clientX, y: event.clientY };
     current.current = { button, light, place, ...start, ...offset, mark: null, lastRequest: null };
     onEscape.current = endOnEscape(() => {
@@ -77,6 +79,7 @@ export function useMarkDrag(app, pane, resolveDrag) {
       drag,
     );
     if (!result) return;
+    wasDragged.current = true;
     drag.mark = result.mark;
     drag.lastRequest = result.request;
     shiftMark(drag);
@@ -92,7 +95,7 @@ export function useMarkDrag(app, pane, resolveDrag) {
     if (drag.lastRequest) app.session.lampMoves.queue(drag.light, drag.lastRequest);
     end();
   };
-  return { down, move, up };
+  return { down, move, up, wasDragged };
 }
 
 /** Call `cancel` once Escape is pressed. @param {() => void} cancel @returns {() => void} to stop it */
