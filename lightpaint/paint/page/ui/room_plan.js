@@ -3,9 +3,10 @@
 import { html, useRef } from '../vendor/preact.js';
 import { AddLight } from './add_light.js';
 import { MoveButton } from './advice.js';
+import { endOnEscape } from './escape_key.js';
 import { dot, subtract, add, normalize, onRail } from './lamp_geometry.js';
 import { placeOf, shiftedTo } from './lamp_marks.js';
-import { DRAG_MIN_PIXELS, endOnEscape } from './lamps/mark_drag.js';
+import { DRAG_MIN_PIXELS } from './lamps/mark_drag.js';
 import { atFullBrightness, luminance, toHex } from './paint_colour.js';
 import { words } from '../language/language.js';
 

@@ -1,5 +1,6 @@
 /** A stroke over the map of an image: it paints, locks or releases the texels that it passes. */
 
+import { endOnEscape } from '../escape_key.js';
 import { presentLevel, stopsOf } from '../level_field.js';
 import { scaled } from '../lamps/lamp_colours.js';
 import { atFullBrightness, luminance } from '../paint_colour.js';
@@ -12,9 +13,9 @@ import { mapStops, wholeLight } from './light_images.js';
 /** @typedef {import("./image_state.js").LightImage} LightImage */
 /** @typedef {[row: number, column: number]} Place */
 /** A stroke that goes on. stops: exposure at its start, which would change under the brush. weights:
- * the answer at its start. keys: ends its listening to keys.
+ * the answer at its start. ignoreKeys: ends its listening to keys.
  * @typedef {{texels: Set<number>, last: Place, stops: number, weights: RGB[],
- *   keys: AbortController}} TexelStroke */
+ *   ignoreKeys: () => void}} TexelStroke */
 
 /** Ends of the brightness of paint, in stops from the mean of the image in the scene. */
 export const MIN_STOPS = -8;
@@ -32,7 +33,7 @@ export function useTexelStroke(image, ui, app, visit) {
   const apply = (/** @type {boolean} */ isFinal) =>
     applyTool(image, ui, app, [...(stroke.current?.texels ?? [])], isFinal);
   const release = () => {
-    stroke.current?.keys.abort();
+    stroke.current?.ignoreKeys();
     stroke.current = null;
   };
   const cancel = () => {
@@ -50,16 +51,9 @@ export function useTexelStroke(image, ui, app, visit) {
     const element = /** @type {HTMLElement} */ (event.currentTarget);
     element.setPointerCapture(event.pointerId);
     element.focus({ preventScroll: true });
-    const [texels, keys] = [new Set([texelAt(start)].filter((k) => k >= 0)), new AbortController()];
-    const { weights } = ui;
-    stroke.current = { texels, last: start, stops: mapStops(image, weights), weights, keys };
-    const press = (/** @type {KeyboardEvent} */ key) => {
-      if (key.key !== 'Escape') return;
-      key.stopPropagation();
-      key.preventDefault();
-      cancel();
-    };
-    window.addEventListener('keydown', press, { signal: keys.signal, capture: true });
+    const texels = new Set([texelAt(start)].filter((k) => k >= 0));
+    const [{ weights }, ignoreKeys] = [ui, endOnEscape(cancel)];
+    stroke.current = { texels, last: start, stops: mapStops(image, weights), weights, ignoreKeys };
     visit(start);
     return apply(false);
   };

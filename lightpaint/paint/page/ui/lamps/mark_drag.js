@@ -1,5 +1,6 @@
 /** Drags of the marks of lights. */
 
+import { endOnEscape } from '../escape_key.js';
 import { useEffect, useLayoutEffect, useRef } from '../../vendor/preact.js';
 
 /** @typedef {import("../engine_interface.js").Pane} Pane */
@@ -96,19 +97,6 @@ export function useMarkDrag(app, pane, resolveDrag) {
     end();
   };
   return { down, move, up, wasDragged };
-}
-
-/** Call `cancel` once Escape is pressed. @param {() => void} cancel @returns {() => void} to stop it */
-export function endOnEscape(cancel) {
-  const controller = new AbortController();
-  const press = (/** @type {KeyboardEvent} */ event) => {
-    if (event.key !== 'Escape') return;
-    event.preventDefault();
-    event.stopPropagation();
-    cancel();
-  };
-  window.addEventListener('keydown', press, { signal: controller.signal, capture: true });
-  return () => controller.abort();
 }
 
 /** Shift a mark from where it is drawn to where it belongs. @param {Drag} drag */
