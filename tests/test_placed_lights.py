@@ -243,7 +243,7 @@ def test_a_missing_lamp_is_added_with_its_constraint_and_written_behind_the_user
         progress=listen,
     )
     # The judgement, which follows the last step, takes its time as well.
-    assert shares == sorted(shares)
+    assert shares == sorted({*shares})
     assert (shares[0], shares[-1]) == (0, 1)
     assert shares[-2] < 0.9
     assert look.placement is not None

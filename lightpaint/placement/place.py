@@ -205,23 +205,30 @@ class _Stages:
         self._progress = progress
         self._ends = [0, *np.cumsum(counts).tolist()]
         self._total = math.ceil((1 + JUDGED_SHARE) * self._ends[-1])
+        self._reported = -1
 
     def begin(self) -> Callable[[], None]:
         """Begin the next stage, and return a function that counts its steps."""
         done, *self._ends = self._ends
         end = self._ends[0] if self._ends else done
-        self._progress("poses", done, self._total)
+        self._report(done)
 
         def count() -> None:
             nonlocal done
             done = min(done + 1, end)
-            self._progress("poses", done, self._total)
+            self._report(done)
 
         return count
 
     def end(self) -> None:
         """Report the end."""
-        self._progress("poses", self._total, self._total)
+        self._report(self._total)
+
+    def _report(self, done: int) -> None:
+        """Report progress, once each, since a stage may have no steps."""
+        if done > self._reported:
+            self._reported = done
+            self._progress("poses", done, self._total)
 
 
 def _sites_by_name(arrangement: Arrangement, names: Sequence[str]) -> dict[str, Site]:
