@@ -39,7 +39,6 @@ def test_pages_are_for_everybody_and_fit(site: Path, browser: Any, width: int) -
 def test_the_search_works_without_a_server(site: Path, browser: Any) -> None:
     page = browser.new_page()
     page.goto(f"{(site / 'search.html').as_uri()}?q=kelvin")
-    page.wait_for_selector("#search-results li a")
-    links = page.eval_on_selector_all("#search-results li a", "all => all.map(x => x.href)")
-    assert any("/lights.html" in link for link in links)
+    # Results are listed one after the other.
+    page.wait_for_selector("#search-results li a[href*='lights.html']")
     page.close()
