@@ -67,6 +67,37 @@ def test_made_once_for_the_same_pixels(make_basis: Any, monkeypatch: pytest.Monk
     assert read_denoised_planes(basis) is not None
 
 
+@pytest.mark.parametrize("factor", [1, 2])
+def test_planes_that_another_basis_shares_are_not_denoised_again(
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch, factor: int
+):
+    basis, denoised_lights = make_basis(3, (24, 32)), []
+    real = denoised_planes.denoise_plane
+    first = obtain_denoised_planes(basis, factor=factor)
+    # The middle light was moved, and the others have changed places in the list.
+    images = basis.images[::-1].copy()
+    images[1] = images[1][::-1]
+    moved = replace(basis, planes=images, origin=replace(basis.origin, scene_identity="moved"))
+
+    def note(basis: Any, k: int, **options: Any) -> Any:
+        denoised_lights.append(k)
+        return real(basis, k, **options)
+
+    monkeypatch.setattr(denoised_planes, "denoise_plane", note)
+    second = obtain_denoised_planes(moved, factor=factor)
+    assert denoised_lights == [1]
+    assert first is not None
+    assert second is not None
+    for k in range(3):
+        np.testing.assert_array_equal(
+            second.plane(k), as_halves(real(moved, k, factor=factor), 1.0).astype(np.float32)
+        )
+    # Planes with other noise, of the same light, are others.
+    noisier = replace(moved, noise=np.ones_like(images))
+    obtain_denoised_planes(noisier, factor=factor)
+    assert denoised_lights == [1, 0, 1, 2]
+
+
 def test_few_pixels_are_not_worth_it(make_basis: Any, monkeypatch: pytest.MonkeyPatch):
     basis = make_basis(2, (24, 32))
     monkeypatch.setattr(denoised_planes, "MIN_PIXELS", basis.images[..., 0].size + 1)

@@ -184,6 +184,15 @@ def companion_path(basis: Basis, ending: str) -> Path:
     return folder() / f"{_path_of(basis).name.removesuffix(SUFFIX)}{ending}"
 
 
+def companions_with(ending: str) -> list[Path]:
+    """Return all files derived from bases that have this ending. Those of no basis in the cache are
+    included; damaged folders have none.
+    """
+    with suppress(OSError, OutputError):
+        return [path for path in folder().glob(f"*{ending}") if is_own(path)]
+    return []
+
+
 def is_cached(basis: Basis) -> bool:
     """Return True if `basis`, or the same basis with more samples, is in the cache."""
     path = _path_of(basis)

@@ -30,7 +30,7 @@ from lightpaint.images.pixel_blocks import block_mean, blocks_in
 from lightpaint.images.resampling import resampled
 from lightpaint.threads import parallel_map
 
-FORMAT, ARRAY_NAMES = "lightpaint-clean 3", ("halves", "scales", "present")
+FORMAT, ARRAY_NAMES = "lightpaint-clean 4", ("halves", "scales", "present")
 
 #: Number of pixels of all planes below which denoising the sum is as fast as reading planes.
 MIN_PIXELS = 2**18
@@ -181,15 +181,20 @@ def obtain_denoised_planes(basis: Basis, *, factor: int = 1) -> DenoisedPlanes |
 
     factor: side of the blocks of pixels whose means are denoised, which costs accordingly less; if
     whole planes are cached, these are returned. None if Open Image Denoise is not installed, or if
-    there are so few pixels that denoising their sum is faster.
+    there are so few pixels that denoising their sum is faster. Planes that another basis shares, as
+    before a lamp was moved, are taken from its file.
     """
     pixels = len(basis.lights) * basis.size[0] * basis.size[1]
     if pixels < MIN_PIXELS or not oidn_is_installed():
         return None
     planes = read_denoised_planes(basis, factor=factor)
     if planes is None:
-        lights = range(len(basis.lights))
-        halves, scales = zip(*(denoise_to_halves(basis, k, factor) for k in lights), strict=True)
+        shared = read_shared_planes(basis, factor=factor)
+        pairs = [
+            shared[k] if k in shared else denoise_to_halves(basis, k, factor)
+            for k in range(len(basis.lights))
+        ]
+        halves, scales = zip(*pairs, strict=True)
         denoised = np.stack(halves), np.array(scales)
         if factor == 1:
             planes = DenoisedPlanes.of(basis, *denoised)
@@ -217,7 +222,7 @@ def read_denoised_planes(basis: Basis, *, factor: int = 1) -> DenoisedPlanes | N
         if not is_own(path):
             return None
         with path.open("rb") as file, np.load(file, allow_pickle=False) as file_arrays:
-            if str(file_arrays["made_of"]) != _content_key(basis):
+            if file_arrays["made_of"].tolist() != _content_keys(basis):
                 return None
             planes = DenoisedPlanes(*(file_arrays[name] for name in ARRAY_NAMES))
         arrays: list[Any] = [planes.halves, planes.scales, planes.current]
@@ -232,12 +237,34 @@ def read_denoised_planes(basis: Basis, *, factor: int = 1) -> DenoisedPlanes | N
     return None
 
 
+def read_shared_planes(basis: Basis, *, factor: int = 1) -> dict[int, tuple[Halves, float]]:
+    """Return cached denoised planes of single lights, whichever basis they were denoised for.
+
+    The keys are the numbers of the lights in `basis`; the values have the form of
+    `denoise_to_halves`.
+    """
+    missing = {key: k for k, key in enumerate(_content_keys(basis)[:-1])}
+    found: dict[int, tuple[Halves, float]] = {}
+    for path in cache.companions_with(DENOISED_SUFFIX):
+        with suppress(*_READ_ERRORS), path.open("rb") as file, np.load(file) as file_arrays:
+            keys = file_arrays["made_of"].tolist()[:-1]
+            numbers = {key: number for number, key in enumerate(keys) if key in missing}
+            if not numbers:
+                continue
+            halves, scales = file_arrays["halves"], file_arrays["scales"]
+            if halves.shape[1:] != (*blocks_in(basis.size, factor), 3):
+                continue
+            for key, number in numbers.items():
+                found[missing.pop(key)] = halves[number], float(scales[number])
+    return found
+
+
 def cache_denoised_planes(basis: Basis, planes: DenoisedPlanes) -> bool:
     """Store denoised planes of `basis`. Returns whether that worked: if not, nothing is lost."""
     try:
         path = cache.companion_path(basis, DENOISED_SUFFIX)
         with replacing(path) as place, place.open("wb") as file:
-            made_of = np.array(_content_key(basis))
+            made_of = np.array(_content_keys(basis))
             arrays = (planes.halves, planes.scales, planes.current)
             parts: dict[str, Any] = dict(zip(ARRAY_NAMES, arrays, strict=True))
             np.savez(file, made_of=made_of, **parts)
@@ -259,23 +286,28 @@ def _shape(basis: Basis) -> tuple[int, int, int, int]:
     return (len(basis.lights), *basis.size, 3)
 
 
-def _content_key(basis: Basis) -> str:
-    """Return a hash of everything that the denoised planes depend on."""
-    other_inputs: list[Floats] = [basis.current_weights]
-    if basis.features is not None:
-        other_inputs += [basis.features.albedo, basis.features.normal]
+def _content_keys(basis: Basis) -> list[str]:
+    """Return hashes of all that the denoised planes depend on: one for each light, and one for all
+    of them in the current scene.
+    """
+    features, parts = basis.features, basis.indirect
+    stacks = [basis.planes, basis.noise]
+    if parts is not None:
+        stacks += [parts.planes, parts.noise]
+    parameters = repr(
+        (FORMAT, denoiser_text(features, raw=""), basis.size, len(stacks), basis.knows_noise)
+    )
+    inputs = [] if features is None else [features.albedo, features.normal]
+    shared = _digest(*inputs, start=parameters)
+    keys = parallel_map(
+        lambda k: _digest(*(planes.plane(k) for planes in stacks), start=shared),
+        range(len(basis.lights)),
+    )
+    return [*keys, _digest(basis.current_weights, start=" ".join(keys))]
 
-    def digest(which: int | Floats) -> bytes:
-        if not isinstance(which, int):
-            return hashlib.blake2b(np.ascontiguousarray(which).data).digest()
-        plane = basis.planes.plane(which)
-        if basis.indirect is not None:
-            # Both parts, so that the key also depends on whether they are known.
-            plane = np.stack([plane, basis.indirect.planes.plane(which)])
-        return hashlib.blake2b(np.ascontiguousarray(plane).data).digest()
 
-    parameters = repr((FORMAT, denoiser_text(basis.features, raw=""), _shape(basis)))
-    content = hashlib.blake2b(parameters.encode(), digest_size=16)
-    for hash_of_input in parallel_map(digest, [*range(len(basis.lights)), *other_inputs]):
-        content.update(hash_of_input)
+def _digest(*arrays: npt.NDArray[Any], start: str) -> str:
+    content = hashlib.blake2b(start.encode(), digest_size=16)
+    for array in arrays:
+        content.update(np.ascontiguousarray(array).data)
     return content.hexdigest()
