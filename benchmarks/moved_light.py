@@ -1,10 +1,10 @@
 """Cost of moving one lamp: the processor's time of a solve after it, against the first one.
 
-    python benchmarks/moved_light.py [--light spot_vase] [--rounds 3]
+    python benchmarks/moved_light.py [--lights spot_vase spot_knot] [--rounds 3]
 
 Each round copies the gallery, solves it with an empty cache, moves one spot by 10 cm in the XML,
 solves again, and once more with nothing changed. Times are of whole processes, user and system, all
-threads, ratios of neighbours in time; medians are taken over the rounds.
+threads, ratios of neighbours in time; medians are taken over all rounds.
 """
 
 import argparse
@@ -20,25 +20,26 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 GALLERY = ROOT / "scenes" / "gallery"
+SPOTS = ["spot_field", "spot_tide", "spot_figure", "spot_knot", "spot_vase"]
 PAINTING = ROOT / "targets" / "gallery" / "evening.exr"
 
 
 def main() -> None:
     """Print the times of each round, and the medians of their ratios."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--light", default="spot_vase")
-    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--lights", nargs="+", default=SPOTS)
+    parser.add_argument("--rounds", type=int, default=1)
     options = parser.parse_args()
-    print("round   first s   moved s   again s   moved / first   again / first")
+    print("moved         first s   moved s   again s   moved / first   again / first")
     ratios = []
-    for k in range(options.rounds):
+    for light in options.lights * options.rounds:
         with tempfile.TemporaryDirectory() as folder:
-            first, move_s, second_s = one_round(Path(folder), options.light)
+            first, move_s, second_s = one_round(Path(folder), light)
         ratios.append((move_s / first, second_s / first))
         shares = "   ".join(f"{ratio:13.2f}" for ratio in ratios[-1])
-        print(f"{k + 1:5d}   {first:7.1f}   {move_s:7.1f}   {second_s:7.1f}   {shares}", flush=True)
+        print(f"{light:11s}   {first:7.1f}   {move_s:7.1f}   {second_s:7.1f}   {shares}", flush=True)
     medians = [statistics.median(column) for column in zip(*ratios, strict=True)]
-    print("median" + " " * 33 + "   ".join(f"{ratio:13.2f}" for ratio in medians))
+    print(f"{'median':41s}   " + "   ".join(f"{ratio:13.2f}" for ratio in medians))
 
 
 def one_round(folder: Path, light: str) -> tuple[float, float, float]:

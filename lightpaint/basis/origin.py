@@ -16,7 +16,8 @@ LIGHT_GROUPS = "light groups of "
 class Origin:
     """The origin of a basis, which decides whether bases are comparable and samples can be added.
 
-    halves: samples per pixel of each of the two halves. passes: number of passes of each half.
+    halves: samples per pixel of each of the two halves; a light rendered alone until it was as
+    clean as the others counts as having theirs. passes: number of passes of each half.
     each_light: samples of halves A and B and passes of A and B for each light, if these numbers
     differ because separate renders were interrupted or come from several runs; `halves` and
     `passes` are then the minimum over all lights.

@@ -9,9 +9,11 @@ from lightpaint.arrays import Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache
 from lightpaint.basis.cache.plane_reuse import (
+    as_sampled,
     counts_of,
     gather_planes,
     least_sampled_lights,
+    mean_variance,
     merge,
     restrict,
 )
@@ -54,13 +56,15 @@ def obtain_basis(
     render: Render = render_basis,
     report_reuse: ReuseReport = lambda count, of: None,
     before: Basis | None = None,
+    as_clean_as: Basis | None = None,
 ) -> Basis:
     """Return the basis of `scene`, from cached planes and newly rendered samples.
 
     A plane serves every scene that has its identity (`Scene.light_identities`): if one lamp of a
     scene was moved, only that lamp is rendered. Its samples follow the same camera paths as in a
     render of all lights, but choose among fewer emitters. So the planes have the same means as
-    those of a complete render, but different noise.
+    those of a complete render, but less noise, and such a lamp needs fewer samples: once it is as
+    clean, in relation to its light, as the others are on average, it counts as having as many.
 
     time_s: seconds of rendering to add to the cached samples, instead of spp. If some lights have
     fewer samples than others, they get the time until they have caught up.
@@ -75,6 +79,8 @@ def obtain_basis(
     others are rendered.
     before: a basis of the scene in another state, with the same seed and film, whose planes are
     reused as well.
+    as_clean_as: a basis of other lights in the same picture; a light of `scene` that is as clean as
+    its lights counts as having all its samples.
     Raises SceneError for exact_spp together with time_s, which gives no number of samples.
     """
     if exact_spp and time_s is not None:
@@ -86,7 +92,7 @@ def obtain_basis(
         if before is not None:
             options["keep"] = lambda basis: False
             start = gather_planes(scene, None, spp=spp, seed=seed, before=before, use_cache=False)
-        return as_stored(_completed(scene, start, spp=goal_spp, render=render, options=options))
+        return as_stored(_completed(scene, start, as_clean_as, goal_spp, render, options))
     cached = _cached_basis(scene, seed)
     start = _starting_planes(
         scene, cached, goal_spp=goal_spp, seed=seed, exact_spp=exact_spp, before=before
@@ -102,7 +108,7 @@ def obtain_basis(
         start = replace(start, lights=basis_lights(scene), source=str(scene.path))
         _report_reused(start, goal_spp, report_reuse)
     options |= {"keep": keep, "is_final": is_final}
-    basis = _completed(scene, start, spp=goal_spp, render=render, options=options)
+    basis = _completed(scene, start, as_clean_as, goal_spp, render, options)
     if basis is start:
         return basis
     return _as_from_cache(scene, _marked(basis, is_composed=is_composed), keep)
@@ -166,37 +172,47 @@ def _as_from_cache(scene: Scene, basis: Basis, keep: Callable[[Basis], bool]) ->
 
 
 def _completed(
-    scene: Scene, start: Basis | None, *, spp: int | None, render: Render, options: dict[str, Any]
+    scene: Scene,
+    start: Basis | None,
+    as_clean_as: Basis | None,
+    spp: int | None,
+    render: Render,
+    options: dict[str, Any],
 ) -> Basis:
     """Return `start` with the missing samples added, beginning with the lights that have the
-    fewest.
+    fewest, until they are as clean as the others.
 
-    spp: None for the time in `options`, which holds the other arguments of `render`. Once all
-    lights have equal numbers of samples, one pass adds to all of them.
+    as_clean_as: as in `obtain_basis`. spp: None for the time in `options`, which holds the other
+    arguments of `render`. Once all lights have equal numbers of samples, one pass adds to all of
+    them.
     """
     end_s = None if options["time_s"] is None else time.monotonic() + options["time_s"]
 
-    def budget(goal: int | None) -> dict[str, Any]:
+    def budget(goal: int | None, variance: float | None) -> dict[str, Any]:
+        until = {} if variance is None else {"until_variance": variance}
         if end_s is None:
-            return {"spp": goal}
+            return {"spp": goal} | until
         left_s = max(end_s - time.monotonic(), SHORTEST_S)
-        return {"spp": None, "time_s": left_s} | ({} if goal is None else {"until_spp": goal})
+        until |= {} if goal is None else {"until_spp": goal}
+        return {"spp": None, "time_s": left_s} | until
 
     while start is not None and method_of(scene) == ONE_PASS:
         names, goal = least_sampled_lights(start, spp)
         if not names:
             break
         lights_scene, whole = scene.only(names), start
+        variance = None if goal is None else mean_variance(whole, goal)
 
         def keep(part: Basis, whole: Basis = whole) -> bool:
             return bool(options["keep"](merge(scene, whole, part)))
 
-        part_options = options | budget(goal) | {"keep": keep}
+        part_options = options | budget(goal, variance) | {"keep": keep}
         part = render(lights_scene, start=restrict(whole, lights_scene), **part_options)
-        start = merge(scene, whole, part)
+        start = merge(scene, whole, as_sampled(part, goal, variance))
         if end_s is not None and time.monotonic() >= end_s:
             return start
-    return render(scene, start=start, **options | budget(spp))
+    variance = None if as_clean_as is None or spp is None else mean_variance(as_clean_as, spp)
+    return as_sampled(render(scene, start=start, **options | budget(spp, variance)), spp, variance)
 
 
 def _marked(basis: Basis, *, is_composed: bool) -> Basis:

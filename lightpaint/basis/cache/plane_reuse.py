@@ -18,6 +18,8 @@ from lightpaint.basis.derived_planes import PlaneReference, compose_planes
 from lightpaint.basis.file.basis_file import is_large
 from lightpaint.basis.lights import Lights
 from lightpaint.basis.planes import IndirectLight, Planes
+from lightpaint.basis.render.noise_level import is_clean, relative_variances
+from lightpaint.basis.render.render_budget import half_of
 from lightpaint.basis.render.render_origin import ONE_PASS, basis_lights, method_of, origin_of
 from lightpaint.basis.render.separate_renders import emitters_seen
 from lightpaint.scene.properties.emission import ENVIRONMENTS
@@ -166,6 +168,32 @@ def least_sampled_lights(basis: Basis, spp: int | None) -> tuple[list[str], int 
     ]
     goals = [total for total in totals if total > fewest]
     return names, min(goals if spp is None else [spp, *goals], default=None)
+
+
+def mean_variance(basis: Basis, spp: int) -> float | None:
+    """Return the mean relative variance after `spp` samples of the lights that have so many or
+    more; None if none of these lights the picture.
+    """
+    totals = np.array([sum(light_counts[:2]) for light_counts in counts_of(basis)])
+    variances = relative_variances(basis)
+    is_usable = (totals >= spp) & np.isfinite(variances)
+    if not is_usable.any():
+        return None
+    return float(np.mean(variances[is_usable] * totals[is_usable])) / spp
+
+
+def as_sampled(basis: Basis, spp: int | None, variance: float | None) -> Basis:
+    """Return a one-pass basis that is as clean as others of `spp` samples as one of so many.
+
+    What follows then weighs its samples by their variance: those that are added, the choice of the
+    better plane, and the count that people read. variance: from `mean_variance`.
+    """
+    if spp is None or variance is None or basis.origin.spp >= spp or not is_clean(basis, variance):
+        return basis
+    half = half_of(spp)
+    return replace(
+        basis, origin=replace(basis.origin, halves=(half, half), is_composed=True), sums=None
+    )
 
 
 def restrict(basis: Basis, scene: Scene) -> Basis | None:

@@ -9,6 +9,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.planes import as_planes
 from lightpaint.basis.render.banded_film import BandedFilm, WholeFilm
 from lightpaint.basis.render.guide_training import train
+from lightpaint.basis.render.noise_level import is_clean
 from lightpaint.basis.render.one_pass_basis import basis_of_planes, basis_of_sums
 from lightpaint.basis.render.render_budget import Budget, Keeper, steps
 from lightpaint.basis.render.render_memory import check_memory, renders_in_bands
@@ -42,6 +43,7 @@ def render_basis(
     spp: int | None = None,
     time_s: float | None = None,
     until_spp: int | None = None,
+    until_variance: float | None = None,
     seed: int = 0,
     start: Basis | None = None,
     keep: Callable[[Basis], bool] | None = None,
@@ -57,6 +59,8 @@ def render_basis(
             a step that has begun is finished.
         until_spp: Samples per pixel at which rendering stops before `time_s` is over; one-pass
             renders only.
+        until_variance: Σ noise² / Σ light² of a light's picture, without stray pixels. A one-pass
+            render stops early, after at least a quarter of its samples, once no light has more.
         seed: Any number >= 0; different seeds give independent bases.
         start: An earlier basis of the same scene, sensor and seed. Its samples count, so only those
             missing to `spp` are rendered, or as many more as `time_s` allows. If it has `sums`, the
@@ -76,7 +80,7 @@ def render_basis(
     """
     if spp is not None and time_s is not None:
         raise SceneError("give a number of samples or a time to render for, not both")
-    budget = Budget(scene.spp if spp is None else spp, time_s, until_spp)
+    budget = Budget(scene.spp if spp is None else spp, time_s, until_spp, until_variance)
     _check_size(scene)
     check_memory(scene, in_bands=renders_in_bands(scene, start))
     if start is not None and not is_of(scene, start, seed):
@@ -202,12 +206,16 @@ class _OnePassRender:
     def spend(self, budget: Budget, keeper: Keeper, progress: Progress) -> None:
         """Add samples step by step until `budget` is spent."""
         with tracing() as let_others_through:
-            for spp in steps(self._film.band_pixels, budget, self.done, progress):
+            pixels, done = self._film.band_pixels, self.done
+            for spp in steps(pixels, budget, done, progress, self._is_clean):
                 if not self.tracer.is_trained:
                     train(self.tracer, let_others_through)
                 self._film.add(self.done, spp, let_others_through)
                 self.done += spp
                 keeper.now_and_then(self.basis)
+
+    def _is_clean(self, variance: float) -> bool:
+        return is_clean(self.basis(), variance)
 
     def even_out(self) -> None:
         """Complete the step that an interrupt left unfinished in some pixels."""

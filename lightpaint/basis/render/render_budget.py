@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.render.noise_level import LEAST_SHARE, LEAST_SPP, STEP_SHARE
 from lightpaint.errors import SceneError
 from lightpaint.progress import Progress
 from lightpaint.scene.scene_render import largest_pass, plan_passes
@@ -22,7 +23,8 @@ PASS_DIVISOR = 4
 @dataclass(frozen=True)
 class Budget:
     """The budget of a basis: `spp` samples per pixel in all, or `time_s` seconds from now, in which
-    a one-pass render stops at `until_spp`.
+    a one-pass render stops at `until_spp`. It stops earlier where the relative variance of its
+    lights is `until_variance` or less (see noise_level.py).
 
     Time is wall time from the first pass on. It includes compiling kernels, saving the basis and,
     in separate renders, loading the scene for every light.
@@ -31,6 +33,7 @@ class Budget:
     spp: int
     time_s: float | None = None
     until_spp: int | None = None
+    until_variance: float | None = None
 
     def __post_init__(self) -> None:
         if self.time_s is not None and not 0 < self.time_s < math.inf:
@@ -39,6 +42,31 @@ class Budget:
     def met_by(self, spp: int) -> bool:
         """Return True if this many samples per pixel are enough; never for a time budget."""
         return self.time_s is None and spp >= self.spp
+
+    @property
+    def goal(self) -> float:
+        """Samples per pixel of each half at which a one-pass render stops; infinite for a time."""
+        if self.time_s is None:
+            return half_of(self.spp)
+        return math.inf if self.until_spp is None else half_of(self.until_spp)
+
+    @property
+    def least(self) -> float:
+        """Samples per pixel of each half that a render has before it stops for its variance."""
+        if self.until_variance is None:
+            return math.inf
+        return max(math.ceil(LEAST_SHARE * self.goal), LEAST_SPP // 2)
+
+    def step(self, done: int, largest: int) -> int:
+        """Return the samples per pixel of the next step of each half; 0 at the goal.
+
+        done: those so far. largest: the size of a full pass.
+        """
+        step: float = largest
+        if self.until_variance is not None:
+            ahead = self.least - done
+            step = min(largest, ahead if ahead > 0 else math.ceil(STEP_SHARE * self.goal))
+        return max(0, int(min(step, self.goal - done)))
 
 
 class Clock:
@@ -62,26 +90,42 @@ class Clock:
             self.reported = spent
 
 
-def steps(pixels: int, budget: Budget, done: int, progress: Progress) -> Iterator[int]:
+def steps(
+    pixels: int,
+    budget: Budget,
+    done: int,
+    progress: Progress,
+    is_clean: Callable[[float], bool] = lambda variance: False,
+) -> Iterator[int]:
     """Yield the samples per pixel of each half for one step after another until `budget` is spent.
 
-    done: samples per pixel of each half so far.
+    done: samples per pixel of each half so far. is_clean: whether no light has a larger relative
+    variance.
     """
+
+    def is_enough() -> bool:
+        variance = budget.until_variance
+        return variance is not None and done >= budget.least and is_clean(variance)
+
     largest = largest_pass(pixels, shorter=PASS_DIVISOR)
     if budget.time_s is None:
-        remainder = half_of(budget.spp) - done
-        count = -(-remainder // largest)
-        progress("basis", 0, count)
-        for k in range(count):
-            yield min(largest, remainder - k * largest)
-            progress("basis", k + 1, count)
+        sizes, ahead = [], done
+        while step := budget.step(ahead, largest):
+            sizes.append(step)
+            ahead += step
+        progress("basis", 0, len(sizes))
+        for k, step in enumerate(sizes):
+            yield step
+            done += step
+            if is_enough():
+                progress("basis", len(sizes), len(sizes))
+                return
+            progress("basis", k + 1, len(sizes))
         return
     clock = Clock(budget.time_s, progress)
-    goal = math.inf if budget.until_spp is None else half_of(budget.until_spp)
-    while clock.left_s > 0 and done < goal:
-        spp = int(min(largest, goal - done))
-        yield spp
-        done += spp
+    while clock.left_s > 0 and not is_enough() and (step := budget.step(done, largest)):
+        yield step
+        done += step
         clock.report()
 
 

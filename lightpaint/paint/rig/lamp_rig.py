@@ -275,6 +275,7 @@ class LampRig:
                         seed=basis.origin.seed,
                         use_cache=subject.settings.use_cache,
                         progress=progress,
+                        as_clean_as=basis,
                     )
                 )
         with self._lock:

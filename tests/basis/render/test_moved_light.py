@@ -15,11 +15,13 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache
 from lightpaint.basis.cache import cached_render as obtain_module
 from lightpaint.basis.cache.cached_render import obtain_basis
+from lightpaint.basis.cache.plane_reuse import mean_variance
 from lightpaint.basis.file import basis_file
 from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.basis.file.basis_reader import read_basis
 from lightpaint.basis.file.file_planes import FilePlanes
 from lightpaint.basis.render.basis_render import render_basis
+from lightpaint.basis.render.noise_level import is_clean, relative_variances
 from lightpaint.basis.render.render_budget import Budget, steps
 from lightpaint.batch.distribution.basis_parts import PartwiseRender
 from lightpaint.batch.work.item_execution import run_item
@@ -37,7 +39,7 @@ from lightpaint.scene.scene_reader import load_scene
 MOVED = ('x="-0.5" y="1" z="0.5"', 'x="-0.2" y="1.2" z="0.4"')
 NAMES = tuple(LIGHTS)
 
-#: (names of lights that were rendered, samples per pixel that they came to, whether from nothing).
+#: (names of lights that were rendered, samples per pixel at which they stop, whether from nothing).
 Rendered = list[tuple[tuple[str, ...], int, bool]]
 
 
@@ -56,7 +58,8 @@ def rendered_lights(monkeypatch: pytest.MonkeyPatch) -> Rendered:
         options["progress"] = lambda _label, count, _total, *_: progress_counts.append(count)
         basis = render_basis(scene, **options)
         if progress_counts:
-            log.append((basis.names, basis.origin.spp, options.get("start") is None))
+            spp = options.get("spp") or options.get("until_spp") or basis.origin.spp
+            log.append((basis.names, spp, options.get("start") is None))
         return basis
 
     # What `obtain_basis` takes for its own must stay the same object.
@@ -125,6 +128,80 @@ def test_a_moved_lamp_is_rendered_alone(tmp_path: Path, rendered_lights: Rendere
     same_basis(obtain_basis(scene, spp=64), second)
     same_basis(obtain_basis(room(tmp_path), spp=64), first)
     assert len(rendered_lights) == 2
+
+
+def relative_variance(image: Any, noise: Any) -> float:
+    """Σ noise² / Σ light² without the noisiest thousandth of the pixels, at least one."""
+    squares = [np.square(x.astype(float)).sum(axis=-1).ravel() for x in (noise, image)]
+    quiet = np.argsort(squares[0])[: -max(1, round(squares[0].size / 1000))]
+    return float(squares[0][quiet].sum() / squares[1][quiet].sum())
+
+
+def test_a_stray_pixel_does_not_make_a_light_noisy(make_basis: Any) -> None:
+    rng = np.random.default_rng(7)
+    images = 1 + rng.random((2, 24, 20, 3))
+    noise = rng.normal(0, 0.1, images.shape)
+    images[1, 3, 4] = noise[1, 3, 4] = 1000
+    basis = make_basis(images=images, half_differences=noise)
+    expected = [relative_variance(*pair) for pair in zip(images, noise, strict=True)]
+    np.testing.assert_allclose(relative_variances(basis), expected, rtol=1e-5)
+    np.testing.assert_allclose(expected, 0.01 / (7 / 3), rtol=0.2)  # E[(1 + u)²] is 7/3
+    assert is_clean(basis, 0.006)
+    assert not is_clean(basis, 0.003)
+
+
+def test_a_moved_lamp_takes_samples_until_it_is_as_clean_as_the_others(tmp_path: Path) -> None:
+    """Shadow rays to it alone bring less noise than those that are shared, so these are fewer."""
+    rendered: list[int] = []
+
+    def render(scene: Scene, **options: Any) -> Basis:
+        basis = render_basis(scene, **options)
+        rendered.append(basis.origin.spp)
+        return basis
+
+    def variances(basis: Basis) -> dict[str, float]:
+        pairs = zip(basis.images, basis.half_differences, strict=True)
+        return dict(zip(basis.names, (relative_variance(*pair) for pair in pairs), strict=True))
+
+    obtain_basis(room(tmp_path), spp=64, render=render)
+    scene = room(tmp_path, MOVED)
+    basis = obtain_basis(scene, spp=64, render=render)
+    first, spp, _ = rendered
+    assert (first, basis.origin.spp, basis.origin.each_light) == (64, 64, ())
+    assert 16 <= spp < 64
+    others = variances(basis)
+    bulb = others.pop("bulb")
+    assert bulb <= np.mean([*others.values()])
+    # One step less is not enough.
+    fewer = render_basis(scene.only(["bulb"]), spp=spp - 8)
+    assert variances(fewer)["bulb"] > np.mean([*others.values()])
+    # It counts as one of 64 samples from now on, and each of its samples for more than one.
+    assert obtain_basis(scene, spp=64, render=render).origin == basis.origin
+    assert_agrees(obtain_basis(scene, spp=128, render=render), render_basis(scene, spp=64, seed=5))
+    assert rendered[-1] == 128
+    # A render of exactly so many takes nothing of it.
+    exact = obtain_basis(scene, spp=64, exact_spp=True, render=render)
+    same_basis(exact, obtain_basis(scene, spp=64, use_cache=False))
+
+
+def test_a_lamp_whose_light_is_not_found_gets_all_samples(tmp_path: Path) -> None:
+    lamp = '<emitter type="point" id="{}"><point name="position" x="0" y="{}" z="0"/></emitter>'
+    lights = LIGHTS["beam"]
+    obtain_basis(room(tmp_path, lights=lights), spp=16)
+    scene = room(tmp_path, lights=lights + lamp.format("far", -9))
+    rendered: dict[tuple[str, ...], int] = {}
+
+    def render(scene: Scene, **options: Any) -> Basis:
+        basis = render_basis(scene, **options)
+        rendered[basis.names] = basis.origin.spp
+        assert len(basis.lights) > 1 or options["until_variance"] > 0
+        return basis
+
+    basis = obtain_basis(scene, spp=16, render=render)
+    assert not basis.images[basis.names.index("far")].any()
+    assert rendered["far",] == 16
+    # Among black lights, nobody knows what is clean.
+    assert mean_variance(replace(basis, planes=0 * basis.images), 16) is None
 
 
 @pytest.mark.nightly
