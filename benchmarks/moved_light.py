@@ -37,7 +37,8 @@ def main() -> None:
             first, move_s, second_s = one_round(Path(folder), light)
         ratios.append((move_s / first, second_s / first))
         shares = "   ".join(f"{ratio:13.2f}" for ratio in ratios[-1])
-        print(f"{light:11s}   {first:7.1f}   {move_s:7.1f}   {second_s:7.1f}   {shares}", flush=True)
+        seconds = "   ".join(f"{time_s:7.1f}" for time_s in (first, move_s, second_s))
+        print(f"{light:11s}   {seconds}   {shares}", flush=True)
     medians = [statistics.median(column) for column in zip(*ratios, strict=True)]
     print(f"{'median':41s}   " + "   ".join(f"{ratio:13.2f}" for ratio in medians))
 
