@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices, read_only
 from lightpaint.basis.lights import Lights
+from lightpaint.basis.noise_level import relative_variances
 from lightpaint.basis.origin import Origin
 from lightpaint.basis.planes import IndirectLight, Planes, as_planes, power_and_totals
 from lightpaint.colour.color import luminance
@@ -262,6 +263,11 @@ class Basis(Shown):
     def is_fixed(self) -> Bools:
         """(n,), True for lights that stay as they are, with weight 1."""
         return self.lights.is_fixed
+
+    @cached_property
+    def relative_variances(self) -> Doubles:
+        """Σ noise² / Σ light² of each light, (n,), without stray pixels; falls as 1 / samples."""
+        return read_only(relative_variances(self.planes, self.noise))
 
     @cached_property
     def power(self) -> Doubles:

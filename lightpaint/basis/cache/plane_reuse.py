@@ -18,7 +18,6 @@ from lightpaint.basis.derived_planes import PlaneReference, compose_planes
 from lightpaint.basis.file.basis_file import is_large
 from lightpaint.basis.lights import Lights
 from lightpaint.basis.planes import IndirectLight, Planes
-from lightpaint.basis.render.noise_level import is_clean, relative_variances
 from lightpaint.basis.render.render_budget import half_of
 from lightpaint.basis.render.render_origin import ONE_PASS, basis_lights, method_of, origin_of
 from lightpaint.basis.render.separate_renders import emitters_seen
@@ -175,7 +174,7 @@ def mean_variance(basis: Basis, spp: int) -> float | None:
     more; None if none of these lights the picture.
     """
     totals = np.array([sum(light_counts[:2]) for light_counts in counts_of(basis)])
-    variances = relative_variances(basis)
+    variances = basis.relative_variances
     is_usable = (totals >= spp) & np.isfinite(variances)
     if not is_usable.any():
         return None
@@ -188,7 +187,9 @@ def as_sampled(basis: Basis, spp: int | None, variance: float | None) -> Basis:
     What follows then weighs its samples by their variance: those that are added, the choice of the
     better plane, and the count that people read. variance: from `mean_variance`.
     """
-    if spp is None or variance is None or basis.origin.spp >= spp or not is_clean(basis, variance):
+    if spp is None or variance is None or basis.origin.spp >= spp:
+        return basis
+    if (basis.relative_variances > variance).any():
         return basis
     half = half_of(spp)
     return replace(

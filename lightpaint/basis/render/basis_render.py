@@ -9,7 +9,6 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.planes import as_planes
 from lightpaint.basis.render.banded_film import BandedFilm, WholeFilm
 from lightpaint.basis.render.guide_training import train
-from lightpaint.basis.render.noise_level import is_clean
 from lightpaint.basis.render.one_pass_basis import basis_of_planes, basis_of_sums
 from lightpaint.basis.render.render_budget import Budget, Keeper, steps
 from lightpaint.basis.render.render_memory import check_memory, renders_in_bands
@@ -215,7 +214,7 @@ class _OnePassRender:
                 keeper.now_and_then(self.basis)
 
     def _is_clean(self, variance: float) -> bool:
-        return is_clean(self.basis(), variance)
+        return bool((self.basis().relative_variances <= variance).all())
 
     def even_out(self) -> None:
         """Complete the step that an interrupt left unfinished in some pixels."""

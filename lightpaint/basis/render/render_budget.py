@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.render.noise_level import LEAST_SHARE, LEAST_SPP, STEP_SHARE
 from lightpaint.errors import SceneError
 from lightpaint.progress import Progress
 from lightpaint.scene.scene_render import largest_pass, plan_passes
@@ -19,12 +18,16 @@ KEEP_EVERY_S = 30.0
 #: whole passes, and Ctrl-C has to wait for the end of one.
 PASS_DIVISOR = 4
 
+#: A render that may stop early takes at least this share of its samples and this many per pixel,
+#: since the noise of fewer is poorly known, and then looks after each further eighth.
+LEAST_SHARE, LEAST_SPP, STEP_SHARE = 1 / 4, 8, 1 / 8
+
 
 @dataclass(frozen=True)
 class Budget:
     """The budget of a basis: `spp` samples per pixel in all, or `time_s` seconds from now, in which
     a one-pass render stops at `until_spp`. It stops earlier where the relative variance of its
-    lights is `until_variance` or less (see noise_level.py).
+    lights is `until_variance` or less (`Basis.relative_variances`).
 
     Time is wall time from the first pass on. It includes compiling kernels, saving the basis and,
     in separate renders, loading the scene for every light.

@@ -36,7 +36,7 @@ class PathSums:
 
         self._loaded, self._vertices = paths.loaded, vertices
         self._values = 3 * (pixel_count or paths.size[0] * paths.size[1])
-        is_one_each = len(np.unique(vertices.pixels)) == len(vertices)
+        is_one_each = np.bincount(vertices.pixels).max(initial=0) <= 1
         mode = dr.ReduceMode.NoConflicts if is_one_each else dr.ReduceMode.Auto
         # Tracing the kernel anew for each light takes longer than running it.
         self._add = _adder(mode, vertices.pixels)
