@@ -185,8 +185,8 @@ def companion_path(basis: Basis, ending: str) -> Path:
 
 
 def companions_with(ending: str) -> list[Path]:
-    """Return all files derived from bases that have this ending. Those of no basis in the cache are
-    included; damaged folders have none.
+    """Return the cached files with this ending, also those whose basis was deleted; none if the
+    folder cannot be read.
     """
     with suppress(OSError, OutputError):
         return [path for path in folder().glob(f"*{ending}") if is_own(path)]

@@ -252,7 +252,8 @@ def read_shared_planes(basis: Basis, *, factor: int = 1) -> dict[int, tuple[Halv
             if not numbers:
                 continue
             halves, scales = file_arrays["halves"], file_arrays["scales"]
-            if halves.shape[1:] != (*blocks_in(basis.size, factor), 3):
+            shape = (*blocks_in(basis.size, factor), 3)
+            if (halves.shape[1:], halves.dtype) != (shape, np.float16):
                 continue
             for key, number in numbers.items():
                 found[missing.pop(key)] = halves[number], float(scales[number])
