@@ -93,7 +93,10 @@ class PaintedRoom:
 
 
 @pytest.fixture
-def room(browser: Any, tmp_path: Path) -> Iterator[PaintedRoom]:
+def room(browser: Any, tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[PaintedRoom]:
+    """A painted room, by default without a lights file."""
+    if lights_text := getattr(request, "param", ""):
+        (tmp_path / "room.lights.toml").write_text(lights_text, encoding="utf-8")
     context = browser.new_context(viewport={"width": 1280, "height": 720})
     page, errors = context.new_page(), []
     page.on("pageerror", lambda error: errors.append(str(error)))
@@ -223,6 +226,52 @@ def test_what_cannot_be_taken_is_said(room: PaintedRoom) -> None:
     page.mouse.click(box["x"] + 1, box["y"] + 1)
     page.wait_for_selector("text=That is outside the room")
     assert session.requests.added == {}
+
+
+#: A lights file whose beam may slide along a rail that is level.
+ON_A_RAIL = """
+[on.track]
+line = [[-0.3, 1.8, 0.5], [1.8, 1.8, 2.0]]
+
+[light.beam]
+move = { on = "track" }
+"""
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("room", [ON_A_RAIL], indirect=True)
+def test_a_number_slides_a_light_along_its_rail(room: PaintedRoom) -> None:
+    row = room.page.locator('[data-light="beam"]')
+    row.get_by_role("button", name="beam", exact=True).first.click()
+    row.get_by_label("Position x").wait_for()
+    assert row.get_by_label("Position y").is_disabled()
+    for text, expected in (("0.75", [0.75, 1.8, 1.25]), ("9", [1.8, 1.8, 2])):  # beyond its end
+        row.get_by_label("Position x").fill(text)
+        row.get_by_label("Position x").press("Enter")
+        close = pytest.approx(expected, abs=1e-6)
+        wait_until(lambda close=close: room.poses.get("beam", {}).get("position") == close)
+    room.page.wait_for_selector("text=Position x cannot be 9: it is 1.8 now")
+
+
+@pytest.mark.nightly
+def test_no_typed_number_is_lost_while_answers_wait(room: PaintedRoom) -> None:
+    page = room.page
+    row = page.locator('[data-light="beam"]')
+    row.get_by_role("button", name="beam", exact=True).first.click()
+    page.evaluate(
+        f"""() => {{
+          const {{ host }} = {PAINTER}, send = host.send.bind(host);
+          const answers = new Promise((resolve) => (window.letAnswer = resolve));
+          host.send = async (...all) => {{ await answers; return send(...all); }};
+        }}"""
+    )
+    numbers = (("Position x", 0.7), ("Position y", 1.7), ("Position z", 1.4), ("Cone", 33))
+    for label, number in numbers:
+        row.get_by_label(label).fill(str(number))
+        row.get_by_label(label).press("Enter")
+    page.evaluate("letAnswer()")
+    wait_until(lambda: room.poses.get("beam", {}).get("cutoff") == 33)
+    assert room.poses["beam"]["position"] == pytest.approx([0.7, 1.7, 1.4])
 
 
 @pytest.mark.nightly

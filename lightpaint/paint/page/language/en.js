@@ -327,6 +327,7 @@ export const en = {
     place: 'Place',
     position: 'Position',
     target: 'Target',
+    itsRailKeepsThis: '{label} slides along its rail, where this coordinate is the same everywhere',
     theAnswerNeedsNone:
       'Off in this answer, which needs no light from there. Lock its level to keep it on.',
     elevation: 'Elevation',

@@ -2,7 +2,7 @@
 
 import { html } from '../vendor/preact.js';
 import { Button, NumberField } from './controls.js';
-import { directionFrom, skyAngles } from './lamp_geometry.js';
+import { directionFrom, onRailAt, skyAngles } from './lamp_geometry.js';
 import { placeOf } from './lamp_marks.js';
 import { luminance } from './paint_colour.js';
 import { fill, words } from '../language/language.js';
@@ -81,6 +81,15 @@ function SunFields({ direction, up, move }) {
   </div>`;
 }
 
+/** How a coordinate of a light on a rail may be typed. @param {number[][]} rail both ends
+ * @param {number} c @param {string} label of the light */
+function alongRail(rail, c, label) {
+  if (!onRailAt(rail, c, rail[0][c]))
+    return { disabled: true, tip: fill(words.lampFields.itsRailKeepsThis, { label }) };
+  const ends = rail.map((end) => end[c]);
+  return { min: Math.min(...ends), max: Math.max(...ends) };
+}
+
 /** @param {{k: number, ui: Ui, app: App}} props */
 export function LampFields({ k, ui, app }) {
   const { session, store } = app;
@@ -97,6 +106,7 @@ export function LampFields({ k, ui, app }) {
     /** @type {"position" | "target"} */ key,
     /** @type {string} */ title,
     /** @type {number[] | null} */ value,
+    /** @type {number[][] | null} */ rail = null,
   ) =>
     value &&
     html`<div class="lamp-vector" role="group" aria-label=${fill(words.lampFields.of, { title, label })}>
@@ -106,9 +116,12 @@ export function LampFields({ k, ui, app }) {
           axis,
           c,
         ) => html`<${NumberField} key=${axis} label=${`${title} ${axis}`} hidden value=${value[c]}
-        figures=${4} step=${0.05} change=${(/** @type {number} */ x) =>
+        figures=${4} step=${0.05} ...${rail && alongRail(rail, c, label)}
+        change=${(/** @type {number} */ x) =>
           session.moveLamp(k, {
-            [key]: value.map((coordinate, i) => (i === c ? x : coordinate)),
+            [key]: rail
+              ? onRailAt(rail, c, x)
+              : value.map((coordinate, i) => (i === c ? x : coordinate)),
           })} />`,
       )}</div>`;
   const pointButton = (/** @type {"aim" | "highlight" | "shadow"} */ mode) => {
@@ -126,7 +139,7 @@ export function LampFields({ k, ui, app }) {
   return html`<div class="lamp-fields" data-numbers>
     <h3>${words.lampFields.place}</h3>
     ${isUnwanted && html`<p class="faint">${words.lampFields.theAnswerNeedsNone}</p>`}
-    ${vectorFields('position', words.lampFields.position, place.position)}
+    ${vectorFields('position', words.lampFields.position, place.position, place.rail)}
     ${place.position && place.direction && vectorFields('target', words.lampFields.target, place.target)}
     ${
       place.cutoff !== null &&

@@ -145,6 +145,16 @@ export function onRail([start, end], point) {
   return add(start, axis, Math.min(1, Math.max(0, share)));
 }
 
+/** Return the point of a rail at which one coordinate has a value between those of its ends; null if
+ * that coordinate is the same all along. @param {number[][]} rail both ends @param {number} c
+ * @param {number} value @returns {Vector | null} */
+export function onRailAt([start, end], c, value) {
+  const axis = subtract(end, start);
+  const length = Math.hypot(...axis);
+  if (Math.abs(axis[c]) <= 1e-6 * length) return null;
+  return add(start, axis, (value - start[c]) / axis[c]);
+}
+
 /** Return a place moved to the right, away from the camera and upwards, by these amounts.
  * @param {Camera} camera @param {number[]} place @param {number} up axis @param {number[]} amounts
  * @returns {Vector} */

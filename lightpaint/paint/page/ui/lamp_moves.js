@@ -1,6 +1,6 @@
 /**
- * Sends moves of lights: two at a time, and the newest place next, so that a drag never queues. While
- * the page draws the answer to one, the session computes that to the other.
+ * Sends moves of lights: two at a time, and the newest place of each light next, so that a drag never
+ * queues. While the page draws the answer to one, the session computes that to the other.
  */
 
 import { DraftPace } from './draft_pace.js';
@@ -21,18 +21,31 @@ export class LampMoves {
   /** @param {SessionController} session */
   constructor(session) {
     this.session = session;
-    /** @type {Move | null} */
-    this.nextMove = null;
+    /** By light. @type {Map<number, Move>} */
+    this.nextMoves = new Map();
     this.pendingCount = 0;
     this.pace = new DraftPace();
     /** Answers to moves so far. */
     this.answerCount = 0;
   }
 
-  /** Move a light. @param {number} light @param {LampRequest} request */
+  /** Move a light. Numbers that are typed while others still wait go along with them.
+   * @param {number} light @param {LampRequest} request */
   queue(light, request) {
-    this.nextMove = { light, request, isFinal: true, step: 1 };
+    const isChange = request.kind === 'move' && Object.keys(request.pose).length > 0;
+    if (!isChange) this.session.pendingPlaces.delete(light);
+    const whole = this.withEarlier(light, request);
+    this.nextMoves.set(light, { light, request: whole, isFinal: true, step: 1 });
     this.sendNext();
+  }
+
+  /** Return a request together with the numbers that wait to be sent. @param {number} light
+   * @param {LampRequest} request @returns {LampRequest} */
+  withEarlier(light, request) {
+    const earlier = this.nextMoves.get(light);
+    if (!earlier?.isFinal || earlier.request.kind !== 'move') return request;
+    if (request.kind !== 'move' || !Object.keys(request.pose).length) return request;
+    return { kind: 'move', pose: { ...earlier.request.pose, ...request.pose } };
   }
 
   /** Put a light back that is dragged. @param {number} light */
@@ -46,20 +59,21 @@ export class LampMoves {
   drag(light, request, engine) {
     const step = this.pace.nextStep(engine.minDraftStep);
     engine.dragLight(step);
-    this.nextMove = { light, request, isFinal: false, step };
+    this.nextMoves.set(light, { light, request, isFinal: false, step });
     this.sendNext();
   }
 
   sendNext() {
-    if (!this.nextMove || this.pendingCount >= MAX_PENDING) return;
-    const move = this.nextMove;
-    this.nextMove = null;
+    const [move] = this.nextMoves.values();
+    if (!move || this.pendingCount >= MAX_PENDING) return;
+    this.nextMoves.delete(move.light);
     this.pendingCount += 1;
     void this.send(move).then(() => {
       this.pendingCount -= 1;
       this.answerCount += 1;
       if (!move.isFinal) this.pace.noteAnswer(performance.now());
       this.sendNext();
+      if (!this.pendingCount) this.session.pendingPlaces.clear();
     });
   }
 

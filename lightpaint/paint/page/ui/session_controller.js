@@ -205,12 +205,17 @@ export class SessionController extends SessionLink {
     if (!areLampsMarked && !rig) void this.send('show_rig');
   }
 
-  /** Move a light. The page shows the numbers at once, so that the next one goes with them.
+  /** Move a light. The page shows the numbers at once, so that the next one goes with them, and
+   * until the session has answered, whatever else comes from there.
    * @param {number} light @param {Record<string, any>} change of its pose */
   moveLamp(light, change) {
     const { rig } = this.store.value;
     if (rig) {
-      const lights = rig.lights.map((place, k) => (k === light ? { ...place, ...change } : place));
+      // The target of a light that is infinitely far away is the direction of its light.
+      const isFar = !rig.lights[light].position && change.target;
+      const shown = isFar ? { direction: change.target } : change;
+      this.pendingPlaces.set(light, { ...this.pendingPlaces.get(light), ...shown });
+      const lights = rig.lights.map((place, k) => (k === light ? { ...place, ...shown } : place));
       this.store.set({ rig: { ...rig, lights } });
     }
     this.lampMoves.queue(light, { kind: 'move', pose: change });

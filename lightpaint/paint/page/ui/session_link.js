@@ -24,6 +24,7 @@ import { fill, words } from '../language/language.js';
 /** @typedef {import("./engine_interface.js").RGB} RGB */
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./ui_state.js").Constraints} Constraints */
+/** @typedef {import("../engine/messages.js").LightPlace} LightPlace */
 
 /** @type {(keyof HostEvents)[]} */
 const EVENT_KINDS = [
@@ -81,6 +82,8 @@ export class SessionLink {
     this.unlockedConstraints = new Map();
     /** Constraints in requests without a reply yet. @type {Map<number, Constraints>} */
     this.pendingConstraints = new Map();
+    /** Typed places in requests without a reply yet. @type {Map<number, Partial<LightPlace>>} */
+    this.pendingPlaces = new Map();
     /** The number of previews so far. */
     this.previewCount = 0;
     /** The state that the session has confirmed, to return to when it refuses a request.
@@ -227,7 +230,8 @@ export class SessionLink {
   takeRig(rig) {
     const ghosts = this.awaitsGhosts ? { ghosts: movablePlaces(rig, this.store.value.lights) } : {};
     this.awaitsGhosts = false;
-    return { rig, ...ghosts };
+    const lights = rig.lights.map((place, k) => ({ ...place, ...this.pendingPlaces.get(k) }));
+    return { rig: { ...rig, lights }, ...ghosts };
   }
 
   /** Take the result of a search for places, and the earlier places of lights.
