@@ -293,6 +293,7 @@ def _placement(
                 names.append(scenes[0].lights[movable.columns[1]].name)
             for name, new_site in zip(names, movable.sites(site), strict=True):
                 old = scenes[0].light(name).members[0].site
+                about["mirrors"] = "" if name == names[0] else names[0]
                 moves.append(Move(name, old, new_site.without_shape, **about))
     moves.sort(key=lambda move: -move.gain_share)
     additions.sort(key=lambda light: -light.gain_share)

@@ -34,12 +34,14 @@ class Move:
         name: The light.
         old: Its place, direction and cone before.
         new: The same after the move.
-        gain_share: The share of the error that it removes, given the other changes.
+        gain_share: The share of the error that it removes, given the other changes; of a pair, what
+            both remove together.
         place_error: Standard error of its place, in units of the scene; None if it did not slide.
         turn_error: The same of its direction, in degrees; None if it has none.
         is_hardly_visible: Whether the picture hardly tells where it is.
         is_slid_to_end: Whether it hangs at the edge of the places that it may have.
         is_turned_to_end: Whether it turned by all that it may.
+        mirrors: The light of its pair whose mirror image it is; "" if it is no image.
 
     Examples:
         >>> solution, scene = lp.solve(basis, target), lp.load_scene("room.xml")
@@ -57,6 +59,7 @@ class Move:
     is_hardly_visible: bool = False
     is_slid_to_end: bool = False
     is_turned_to_end: bool = False
+    mirrors: str = ""
 
     @property
     def distance(self) -> float:
@@ -94,6 +97,13 @@ class Move:
         is_noticeable = round(new.beam or 0.0) != round(old.beam or 0.0)
         return is_noticeable and abs(_beam_share(new) - _beam_share(old)) >= LEAST_BEAM_CHANGE
 
+    @property
+    def shared_gain(self) -> str:
+        """The gain of a mirror image in words; "" for other lights."""
+        return f"the mirror image of {self.mirrors}, whose gain is that of both" * bool(
+            self.mirrors
+        )
+
     def __str__(self) -> str:
         done = []
         if self.turn >= 0.5:
@@ -104,7 +114,7 @@ class Move:
             done.append(f"cone {self.old.cutoff:.0f}° to {self.new.cutoff:.0f}°")
         if self.has_other_edge:
             done.append(f"beam {self.old.beam:.0f}° to {self.new.beam:.0f}°")
-        gain = f"{_percent(self.gain_share)} of what was missed"
+        gain = self.shared_gain or f"{_percent(self.gain_share)} of what was missed"
         return _with_advice(f"{self.name}: {', '.join(done)}: {gain}", self)
 
 

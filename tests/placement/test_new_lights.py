@@ -11,6 +11,7 @@ from renderer import write_room
 
 import lightpaint as lp
 from lightpaint.errors import SceneError
+from lightpaint.pipeline.results.placement_changes import spoken_change
 from lightpaint.placement.new_lights import Mirror
 from lightpaint.scene.lights.new_emitter import NewEmitter
 from lightpaint.scene.scene import Scene
@@ -195,6 +196,14 @@ def test_a_pair_stays_a_mirror_image(tmp_path: Path) -> None:
     a, b = (np.array(site.position, dtype=float) for site in sites)
     assert a * (-1, 1, 1) == pytest.approx(b, abs=1e-6)
     assert a == pytest.approx((-0.9, 0.9, 0.5), abs=0.08)
+    # What both remove is told once.
+    leader, image = placement.moves
+    assert (leader.name, leader.mirrors, image.mirrors) == ("left", "", "left")
+    assert image.gain_share == leader.gain_share
+    for tell in (str, spoken_change):
+        assert "of what was missed" in tell(leader)
+        assert "of what was missed" not in tell(image)
+        assert "the mirror image of left, whose gain is that of both" in tell(image)
 
 
 def test_mirrors() -> None:

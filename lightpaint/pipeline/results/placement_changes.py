@@ -48,14 +48,15 @@ def _change_of(change: Move | AddedLight) -> LightChange:
 
 def spoken_change(change: Move | AddedLight) -> str:
     """Return a light's change and gain: `spot_knot turned by 12°, slid by 0.6: a fifth …`."""
+    gain = f"{spoken_fraction(change.gain_share)} of what was missed"
     if isinstance(change, Move):
-        phrase = spoken_move(change)
+        phrase, gain = spoken_move(change), change.shared_gain or gain
     else:
         x, y, z = (f"{v:.2f}" for v in change.site.position or (0.0, 0.0, 0.0))
         phrase = f"is a new {change.emitter.kind} at ({x}, {y}, {z})".replace("-", "−")
         if change.place_error:
             phrase += f" ± {rounded_text(change.place_error, 1)}"
-    text = f"{change.name} {phrase}: {spoken_fraction(change.gain_share)} of what was missed"
+    text = f"{change.name} {phrase}: {gain}"
     return f"{text}; {HARDLY_VISIBLE}" if change.is_hardly_visible else text
 
 
