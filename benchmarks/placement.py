@@ -101,7 +101,7 @@ def one_room(folder: Path, kind: str, seed: int, *, with_rivals: bool) -> tuple[
     basis = lp.render_basis(scene, spp=BASIS_SPP, seed=3)
     solution = lp.solve(basis, lp.Target.of(painted), space="linear", hold=0)
     start, waited = cpu_s(), time.perf_counter()
-    new = [lp.NewLights(kind, count=3)]
+    new = [lp.NewLights(kind, count=3, in_view=True)]
     placement = lp.place(scene, basis, solution, new=new, seed=seed)
     seconds, waited = cpu_s() - start, time.perf_counter() - waited
     found_pair = verifications(placement.scene, solution, folder)

@@ -38,7 +38,8 @@ class NewLights:
         freedom: Where they may hang; without a place, in all free space. Spots and panels point
             anywhere unless `aim` says otherwise, as degrees from straight ahead of `like`.
         apart: Least distance from each other, in units of the scene.
-        in_view: False for places that the camera does not see.
+        in_view: False for places that the camera does not see, True for any. None: any for points
+            and spots, which are not seen themselves, and unseen ones for panels, which are.
         name: Their name, numbered if there are several, as in new_1.
         size: Smallest and largest side of panels; None for sides that suit the room.
 
@@ -55,9 +56,13 @@ class NewLights:
     count: int = 3
     freedom: Freedom = field(default_factory=Freedom)
     apart: float = 0.0
-    in_view: bool = True
+    in_view: bool | None = None
     name: str = "new"
     size: tuple[float, float] | None = None
+
+    def is_kept_out_of_view(self, kind: NewKind) -> bool:
+        """Return whether lights of that kind may hang only where the camera does not see them."""
+        return kind == "panel" if self.in_view is None else not self.in_view
 
     def __post_init__(self) -> None:
         if self.kind not in get_args(NewKind):

@@ -13,6 +13,7 @@ import lightpaint as lp
 from lightpaint.errors import SceneError
 from lightpaint.pipeline.results.placement_changes import spoken_change
 from lightpaint.placement.new_lights import Mirror
+from lightpaint.placement.space.free_space import seen_by_camera
 from lightpaint.scene.lights.new_emitter import NewEmitter
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
@@ -93,6 +94,22 @@ def test_a_panel_is_found_by_its_flux(room: Scene, basis: lp.Basis) -> None:
     assert light.flux[1] / away[0] ** 2 == pytest.approx(60 * 0.16 * np.pi / away[1] ** 2, rel=0.2)
     [panel] = [x for x in placement.scene.emitters if x.name == "new"]
     assert panel.plugin == "area"
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("in_view", [None, True])
+def test_a_panel_is_hung_in_the_picture_only_on_request(
+    room: Scene, basis: lp.Basis, in_view: bool | None
+) -> None:
+    """The painting has one that the camera sees; a person rather paints its light on walls."""
+    pose = lp.Pose(position=(-0.3, 1.2, 0.3), target=(-0.1, 0.9, 2.0))
+    true = NewEmitter("true", "panel", pose, size=(0.3, 0.3), emission=(60, 60, 60))
+    painted = room.with_new_emitters([true])
+    new = lp.NewLights("panel", count=1, in_view=in_view)
+    placement = lp.place(room, basis, solved(basis, painted), new=[new])
+    places = np.array([place_of(light) for light in placement.additions]).reshape(-1, 3)
+    seen = room.while_loaded(lambda loaded: seen_by_camera(room, loaded, places))
+    assert seen.tolist() == ([True] if in_view else [False] * len(places))
 
 
 def test_nothing_is_added_where_nothing_is_missed(room: Scene, basis: lp.Basis) -> None:

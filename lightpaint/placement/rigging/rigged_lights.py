@@ -156,7 +156,7 @@ def _new_lights(table: Mapping[str, Any], where: str, scene: Scene, rigging: Rig
             count=table.get("count", 1),
             freedom=Freedom(**places, **_turns(table)),
             apart=table.get("apart", 0.0),
-            in_view=table.get("in_view", True),
+            in_view=table.get("in_view"),
             name=table.get("name", f"new_{like or table['kind']}"),
             size=(size, size) if isinstance(size, int | float) else size,
         )

@@ -6,7 +6,9 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Floats
 from lightpaint.placement.movable import Movable
+from lightpaint.placement.paths.panel_site import PanelSite
 from lightpaint.placement.paths.view_paths import SearchPaths
+from lightpaint.scene.lights.new_emitter import NewKind
 from lightpaint.scene.properties.pose import Site
 
 
@@ -34,7 +36,7 @@ class PoseRules:
                 ).all()
             ):
                 return False
-            if not group.in_view and self._paths.in_view(place).any():
+            if _is_kept_out_of_view(movable) and self._in_view(site, place).any():
                 return False
         return True
 
@@ -43,9 +45,16 @@ class PoseRules:
         clear = movable.light.freedom.clear
         # Lights on a surface keep the requested distance from it.
         is_usable = self._paths.usable(places, None if clear is None else 0.9 * clear)
-        if movable.group is not None and not movable.group.in_view:
-            is_usable &= ~self._paths.in_view(places)
+        if _is_kept_out_of_view(movable):
+            is_usable &= ~self._in_view(movable.light.site, places)
         return is_usable
+
+    def _in_view(self, site: Site, places: Floats) -> Bools:
+        """Return at which places, (k,), a light is seen; of a panel, what surrounds its centre."""
+        side = site.side if isinstance(site, PanelSite) else 0.0
+        around = np.vstack([np.zeros((1, 3)), side / 2 * np.eye(3), -side / 2 * np.eye(3)])
+        seen = self._paths.in_view((places[:, None] + around).reshape(-1, 3))
+        return np.asarray(seen.reshape(len(places), -1).any(axis=1))
 
     def keep_apart(
         self,
@@ -63,3 +72,8 @@ class PoseRules:
                 away = np.linalg.norm(places - np.array(site.position), axis=1)
                 is_apart &= away >= movable.group.apart
         return is_apart
+
+
+def _is_kept_out_of_view(movable: Movable) -> bool:
+    kind: NewKind = "panel" if isinstance(movable.light.site, PanelSite) else "point"
+    return movable.group is not None and movable.group.is_kept_out_of_view(kind)
