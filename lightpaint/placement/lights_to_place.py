@@ -271,7 +271,7 @@ def _first_position(
     """Return a free place that a new light may have. Raises NoPlaceError if none is found."""
     tested = places.random(TESTED, np.random.default_rng(seed))
     is_free = paths.usable(tested, None if freedom.clear is None else 0.9 * freedom.clear)
-    if light.group.is_kept_out_of_view(light.kind):
+    if light.group.is_kept_out_of_view(is_panel=light.kind == "panel"):
         is_free &= ~paths.in_view(tested)
     if not is_free.any():
         raise NoPlaceError(_no_place(f"new light {light.name!r}"))

@@ -60,9 +60,11 @@ class NewLights:
     name: str = "new"
     size: tuple[float, float] | None = None
 
-    def is_kept_out_of_view(self, kind: NewKind) -> bool:
-        """Return whether lights of that kind may hang only where the camera does not see them."""
-        return kind == "panel" if self.in_view is None else not self.in_view
+    def is_kept_out_of_view(self, *, is_panel: bool) -> bool:
+        """Return whether they may hang only where the camera does not see them. is_panel: whether
+        they are panels, which `like` may decide.
+        """
+        return is_panel if self.in_view is None else not self.in_view
 
     def __post_init__(self) -> None:
         if self.kind not in get_args(NewKind):

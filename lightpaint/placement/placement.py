@@ -100,9 +100,9 @@ class Move:
     @property
     def shared_gain(self) -> str:
         """The gain of a mirror image in words; "" for other lights."""
-        return f"the mirror image of {self.mirrors}, whose gain is that of both" * bool(
-            self.mirrors
-        )
+        if not self.mirrors:
+            return ""
+        return f"the mirror image of {self.mirrors}, whose gain is that of both"
 
     def __str__(self) -> str:
         done = []

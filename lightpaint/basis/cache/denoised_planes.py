@@ -187,9 +187,10 @@ def obtain_denoised_planes(basis: Basis, *, factor: int = 1) -> DenoisedPlanes |
     pixels = len(basis.lights) * basis.size[0] * basis.size[1]
     if pixels < MIN_PIXELS or not oidn_is_installed():
         return None
-    planes = read_denoised_planes(basis, factor=factor)
+    keys = _content_keys(basis)
+    planes = _read(basis, keys, factor)
     if planes is None:
-        shared = read_shared_planes(basis, factor=factor)
+        shared = _read_shared(basis, keys, factor)
         pairs = [
             shared[k] if k in shared else denoise_to_halves(basis, k, factor)
             for k in range(len(basis.lights))
@@ -200,7 +201,7 @@ def obtain_denoised_planes(basis: Basis, *, factor: int = 1) -> DenoisedPlanes |
             planes = DenoisedPlanes.of(basis, *denoised)
         else:
             planes = DenoisedPlanes(*denoised, denoise_current_look(replace(basis, former=None)))
-        cache_denoised_planes(basis, planes)
+        _write(basis, keys, planes)
     return planes
 
 
@@ -217,12 +218,16 @@ def read_denoised_planes(basis: Basis, *, factor: int = 1) -> DenoisedPlanes | N
 
     factor: side of blocks; planes of such blocks are accepted as well as whole planes.
     """
+    return _read(basis, _content_keys(basis), factor)
+
+
+def _read(basis: Basis, keys: list[str], factor: int) -> DenoisedPlanes | None:
     with suppress(*_READ_ERRORS, LightpaintError):
         path = cache.companion_path(basis, DENOISED_SUFFIX)
         if not is_own(path):
             return None
         with path.open("rb") as file, np.load(file, allow_pickle=False) as file_arrays:
-            if file_arrays["made_of"].tolist() != _content_keys(basis):
+            if file_arrays["made_of"].tolist() != keys:
                 return None
             planes = DenoisedPlanes(*(file_arrays[name] for name in ARRAY_NAMES))
         arrays: list[Any] = [planes.halves, planes.scales, planes.current]
@@ -237,18 +242,16 @@ def read_denoised_planes(basis: Basis, *, factor: int = 1) -> DenoisedPlanes | N
     return None
 
 
-def read_shared_planes(basis: Basis, *, factor: int = 1) -> dict[int, tuple[Halves, float]]:
-    """Return cached denoised planes of single lights, whichever basis they were denoised for.
-
-    The keys are the numbers of the lights in `basis`; the values have the form of
-    `denoise_to_halves`.
+def _read_shared(basis: Basis, keys: list[str], factor: int) -> dict[int, tuple[Halves, float]]:
+    """Return cached denoised planes of single lights, whichever basis they were denoised for: by
+    their numbers in `basis`, in the form of `denoise_to_halves`.
     """
-    missing = {key: k for k, key in enumerate(_content_keys(basis)[:-1])}
+    missing = {key: k for k, key in enumerate(keys[:-1])}
     found: dict[int, tuple[Halves, float]] = {}
     for path in cache.companions_with(DENOISED_SUFFIX):
         with suppress(*_READ_ERRORS), path.open("rb") as file, np.load(file) as file_arrays:
-            keys = file_arrays["made_of"].tolist()[:-1]
-            numbers = {key: number for number, key in enumerate(keys) if key in missing}
+            made_of = file_arrays["made_of"].tolist()[:-1]
+            numbers = {key: number for number, key in enumerate(made_of) if key in missing}
             if not numbers:
                 continue
             halves, scales = file_arrays["halves"], file_arrays["scales"]
@@ -262,10 +265,14 @@ def read_shared_planes(basis: Basis, *, factor: int = 1) -> dict[int, tuple[Halv
 
 def cache_denoised_planes(basis: Basis, planes: DenoisedPlanes) -> bool:
     """Store denoised planes of `basis`. Returns whether that worked: if not, nothing is lost."""
+    return _write(basis, _content_keys(basis), planes)
+
+
+def _write(basis: Basis, keys: list[str], planes: DenoisedPlanes) -> bool:
     try:
         path = cache.companion_path(basis, DENOISED_SUFFIX)
         with replacing(path) as place, place.open("wb") as file:
-            made_of = np.array(_content_keys(basis))
+            made_of = np.array(keys)
             arrays = (planes.halves, planes.scales, planes.current)
             parts: dict[str, Any] = dict(zip(ARRAY_NAMES, arrays, strict=True))
             np.savez(file, made_of=made_of, **parts)

@@ -108,7 +108,7 @@ def steps(
 
     def is_enough() -> bool:
         variance = budget.until_variance
-        return variance is not None and done >= budget.least and is_clean(variance)
+        return variance is not None and budget.least <= done < budget.goal and is_clean(variance)
 
     largest = largest_pass(pixels, shorter=PASS_DIVISOR)
     if budget.time_s is None:
@@ -120,10 +120,10 @@ def steps(
         for k, step in enumerate(sizes):
             yield step
             done += step
-            if is_enough():
-                progress("basis", len(sizes), len(sizes))
+            has_ended = is_enough()
+            progress("basis", len(sizes) if has_ended else k + 1, len(sizes))
+            if has_ended:
                 return
-            progress("basis", k + 1, len(sizes))
         return
     clock = Clock(budget.time_s, progress)
     while clock.left_s > 0 and not is_enough() and (step := budget.step(done, largest)):

@@ -8,7 +8,6 @@ from lightpaint.arrays import Bools, Floats
 from lightpaint.placement.movable import Movable
 from lightpaint.placement.paths.panel_site import PanelSite
 from lightpaint.placement.paths.view_paths import SearchPaths
-from lightpaint.scene.lights.new_emitter import NewKind
 from lightpaint.scene.properties.pose import Site
 
 
@@ -51,8 +50,9 @@ class PoseRules:
 
     def _in_view(self, site: Site, places: Floats) -> Bools:
         """Return at which places, (k,), a light is seen; of a panel, what surrounds its centre."""
-        side = site.side if isinstance(site, PanelSite) else 0.0
-        around = np.vstack([np.zeros((1, 3)), side / 2 * np.eye(3), -side / 2 * np.eye(3)])
+        around = np.zeros((1, 3))
+        if isinstance(site, PanelSite):
+            around = np.vstack([around, site.side / 2 * np.eye(3), -site.side / 2 * np.eye(3)])
         seen = self._paths.in_view((places[:, None] + around).reshape(-1, 3))
         return np.asarray(seen.reshape(len(places), -1).any(axis=1))
 
@@ -75,5 +75,5 @@ class PoseRules:
 
 
 def _is_kept_out_of_view(movable: Movable) -> bool:
-    kind: NewKind = "panel" if isinstance(movable.light.site, PanelSite) else "point"
-    return movable.group is not None and movable.group.is_kept_out_of_view(kind)
+    group, is_panel = movable.group, isinstance(movable.light.site, PanelSite)
+    return group is not None and group.is_kept_out_of_view(is_panel=is_panel)
