@@ -1,5 +1,6 @@
 """A painting prepared for the solve: linear pixels with their weights."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.keywords import keywords
 from lightpaint.target.target_pixels import TargetPixels
+from lightpaint.target.wish import Wish
 
 #: Negative luminance that resampling leaves beside bright edges, as a share of the brightest.
 NEGATIVE = 1e-3
@@ -54,6 +56,8 @@ class Target(Shown):
         files: The files that it was read from: the painting first, then mask and template.
         full_size_share: `painted_share` of the painting as it was read; None if it has not been
             cropped or averaged since.
+        wishes: Its parts that ask for something of their own, the lowest first; empty where it has
+            no layers, and `find_wishes` tells them apart.
 
     Examples:
         >>> image = np.full((16, 16, 3), 0.5)
@@ -79,6 +83,7 @@ class Target(Shown):
     reads_emitters: bool = True
     files: tuple[Path, ...] = ()
     full_size_share: float | None = None
+    wishes: tuple[Wish, ...] = ()
 
     def __post_init__(self) -> None:
         if self.image.shape != (*self.importance.shape, 3):
@@ -90,6 +95,11 @@ class Target(Shown):
             raise SizeError(
                 f"{titled(self.name)}: image {self.image.shape} and at_least {self.at_least.shape} "
                 "differ in size"
+            )
+        if any(wish.area.shape != self.importance.shape for wish in self.wishes):
+            raise SizeError(
+                f"{titled(self.name)}: a wish of another size than its importance, "
+                f"{self.importance.shape}"
             )
         if lost_count := int((~np.isfinite(self.image).all(axis=-1)).sum()):
             raise TargetError(
@@ -185,11 +195,16 @@ class Target(Shown):
         """
         if size == self.size:
             return self
-        return self._with_pixels(self._pixels.resampled(size))
+        return self._with_pixels(
+            self._pixels.resampled(size), [wish.resized(size) for wish in self.wishes]
+        )
 
     def cropped(self, height: int, width: int) -> "Target":
         """Return the top left part of the target, of this size."""
-        return self._with_pixels(self._pixels.cropped(height, width))
+        return self._with_pixels(
+            self._pixels.cropped(height, width),
+            [wish.cropped(height, width) for wish in self.wishes],
+        )
 
     def reduced(self, factor: int) -> "Target":
         """Return the target averaged over blocks of factor × factor pixels, weighted by importance.
@@ -199,15 +214,18 @@ class Target(Shown):
         """
         if factor == 1:
             return self
-        return self._with_pixels(self._pixels.averaged(factor))
+        return self._with_pixels(
+            self._pixels.averaged(factor), [wish.reduced(factor) for wish in self.wishes]
+        )
 
     @property
     def _pixels(self) -> TargetPixels:
         return TargetPixels(self.image, self.importance, self.at_least)
 
-    def _with_pixels(self, pixels: TargetPixels) -> "Target":
-        """Return the target with its pixels at another size."""
-        return replace(self, **pixels._asdict(), full_size_share=self.painted_share)
+    def _with_pixels(self, pixels: TargetPixels, wishes: Sequence[Wish]) -> "Target":
+        """Return the target with its pixels and wishes at another size."""
+        share = self.painted_share
+        return replace(self, **pixels._asdict(), full_size_share=share, wishes=tuple(wishes))
 
     def without(self, holes: npt.NDArray[np.bool_]) -> "Target":
         """Return the target with importance 0 in the pixels `holes`, (h, w), which the basis

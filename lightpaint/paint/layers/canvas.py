@@ -180,6 +180,7 @@ class Canvas:
             transform=transform,
             through_view=is_sketch,
             over_look=is_sketch,
+            wishes=self._layers.wishes(),
         )
 
     def put(self, layer: int, region: Region, pixels: Pixels) -> None:

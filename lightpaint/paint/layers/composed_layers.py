@@ -23,6 +23,7 @@ from lightpaint.paint.layers.lower_layers import LowerLayers
 from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
 from lightpaint.paint.store.history_steps import Patch, Step
 from lightpaint.paint.store.stored_compositions import StoredComposition
+from lightpaint.target.wish import Wish, separate
 
 #: Importance of the rest of a fully painted picture relative to one layer, and the largest accent,
 #: which compensates for a layer over a fortieth of the picture.
@@ -102,6 +103,34 @@ class ComposedLayers:
     def accent(self, number: int) -> float:
         """Return the accent of a layer; 1 for a hidden one."""
         return next((shown.accent for shown in self._shown if shown.layer.id == number), 1.0)
+
+    def wishes(self) -> tuple[Wish, ...]:
+        """Return what each visible layer covers and no layer above it, the lowest first."""
+        shown = [x for x in self._shown if x.layer.kind != "weigh"]
+        areas = [self._coverage(x) for x in shown]
+        return tuple(
+            Wish(
+                self._stack[x.layer.id].name,
+                area,
+                layer=x.layer.id,
+                group=self._group_name(x.layer.id),
+                has_strokes=x.layer.kind in ("pixels", "paint"),
+            )
+            for x, area in zip(shown, separate(areas), strict=True)
+            if area.any()
+        )
+
+    def _coverage(self, shown: ShownLayer) -> Floats:
+        """Return how much of each pixel a layer covers, (h, w) from 0 to 1."""
+        coverage = np.zeros(self.size, np.float32)
+        if not is_empty(bounds := shown.pixels.bounds):
+            coverage[slices(bounds)] = np.minimum(shown.pixels.coverage(bounds), 1)
+        return coverage
+
+    def _group_name(self, number: int) -> str:
+        """Return the name of the group of a layer; "" for one without."""
+        group = self._stack[number].group
+        return "" if group is None else self._stack[group].name
 
     def composition(self) -> StoredComposition:
         """Return a copy of the target, and what is known of the layers without their pixels."""
