@@ -1,0 +1,109 @@
+"""The wishes in a painting without layers: its strokes, and places that ask for something else.
+
+A person who repaints a whole picture darker and three figures in it brighter has asked for four
+things. They lie in one picture; what tells them apart is what is asked: the ratio of the painting
+to the current look, in stops of each channel.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from scipy.ndimage import binary_dilation, gaussian_filter, label
+
+from lightpaint.arrays import Bools, Doubles, Floats
+from lightpaint.colour.color import luminance
+from lightpaint.target.target import Target
+from lightpaint.target.wish import Wish
+
+#: Stops by which a place must ask for something else than what is around it, to be a wish.
+DISTINCT_STOPS = 0.5
+
+#: Least share of the picture of a wish, and largest share of the paint of one within other paint.
+MIN_SHARE, MAX_INNER_SHARE = 0.001, 0.5
+
+#: Largest number of wishes in one layer; places that ask for less stay with their surroundings.
+MAX_WISHES = 8
+
+#: Radius over which the ratio is averaged, and that joins strokes, in widths of the picture.
+SMOOTHING, JOINING = 1 / 160, 1 / 80
+
+#: Light below which a ratio says little, relative to the mean of the look.
+DARK = 0.01
+
+#: Importance, or coverage, that counts as painted.
+PAINTED = 0.02
+
+
+def find_wishes(target: Target, current_look: Floats) -> tuple[Wish, ...]:
+    """Return the wishes of a painting, the lowest first, with separate strokes told apart.
+
+    current_look: (h, w, 3) linear, the current look at the size of the target. The areas of all
+    wishes together add up to at most 1 in each pixel.
+    """
+    layers = target.wishes or (
+        Wish(target.name, np.minimum(target.importance, 1), has_strokes=True),
+    )
+    wishes: list[Wish] = []
+    for layer in layers:
+        wishes += _split(layer, target, current_look) if layer.has_strokes else [layer]
+    return tuple(wishes)
+
+
+def asked_ratio(target: Target, current_look: Floats) -> Doubles:
+    """Return what is asked for in stops of each channel, (h, w, 3), as a wash.
+
+    current_look: (h, w, 3) linear. 0 where the painting is the look, or where both are black.
+    """
+    dark = DARK * float(np.mean(current_look))
+    asked, now = (np.maximum(x, 0).astype(np.float64) + dark for x in (target.image, current_look))
+    ratio = np.log2(asked / now) if dark else np.zeros(asked.shape)
+    radius = SMOOTHING * ratio.shape[1]
+    counts = (target.importance > 0).astype(np.float64)
+    total = gaussian_filter(counts, radius)
+    wash = np.dstack([gaussian_filter(x * counts, radius) for x in np.moveaxis(ratio, -1, 0)])
+    return np.asarray(
+        np.where(total > 0, 1, 0)[..., None] * wash / np.maximum(total, 1e-6)[..., None]
+    )
+
+
+def _split(layer: Wish, target: Target, current_look: Floats) -> Iterator[Wish]:
+    """Split a layer into its strokes, and these into places that ask for something else."""
+    painted = (layer.area >= PAINTED) & (target.importance > 0)
+    ratio = asked_ratio(target, current_look)
+    least = MIN_SHARE * painted.size
+    strokes = [
+        x for x in _connected(painted, round(JOINING * painted.shape[1])) if x.sum() >= least
+    ]
+    if not strokes:
+        yield layer
+        return
+    owner, parts = np.zeros(painted.shape, int), 0
+    for stroke in sorted(strokes, key=lambda x: -int(x.sum()))[:MAX_WISHES]:
+        parts += 1
+        owner[stroke] = parts
+        for place in _distinct_places(stroke, ratio, least)[: MAX_WISHES - parts]:
+            parts += 1
+            owner[place] = parts
+    for k in range(1, parts + 1):
+        area = np.where(owner == k, layer.area, 0).astype(np.float32)
+        yield replace(layer, area=area)
+
+
+def _distinct_places(stroke: Bools, ratio: Doubles, least: float) -> list[Bools]:
+    """Return connected places in a stroke that ask for something else than most of it, (h, w)
+    each, those that ask for most first.
+    """
+    usual = np.median(ratio[stroke], axis=0)
+    differs = np.abs(luminance(ratio - usual)) > DISTINCT_STOPS
+    differs |= np.ptp(ratio - usual, axis=-1) > DISTINCT_STOPS
+    places = [x for x in _connected(stroke & differs, 0) if x.sum() >= least]
+    places = [x for x in places if x.sum() <= MAX_INNER_SHARE * stroke.sum()]
+    return sorted(places, key=lambda x: -float(np.abs(ratio[x] - usual).sum()))
+
+
+def _connected(mask: Bools, radius: int) -> list[Bools]:
+    """Return the connected parts of a mask, joined over gaps up to about twice a radius."""
+    wide = binary_dilation(mask, iterations=radius) if radius > 0 else mask
+    parts, count = label(wide, np.ones((3, 3)))
+    return [mask & (parts == k) for k in range(1, count + 1)]
