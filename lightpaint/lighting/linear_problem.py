@@ -13,6 +13,7 @@ from lightpaint.display_text import short_repr
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.white_lights import whiten_open_lights
 from lightpaint.lighting.fit import Fit
+from lightpaint.lighting.loss.expected_lights import ExpectedLights
 from lightpaint.lighting.loss.image_prior import image_prior
 from lightpaint.lighting.loss.weight_penalty import weight_pull
 from lightpaint.lighting.normal_equations import NormalEquations
@@ -29,7 +30,7 @@ class LinearProblem:
     equations: M and b of the squares; corrected: the same without the share `noise_removed` of the
     noise, None if none was removed. constraints: on the lights. reduction: the unknowns that these
     leave; full: the same with the lights that `sparse` has not chosen. fit: with nothing left open.
-    dimming: see `weight_pull`. tether: a further pull on the weights, to lights at other frames;
+    expected: see `weight_pull`. tether: a further pull on the weights, to lights at other frames;
     None for a problem that stands alone.
     """
 
@@ -40,7 +41,7 @@ class LinearProblem:
     reduction: Reduction
     full: Reduction
     fit: Fit
-    dimming: Doubles | None
+    expected: ExpectedLights | None
     tether: NormalEquations | None
 
     if TYPE_CHECKING:  # properties of one kind of problem, fields of the other
@@ -108,10 +109,10 @@ class LinearProblem:
 
     @cached_property
     def pull(self) -> NormalEquations | None:
-        """The penalty for leaving the current lighting, its colours, or the lights at other frames;
+        """The penalty for leaving the current lighting, expected colours, or the lights at other frames;
         None if there is none.
         """
-        prior = image_prior(self.lights, self.power, self.fit, self.painted_share)
+        prior = image_prior(self.lights, self.power, self.fit, self.painted_share, self.expected)
         pull = weight_pull(
             self.power,
             self.lights.current_weights,
@@ -119,7 +120,7 @@ class LinearProblem:
             prefer_current=self.constraints.prefer_current,
             painted_share=self.painted_share,
             keeps_color=self.keeps_color,
-            dimming=self.dimming,
+            expected=self.expected,
         )
         pulls = [x for x in (pull, prior, self.tether) if x is not None]
         return reduce(add, pulls) if pulls else None
@@ -163,7 +164,7 @@ class SummedProblem(LinearProblem):
     spp: int | None = None
     corrected: NormalEquations | None = None
     noise_removed: float = 0.0
-    dimming: Doubles | None = None
+    expected: ExpectedLights | None = None
     tether: NormalEquations | None = None
 
     __repr__ = short_repr

@@ -21,6 +21,7 @@ from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.fit import Fit, Space, resolve_for_targets
 from lightpaint.lighting.joined_views import Views, joint_basis
 from lightpaint.lighting.linear_problem import LinearProblem, reduce_lights
+from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash
 from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.loss import Loss, Squares
 from lightpaint.lighting.loss.painting import (
@@ -79,8 +80,8 @@ class Problem(LinearProblem):
         corrected: The equations without that share of the noise; None if none was removed.
         noise_removed: The share of the noise in `equations` that `corrected` lacks.
         refinement: The last step that improved an answer, if there was one.
-        dimming: (n,), the factor by which an earlier answer dims lights, which strengthens the
-            pull to their colours; None without one.
+        expected: The lights that the paintings let one expect, where lights keep to them; None
+            where they may take any colour.
         block_side: Pixels along the side of the blocks behind `corrected`; 1 for single pixels.
         tether: A further pull on the weights, to those at other frames of a shot; None without.
 
@@ -103,7 +104,7 @@ class Problem(LinearProblem):
     corrected: NormalEquations | None = None
     noise_removed: float = 0.0
     refinement: Refinement | None = None
-    dimming: Doubles | None = None
+    expected: ExpectedLights | None = None
     block_side: int = 1
     tether: NormalEquations | None = None
 
@@ -154,6 +155,7 @@ class Problem(LinearProblem):
             full=reduction,
             start=whole.current_weights if start is None else start,
             fit=fit,
+            expected=expected_for(views, fit),
         )
 
     @property
@@ -270,6 +272,14 @@ def _resolve_views(
         for target, basis in zip(fitted, bases, strict=True)
     )
     return Views(bases, tuple(resolved)), fit
+
+
+def expected_for(views: Views, fit: Fit) -> ExpectedLights | None:
+    """Return the lights that paintings let one expect; None if `fit` leaves colours free."""
+    if fit.colors != "gentle":
+        return None
+    washes = [Wash.of(*view) for view in zip(views.bases, views.targets, strict=True)]
+    return ExpectedLights.of(Wash.joined(washes), views.bases[0].current_weights)
 
 
 def gamuts_for(basis: Basis, views: Views, fit: Fit) -> Gamuts | None:

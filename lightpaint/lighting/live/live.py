@@ -26,15 +26,11 @@ from lightpaint.lighting.fit import Fit, Space
 from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.live.live_sums import MAX_FILM_PIXELS, Films, SmallFilm
 from lightpaint.lighting.live.live_view import LiveView
+from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash
 from lightpaint.lighting.loss.image_prior import image_prior
 from lightpaint.lighting.loss.painting import unpainted_weight
 from lightpaint.lighting.loss.pixel_bins import block_side
-from lightpaint.lighting.loss.weight_penalty import (
-    dimming_factors,
-    pull_to_current,
-    strengthen,
-    weight_pull,
-)
+from lightpaint.lighting.loss.weight_penalty import pull_to_current, weight_pull
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.gamut_bounds import solve_near_sides
 from lightpaint.lighting.unknowns.gamuts import Gamuts, PaintedLight
@@ -56,11 +52,6 @@ WHITE_WIDTH = 8
 #: Painted pixels that determine the colours lights may take, about.
 GAMUT_PIXELS = 2**8
 
-#: A pull on the weights, if there is one.
-_Pull = NormalEquations | None
-#: Views, with the pulls to the current lighting and to its colours, and what images should be.
-_Pulls = tuple[tuple[LiveView, ...], _Pull, _Pull, _Pull]
-
 
 class LiveSolver:
     """The lighting for paintings that change under a brush, updated in place.
@@ -79,7 +70,6 @@ class LiveSolver:
         """Change fit and constraints. Raises ConstraintError for impossible ones."""
         reduction = reduce_lights(constraints, self._basis.lights, fit)
         self._fit, self._constraints, self._reduction = fit, constraints, reduction
-        self._pulls: _Pulls | None = None
         self._untouched: Doubles | None = None
         self._within, self._gamuts_of = reduction, tuple[LiveView, ...]()
         self._is_kept_to = False  # whether the last answer kept to the constraints
@@ -92,7 +82,7 @@ class LiveSolver:
         Returns the first view's basis.
         """
         self._basis = self._views[0].basis
-        self._pulls, self._untouched, self._gamuts_of = None, None, ()
+        self._untouched, self._gamuts_of = None, ()
         if self._films is not None:
             self._films[1].join()
         return self._basis
@@ -102,7 +92,7 @@ class LiveSolver:
         for view in self._views:
             if self.mode == "linear":
                 view.tiles()
-            else:
+            if self.mode != "linear" or self._fit.colors == "gentle":
                 self._film(view)
 
     @property
@@ -135,17 +125,9 @@ class LiveSolver:
         def allowed(weights: Doubles) -> Doubles:
             return clip_to_gamuts(reduction, snap_to_whites(reduction, weights))
 
+        pull = self._pull(views)
         if self.mode == "linear" and not while_moving:
-            equations = reduce(add, (x.tiles().equations(unpainted) for x in views))
-            pull = self._pull(views, self._basis.current_weights)
-            weights = best(equations, start)
-            if self._fit.colors != "gentle":
-                return weights
-            # Solve again, as `solve` does, with a stronger pull to the colours of lights that came
-            # out dim.
-            pull = self._pull(views, weights)
-            return best(equations, weights)
-        pull = self._pull(views, start)
+            return best(reduce(add, (x.tiles().equations(unpainted) for x in views)), start)
         films = self._joint_films(views)
         pixels = films.pixels(unpainted, self._fit.transform)
         # After a change of the painting the last answer may be worse than the current lighting.
@@ -189,38 +171,26 @@ class LiveSolver:
         options: dict[str, Any] = {"steps": WHITE_STEPS, "method": method}
         return next_whites(equations, reduction, start, **options)[1].weights
 
-    def _pull(self, views: tuple[LiveView, ...], before: Doubles) -> NormalEquations | None:
-        """Return the pull on the weights, as `Problem.pull`; the part of the colours is cached.
-
-        before: (n, 3), an answer that tells which lights are dim.
-        """
-        if self._pulls is None or self._pulls[0] != views:
-            power = _power(views)
-            keeps_color = self._reduction.is_free & power.any(axis=1)
-            keeps_color &= ~texel_lights(self._basis.lights)
-            current, prefer = self._basis.current_weights, self._constraints.prefer_current
-
-            def pull_to(prefer: float, share: float) -> NormalEquations | None:
-                return weight_pull(
-                    power,
-                    current,
-                    self._fit,
-                    prefer_current=prefer,
-                    painted_share=share,
-                    keeps_color=keeps_color,
-                )
-
-            prior = image_prior(self._basis.lights, power, self._fit, 1.0)
-            self._pulls = views, pull_to(prefer, 0.0), pull_to(0.0, 1.0), prior
-        _, to_current, to_colors, prior = self._pulls
+    def _pull(self, views: tuple[LiveView, ...]) -> NormalEquations | None:
+        """Return the pull on the weights, as `Problem.pull`."""
+        power, lights = _power(views), self._basis.lights
+        expected = None
+        if self._fit.colors == "gentle":
+            wash = Wash.joined([self._film(view).wash() for view in views])
+            expected = ExpectedLights.of(wash, self._basis.current_weights)
         # The total importance, relative to the number of pixels.
-        pixels = sum(view.pixels for view in views)
-        share = sum(float(view.counts[0]) for view in views) / pixels
-        if to_colors is not None:
-            dimming = dimming_factors(self._basis.current_weights, before)
-            to_colors = strengthen(to_colors.scaled(share), dimming)
-        prior = None if prior is None else prior.scaled(share)
-        pulls = [pull for pull in (to_current, to_colors, prior) if pull is not None]
+        share = sum(float(view.counts[0]) for view in views) / sum(view.pixels for view in views)
+        pull = weight_pull(
+            power,
+            self._basis.current_weights,
+            self._fit,
+            prefer_current=self._constraints.prefer_current,
+            painted_share=share,
+            keeps_color=self._reduction.is_free & power.any(axis=1) & ~texel_lights(lights),
+            expected=expected,
+        )
+        prior = image_prior(lights, power, self._fit, share, expected)
+        pulls = [x for x in (pull, prior) if x is not None]
         return reduce(add, pulls) if pulls else None
 
     def _joint_films(self, views: tuple[LiveView, ...]) -> Films:

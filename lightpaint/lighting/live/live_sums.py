@@ -12,6 +12,7 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.pixel_blocks import block_mean, block_sums, enlarged
 from lightpaint.lighting.live.tiles import MAX_CHEAP_LIGHTS, TiledEquations
 from lightpaint.lighting.loss.channel_loss import PaintedPixels, join_pixels
+from lightpaint.lighting.loss.expected_lights import Wash
 from lightpaint.lighting.loss.loss import STRIP_PIXELS
 from lightpaint.lighting.loss.reweighting import interpolate
 from lightpaint.lighting.normal_equations import NormalEquations
@@ -188,6 +189,17 @@ class SmallFilm:
         """Return the averaged picture (h', w', 3) of a lighting, linear. weights: (n, 3)."""
         mixed = np.stack([w @ rows for w, rows in zip(weights.T, self.rows, strict=True)], axis=-1)
         return np.asarray(mixed.reshape(*self._size, 3), np.float32)
+
+    def wash(self) -> Wash:
+        """Return the paint, the look under it and the light of each lamp, averaged."""
+        counts = self._counts
+        importance = np.minimum(self._a / np.where(counts > 0, counts, 1), 1)
+        return Wash(self.rows, self._painted, self._current, importance, counts)
+
+    @cached_property
+    def _counts(self) -> Doubles:
+        """Number of pixels in each block without emitters, (p,)."""
+        return block_sums((~self._seen).astype(np.float64), self._side).ravel()
 
     def pixels(self, rest_weight: float, transform: ViewTransform | None) -> PaintedPixels:
         """Return the loss of these pixels; an average counts as much as all pixels in it."""

@@ -26,9 +26,8 @@ from lightpaint.lighting.loss.reweighting import (
     run_rounds,
 )
 from lightpaint.lighting.loss.warm_start import sample_pixels
-from lightpaint.lighting.loss.weight_penalty import dimming_factors
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.problem import Problem, gamuts_for
+from lightpaint.lighting.problem import Problem, expected_for, gamuts_for
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
 from lightpaint.lighting.unknowns.reduction import only_knobs
@@ -115,20 +114,6 @@ def best_by_colors(solution: Solution) -> dict[Colors, Doubles]:
 
 def _solver(solution: Solution) -> Callable[[Problem], Doubles]:
     """Return a function that solves the problem with other colours for its weights (n, 3)."""
-    single_solver = _single_solver(solution)
-
-    def best(problem: Problem) -> Doubles:
-        weights = single_solver(problem)
-        if problem.fit.colors != "gentle" or problem.dimming is not None:
-            return weights
-        dimming = dimming_factors(problem.basis.current_weights, weights)
-        return single_solver(replace(problem, dimming=dimming))
-
-    return best
-
-
-def _single_solver(solution: Solution) -> Callable[[Problem], Doubles]:
-    """Return the same function with the pull to colours that a problem has."""
     loss, weights, solved = solution.problem.loss, solution.weights, solution.problem.solved
 
     def squares(problem: Problem) -> tuple[Problem, Doubles]:
@@ -179,7 +164,8 @@ def _with_colors(problem: Problem, colors: Colors) -> Problem:
     if problem.reduction is not problem.full:
         knobs = enumerate(problem.reduction.knobs)
         reduction = only_knobs(full, [k for k, x in knobs if any(u.upper > 0 for u in x.unknowns)])
-    return replace(problem, fit=fit, full=full, reduction=reduction)
+    expected = problem.expected or expected_for(problem.views, fit)
+    return replace(problem, fit=fit, full=full, reduction=reduction, expected=expected)
 
 
 def _view_choices(view: Solution, delta_e: float, answers: Mapping[Colors, Doubles]) -> Choices:
