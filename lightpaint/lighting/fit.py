@@ -85,6 +85,12 @@ class Fit:
     }
 
     @property
+    def is_sketch(self) -> bool:
+        """True if the painting says what is meant, and not what light arrives: once resolved."""
+        is_held = self.transform is not None or bool(self.hold) or self.colors == "gentle"
+        return is_held and not self.literal
+
+    @property
     def brightness(self) -> float:
         """The factor by which the view transform brightens squares of light."""
         return 1.0 if self.transform is None else float(4.0**self.transform.stops)

@@ -42,6 +42,7 @@ class LinearProblem:
     full: Reduction
     fit: Fit
     expected: ExpectedLights | None
+    contrast: NormalEquations | None
     tether: NormalEquations | None
 
     if TYPE_CHECKING:  # properties of one kind of problem, fields of the other
@@ -109,8 +110,8 @@ class LinearProblem:
 
     @cached_property
     def pull(self) -> NormalEquations | None:
-        """The penalty for leaving the current lighting, expected colours, or the lights at other frames;
-        None if there is none.
+        """The penalty for leaving the current lighting, the expected colours, the contrasts or the
+        lights at other frames; None if there is none.
         """
         prior = image_prior(self.lights, self.power, self.fit, self.painted_share, self.expected)
         pull = weight_pull(
@@ -122,7 +123,7 @@ class LinearProblem:
             keeps_color=self.keeps_color,
             expected=self.expected,
         )
-        pulls = [x for x in (pull, prior, self.tether) if x is not None]
+        pulls = [x for x in (pull, prior, self.contrast, self.tether) if x is not None]
         return reduce(add, pulls) if pulls else None
 
     def with_pull(self, equations: NormalEquations) -> NormalEquations:
@@ -165,6 +166,7 @@ class SummedProblem(LinearProblem):
     corrected: NormalEquations | None = None
     noise_removed: float = 0.0
     expected: ExpectedLights | None = None
+    contrast: NormalEquations | None = None
     tether: NormalEquations | None = None
 
     __repr__ = short_repr

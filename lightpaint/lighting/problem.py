@@ -21,6 +21,7 @@ from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.fit import Fit, Space, resolve_for_targets
 from lightpaint.lighting.joined_views import Views, joint_basis
 from lightpaint.lighting.linear_problem import LinearProblem, reduce_lights
+from lightpaint.lighting.loss.contrast import contrast_rows, contrast_term
 from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash
 from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.loss import Loss, Squares
@@ -82,6 +83,7 @@ class Problem(LinearProblem):
         refinement: The last step that improved an answer, if there was one.
         expected: The lights that the paintings let one expect, where lights keep to them; None
             where they may take any colour.
+        contrast: The term that keeps the contrasts between wishes; None without one.
         block_side: Pixels along the side of the blocks behind `corrected`; 1 for single pixels.
         tether: A further pull on the weights, to those at other frames of a shot; None without.
 
@@ -105,6 +107,7 @@ class Problem(LinearProblem):
     noise_removed: float = 0.0
     refinement: Refinement | None = None
     expected: ExpectedLights | None = None
+    contrast: NormalEquations | None = None
     block_side: int = 1
     tether: NormalEquations | None = None
 
@@ -155,7 +158,7 @@ class Problem(LinearProblem):
             full=reduction,
             start=whole.current_weights if start is None else start,
             fit=fit,
-            expected=expected_for(views, fit),
+            **_wash_fields(views, fit),
         )
 
     @property
@@ -274,12 +277,29 @@ def _resolve_views(
     return Views(bases, tuple(resolved)), fit
 
 
-def expected_for(views: Views, fit: Fit) -> ExpectedLights | None:
-    """Return the lights that paintings let one expect; None if `fit` leaves colours free."""
+def wash_of(views: Views) -> Wash:
+    """Return the paintings of views and their lights, averaged over blocks of pixels."""
+    return Wash.joined([Wash.of(*view) for view in zip(views.bases, views.targets, strict=True)])
+
+
+def expected_for(views: Views, fit: Fit, wash: Wash | None = None) -> ExpectedLights | None:
+    """Return the lights that paintings let one expect; None if `fit` leaves colours free.
+
+    wash: that of the views, if it is known.
+    """
     if fit.colors != "gentle":
         return None
-    washes = [Wash.of(*view) for view in zip(views.bases, views.targets, strict=True)]
-    return ExpectedLights.of(Wash.joined(washes), views.bases[0].current_weights)
+    return ExpectedLights.of(wash or wash_of(views), views.bases[0].current_weights)
+
+
+def _wash_fields(views: Views, fit: Fit) -> dict[str, Any]:
+    """Return what a sketch lets one expect, and its contrasts, as fields of a problem."""
+    if not fit.is_sketch:
+        return {}
+    wash = wash_of(views)
+    strength = sum(float(x.importance.sum(dtype=np.float64)) for x in views.targets)
+    contrast = contrast_term(contrast_rows(wash, fit.transform), strength)
+    return {"expected": expected_for(views, fit, wash), "contrast": contrast}
 
 
 def gamuts_for(basis: Basis, views: Views, fit: Fit) -> Gamuts | None:

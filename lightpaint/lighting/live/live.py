@@ -26,6 +26,7 @@ from lightpaint.lighting.fit import Fit, Space
 from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.live.live_sums import MAX_FILM_PIXELS, Films, SmallFilm
 from lightpaint.lighting.live.live_view import LiveView
+from lightpaint.lighting.loss.contrast import contrast_rows, contrast_term
 from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash
 from lightpaint.lighting.loss.image_prior import image_prior
 from lightpaint.lighting.loss.painting import unpainted_weight
@@ -92,7 +93,7 @@ class LiveSolver:
         for view in self._views:
             if self.mode == "linear":
                 view.tiles()
-            if self.mode != "linear" or self._fit.colors == "gentle":
+            if self.mode != "linear" or self._fit.is_sketch:
                 self._film(view)
 
     @property
@@ -174,12 +175,15 @@ class LiveSolver:
     def _pull(self, views: tuple[LiveView, ...]) -> NormalEquations | None:
         """Return the pull on the weights, as `Problem.pull`."""
         power, lights = _power(views), self._basis.lights
-        expected = None
-        if self._fit.colors == "gentle":
-            wash = Wash.joined([self._film(view).wash() for view in views])
-            expected = ExpectedLights.of(wash, self._basis.current_weights)
         # The total importance, relative to the number of pixels.
-        share = sum(float(view.counts[0]) for view in views) / sum(view.pixels for view in views)
+        total = sum(float(view.counts[0]) for view in views)
+        share = total / sum(view.pixels for view in views)
+        expected, contrast = None, None
+        if self._fit.is_sketch:
+            wash = Wash.joined([self._film(view).wash(view.layers) for view in views])
+            contrast = contrast_term(contrast_rows(wash, self._fit.transform), total)
+            if self._fit.colors == "gentle":
+                expected = ExpectedLights.of(wash, self._basis.current_weights)
         pull = weight_pull(
             power,
             self._basis.current_weights,
@@ -190,7 +194,7 @@ class LiveSolver:
             expected=expected,
         )
         prior = image_prior(lights, power, self._fit, share, expected)
-        pulls = [x for x in (pull, prior) if x is not None]
+        pulls = [x for x in (pull, prior, contrast) if x is not None]
         return reduce(add, pulls) if pulls else None
 
     def _joint_films(self, views: tuple[LiveView, ...]) -> Films:

@@ -7,7 +7,12 @@ import numpy as np
 from lightpaint.arrays import Doubles, Floats, Slices
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.lighting.live.live_sums import MAX_FILM_PIXELS, PaintedTiles, SmallFilm
+from lightpaint.lighting.live.live_sums import (
+    MAX_FILM_PIXELS,
+    LayerWishes,
+    PaintedTiles,
+    SmallFilm,
+)
 from lightpaint.lighting.loss.paint_on_emitters import (
     affected_region,
     dark_threshold,
@@ -22,11 +27,18 @@ class LiveView:
     """A view whose painting changes under a brush, updated in place.
 
     image: (h, w, 3) linear; importance: (h, w). Painters write to these arrays, and then call
-    `update`.
+    `update`. layers: returns the wishes of its layers; by default, it has none.
     """
 
-    def __init__(self, basis: Basis, image: Floats, importance: Floats) -> None:
+    def __init__(
+        self,
+        basis: Basis,
+        image: Floats,
+        importance: Floats,
+        layers: LayerWishes = lambda _side: (),
+    ) -> None:
         self.basis, self._image, self._importance = basis, image, importance
+        self.layers = layers
         self._counted = importance.copy()
         self._dark = dark_threshold(basis.current_look, basis.emitters_seen)
         self._transform: ViewTransform | None = None

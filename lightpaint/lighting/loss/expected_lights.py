@@ -7,9 +7,11 @@ within the error of paint, a large one was meant.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import ceil
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
@@ -17,6 +19,8 @@ from lightpaint.basis.derived_planes import block_means
 from lightpaint.colour.color import luminance
 from lightpaint.images.pixel_blocks import block_sums
 from lightpaint.target.target import Target
+from lightpaint.target.wish import Wish
+from lightpaint.target.wish_finding import split_wishes
 
 #: Approximate number of blocks of pixels over which the light of a painting is compared.
 BLOCKS = 2**13
@@ -34,7 +38,8 @@ class Wash:
     """A painting, the look under it and the light of each lamp, averaged over blocks of pixels.
 
     rows: (3, n, p), Φ. painted, look: (3, p), linear. importance: (p,), the share of a block that
-    is painted. counts: (p,), the number of its pixels that count.
+    is painted. counts: (p,), the number of its pixels that count. wishes: (k, p), the share of a
+    block that each wish covers.
     """
 
     rows: Floats
@@ -42,27 +47,41 @@ class Wash:
     look: Floats
     importance: Doubles
     counts: Doubles
+    wishes: Floats
 
     @classmethod
     def of(cls, basis: Basis, target: Target) -> "Wash":
         """Average a view. target: at the size of the basis."""
         height, width = basis.size
-        side = max(1, round((height * width / BLOCKS) ** 0.5))
+        side = max(1, ceil((height * width / BLOCKS) ** 0.5))
         counted = (~basis.emitters_seen).astype(np.float64)
         weight = np.minimum(target.importance, 1) * counted
         counts, painted_counts = block_sums(counted, side), block_sums(weight, side)
 
         def mean(image: Floats, weight: Doubles, total: Doubles) -> Doubles:
             sums = block_sums(image * weight[..., None], side)
-            return np.asarray(sums / np.where(total > 0, total, 1)[..., None]).reshape(-1, 3).T
+            return np.asarray(sums / np.where(total > 0, total, 1)[..., None])
 
-        planes = block_means(basis.planes, counted, side).pixels(slice(None))
+        look = mean(basis.current_look, counted, counts)
+        importance = painted_counts / np.where(counts > 0, counts, 1)
+        # Where nothing is painted, nothing is asked for.
+        painted = np.where(
+            importance[..., None] > 0, mean(target.image, weight, painted_counts), look
+        )
+        pixels = block_sums(np.ones(basis.size), side)
+        layers = [
+            replace(wish, area=(block_sums(wish.area, side) / pixels).astype(np.float32))
+            for wish in target.wishes
+        ]
+        rows = block_means(basis.planes, counted, side).pixels(slice(None)).transpose(2, 0, 1)
+        wishes = wish_shares(layers, painted, importance, look)
         return cls(
-            np.ascontiguousarray(planes.transpose(2, 0, 1)),
-            mean(target.image, weight, painted_counts),
-            mean(basis.current_look, counted, counts),
-            (painted_counts / np.where(counts > 0, counts, 1)).ravel(),
+            np.ascontiguousarray(rows),
+            painted.reshape(-1, 3).T,
+            look.reshape(-1, 3).T,
+            importance.ravel(),
             counts.ravel(),
+            wishes,
         )
 
     @classmethod
@@ -71,7 +90,8 @@ class Wash:
         if len(views) == 1:
             return views[0]
         names = "rows", "painted", "look", "importance", "counts"
-        return cls(*(np.concatenate([getattr(x, k) for x in views], axis=-1) for k in names))
+        joined = (np.concatenate([getattr(x, k) for x in views], axis=-1) for k in names)
+        return cls(*joined, block_diag(*(x.wishes for x in views)))
 
     def asked(self) -> Doubles:
         """Return the change that is asked for in each block, (3, p), in stops; 0 without paint."""
@@ -81,6 +101,19 @@ class Wash:
             return np.zeros(self.look.shape)
         asked, now = (np.maximum(x, 0).astype(np.float64) + dark for x in (self.painted, self.look))
         return np.where(weight > 0, np.log2(asked / now), 0)
+
+
+def wish_shares(
+    layers: Sequence[Wish], painted: Floats, importance: Doubles, look: Floats
+) -> Doubles:
+    """Return the share of each block of pixels that wishes cover, (k, p).
+
+    layers: with an area of a value for each block, (h, w); none for a painting without layers.
+    painted, look: (h, w, 3) linear; importance: (h, w).
+    """
+    whole = Wish("painting", importance.astype(np.float32), has_strokes=True)
+    wishes = split_wishes(layers or [whole], painted, importance, look)
+    return np.array([wish.area.ravel() for wish in wishes], np.float64)
 
 
 @dataclass(frozen=True)

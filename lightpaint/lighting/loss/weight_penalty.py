@@ -55,8 +55,8 @@ def weight_pull(
 def dimming_factors(current: Doubles, weights: Doubles) -> Doubles:
     """Return the factor (n,) by which weights (n, 3) are dimmer than the current ones, or 1.
 
-    The pull to a light's colour is quadratic in its light, and would vanish for one that is expected
-    to be dim. This factor makes it linear.
+    The pull to a light's colour is quadratic in its light, and would vanish for one that is
+    expected to be dim. This factor makes it linear.
     """
     current_luminance, luminances = (
         np.asarray(luminance(x), np.float64) for x in (current, weights)
@@ -78,7 +78,8 @@ def pull_to_colors(power: Doubles, colors: Doubles, lights: Bools) -> NormalEqua
     """Return the pull s Σᵢ ‖Φᵢ (wᵢ − Y(wᵢ) cᵢ)‖² of `lights`, (n,), to colours.
 
     power: (n, 3), s ‖Φᵢ‖². cᵢ is the emission of these colours, (n, 3), at luminance 1, and white
-    for a light that is off. Dimming costs nothing; a change of hue costs its effect in each channel.
+    for a light that is off. Dimming costs nothing; a change of hue costs its effect in each
+    channel.
     """
     n = len(power)
     now = np.asarray(luminance(colors), np.float64)[:, None]
