@@ -11,6 +11,7 @@ from lightpaint.basis.lights import Lights
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.display_text import short_repr
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.own_colors import keep_own_colors, own_color_labels
 from lightpaint.lighting.constraints.white_lights import whiten_open_lights
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.loss.image_prior import image_prior
@@ -203,4 +204,8 @@ def reduce_lights(
     # Pulls to the colours of lights and images couple the channels.
     is_joined = fit.colors == "gentle" or bool(texel_lights(lights).any())
     reduction = replace(reduce_to(constraints, lights), is_joined=is_joined)
+    if fit.colors == "own":
+        labels = own_color_labels(reduction.labels, constraints, lights)
+        dimmers = reduce_to(keep_own_colors(constraints, lights), lights)
+        return replace(dimmers, is_joined=is_joined, labels=labels)
     return reduction if gamuts is None else reduction.with_gamuts(gamuts)

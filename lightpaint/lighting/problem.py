@@ -207,8 +207,8 @@ class Problem(LinearProblem):
 
     @property
     def is_constrained(self) -> bool:
-        """True if anything limits the lights: constraints, or whites only."""
-        return bool(self.constraints) or self.fit.colors == "white"
+        """True if anything limits the lights: constraints, or whites or own colours only."""
+        return bool(self.constraints) or self.fit.colors in ("white", "own")
 
     @cached_property
     def local_reduction(self) -> Reduction:

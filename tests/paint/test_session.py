@@ -253,7 +253,7 @@ DONE = st.one_of(
     st.tuples(st.just("slide"), st.integers(0, 2), st.floats(-1, 2, width=16), st.booleans()),
     st.tuples(st.just("load"), st.floats(0, 2, width=16), st.sampled_from([{}, {"off": True}])),
     st.tuples(st.just("leave"), st.booleans()),
-    st.tuples(st.just("set"), st.sampled_from(["free", "white", None])),
+    st.tuples(st.just("set"), st.sampled_from(["free", "white", "own", None])),
     st.tuples(st.sampled_from(["undo", "redo", "drop"])),
 )
 

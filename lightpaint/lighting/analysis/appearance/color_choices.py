@@ -64,7 +64,7 @@ class ColorChoice:
     Examples:
         >>> [analysis] = lp.analyse(lp.solve(basis, target, colors="gentle"))
         >>> [choice.colors for choice in analysis.color_choices]
-        ['free', 'gentle', 'white']
+        ['free', 'gentle', 'white', 'own']
     """
 
     colors: Colors
@@ -85,7 +85,7 @@ Choices = tuple[ColorChoice, ...]
 def color_choices(
     solution: Solution, delta_e: Sequence[float], best: Mapping[Colors, Doubles] | None = None
 ) -> tuple[Choices, ...]:
-    """Return, for each view, the answers of `free`, `gentle` and `white`.
+    """Return, for each view, the answers of `free`, `gentle`, `white` and `own`.
 
     delta_e: of the answer, for each view. best: the result of `best_by_colors`, if known. Empty if
     no light may change its colour, and for pictures without colour.
