@@ -10,6 +10,8 @@ of views but the first as `plane/3@1`.
 
 from lightpaint.paint.protocol.answer_parts import (
     Advice,
+    AnswerChoice,
+    AnswerColors,
     Closeness,
     Findings,
     LightAnswer,
@@ -18,6 +20,7 @@ from lightpaint.paint.protocol.base import Message
 from lightpaint.paint.protocol.events import (
     EVENTS,
     Acknowledgement,
+    AnswerChoices,
     AnswerUpdate,
     CanvasPatch,
     Closing,
@@ -130,6 +133,9 @@ __all__ = [
     "AddLight",
     "AddReference",
     "Advice",
+    "AnswerChoice",
+    "AnswerChoices",
+    "AnswerColors",
     "AnswerUpdate",
     "AnyRequest",
     "ApplyPreset",

@@ -25,6 +25,7 @@ from lightpaint.paint.session.session_state import state_fields
 from lightpaint.paint.session_access import SessionAccess
 from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.session_requests import SessionRequests
+from lightpaint.paint.studio.answer_choices import ChoiceSolver
 from lightpaint.paint.studio.background_jobs import BackgroundJobs
 from lightpaint.paint.studio.exact_answers import ExactAnswers
 from lightpaint.paint.studio.layer_imports import LayerImports
@@ -41,6 +42,7 @@ class RequestHandler:
         comparison: Shows looks whose lights hang elsewhere.
         jobs: Exports, verifies, explains and previews.
         exact_answers: Looks for a new answer after each change.
+        choices: Has the answers with other light colours.
         threads: Runs searches for places of lights.
     """
 
@@ -52,11 +54,12 @@ class RequestHandler:
         comparison: LookComparison,
         jobs: BackgroundJobs,
         exact_answers: ExactAnswers,
+        choices: ChoiceSolver,
         threads: BackgroundThreads,
     ) -> None:
         self._access, self._publisher = access, publisher
         self._mover, self._jobs, self._exact_answers = mover, jobs, exact_answers
-        self._comparison = comparison
+        self._comparison, self._choices = comparison, choices
         self._subjects = mover.rig.subjects
         self._imports = LayerImports(access, publisher, threads, exact_answers.notify)
         self._references = ReferenceImports(access, publisher, threads)
@@ -78,7 +81,8 @@ class RequestHandler:
                 progress = self._publisher.last_progress  # of the first picture
                 return SessionPending(**fields, text=self._access.failure_text, progress=progress)
             findings = self._exact_answers.findings_of(session)
-            fields |= {"answer": findings, "weights": session.weights}
+            choices = self._choices.choices_at(session.version)
+            fields |= {"answer": findings, "weights": session.weights, "choices": choices}
             return SessionState(**fields, **self._state_fields(session), **session.edit_state)
 
     def greet(self, *, is_back: bool) -> Message:

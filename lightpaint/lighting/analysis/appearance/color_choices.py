@@ -99,12 +99,18 @@ def color_choices(
     )
 
 
+def can_change_colors(solution: Solution) -> bool:
+    """Return whether any light may change its colour, and the pictures show colour."""
+    problem = solution.problem
+    is_grey = problem.equations.reached.any(axis=0).sum() < 2
+    return bool(not is_grey and _with_colors(problem, "free").keeps_color.any())
+
+
 def best_by_colors(solution: Solution) -> dict[Colors, Doubles]:
     """Solve with each choice of `colors`; return weights, (n, 3), none if there is no choice."""
     problem = solution.problem
-    is_grey = problem.equations.reached.any(axis=0).sum() < 2
     best: dict[Colors, Doubles] = {}
-    if is_grey or not _with_colors(problem, "free").keeps_color.any():
+    if not can_change_colors(solution):
         return best
     solve_problem = _solver(solution)
     for colors in get_args(Colors):

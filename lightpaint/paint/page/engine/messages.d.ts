@@ -332,6 +332,17 @@ export interface Closeness {
 }
 
 /**
+ * The exact answer with one choice of `colors`. Its picture is `choice/COLORS`, in each view.
+ *
+ * is_chosen: whether it is the answer itself. delta_e: its mean ΔE over the paint.
+ */
+export interface AnswerChoice {
+  colors: 'own' | 'gentle' | 'free';
+  is_chosen: boolean;
+  delta_e: number;
+}
+
+/**
  * The answer for one light.
  *
  * stops: relative to its current emission; null if it is, or was, off. kelvin: null for a colour
@@ -377,7 +388,8 @@ export interface Findings {
  * that grows when one is replaced. verifications: the last one of each view. is_new: whether
  * the session has no steps yet. stroke: number of the last stroke that arrived. command: solves
  * for the exported paintings. is_back: the client had the session before, and no other client
- * since; also true if unasked. weights: (lights, 3) float64, the last answer.
+ * since; also true if unasked. weights: (lights, 3) float64, the last answer. choices: as the last
+ * `choices` had them; empty once the session has changed since.
  */
 export interface SessionState {
   kind: 'state';
@@ -418,6 +430,7 @@ export interface SessionState {
   command: string;
   answer: Findings;
   is_back: boolean;
+  choices: AnswerChoice[];
   arrays: { weights: Picture };
 }
 
@@ -614,6 +627,21 @@ export interface ReferenceList {
   kind: 'references';
   reply?: number;
   references: ReferenceInfo[];
+  arrays: {  };
+}
+
+/**
+ * The answers with other light colours, to choose from. Unasked, once the exact answer rests.
+ *
+ * version: of the session. choices: from the least freedom to the most; empty without paint, and
+ * where no light can change its colour. resources: numbers of their pictures.
+ */
+export interface AnswerChoices {
+  kind: 'choices';
+  reply?: number;
+  version: number;
+  choices: AnswerChoice[];
+  resources: Record<string, number>;
   arrays: {  };
 }
 
@@ -1263,6 +1291,7 @@ export interface Events {
   previous: PreviousAnswer;
   looks: LookList;
   references: ReferenceList;
+  choices: AnswerChoices;
   progress: ProgressReport;
   started: TaskStarted;
   stopped: TaskStopped;

@@ -78,6 +78,16 @@ export const en = {
     grey: 'grey',
     unpainted: 'unpainted',
   },
+  answerChoices: {
+    lightColours: 'Light colours of the answer',
+    own: 'Own colours',
+    ownTip: 'Lamps keep the colours they have, and only get brighter or dimmer.',
+    asPainted: 'As painted',
+    asPaintedTip: 'Lamps take the whites and colours that the painting asks for.',
+    bold: 'Bold',
+    boldTip: 'Lamps may take any colour.',
+    withDifference: '{label}: mean ΔE {number} from the painting',
+  },
   answerLine: {
     meanColourDifferenceFromThe:
       'Mean colour difference from the painting (ΔE 2000), and what it was with the current lighting. 1 is just visible, 5 is obvious.',

@@ -59,6 +59,8 @@ export function stateUpdate(message, /** @type {import('./ui_state.js').Ui} */ p
     looks,
     resources: message.resources ?? {},
     references: message.references ?? [],
+    choices: message.choices ?? [],
+    choicesVersion: -1,
     hint: Boolean(message.is_new),
     connection: 'open',
     closure: null,
