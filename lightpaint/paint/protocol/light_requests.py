@@ -62,6 +62,9 @@ def _check_step(step: int) -> None:
 class MoveLights(Message, kind="move"):
     """New places, targets and cones of lights, by name. Answered by `answer`; `rig` follows.
 
+    A light that is moved keeps its level from then on, as if it were locked, until it is released
+    or put back.
+
     poses: changed fields of `lightpaint.Pose`: position, target, cutoff and beam; an empty object
     restores a light's place from the scene; without any pose, a drag ends and its light goes back.
     is_final: whether it becomes a step; false while a light is dragged. view: index of the view

@@ -40,6 +40,7 @@ def edit_state(history: History, live_answer: LiveAnswer, views: Canvases) -> di
         ),
         "master": requests.master,
         "earlier": dict(requests.earlier),
+        "kept": requests.kept,
         "selection": SelectionInfo(
             tuple(view.selection.bounds for view in views),
             sum(view.selection.revision for view in views),

@@ -3,10 +3,17 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
+from lightpaint.arrays import Doubles
 from lightpaint.basis.lights import Lights
+from lightpaint.colour.color import luminance
 from lightpaint.errors import PaintError
 from lightpaint.paint import protocol
 from lightpaint.paint.store.session_requests import TITLES, SessionRequests
+
+#: Part of its level in the scene at which a light counts as off.
+OFF = 1e-4
 
 #: Messages that change the requests in effect.
 RequestChange = (
@@ -95,6 +102,32 @@ def move_lights(
     """Return the requests with the poses of some lights replaced, by their names."""
     _check_names(poses, lights)
     return requests.with_poses(poses)
+
+
+def keep_moved_lights(
+    requests: SessionRequests,
+    lights: Lights,
+    poses: Mapping[str, Mapping[str, Any]],
+    weights: Doubles,
+) -> SessionRequests:
+    """Return requests in which lights that a person has moved keep their level, until released.
+
+    Those put back in their place are released. A light that the answer had switched off gets its
+    level in the scene: somebody who aims it wants to see it. poses: the changes, by name. weights:
+    (n, 3), of the answer before.
+    """
+    for name, change in poses.items():
+        light = lights[lights.names.index(name)]
+        if not change:
+            requests = requests.without_kept(name) if name in requests.kept else requests
+        elif not (light.is_fixed or requests.holds(name)):
+            emission = weights[lights.names.index(name)]
+            if luminance(emission) <= OFF * luminance(light.emission):
+                emission = np.array(light.emission)
+            if emission.any():
+                level = float(emission[0]) if light.is_scalar else emission.tolist()
+                requests = requests.with_kept(name, level)
+    return requests
 
 
 def remove_light(requests: SessionRequests, lights: Lights, name: str) -> SessionRequests:

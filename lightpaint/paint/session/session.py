@@ -32,6 +32,7 @@ from lightpaint.paint.session.moved_lights import NoPlaneSource, Placed, PlaneSo
 from lightpaint.paint.session.request_changes import (
     RequestChange,
     changed_requests,
+    keep_moved_lights,
     move_lights,
     previewed_requests,
 )
@@ -281,7 +282,9 @@ class Session:
             self._edits.reset_slider()
             return self.answer_update(poses=dict(self.requests.poses))
         label, requests = changed_requests(self.requests, self.basis.lights, message)
-        if is_move:
+        if isinstance(message, protocol.MoveLights):
+            lights, weights = self.basis.lights, self.weights
+            requests = keep_moved_lights(requests, lights, message.poses, weights)
             self._edits.check_places(requests.placed)
         if getattr(message, "is_final", True):
             return self._append_requests(label, requests)

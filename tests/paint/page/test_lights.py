@@ -32,6 +32,21 @@ def test_a_light_is_moved_by_hand_and_freed(painter: Painter) -> None:
     assert newest_constraints(painter) == {"lock": [0, 0, 0]}
 
 
+def test_a_moved_light_says_why_it_stays_and_a_press_releases_it(painter: Painter) -> None:
+    row = painter.page.locator('[data-light="key"]')
+    assert row.locator(".kept").count() == 0
+    constraints = {"key": {"lock": [1, 1, 1]}}
+    painter.tell(kind="answer", version=9, exact=False, constraints=constraints, kept=["key"])
+    kept = row.get_by_role("button", name="Release key: the solve sets it again")
+    assert kept.inner_text() == "kept"
+    assert "You moved it" in kept.get_attribute("data-tip")
+    assert "You moved it" in row.locator(".badge").get_attribute("data-tip")
+    kept.click()
+    assert painter.requests("constrain_light")[-1]["constraints"] == {}
+    painter.tell(kind="answer", version=10, exact=False, constraints={}, kept=[])
+    assert row.locator(".kept").count() == 0
+
+
 @pytest.mark.nightly
 def test_a_level_is_typed_in_stops_or_percent(painter: Painter) -> None:
     current = painter.page.evaluate("() => window.painter.store.value.lights[0].present")

@@ -289,7 +289,7 @@ export interface ResolvedFit {
  * weight. selection: the part of the painting that strokes keep to.
  *
  * earlier: constraints of lights that are locked or off, by name, from before they were, to be
- * sent when they are released.
+ * sent when they are released. kept: names of those that are locked only since they were moved.
  */
 export interface EditState {
   history?: HistoryInfo;
@@ -304,6 +304,7 @@ export interface EditState {
   master?: number;
   selection?: SelectionInfo;
   earlier?: Record<string, Record<string, any>>;
+  kept?: string[];
 }
 
 /**
@@ -406,6 +407,7 @@ export interface SessionState {
   master?: number;
   selection?: SelectionInfo;
   earlier?: Record<string, Record<string, any>>;
+  kept?: string[];
   version: number;
   scene: string;
   folder: string;
@@ -483,6 +485,7 @@ export interface AnswerUpdate {
   master?: number;
   selection?: SelectionInfo;
   earlier?: Record<string, Record<string, any>>;
+  kept?: string[];
   version: number;
   stroke: number;
   exact: boolean;
@@ -512,6 +515,7 @@ export interface CanvasPatch {
   master?: number;
   selection?: SelectionInfo;
   earlier?: Record<string, Record<string, any>>;
+  kept?: string[];
   region: Region;
   view: number;
   views: number[];
@@ -540,6 +544,7 @@ export interface SelectionUpdate {
   master?: number;
   selection?: SelectionInfo;
   earlier?: Record<string, Record<string, any>>;
+  kept?: string[];
   arrays: {  };
 }
 
@@ -1047,6 +1052,9 @@ export interface SetMaster {
 
 /**
  * New places, targets and cones of lights, by name. Answered by `answer`; `rig` follows.
+ *
+ * A light that is moved keeps its level from then on, as if it were locked, until it is released
+ * or put back.
  *
  * poses: changed fields of `lightpaint.Pose`: position, target, cutoff and beam; an empty object
  * restores a light's place from the scene; without any pose, a drag ends and its light goes back.

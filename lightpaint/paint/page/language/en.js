@@ -560,6 +560,10 @@ export const en = {
     deselectFound: 'Deselect the {count} found',
   },
   lightRow: {
+    kept: 'kept',
+    release: 'Release {label}: the solve sets it again',
+    keptSinceItWasMoved:
+      'You moved it, so it keeps its level, and the others are solved around it. A press releases it: the solve sets it again',
     selectForOneActionOnSeveral:
       'Select, for one action on several lights; with Shift all from the last one',
     select: 'Select {label}',

@@ -115,7 +115,7 @@ function renderRow(ui, app, k, isMany) {
   const light = ui.lights[k];
   const isOpen = ui.openLights.includes(k);
   return html`<${LightRow} key=${light.name} k=${k} light=${light} app=${app}
-    rgb=${ui.weights[k] ?? light.present} answer=${ui.lightAnswers[k]} constraints=${constraintsOf(ui, k)} tie=${findTie(ui, k)}
+    rgb=${ui.weights[k] ?? light.present} answer=${ui.lightAnswers[k]} isKept=${ui.kept.includes(light.name)} constraints=${constraintsOf(ui, k)} tie=${findTie(ui, k)}
     isSelected=${ui.selectedLights.includes(k)} isLive=${ui.isLive} isSolo=${ui.solo.includes(k)} isMute=${ui.mute.includes(k)} isOpen=${isOpen}
     pointerShare=${ui.probe?.shares[k]} hasSlider=${isOpen || !isMany}
     picture=${nameInView(`thumb/${k}`, ui.view)} thumb=${ui.resources[nameInView(`thumb/${k}`, ui.view)]}
