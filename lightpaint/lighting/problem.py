@@ -18,6 +18,7 @@ from lightpaint.errors import BasisError, ConstraintError, TargetError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
+from lightpaint.lighting.constraints.start_lighting import held_at_start, start_weights
 from lightpaint.lighting.fit import Fit, Space, resolve_for_targets
 from lightpaint.lighting.joined_views import Views, joint_basis
 from lightpaint.lighting.linear_problem import LinearProblem, reduce_lights
@@ -131,8 +132,8 @@ class Problem(LinearProblem):
             raise ConstraintError(
                 f"the constraints are a {type(constraints).__name__}: give Constraints.of(...)"
             )
-        whole, parts = joint_basis(bases)
-        all_constraints = constraints_of(whole.requests).and_then(constraints or Constraints())
+        all_constraints = constraints_of(bases[0].requests).and_then(constraints or Constraints())
+        whole, parts = joint_basis([held_at_start(x, all_constraints.start) for x in bases])
         views, fit = _resolve_views(parts, targets, fit or Fit(), resize=resize)
         squares = joint_squares(views, unpainted=unpainted_weight_of(views, fit))
         loss = choose_loss(
@@ -142,7 +143,9 @@ class Problem(LinearProblem):
             painted=lambda: target_light(views),
             current=lambda: whole.current_look,
         )
-        reduction = reduce_lights(all_constraints, whole.lights, fit, gamuts_for(whole, views, fit))
+        reference = start_weights(all_constraints.start, whole.lights)
+        gamuts = gamuts_for(whole, views, fit, reference)
+        reduction = reduce_lights(all_constraints, whole.lights, fit, gamuts)
         return cls(
             basis=whole,
             views=views,
@@ -152,7 +155,7 @@ class Problem(LinearProblem):
             constraints=all_constraints,
             reduction=reduction,
             full=reduction,
-            start=whole.current_weights if start is None else start,
+            start=reference if start is None else start,
             fit=fit,
         )
 
@@ -272,8 +275,11 @@ def _resolve_views(
     return Views(bases, tuple(resolved)), fit
 
 
-def gamuts_for(basis: Basis, views: Views, fit: Fit) -> Gamuts | None:
-    """Return the colours that each light may take; None if `fit` does not limit them."""
+def gamuts_for(basis: Basis, views: Views, fit: Fit, own: Doubles | None = None) -> Gamuts | None:
+    """Return the colours that each light may take; None if `fit` does not limit them.
+
+    own: (n, 3), weights with the colours that lights have, by default the current ones.
+    """
     if fit.colors != "gentle":
         return None
     views_of_paint = [
@@ -281,7 +287,8 @@ def gamuts_for(basis: Basis, views: Views, fit: Fit) -> Gamuts | None:
         for view_basis, target in zip(views.bases, views.targets, strict=True)
     ]
     painted = partial(PaintedLight.of, views_of_paint)
-    return Gamuts(painted, basis.power, basis.current_weights, texel_lights(basis.lights))
+    own = basis.current_weights if own is None else own
+    return Gamuts(painted, basis.power, own, texel_lights(basis.lights))
 
 
 def _color_importance(target: Target) -> Floats:

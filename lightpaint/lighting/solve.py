@@ -97,7 +97,7 @@ def solution_of(problem: Problem, *, start: Doubles | None = None) -> Solution:
     solution = _solve_once(problem, begin, blocks)
     if not problem.keeps_color.any() or problem.fit.colors != "gentle":
         return solution
-    dimming = dimming_factors(problem.basis.current_weights, solution.weights)
+    dimming = dimming_factors(problem.reference, solution.weights)
     if problem.dimming is not None or (dimming[problem.keeps_color] == 1).all():
         return solution
     dimmed = replace(solution.problem, dimming=dimming)
@@ -300,8 +300,8 @@ def _least_loss(
 
 
 def nearest_to_current(problem: Problem) -> Doubles:
-    """Return the weights (n, 3) nearest to the current ones that constraints allow."""
-    current = problem.basis.current_weights
+    """Return the weights (n, 3) nearest to those to start from that constraints allow."""
+    current = problem.reference
     pull = pull_to_current(problem.basis.power, current)
     return solve_reduced(pull, problem.reduction, current).weights
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from lightpaint.basis.lights import BasisLight
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.light_patterns import lights_of_open_color
+from lightpaint.lighting.constraints.start_lighting import start_weights
 
 #: That restriction in few words, for tables.
 OWN_COLOR_LABEL = "own colour"
@@ -15,8 +16,9 @@ def keep_own_colors(constraints: Constraints, lights: Sequence[BasisLight]) -> C
 
     A light that is off has no colour, and is white.
     """
+    own = start_weights(constraints.start, lights)
     own_colors = {
-        lights[k].name: {"color": list(lights[k].emission) if any(lights[k].emission) else "#fff"}
+        lights[k].name: {"color": own[k].tolist() if own[k].any() else "#fff"}
         for k in lights_of_open_color(constraints, lights)
     }
     return constraints.and_then(Constraints.of(own_colors))

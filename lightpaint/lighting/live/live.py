@@ -13,15 +13,16 @@ Only painted views count. Each has its own sums, so that a stroke costs no more 
 view.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial, reduce
 from operator import add
 from typing import Any
 
-from lightpaint.arrays import Doubles
+from lightpaint.arrays import RGB, Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.light_images import texel_lights
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.start_lighting import start_weights
 from lightpaint.lighting.fit import Fit, Space
 from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.live.live_sums import MAX_FILM_PIXELS, Films, SmallFilm
@@ -31,6 +32,7 @@ from lightpaint.lighting.loss.painting import unpainted_weight
 from lightpaint.lighting.loss.pixel_bins import block_side
 from lightpaint.lighting.loss.weight_penalty import (
     dimming_factors,
+    pull_near_start,
     pull_to_current,
     strengthen,
     weight_pull,
@@ -73,17 +75,22 @@ class LiveSolver:
         self._views = tuple(views)
         self._basis = views[0].basis
         self._films: tuple[tuple[LiveView, ...], Films] | None = None
+        self._start: Mapping[str, RGB] = {}
         self.constrain(fit, constraints)
 
     def constrain(self, fit: Fit, constraints: Constraints) -> None:
         """Change fit and constraints. Raises ConstraintError for impossible ones."""
         reduction = reduce_lights(constraints, self._basis.lights, fit)
+        self._reference = start_weights(constraints.start, self._basis.lights)
         self._fit, self._constraints, self._reduction = fit, constraints, reduction
         self._pulls: _Pulls | None = None
         self._untouched: Doubles | None = None
         self._within, self._gamuts_of = reduction, tuple[LiveView, ...]()
         self._is_kept_to = False  # whether the last answer kept to the constraints
+        self._films = None if self._start != constraints.start else self._films
+        self._start = constraints.start
         for view in self._views:
+            view.set_start(constraints.start)
             view.set_transform(fit.transform)
 
     def follow_planes(self) -> Basis:
@@ -93,6 +100,8 @@ class LiveSolver:
         """
         self._basis = self._views[0].basis
         self._pulls, self._untouched, self._gamuts_of = None, None, ()
+        if self._start:  # whose look has these planes, too
+            self._films = None
         if self._films is not None:
             self._films[1].join()
         return self._basis
@@ -137,7 +146,7 @@ class LiveSolver:
 
         if self.mode == "linear" and not while_moving:
             equations = reduce(add, (x.tiles().equations(unpainted) for x in views))
-            pull = self._pull(views, self._basis.current_weights)
+            pull = self._pull(views, self._reference)
             weights = best(equations, start)
             if self._fit.colors != "gentle":
                 return weights
@@ -155,7 +164,7 @@ class LiveSolver:
     def _unpainted_answer(self) -> Doubles:
         """Return the answer without paint, (n, 3)."""
         if self._untouched is None:
-            self._untouched = unpainted_weights(self._views, self._reduction)
+            self._untouched = _nearest(self._reference, self._views, self._reduction)
         return self._untouched
 
     def _with_gamuts(self, views: tuple[LiveView, ...]) -> Reduction:
@@ -169,7 +178,7 @@ class LiveSolver:
         if confined.gamuts is None or self._gamuts_of != views:
             painted = partial(PaintedLight.of, [x.painting for x in views], max_pixels=GAMUT_PIXELS)
             is_texel = texel_lights(self._basis.lights)
-            gamuts = Gamuts(painted, _power(views), self._basis.current_weights, is_texel)
+            gamuts = Gamuts(painted, _power(views), self._reference, is_texel)
             confined, self._gamuts_of = self._reduction.with_gamuts(gamuts), views
         else:
             confined.gamuts.refresh()
@@ -198,7 +207,7 @@ class LiveSolver:
             power = _power(views)
             keeps_color = self._reduction.is_free & power.any(axis=1)
             keeps_color &= ~texel_lights(self._basis.lights)
-            current, prefer = self._basis.current_weights, self._constraints.prefer_current
+            current, prefer = self._reference, self._constraints.prefer_current
 
             def pull_to(prefer: float, share: float) -> NormalEquations | None:
                 return weight_pull(
@@ -211,13 +220,17 @@ class LiveSolver:
                 )
 
             prior = image_prior(self._basis.lights, power, self._fit, 1.0)
+            near = pull_near_start(
+                power, current, self._fit, near=self._constraints.near, painted_share=1.0
+            )
+            prior = near if prior is None else prior if near is None else prior + near
             self._pulls = views, pull_to(prefer, 0.0), pull_to(0.0, 1.0), prior
         _, to_current, to_colors, prior = self._pulls
         # The total importance, relative to the number of pixels.
         pixels = sum(view.pixels for view in views)
         share = sum(float(view.counts[0]) for view in views) / pixels
         if to_colors is not None:
-            dimming = dimming_factors(self._basis.current_weights, before)
+            dimming = dimming_factors(self._reference, before)
             to_colors = strengthen(to_colors.scaled(share), dimming)
         prior = None if prior is None else prior.scaled(share)
         pulls = [pull for pull in (to_current, to_colors, prior) if pull is not None]
@@ -240,11 +253,6 @@ class LiveSolver:
 def _power(views: Sequence[LiveView]) -> Doubles:
     """Return ‖Φᵢ‖² of all views together, (n, 3)."""
     return reduce(add, (view.basis.power for view in views))
-
-
-def unpainted_weights(views: Sequence[LiveView], reduction: Reduction) -> Doubles:
-    """Return the weights (n, 3) nearest to the current ones that constraints allow."""
-    return _nearest(views[0].basis.current_weights, views, reduction)
 
 
 def _nearest(weights: Doubles, views: Sequence[LiveView], reduction: Reduction) -> Doubles:

@@ -48,6 +48,7 @@ from lightpaint.paint.protocol.light_requests import (
     RemoveLight,
     SetMaster,
     ShowRig,
+    StartFromLamps,
     TieLights,
 )
 from lightpaint.paint.protocol.message_parts import (
@@ -213,6 +214,7 @@ __all__ = [
     "SetMaster",
     "ShowPrevious",
     "ShowRig",
+    "StartFromLamps",
     "StartOver",
     "StepInfo",
     "StepList",

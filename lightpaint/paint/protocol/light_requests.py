@@ -49,6 +49,16 @@ class SetMaster(Message, kind="set_master"):
     level: float
 
 
+@dataclass(frozen=True)
+class StartFromLamps(Message, kind="start_from_lamps"):
+    """The lights as they are now become the lighting that the solve starts from and stays near, and
+    locked ones are released; or this ends. One step. Answered by `answer`. The setting `near` says
+    how near.
+    """
+
+    is_on: bool = True
+
+
 #: Largest step between the pixels of a dragged light's picture.
 MAX_STEP = 8
 

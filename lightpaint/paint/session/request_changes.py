@@ -23,16 +23,17 @@ RequestChange = (
     | protocol.RemoveLight
     | protocol.TieLights
     | protocol.SetMaster
+    | protocol.StartFromLamps
     | protocol.ChangeSettings
 )
 
 
 def changed_requests(
-    requests: SessionRequests, lights: Lights, message: RequestChange
+    requests: SessionRequests, lights: Lights, message: RequestChange, weights: Doubles
 ) -> tuple[str, SessionRequests]:
     """Return the label of a change for undo, and the requests after it.
 
-    Raises LightpaintError if it is impossible.
+    weights: (n, 3), the answer before. Raises LightpaintError if it is impossible.
     """
     match message:
         case protocol.ConstrainLight():
@@ -44,6 +45,7 @@ def changed_requests(
             return message.label or ", ".join(message.constraints), changed
         case protocol.MoveLights():
             changed = move_lights(requests, lights, message.poses)
+            changed = keep_moved_lights(changed, lights, message.poses, weights)
             return _label_of_moves(message.poses), changed
         case protocol.RemoveLight():
             return f"remove {message.name}", remove_light(requests, lights, message.name)
@@ -52,6 +54,13 @@ def changed_requests(
         case protocol.SetMaster():
             changed = requests.with_master(message.level)
             return f"master {100 * message.level:.0f} %", changed
+        case protocol.StartFromLamps():
+            if not message.is_on:
+                return "start from the scene", requests.with_start({})
+            pairs = zip(lights, weights, strict=True)
+            start = {light.name: emission for light, emission in pairs if not light.is_fixed}
+            start = {name: emission.tolist() for name, emission in start.items()}
+            return "start from my lamps", requests.with_start(start)
         case protocol.ChangeSettings():
             changed = requests.with_values(message.settings)
             return ", ".join(TITLES[key] for key in message.settings), changed

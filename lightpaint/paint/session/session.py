@@ -32,7 +32,6 @@ from lightpaint.paint.session.moved_lights import NoPlaneSource, Placed, PlaneSo
 from lightpaint.paint.session.request_changes import (
     RequestChange,
     changed_requests,
-    keep_moved_lights,
     move_lights,
     previewed_requests,
 )
@@ -281,10 +280,9 @@ class Session:
         if isinstance(message, protocol.MoveLights) and not message.poses:
             self._edits.reset_slider()
             return self.answer_update(poses=dict(self.requests.poses))
-        label, requests = changed_requests(self.requests, self.basis.lights, message)
-        if isinstance(message, protocol.MoveLights):
-            lights, weights = self.basis.lights, self.weights
-            requests = keep_moved_lights(requests, lights, message.poses, weights)
+        lights, weights = self.basis.lights, self.weights
+        label, requests = changed_requests(self.requests, lights, message, weights)
+        if is_move:
             self._edits.check_places(requests.placed)
         if getattr(message, "is_final", True):
             return self._append_requests(label, requests)

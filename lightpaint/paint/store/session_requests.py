@@ -17,7 +17,11 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.validation import is_amount, is_number
 
 #: Settings of the answer: those of its fit, and those of all lights together.
-FIT_KEYS, ALL_LIGHTS_KEYS = ("hold", "space", "colors", "literal"), ("prefer_current", "sparse")
+FIT_KEYS = ("hold", "space", "colors", "literal")
+ALL_LIGHTS_KEYS = ("prefer_current", "near", "sparse")
+
+#: Strength of the pull to lamps that somebody started from, if nobody has set another.
+DEFAULT_NEAR = 0.1
 
 #: Keys that hold a light at a level.
 HOLD_KEYS = ("lock", "off")
@@ -32,6 +36,7 @@ TITLES = {
     "colors": "Light colours",
     "literal": "Read the paint as",
     "prefer_current": "Lights that make little difference",
+    "near": "Near my lamps",
     "sparse": "Number of lights",
 }
 
@@ -48,6 +53,8 @@ class SessionRequests:
     master: factor of all lights but fixed ones, applied to the answer.
     earlier: constraints of held lights, by name, which apply again once they are released.
     kept: names of the lights that are locked only since they were moved.
+    start: emissions by name of light, set by hand, that the solve starts from; none for those of
+    the scene.
     """
 
     lights: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
@@ -58,6 +65,7 @@ class SessionRequests:
     master: float = 1.0
     earlier: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     kept: tuple[str, ...] = ()
+    start: Mapping[str, Sequence[float]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, data: Mapping[str, Any]) -> "SessionRequests":
@@ -68,7 +76,8 @@ class SessionRequests:
         lights, values = dict(data.get("lights", {})), dict(data.get("values", {}))
         earlier = {name: dict(entry) for name, entry in data.get("earlier", {}).items()}
         kept = tuple(data.get("kept", ()))
-        requests = cls(lights, ties, values, poses, added, earlier=earlier, kept=kept)
+        start = {name: tuple(emission) for name, emission in data.get("start", {}).items()}
+        requests = cls(lights, ties, values, poses, added, earlier=earlier, kept=kept, start=start)
         return requests.with_master(data.get("master", 1.0))
 
     def as_json(self) -> dict[str, Any]:
@@ -85,6 +94,7 @@ class SessionRequests:
             **({"master": self.master} if self.master != 1 else {}),
             **({"earlier": {k: dict(v) for k, v in self.earlier.items()}} if self.earlier else {}),
             **({"kept": list(self.kept)} if self.kept else {}),
+            **({"start": {k: list(v) for k, v in self.start.items()}} if self.start else {}),
         }
 
     @property
@@ -129,6 +139,18 @@ class SessionRequests:
         """Return these requests with such a light released."""
         return self.with_light(name, self.earlier.get(name, {}))
 
+    def with_start(self, start: Mapping[str, Sequence[float]]) -> "SessionRequests":
+        """Return these requests with a lighting to start from, emissions by name; locked lights are
+        released. Without any, the solve starts from the scene again, and nothing is near.
+        """
+        locked = [name for name, entry in self.lights.items() if _holds(entry) and "lock" in entry]
+        released = self
+        for name in locked if start else ():
+            released = released.with_light(name, self.earlier.get(name, {}))
+        values = {key: value for key, value in self.values.items() if start or key != "near"}
+        emissions = {name: tuple(emission) for name, emission in start.items()}
+        return replace(released, start=emissions, values=values)
+
     def holds(self, name: str) -> bool:
         """Return whether a light is held at a level, by itself or with others on its dimmer."""
         tied = next((names for names in self.ties if name in names), ())
@@ -171,6 +193,7 @@ class SessionRequests:
             added=others(self.added),
             earlier=others(self.earlier),
             kept=tuple(x for x in self.kept if x != name),
+            start={key: value for key, value in self.start.items() if key != name},
         )
 
     def with_ties(self, ties: Sequence[Sequence[str]]) -> "SessionRequests":
@@ -225,6 +248,8 @@ class SessionRequests:
     def constraints(self) -> Constraints:
         """Return the constraints on the lights. Raises ConstraintError for invalid ones."""
         joint = {key: self.values[key] for key in ALL_LIGHTS_KEYS if key in self.values}
+        if self.start:
+            joint = {"near": DEFAULT_NEAR, **joint, "start": self.start}
         return Constraints.of(self.lights, tie=self.ties, **joint)
 
     def settings(self, base: Settings) -> Settings:

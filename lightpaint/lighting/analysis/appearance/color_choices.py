@@ -127,7 +127,7 @@ def _solver(solution: Solution) -> Callable[[Problem], Doubles]:
         weights = single_solver(problem)
         if problem.fit.colors != "gentle" or problem.dimming is not None:
             return weights
-        dimming = dimming_factors(problem.basis.current_weights, weights)
+        dimming = dimming_factors(problem.reference, weights)
         return single_solver(replace(problem, dimming=dimming))
 
     return best
@@ -179,7 +179,7 @@ def _with_colors(problem: Problem, colors: Colors) -> Problem:
     Raises ConstraintError if a light cannot have it.
     """
     fit = replace(problem.fit, colors=colors)
-    gamuts = gamuts_for(problem.basis, problem.views, fit)
+    gamuts = gamuts_for(problem.basis, problem.views, fit, problem.reference)
     full = reduce_lights(problem.constraints, problem.lights, fit, gamuts)
     reduction = full
     if problem.reduction is not problem.full:

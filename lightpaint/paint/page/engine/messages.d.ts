@@ -290,6 +290,7 @@ export interface ResolvedFit {
  *
  * earlier: constraints of lights that are locked or off, by name, from before they were, to be
  * sent when they are released. kept: names of those that are locked only since they were moved.
+ * is_started: whether the solve starts from lamps that were set by hand.
  */
 export interface EditState {
   history?: HistoryInfo;
@@ -305,6 +306,7 @@ export interface EditState {
   selection?: SelectionInfo;
   earlier?: Record<string, Record<string, any>>;
   kept?: string[];
+  is_started?: boolean;
 }
 
 /**
@@ -408,6 +410,7 @@ export interface SessionState {
   selection?: SelectionInfo;
   earlier?: Record<string, Record<string, any>>;
   kept?: string[];
+  is_started?: boolean;
   version: number;
   scene: string;
   folder: string;
@@ -486,6 +489,7 @@ export interface AnswerUpdate {
   selection?: SelectionInfo;
   earlier?: Record<string, Record<string, any>>;
   kept?: string[];
+  is_started?: boolean;
   version: number;
   stroke: number;
   exact: boolean;
@@ -516,6 +520,7 @@ export interface CanvasPatch {
   selection?: SelectionInfo;
   earlier?: Record<string, Record<string, any>>;
   kept?: string[];
+  is_started?: boolean;
   region: Region;
   view: number;
   views: number[];
@@ -545,6 +550,7 @@ export interface SelectionUpdate {
   selection?: SelectionInfo;
   earlier?: Record<string, Record<string, any>>;
   kept?: string[];
+  is_started?: boolean;
   arrays: {  };
 }
 
@@ -1051,6 +1057,15 @@ export interface SetMaster {
 }
 
 /**
+ * The lights as they are now become the lighting that the solve starts from and stays near, and
+ * locked ones are released; or this ends. One step. Answered by `answer`. The setting `near` says
+ * how near.
+ */
+export interface StartFromLamps {
+  is_on?: boolean;
+}
+
+/**
  * New places, targets and cones of lights, by name. Answered by `answer`; `rig` follows.
  *
  * A light that is moved keeps its level from then on, as if it were locked, until it is released
@@ -1142,8 +1157,8 @@ export interface TieLights {
 /**
  * Settings of the answer, as in `Fit`. Answered by `answer`.
  *
- * settings: of hold, space, colors, literal, prefer_current, sparse; null for the default that
- * follows from the painting.
+ * settings: of hold, space, colors, literal, prefer_current, near, sparse; null for the default
+ * that follows from the painting.
  */
 export interface ChangeSettings {
   settings: Record<string, any>;
@@ -1338,6 +1353,7 @@ export interface Requests {
   constrain_light: ConstrainLight;
   constrain_lights: ConstrainLights;
   set_master: SetMaster;
+  start_from_lamps: StartFromLamps;
   move: MoveLights;
   point: PointLight;
   add_light: AddLight;

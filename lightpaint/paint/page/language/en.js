@@ -78,6 +78,15 @@ export const en = {
     grey: 'grey',
     unpainted: 'unpainted',
   },
+  startLamps: {
+    startFromMyLamps: 'Start from my lamps',
+    theSolveImprovesThem:
+      'The lamps as they are now become the start: the solve improves them and stays near. Locked ones are released',
+    nearMyLamps: 'Near my lamps',
+    howNear:
+      'How near the solve stays to the lamps that you started from, where the paint does not say otherwise',
+    startFromTheScene: 'Start from the scene again',
+  },
   answerChoices: {
     lightColours: 'Light colours of the answer',
     own: 'Own colours',

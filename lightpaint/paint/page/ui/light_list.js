@@ -14,6 +14,7 @@ import {
   sortLights,
 } from './lamps/listed_lights.js';
 import { MasterDimmer } from './lamps/master_dimmer.js';
+import { StartLamps } from './lamps/start_lamps.js';
 import { GroupDimmer, SelectionPanel, levelsText } from './lamps/selection_panel.js';
 import { constraintsOf, lockedLights, findTie } from './tied_lights.js';
 import { lightCountText, percentText } from './format.js';
@@ -45,6 +46,7 @@ export function LightList({ ui, app }) {
     key === 'Enter' && indices.length && store.set({ selectedLights: indices });
   return html`<div class=${`lights ${isAnswerHidden(ui) ? 'is-unseen' : ''}`}>
     ${ui.lights.length > 1 && html`<${MasterDimmer} ui=${ui} app=${app} />`}
+    <${StartLamps} ui=${ui} app=${app} />
     ${
       ui.lights.length > 1 &&
       html`<div class="lights-tools">

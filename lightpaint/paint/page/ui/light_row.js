@@ -249,7 +249,6 @@ function listRemarks({ light, answer, constraints = {}, tie, isKept }) {
       words.lightRow.locked,
       words.lightRow.youLockedItAtThisLevel,
     ],
-    [isKept, words.lightRow.kept, words.lightRow.keptSinceItWasMoved],
     [constraints.limits, words.lightRow.limits, words.lightRow.youLimitedItsLevel],
     [colourConstraint(constraints), words.lightRow.colour, words.lightRow.youLimitedItsColour],
     [

@@ -49,6 +49,7 @@ export function stateUpdate(message, /** @type {import('./ui_state.js').Ui} */ p
     constraints: message.constraints ?? {},
     earlier: message.earlier ?? {},
     kept: message.kept ?? [],
+    isStarted: message.is_started ?? false,
     ties: message.ties ?? [],
     settings: message.settings ?? {},
     effectiveSettings: message.effective_settings ?? {},
@@ -274,6 +275,7 @@ export function answerUpdate(message, ui) {
   ])) {
     if (message[key]) changes[key] = message[key];
   }
+  if (message.is_started !== undefined) changes.isStarted = message.is_started;
   if (message.master !== undefined) changes.master = message.master ?? 1;
   if (message.effective_settings) changes.effectiveSettings = message.effective_settings;
   if (message.added_lights) changes.addedLights = message.added_lights;

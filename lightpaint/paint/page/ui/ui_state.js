@@ -70,6 +70,7 @@ import { initialSelection } from './selection/selection_settings.js';
  * @property {boolean} isJudgementCurrent whether the statements on the answer are on the last one
  * @property {Record<string, Constraints>} constraints
  * @property {Record<string, Constraints>} earlier those of held lights from before they were held
+ * @property {boolean} isStarted whether the solve starts from lamps that were set by hand
  * @property {string[]} kept names of lights that are held only since they were moved
  * @property {string[][]} ties
  * @property {Record<string, Record<string, any>>} poses of lights that were moved, by name
@@ -212,6 +213,7 @@ export function initialState() {
     constraints: {},
     earlier: {},
     kept: [],
+    isStarted: false,
     ties: [],
     poses: {},
     addedLights: [],
