@@ -10,6 +10,7 @@ import pytest
 from studio_client import StudioClient
 
 import lightpaint as lp
+from lightpaint.basis.denoised_mixes import denoise_mix
 from lightpaint.cli.commands.paint_command import options_of
 from lightpaint.cli.options.job_options import constraints_of
 from lightpaint.cli.options.parser import command_parser
@@ -105,3 +106,38 @@ def test_what_is_switched_off_stays_off(client: StudioClient):
     studio.handle(protocol.StartFromLamps(), {})
     assert session.requests.lights == {"light 2": {"off": True}}
     assert not session.weights[2].any()
+
+
+def test_their_look_lies_under_the_painting(client: StudioClient):
+    """A page gets the whole state with new pictures; undo brings the look of the scene back."""
+    studio, session = client.studio, client.studio.session
+    scene_look = session.views[0].current.copy()
+    studio.handle(protocol.ConstrainLights(LOCKS), {})
+    before = studio.state().resources  # type: ignore[union-attr]
+    weights = session.weights.copy()
+    [state] = studio.handle(protocol.StartFromLamps(), {})
+    assert isinstance(state, protocol.SessionState)
+    for name in ("present", "ground", "look"):
+        assert state.resources[name] > before[name]
+    expected = denoise_mix(session.basis, weights)
+    np.testing.assert_allclose(studio.resource("ground"), expected, rtol=1e-6)
+    np.testing.assert_array_equal(session.views[0].image, studio.resource("ground"))
+    client.paint(1, 0.8)
+    [state] = studio.handle(protocol.GoToStep(0), {})
+    assert isinstance(state, protocol.SessionState)
+    np.testing.assert_array_equal(studio.resource("ground"), scene_look)
+
+
+def test_it_lies_there_again_when_the_session_opens(client: StudioClient, tmp_path: Path):
+    _set_by_hand(client)
+    client.paint(1, 0.8)
+    client.exact()
+    image, basis = client.studio.session.views[0].image.copy(), client.studio.session.basis
+    client.studio.close()
+    client.studio.wait()
+    reopened = StudioClient(tmp_path, basis)
+    np.testing.assert_allclose(reopened.studio.session.views[0].image, image, rtol=1e-6)
+    assert reopened.studio.session.edit_state["is_started"]
+    assert reopened.paint(2, 0.7).kind == "answer"  # the pictures are known
+    reopened.studio.close()
+    reopened.studio.wait()

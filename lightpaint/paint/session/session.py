@@ -101,6 +101,11 @@ class Session:
         return self._edits.version
 
     @property
+    def ground(self) -> int:
+        """A number that grows when another look lies under the painting."""
+        return self._edits.ground
+
+    @property
     def basis(self) -> Basis:
         """Basis of the first view; its lights are those of all views."""
         return self.views[0].basis
