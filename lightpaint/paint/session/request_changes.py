@@ -131,7 +131,7 @@ def keep_moved_lights(
             requests = requests.without_kept(name) if name in requests.kept else requests
         elif not (light.is_fixed or requests.holds(name)):
             emission = weights[lights.names.index(name)]
-            if luminance(emission) <= OFF * luminance(light.emission):
+            if luminance(emission) <= OFF * luminance(np.array(light.emission)):
                 emission = np.array(light.emission)
             if emission.any():
                 level = float(emission[0]) if light.is_scalar else emission.tolist()
