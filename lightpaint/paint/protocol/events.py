@@ -69,8 +69,9 @@ class SessionState(EditState, Message, kind="state"):
     that grows when one is replaced. verifications: the last one of each view. is_new: whether
     the session has no steps yet. stroke: number of the last stroke that arrived. command: solves
     for the exported paintings. is_back: the client had the session before, and no other client
-    since; also true if unasked. weights: (lights, 3) float64, the last answer. choices: as the last
-    `choices` had them; empty once the session has changed since.
+    since; also true if unasked. weights: (lights, 3) float64, the last answer.
+
+    choices: as the last `choices` had them; empty once the session has changed since.
     """
 
     version: int
