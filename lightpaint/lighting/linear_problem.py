@@ -11,11 +11,13 @@ from lightpaint.basis.lights import Lights
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.display_text import short_repr
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.own_colors import keep_own_colors, own_color_labels
+from lightpaint.lighting.constraints.start_lighting import start_weights
 from lightpaint.lighting.constraints.white_lights import whiten_open_lights
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.loss.expected_lights import ExpectedLights
 from lightpaint.lighting.loss.image_prior import image_prior
-from lightpaint.lighting.loss.weight_penalty import weight_pull
+from lightpaint.lighting.loss.weight_penalty import pull_near_start, weight_pull
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.constraint_reduction import reduce_to
 from lightpaint.lighting.unknowns.gamuts import Gamuts
@@ -109,6 +111,11 @@ class LinearProblem:
         return self.full.is_free & self.equations.reached.any(axis=1) & is_lamp
 
     @cached_property
+    def reference(self) -> Doubles:
+        """(n, 3), the lighting to start from: the current one, unless another was set by hand."""
+        return start_weights(self.constraints.start, self.lights)
+
+    @cached_property
     def pull(self) -> NormalEquations | None:
         """The penalty for leaving the current lighting, the expected colours, the contrasts or the
         lights at other frames; None if there is none.
@@ -116,14 +123,21 @@ class LinearProblem:
         prior = image_prior(self.lights, self.power, self.fit, self.painted_share, self.expected)
         pull = weight_pull(
             self.power,
-            self.lights.current_weights,
+            self.reference,
             self.fit,
             prefer_current=self.constraints.prefer_current,
             painted_share=self.painted_share,
             keeps_color=self.keeps_color,
             expected=self.expected,
         )
-        pulls = [x for x in (pull, prior, self.contrast, self.tether) if x is not None]
+        near = pull_near_start(
+            self.power,
+            self.reference,
+            self.fit,
+            near=self.constraints.near,
+            painted_share=self.painted_share,
+        )
+        pulls = [x for x in (pull, near, prior, self.contrast, self.tether) if x is not None]
         return reduce(add, pulls) if pulls else None
 
     def with_pull(self, equations: NormalEquations) -> NormalEquations:
@@ -206,4 +220,8 @@ def reduce_lights(
     # Pulls to the colours of lights and images couple the channels.
     is_joined = fit.colors == "gentle" or bool(texel_lights(lights).any())
     reduction = replace(reduce_to(constraints, lights), is_joined=is_joined)
+    if fit.colors == "own":
+        labels = own_color_labels(reduction.labels, constraints, lights)
+        dimmers = reduce_to(keep_own_colors(constraints, lights), lights)
+        return replace(dimmers, is_joined=is_joined, labels=labels)
     return reduction if gamuts is None else reduction.with_gamuts(gamuts)

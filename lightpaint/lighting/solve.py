@@ -270,8 +270,8 @@ def _least_loss(
 
 
 def nearest_to_current(problem: Problem) -> Doubles:
-    """Return the weights (n, 3) nearest to the current ones that constraints allow."""
-    current = problem.basis.current_weights
+    """Return the weights (n, 3) nearest to those to start from that constraints allow."""
+    current = problem.reference
     pull = pull_to_current(problem.basis.power, current)
     return solve_reduced(pull, problem.reduction, current).weights
 

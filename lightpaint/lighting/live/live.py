@@ -13,15 +13,16 @@ Only painted views count. Each has its own sums, so that a stroke costs no more 
 view.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial, reduce
 from operator import add
 from typing import Any
 
-from lightpaint.arrays import Doubles
+from lightpaint.arrays import RGB, Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.light_images import texel_lights
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.start_lighting import start_weights
 from lightpaint.lighting.fit import Fit, Space
 from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.live.live_sums import MAX_FILM_PIXELS, Films, SmallFilm
@@ -31,7 +32,7 @@ from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash
 from lightpaint.lighting.loss.image_prior import image_prior
 from lightpaint.lighting.loss.painting import unpainted_weight
 from lightpaint.lighting.loss.pixel_bins import block_side
-from lightpaint.lighting.loss.weight_penalty import pull_to_current, weight_pull
+from lightpaint.lighting.loss.weight_penalty import pull_near_start, pull_to_current, weight_pull
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.gamut_bounds import solve_near_sides
 from lightpaint.lighting.unknowns.gamuts import Gamuts, PaintedLight
@@ -65,16 +66,21 @@ class LiveSolver:
         self._views = tuple(views)
         self._basis = views[0].basis
         self._films: tuple[tuple[LiveView, ...], Films] | None = None
+        self._start: Mapping[str, RGB] = {}
         self.constrain(fit, constraints)
 
     def constrain(self, fit: Fit, constraints: Constraints) -> None:
         """Change fit and constraints. Raises ConstraintError for impossible ones."""
         reduction = reduce_lights(constraints, self._basis.lights, fit)
+        self._reference = start_weights(constraints.start, self._basis.lights)
         self._fit, self._constraints, self._reduction = fit, constraints, reduction
         self._untouched: Doubles | None = None
         self._within, self._gamuts_of = reduction, tuple[LiveView, ...]()
         self._is_kept_to = False  # whether the last answer kept to the constraints
+        self._films = None if self._start != constraints.start else self._films
+        self._start = constraints.start
         for view in self._views:
+            view.set_start(constraints.start)
             view.set_transform(fit.transform)
 
     def follow_planes(self) -> Basis:
@@ -84,6 +90,8 @@ class LiveSolver:
         """
         self._basis = self._views[0].basis
         self._untouched, self._gamuts_of = None, ()
+        if self._start:  # whose look has these planes, too
+            self._films = None
         if self._films is not None:
             self._films[1].join()
         return self._basis
@@ -138,7 +146,7 @@ class LiveSolver:
     def _unpainted_answer(self) -> Doubles:
         """Return the answer without paint, (n, 3)."""
         if self._untouched is None:
-            self._untouched = unpainted_weights(self._views, self._reduction)
+            self._untouched = _nearest(self._reference, self._views, self._reduction)
         return self._untouched
 
     def _with_gamuts(self, views: tuple[LiveView, ...]) -> Reduction:
@@ -152,7 +160,7 @@ class LiveSolver:
         if confined.gamuts is None or self._gamuts_of != views:
             painted = partial(PaintedLight.of, [x.painting for x in views], max_pixels=GAMUT_PIXELS)
             is_texel = texel_lights(self._basis.lights)
-            gamuts = Gamuts(painted, _power(views), self._basis.current_weights, is_texel)
+            gamuts = Gamuts(painted, _power(views), self._reference, is_texel)
             confined, self._gamuts_of = self._reduction.with_gamuts(gamuts), views
         else:
             confined.gamuts.refresh()
@@ -183,18 +191,25 @@ class LiveSolver:
             wash = Wash.joined([self._film(view).wash(view.layers) for view in views])
             contrast = contrast_term(contrast_rows(wash, self._fit.transform), total)
             if self._fit.colors == "gentle":
-                expected = ExpectedLights.of(wash, self._basis.current_weights)
+                expected = ExpectedLights.of(wash, self._reference)
         pull = weight_pull(
             power,
-            self._basis.current_weights,
+            self._reference,
             self._fit,
             prefer_current=self._constraints.prefer_current,
             painted_share=share,
             keeps_color=self._reduction.is_free & power.any(axis=1) & ~texel_lights(lights),
             expected=expected,
         )
+        near = pull_near_start(
+            power,
+            self._reference,
+            self._fit,
+            near=self._constraints.near,
+            painted_share=share,
+        )
         prior = image_prior(lights, power, self._fit, share, expected)
-        pulls = [x for x in (pull, prior, contrast) if x is not None]
+        pulls = [x for x in (pull, near, prior, contrast) if x is not None]
         return reduce(add, pulls) if pulls else None
 
     def _joint_films(self, views: tuple[LiveView, ...]) -> Films:
@@ -214,11 +229,6 @@ class LiveSolver:
 def _power(views: Sequence[LiveView]) -> Doubles:
     """Return ‖Φᵢ‖² of all views together, (n, 3)."""
     return reduce(add, (view.basis.power for view in views))
-
-
-def unpainted_weights(views: Sequence[LiveView], reduction: Reduction) -> Doubles:
-    """Return the weights (n, 3) nearest to the current ones that constraints allow."""
-    return _nearest(views[0].basis.current_weights, views, reduction)
 
 
 def _nearest(weights: Doubles, views: Sequence[LiveView], reduction: Reduction) -> Doubles:

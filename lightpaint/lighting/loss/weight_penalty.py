@@ -74,6 +74,18 @@ def pull_to_current(power: Doubles, current: Doubles) -> NormalEquations:
     return NormalEquations(M, (power * current).T, (power * current**2).sum(axis=0))
 
 
+def pull_near_start(
+    power: Doubles, start: Doubles, fit: Fit, *, near: float, painted_share: float
+) -> NormalEquations | None:
+    """Return the pull s Σᵢ ‖Φᵢ‖² (wᵢ − startᵢ)² to the lighting to start from; None without any.
+
+    s is `near` times the share of painted pixels, so that it is small beside what the paint asks of
+    the lights that reach it, and settles what the paint leaves open. power, start: (n, 3).
+    """
+    strength = near * fit.brightness * painted_share
+    return pull_to_current(strength * power, start) if strength > 0 else None
+
+
 def pull_to_colors(power: Doubles, colors: Doubles, lights: Bools) -> NormalEquations:
     """Return the pull s Σᵢ ‖Φᵢ (wᵢ − Y(wᵢ) cᵢ)‖² of `lights`, (n,), to colours.
 

@@ -63,7 +63,7 @@ class ColorChoice:
     Examples:
         >>> [analysis] = lp.analyse(lp.solve(basis, target, colors="gentle"))
         >>> [choice.colors for choice in analysis.color_choices]
-        ['free', 'gentle', 'white']
+        ['free', 'gentle', 'white', 'own']
     """
 
     colors: Colors
@@ -84,7 +84,7 @@ Choices = tuple[ColorChoice, ...]
 def color_choices(
     solution: Solution, delta_e: Sequence[float], best: Mapping[Colors, Doubles] | None = None
 ) -> tuple[Choices, ...]:
-    """Return, for each view, the answers of `free`, `gentle` and `white`.
+    """Return, for each view, the answers of `free`, `gentle`, `white` and `own`.
 
     delta_e: of the answer, for each view. best: the result of `best_by_colors`, if known. Empty if
     no light may change its colour, and for pictures without colour.
@@ -98,12 +98,18 @@ def color_choices(
     )
 
 
+def can_change_colors(solution: Solution) -> bool:
+    """Return whether any light may change its colour, and the pictures show colour."""
+    problem = solution.problem
+    is_grey = problem.equations.reached.any(axis=0).sum() < 2
+    return bool(not is_grey and _with_colors(problem, "free").keeps_color.any())
+
+
 def best_by_colors(solution: Solution) -> dict[Colors, Doubles]:
     """Solve with each choice of `colors`; return weights, (n, 3), none if there is no choice."""
     problem = solution.problem
-    is_grey = problem.equations.reached.any(axis=0).sum() < 2
     best: dict[Colors, Doubles] = {}
-    if is_grey or not _with_colors(problem, "free").keeps_color.any():
+    if not can_change_colors(solution):
         return best
     solve_problem = _solver(solution)
     for colors in get_args(Colors):
@@ -158,13 +164,13 @@ def _with_colors(problem: Problem, colors: Colors) -> Problem:
     Raises ConstraintError if a light cannot have it.
     """
     fit = replace(problem.fit, colors=colors)
-    gamuts = gamuts_for(problem.basis, problem.views, fit)
+    gamuts = gamuts_for(problem.basis, problem.views, fit, problem.reference)
     full = reduce_lights(problem.constraints, problem.lights, fit, gamuts)
     reduction = full
     if problem.reduction is not problem.full:
         knobs = enumerate(problem.reduction.knobs)
         reduction = only_knobs(full, [k for k, x in knobs if any(u.upper > 0 for u in x.unknowns)])
-    expected = problem.expected or expected_for(problem.views, fit)
+    expected = problem.expected or expected_for(problem.views, fit, problem.reference)
     return replace(problem, fit=fit, full=full, reduction=reduction, expected=expected)
 
 
