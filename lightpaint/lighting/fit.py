@@ -89,8 +89,8 @@ class Fit:
     @property
     def is_sketch(self) -> bool:
         """True if the painting says what is meant, and not what light arrives: once resolved."""
-        is_held = self.transform is not None or bool(self.hold) or self.colors == "gentle"
-        return is_held and not self.literal
+        is_meant = self.transform is not None or self.colors == "gentle"
+        return is_meant and not self.literal
 
     @property
     def brightness(self) -> float:

@@ -117,7 +117,7 @@ class LinearProblem:
 
     @cached_property
     def pull(self) -> NormalEquations | None:
-        """The penalty for leaving the current lighting, the expected colours, the contrasts or the
+        """The penalty for leaving the current lighting, its colours, the contrasts or the
         lights at other frames; None if there is none.
         """
         prior = image_prior(self.lights, self.power, self.fit, self.painted_share, self.expected)

@@ -12,8 +12,9 @@ from lightpaint.colour.color import LUMINANCE
 from lightpaint.errors import TargetError
 from lightpaint.lighting import problem
 from lightpaint.lighting.fit import DEFAULT_HOLD, Fit, resolve_for_targets
+from lightpaint.lighting.loss import contrast
 from lightpaint.lighting.loss.painting import unpainted_weight_of
-from lightpaint.lighting.loss.weight_penalty import COLOR_PULL, MAX_DIMMING
+from lightpaint.lighting.loss.weight_penalty import CLEAR_PULL, COLOR_PULL, MAX_DIMMING
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solve import solution_of
 
@@ -101,9 +102,11 @@ def test_an_untouched_look_is_met_by_the_present_lighting(make_basis: Any):
 def test_colors_are_pulled_as_the_formula_says(make_basis: Any, monkeypatch: pytest.MonkeyPatch):
     """The optimum of squares and pull together, of any colours, found by another solver.
 
-    And once again with the pull to each light in proportion to how much dimmer that has come out.
+    The pull to each light grows with how dim it is expected to be, and falls with how clearly other
+    colours are painted where it shines.
     """
     monkeypatch.setattr(problem, "gamuts_for", lambda *_: None)
+    monkeypatch.setattr(contrast, "CONTRAST", 0.0)
     basis = _basis(make_basis)
     target = _paint(basis, over_look=True)
     solution = lp.solve(basis, target, hold=0)
@@ -116,19 +119,17 @@ def test_colors_are_pulled_as_the_formula_says(make_basis: Any, monkeypatch: pyt
         w = flat.reshape(-1, 3)
         residual = target.image - np.einsum("nhwc,nc->hwc", images, w)
         hue = w - (w @ LUMINANCE)[:, None] * colors
-        pull = (dimming[:, None] * power * hue**2).sum()
-        return float((D[..., None] * residual**2).sum() + COLOR_PULL * D.mean() * pull)
+        pull = (strength[:, None] * power * hue**2).sum()
+        return float((D[..., None] * residual**2).sum() + D.mean() * pull)
 
-    bounds, dimming, start = [(0, None)] * current.size, np.ones(4), current.ravel()
+    expected = solution.problem.expected
+    assert expected is not None
+    dimming = np.clip((current / expected.emission)[:, 1], 1, MAX_DIMMING)
+    strength = dimming * (COLOR_PULL * (1 - expected.clarity) + CLEAR_PULL * expected.clarity)
+    bounds, start = [(0, None)] * current.size, current.ravel()
     options = {"method": "L-BFGS-B", "options": {"ftol": 1e-15, "maxiter": 5000}}
-    for _ in range(2):
-        optimum = minimize(cost, start, bounds=bounds, **options)
-        assert optimum.success
-        before, start = dimming, optimum.x
-        luminances = np.maximum(optimum.x.reshape(-1, 3) @ LUMINANCE, 1e-9)
-        dimming = np.clip(current @ LUMINANCE / luminances, 1, MAX_DIMMING)
-    dimming = before
-    assert dimming.max() > 1.5
+    optimum = minimize(cost, start, bounds=bounds, **options)
+    assert optimum.success
     assert cost(solution.weights.ravel()) <= optimum.fun * (1 + 1e-7)
     np.testing.assert_allclose(solution.weights.ravel(), optimum.x, rtol=1e-3, atol=1e-4)
     assert solution.certificate.converged

@@ -1,9 +1,9 @@
 """What a painting lets one expect of each light, before anything is solved.
 
-A moonlit picture was painted blue wherever a lamp shines, so that each lamp is expected to become
-blue. Of one in an unpainted corner, nothing else than its own colour is. This expectation is where
-the pull to colours leads, and it says how strong that pull may be: a small change of colour is
-within the error of paint, a large one was meant.
+A moonlit picture was painted blue wherever its lamps shine: then it is the painting that decides
+their colours. A lamp in an unpainted corner, or one under paint whose hue is a little off, is
+expected to keep its own. How much colour is asked for where a light shines says how strong the pull
+to its colour may be, and how much light, how dim it will be.
 """
 
 from collections.abc import Sequence
@@ -120,8 +120,8 @@ def wish_shares(
 class ExpectedLights:
     """The emission that a painting lets one expect, and how clearly it asks for other colours.
 
-    emission: (n, 3). clarity: (n,), from 0, where a light is expected to keep its colour, to 1,
-    where the painting decides.
+    emission: (n, 3), in the current colours. clarity: (n,), from 0, where a light is expected to
+    keep its colour, to 1, where the painting decides.
     """
 
     emission: Doubles
@@ -133,7 +133,8 @@ class ExpectedLights:
 
         The change of light i in channel c is the mean change that is asked for, weighted by how
         much of the light in each pixel a unit of it makes: Σ D a Φᵢ / L / Σ Φᵢ / L, with the change
-        a in stops and the look L. Its colour changes by the part of this that is clearly meant.
+        a in stops and the look L; its level is the luminance of that. The colour that is asked for
+        is the RMS of a's range over the channels, with the same weights.
         """
         dark = DARK * float(np.mean(wash.look)) or 1.0
         stops = wash.asked()
@@ -150,10 +151,7 @@ class ExpectedLights:
         amount = np.sqrt(np.maximum(squares / np.where(reached > 0, reached, 1), 0))
         excess = (amount / MEANT_STOPS) ** SHARPNESS
         clarity = np.asarray(excess / (1 + excess), np.float64)
-        level = luminance(change)[:, None]
-        return cls(
-            np.asarray(current * 2.0 ** (level + clarity[:, None] * (change - level))), clarity
-        )
+        return cls(np.asarray(current * 2.0 ** luminance(change)[:, None]), clarity)
 
     @classmethod
     def unchanged(cls, current: Doubles) -> "ExpectedLights":

@@ -45,7 +45,7 @@ def image_prior(
     For radiances f of an image, energy E of the picture of an even white one and current chroma c,
     it is E times the mean of s |∇f|² + COLOR |f − Y(f) c|² + STAYING (f − f₀)² over the image, on
     which lengths are such that its area is 4π; s is SMOOTHNESS times that of the domain. Where the
-    painting asks for other colours, c is the chroma of these.
+    painting asks for other colours, COLOR is smaller.
     """
     images, strength = light_images(lights), fit.brightness * painted_share
     if not images or strength <= 0:
@@ -80,5 +80,5 @@ def image_prior(
         return even + staying + pull_to_colors(COLOR * shares, current, texel_lights(lights))
     expected = expected or ExpectedLights.unchanged(current)
     color = (GENTLE_COLOR + expected.clarity * (COLOR - GENTLE_COLOR))[:, None]
-    colors = pull_to_colors(color * shares, expected.emission, texel_lights(lights))
+    colors = pull_to_colors(color * shares, current, texel_lights(lights))
     return even + staying + colors

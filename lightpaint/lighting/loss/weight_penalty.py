@@ -12,7 +12,7 @@ from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.loss.expected_lights import ExpectedLights
 from lightpaint.lighting.normal_equations import NormalEquations
 
-#: Strength of the pull to the expected colours, of lights of which the painting asks for no other
+#: Strength of the pull to the current colours, of lights of which the painting asks for no other
 #: colour, and of lights of which it clearly does: the share of a hue's effect on the picture that
 #: counts as an error, scaled by the share of painted pixels.
 COLOR_PULL, CLEAR_PULL = 1.5, 0.02
@@ -35,7 +35,7 @@ def weight_pull(
 
     power, current: (n, 3), ‖Φᵢ‖² of the lights' pictures, and their current weights.
     prefer_current: see `Constraints`. painted_share: total importance relative to the number of
-    pixels, which scales the pull to the expected colours. keeps_color: (n,), lights to which that
+    pixels, which scales the pull to the current colours. keeps_color: (n,), lights to which that
     pull applies. expected: the lights that the painting lets one expect; None for the current ones.
     """
     gentle = fit.brightness * painted_share if fit.colors == "gentle" else 0.0
@@ -48,7 +48,7 @@ def weight_pull(
         expected = expected or ExpectedLights.unchanged(current)
         strength = COLOR_PULL + expected.clarity * (CLEAR_PULL - COLOR_PULL)
         strength *= gentle * dimming_factors(current, expected.emission)
-        added.append(pull_to_colors(strength[:, None] * power, expected.emission, keeps_color))
+        added.append(pull_to_colors(strength[:, None] * power, current, keeps_color))
     return None if not added else added[0] if len(added) == 1 else added[0] + added[1]
 
 
@@ -86,16 +86,16 @@ def pull_near_start(
     return pull_to_current(strength * power, start) if strength > 0 else None
 
 
-def pull_to_colors(power: Doubles, colors: Doubles, lights: Bools) -> NormalEquations:
-    """Return the pull s Σᵢ ‖Φᵢ (wᵢ − Y(wᵢ) cᵢ)‖² of `lights`, (n,), to colours.
+def pull_to_colors(power: Doubles, current: Doubles, lights: Bools) -> NormalEquations:
+    """Return the pull s Σᵢ ‖Φᵢ (wᵢ − Y(wᵢ) cᵢ)‖² of `lights`, (n,), to their current colours.
 
-    power: (n, 3), s ‖Φᵢ‖². cᵢ is the emission of these colours, (n, 3), at luminance 1, and white
-    for a light that is off. Dimming costs nothing; a change of hue costs its effect in each
+    power: (n, 3), s ‖Φᵢ‖². cᵢ is the current emission at luminance 1, and white for a light that is
+    off. Dimming costs nothing; a change of hue costs its effect in each
     channel.
     """
     n = len(power)
-    now = np.asarray(luminance(colors), np.float64)[:, None]
-    chroma = np.where(now > 0, colors / np.where(now > 0, now, 1), 1.0)
+    now = np.asarray(luminance(current), np.float64)[:, None]
+    chroma = np.where(now > 0, current / np.where(now > 0, now, 1), 1.0)
     hue = np.eye(3) - chroma[:, :, None] * LUMINANCE
     across = np.einsum("ndc,nd,nde->nce", hue, power * lights[:, None], hue)
     M = np.zeros((3, n, n))
