@@ -6,6 +6,7 @@
 writes beside itself
 
     evening.exr                     dusk, the works glow; alpha says how firmly each part is meant
+    evening.png                     the same as a painter's program saves it, for `lightpaint demo`
     morning.exr, morning.mask.exr   the first sun, the lamps off; what was painted is in the mask
     opening.png                     opening night: everything that can shine does
     after-hours.png                 a lamp left on in the annex
@@ -254,6 +255,7 @@ def main() -> None:
         name = mood.__name__.replace("_", "-")
         if mood is evening:
             sheet.canvas.write_with_alpha(HERE / f"{name}.exr")
+            sheet.canvas.write_png(HERE / f"{name}.png")
         elif mood is morning:
             sheet.canvas.write(HERE / f"{name}.exr")
             sheet.canvas.write_mask(HERE / f"{name}.mask.exr")

@@ -198,8 +198,8 @@ def maps(
     figures = [
         figure(
             PagePicture("Residual", "False-colour map of the residual.", picture),
-            f"Luminance, answer − painting, as rendered{missed.spoken}. Hatched pixels do not "
-            "count.",
+            f"Luminance, answer − painting, as rendered{missed.spoken}. Grey, dim pixels do "
+            "not count.",
             signed_scale(missed.limit),
         ),
         _importance_map(solution.importance, current, transform=transform),
