@@ -208,7 +208,7 @@ def _is_measured(predicted: Estimate, verified: Estimate) -> Bools:
     zero = PRECISION * np.abs(verified.image)
     lit_halves = np.mean([(np.abs(half) > zero).any(axis=-1) for half in halves], axis=0)
     is_lit = box_mean(lit_halves, POOL_RADIUS) >= LIT_SHARE
-    is_dark = ~(predicted.image.any(axis=-1) | verified.image.any(axis=-1))
+    is_dark = np.asarray(~(predicted.image.any(axis=-1) | verified.image.any(axis=-1)), np.float64)
     of_prediction, of_render = (
         luminance(estimate.variance(radius=POOL_RADIUS)) for estimate in (predicted, verified)
     )
@@ -219,7 +219,8 @@ def _is_measured(predicted: Estimate, verified: Estimate) -> Bools:
     mean = box_mean(luminance(predicted.image), POOL_RADIUS)
     hits = (2 * POOL_RADIUS + 1) ** 2 * noise_ratio * np.square(mean)
     is_expected = hits >= ENOUGH_HITS * of_prediction
-    return is_lit | (is_expected & (mean > 0)) | (box_mean(is_dark, POOL_RADIUS) == 1)
+    is_black = box_mean(is_dark, POOL_RADIUS) == 1
+    return np.asarray(is_lit | (is_expected & (mean > 0)) | is_black)
 
 
 def noise_of(predicted: Estimate, verified: Estimate) -> tuple[Doubles, Doubles]:

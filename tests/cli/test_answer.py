@@ -213,10 +213,24 @@ def test_what_became_of_a_light(current: Any, new: Any, sentence: str):
         (
             Reason("off", ("cove",), 0.57),
             "room.toml",
-            "57 % of the difference.",
+            "57 % of the difference from the painting.",
         ),  # of a lights file
         (Reason("hold", loosening=Loosening(0.8, 0.35, None)), "", "(--hold 0.8) would remove"),
-        (Reason("colors", (), 0.5), "", "; --colors free would remove 50 % of the difference."),
+        (
+            Reason("hold", loosening=Loosening(0.8, 0.35, None, (9.14, 6.0), 4.0)),
+            "",
+            "(--hold 0.8 instead of 4) would bring the mean ΔE from 9.1 to 6.0.",
+        ),
+        (
+            Reason("colors", (), 0.5),
+            "",
+            "; --colors free would remove 50 % of the difference from the painting.",
+        ),
+        (
+            Reason("colors", (), 0.12, delta_e=(5.9, 4.5)),
+            "",
+            "; --colors free would bring the mean ΔE from 5.9 to 4.5.",
+        ),
     ],
 )
 def test_what_holds_the_lights_is_said_with_its_option(

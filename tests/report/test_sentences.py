@@ -199,7 +199,7 @@ def test_what_is_out_of_reach_is_so_beside_what_is_held(make_basis: Any):
 def test_what_holds_a_light_is_said(bound: Bound, words: str):
     sentence = spoken_bound(bound, 0.38)
     assert words in sentence
-    assert sentence.endswith("would remove 38 % of the difference.")
+    assert sentence.endswith("would remove 38 % of the difference from the painting.")
 
 
 def test_the_switched_off_light_that_would_help_most_is_named(make_basis: Any):
