@@ -15,12 +15,13 @@ from rich.cells import cell_len
 from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.basis.lights import BasisLight
 from lightpaint.cli import main
-from lightpaint.cli.commands.answer_text import _limit_sentences, change
+from lightpaint.cli.commands.answer_text import _limit_sentences, _sentences, change
 from lightpaint.cli.options.job_options import BY_OPTION
 from lightpaint.cli.output import terminal
 from lightpaint.cli.output.vocabulary import spoken
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.images.formats.png import png_bytes
+from lightpaint.lighting.analysis.appearance.color_choices import ColorChoice
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Loosening, Reason
 from lightpaint.lighting.answer.light_setting import LightSetting
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -181,6 +182,32 @@ def test_one_line_says_what_the_painting_leaves_open(tmp_path: Path, make_basis:
     ):
         assert words in line
     assert "left unchanged" not in completed.stderr.replace(line, "")
+
+
+def test_other_colours_are_offered_once():
+    """By the line that says which lamp turns; both would have the same ΔE."""
+    white, green = (1.0, 1.0, 1.0), (0.5, 1.2, 0.5)
+    choices = tuple(
+        ColorChoice(colors, colors == "gentle", delta_e, "lamp", white, green, np.ones((1, 3)))
+        for colors, delta_e in (("free", 4.6), ("gentle", 5.9))
+    )
+    reason = Reason("colors", (), 0.12, delta_e=(5.9, 4.6))
+    appearance = SimpleNamespace(reasons=(reason,), is_close=False)
+    constraints = SimpleNamespace(constraints=Constraints())
+    look = SimpleNamespace(
+        solution=SimpleNamespace(problem=constraints),
+        analysis=SimpleNamespace(appearance=appearance, color_choices=choices),
+    )
+    told = _sentences(look, "short")  # type: ignore[arg-type]
+    assert told == [
+        "Other colours come closer: --colors free: ΔE 4.6 instead of 5.9, but lamp turns green."
+    ]
+    alone = replace(choices[0], delta_e=5.8), choices[1]
+    look.analysis.color_choices = alone
+    told = _sentences(look, "short")  # type: ignore[arg-type]
+    assert [spoken(sentence) for sentence in told] == [
+        "Lights keep their colours; --colors free would bring the mean ΔE from 5.9 to 4.6."
+    ]
 
 
 def _setting(r: float, g: float, b: float) -> LightSetting:

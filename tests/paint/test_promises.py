@@ -106,6 +106,9 @@ def test_the_answer_after_the_click_is_what_was_promised(
     assert is_told == (rest.worst >= INVISIBLE)
     if after.changes_unpainted:
         assert f"ΔE {spoken_amount(rest.worst)}" in sketch_headline(after)
+    if kind == "colors":
+        [choice] = [x for x in before.color_choices if x.colors == "free"]
+        assert choice.delta_e == given.delta_e[1]
     if kind == "hold":
         loosening = before.appearance.causes[0].loosening
         assert loosening is not None
