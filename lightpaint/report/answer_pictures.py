@@ -77,7 +77,7 @@ def paint_coverage(importance: Floats) -> Floats:
 
     Paint is shown whole, however little it counts; the fringe of soft paint fades.
     """
-    return np.clip(coverage(importance) / PAINT_SHOWN, 0, 1)
+    return np.asarray(np.clip(coverage(importance) / PAINT_SHOWN, 0, 1))
 
 
 def unpainted_look(current: Floats, *, transform: ViewTransform, hatched: bool = False) -> Floats:

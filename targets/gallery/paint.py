@@ -84,7 +84,7 @@ class Sheet:
     @classmethod
     def over(cls, template: Path) -> Sheet:
         """A fresh one."""
-        canvas, room = Canvas.read_template(template), Room(Surfaces.read(template))
+        canvas, room = Canvas.read_template(template), Room(Surfaces.read(template).at_edges())
         # To a painter bronze has a colour; in the scene it has an index of refraction.
         bronze = room.within((0.8, 1.025, 2.5), (1.75, 1.8, 3.5)).amount[..., None]
         albedo = room.surfaces.albedo * (1 + bronze * (np.array(BRONZE, np.float32) - 1))
