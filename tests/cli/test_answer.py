@@ -140,13 +140,14 @@ def test_of_many_lights_the_ten_that_matter_and_what_the_others_do(tmp_path: Pat
         (
             ("--space", "display", "--hold", "0.5", "--colors", "gentle"),
             # Most of the painting is brighter than middle grey, a quarter brighter than white.
-            "Fitted as the eye sees it (srgb at -1.2 stops); unpainted parts are held (0.5); "
+            "Fitted as the eye sees it (srgb at -1.2 stops); unpainted parts are held (0.5 times "
+            "the weight of the paint); "
             "lights are pulled to their own colour (gentle); --literal turns this off.",
         ),
         (("--colors", "white"), "Lights are white; --literal turns this off."),
         (
             ("--unpainted", "0.1"),
-            "Each unpainted pixel counts 0.1; --literal turns this off.",
+            "Each unpainted pixel counts 0.1 times a painted one; --literal turns this off.",
         ),
     ],
 )
