@@ -71,8 +71,9 @@ def test_difference_of_colours(painted: Any, final: Any, words: str):
 def test_places(region: tuple[int, int], place_words: str):
     place = Place(region, 0.38, (0, 0, 1, 1), (1, 1, 4), (1, 1, 1))
     assert place_words in spoken_place(place)
-    assert "(38 % of it): the paint is brighter and bluer than any mix of the lights." in spoken_place(
-        place
+    assert (
+        "(38 % of it): the paint is brighter and bluer than any mix of the lights."
+        in spoken_place(place)
     )
 
 
